@@ -1,0 +1,77 @@
+//! What the stack asks of the train, and shows to the driver.
+
+use super::SimTime;
+use serde::{Deserialize, Serialize};
+
+/// How hard the protection brakes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum BrakeDemand {
+    /// The driver drives.
+    #[default]
+    None,
+    /// Full service brake, traction cut.
+    Service,
+    /// Emergency brake until standstill.
+    Emergency,
+}
+
+/// From the protection to the train, every cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TrainCommand {
+    /// Overrides the driver where it is not `None`.
+    pub brake: BrakeDemand,
+    /// The speed that the driver may not exceed; the automatic driver keeps under it.
+    pub permitted_speed_mps: f64,
+}
+
+/// One lamp with its buzzer, on the driver's display.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lamp {
+    /// Nothing on the way.
+    #[default]
+    NormalGreen,
+    /// An obstacle ahead: brake; red, with buzzer.
+    BrakeWarningRed,
+    /// The automatic brake failed: brake by hand; emergency lamp and buzzer.
+    Emergency,
+}
+
+/// The driver's display.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DriverDisplay {
+    /// The equipment has power.
+    pub power: bool,
+    /// Which lamp is lit.
+    pub lamp: Lamp,
+    /// Where the train takes itself to be, chainage.
+    pub position_m: Option<f64>,
+    /// Distance to the obstacle ahead.
+    pub distance_to_obstacle_m: Option<f64>,
+    /// One line of text.
+    pub text: String,
+}
+
+/// One cycle of the protection, for the record.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ProtectionReport {
+    /// When.
+    pub time: SimTime,
+    /// Estimated chainage of the train head.
+    pub position_m: Option<f64>,
+    /// One sigma of it.
+    pub sigma_m: Option<f64>,
+    /// Estimated speed.
+    pub speed_mps: f64,
+    /// Permitted speed here.
+    pub permitted_mps: f64,
+    /// Speed at which the service brake intervenes.
+    pub service_mps: f64,
+    /// Speed at which the emergency brake intervenes.
+    pub emergency_mps: f64,
+    /// What goes to the train.
+    pub command: TrainCommand,
+    /// What the driver sees.
+    pub display: DriverDisplay,
+}

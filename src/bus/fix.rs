@@ -1,0 +1,109 @@
+//! What the positioning stack says of one pair of images.
+
+use super::SimTime;
+use crate::track::uid::Uid;
+use nalgebra::{Point2, Point3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Which estimator made a fix.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Stereo triangulation of the lamp centre.
+    Paper,
+    /// One camera, range from the lamp's apparent size.
+    Mono,
+    /// The best estimate from everything.
+    Fused,
+}
+
+/// How a lamp got its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Identity {
+    /// Read whole from the stripes of this frame.
+    Decoded,
+    /// Read from the stripes of several frames joined.
+    Joined,
+    /// Followed from the position that earlier fixes predict.
+    Predicted,
+}
+
+/// Pixel rectangle, both corners inside.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct PixelBox {
+    /// Leftmost column.
+    pub u0: u32,
+    /// Top row.
+    pub v0: u32,
+    /// Rightmost column.
+    pub u1: u32,
+    /// Bottom row.
+    pub v1: u32,
+}
+
+/// An ellipse in the image.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ellipse {
+    /// Centre.
+    pub centre: Point2<f64>,
+    /// Longer half axis.
+    pub semi_major_px: f64,
+    /// Shorter half axis.
+    pub semi_minor_px: f64,
+    /// From the u axis to the longer axis, towards v.
+    pub angle_rad: f64,
+}
+
+/// One lamp image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Spot {
+    /// Its bounding box.
+    pub bounds: PixelBox,
+    /// Centre by the method's weighting.
+    pub centre: Point2<f64>,
+    /// Fitted outline, where the fit held.
+    pub ellipse: Option<Ellipse>,
+    /// 4 pi S / P^2: 1 for a circle.
+    pub roundness: f64,
+    /// The image border cuts it.
+    pub cut: bool,
+    /// Name, and how it was found.
+    pub uid: Option<(Uid, Identity)>,
+}
+
+/// A position.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PositionFix {
+    /// When the train was there (mid-exposure of the lamp's centre row).
+    pub time: SimTime,
+    /// By which method.
+    pub method: Method,
+    /// Chainage of the train head.
+    pub chainage_m: f64,
+    /// One sigma along the track.
+    pub sigma_m: f64,
+    /// Vehicle origin in the world.
+    pub position: Point3<f64>,
+    /// The lamp it rests on.
+    pub uid: Uid,
+    /// How the lamp was named.
+    pub identity: Identity,
+    /// The lamp in the left eye's frame.
+    pub lamp_in_camera: Vector3<f64>,
+}
+
+/// Everything said of one pair.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LedReport {
+    /// Start of the pair's first row.
+    pub time: SimTime,
+    /// The pair's frame number.
+    pub number: u32,
+    /// Lamps seen by the left eye.
+    pub left: Vec<Spot>,
+    /// Lamps seen by the right eye.
+    pub right: Vec<Spot>,
+    /// Fixes, at most one a method.
+    pub fixes: Vec<PositionFix>,
+}

@@ -1,0 +1,34 @@
+//! What travels between the world and the stack, as plain data: frames with their row times,
+//! calibrations, samples and scans on the way in; fixes, reports, messages and commands on the
+//! way out. Nothing here computes more than a unit conversion.
+//!
+//! Frames of reference: world x east, y north, z up; vehicle x forward, y left, z up (ISO 8855);
+//! camera x right, y down, z forward. A transform is named `a_from_b`: it takes coordinates in
+//! `b` to coordinates in `a`.
+//!
+//! ```
+//! use metrotwin::bus::{Shutter, SimTime};
+//! let shutter = Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6 };
+//! let start = SimTime::from_secs(1.0);
+//! // Row 100 is exposed from 2.22 ms after the frame's start.
+//! assert_eq!(shutter.row_open(start, 100.0), SimTime::from_nanos(1_002_220_000));
+//! ```
+
+mod camera;
+mod command;
+mod fix;
+mod message;
+mod motion;
+mod time;
+mod wayside;
+
+pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
+pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, TrainCommand};
+pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
+pub use message::{Delivery, ObstacleWarning, Via};
+pub use motion::{ImuSample, OdometerSample};
+pub use time::SimTime;
+pub use wayside::{
+    Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, WaysideCalibration,
+    WaysideReport,
+};

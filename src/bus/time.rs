@@ -1,0 +1,53 @@
+//! Time since the scenario's start.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Integer nanoseconds since the scenario's start: adding steps never drifts, and equal times
+/// compare equal.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+pub struct SimTime(i64);
+
+impl SimTime {
+    /// The scenario's start.
+    pub const ZERO: Self = Self(0);
+
+    /// From integer nanoseconds.
+    pub const fn from_nanos(nanos: i64) -> Self {
+        Self(nanos)
+    }
+
+    /// From seconds, rounded to the nearest nanosecond.
+    pub fn from_secs(seconds: f64) -> Self {
+        Self((seconds * 1e9).round() as i64)
+    }
+
+    /// Integer nanoseconds since the start.
+    pub const fn nanos(self) -> i64 {
+        self.0
+    }
+
+    /// Seconds since the start.
+    pub fn secs(self) -> f64 {
+        self.0 as f64 * 1e-9
+    }
+
+    /// This time plus `seconds` (which may be negative).
+    #[must_use]
+    pub fn plus(self, seconds: f64) -> Self {
+        Self(self.0 + (seconds * 1e9).round() as i64)
+    }
+
+    /// Seconds from `earlier` to this time.
+    pub fn since(self, earlier: Self) -> f64 {
+        (self.0 - earlier.0) as f64 * 1e-9
+    }
+}
+
+impl fmt::Display for SimTime {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{:.3} s", self.secs())
+    }
+}

@@ -1,0 +1,140 @@
+//! What a wayside device sees, knows and says.
+
+use super::{CameraModel, PixelBox, SimTime};
+use image::GrayImage;
+use nalgebra::{Isometry3, Point3};
+use serde::{Deserialize, Serialize};
+
+/// One lidar echo, in the lidar's own angles: X = R cos w sin a, Y = R cos w cos a, Z = R sin w,
+/// Y along the lidar's axis, Z up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LidarReturn {
+    /// Range R.
+    pub range_m: f64,
+    /// Horizontal angle a from the axis, positive to X.
+    pub azimuth_rad: f64,
+    /// Elevation w.
+    pub elevation_rad: f64,
+}
+
+/// One sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LidarScan {
+    /// When it began.
+    pub time: SimTime,
+    /// Its echoes.
+    pub returns: Vec<LidarReturn>,
+}
+
+/// A wayside device as surveyed and calibrated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaysideCalibration {
+    /// Name of the device.
+    pub name: String,
+    /// Its camera.
+    pub camera: CameraModel,
+    /// Where the camera is and looks.
+    pub world_from_camera: Isometry3<f64>,
+    /// Where the lidar is and looks (its own frame: X right, Y along the axis, Z up).
+    pub world_from_lidar: Option<Isometry3<f64>>,
+    /// Chainage of the device (point A of the distance formulas).
+    pub chainage_m: f64,
+    /// Chainage of the balise (point C) that its distances count from.
+    pub balise_chainage_m: f64,
+}
+
+/// How dangerous an obstacle is to a train.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DangerLevel {
+    /// Outside the structure gauge, or nothing.
+    #[default]
+    None,
+    /// The driver is warned, with picture and data.
+    Low,
+    /// The train brakes without him.
+    High,
+}
+
+/// What the report recommends.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Plan {
+    /// Pass normally.
+    #[default]
+    Pass,
+    /// Warn the driver.
+    WarnDriver,
+    /// Brake automatically.
+    BrakeAutomatically,
+}
+
+/// A connected region of the binary difference image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blob {
+    /// Where in the image.
+    pub bounds: PixelBox,
+    /// Pixels over the threshold.
+    pub area_px: u32,
+}
+
+/// An obstacle, placed on the line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct DetectedObstacle {
+    /// Its region in the image.
+    pub blob: Blob,
+    /// Its foot in the world.
+    pub position: Point3<f64>,
+    /// Nearest range from the device and its angle to the running direction (r, theta).
+    pub near_range_m: f64,
+    /// Angle of the nearest point.
+    pub near_angle_rad: f64,
+    /// Farthest range (R).
+    pub far_range_m: f64,
+    /// Angle of the farthest point (alpha).
+    pub far_angle_rad: f64,
+    /// Chainage of the end that a train running up the line meets first.
+    pub from_chainage_m: f64,
+    /// Chainage of the other end.
+    pub to_chainage_m: f64,
+    /// Left of the centreline.
+    pub lateral_m: f64,
+    /// Width, across the line of sight.
+    pub width_m: f64,
+    /// Height over its foot.
+    pub height_m: f64,
+    /// Against the structure gauge.
+    pub danger: DangerLevel,
+}
+
+/// The report of one frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaysideReport {
+    /// Start of the frame.
+    pub time: SimTime,
+    /// Frame number.
+    pub number: u32,
+    /// Everything found, confirmed obstacles only.
+    pub obstacles: Vec<DetectedObstacle>,
+    /// All regions of the binary image over the size limit, confirmed or not.
+    pub blobs: Vec<Blob>,
+    /// Distance S from the train head to the farthest obstacle point by the paper's formula,
+    /// where a train position is known.
+    pub train_distance_m: Option<f64>,
+    /// The same along the alignment.
+    pub train_distance_exact_m: Option<f64>,
+    /// A train is affected.
+    pub train_affected: bool,
+    /// Highest danger found.
+    pub danger: DangerLevel,
+    /// Normal passage is possible.
+    pub passage_possible: bool,
+    /// An emergency measure is needed.
+    pub emergency_needed: bool,
+    /// Which plan.
+    pub plan: Plan,
+    /// Difference image and binary image, for the record.
+    pub difference: Option<GrayImage>,
+    /// Binary image, 0 or 255.
+    pub binary: Option<GrayImage>,
+}

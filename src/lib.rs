@@ -1,0 +1,36 @@
+//! **metrotwin**: a physics-backed digital twin of a metro tunnel.
+//!
+//! A simulated train shakes along a surveyed line; a rolling-shutter camera on its head and a
+//! camera on the tunnel wall see what such cameras would see; the positioning and detection
+//! stack reads those pixels, never the truth; its decisions act on the train.
+//!
+//! The rooms, in the order a user meets them. Imports point up this list only:
+//!
+//! | room | what it holds |
+//! |---|---|
+//! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices |
+//! | [`bus`] | what travels between the world and the stack, as plain data |
+//! | [`stack`] | the real thing: lamp decoding, positioning, obstacle detection, protection |
+//! | `twin` | the world: physics, renderer, sensors |
+//! | `scenario` | the files a user writes |
+//! | `session` | one run, step by step, scored against the truth |
+//! | `record` | what a session shows in a rerun recording |
+//! | `cli` | one file a subcommand |
+//!
+//! `track`, `bus` and `stack` build alone (`--no-default-features`): that is what would run on a
+//! train or in a wayside box. The feature `twin` (on by default) adds the rest.
+
+pub mod bus;
+pub mod stack;
+pub mod track;
+
+#[cfg(feature = "twin")]
+pub mod cli;
+#[cfg(feature = "twin")]
+pub mod record;
+#[cfg(feature = "twin")]
+pub mod scenario;
+#[cfg(feature = "twin")]
+pub mod session;
+#[cfg(feature = "twin")]
+pub mod twin;

@@ -1,0 +1,91 @@
+//! What passes in a session, as observers (recordings, tables, scores) see it.
+
+use crate::bus::{
+    Delivery, DriverDisplay, LedReport, ProtectionReport, RigCalibration, SimTime, StereoPair,
+    WaysideCalibration, WaysideReport,
+};
+use crate::track::Tunnel;
+use crate::twin::render::Body;
+use image::GrayImage;
+use nalgebra::{Isometry3, Vector3};
+
+/// What is known before the first step.
+#[derive(Clone, Copy, Debug)]
+pub struct Opening<'a> {
+    /// Name of the scenario.
+    pub scenario: &'a str,
+    /// The line.
+    pub tunnel: &'a Tunnel,
+    /// The rig on the train.
+    pub rig: Option<&'a RigCalibration>,
+    /// Wayside devices in use.
+    pub wayside: &'a [WaysideCalibration],
+    /// Half extents of every car body and the pose of its centre over the vehicle frame.
+    pub car_half_extents_m: Vector3<f64>,
+    /// Cars of the train, 0 where there is none.
+    pub cars: usize,
+}
+
+/// The train as it really is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TrainTruth {
+    /// When.
+    pub time: SimTime,
+    /// Chainage of the head.
+    pub chainage_m: f64,
+    /// Speed along the line.
+    pub speed_mps: f64,
+    /// Acceleration along the line.
+    pub accel_mps2: f64,
+    /// Pose of the vehicle frame of the leading car.
+    pub world_from_vehicle: Isometry3<f64>,
+    /// Pose of the left camera, where there is a rig.
+    pub world_from_left: Option<Isometry3<f64>>,
+    /// Poses of the centres of all car bodies, leading car first.
+    pub world_from_cars: Vec<Isometry3<f64>>,
+    /// Vertical and lateral acceleration of the leading car's floor over its first bogie.
+    pub floor_accel_mps2: Vector3<f64>,
+    /// Vertical travel of the leading car's secondary suspension, front bogie.
+    pub secondary_travel_m: f64,
+}
+
+/// One thing that happened. Events come in order of their time of completion.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// Regular truth, 50 times a second.
+    Train(&'a TrainTruth),
+    /// Everything solid but the train, 10 times a second.
+    Bodies(SimTime, &'a [Body]),
+    /// A pair of images, what the stack said of it, and the true chainage at each fix's time.
+    Pair(&'a StereoPair, &'a LedReport, &'a [f64]),
+    /// A wayside frame and its report; the index is into [`Opening::wayside`].
+    Wayside(usize, SimTime, &'a GrayImage, &'a WaysideReport),
+    /// A cycle of the protection.
+    Protection(&'a ProtectionReport),
+    /// The display changed.
+    Display(SimTime, &'a DriverDisplay),
+    /// A message arrived at the train.
+    Delivery(&'a Delivery),
+    /// Anything worth a line in the log.
+    Note(SimTime, &'a str),
+}
+
+/// Something that watches a session. It cannot change what happens.
+pub trait Observer {
+    /// Before the first step.
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError>;
+    /// After each happening.
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError>;
+    /// After the last one; also when a run is broken off or fails.
+    fn close(&mut self) -> Result<(), ObserverError>;
+}
+
+/// Why an observer could not write down what it saw.
+#[derive(Debug, thiserror::Error)]
+#[error("{what}: {source}")]
+pub struct ObserverError {
+    /// What it was doing.
+    pub what: String,
+    /// What went wrong.
+    pub source: Box<dyn std::error::Error + Send + Sync>,
+}

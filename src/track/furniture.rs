@@ -1,0 +1,70 @@
+//! What is fixed to the tunnel: lamps, wayside devices, balises, base stations.
+
+use super::uid::Uid;
+use nalgebra::{Point3, Unit, Vector3};
+
+/// A lamp as surveyed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LampSite {
+    /// Its name on the air.
+    pub uid: Uid,
+    /// Chainage.
+    pub chainage_m: f64,
+    /// Left of the centreline.
+    pub lateral_m: f64,
+    /// Above top of rail.
+    pub height_m: f64,
+    /// Centre of its disc in the world.
+    pub centre: Point3<f64>,
+    /// Where its disc faces, in the world.
+    pub facing: Unit<Vector3<f64>>,
+    /// Diameter of the luminous disc.
+    pub diameter_m: f64,
+    /// Electrical power; light output is this times the efficacy.
+    pub power_w: f64,
+    /// Luminous efficacy.
+    pub efficacy_lm_per_w: f64,
+    /// Full angle at which the intensity has fallen to half.
+    pub beam_deg: f64,
+    /// Duration of a chip of its code.
+    pub chip_s: f64,
+}
+
+/// A wayside device: a camera and a lidar on the tunnel wall.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaysideSite {
+    /// Name.
+    pub name: String,
+    /// Chainage.
+    pub chainage_m: f64,
+    /// Left of the centreline.
+    pub lateral_m: f64,
+    /// Above top of rail.
+    pub height_m: f64,
+    /// Turn of its axis from up the line, to the left.
+    pub yaw_rad: f64,
+    /// Tilt of its axis, up positive.
+    pub pitch_rad: f64,
+    /// Name of the balise that gets its messages.
+    pub balise: String,
+}
+
+/// A balise between the rails.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Balise {
+    /// Name.
+    pub name: String,
+    /// Chainage.
+    pub chainage_m: f64,
+}
+
+/// A radio base station and the stretch that it covers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BaseStation {
+    /// Name.
+    pub name: String,
+    /// Chainage.
+    pub chainage_m: f64,
+    /// Reach up and down the line.
+    pub reach_m: f64,
+}

@@ -1,0 +1,1 @@
+//! Cross-sections swept along the alignment into triangles.

@@ -1,0 +1,6 @@
+//! The world: physics, renderer, sensors. Uses the track and the bus, never the stack.
+
+pub mod physics;
+pub mod random;
+pub mod render;
+pub mod sensors;

@@ -1,0 +1,46 @@
+//! From the world to 8-bit images: a wgpu renderer, and a plain one beside it as oracle and
+//! fall-back. Both draw the same [`Scene`] through the same [`View`].
+
+pub mod cpu;
+pub mod gpu;
+mod light;
+mod scene;
+
+pub use scene::{
+    Body, CameraMotion, Headlight, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View,
+};
+
+use image::GrayImage;
+
+/// Which renderer drew, for the summary.
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+pub struct Backend {
+    /// `vulkan`, `metal`, `dx12` or `cpu`.
+    pub backend: String,
+    /// Name of the adapter.
+    pub adapter: String,
+}
+
+/// Why a picture could not be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum RenderError {
+    /// No adapter at all.
+    #[error("no graphics adapter found: {0}")]
+    NoAdapter(String),
+    /// The adapter gave up.
+    #[error("the graphics adapter failed: {0}")]
+    Device(String),
+    /// `collect` without `submit`.
+    #[error("no picture was asked for")]
+    NothingSubmitted,
+}
+
+/// A renderer holds the scene and draws jobs, one in flight while the caller does other work.
+pub trait Renderer: Send {
+    /// What draws.
+    fn backend(&self) -> Backend;
+    /// Starts to draw all views of a job.
+    fn submit(&mut self, job: &Job) -> Result<(), RenderError>;
+    /// Waits for the oldest submitted job; one image a view, in order.
+    fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError>;
+}

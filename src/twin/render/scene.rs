@@ -1,0 +1,181 @@
+//! What there is to see, and through which camera.
+
+use crate::bus::{CameraModel, SimTime};
+use crate::track::Tunnel;
+use crate::track::uid::Waveform;
+use crate::twin::random::Stream;
+use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// All that stands still for a whole run.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The line with its cross-sections.
+    pub tunnel: Arc<Tunnel>,
+    /// The lamps as they really are (the survey may be wrong about them).
+    pub lamps: Vec<LampLight>,
+}
+
+/// A lamp: a luminous disc that blinks.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LampLight {
+    /// Centre of the disc, world.
+    pub centre: Point3<f64>,
+    /// Normal of the disc, on the luminous side.
+    pub facing: Unit<Vector3<f64>>,
+    /// Radius of the disc.
+    pub radius_m: f64,
+    /// Luminance along the normal while on, cd/m^2. Seen at angle a from the normal it is this
+    /// times cos(a)^(exponent - 1).
+    pub luminance_cd_m2: f64,
+    /// Exponent m of the intensity pattern I = I0 cos(a)^m.
+    pub exponent: f64,
+    /// When it is on.
+    pub waveform: Waveform,
+}
+
+/// A solid shape, centred on its body's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Half extents.
+    Box(Vector3<f64>),
+    /// Radius and half height, along z.
+    Cylinder(f64, f64),
+    /// Radius.
+    Sphere(f64),
+    /// Radius and half length of the straight part, along z.
+    Capsule(f64, f64),
+}
+
+/// Something that may move: obstacle, limb of a worker, part of a train.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Its shape.
+    pub shape: Shape,
+    /// Where it is at `Job::time`.
+    pub world_from_body: Isometry3<f64>,
+    /// Where it goes meanwhile, world.
+    pub velocity_mps: Vector3<f64>,
+    /// Share of light reflected (Lambert), 0 to 1.
+    pub albedo: f64,
+    /// Luminance of its own, cd/m^2 (a headlight's lens).
+    pub luminance_cd_m2: f64,
+}
+
+/// A lamp on a train that lights what is in front.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Headlight {
+    /// Where it is and where it looks (along its x axis).
+    pub world_from_light: Isometry3<f64>,
+    /// Intensity along the axis.
+    pub intensity_cd: f64,
+    /// Exponent of its pattern I = I0 cos(a)^m.
+    pub exponent: f64,
+}
+
+/// Poses of a camera through a frame, at equal steps; between them position runs linearly and
+/// attitude by spherical interpolation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CameraMotion {
+    /// Time of the first pose.
+    pub first: SimTime,
+    /// From pose to pose.
+    pub step_s: f64,
+    /// `world_from_camera`.
+    pub poses: Vec<Isometry3<f64>>,
+}
+
+impl CameraMotion {
+    /// A camera that does not move.
+    pub fn still(pose: Isometry3<f64>) -> Self {
+        Self {
+            first: SimTime::ZERO,
+            step_s: 1.0,
+            poses: vec![pose],
+        }
+    }
+
+    /// `world_from_camera` at a time; held beyond the ends.
+    pub fn pose_at(&self, time: SimTime) -> Isometry3<f64> {
+        let last = self.poses.len() - 1;
+        let x = (time.since(self.first) / self.step_s).clamp(0.0, last as f64);
+        let k = (x.floor() as usize).min(last.saturating_sub(1));
+        match self.poses.get(k + 1) {
+            Some(next) => self.poses[k].lerp_slerp(next, x - k as f64),
+            None => self.poses[k],
+        }
+    }
+}
+
+/// From light to grey levels.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorSettings {
+    /// Grey levels (of 255) that a luminance of 1 cd/m^2 gives in an exposure of 1 s.
+    pub grey_per_cd_s: f64,
+    /// Grey level of darkness.
+    pub black_level_grey: f64,
+    /// Electrons a grey level (sets the shot noise).
+    pub electrons_per_grey: f64,
+    /// Read noise.
+    pub read_noise_e: f64,
+    /// Share of a lamp's light that glare spreads around it.
+    pub halo_share: f64,
+    /// Distance in which the glare falls to 1/e, pixels.
+    pub halo_px: f64,
+    /// Draw noise at all.
+    pub noise: bool,
+}
+
+impl Default for SensorSettings {
+    fn default() -> Self {
+        Self {
+            grey_per_cd_s: 2600.0,
+            black_level_grey: 4.0,
+            electrons_per_grey: 40.0,
+            read_noise_e: 25.0,
+            halo_share: 0.02,
+            halo_px: 12.0,
+            noise: true,
+        }
+    }
+}
+
+/// Names the noise of a frame: pixel noise is a hash of stream, frame and pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct NoiseKey {
+    /// Of the camera.
+    pub stream: Stream,
+    /// Frame number.
+    pub frame: u32,
+}
+
+/// One image to draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct View {
+    /// Geometry and shutter.
+    pub camera: CameraModel,
+    /// When row 0 opens.
+    pub start: SimTime,
+    /// Where the camera is, row by row.
+    pub motion: CameraMotion,
+    /// The sensor.
+    pub sensor: SensorSettings,
+    /// Its noise.
+    pub noise: NoiseKey,
+}
+
+/// Images of one instant, and what moves in them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Job {
+    /// Time of the bodies' poses.
+    pub time: SimTime,
+    /// Everything solid that is not the tunnel.
+    pub bodies: Vec<Body>,
+    /// Headlights that are lit.
+    pub headlights: Vec<Headlight>,
+    /// One image each.
+    pub views: Vec<View>,
+}

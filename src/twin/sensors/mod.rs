@@ -1,0 +1,1 @@
+//! Sensors of motion and range: each turns the world's state at its own mount into raw output.
