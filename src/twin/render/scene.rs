@@ -132,7 +132,7 @@ pub struct SensorSettings {
 impl Default for SensorSettings {
     fn default() -> Self {
         Self {
-            grey_per_cd_s: 2600.0,
+            grey_per_cd_s: 1000.0,
             black_level_grey: 4.0,
             electrons_per_grey: 40.0,
             read_noise_e: 25.0,
