@@ -1,1 +1,42 @@
-//! .
+//! The files a user writes: a scenario says everything about one run, and is checked as a whole
+//! before anything starts.
+//!
+//! [`ScenarioFile`] is the file as written (TOML; every key is optional but `name` and `tunnel`).
+//! [`Scenario`] is what it means: the tunnel is read, the cameras are calibrated, and every
+//! check has passed, including those between parts: an obstacle in the rock, a wayside device that
+//! the tunnel does not have, more rows than a frame has time for, a rig that never sees a lamp.
+//! All problems are reported at once, each with its key, what is wrong and what would be right.
+//!
+//! ```
+//! use metrotwin::scenario::ScenarioFile;
+//! use metrotwin::track::read_toml;
+//!
+//! let file: ScenarioFile = read_toml(r#"
+//!     name = "first_run"
+//!     tunnel = "../tunnels/test_bench.toml"
+//!     duration_s = 10.0
+//!     [train]
+//!     cruise_speed_kmh = 40.0
+//! "#)?;
+//! assert_eq!(file.duration_s, 10.0);
+//! // What is not written has the reference values.
+//! assert_eq!(file.train.map(|t| t.cars), Some(6));
+//! # Ok::<(), metrotwin::track::FileError>(())
+//! ```
+//!
+//! The settings of each part are declared beside its own code; this room only puts them together.
+//! `--set key=value` overrides are applied to the document before it is parsed ([`Override`]), so
+//! that they meet the same checks as the file.
+//!
+//! What it does not do: distributions and many runs (studies), and anything that needs a clock
+//! or a renderer.
+
+mod build;
+mod file;
+mod overrides;
+mod place;
+pub mod schema;
+
+pub use build::{Scenario, ScenarioError, WaysidePost};
+pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
+pub use overrides::{Override, OverrideError};

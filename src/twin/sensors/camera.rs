@@ -1,0 +1,475 @@
+//! Cameras as a user mounts them: the stereo rig on the train head and the camera of a wayside
+//! device, from degrees and millimetres to calibrations.
+//!
+//! A mount turns by yaw about the vertical (left positive) and then by pitch about its own right
+//! hand axis (up positive). The papers measure psi from the lateral direction: psi = 90 deg - yaw.
+//!
+//! **Why the rig looks where it does.** A lamp 1.7 m to the left and 1.5 m above the left eye is
+//! to be seen whole, by both eyes, over a full unit of 10 m. Without a pitch, psi =
+//! atan(10/1.7) - 64/2 = 49 deg is the smallest that reaches far enough, but then lamps nearer than
+//! 4.3 m are above the picture. A pitch of 22 deg brings them in from 1.0 m on; it also turns the
+//! far lamps outwards, so that psi has to grow to 51 deg (yaw 39). The visible interval is
+//! then 1.04 m to 11.46 m ahead on straight track, 10.4 m of 10 ([`visible_interval`]); with
+//! psi = 49 deg no pitch gives more than 8.4 m.
+
+use super::super::render::SensorSettings;
+use crate::bus::{CameraModel, Intrinsics, RigCalibration, Shutter, WaysideCalibration};
+use crate::track::{LampSite, Problem, TrackPoint, Tunnel, WaysideSite};
+use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Shape and timing of one image sensor behind its lens.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Optics {
+    focal_length_mm: f64,
+    pixel_um: f64,
+    width_px: u32,
+    height_px: u32,
+    line_time_us: f64,
+    exposure_us: f64,
+    frames_per_s: f64,
+    rate_key: &'static str,
+}
+
+impl Optics {
+    fn camera(&self) -> CameraModel {
+        CameraModel {
+            intrinsics: Intrinsics::centred(
+                self.width_px,
+                self.height_px,
+                self.focal_length_mm * 1e3 / self.pixel_um,
+            ),
+            shutter: Shutter {
+                line_time_s: self.line_time_us * 1e-6,
+                exposure_s: self.exposure_us * 1e-6,
+            },
+        }
+    }
+
+    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        positive(problems, at, "focal_length_mm", self.focal_length_mm, "mm", 3.9);
+        positive(problems, at, "pixel_um", self.pixel_um, "um", 3.75);
+        positive(problems, at, "exposure_us", self.exposure_us, "us", 30.0);
+        positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
+        for (key, value) in [("width_px", self.width_px), ("height_px", self.height_px)] {
+            if !(16..=8192).contains(&value) {
+                problems.push(Problem::new(
+                    format!("{at}.{key}"),
+                    format!("{value} px is no size of an image"),
+                    "give 16 to 8192 px",
+                ));
+            }
+        }
+        if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
+            problems.push(Problem::new(
+                format!("{at}.line_time_us"),
+                format!("a row cannot open {} us after the one before", self.line_time_us),
+                "give the time from row to row in us, 0 for a global shutter",
+            ));
+        }
+        self.check_frame_time(at, problems);
+    }
+
+    /// The last row must close before the next frame's first one opens.
+    fn check_frame_time(&self, at: &str, problems: &mut Vec<Problem>) {
+        let frame_us = 1e6 / self.frames_per_s;
+        if !(frame_us.is_finite() && frame_us > 0.0) {
+            return;
+        }
+        if self.exposure_us > frame_us {
+            problems.push(Problem::new(
+                format!("{at}.exposure_us"),
+                format!(
+                    "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {}",
+                    self.exposure_us, self.frames_per_s, self.rate_key
+                ),
+                format!("expose for less than {frame_us:.0} us, or lower {}", self.rate_key),
+            ));
+            return;
+        }
+        let span_us = self.camera().shutter.frame_span_s(self.height_px) * 1e6;
+        if span_us > frame_us {
+            let fits = ((frame_us - self.exposure_us) / self.line_time_us).floor() + 1.0;
+            problems.push(Problem::new(
+                format!("{at}.height_px"),
+                format!(
+                    "{} rows of {} us take {span_us:.0} us, but a frame lasts {frame_us:.0} us at {} {}",
+                    self.height_px, self.line_time_us, self.frames_per_s, self.rate_key
+                ),
+                format!("read at most {fits:.0} rows, or lower line_time_us or {}", self.rate_key),
+            ));
+        }
+    }
+}
+
+/// The stereo rig on the train head: where it is mounted, what it sees, when.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigSettings {
+    /// Focal length of either eye, mm. Default 3.9 (1040 px).
+    pub focal_length_mm: f64,
+    /// Width and height of a pixel, um. Default 3.75.
+    pub pixel_um: f64,
+    /// Columns of either eye's image. Default 1280.
+    pub width_px: u32,
+    /// Rows of either eye's image. Default 720.
+    pub height_px: u32,
+    /// Distance between the eyes, mm; the right eye sits that far along the left eye's right hand
+    /// axis. Default 120.
+    pub baseline_mm: f64,
+    /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
+    /// Default 22.2.
+    pub line_time_us: f64,
+    /// How long every row collects light, us. Longer than a chip of the lamps' code (about 100 us)
+    /// it blurs the stripes away. Default 30.
+    pub exposure_us: f64,
+    /// Pairs of images a second. Default 30.
+    pub pairs_per_s: f64,
+    /// Left eye, m ahead of the train head (negative: behind the windscreen). Default -0.5.
+    pub forward_m: f64,
+    /// Left eye, m to the left of the centreline. Default 1.08.
+    pub lateral_m: f64,
+    /// Left eye, m above top of rail. Default 1.75.
+    pub height_m: f64,
+    /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
+    /// Default 39.
+    pub yaw_deg: f64,
+    /// Tilt of the optical axis, deg, up positive. Default 22.
+    pub pitch_deg: f64,
+    /// By how much the mount really differs from the calibration that the stack is given.
+    /// Default: not at all.
+    pub calibration_error: RigError,
+    /// From light to grey levels.
+    pub sensor: SensorSettings,
+}
+
+impl Default for RigSettings {
+    fn default() -> Self {
+        Self {
+            focal_length_mm: 3.9,
+            pixel_um: 3.75,
+            width_px: 1280,
+            height_px: 720,
+            baseline_mm: 120.0,
+            line_time_us: 22.2,
+            exposure_us: 30.0,
+            pairs_per_s: 30.0,
+            forward_m: -0.5,
+            lateral_m: 1.08,
+            height_m: 1.75,
+            yaw_deg: 39.0,
+            pitch_deg: 22.0,
+            calibration_error: RigError::default(),
+            sensor: SensorSettings::default(),
+        }
+    }
+}
+
+/// What a calibration got wrong: the true value less the calibrated one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RigError {
+    /// Focal length, mm. Default 0.
+    pub focal_length_mm: f64,
+    /// Baseline, mm. Default 0.
+    pub baseline_mm: f64,
+    /// Yaw, deg. Default 0.
+    pub yaw_deg: f64,
+    /// Pitch, deg. Default 0.
+    pub pitch_deg: f64,
+}
+
+impl RigSettings {
+    /// The calibration sheet, which the stack gets.
+    pub fn calibration(&self) -> RigCalibration {
+        RigCalibration {
+            camera: self.optics().camera(),
+            baseline_m: self.baseline_mm * 1e-3,
+            vehicle_from_left: mounted(
+                Vector3::new(self.forward_m, self.lateral_m, self.height_m),
+                self.yaw_deg.to_radians(),
+                self.pitch_deg.to_radians(),
+            ),
+        }
+    }
+
+    /// The rig as it really is, through which the world is drawn.
+    pub fn actual(&self) -> RigCalibration {
+        let error = self.calibration_error;
+        Self {
+            focal_length_mm: self.focal_length_mm + error.focal_length_mm,
+            baseline_mm: self.baseline_mm + error.baseline_mm,
+            yaw_deg: self.yaw_deg + error.yaw_deg,
+            pitch_deg: self.pitch_deg + error.pitch_deg,
+            ..self.clone()
+        }
+        .calibration()
+    }
+
+    /// Appends what is wrong.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.optics().check(at, problems);
+        positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
+        positive(problems, at, "height_m", self.height_m, "m", 1.75);
+        within(problems, at, "forward_m", self.forward_m, "m", 5.0);
+        within(problems, at, "lateral_m", self.lateral_m, "m", 2.0);
+        within(problems, at, "yaw_deg", self.yaw_deg, "deg", 180.0);
+        within(problems, at, "pitch_deg", self.pitch_deg, "deg", 89.0);
+        let error = self.calibration_error;
+        let at = format!("{at}.calibration_error");
+        let half_focal = 0.5 * self.focal_length_mm.abs();
+        let half_baseline = 0.5 * self.baseline_mm.abs();
+        within(problems, &at, "focal_length_mm", error.focal_length_mm, "mm", half_focal);
+        within(problems, &at, "baseline_mm", error.baseline_mm, "mm", half_baseline);
+        within(problems, &at, "yaw_deg", error.yaw_deg, "deg", 45.0);
+        within(problems, &at, "pitch_deg", error.pitch_deg, "deg", 45.0);
+    }
+
+    fn optics(&self) -> Optics {
+        Optics {
+            focal_length_mm: self.focal_length_mm,
+            pixel_um: self.pixel_um,
+            width_px: self.width_px,
+            height_px: self.height_px,
+            line_time_us: self.line_time_us,
+            exposure_us: self.exposure_us,
+            frames_per_s: self.pairs_per_s,
+            rate_key: "pairs_per_s",
+        }
+    }
+}
+
+/// The camera of a wayside device. Where it hangs and looks is in the tunnel file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WaysideCameraSettings {
+    /// Focal length, mm. Default 4.1 (1093 px: 82 deg across).
+    pub focal_length_mm: f64,
+    /// Width and height of a pixel, um. Default 3.75.
+    pub pixel_um: f64,
+    /// Columns. Default 1920.
+    pub width_px: u32,
+    /// Rows. Default 1080.
+    pub height_px: u32,
+    /// Time from the opening of a row to the opening of the next, us. Default 14.8.
+    pub line_time_us: f64,
+    /// How long every row collects light, us. Default 8000.
+    pub exposure_us: f64,
+    /// Frames a second. Default 10.
+    pub frames_per_s: f64,
+    /// From light to grey levels.
+    pub sensor: SensorSettings,
+}
+
+impl Default for WaysideCameraSettings {
+    fn default() -> Self {
+        Self {
+            focal_length_mm: 4.1,
+            pixel_um: 3.75,
+            width_px: 1920,
+            height_px: 1080,
+            line_time_us: 14.8,
+            exposure_us: 8000.0,
+            frames_per_s: 10.0,
+            sensor: SensorSettings::default(),
+        }
+    }
+}
+
+impl WaysideCameraSettings {
+    /// The camera alone.
+    pub fn camera(&self) -> CameraModel {
+        self.optics().camera()
+    }
+
+    /// The device as surveyed: this camera at that site, with a lidar in the same housing where
+    /// `with_lidar`. `None` where the tunnel has no balise of the name that the site gives.
+    pub fn calibration(
+        &self,
+        site: &WaysideSite,
+        tunnel: &Tunnel,
+        with_lidar: bool,
+    ) -> Option<WaysideCalibration> {
+        let balise = tunnel.balises.iter().find(|b| b.name == site.balise)?;
+        let world_from_housing = world_from_housing(site, tunnel);
+        Some(WaysideCalibration {
+            name: site.name.clone(),
+            camera: self.camera(),
+            world_from_camera: world_from_housing * forward_from_camera(),
+            world_from_lidar: with_lidar.then(|| world_from_housing * forward_from_lidar()),
+            chainage_m: site.chainage_m,
+            balise_chainage_m: balise.chainage_m,
+        })
+    }
+
+    /// Appends what is wrong.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.optics().check(at, problems);
+    }
+
+    fn optics(&self) -> Optics {
+        Optics {
+            focal_length_mm: self.focal_length_mm,
+            pixel_um: self.pixel_um,
+            width_px: self.width_px,
+            height_px: self.height_px,
+            line_time_us: self.line_time_us,
+            exposure_us: self.exposure_us,
+            frames_per_s: self.frames_per_s,
+            rate_key: "frames_per_s",
+        }
+    }
+}
+
+/// Forward, left, up at the device's axis.
+fn world_from_housing(site: &WaysideSite, tunnel: &Tunnel) -> Isometry3<f64> {
+    let place = TrackPoint {
+        s_m: site.chainage_m,
+        l_m: site.lateral_m,
+        h_m: site.height_m,
+    };
+    let heading = tunnel.alignment.at(site.chainage_m).heading_rad + site.yaw_rad;
+    Isometry3::from_parts(
+        Translation3::from(tunnel.alignment.world_from_track(place)),
+        yaw_pitch(heading, site.pitch_rad),
+    )
+}
+
+/// A camera at `place` of a frame with x forward, y left, z up.
+fn mounted(place: Vector3<f64>, yaw_rad: f64, pitch_rad: f64) -> Isometry3<f64> {
+    Isometry3::from_parts(Translation3::from(place), yaw_pitch(yaw_rad, pitch_rad))
+        * forward_from_camera()
+}
+
+fn yaw_pitch(yaw_rad: f64, pitch_rad: f64) -> UnitQuaternion<f64> {
+    // Up is a negative turn about the left hand axis.
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), yaw_rad)
+        * UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -pitch_rad)
+}
+
+/// Camera axes (x right, y down, z forward) in axes x forward, y left, z up.
+fn forward_from_camera() -> Isometry3<f64> {
+    axes(Matrix3::new(0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0))
+}
+
+/// Lidar axes (x right, y along the axis, z up) in axes x forward, y left, z up.
+fn forward_from_lidar() -> Isometry3<f64> {
+    axes(Matrix3::new(0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0))
+}
+
+fn axes(columns: Matrix3<f64>) -> Isometry3<f64> {
+    let rotation = Rotation3::from_matrix_unchecked(columns);
+    Isometry3::from_parts(
+        Translation3::identity(),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    )
+}
+
+/// Train positions, as metres from the head to the lamp, at which both eyes see the whole disc
+/// from its luminous side: the longest stretch, nearest and farthest end. The vehicle stands on
+/// the track without vibration. `None` where the rig never sees the lamp.
+pub fn visible_interval(
+    rig: &RigCalibration,
+    tunnel: &Tunnel,
+    lamp: &LampSite,
+) -> Option<(f64, f64)> {
+    let rim = rim(lamp);
+    let mut best: Option<(f64, f64)> = None;
+    let mut run: Option<(f64, f64)> = None;
+    for k in REACH_STEPS {
+        let ahead_m = f64::from(k) * REACH_STEP_M;
+        if !sees(rig, tunnel, lamp, &rim, lamp.chainage_m - ahead_m) {
+            run = None;
+            continue;
+        }
+        let now = (run.map_or(ahead_m, |r| r.0), ahead_m);
+        run = Some(now);
+        if best.is_none_or(|b| now.1 - now.0 > b.1 - b.0) {
+            best = Some(now);
+        }
+    }
+    best
+}
+
+/// Whether both eyes ever see the whole disc.
+pub fn ever_sees(rig: &RigCalibration, tunnel: &Tunnel, lamp: &LampSite) -> bool {
+    let rim = rim(lamp);
+    REACH_STEPS
+        .step_by(4)
+        .map(|k| lamp.chainage_m - f64::from(k) * REACH_STEP_M)
+        .any(|head_m| sees(rig, tunnel, lamp, &rim, head_m))
+}
+
+/// A lamp is looked for from 5 m behind the head to 80 m ahead of it.
+const REACH_STEPS: std::ops::Range<i32> = -100..1600;
+const REACH_STEP_M: f64 = 0.05;
+
+fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
+    let n = lamp.facing.into_inner();
+    let across = n.cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
+    let along = n.cross(&across);
+    std::array::from_fn(|k| {
+        let (sin, cos) = (k as f64 * std::f64::consts::TAU / 16.0).sin_cos();
+        lamp.centre + 0.5 * lamp.diameter_m * (cos * across + sin * along)
+    })
+}
+
+fn sees(
+    rig: &RigCalibration,
+    tunnel: &Tunnel,
+    lamp: &LampSite,
+    rim: &[Point3<f64>],
+    head_m: f64,
+) -> bool {
+    let world_from_left = tunnel.alignment.at(head_m).world_from_rails() * rig.vehicle_from_left;
+    let left_from_world = world_from_left.inverse();
+    let towards = Point3::from(world_from_left.translation.vector) - lamp.centre;
+    let camera = &rig.camera.intrinsics;
+    let inside = |p: Point3<f64>| {
+        p.z > 0.1
+            && camera.project(&p).is_some_and(|uv| {
+                (0.0..=f64::from(camera.width_px) - 1.0).contains(&uv.x)
+                    && (0.0..=f64::from(camera.height_px) - 1.0).contains(&uv.y)
+            })
+    };
+    towards.dot(&lamp.facing) > 0.0
+        && rim.iter().all(|p| {
+            let left = left_from_world * p;
+            inside(left) && inside(left - Vector3::new(rig.baseline_m, 0.0, 0.0))
+        })
+}
+
+fn positive(
+    problems: &mut Vec<Problem>,
+    at: &str,
+    key: &str,
+    value: f64,
+    unit: &str,
+    usual: f64,
+) {
+    if !(value.is_finite() && value > 0.0) {
+        problems.push(Problem::new(
+            format!("{at}.{key}"),
+            format!("{value} {unit} is not greater than 0"),
+            format!("give a positive number of {unit}, usually {usual}"),
+        ));
+    }
+}
+
+fn within(
+    problems: &mut Vec<Problem>,
+    at: &str,
+    key: &str,
+    value: f64,
+    unit: &str,
+    limit: f64,
+) {
+    if !(value.abs() <= limit) {
+        problems.push(Problem::new(
+            format!("{at}.{key}"),
+            format!("{value} {unit} is out of range"),
+            format!("give {} to {limit} {unit}", -limit),
+        ));
+    }
+}
