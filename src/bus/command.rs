@@ -53,8 +53,23 @@ pub struct DriverDisplay {
     pub text: String,
 }
 
+/// How far the speed supervision has gone.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Supervision {
+    /// The speed is permitted.
+    #[default]
+    Permitted,
+    /// Over the permitted speed: the driver is warned.
+    Warning,
+    /// The service brake intervenes, or holds the train before an obstacle.
+    Service,
+    /// The emergency brake intervenes.
+    Emergency,
+}
+
 /// One cycle of the protection, for the record.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ProtectionReport {
     /// When.
     pub time: SimTime,
@@ -70,6 +85,10 @@ pub struct ProtectionReport {
     pub service_mps: f64,
     /// Speed at which the emergency brake intervenes.
     pub emergency_mps: f64,
+    /// How far the supervision has gone.
+    pub supervision: Supervision,
+    /// Where the movement authority ends, while something limits it.
+    pub authority_end_m: Option<f64>,
     /// What goes to the train.
     pub command: TrainCommand,
     /// What the driver sees.

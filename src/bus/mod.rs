@@ -23,12 +23,12 @@ mod time;
 mod wayside;
 
 pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
-pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, TrainCommand};
+pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
 pub use message::{Delivery, ObstacleWarning, Via};
 pub use motion::{ImuSample, OdometerSample};
 pub use time::SimTime;
 pub use wayside::{
-    Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, WaysideCalibration,
-    WaysideReport,
+    Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,
+    WaysideCalibration, WaysideReport,
 };

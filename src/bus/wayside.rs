@@ -107,13 +107,28 @@ pub struct DetectedObstacle {
     pub danger: DangerLevel,
 }
 
+/// What a train tells of itself to the devices along the line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainReport {
+    /// Chainage of its head.
+    pub chainage_m: f64,
+    /// Speed up the line.
+    pub speed_mps: f64,
+    /// When it was there.
+    pub time: SimTime,
+}
+
 /// The report of one frame.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct WaysideReport {
     /// Start of the frame.
     pub time: SimTime,
     /// Frame number.
     pub number: u32,
+    /// The reference image is still being learnt: nothing can be found yet.
+    pub learning: bool,
+    /// A train stands or runs where the camera looks, so that part of its view is blind.
+    pub train_in_view: bool,
     /// Everything found, confirmed obstacles only.
     pub obstacles: Vec<DetectedObstacle>,
     /// All regions of the binary image over the size limit, confirmed or not.

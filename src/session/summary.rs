@@ -1,0 +1,202 @@
+//! What a session comes to, as `summary.json` has it.
+
+use crate::bus::Method;
+use crate::twin::render::Backend;
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+/// The figures of one run. Lengths in metres, times in seconds; `null` where a scenario has none.
+#[derive(Clone, Debug, Serialize)]
+pub struct Summary {
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Its seed.
+    pub seed: u64,
+    /// How the run ended.
+    pub end: End,
+    /// Simulated time.
+    pub simulated_s: f64,
+    /// Time that it took.
+    pub wall_s: f64,
+    /// `simulated_s / wall_s`.
+    pub real_time_factor: f64,
+    /// What drew the images.
+    pub renderer: Backend,
+    /// Stereo pairs drawn.
+    pub stereo_frames: u32,
+    /// Wayside frames drawn.
+    pub wayside_frames: u32,
+    /// Cost of the physics.
+    pub physics: Physics,
+    /// Where the wall time went, seconds.
+    pub wall_shares_s: WallShares,
+    /// Positioning, by method.
+    pub positioning: BTreeMap<Method, Positioning>,
+    /// Wayside detection.
+    pub wayside: Option<Wayside>,
+    /// Train protection.
+    pub protection: Option<Protection>,
+}
+
+/// How a run ended.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum End {
+    /// As the scenario has it.
+    Complete,
+    /// Broken off by the user.
+    Interrupted,
+    /// Something failed; the text says what.
+    Failed(String),
+}
+
+/// Cost of the physics.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Physics {
+    /// Microseconds of wall time a step of the world.
+    pub us_per_step: f64,
+}
+
+/// Where the wall time went.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct WallShares {
+    /// Stepping the world.
+    pub physics_s: f64,
+    /// Handing scenes to the renderer.
+    pub submit_s: f64,
+    /// Waiting for images.
+    pub wait_s: f64,
+    /// The stack at work.
+    pub stack_s: f64,
+    /// Recording.
+    pub record_s: f64,
+}
+
+/// One method's figures. Errors are along the track, without sign.
+#[derive(Clone, Debug, Serialize)]
+pub struct Positioning {
+    /// Positions given.
+    pub fixes: u32,
+    /// Fixes a pair.
+    pub availability: Option<f64>,
+    /// Share of the lamps passed whose name was read from the stripes.
+    pub uid_decode_rate: Option<f64>,
+    /// Fixes that rest on the wrong lamp.
+    pub wrong_uid: u32,
+    /// Error of the chainage.
+    pub error_m: Option<Distribution>,
+    /// Cost of the stack a pair of images (all methods together).
+    pub ms_per_frame: Option<Cost>,
+    /// Mean of (error/sigma)^2: 1 for an honest sigma.
+    pub nees_mean: Option<f64>,
+}
+
+/// Order statistics.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct Distribution {
+    pub mean: f64,
+    pub p50: f64,
+    pub p75: f64,
+    pub p95: f64,
+    pub p99: f64,
+    pub max: f64,
+}
+
+impl Distribution {
+    /// Of the values given (sorted in passing); `None` of none.
+    pub fn of(values: &mut [f64]) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        let max = *values.last()?;
+        Some(Self {
+            mean: values.iter().sum::<f64>() / values.len() as f64,
+            p50: quantile(values, 0.50),
+            p75: quantile(values, 0.75),
+            p95: quantile(values, 0.95),
+            p99: quantile(values, 0.99),
+            max,
+        })
+    }
+}
+
+/// Median and 99th percentile of a cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct Cost {
+    pub p50: f64,
+    pub p99: f64,
+}
+
+impl Cost {
+    /// Of the values given (sorted in passing); `None` of none.
+    pub fn of(values: &mut [f64]) -> Option<Self> {
+        values.sort_by(f64::total_cmp);
+        (!values.is_empty()).then(|| Self { p50: quantile(values, 0.50), p99: quantile(values, 0.99) })
+    }
+}
+
+/// Linear interpolation between order statistics (numpy's default) of sorted values.
+fn quantile(sorted: &[f64], p: f64) -> f64 {
+    let x = p * (sorted.len() - 1) as f64;
+    let k = x.floor() as usize;
+    let next = sorted[(k + 1).min(sorted.len() - 1)];
+    sorted[k] + (next - sorted[k]) * (x - k as f64)
+}
+
+/// Wayside detection.
+#[derive(Clone, Debug, Serialize)]
+pub struct Wayside {
+    /// Every obstacle that came to lie in view.
+    pub obstacles: Vec<ObstacleScore>,
+    /// Reported obstacles, a frame each, that match nothing real.
+    pub false_alarms: u32,
+    /// Cost of the stack a frame.
+    pub ms_per_frame: Option<Cost>,
+}
+
+/// How one obstacle was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct ObstacleScore {
+    /// Its name in the scenario.
+    pub name: String,
+    /// Its largest dimension.
+    pub size_m: f64,
+    /// When it was first reported.
+    pub first_detected_s: Option<f64>,
+    /// From its appearance in the world to its first report.
+    pub latency_s: Option<f64>,
+    /// Reported less true distance along the line, mean over the frames that report it at rest.
+    pub distance_error_m: Option<f64>,
+}
+
+/// Train protection.
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct Protection {
+    /// When the equipment first braked.
+    pub brake_commanded_s: Option<f64>,
+    /// When the train then stood.
+    pub stopped_s: Option<f64>,
+    /// From the head of the standing train to the nearest obstacle in its way.
+    pub stop_margin_m: Option<f64>,
+    /// The train hit something.
+    pub collision: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Off-by-one in the quantiles, mean over the wrong count. Figures from numpy.percentile.
+    #[test]
+    fn distribution_matches_numpy() {
+        let mut v = vec![5.0, 1.0, 4.0, 2.0];
+        let d = Distribution::of(&mut v).unwrap_or_else(|| unreachable!());
+        assert!((d.mean - 3.0).abs() < 1e-15);
+        assert!((d.p50 - 3.0).abs() < 1e-15);
+        assert!((d.p75 - 4.25).abs() < 1e-15);
+        assert!((d.p95 - 4.85).abs() < 1e-12);
+        assert!((d.max - 5.0).abs() < 1e-15);
+        assert_eq!(Distribution::of(&mut []), None);
+        assert_eq!(Cost::of(&mut []), None);
+    }
+}

@@ -1,0 +1,171 @@
+//! What a scenario may say about the protection.
+
+use crate::track::Problem;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the train protection. Defaults: a metro train of class B, and the typical ranges
+/// of IEEE 1474.1 for the delays.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ProtectionSettings {
+    /// Speed limit of the line, km/h.
+    pub line_speed_kmh: f64,
+    /// Position that the driver set before departure, m of chainage of the train head; without
+    /// it the first fix or balise tells.
+    pub initial_chainage_m: Option<f64>,
+    /// One sigma of that position, m.
+    pub initial_sigma_m: f64,
+    /// The train stops at least this far before an obstacle, m.
+    pub safety_distance_m: f64,
+    /// How many sigma of its position the train is taken to be ahead of its estimate.
+    pub position_sigmas: f64,
+    /// Odometer error, share of the distance run (wheel wear, slip).
+    pub odometer_drift: f64,
+    /// Odometer speed error, km/h.
+    pub speed_error_kmh: f64,
+    /// No fix makes the position better than this, m, one sigma (survey and mounting errors do
+    /// not average out).
+    pub sigma_floor_m: f64,
+    /// One sigma of the position given by a balise, m.
+    pub balise_sigma_m: f64,
+    /// A fix further off than this many sigma is refused.
+    pub gate_sigmas: f64,
+    /// Time of the onboard equipment to react, s, with traction still on.
+    pub reaction_s: f64,
+    /// From there until traction is off, s.
+    pub traction_cut_s: f64,
+    /// Greatest acceleration by traction on level track, m/s^2.
+    pub traction_mps2: f64,
+    /// Brake build-up, from nothing to the full rate along a ramp, s.
+    pub brake_buildup_s: f64,
+    /// Guaranteed rate of the emergency brake on level track, m/s^2.
+    pub emergency_mps2: f64,
+    /// Rate of the full service brake on level track, m/s^2.
+    pub service_mps2: f64,
+    /// Rotating mass as a share of the train's mass.
+    pub rotating_mass: f64,
+    /// Train length, m.
+    pub train_length_m: f64,
+    /// Time that the driver has from the permitted speed to the intervention, s.
+    pub driver_time_s: f64,
+    /// Warning comes this long before the intervention, s.
+    pub warning_time_s: f64,
+    /// Over the line speed by this: service brake, km/h.
+    pub service_margin_kmh: f64,
+    /// Over the line speed by this: emergency brake, km/h.
+    pub emergency_margin_kmh: f64,
+    /// Without odometer samples for this long, the emergency brake is applied, s.
+    pub odometer_timeout_s: f64,
+    /// A device whose warning was not refreshed for this long is shown as silent, s (its warning
+    /// stays in force).
+    pub radio_timeout_s: f64,
+}
+
+impl Default for ProtectionSettings {
+    fn default() -> Self {
+        Self {
+            line_speed_kmh: 80.0,
+            initial_chainage_m: None,
+            initial_sigma_m: 5.0,
+            safety_distance_m: 20.0,
+            position_sigmas: 3.0,
+            odometer_drift: 0.02,
+            speed_error_kmh: 3.0,
+            sigma_floor_m: 0.3,
+            balise_sigma_m: 0.5,
+            gate_sigmas: 5.0,
+            reaction_s: 0.5,
+            traction_cut_s: 0.5,
+            traction_mps2: 1.0,
+            brake_buildup_s: 1.5,
+            emergency_mps2: 1.0,
+            service_mps2: 0.8,
+            rotating_mass: 0.08,
+            train_length_m: 118.0,
+            driver_time_s: 4.0,
+            warning_time_s: 2.0,
+            service_margin_kmh: 5.5,
+            emergency_margin_kmh: 7.5,
+            odometer_timeout_s: 1.0,
+            radio_timeout_s: 5.0,
+        }
+    }
+}
+
+impl ProtectionSettings {
+    /// Appends what is wrong, with keys under `at`.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                problems.push(Problem::new(
+                    format!("{at}.{key}"),
+                    format!("is {value}{unit}"),
+                    format!("give {low} to {high}{unit}"),
+                ));
+            }
+        };
+        range("line_speed_kmh", self.line_speed_kmh, " km/h", 5.0, 200.0);
+        if let Some(chainage) = self.initial_chainage_m {
+            range("initial_chainage_m", chainage, " m", -1e5, 1e6);
+        }
+        range("initial_sigma_m", self.initial_sigma_m, " m", 0.01, 1e3);
+        range(
+            "safety_distance_m",
+            self.safety_distance_m,
+            " m",
+            0.0,
+            500.0,
+        );
+        range("position_sigmas", self.position_sigmas, "", 0.0, 10.0);
+        range("odometer_drift", self.odometer_drift, "", 0.0, 0.5);
+        range("speed_error_kmh", self.speed_error_kmh, " km/h", 0.0, 20.0);
+        range("sigma_floor_m", self.sigma_floor_m, " m", 0.0, 50.0);
+        range("balise_sigma_m", self.balise_sigma_m, " m", 0.01, 50.0);
+        range("gate_sigmas", self.gate_sigmas, "", 1.0, 100.0);
+        range("reaction_s", self.reaction_s, " s", 0.0, 5.0);
+        range("traction_cut_s", self.traction_cut_s, " s", 0.0, 5.0);
+        range("traction_mps2", self.traction_mps2, " m/s^2", 0.0, 3.0);
+        range("brake_buildup_s", self.brake_buildup_s, " s", 0.0, 10.0);
+        range("emergency_mps2", self.emergency_mps2, " m/s^2", 0.4, 3.0);
+        range(
+            "service_mps2",
+            self.service_mps2,
+            " m/s^2",
+            0.4,
+            self.emergency_mps2.max(0.4),
+        );
+        range("rotating_mass", self.rotating_mass, "", 0.0, 0.5);
+        range("train_length_m", self.train_length_m, " m", 5.0, 500.0);
+        range("driver_time_s", self.driver_time_s, " s", 0.0, 20.0);
+        range(
+            "warning_time_s",
+            self.warning_time_s,
+            " s",
+            0.0,
+            self.driver_time_s.max(0.0),
+        );
+        range(
+            "service_margin_kmh",
+            self.service_margin_kmh,
+            " km/h",
+            0.5,
+            self.emergency_margin_kmh.max(0.5),
+        );
+        range(
+            "emergency_margin_kmh",
+            self.emergency_margin_kmh,
+            " km/h",
+            0.5,
+            30.0,
+        );
+        range(
+            "odometer_timeout_s",
+            self.odometer_timeout_s,
+            " s",
+            0.1,
+            30.0,
+        );
+        range("radio_timeout_s", self.radio_timeout_s, " s", 0.1, 600.0);
+    }
+}

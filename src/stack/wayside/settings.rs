@@ -1,0 +1,127 @@
+//! What a scenario may say about the detection.
+
+use crate::track::Problem;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the obstacle detection of a wayside device.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WaysideSettings {
+    /// Frames at the start from which the reference image is learnt; the track must be clear.
+    pub reference_frames: u32,
+    /// Threshold T of the difference, grey levels of 255.
+    pub threshold_grey: f64,
+    /// Reference pixels at or over this grey level are not looked at: lamps and their halos.
+    pub saturated_grey: f64,
+    /// Reference pixels whose range over the reference frames is at least this are not looked at.
+    pub unstable_grey: f64,
+    /// How much the threshold rises with a change of illumination: share of the change of grey
+    /// level that is not trusted.
+    pub gain_distrust: f64,
+    /// Smallest region, pixels.
+    pub min_area_px: u32,
+    /// Smallest extent of an obstacle, the larger of width and height, m.
+    pub min_size_m: f64,
+    /// How far along the line from the device obstacles are looked for, m.
+    pub reach_m: f64,
+    /// Frames, of the last `confirm_of`, in which an obstacle must be found to be confirmed.
+    pub confirm_frames: u32,
+    /// Length of the memory for confirmation, frames (64 at most). An obstacle that is not found
+    /// in any of them is gone.
+    pub confirm_of: u32,
+    /// Half width of the structure gauge, clearance included, m from the centreline.
+    pub gauge_half_width_m: f64,
+    /// Height of the structure gauge over top of rail, m.
+    pub gauge_height_m: f64,
+    /// Beside and over the gauge, danger is low within this distance, m.
+    pub near_gauge_m: f64,
+    /// Anything on the bed inside the gauge that rises to at least this height over top of rail
+    /// is a high danger, m (negative: below).
+    pub dangerous_height_m: f64,
+    /// Length of the trains of the line, m.
+    pub train_length_m: f64,
+    /// While an obstacle is there, its warning is sent again after this time, s.
+    pub refresh_s: f64,
+    /// Put difference and binary image into every report.
+    pub keep_images: bool,
+}
+
+impl Default for WaysideSettings {
+    fn default() -> Self {
+        Self {
+            reference_frames: 10,
+            threshold_grey: 15.0,
+            saturated_grey: 250.0,
+            unstable_grey: 40.0,
+            gain_distrust: 0.35,
+            min_area_px: 24,
+            min_size_m: 0.1,
+            reach_m: 80.0,
+            confirm_frames: 3,
+            confirm_of: 5,
+            gauge_half_width_m: 1.6,
+            gauge_height_m: 3.9,
+            near_gauge_m: 0.5,
+            dangerous_height_m: 0.0,
+            train_length_m: 118.0,
+            refresh_s: 1.0,
+            keep_images: true,
+        }
+    }
+}
+
+impl WaysideSettings {
+    /// Appends what is wrong, with keys under `at`.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                problems.push(Problem::new(
+                    format!("{at}.{key}"),
+                    format!("is {value}{unit}"),
+                    format!("give {low} to {high}{unit}"),
+                ));
+            }
+        };
+        range(
+            "reference_frames",
+            f64::from(self.reference_frames),
+            "",
+            1.0,
+            250.0,
+        );
+        range("threshold_grey", self.threshold_grey, "", 1.0, 254.0);
+        range("saturated_grey", self.saturated_grey, "", 1.0, 256.0);
+        range("unstable_grey", self.unstable_grey, "", 1.0, 256.0);
+        range("gain_distrust", self.gain_distrust, "", 0.0, 1.0);
+        range("min_area_px", f64::from(self.min_area_px), " px", 1.0, 1e6);
+        range("min_size_m", self.min_size_m, " m", 0.0, 5.0);
+        range("reach_m", self.reach_m, " m", 5.0, 500.0);
+        range("confirm_of", f64::from(self.confirm_of), "", 1.0, 64.0);
+        range(
+            "confirm_frames",
+            f64::from(self.confirm_frames),
+            "",
+            1.0,
+            f64::from(self.confirm_of.clamp(1, 64)),
+        );
+        range(
+            "gauge_half_width_m",
+            self.gauge_half_width_m,
+            " m",
+            0.75,
+            3.0,
+        );
+        range("gauge_height_m", self.gauge_height_m, " m", 1.0, 6.0);
+        range("near_gauge_m", self.near_gauge_m, " m", 0.0, 3.0);
+        range(
+            "dangerous_height_m",
+            self.dangerous_height_m,
+            " m",
+            -0.5,
+            1.0,
+        );
+        range("train_length_m", self.train_length_m, " m", 5.0, 500.0);
+        range("refresh_s", self.refresh_s, " s", 0.05, 60.0);
+    }
+}
