@@ -3,7 +3,7 @@
 
 pub mod cpu;
 pub mod gpu;
-mod light;
+pub mod light;
 pub mod sample;
 mod scene;
 pub mod surface;

@@ -10,7 +10,7 @@
 
 use super::{Body, CameraMotion, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View};
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
-use crate::track::uid::{Uid, Waveform};
+use crate::track::uid::Uid;
 use crate::track::{
     Alignment, CrossSection, LampSite, Material, OutlinePoint, PlanElement, SectionRange,
     TrackPoint, Tunnel,
@@ -75,35 +75,11 @@ pub fn scene() -> Scene {
     let lamps = tunnel
         .lamps
         .iter()
-        .map(|site| {
-            let mut lamp = lamp_light(site);
-            lamp.waveform.phase_s = 1e-4 * f64::from(site.uid.lamp % 17);
-            lamp
-        })
+        .map(|site| LampLight::from_site(site, 1e-4 * f64::from(site.uid.lamp % 17)))
         .collect();
     Scene {
         tunnel: Arc::new(tunnel),
         lamps,
-    }
-}
-
-/// A lamp as surveyed, lit, with a period of its name starting at time 0.
-pub fn lamp_light(site: &LampSite) -> LampLight {
-    let half_beam = 0.5 * site.beam_deg.to_radians();
-    let exponent = 0.5f64.ln() / half_beam.cos().ln();
-    let radius_m = 0.5 * site.diameter_m;
-    let intensity_cd = site.power_w * site.efficacy_lm_per_w * (exponent + 1.0) / TAU;
-    LampLight {
-        centre: site.centre,
-        facing: site.facing,
-        radius_m,
-        luminance_cd_m2: intensity_cd / (0.5 * TAU * radius_m * radius_m),
-        exponent,
-        waveform: Waveform {
-            frame: site.uid.manchester(),
-            chip_s: site.chip_s,
-            phase_s: 0.0,
-        },
     }
 }
 

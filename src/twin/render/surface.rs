@@ -28,8 +28,6 @@ use std::fmt::Write;
 pub const RING_M: f64 = 1.0;
 /// A pixel sees no surface at a flatter angle than this sine (of the ray to the surface).
 pub const MIN_SINE: f64 = 0.05;
-/// Lamps light surfaces up to this distance.
-pub const LAMP_REACH_M: f64 = 30.0;
 /// Lamps are seen up to this distance.
 pub const LAMP_SIGHT_M: f64 = 80.0;
 /// Reflectance of a lamp's disc while it is off.
