@@ -1,6 +1,6 @@
 //! What is fixed to the tunnel: lamps, wayside devices, balises, base stations.
 
-use super::uid::Uid;
+use super::uid::{LineCode, Uid};
 use nalgebra::{Point3, Unit, Vector3};
 
 /// A lamp as surveyed.
@@ -28,6 +28,8 @@ pub struct LampSite {
     pub beam_deg: f64,
     /// Duration of a chip of its code.
     pub chip_s: f64,
+    /// Its code.
+    pub code: LineCode,
 }
 
 /// A wayside device: a camera and a lidar on the tunnel wall.

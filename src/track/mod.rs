@@ -8,17 +8,33 @@
 //! The world is x east, y north, z up.
 
 mod alignment;
+mod check;
+mod document;
 mod file;
 mod furniture;
+mod gauge;
+mod lamps;
 mod mesh;
 mod problem;
 mod section;
 pub mod uid;
 
 pub use alignment::{Alignment, Grade, PlanElement, RAIL_CENTRES_M, TrackFrame, TrackPoint};
+pub use document::{did_you_mean, locate, read_toml};
+pub use file::{
+    BaliseEntry, BaseStationEntry, GradeEntry, LampEntry, LampRow, PlanEntry, PlanKind,
+    SectionEntry, SectionKind, StartEntry, StationEntry, TunnelFile, WaysideEntry, tunnel_schema,
+};
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
-pub use problem::Problem;
-pub use section::{CrossSection, Material, OutlinePoint, SectionRange};
+pub use gauge::{Gauge, RAIL_CENTRE_M, RAIL_FOOT_M, RAIL_WIDTH_M, rail_boxes};
+pub use problem::{FileError, Problem};
+pub use section::{
+    BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
+    Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
+};
+
+/// Why a tunnel file cannot be used.
+pub type TunnelError = FileError;
 
 /// A tunnel, checked and ready to use.
 #[derive(Clone, Debug)]
@@ -43,4 +59,25 @@ pub struct Tunnel {
     pub stations: Vec<(String, f64)>,
     /// Light that reaches every surface after many reflections, lux.
     pub ambient_lx: f64,
+}
+
+impl Tunnel {
+    /// The cross-section at a chainage; the first and the last one go on beyond the ends.
+    pub fn section_at(&self, s_m: f64) -> Option<&CrossSection> {
+        let k = self.sections.partition_point(|r| r.to_m <= s_m);
+        self.sections
+            .get(k)
+            .or(self.sections.last())
+            .map(|r| &r.section)
+    }
+
+    /// The lamp with a UID.
+    pub fn lamp(&self, uid: uid::Uid) -> Option<&LampSite> {
+        self.lamps.iter().find(|l| l.uid == uid)
+    }
+
+    /// The balise with a name.
+    pub fn balise(&self, name: &str) -> Option<&Balise> {
+        self.balises.iter().find(|b| b.name == name)
+    }
 }

@@ -1,12 +1,21 @@
 //! The lamp's name on the air: how a UID becomes light switched on and off.
 //!
 //! Frame, sent over and over: header, line number (4 bits), lamp number (10 bits), check sum
-//! (CRC-6, polynomial x^6 + x + 1 as in ITU-T G.704), footer. Each data bit is two Manchester
-//! chips (1 = on then off, 0 = off then on, as in IEEE 802.15.7 PHY I), so no run in the data is
-//! longer than two chips and the lamp's mean brightness does not depend on its name. The header
-//! is three chips on, three off: runs that the data cannot contain, so the frame cannot be found
-//! anywhere else when it is read cyclically.
+//! (CRC-6, polynomial x^6 + x + 1 as in ITU-T G.704), footer. Two codes carry it:
+//!
+//! **Manchester** ([`LineCode::Manchester`], 48 chips). Each data bit is two chips (1 = on then
+//! off, 0 = off then on, as in IEEE 802.15.7 PHY I), so no run in the data is longer than two
+//! chips and the lamp's mean brightness does not depend on its name. The header is three chips
+//! on, three off: runs that the data cannot contain, so the frame cannot be found anywhere else
+//! when it is read cyclically. The footer is off, on; read cyclically its last chip makes the
+//! header's bright run four chips long, and a first data bit of 0 does so to the dark run.
+//!
+//! **NRZ** ([`LineCode::Nrz`], 33 chips). A chip a bit, as the stripes of Zhang et al. 2023 have
+//! it; after every 4 bits the complement of the last one, so runs end after 5 chips. The header
+//! is six chips on and one off, the footer one off. Shorter, but the mean brightness depends on
+//! the name.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -32,6 +41,13 @@ pub struct ChipFrame {
     pub bits: u64,
     /// Chips in a period, at most 64.
     pub len: u32,
+}
+
+impl ChipFrame {
+    /// Whether the lamp is on in chip `k`; never beyond the frame.
+    pub fn is_on(&self, k: u32) -> bool {
+        k < self.len && self.bits.checked_shr(k).unwrap_or(0) & 1 == 1
+    }
 }
 
 /// How a lamp blinks: a chip frame sent over and over.
@@ -67,7 +83,8 @@ impl Waveform {
     /// Whether the lamp is on at a time.
     pub fn on_at(&self, t_s: f64) -> bool {
         let chip = ((t_s - self.phase_s) / self.chip_s).floor();
-        self.frame.bits >> (chip.rem_euclid(f64::from(self.frame.len)) as u32) & 1 == 1
+        self.frame
+            .is_on(chip.rem_euclid(f64::from(self.frame.len)) as u32)
     }
 
     /// Chips' worth of light between the phase's origin and `x` chips later.
@@ -82,12 +99,11 @@ impl Waveform {
             (1u64 << whole as u32) - 1
         };
         let full = f64::from(self.frame.bits.count_ones());
-        let current =
-            if (whole as u32) < self.frame.len && self.frame.bits >> (whole as u32) & 1 == 1 {
-                inside - whole
-            } else {
-                0.0
-            };
+        let current = if self.frame.is_on(whole as u32) {
+            inside - whole
+        } else {
+            0.0
+        };
         periods * full + f64::from((self.frame.bits & mask).count_ones()) + current
     }
 }
@@ -96,6 +112,47 @@ impl Waveform {
 pub const PAYLOAD_BITS: u32 = 20;
 /// Chips of a Manchester frame: 6 header, 40 payload, 2 footer.
 pub const MANCHESTER_CHIPS: u32 = 48;
+/// Chips of an NRZ frame: 7 header, 20 payload with 5 complements, 1 footer.
+pub const NRZ_CHIPS: u32 = 33;
+/// Data bits of an NRZ group, which a complement follows.
+const NRZ_GROUP_BITS: u32 = 4;
+
+/// How the bits of a frame become chips.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum LineCode {
+    /// Two chips a bit, constant mean brightness.
+    #[default]
+    Manchester,
+    /// One chip a bit, runs bounded by a complement after every 4 bits.
+    Nrz,
+}
+
+impl LineCode {
+    /// Chips of a frame.
+    pub fn chips(self) -> u32 {
+        match self {
+            Self::Manchester => MANCHESTER_CHIPS,
+            Self::Nrz => NRZ_CHIPS,
+        }
+    }
+
+    /// The header: pattern (bit k is chip k) and its length in chips.
+    pub fn header(self) -> (u64, u32) {
+        match self {
+            Self::Manchester => (0b000_111, 6),
+            Self::Nrz => (0b011_1111, 7),
+        }
+    }
+
+    /// The longest run of equal chips that data can make.
+    pub fn longest_data_run(self) -> u32 {
+        match self {
+            Self::Manchester => 2,
+            Self::Nrz => 5,
+        }
+    }
+}
 
 impl Uid {
     /// The 20 bits sent: line, lamp, CRC-6.
@@ -113,10 +170,36 @@ impl Uid {
         })
     }
 
+    /// One period of the signal in a code.
+    pub fn frame(self, code: LineCode) -> ChipFrame {
+        match code {
+            LineCode::Manchester => self.manchester(),
+            LineCode::Nrz => self.nrz(),
+        }
+    }
+
+    /// From a whole frame that starts with its header; `None` where any chip cannot be.
+    pub fn from_frame(frame: ChipFrame, code: LineCode) -> Option<Self> {
+        let (_, header_chips) = code.header();
+        let mut payload = 0;
+        let mut at = header_chips;
+        for k in 0..PAYLOAD_BITS {
+            let bit = frame.is_on(at);
+            payload = payload << 1 | u32::from(bit);
+            at += match code {
+                LineCode::Manchester => 2,
+                LineCode::Nrz if (k + 1) % NRZ_GROUP_BITS == 0 => 2,
+                LineCode::Nrz => 1,
+            };
+        }
+        // Header, footer, second halves and complements are right if sending again gives the
+        // same chips.
+        Self::from_payload(payload).filter(|uid| uid.frame(code) == frame)
+    }
+
     /// One period of the Manchester signal.
     pub fn manchester(self) -> ChipFrame {
-        let mut bits = 0b000_111u64;
-        let mut at = 6;
+        let (mut bits, mut at) = LineCode::Manchester.header();
         let payload = self.payload();
         for k in (0..PAYLOAD_BITS).rev() {
             bits |= if payload >> k & 1 == 1 { 0b01 } else { 0b10 } << at;
@@ -127,6 +210,25 @@ impl Uid {
         ChipFrame {
             bits,
             len: MANCHESTER_CHIPS,
+        }
+    }
+
+    /// One period of the NRZ signal. The footer is a chip off, so nothing is set for it.
+    fn nrz(self) -> ChipFrame {
+        let (mut bits, mut at) = LineCode::Nrz.header();
+        let payload = self.payload();
+        for k in (0..PAYLOAD_BITS).rev() {
+            let bit = u64::from(payload >> k & 1);
+            bits |= bit << at;
+            at += 1;
+            if k % NRZ_GROUP_BITS == 0 {
+                bits |= (bit ^ 1) << at;
+                at += 1;
+            }
+        }
+        ChipFrame {
+            bits,
+            len: NRZ_CHIPS,
         }
     }
 }

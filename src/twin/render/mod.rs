@@ -3,8 +3,10 @@
 
 pub mod cpu;
 pub mod gpu;
-mod light;
+pub mod light;
+pub mod sample;
 mod scene;
+pub mod surface;
 
 pub use scene::{
     Body, CameraMotion, Headlight, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View,

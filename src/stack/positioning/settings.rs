@@ -1,0 +1,150 @@
+//! What a user may set about the positioning.
+
+use crate::track::Problem;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Settings of the lamp positioning.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct LedSettings {
+    /// A spot must stand out of the darkness by this many grey levels (of 255).
+    pub min_contrast_grey: f64,
+    /// A spot must cover this many pixels after closing.
+    pub min_area_px: f64,
+    /// Correct the stripes' tilt where it shears them by more than this many rows across the spot.
+    pub tilt_over_rows: f64,
+    /// Motion blur is undone where the smear is longer than this many pixels.
+    pub deblur_over_px: f64,
+    /// Noise-to-signal power ratio of the Wiener filter.
+    pub wiener_noise_to_signal: f64,
+    /// Smallest standard deviation of a disparity, pixels, however well the outline fits.
+    pub disparity_sigma_px: f64,
+    /// A lamp is taken for the predicted one within this share of the lamps' spacing (under 0.5).
+    pub gate_share: f64,
+    /// Without a prediction, as many frames must read the same name before it is believed; as
+    /// many must contradict a prediction before it is given up.
+    pub agreeing_reads: u32,
+    /// A lamp not seen for this many seconds is forgotten, with what was read of its code.
+    pub forget_s: f64,
+    /// Odometer error as a share of the distance run (one sigma).
+    pub odometer_sigma_share: f64,
+    /// Time constant in seconds with which the gyro's deviation from the track's attitude fades.
+    pub imu_fade_s: f64,
+    /// Standard deviation of the attitude that remains, degrees.
+    pub attitude_sigma_deg: f64,
+    /// From the train head back to the leading car's front bogie pivot, metres.
+    pub front_pivot_m: f64,
+    /// From the train head back to the leading car's rear bogie pivot, metres.
+    pub rear_pivot_m: f64,
+    /// Standard deviation of a surveyed lamp position along the track, metres.
+    pub survey_sigma_m: f64,
+}
+
+impl Default for LedSettings {
+    fn default() -> Self {
+        Self {
+            min_contrast_grey: 15.0,
+            min_area_px: 60.0,
+            tilt_over_rows: 0.5,
+            deblur_over_px: 0.5,
+            wiener_noise_to_signal: 0.01,
+            disparity_sigma_px: 0.08,
+            gate_share: 0.4,
+            agreeing_reads: 2,
+            forget_s: 0.5,
+            odometer_sigma_share: 0.01,
+            imu_fade_s: 10.0,
+            attitude_sigma_deg: 0.1,
+            front_pivot_m: 3.5,
+            rear_pivot_m: 16.1,
+            survey_sigma_m: 0.005,
+        }
+    }
+}
+
+impl LedSettings {
+    /// Appends what is wrong, with keys under `at`.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
+            if !(low..=high).contains(&value) {
+                problems.push(Problem::new(
+                    format!("{at}.{key}"),
+                    format!("{value}{unit} is outside of what can work"),
+                    format!("use {low} to {high}{unit}"),
+                ));
+            }
+        };
+        range("min_contrast_grey", self.min_contrast_grey, "", 2.0, 250.0);
+        range("min_area_px", self.min_area_px, " px", 9.0, 1e5);
+        range("tilt_over_rows", self.tilt_over_rows, " rows", 0.05, 1e3);
+        range("deblur_over_px", self.deblur_over_px, " px", 0.05, 1e3);
+        range(
+            "wiener_noise_to_signal",
+            self.wiener_noise_to_signal,
+            "",
+            1e-6,
+            1.0,
+        );
+        range(
+            "disparity_sigma_px",
+            self.disparity_sigma_px,
+            " px",
+            1e-3,
+            10.0,
+        );
+        range("gate_share", self.gate_share, "", 0.01, 0.49);
+        range(
+            "agreeing_reads",
+            f64::from(self.agreeing_reads),
+            "",
+            1.0,
+            20.0,
+        );
+        range("forget_s", self.forget_s, " s", 0.02, 60.0);
+        range(
+            "odometer_sigma_share",
+            self.odometer_sigma_share,
+            "",
+            0.0,
+            0.5,
+        );
+        range("imu_fade_s", self.imu_fade_s, " s", 0.1, 3600.0);
+        range(
+            "attitude_sigma_deg",
+            self.attitude_sigma_deg,
+            " deg",
+            0.0,
+            10.0,
+        );
+        range("front_pivot_m", self.front_pivot_m, " m", 0.0, 30.0);
+        range("survey_sigma_m", self.survey_sigma_m, " m", 0.0, 5.0);
+        range(
+            "rear_pivot_m",
+            self.rear_pivot_m,
+            " m",
+            self.front_pivot_m + 1.0,
+            60.0,
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_in_order_and_nonsense_is_named() {
+        let mut problems = Vec::new();
+        LedSettings::default().check("positioning", &mut problems);
+        assert!(problems.is_empty(), "{problems:?}");
+        let wrong = LedSettings {
+            gate_share: 0.5,
+            rear_pivot_m: f64::NAN,
+            ..LedSettings::default()
+        };
+        wrong.check("positioning", &mut problems);
+        let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
+        assert_eq!(keys, ["positioning.gate_share", "positioning.rear_pivot_m"]);
+    }
+}

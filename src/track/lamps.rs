@@ -1,0 +1,204 @@
+//! Lamps of a tunnel file: from a row and single entries to surveyed sites.
+
+use super::check::{free_standing, on_line};
+use super::file::{LampEntry, LampRow, TunnelFile};
+use super::furniture::LampSite;
+use super::problem::Problem;
+use super::section::OutlinePoint;
+use super::uid::Uid;
+use super::{TrackPoint, Tunnel};
+use nalgebra::{Unit, Vector3};
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// Lamp numbers have 10 bits.
+const MOST_LAMPS: usize = 1024;
+
+/// Places every lamp of the file, in order of chainage.
+pub(super) fn place(
+    file: &TunnelFile,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) -> Vec<LampSite> {
+    let common = file.lamps.clone().unwrap_or_default();
+    check_common(&common, problems);
+    let length_m = tunnel.alignment.length_m();
+    let mut placed: Vec<(String, LampSite)> = Vec::new();
+    if let Some(row) = &file.lamps {
+        for entry in row_entries(row, length_m, problems) {
+            let site = site(&common, &entry, tunnel);
+            placed.push((format!("lamps (lamp {})", entry.number), site));
+        }
+    }
+    for (k, entry) in file.lamp.iter().enumerate() {
+        let key = format!("lamp[{k}]");
+        Problem::unless_within(
+            problems,
+            format!("{key}.number"),
+            entry.number.into(),
+            0.0..=(MOST_LAMPS - 1) as f64,
+            "",
+        );
+        if on_line(
+            &format!("{key}.chainage_m"),
+            entry.chainage_m,
+            length_m,
+            problems,
+        ) {
+            placed.push((key, site(&common, entry, tunnel)));
+        }
+    }
+    check_places(&placed, tunnel, problems);
+    let mut sites: Vec<LampSite> = placed.into_iter().map(|(_, site)| site).collect();
+    sites.sort_by(|a, b| a.chainage_m.total_cmp(&b.chainage_m));
+    sites
+}
+
+fn check_common(row: &LampRow, problems: &mut Vec<Problem>) {
+    for (name, value, low, high, unit) in [
+        ("aim_yaw_deg", row.aim_yaw_deg, -90.0, 90.0, "deg"),
+        ("aim_pitch_deg", row.aim_pitch_deg, -90.0, 90.0, "deg"),
+        ("diameter_m", row.diameter_m, 0.01, 2.0, "m"),
+        ("power_w", row.power_w, 0.01, 10_000.0, "W"),
+        (
+            "efficacy_lm_per_w",
+            row.efficacy_lm_per_w,
+            1.0,
+            700.0,
+            "lm/W",
+        ),
+        ("beam_deg", row.beam_deg, 5.0, 170.0, "deg"),
+        ("chip_us", row.chip_us, 1.0, 10_000.0, "us"),
+        ("lateral_m", row.lateral_m, -60.0, 60.0, "m"),
+        ("height_m", row.height_m, -1.0, 30.0, "m"),
+    ] {
+        Problem::unless_within(problems, format!("lamps.{name}"), value, low..=high, unit);
+    }
+}
+
+/// The row as single lamps; none where its numbers make no sense.
+fn row_entries(row: &LampRow, length_m: f64, problems: &mut Vec<Problem>) -> Vec<LampEntry> {
+    let before = problems.len();
+    let to_m = row.to_m.unwrap_or(length_m);
+    Problem::unless_within(
+        problems,
+        "lamps.spacing_m",
+        row.spacing_m,
+        0.1..=10_000.0,
+        "m",
+    );
+    on_line("lamps.from_m", row.from_m, length_m, problems);
+    on_line("lamps.to_m", to_m, length_m, problems);
+    if to_m < row.from_m {
+        problems.push(Problem::new(
+            "lamps.to_m",
+            format!("{to_m} m is before the row's begin at {} m", row.from_m),
+            "let the row end further up the line",
+        ));
+    }
+    if problems.len() > before {
+        return Vec::new();
+    }
+    let count = ((to_m - row.from_m) / row.spacing_m + 1e-9).floor() as usize + 1;
+    if usize::from(row.first_number) + count > MOST_LAMPS {
+        problems.push(Problem::new(
+            "lamps.spacing_m",
+            format!(
+                "{count} lamps from number {} need numbers over {}",
+                row.first_number,
+                MOST_LAMPS - 1
+            ),
+            format!("a line has at most {MOST_LAMPS} lamps: space them wider, or shorten the row"),
+        ));
+        return Vec::new();
+    }
+    (0..count)
+        .map(|k| LampEntry {
+            number: row.first_number + k as u16,
+            chainage_m: row.from_m + k as f64 * row.spacing_m,
+            lateral_m: None,
+            height_m: None,
+            aim_yaw_deg: None,
+            aim_pitch_deg: None,
+            power_w: None,
+        })
+        .collect()
+}
+
+fn site(common: &LampRow, entry: &LampEntry, tunnel: &Tunnel) -> LampSite {
+    let lateral_m = entry.lateral_m.unwrap_or(common.lateral_m);
+    let height_m = entry.height_m.unwrap_or(common.height_m);
+    let yaw = entry.aim_yaw_deg.unwrap_or(common.aim_yaw_deg).to_radians();
+    let pitch = entry
+        .aim_pitch_deg
+        .unwrap_or(common.aim_pitch_deg)
+        .to_radians();
+    let heading = tunnel.alignment.at(entry.chainage_m).heading_rad;
+    let ahead = Vector3::new(heading.cos(), heading.sin(), 0.0);
+    let across = Vector3::new(heading.sin(), -heading.cos(), 0.0) * lateral_m.signum();
+    let facing =
+        (across * yaw.cos() - ahead * yaw.sin()) * pitch.cos() + Vector3::z() * pitch.sin();
+    LampSite {
+        uid: Uid {
+            line: tunnel.line_number,
+            lamp: entry.number,
+        },
+        chainage_m: entry.chainage_m,
+        lateral_m,
+        height_m,
+        centre: tunnel.alignment.world_from_track(TrackPoint {
+            s_m: entry.chainage_m,
+            l_m: lateral_m,
+            h_m: height_m,
+        }),
+        facing: Unit::new_normalize(facing),
+        diameter_m: common.diameter_m,
+        power_w: entry.power_w.unwrap_or(common.power_w),
+        efficacy_lm_per_w: common.efficacy_lm_per_w,
+        beam_deg: common.beam_deg,
+        chip_s: common.chip_us * 1e-6,
+        code: common.code,
+    }
+}
+
+/// UIDs that are there twice, discs in the rock or in the train's way. A row repeats the same
+/// fault at every lamp, so only its first is told.
+fn check_places(placed: &[(String, LampSite)], tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    let mut seen: BTreeMap<Uid, &str> = BTreeMap::new();
+    let mut row_told = false;
+    for (key, lamp) in placed {
+        if let Some(first) = seen.insert(lamp.uid, key) {
+            problems.push(Problem::new(
+                format!("{key}.number"),
+                format!("UID {} is that of {first} too", lamp.uid),
+                "give each lamp a number of its own",
+            ));
+        }
+        let of_row = key.starts_with("lamps");
+        if of_row && row_told {
+            continue;
+        }
+        let before = problems.len();
+        let key = if of_row { "lamps" } else { key };
+        free_standing(key, tunnel, lamp.chainage_m, &rim(lamp, tunnel), problems);
+        row_told |= of_row && problems.len() > before;
+    }
+}
+
+/// The disc's centre and rim in the cross-section.
+fn rim(lamp: &LampSite, tunnel: &Tunnel) -> Vec<OutlinePoint> {
+    let heading = tunnel.alignment.at(lamp.chainage_m).heading_rad;
+    let left = Vector3::new(-heading.sin(), heading.cos(), 0.0);
+    let radius_m = 0.5 * lamp.diameter_m;
+    // Two radii of the disc; where it faces up or down any horizontal one will do.
+    let level = Vector3::z().cross(&lamp.facing);
+    let u = level.try_normalize(1e-9).unwrap_or(left);
+    let v = lamp.facing.cross(&u);
+    let mut points = vec![OutlinePoint::new(lamp.lateral_m, lamp.height_m)];
+    points.extend((0..16).map(|k| {
+        let (sin, cos) = (f64::from(k) * TAU / 16.0).sin_cos();
+        let d = (u * cos + v * sin) * radius_m;
+        OutlinePoint::new(lamp.lateral_m + d.dot(&left), lamp.height_m + d.z)
+    }));
+    points
+}
