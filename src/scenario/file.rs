@@ -172,6 +172,11 @@ impl BenchSettings {
         (0..self.points).map(move |k| first_m + f64::from(k) * step_m)
     }
 
+    /// Time that all pairs of images take.
+    pub fn duration_s(&self, pairs_per_s: f64) -> f64 {
+        f64::from(self.points) * f64::from(self.fixes_per_point) / pairs_per_s
+    }
+
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         let points = f64::from(self.points);

@@ -32,9 +32,9 @@
 //! or a renderer.
 
 mod build;
+mod check;
 mod file;
 mod overrides;
-mod place;
 pub mod schema;
 
 pub use build::{Scenario, ScenarioError, WaysidePost};

@@ -1,0 +1,233 @@
+//! From a file to a checked scenario.
+
+use super::file::{BenchSettings, ScenarioFile, StackSettings};
+use super::{Override, OverrideError, check};
+use crate::bus::WaysideCalibration;
+use crate::record::RecordSettings;
+use crate::track::{FileError, Problem, Tunnel, read_toml};
+use crate::twin::comms::RadioSettings;
+use crate::twin::physics::PhysicsSettings;
+use crate::twin::sensors::{
+    ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
+};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A scenario, checked and ready to run.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Short name, fit for a folder.
+    pub name: String,
+    /// What it shows.
+    pub description: String,
+    /// Everything random follows from it.
+    pub seed: u64,
+    /// Simulated time; of a bench run, until the last pair of images is taken.
+    pub duration_s: f64,
+    /// End earlier, once the train has run and then stood for this long.
+    pub stop_after_standstill_s: Option<f64>,
+    /// The line.
+    pub tunnel: Arc<Tunnel>,
+    /// Train, track, obstacles, workers.
+    pub physics: PhysicsSettings,
+    /// A still rig moved from point to point, in place of a train.
+    pub bench: Option<BenchSettings>,
+    /// The stereo rig.
+    pub rig: Option<RigSettings>,
+    /// The inertial unit.
+    pub imu: ImuSettings,
+    /// The odometer.
+    pub odometer: OdometerSettings,
+    /// Wayside devices in use.
+    pub wayside: Vec<WaysidePost>,
+    /// The radio.
+    pub radio: RadioSettings,
+    /// The stack's settings.
+    pub stack: StackSettings,
+    /// What goes into the recording.
+    pub record: RecordSettings,
+}
+
+/// A wayside device in use, at its place.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WaysidePost {
+    /// As surveyed and calibrated.
+    pub calibration: WaysideCalibration,
+    /// Name of the balise that gets its messages.
+    pub balise: String,
+    /// Its camera's settings.
+    pub camera: WaysideCameraSettings,
+    /// Its lidar's settings.
+    pub lidar: Option<LidarSettings>,
+}
+
+/// Why there is no scenario.
+#[derive(Debug, thiserror::Error)]
+pub enum ScenarioError {
+    /// An override that cannot be applied.
+    #[error("--set {0}")]
+    Override(#[from] OverrideError),
+    /// The file is right by itself, but not with these overrides.
+    #[error("{} is right by itself, but not with {}: {source}", path.display(), list(overrides))]
+    Overridden {
+        /// The file.
+        path: PathBuf,
+        /// The overrides.
+        overrides: Vec<Override>,
+        /// What is wrong.
+        source: FileError,
+    },
+    /// A file is wrong: the scenario, or the tunnel that it names.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Its text, empty where it could not be read.
+        text: String,
+        /// Values in it that overrides have replaced.
+        overrides: Vec<Override>,
+        /// What is wrong.
+        source: FileError,
+    },
+}
+
+fn list(overrides: &[Override]) -> String {
+    let list: Vec<String> = overrides.iter().map(Override::to_string).collect();
+    list.join(" ")
+}
+
+impl Scenario {
+    /// Reads and checks a scenario file and the tunnel that it names.
+    pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ScenarioError> {
+        Self::from_text(path, &read(path)?, overrides)
+    }
+
+    /// As [`Self::load`], of a text already read; `path` is where relative paths count from.
+    pub fn from_text(
+        path: &Path,
+        text: &str,
+        overrides: &[Override],
+    ) -> Result<Self, ScenarioError> {
+        let wrong = |source| ScenarioError::File {
+            path: path.to_owned(),
+            text: text.to_owned(),
+            overrides: overrides.to_vec(),
+            source,
+        };
+        // The file must be right by itself, so that its errors are told apart from those of
+        // the command line.
+        let mut file: ScenarioFile = read_toml(text).map_err(wrong)?;
+        if !overrides.is_empty() {
+            file = overridden(path, text, overrides)?;
+        }
+
+        let mut problems = Vec::new();
+        check::alone(&file, &mut problems);
+        let tunnel_path = path.parent().unwrap_or(Path::new("")).join(&file.tunnel);
+        let tunnel = match std::fs::read_to_string(&tunnel_path) {
+            Ok(text) => Some(parse_tunnel(&tunnel_path, &text)),
+            Err(error) => {
+                problems.push(Problem::new(
+                    "tunnel",
+                    format!("cannot read {}: {error}", tunnel_path.display()),
+                    "give the path of a tunnel file, counted from the scenario's folder",
+                ));
+                None
+            }
+        };
+        let tunnel = match tunnel {
+            // The scenario's own problems first: the tunnel may be the wrong one.
+            Some(tunnel) if problems.is_empty() => tunnel?,
+            Some(Ok(tunnel)) => tunnel,
+            _ => return Err(wrong(FileError::Problems(problems))),
+        };
+        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        if !problems.is_empty() {
+            return Err(wrong(FileError::Problems(problems)));
+        }
+        Ok(Self::new(file, tunnel, wayside))
+    }
+
+    fn new(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
+        let physics = PhysicsSettings {
+            history_s: history_s(&file),
+            ..file.physics()
+        };
+        Self {
+            duration_s: match (&file.bench, &file.rig) {
+                (Some(bench), Some(rig)) => bench.duration_s(rig.pairs_per_s),
+                _ => file.duration_s,
+            },
+            name: file.name,
+            description: file.description,
+            seed: file.seed,
+            stop_after_standstill_s: file.stop_after_standstill_s,
+            tunnel: Arc::new(tunnel),
+            physics,
+            bench: file.bench,
+            rig: file.rig,
+            imu: file.imu,
+            odometer: file.odometer,
+            wayside,
+            radio: file.radio,
+            stack: file.stack,
+            record: file.record,
+        }
+    }
+}
+
+/// Reads and checks a tunnel's text; `path` is for the messages.
+pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioError> {
+    Tunnel::from_toml(text).map_err(|source| ScenarioError::File {
+        path: path.to_owned(),
+        text: text.to_owned(),
+        overrides: Vec::new(),
+        source,
+    })
+}
+
+/// Reads a file's text.
+pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
+    std::fs::read_to_string(path).map_err(|source| ScenarioError::File {
+        path: path.to_owned(),
+        text: String::new(),
+        overrides: Vec::new(),
+        source: FileError::Read {
+            path: path.to_owned(),
+            source,
+        },
+    })
+}
+
+fn overridden(
+    path: &Path,
+    text: &str,
+    overrides: &[Override],
+) -> Result<ScenarioFile, ScenarioError> {
+    let wrong = |source| ScenarioError::Overridden {
+        path: path.to_owned(),
+        overrides: overrides.to_vec(),
+        source,
+    };
+    let syntax = |message: String| FileError::Syntax {
+        message,
+        span: None,
+    };
+    let mut document: toml::Table = text
+        .parse()
+        .map_err(|e: toml::de::Error| wrong(syntax(e.message().to_owned())))?;
+    for change in overrides {
+        change.apply(&mut document)?;
+    }
+    let text = toml::to_string(&document).map_err(|e| wrong(syntax(e.to_string())))?;
+    read_toml(&text).map_err(wrong)
+}
+
+/// Poses are asked for until the last row of a frame has closed.
+fn history_s(file: &ScenarioFile) -> f64 {
+    let span_s = file.rig.as_ref().map_or(0.0, |rig| {
+        let camera = rig.calibration().camera;
+        camera.shutter.frame_span_s(camera.intrinsics.height_px)
+    });
+    (2.0 * span_s).max(PhysicsSettings::default().history_s)
+}

@@ -1,0 +1,310 @@
+//! What no part can check by itself: how the parts of a scenario go together.
+
+use super::WaysidePost;
+use super::file::{ScenarioFile, WaysidePostSettings};
+use crate::track::{Problem, Tunnel, did_you_mean};
+use crate::twin::physics::TrainSettings;
+use crate::twin::sensors::{RigSettings, ever_sees};
+
+/// Checks that need no tunnel.
+pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    check_name(&file.name, problems);
+    let duration = file.duration_s;
+    Problem::unless_within(problems, "duration_s", duration, 1e-3..=86_400.0, "s");
+    if let Some(standstill) = file.stop_after_standstill_s {
+        let key = "stop_after_standstill_s";
+        Problem::unless_within(problems, key, standstill, 0.0..=86_400.0, "s");
+    }
+    file.physics().check("", problems);
+    file.imu.check("imu", problems);
+    file.odometer.check("odometer", problems);
+    file.radio.check("radio", problems);
+    file.stack.check("stack", problems);
+    file.record.check("record", problems);
+    if let Some(bench) = &file.bench {
+        bench.check("bench", problems);
+    }
+    if let Some(rig) = &file.rig {
+        rig.check("rig", problems);
+    }
+    for (k, post) in file.wayside.iter().enumerate() {
+        post.camera.check(&format!("wayside[{k}].camera"), problems);
+        if let Some(lidar) = &post.lidar {
+            lidar.check(&format!("wayside[{k}].lidar"), problems);
+        }
+        if file.wayside[..k].iter().any(|p| p.device == post.device) {
+            problems.push(Problem::new(
+                format!("wayside[{k}].device"),
+                format!("`{}` is in use already", post.device),
+                "name each device once",
+            ));
+        }
+    }
+    check_carrier(file, problems);
+    check_appearances(file, problems);
+}
+
+/// Checks against the line, and the wayside devices at their places.
+pub(super) fn in_tunnel(
+    file: &ScenarioFile,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) -> Vec<WaysidePost> {
+    if let Some(train) = &file.train {
+        check_train(train, file.duration_s, tunnel, problems);
+    }
+    if let Some(bench) = &file.bench {
+        let heads: Vec<f64> = bench.heads_m().collect();
+        for (key, head) in [("first_m", heads.first()), ("points", heads.last())] {
+            if let Some(&head_m) = head {
+                inside_line(&format!("bench.{key}"), "the head", head_m, tunnel, problems);
+            }
+        }
+    }
+    check_obstacles(file, tunnel, problems);
+    check_workers(file, tunnel, problems);
+    if let Some(rig) = &file.rig {
+        check_view(rig, tunnel, problems);
+    }
+    let posts = file.wayside.iter().enumerate();
+    posts
+        .filter_map(|(k, post)| place(post, &format!("wayside[{k}]"), tunnel, problems))
+        .collect()
+}
+
+fn check_name(name: &str, problems: &mut Vec<Problem>) {
+    let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(fit) {
+        problems.push(Problem::new(
+            "name",
+            format!("`{name}` cannot name a folder of results"),
+            "use letters, digits, `_` and `-`",
+        ));
+    }
+}
+
+/// Something must move or look, and only one thing may carry the rig.
+fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    match (&file.train, &file.bench, &file.rig) {
+        (Some(_), Some(_), _) => problems.push(Problem::new(
+            "bench",
+            "there is a train too, and the rig can be on one of them only",
+            "take out [bench] or [train]",
+        )),
+        (None, Some(_), None) => problems.push(Problem::new(
+            "bench",
+            "there is no rig to stand at its points",
+            "add [rig]; empty, it is the reference rig",
+        )),
+        (None, None, Some(_)) => problems.push(Problem::new(
+            "rig",
+            "there is nothing that carries it",
+            "add [train], or [bench] for a rig at rest",
+        )),
+        (None, None, None) if file.wayside.is_empty() => problems.push(Problem::new(
+            "train",
+            "there is no train, no bench and no wayside device: nothing would be seen",
+            "add [train] with [rig], [bench] with [rig], or [[wayside]]",
+        )),
+        _ => {}
+    }
+}
+
+fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    let mut late = |key: String, what: &str, at_s: f64| {
+        if at_s > file.duration_s {
+            problems.push(Problem::new(
+                key,
+                format!("{what} at {at_s} s, but the run ends at {} s", file.duration_s),
+                "choose an earlier time, or a longer duration_s",
+            ));
+        }
+    };
+    for (k, obstacle) in file.obstacles.iter().enumerate() {
+        late(format!("obstacles[{k}].appears_s"), "it appears", obstacle.appears_s);
+    }
+    for (k, worker) in file.workers.iter().enumerate() {
+        if let Some(at_s) = worker.puts_down_s {
+            late(format!("workers[{k}].puts_down_s"), "he puts it down", at_s);
+            if worker.carries.is_none() {
+                problems.push(Problem::new(
+                    format!("workers[{k}].puts_down_s"),
+                    "he carries nothing that he could put down",
+                    format!("add [workers.carries] to workers[{k}], or take this out"),
+                ));
+            }
+        }
+    }
+}
+
+fn check_train(
+    train: &TrainSettings,
+    duration_s: f64,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) {
+    let end_m = tunnel.alignment.length_m();
+    let head_m = train.start_chainage_m;
+    let length_m = f64::from(train.cars) * train.car_length_m;
+    inside_line("train.start_chainage_m", "the train head", head_m, tunnel, problems);
+    if head_m < length_m {
+        problems.push(Problem::new(
+            "train.start_chainage_m",
+            format!("with its head at {head_m} m a train of {length_m:.1} m begins outside"),
+            format!("start at {length_m:.1} m or further up the line"),
+        ));
+    }
+    if let Some(stop_m) = train.stop_at_m {
+        inside_line("train.stop_at_m", "the train head", stop_m, tunnel, problems);
+    } else {
+        let reach_m = head_m + farthest_run_m(train, duration_s);
+        if reach_m > end_m {
+            problems.push(Problem::new(
+                "train.stop_at_m",
+                format!(
+                    "it is not given, and in {duration_s} s the train can get to {reach_m:.0} m, \
+                     past the end of the tunnel at {end_m:.0} m"
+                ),
+                format!("give a stop_at_m up to {end_m:.0} m, or shorten duration_s"),
+            ));
+        }
+    }
+}
+
+/// How far the driver can get: at full acceleration to the cruising speed, then at that.
+fn farthest_run_m(train: &TrainSettings, duration_s: f64) -> f64 {
+    let (start, cruise) = (train.start_speed_kmh / 3.6, train.cruise_speed_kmh / 3.6);
+    let driven_s = (duration_s - train.start_s).max(0.0);
+    let waited_m = start * (duration_s - driven_s);
+    let ramp_s = ((cruise - start).max(0.0) / train.accel_mps2).min(driven_s);
+    let top = start.max(cruise);
+    waited_m + (start + 0.5 * train.accel_mps2 * ramp_s) * ramp_s + top * (driven_s - ramp_s)
+}
+
+fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    for (k, o) in file.obstacles.iter().enumerate() {
+        let key = format!("obstacles[{k}].chainage_m");
+        if inside_line(&key, "it", o.chainage_m, tunnel, problems) {
+            let middle_m = o.height_m + 0.5 * o.body.size_m().z;
+            let at = format!("obstacles[{k}].lateral_m");
+            in_the_open(&at, o.chainage_m, o.lateral_m, middle_m, tunnel, problems);
+        }
+    }
+}
+
+fn check_workers(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    for (k, worker) in file.workers.iter().enumerate() {
+        for (j, p) in worker.path.iter().enumerate() {
+            let at = format!("workers[{k}].path[{j}]");
+            let key = format!("{at}.chainage_m");
+            if inside_line(&key, "he", p.chainage_m, tunnel, problems) {
+                let middle_m = worker.ground_m + 0.5 * worker.stature_m;
+                let at = format!("{at}.lateral_m");
+                in_the_open(&at, p.chainage_m, p.lateral_m, middle_m, tunnel, problems);
+            }
+        }
+    }
+}
+
+fn inside_line(
+    key: &str,
+    who: &str,
+    chainage_m: f64,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) -> bool {
+    let end_m = tunnel.alignment.length_m();
+    let inside = (0.0..=end_m).contains(&chainage_m);
+    if !inside {
+        problems.push(Problem::new(
+            key,
+            format!("{who} would be at {chainage_m} m, outside of the tunnel"),
+            format!("the line runs from 0 to {end_m:.1} m"),
+        ));
+    }
+    inside
+}
+
+fn in_the_open(
+    key: &str,
+    chainage_m: f64,
+    lateral_m: f64,
+    height_m: f64,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) {
+    let section = tunnel.section_at(chainage_m);
+    if section.is_some_and(|section| !section.contains(lateral_m, height_m)) {
+        problems.push(Problem::new(
+            key,
+            format!(
+                "{lateral_m} m to the left and {height_m:.2} m above top of rail is inside the \
+                 wall at chainage {chainage_m} m"
+            ),
+            "bring it nearer to the centreline (0 m), or check its height",
+        ));
+    }
+}
+
+fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    if tunnel.lamps.is_empty() {
+        problems.push(Problem::new(
+            "rig",
+            format!("tunnel `{}` has no lamps to see", tunnel.name),
+            "choose a tunnel with lamps, or take out [rig]",
+        ));
+        return;
+    }
+    let calibration = rig.calibration();
+    if !tunnel.lamps.iter().any(|lamp| ever_sees(&calibration, tunnel, lamp)) {
+        problems.push(Problem::new(
+            "rig.yaw_deg",
+            format!(
+                "turned {} deg to the left and {} deg up, the rig never sees a whole lamp with \
+                 both eyes",
+                rig.yaw_deg, rig.pitch_deg
+            ),
+            "turn it towards the lamps; the reference rig has yaw_deg = 39, pitch_deg = 22",
+        ));
+    }
+}
+
+fn place(
+    post: &WaysidePostSettings,
+    at: &str,
+    tunnel: &Tunnel,
+    problems: &mut Vec<Problem>,
+) -> Option<WaysidePost> {
+    let Some(site) = tunnel.wayside.iter().find(|site| site.name == post.device) else {
+        problems.push(unknown_device(post, at, tunnel));
+        return None;
+    };
+    let calibration = post.camera.calibration(site, tunnel, post.lidar.is_some());
+    if calibration.is_none() {
+        problems.push(Problem::new(
+            format!("{at}.device"),
+            format!("its balise `{}` is not in the tunnel", site.balise),
+            "name a balise of the tunnel in the tunnel file",
+        ));
+    }
+    calibration.map(|calibration| WaysidePost {
+        calibration,
+        balise: site.balise.clone(),
+        camera: post.camera.clone(),
+        lidar: post.lidar.clone(),
+    })
+}
+
+fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Problem {
+    let names: Vec<String> = tunnel.wayside.iter().map(|site| site.name.clone()).collect();
+    let remedy = match did_you_mean(&post.device, &names) {
+        Some(name) => format!("did you mean `{name}`?"),
+        None if names.is_empty() => "add [[wayside]] to the tunnel file".to_owned(),
+        None => format!("devices of this tunnel: {}", names.join(", ")),
+    };
+    Problem::new(
+        format!("{at}.device"),
+        format!("tunnel `{}` has no wayside device `{}`", tunnel.name, post.device),
+        remedy,
+    )
+}

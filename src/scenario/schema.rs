@@ -1,0 +1,18 @@
+//! JSON Schemas of the files, generated from the types. The copies in the repository serve
+//! editors (`#:schema scenario.schema.json` as a file's first line); a test keeps them in step.
+
+use super::ScenarioFile;
+use crate::track::tunnel_schema;
+use schemars::schema_for;
+
+/// Where each schema is kept, relative to the repository, and its text.
+pub fn all() -> Result<[(&'static str, String); 2], serde_json::Error> {
+    let pretty = |schema| serde_json::to_string_pretty(&schema).map(|text| text + "\n");
+    Ok([
+        (
+            "scenarios/scenario.schema.json",
+            pretty(schema_for!(ScenarioFile))?,
+        ),
+        ("tunnels/tunnel.schema.json", pretty(tunnel_schema())?),
+    ])
+}
