@@ -4,7 +4,9 @@
 pub mod cpu;
 pub mod gpu;
 pub mod light;
+pub mod sample;
 mod scene;
+pub mod surface;
 
 pub use scene::{
     Body, CameraMotion, Headlight, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View,
