@@ -14,6 +14,8 @@ use nalgebra::{Isometry3, Vector3};
 pub struct Opening<'a> {
     /// Name of the scenario.
     pub scenario: &'a str,
+    /// Its seed.
+    pub seed: u64,
     /// The line.
     pub tunnel: &'a Tunnel,
     /// The rig on the train.

@@ -211,6 +211,17 @@ impl WaysideScore {
         }
     }
 
+    /// Takes in the scores of another device.
+    pub fn add(&mut self, other: Self) {
+        for (name, theirs) in other.found {
+            let ours = self.found.entry(name).or_insert(theirs);
+            ours.appeared = ours.appeared.min(theirs.appeared);
+            ours.first = ours.first.into_iter().chain(theirs.first).min();
+        }
+        self.false_alarms += other.false_alarms;
+        self.costs_ms.extend(other.costs_ms);
+    }
+
     /// The figures.
     pub fn finish(mut self) -> Wayside {
         let score = |(name, f): (String, Found)| ObstacleScore {
