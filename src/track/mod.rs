@@ -27,6 +27,7 @@ pub use file::{
 };
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
 pub use gauge::{Gauge, RAIL_CENTRE_M, RAIL_FOOT_M, RAIL_WIDTH_M, rail_boxes};
+pub use mesh::{Mesh, RING_M, sweep};
 pub use problem::{FileError, Problem};
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,

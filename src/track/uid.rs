@@ -14,6 +14,15 @@
 //! it; after every 4 bits the complement of the last one, so runs end after 5 chips. The header
 //! is six chips on and one off, the footer one off. Shorter, but the mean brightness depends on
 //! the name.
+//!
+//! ```
+//! use metrotwin::track::uid::{LineCode, Uid};
+//!
+//! let uid = Uid { line: 1, lamp: 152 };
+//! let frame = uid.frame(LineCode::Manchester);
+//! assert_eq!(frame.len, 48);
+//! assert_eq!(Uid::from_frame(frame, LineCode::Manchester), Some(uid));
+//! ```
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -239,4 +248,183 @@ fn crc6(data: u32, n: u32) -> u32 {
         let feedback = (crc >> 5 ^ data >> k) & 1;
         (crc << 1 & 0x3f) ^ (feedback * 0b00_0011)
     })
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    const CODES: [LineCode; 2] = [LineCode::Manchester, LineCode::Nrz];
+
+    fn all() -> impl Iterator<Item = Uid> {
+        (0..16).flat_map(|line| (0..1024).map(move |lamp| Uid { line, lamp }))
+    }
+
+    fn cyclic(frame: ChipFrame, from: u32) -> impl Iterator<Item = bool> {
+        (0..frame.len).map(move |k| frame.is_on((from + k) % frame.len))
+    }
+
+    /// Longest runs of equal chips, read cyclically, in falling order.
+    fn runs(frame: ChipFrame) -> Vec<u32> {
+        let len = frame.len;
+        let change = |k: u32| frame.is_on(k % len) != frame.is_on((k + len - 1) % len);
+        let starts: Vec<u32> = (0..len).filter(|k| change(*k)).collect();
+        let next = starts.iter().skip(1).copied().chain([starts[0] + len]);
+        let mut runs: Vec<u32> = starts.iter().zip(next).map(|(a, b)| b - a).collect();
+        runs.sort_unstable_by(|a, b| b.cmp(a));
+        runs
+    }
+
+    /// Provokes: two names with the same signal, or a frame that is not read back.
+    #[test]
+    fn frames_are_read_back_and_nothing_else_is() {
+        for code in CODES {
+            for uid in all() {
+                let frame = uid.frame(code);
+                assert_eq!(frame.len, code.chips());
+                assert_eq!(Uid::from_frame(frame, code), Some(uid));
+                let damaged = ChipFrame {
+                    bits: frame.bits ^ 1 << (uid.lamp as u32 % frame.len),
+                    len: frame.len,
+                };
+                assert_eq!(Uid::from_frame(damaged, code), None);
+            }
+        }
+    }
+
+    /// Provokes: a header that data can imitate: over all names and cyclic shifts the header
+    /// stands at one place only.
+    #[test]
+    fn a_frame_cannot_be_found_inside_itself() {
+        for code in CODES {
+            let (pattern, n) = code.header();
+            for uid in all() {
+                let frame = uid.frame(code);
+                let found = (0..frame.len)
+                    .filter(|from| {
+                        cyclic(frame, *from)
+                            .take(n as usize)
+                            .enumerate()
+                            .all(|(k, on)| on == (pattern >> k & 1 == 1))
+                    })
+                    .count();
+                assert_eq!(found, 1, "{uid} {code:?}");
+            }
+        }
+    }
+
+    /// Provokes: data runs as long as the header's, which would have to be told apart by a chip.
+    #[test]
+    fn runs_are_bounded() {
+        for uid in all() {
+            let manchester = runs(uid.frame(LineCode::Manchester));
+            assert!(manchester[0] == 4 && (3..=4).contains(&manchester[1]));
+            assert!(manchester[2] <= LineCode::Manchester.longest_data_run());
+            let nrz = runs(uid.frame(LineCode::Nrz));
+            assert_eq!(nrz[0], 6);
+            assert!(nrz[1] <= LineCode::Nrz.longest_data_run());
+        }
+    }
+
+    /// Provokes: a lamp whose brightness depends on its name (flicker from lamp to lamp).
+    #[test]
+    fn manchester_is_on_half_of_the_time() {
+        for uid in all() {
+            assert_eq!(uid.manchester().bits.count_ones(), MANCHESTER_CHIPS / 2);
+        }
+    }
+
+    /// Provokes: a check polynomial of too short a period or with a reflected shift: every one
+    /// and two wrong bits of the 20 are noticed, for every name.
+    #[test]
+    fn val_crc_detects_one_and_two_wrong_bits() {
+        for uid in all() {
+            let sent = uid.payload();
+            assert_eq!(Uid::from_payload(sent), Some(uid));
+            for a in 0..PAYLOAD_BITS {
+                assert_eq!(Uid::from_payload(sent ^ 1 << a), None);
+                for b in 0..a {
+                    assert_eq!(Uid::from_payload(sent ^ 1 << a ^ 1 << b), None);
+                }
+            }
+            assert_eq!(Uid::from_payload(sent | 1 << PAYLOAD_BITS), None);
+        }
+    }
+
+    /// Remainder of polynomial division by x^6 + x + 1, done on the whole word at once.
+    #[test]
+    fn val_crc_is_the_remainder_of_the_polynomial() {
+        for data in 0..1 << 14 {
+            let mut rest: u32 = data << 6;
+            for k in (6..20).rev() {
+                if rest >> k & 1 == 1 {
+                    rest ^= 0b100_0011 << (k - 6);
+                }
+            }
+            assert_eq!(crc6(data, 14), rest);
+        }
+    }
+
+    /// Provokes: an integral that is off at chip borders, over whole periods, before the phase,
+    /// or late in a run: held against 20,000 samples.
+    #[test]
+    fn on_share_is_the_mean_of_dense_samples() {
+        for (k, uid) in all().step_by(997).enumerate() {
+            let waveform = Waveform {
+                frame: uid.frame(CODES[k % 2]),
+                chip_s: 45e-6,
+                phase_s: 3.21e-4 * k as f64,
+            };
+            for (open, span) in [
+                (-0.01, 50e-6),
+                (0.0123, 13e-6),
+                (0.3, 45e-6),
+                (600.0, 100e-6),
+                (2.0, 7e-3),
+            ] {
+                let n = 20_000;
+                let on = (0..n)
+                    .filter(|i| waveform.on_at(open + span * (f64::from(*i) + 0.5) / f64::from(n)))
+                    .count();
+                let sampled = on as f64 / f64::from(n);
+                let share = waveform.on_share(open, open + span);
+                // A sample decides for its cell: half a cell a border of a chip.
+                let borders = 2.0 + span / waveform.chip_s;
+                assert!(
+                    (share - sampled).abs() < 0.5 * borders / f64::from(n) + 1e-6,
+                    "{uid} {open} {span}: {share} {sampled}"
+                );
+            }
+            let whole = waveform.on_share(0.1, 0.1 + 3.0 * waveform.period_s());
+            let mean = f64::from(waveform.frame.bits.count_ones()) / f64::from(waveform.frame.len);
+            assert!((whole - mean).abs() < 1e-9);
+        }
+    }
+
+    /// Provokes: shifts by more bits than there are.
+    #[test]
+    fn odd_frames_do_not_panic() {
+        for (bits, len) in [(u64::MAX, 64), (5, 0), (u64::MAX, 200)] {
+            let waveform = Waveform {
+                frame: ChipFrame { bits, len },
+                chip_s: 45e-6,
+                phase_s: 0.0,
+            };
+            for t in [-1.0, 0.0, 1e-3, f64::NAN] {
+                waveform.on_at(t);
+                waveform.on_share(t, t + 1e-4);
+            }
+        }
+        let full = ChipFrame {
+            bits: u64::MAX,
+            len: 64,
+        };
+        let waveform = Waveform {
+            frame: full,
+            chip_s: 1.0,
+            phase_s: 0.0,
+        };
+        assert!((waveform.on_share(-3.3, 130.7) - 1.0).abs() < 1e-12);
+    }
 }

@@ -1,21 +1,137 @@
-//! Obstacle detection in a wayside box.
+//! Obstacle detection in a wayside box: camera frames and lidar scans in, a report a frame and
+//! messages to the trains out.
+//!
+//! ```
+//! use metrotwin::bus::{CameraModel, Frame, Intrinsics, Shutter, SimTime, WaysideCalibration};
+//! use metrotwin::stack::wayside::{WaysideDetector, WaysideSettings};
+//! # use metrotwin::track::{Alignment, Grade, PlanElement, Tunnel};
+//! # use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
+//! # let straight = PlanElement { length_m: 400.0, start_per_m: 0.0, end_per_m: 0.0,
+//! #     start_cant_m: 0.0, end_cant_m: 0.0 };
+//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(),
+//! #     alignment: Alignment::new(Point3::origin(), 0.0, &[straight], &[]),
+//! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
+//! #     line_number: 1, stations: vec![], ambient_lx: 5.0 });
+//! // On the left wall at chainage 200 m, 2.5 m up, looking down the line at approaching trains.
+//! let axes = Matrix3::new(0.0, 0.1, -1.0, 1.0, 0.0, 0.0, 0.0, -1.0, -0.1);
+//! let calibration = WaysideCalibration {
+//!     name: "W1".into(),
+//!     camera: CameraModel {
+//!         intrinsics: Intrinsics::centred(640, 360, 367.0),
+//!         shutter: Shutter { line_time_s: 14.8e-6, exposure_s: 8e-3 },
+//!     },
+//!     world_from_camera: Isometry3::from_parts(
+//!         Translation3::new(200.0, 2.5, 2.5),
+//!         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&axes)),
+//!     ),
+//!     world_from_lidar: None,
+//!     chainage_m: 200.0,
+//!     balise_chainage_m: 0.0,
+//! };
+//! let settings = WaysideSettings { reference_frames: 1, ..Default::default() };
+//! let mut detector = WaysideDetector::new(&settings, calibration, map);
+//! let mut image = image::GrayImage::from_pixel(640, 360, image::Luma([90]));
+//! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
+//!     let start = SimTime::from_secs(f64::from(number) * 0.1);
+//!     detector.on_frame(&Frame { number, start, image: image.clone() }, None, None)
+//! };
+//! assert!(report(&mut detector, 0, &image).learning);
+//! assert!(report(&mut detector, 1, &image).passage_possible);
+//! // Something dark lies on the track from now on; the third frame confirms it.
+//! for (u, v) in (390..410).flat_map(|u| (190..210).map(move |v| (u, v))) {
+//!     image.put_pixel(u, v, image::Luma([30]));
+//! }
+//! assert!(report(&mut detector, 2, &image).obstacles.is_empty());
+//! assert!(report(&mut detector, 3, &image).obstacles.is_empty());
+//! assert_eq!(report(&mut detector, 4, &image).obstacles.len(), 1);
+//! ```
+//!
+//! # Method
+//!
+//! The baseline of Xiao, Xu and Yu, "Research on Obstacle Detection and Train Control Technology
+//! for Urban Rail Transit", Journal of Ordnance Equipment Engineering 41(10), 2020, 161-165:
+//! difference to a reference image of the clear track, |id| >= T, connected regions, comparison
+//! with stored knowledge of the structure gauge. One file a stage:
+//!
+//! | file | stage |
+//! |---|---|
+//! | `reference` | the reference image, learnt from the first frames and held |
+//! | `difference` | difference, threshold, 3x3 median; compensation of headlights |
+//! | `regions` | connected regions |
+//! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
+//! | `place` | region to obstacle: place, width, height; fused with lidar echoes |
+//! | `gauge` | danger level |
+//! | `confirm` | k of n frames |
+//! | [`distance`] | distance to the train, by the paper's formulas and exact |
+//! | `announce` | messages |
+//!
+//! # The train itself
+//!
+//! It enters the view, and its headlights come before it. While a train is reported within
+//! [`HEADLIGHT_M`] of the device, grey levels are compensated by the local gain (see
+//! `difference`). Where the train is reported to be, with a margin, lines of sight that pass the
+//! gauge there are blind: nothing is found by them, and what was confirmed there stays confirmed
+//! until they see again. Without reports of the train it is an obstacle like any other.
+//!
+//! # What it does not do
+//!
+//! It finds nothing whose grey is within T of what is behind, nor anything smaller than the noise
+//! filter lets through; it needs a clear track at the start; it takes a region's lowest edge for
+//! its foot, so that something above the bed is placed too far away.
 
+mod announce;
+mod cells;
+mod confirm;
+mod difference;
+pub mod distance;
+mod gauge;
+mod place;
+mod reference;
+mod regions;
 mod settings;
+mod sight;
+#[cfg(test)]
+mod test_scene;
+#[cfg(test)]
+mod tests;
 
+pub use place::lidar_point;
 pub use settings::WaysideSettings;
 
 use crate::bus::{
-    Frame, LidarScan, ObstacleWarning, TrainReport, WaysideCalibration, WaysideReport,
+    DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, TrainReport,
+    WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
+use announce::Announcer;
+use cells::Cells;
+use confirm::Confirmation;
+use difference::Difference;
+use image::GrayImage;
+use place::Placer;
+use reference::Reference;
+use regions::Regions;
+use sight::Sight;
 use std::sync::Arc;
+
+/// A train nearer than this to the device's view may light it.
+pub const HEADLIGHT_M: f64 = 200.0;
+/// A train's place is known to this; its halo reaches as far.
+const TRAIN_MARGIN_M: f64 = 10.0;
 
 /// One wayside device.
 #[derive(Clone, Debug)]
 pub struct WaysideDetector {
     settings: WaysideSettings,
-    calibration: WaysideCalibration,
-    map: Arc<Tunnel>,
+    sight: Sight,
+    cells: Cells,
+    reference: Reference,
+    difference: Difference,
+    regions: Regions,
+    placer: Placer,
+    confirmation: Confirmation,
+    announcer: Announcer,
+    found: Vec<DetectedObstacle>,
 }
 
 impl WaysideDetector {
@@ -25,32 +141,151 @@ impl WaysideDetector {
         calibration: WaysideCalibration,
         map: Arc<Tunnel>,
     ) -> Self {
+        let intrinsics = calibration.camera.intrinsics;
+        let (width, height) = (intrinsics.width_px as usize, intrinsics.height_px as usize);
+        let announcer = Announcer::new(settings, &calibration.name);
+        let sight = Sight::new(settings, calibration, map);
         Self {
             settings: settings.clone(),
-            calibration,
-            map,
+            cells: Cells::new(&sight, width, height),
+            sight,
+            reference: Reference::new(settings, width * height),
+            difference: Difference::new(settings, width, height),
+            regions: Regions::default(),
+            placer: Placer::default(),
+            confirmation: Confirmation::new(settings),
+            announcer,
+            found: Vec::new(),
         }
     }
 
-    /// Looks at one frame; `train` is the last position report of the train on approach.
+    /// Looks at one frame; `scan` is a lidar sweep of about the same time, `train` the last
+    /// position report of the train on approach. A frame of another size than the calibration's
+    /// tells nothing.
     pub fn on_frame(
         &mut self,
         frame: &Frame,
-        _scan: Option<&LidarScan>,
-        _train: Option<TrainReport>,
+        scan: Option<&LidarScan>,
+        train: Option<TrainReport>,
     ) -> WaysideReport {
-        let _ = (&self.settings, &self.calibration, &self.map);
-        WaysideReport {
+        let intrinsics = self.sight.calibration().camera.intrinsics;
+        if frame.image.dimensions() != (intrinsics.width_px, intrinsics.height_px) {
+            return self.report(frame, train, Vec::new());
+        }
+        if !self.reference.ready() {
+            self.learn(frame.image.as_raw());
+            return self.report(frame, train, Vec::new());
+        }
+        let train = train.map(|t| TrainReport {
+            chainage_m: t.chainage_m + t.speed_mps * frame.start.since(t.time).max(0.0),
             time: frame.start,
-            number: frame.number,
-            learning: true,
-            passage_possible: true,
-            ..WaysideReport::default()
+            ..t
+        });
+        self.cells.occupy(train.map(|t| self.occupied_m(t)));
+        self.difference.run(
+            frame.image.as_raw(),
+            &self.reference.mean,
+            &self.reference.valid,
+            &self.cells,
+            train.is_some_and(|t| self.may_light(t)),
+        );
+        let blobs = self.regions.find(
+            &self.difference.binary,
+            intrinsics.width_px as usize,
+            self.settings.min_area_px,
+        );
+        self.found.clear();
+        for blob in &blobs {
+            let placed = self.placer.place(
+                &self.settings,
+                &self.sight,
+                blob,
+                &self.difference.binary,
+                scan,
+            );
+            self.found.extend(placed);
+        }
+        self.confirmation.update(&self.found, &self.cells);
+        let mut report = self.report(frame, train, blobs);
+        if self.settings.keep_images {
+            let (w, h) = frame.image.dimensions();
+            report.difference = GrayImage::from_raw(w, h, self.difference.absolute.clone());
+            report.binary = GrayImage::from_raw(w, h, self.difference.binary.clone());
+        }
+        report
+    }
+
+    /// The message that this report gives rise to, if any: on a change of danger, again every
+    /// `refresh_s` while it lasts, and a clear message (danger none) when it is over.
+    pub fn message(&mut self, report: &WaysideReport) -> Option<ObstacleWarning> {
+        self.announcer.message(report)
+    }
+
+    fn learn(&mut self, grey: &[u8]) {
+        self.reference.learn(grey, &self.settings);
+        if self.reference.ready() {
+            let width = self.sight.calibration().camera.intrinsics.width_px as usize;
+            let cells = &self.cells;
+            self.reference.restrict(width, |u, v| cells.in_gauge(u, v));
+            self.difference
+                .set_reference(&self.reference.mean, &self.reference.valid);
         }
     }
 
-    /// The message that this report gives rise to, if any.
-    pub fn message(&mut self, _report: &WaysideReport) -> Option<ObstacleWarning> {
-        None
+    /// Tail and head of a train, with margin.
+    fn occupied_m(&self, train: TrainReport) -> (f64, f64) {
+        (
+            train.chainage_m - self.settings.train_length_m - TRAIN_MARGIN_M,
+            train.chainage_m + TRAIN_MARGIN_M,
+        )
+    }
+
+    fn may_light(&self, train: TrainReport) -> bool {
+        let device = self.sight.calibration().chainage_m;
+        let reach = self.settings.reach_m + HEADLIGHT_M;
+        train.chainage_m > device - reach
+            && train.chainage_m - self.settings.train_length_m < device + reach
+    }
+
+    fn report(
+        &self,
+        frame: &Frame,
+        train: Option<TrainReport>,
+        blobs: Vec<crate::bus::Blob>,
+    ) -> WaysideReport {
+        let obstacles: Vec<DetectedObstacle> = self.confirmation.confirmed().cloned().collect();
+        let danger = obstacles.iter().map(|o| o.danger).max().unwrap_or_default();
+        // Only what lies before the train's head concerns it; the nearest comes first.
+        let distances = train.and_then(|t| {
+            obstacles
+                .iter()
+                .filter(|o| o.danger != DangerLevel::None && o.to_chainage_m >= t.chainage_m)
+                .map(|o| {
+                    distance::train_distance_m(self.sight.map(), self.sight.calibration(), t, o)
+                })
+                .min_by(|a, b| a.1.total_cmp(&b.1))
+        });
+        let learning = !self.reference.ready();
+        WaysideReport {
+            time: frame.start,
+            number: frame.number,
+            learning,
+            train_in_view: self.cells.any_blind(),
+            blobs,
+            train_distance_m: distances.map(|d| d.0),
+            train_distance_exact_m: distances.map(|d| d.1),
+            train_affected: danger == DangerLevel::High,
+            danger,
+            passage_possible: !learning && danger != DangerLevel::High,
+            emergency_needed: danger == DangerLevel::High,
+            plan: match danger {
+                DangerLevel::None => Plan::Pass,
+                DangerLevel::Low => Plan::WarnDriver,
+                DangerLevel::High => Plan::BrakeAutomatically,
+            },
+            obstacles,
+            difference: None,
+            binary: None,
+        }
     }
 }

@@ -1,0 +1,198 @@
+//! The outline of a lamp whose image is cut into stripes.
+//!
+//! The binary spot is closed (dilated, then eroded) by an upright segment longer than the code's
+//! longest darkness, so that the stripes become one component. The closing decides *what belongs
+//! together*, not where the edge is: where a dark stripe touches the upper or lower end of the
+//! lamp, the closed spot ends too early, by up to four chips (eight rows), and an ellipse through
+//! those ends would be too small and off the centre. Therefore edge points are taken from lit rows
+//! only, to the left and right: there the edge is the lamp's own, a dark stripe removes points
+//! and never makes a false one, and the two sides alone determine the ellipse.
+//!
+//! An edge lies where the row crosses half of its own plateau, between two pixels by linear
+//! interpolation; so a row that caught the lamp switching, at half its brightness, gives the same
+//! edge. Where the sensor saturates the plateau is too low and the edge lies up to half a pixel
+//! outside, left and right alike.
+
+use super::patch::Patch;
+use nalgebra::Point2;
+
+/// A connected spot in a patch, row by row.
+#[derive(Debug, Default)]
+pub struct Outline {
+    /// Rows of the patch that the spot covers: from the first to the last.
+    pub rows: Option<(usize, usize)>,
+    /// Leftmost and rightmost column of the closed spot in every row of `rows`.
+    pub extents: Vec<(usize, usize)>,
+    /// Pixels of the closed spot.
+    pub area_px: usize,
+    /// Lit rows, as row of the patch and sub-pixel left and right edge, `NaN` where the image's
+    /// border cut it.
+    pub edges: Vec<(usize, f64, f64)>,
+    /// Edge points in image coordinates.
+    pub points: Vec<Point2<f64>>,
+    /// It touches the image's border.
+    pub cut: bool,
+    mask: Vec<bool>,
+    stack: Vec<usize>,
+}
+
+impl Outline {
+    /// Finds the largest spot over `threshold` in the filtered patch after closing gaps of up to
+    /// `gap_rows`. `false` where there is none.
+    pub fn find(&mut self, filtered: &Patch, threshold: u8, gap_rows: usize) -> bool {
+        let w = filtered.width;
+        self.rows = None;
+        self.mask.clear();
+        self.mask.extend(filtered.data.iter().map(|&g| g > threshold));
+        close_columns(&mut self.mask, w, gap_rows);
+        let mut largest = (0, 0);
+        let mut labelled = std::mem::take(&mut self.mask);
+        let seen = labelled.clone();
+        for start in 0..labelled.len() {
+            if labelled[start] {
+                let area = self.flood(&mut labelled, w, start, |_| {});
+                if area > largest.0 {
+                    largest = (area, start);
+                }
+            }
+        }
+        self.mask = seen;
+        if largest.0 == 0 {
+            return false;
+        }
+        self.take(largest.1, w);
+        true
+    }
+
+    /// Fills rows and extents from the component that holds pixel `start`.
+    fn take(&mut self, start: usize, w: usize) {
+        let mut mask = std::mem::take(&mut self.mask);
+        let mut extents = std::mem::take(&mut self.extents);
+        extents.clear();
+        extents.resize(mask.len() / w, (usize::MAX, 0));
+        self.area_px = self.flood(&mut mask, w, start, |k| {
+            let (u, extent) = (k % w, &mut extents[k / w]);
+            *extent = (extent.0.min(u), extent.1.max(u));
+        });
+        self.mask = mask;
+        let covered = |e: &(usize, usize)| e.0 <= e.1;
+        let first = extents.iter().position(covered).unwrap_or(0);
+        let last = extents.iter().rposition(covered).unwrap_or(0);
+        extents.copy_within(first..=last, 0);
+        extents.truncate(last - first + 1);
+        self.extents = extents;
+        self.rows = Some((first, last));
+    }
+
+    /// Clears a component of the mask and counts its pixels (neighbours share a side or corner).
+    fn flood(&mut self, mask: &mut [bool], w: usize, start: usize, mut each: impl FnMut(usize)) -> usize {
+        let h = mask.len() / w;
+        let mut area = 0;
+        mask[start] = false;
+        self.stack.clear();
+        self.stack.push(start);
+        while let Some(k) = self.stack.pop() {
+            area += 1;
+            each(k);
+            let (u, v) = (k % w, k / w);
+            for v in v.saturating_sub(1)..(v + 2).min(h) {
+                for u in u.saturating_sub(1)..(u + 2).min(w) {
+                    if std::mem::take(&mut mask[v * w + u]) {
+                        self.stack.push(v * w + u);
+                    }
+                }
+            }
+        }
+        area
+    }
+
+    /// Sub-pixel edges of the lit rows from the unfiltered patch (the median would shorten rows
+    /// beside dark ones). `image_size` tells which borders of the patch are the image's.
+    pub fn trace(&mut self, raw: &Patch, black: f64, threshold: u8, image_size: (usize, usize)) {
+        self.edges.clear();
+        self.points.clear();
+        self.cut = false;
+        let Some((first, last)) = self.rows else {
+            return;
+        };
+        let at_left = raw.u0 == 0;
+        let at_right = raw.u0 + raw.width == image_size.0;
+        self.cut = raw.v0 + first == 0 || raw.v0 + last + 1 >= image_size.1;
+        for v in first..=last {
+            let (u0, u1) = self.extents[v - first];
+            let row = raw.row(v);
+            let Some((u0, u1)) = lit_core(row, u0, u1, threshold) else {
+                continue;
+            };
+            let level = black + 0.5 * (plateau(row, u0, u1) - black);
+            let left = if at_left && u0 == 0 {
+                None
+            } else {
+                crossing(row, (0..=(u0 + u1) / 2).rev(), level)
+            };
+            let right = if at_right && u1 + 1 == raw.width {
+                None
+            } else {
+                crossing(row, (u0 + u1) / 2..raw.width, level)
+            };
+            self.cut |= (at_left && u0 == 0) || (at_right && u1 + 1 == raw.width);
+            let (du, dv) = (raw.u0 as f64, (raw.v0 + v) as f64);
+            let found = left.into_iter().chain(right);
+            self.points.extend(found.map(|u| Point2::new(u + du, dv)));
+            self.edges.push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
+        }
+    }
+}
+
+/// Fills dark gaps of up to `gap` rows between lit pixels of a column: closing by a segment.
+fn close_columns(mask: &mut [bool], w: usize, gap: usize) {
+    if w == 0 {
+        return;
+    }
+    let h = mask.len() / w;
+    for u in 0..w {
+        let mut last_lit: Option<usize> = None;
+        for v in 0..h {
+            if mask[v * w + u] {
+                if let Some(last) = last_lit.filter(|last| v - last <= gap + 1) {
+                    for between in last + 1..v {
+                        mask[between * w + u] = true;
+                    }
+                }
+                last_lit = Some(v);
+            }
+        }
+    }
+}
+
+/// Narrows an extent to the pixels over the threshold; `None` where fewer than 60 % of them, or
+/// fewer than four, are lit.
+fn lit_core(row: &[u8], u0: usize, u1: usize, threshold: u8) -> Option<(usize, usize)> {
+    let over = |&u: &usize| row[u] > threshold;
+    let first = (u0..=u1).find(over)?;
+    let last = (u0..=u1).rev().find(over)?;
+    let lit = (first..=last).filter(over).count();
+    (lit >= 4 && lit * 10 >= (u1 + 1 - u0) * 6).then_some((first, last))
+}
+
+/// Mean of the middle half of a lit row.
+fn plateau(row: &[u8], u0: usize, u1: usize) -> f64 {
+    let quarter = (u1 - u0) / 4;
+    let middle = &row[u0 + quarter..=u1 - quarter];
+    middle.iter().map(|&g| f64::from(g)).sum::<f64>() / middle.len() as f64
+}
+
+/// Where a row falls under `level`, walking along `columns` from inside the lamp outwards.
+fn crossing(row: &[u8], columns: impl Iterator<Item = usize>, level: f64) -> Option<f64> {
+    let mut inside: Option<(usize, f64)> = None;
+    for u in columns {
+        let grey = f64::from(row[u]);
+        if grey < level {
+            let (before, g) = inside?;
+            let share = (g - level) / (g - grey);
+            return Some(before as f64 + share * (u as f64 - before as f64));
+        }
+        inside = Some((u, grey));
+    }
+    None
+}

@@ -1,0 +1,68 @@
+//! When a device speaks: on a change of danger, again and again while it lasts, once when it is
+//! over.
+
+use super::WaysideSettings;
+use crate::bus::{DangerLevel, ObstacleWarning, SimTime, WaysideReport};
+
+/// What was said last.
+#[derive(Clone, Debug)]
+pub(super) struct Announcer {
+    device: String,
+    refresh_s: f64,
+    number: u32,
+    danger: DangerLevel,
+    last: SimTime,
+    extent_m: (f64, f64),
+}
+
+impl Announcer {
+    pub fn new(settings: &WaysideSettings, device: &str) -> Self {
+        Self {
+            device: device.to_owned(),
+            refresh_s: settings.refresh_s,
+            number: 0,
+            danger: DangerLevel::None,
+            last: SimTime::ZERO,
+            extent_m: (0.0, 0.0),
+        }
+    }
+
+    pub fn message(&mut self, report: &WaysideReport) -> Option<ObstacleWarning> {
+        if report.learning {
+            return None;
+        }
+        let changed = report.danger != self.danger;
+        let due = report.danger != DangerLevel::None
+            && report.time.since(self.last) >= self.refresh_s - 1e-6;
+        if !changed && !due {
+            return None;
+        }
+        // A clear message names the stretch that it clears.
+        if report.danger != DangerLevel::None {
+            self.extent_m = extent(report);
+        }
+        self.danger = report.danger;
+        self.last = report.time;
+        let number = self.number;
+        self.number += 1;
+        Some(ObstacleWarning {
+            device: self.device.clone(),
+            number,
+            issued: report.time,
+            danger: report.danger,
+            from_chainage_m: self.extent_m.0,
+            to_chainage_m: self.extent_m.1,
+        })
+    }
+}
+
+/// From the first to the last chainage of the obstacles of the report's danger.
+fn extent(report: &WaysideReport) -> (f64, f64) {
+    report
+        .obstacles
+        .iter()
+        .filter(|o| o.danger == report.danger)
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), o| {
+            (a.min(o.from_chainage_m), b.max(o.to_chainage_m))
+        })
+}

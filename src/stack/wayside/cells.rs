@@ -1,0 +1,84 @@
+//! The image in cells of 8 x 8 pixels: which of them look through the structure gauge at all,
+//! and which are blind while a train is there.
+
+use super::sight::{GaugeSpan, Sight};
+use crate::bus::PixelBox;
+
+/// Side of a cell.
+pub(super) const CELL_PX: usize = 8;
+
+/// One span and one flag a cell.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    wide: usize,
+    spans: Vec<Option<GaugeSpan>>,
+    blind: Vec<bool>,
+    any_blind: bool,
+}
+
+impl Cells {
+    pub fn new(sight: &Sight, width: usize, height: usize) -> Self {
+        let (wide, high) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
+        let middle = |k: usize| (k * CELL_PX) as f64 + (CELL_PX as f64 - 1.0) / 2.0;
+        let spans = (0..wide * high)
+            .map(|k| sight.gauge_span(middle(k % wide), middle(k / wide)))
+            .collect();
+        Self {
+            wide,
+            spans,
+            blind: vec![false; wide * high],
+            any_blind: false,
+        }
+    }
+
+    /// Whether a pixel looks through the gauge.
+    pub fn in_gauge(&self, u: usize, v: usize) -> bool {
+        self.spans[v / CELL_PX * self.wide + u / CELL_PX].is_some()
+    }
+
+    /// Blinds the cells whose line of sight passes the stretch that a train occupies.
+    pub fn occupy(&mut self, train: Option<(f64, f64)>) {
+        self.any_blind = false;
+        for (blind, span) in self.blind.iter_mut().zip(&self.spans) {
+            *blind = match (train, span) {
+                (Some((tail, head)), Some(span)) => span.from_m <= head && span.to_m >= tail,
+                _ => false,
+            };
+            self.any_blind |= *blind;
+        }
+    }
+
+    pub fn any_blind(&self) -> bool {
+        self.any_blind
+    }
+
+    /// Whether more than half of a box's cells are blind.
+    pub fn is_blind(&self, bounds: PixelBox) -> bool {
+        if !self.any_blind {
+            return false;
+        }
+        let (mut blind, mut all) = (0, 0);
+        for y in bounds.v0 as usize / CELL_PX..=bounds.v1 as usize / CELL_PX {
+            for x in bounds.u0 as usize / CELL_PX..=bounds.u1 as usize / CELL_PX {
+                all += 1;
+                blind += usize::from(self.blind.get(y * self.wide + x) == Some(&true));
+            }
+        }
+        2 * blind > all
+    }
+
+    /// Sets the pixels of blind cells to 0.
+    pub fn clear_blind(&self, image: &mut [u8], width: usize) {
+        if !self.any_blind {
+            return;
+        }
+        for (v, row) in image.chunks_exact_mut(width.max(1)).enumerate() {
+            let blind = &self.blind[v / CELL_PX * self.wide..];
+            for (cell, &blind) in row.chunks_mut(CELL_PX).zip(blind) {
+                if blind {
+                    cell.fill(0);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,237 @@
+//! Background difference, threshold and noise filter.
+//!
+//! id = f(i) - b(i0), binary where |id| >= T, then a 3x3 median, which on a binary image is a
+//! vote of nine: single pixels and lines one pixel wide (edges under camera shake) lose it.
+//!
+//! Headlights change the light everywhere. When a train is near, or much of the picture got
+//! brighter or darker together, f is compared with g b instead, g the local gain: the ratio of
+//! the mean grey of tiles, median over 5 x 5 tiles, so that an obstacle does not move it. The
+//! gain is only known roughly, so T rises by a share of |g b - b|.
+
+use super::WaysideSettings;
+use super::cells::{CELL_PX, Cells};
+
+/// Side of a gain tile.
+const TILE_PX: usize = 48;
+/// Rows that tile means are taken from: every fourth says enough.
+const TILE_ROW_STEP: usize = 4;
+/// Fixed point unit of gains.
+const UNIT: u32 = 1 << 10;
+/// Keeps the ratio of dark tiles from being a ratio of noise.
+const DARK_GREY: f64 = 4.0;
+/// A tile has changed when its mean has, by this share of the threshold; the light has changed
+/// when this share of the tiles has.
+const CHANGED_SHARE_OF_THRESHOLD: f64 = 0.25;
+const CHANGED_TILES: f64 = 0.25;
+
+/// Works on images of one size, with its own buffers.
+#[derive(Clone, Debug)]
+pub(super) struct Difference {
+    width: usize,
+    height: usize,
+    threshold: u8,
+    distrust: u32,
+    /// Highest grey level that counts as not saturated.
+    saturated: u8,
+    tiles_wide: usize,
+    tiles_high: usize,
+    reference_sums: Vec<(u64, u32)>,
+    ratio: Vec<f64>,
+    gain: Vec<f64>,
+    window: Vec<f64>,
+    raw: Vec<u8>,
+    votes: Vec<u8>,
+    /// |id|.
+    pub absolute: Vec<u8>,
+    /// 0 or 255.
+    pub binary: Vec<u8>,
+}
+
+impl Difference {
+    pub fn new(settings: &WaysideSettings, width: usize, height: usize) -> Self {
+        let (tiles_wide, tiles_high) = (width.div_ceil(TILE_PX), height.div_ceil(TILE_PX));
+        let tiles = tiles_wide * tiles_high;
+        Self {
+            width,
+            height,
+            threshold: settings.threshold_grey.round().clamp(1.0, 255.0) as u8,
+            distrust: (settings.gain_distrust.clamp(0.0, 1.0) * 256.0) as u32,
+            saturated: (settings.saturated_grey - 1.0).clamp(0.0, 255.0) as u8,
+            tiles_wide,
+            tiles_high,
+            reference_sums: Vec::new(),
+            ratio: vec![1.0; tiles],
+            gain: vec![1.0; tiles],
+            window: Vec::with_capacity(25),
+            raw: vec![0; width * height],
+            votes: vec![0; width],
+            absolute: vec![0; width * height],
+            binary: vec![0; width * height],
+        }
+    }
+
+    /// Prepares for a new reference.
+    pub fn set_reference(&mut self, reference: &[u8], valid: &[u8]) {
+        self.reference_sums = (0..self.ratio.len())
+            .map(|tile| self.tile_sum(tile, reference, valid))
+            .collect();
+    }
+
+    /// Fills `absolute` and `binary`. `train_near` asks for the compensation at once.
+    pub fn run(
+        &mut self,
+        frame: &[u8],
+        reference: &[u8],
+        valid: &[u8],
+        cells: &Cells,
+        train_near: bool,
+    ) {
+        let changed = self.measure_gain(frame, valid);
+        if train_near || changed {
+            self.smooth_gain();
+            // What blinds the camera while a train is near is its lamps.
+            let dazzle = if train_near { self.saturated } else { u8::MAX };
+            self.compare_compensated(frame, reference, valid, dazzle);
+        } else {
+            self.compare(frame, reference, valid);
+        }
+        cells.clear_blind(&mut self.raw, self.width);
+        self.vote();
+    }
+
+    /// The plain difference of the paper.
+    fn compare(&mut self, frame: &[u8], reference: &[u8], valid: &[u8]) {
+        let inputs = frame.iter().zip(reference).zip(valid);
+        let outputs = self.absolute.iter_mut().zip(&mut self.raw);
+        for (((&f, &b), &ok), (absolute, raw)) in inputs.zip(outputs) {
+            let d = f.abs_diff(b);
+            *absolute = d;
+            *raw = u8::from(d >= self.threshold) & ok;
+        }
+    }
+
+    fn compare_compensated(&mut self, frame: &[u8], reference: &[u8], valid: &[u8], dazzle: u8) {
+        let (threshold, distrust) = (u32::from(self.threshold), self.distrust);
+        for v in 0..self.height {
+            let row = v * self.width;
+            for u in (0..self.width).step_by(CELL_PX) {
+                let gain = self.gain_at(u, v);
+                let span = row + u..row + (u + CELL_PX).min(self.width);
+                let inputs = frame[span.clone()]
+                    .iter()
+                    .zip(&reference[span.clone()])
+                    .zip(&valid[span.clone()]);
+                let outputs = self.absolute[span.clone()]
+                    .iter_mut()
+                    .zip(&mut self.raw[span]);
+                for (((&f, &b), &ok), (absolute, raw)) in inputs.zip(outputs) {
+                    let expected = ((u32::from(b) * gain) / UNIT).min(255);
+                    let limit = threshold + expected.abs_diff(u32::from(b)) * distrust / 256;
+                    let d = u32::from(f).abs_diff(expected);
+                    *absolute = d as u8;
+                    *raw = u8::from(d >= limit) & u8::from(f <= dazzle) & ok;
+                }
+            }
+        }
+    }
+
+    /// Ratio of tile means; true when the light changed in most of the picture.
+    fn measure_gain(&mut self, frame: &[u8], valid: &[u8]) -> bool {
+        let limit = CHANGED_SHARE_OF_THRESHOLD * f64::from(self.threshold);
+        let (mut changed, mut known) = (0u32, 0u32);
+        for tile in 0..self.ratio.len() {
+            let Some(&(before, pixels)) = self.reference_sums.get(tile) else {
+                return false;
+            };
+            let enough = pixels as usize >= TILE_PX * TILE_PX / TILE_ROW_STEP / 8;
+            self.ratio[tile] = if enough {
+                let (now, _) = self.tile_sum(tile, frame, valid);
+                let n = f64::from(pixels);
+                let (now, before) = (now as f64 / n, before as f64 / n);
+                known += 1;
+                changed += u32::from((now - before).abs() > limit);
+                (now + DARK_GREY) / (before + DARK_GREY)
+            } else {
+                f64::NAN
+            };
+        }
+        f64::from(changed) > CHANGED_TILES * f64::from(known)
+    }
+
+    /// Grey sum of the valid pixels of a tile, and their number.
+    fn tile_sum(&self, tile: usize, grey: &[u8], valid: &[u8]) -> (u64, u32) {
+        let (i, j) = (tile % self.tiles_wide, tile / self.tiles_wide);
+        let (mut sum, mut pixels) = (0u64, 0u32);
+        let (u0, v0) = (i * TILE_PX, j * TILE_PX);
+        let u1 = (u0 + TILE_PX).min(self.width);
+        for v in (v0..(v0 + TILE_PX).min(self.height)).step_by(TILE_ROW_STEP) {
+            let span = v * self.width + u0..v * self.width + u1;
+            let (mut row_sum, mut row_pixels) = (0u32, 0u32);
+            for (&g, &ok) in grey[span.clone()].iter().zip(&valid[span]) {
+                row_sum += u32::from(g) * u32::from(ok);
+                row_pixels += u32::from(ok);
+            }
+            sum += u64::from(row_sum);
+            pixels += row_pixels;
+        }
+        (sum, pixels)
+    }
+
+    fn smooth_gain(&mut self) {
+        let (wide, high) = (self.tiles_wide, self.tiles_high);
+        for j in 0..high {
+            for i in 0..wide {
+                self.window.clear();
+                for y in j.saturating_sub(2)..(j + 3).min(high) {
+                    for x in i.saturating_sub(2)..(i + 3).min(wide) {
+                        let ratio = self.ratio[y * wide + x];
+                        if ratio.is_finite() {
+                            self.window.push(ratio);
+                        }
+                    }
+                }
+                self.window.sort_unstable_by(f64::total_cmp);
+                let median = self.window.get(self.window.len() / 2).copied();
+                self.gain[j * wide + i] = median.unwrap_or(1.0);
+            }
+        }
+    }
+
+    /// Gain at a pixel, bilinear between tile centres, fixed point.
+    fn gain_at(&self, u: usize, v: usize) -> u32 {
+        let place = |p: usize, tiles: usize| {
+            let x = (p as f64 / TILE_PX as f64 - 0.5).clamp(0.0, tiles as f64 - 1.0);
+            let k = (x as usize).min(tiles.saturating_sub(2));
+            (k, (k + 1).min(tiles - 1), x - k as f64)
+        };
+        let (i, i1, x) = place(u + CELL_PX / 2, self.tiles_wide);
+        let (j, j1, y) = place(v, self.tiles_high);
+        let at = |i: usize, j: usize| self.gain[j * self.tiles_wide + i];
+        let upper = at(i, j) + (at(i1, j) - at(i, j)) * x;
+        let lower = at(i, j1) + (at(i1, j1) - at(i, j1)) * x;
+        ((upper + (lower - upper) * y) * f64::from(UNIT)).clamp(0.0, 255.0 * f64::from(UNIT)) as u32
+    }
+
+    /// 3x3 median of the raw binary image; the outermost pixels become 0.
+    fn vote(&mut self) {
+        let (w, h) = (self.width, self.height);
+        self.binary.fill(0);
+        if w < 3 {
+            return;
+        }
+        for v in 1..h.saturating_sub(1) {
+            let row = |k: usize| &self.raw[k * w..(k + 1) * w];
+            let (above, here, below) = (row(v - 1), row(v), row(v + 1));
+            let columns = above.iter().zip(here).zip(below);
+            for (vote, ((&a, &b), &c)) in self.votes.iter_mut().zip(columns) {
+                *vote = a + b + c;
+            }
+            let out = &mut self.binary[v * w + 1..(v + 1) * w - 1];
+            let left = self.votes.iter();
+            let (mid, right) = (&self.votes[1..], &self.votes[2..]);
+            for (out, ((&a, &b), &c)) in out.iter_mut().zip(left.zip(mid).zip(right)) {
+                *out = if a + b + c >= 5 { 255 } else { 0 };
+            }
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! The detector on drawn images whose truth is known.
+#![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+
+use super::test_scene::*;
+use super::*;
+use crate::bus::SimTime;
+
+const STEADY: fn(u32, u32) -> f64 = |_, _| 1.0;
+
+fn detector(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
+    WaysideDetector::new(settings, scene.calibration.clone(), scene.map.clone())
+}
+
+fn quiet() -> WaysideSettings {
+    WaysideSettings {
+        keep_images: false,
+        ..WaysideSettings::default()
+    }
+}
+
+/// Runs the frames of the reference.
+fn taught(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
+    let mut d = detector(scene, settings);
+    for n in 0..settings.reference_frames {
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        assert!(report.learning == (n + 1 < settings.reference_frames));
+    }
+    d
+}
+
+/// Noise alone, 300 frames: a threshold too near to the noise, or an overflow in sums, alarms.
+#[test]
+fn noise_raises_no_alarm() {
+    let scene = Scene::new(640, 360);
+    let settings = quiet();
+    let mut d = taught(&scene, &settings);
+    for n in 10..310 {
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        assert!(
+            report.obstacles.is_empty() && report.blobs.is_empty(),
+            "frame {n}"
+        );
+        assert!(d.message(&report).is_none());
+        assert!(report.passage_possible);
+    }
+}
+
+/// Crates over distance, size and contrast: place, width and height within two pixels' worth.
+/// The camera cannot see depth; the crate's near face is what it places.
+#[test]
+fn crates_are_found_where_they_are() {
+    let scene = Scene::new(1280, 720);
+    let settings = quiet();
+    let f_px = scene.calibration.camera.intrinsics.fx_px;
+    for (s, l, size, grey) in [
+        (190.0, 0.0, 0.3, 20.0),
+        (180.0, 0.4, 0.4, 190.0),
+        (165.0, -0.6, 0.5, 15.0),
+        (150.0, 0.0, 0.8, 200.0),
+        (135.0, 0.3, 1.0, 20.0),
+    ] {
+        let mut d = taught(&scene, &settings);
+        let item = Crate::on_bed(s, l, size);
+        let mut last = None;
+        for n in 10..14 {
+            last = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, grey)]), None, None));
+        }
+        let report = last.unwrap();
+        assert_eq!(report.obstacles.len(), 1, "crate at {s} m");
+        let o = &report.obstacles[0];
+        let range = DEVICE_M - item.s.1;
+        let pixel_m = range / f_px;
+        // A row at the foot spans range^2 / (f H) along the bed.
+        let row_m = range * range / (f_px * (2.8 - BED_M));
+        assert!(
+            (o.to_chainage_m - item.s.1).abs() < 2.0 * row_m + 0.05,
+            "{s}: {} against {}",
+            o.to_chainage_m,
+            item.s.1
+        );
+        assert!(
+            (o.lateral_m - l).abs() < 0.1 * size + 3.0 * pixel_m,
+            "{s}: l {}",
+            o.lateral_m
+        );
+        assert!(
+            (o.width_m - size).abs() < 0.2 * size + 3.0 * pixel_m,
+            "{s}: w {}",
+            o.width_m
+        );
+        // The top's far edge is seen over the near one.
+        let tilt = (2.8 - item.h.1) / range;
+        let height = size + size * tilt;
+        assert!(
+            (o.height_m - height).abs() < 0.1 * size + 3.0 * pixel_m,
+            "{s}: h {}",
+            o.height_m
+        );
+        assert_eq!(o.danger, DangerLevel::High);
+        assert!(report.emergency_needed && !report.passage_possible);
+    }
+}
+
+/// With a lidar the depth is measured, and the place is no longer a matter of one row.
+#[test]
+fn lidar_sharpens_the_place() {
+    let scene = Scene::new(1280, 720);
+    let settings = quiet();
+    let item = Crate {
+        s: (178.5, 181.0),
+        l: (-0.4, 0.4),
+        h: (BED_M, 0.6),
+    };
+    let scan = scene.scan(&[item]);
+    let mut d = taught(&scene, &settings);
+    let mut report = None;
+    for n in 10..14 {
+        report = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), Some(&scan), None));
+    }
+    let report = report.unwrap();
+    let o = &report.obstacles[0];
+    // The outline shows the front and, 2 m from the camera's side of it, the crate's long side.
+    let seen = 0.8 + 2.0 * 2.5 / 21.5;
+    // Rows of echoes on the top, 0.2 degrees apart and 2 m lower than the lidar.
+    let row_m = 21.5 * 21.5 / 2.0 * 0.2f64.to_radians();
+    assert!(
+        (o.to_chainage_m - 181.0).abs() < 0.1,
+        "near {}",
+        o.to_chainage_m
+    );
+    assert!(
+        (o.from_chainage_m - 178.5).abs() < row_m,
+        "far {}",
+        o.from_chainage_m
+    );
+    assert!((o.width_m - seen).abs() < 0.15, "width {}", o.width_m);
+}
+
+/// An adaptive background would lose it: 300 frames later the crate must still be there, under
+/// the same warning, refreshed every second, never cleared.
+#[test]
+fn what_stays_stays_found() {
+    let scene = Scene::new(640, 360);
+    let mut d = taught(&scene, &quiet());
+    let item = Crate::on_bed(180.0, 0.0, 0.5);
+    let mut messages = Vec::new();
+    for n in 10..310 {
+        let report = d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), None, None);
+        assert_eq!(report.obstacles.len(), usize::from(n >= 12), "frame {n}");
+        messages.extend(d.message(&report));
+    }
+    assert!(messages.iter().all(|m| m.danger == DangerLevel::High));
+    // Confirmed in the third frame; then once a second over 29.7 s.
+    assert_eq!(messages[0].issued, SimTime::from_secs(1.2));
+    assert_eq!(messages.len(), 30);
+    assert!(messages.windows(2).all(|w| w[1].number == w[0].number + 1));
+}
+
+/// A person walks across the track and leaves, a tool box stays: one confirmed thing while he is
+/// there, the box after him, a clear message only when the box is gone too.
+#[test]
+fn a_worker_leaves_his_box() {
+    let scene = Scene::new(640, 360);
+    let mut d = taught(&scene, &quiet());
+    let mut messages = Vec::new();
+    let mut boxes = 0;
+    for n in 10..110u32 {
+        let walked = f64::from(n - 10) * 0.1;
+        let person = Crate {
+            s: (178.0 + walked - 0.2, 178.0 + walked + 0.2),
+            l: (0.3, 0.8),
+            h: (BED_M, 1.55),
+        };
+        let tool_box = Crate {
+            s: (180.0, 180.5),
+            l: (-0.2, 0.2),
+            h: (BED_M, 0.15),
+        };
+        let mut things = Vec::new();
+        if n < 60 {
+            things.push((person, 170.0));
+        }
+        if (30..90).contains(&n) {
+            things.push((tool_box, 20.0));
+        }
+        let report = d.on_frame(&scene.frame(n, STEADY, &things), None, None);
+        if (70..90).contains(&n) {
+            assert_eq!(report.obstacles.len(), 1, "frame {n}");
+            boxes += usize::from(report.danger == DangerLevel::High);
+            assert!((report.obstacles[0].to_chainage_m - 180.5).abs() < 0.5);
+        }
+        messages.extend(d.message(&report));
+    }
+    assert_eq!(boxes, 20);
+    let last = messages.last().unwrap();
+    assert_eq!(last.danger, DangerLevel::None);
+    assert!(last.issued > SimTime::from_secs(9.0) && last.issued < SimTime::from_secs(9.8));
+    let cleared = messages.iter().filter(|m| m.danger == DangerLevel::None);
+    assert_eq!(cleared.count(), 1);
+}
+
+/// Lamps: saturated in the reference and flickering, with bands over all rows. Pixels that cannot
+/// be compared must be left out, and the bands stay under the threshold.
+#[test]
+fn flicker_raises_no_alarm() {
+    let scene = Scene::new(640, 360);
+    let mut d = detector(&scene, &quiet());
+    let lamp = |u: u32, v: u32| u.abs_diff(330) < 12 && v.abs_diff(150) < 8;
+    for n in 0..120u32 {
+        let light = |u: u32, v: u32| {
+            let bands = 1.0 + 0.03 * (f64::from(v) * 0.21 + f64::from(n) * 1.3).sin();
+            if lamp(u, v) {
+                if n % 2 == 0 { 9.0 } else { 1.5 }
+            } else {
+                bands
+            }
+        };
+        let report = d.on_frame(&scene.frame(n, light, &[]), None, None);
+        assert!(report.blobs.is_empty(), "frame {n}");
+    }
+}
+
+/// The light doubles everywhere, or grows towards one side as before headlights: no alarm, and a
+/// crate is still found. Without compensation all of it would be a difference.
+#[test]
+fn brightening_is_told_from_an_obstacle() {
+    let scene = Scene::new(640, 360);
+    let item = Crate::on_bed(182.0, 0.0, 0.6);
+    for with_crate in [false, true] {
+        let mut d = taught(&scene, &quiet());
+        let things = if with_crate {
+            vec![(item, 5.0)]
+        } else {
+            vec![]
+        };
+        let mut found = 0;
+        for n in 10..60u32 {
+            let step = f64::from(n - 10) / 50.0;
+            let light = |u: u32, _| 1.0 + step * (0.5 + f64::from(u) / 640.0);
+            let report = d.on_frame(&scene.frame(n, light, &things), None, None);
+            found += report.obstacles.len();
+            if !with_crate {
+                assert!(report.obstacles.is_empty(), "frame {n}");
+            }
+        }
+        assert_eq!(found, if with_crate { 48 } else { 0 });
+    }
+}
+
+/// A train comes into view behind a crate, its lamp blinding: the train is no obstacle, the
+/// crate stays confirmed throughout, and without a report of the train it is found like any
+/// other body.
+#[test]
+fn the_train_is_no_obstacle() {
+    let scene = Scene::new(640, 360);
+    let item = Crate::on_bed(185.0, 0.0, 0.5);
+    for reported in [true, false] {
+        let mut d = taught(&scene, &quiet());
+        let mut seen_train = false;
+        for n in 10..60u32 {
+            let head = 60.0 + 2.0 * f64::from(n - 10);
+            let train = Crate {
+                s: (head - 118.0, head),
+                l: (-1.4, 1.4),
+                h: (0.1, 3.8),
+            };
+            let near = 0.3 * (f64::from(n - 10) / 50.0);
+            let light = |_, _| 1.0 + near;
+            let frame = scene.frame(n, light, &[(train, 210.0), (item, 20.0)]);
+            let report = TrainReport {
+                chainage_m: head - 1.0,
+                speed_mps: 20.0,
+                time: frame.start.plus(-0.05),
+            };
+            let report = d.on_frame(&frame, None, reported.then_some(report));
+            let behind = |o: &DetectedObstacle| o.to_chainage_m < 183.0;
+            if reported {
+                assert!(!report.obstacles.iter().any(behind), "train at {head} m");
+                if n > 20 {
+                    assert_eq!(report.obstacles.len(), 1, "train at {head} m");
+                    let s = report.train_distance_exact_m.unwrap();
+                    let paper = report.train_distance_m.unwrap();
+                    assert!((s - (184.75 - head)).abs() < 0.5, "{s}");
+                    assert!((paper - s).abs() < 0.5, "{paper} {s}");
+                }
+            } else {
+                seen_train |= report.obstacles.iter().any(behind);
+            }
+        }
+        assert!(reported || seen_train);
+    }
+}
+
+/// Frames of another size, empty calibrations: no panic, nothing claimed.
+#[test]
+fn odd_input_is_survived() {
+    let scene = Scene::new(64, 36);
+    let mut d = detector(&scene, &quiet());
+    let other = Scene::new(32, 36).frame(0, STEADY, &[]);
+    assert!(d.on_frame(&other, None, None).learning);
+    let mut calibration = scene.calibration.clone();
+    for (w, h) in [(0, 0), (1, 1), (2, 7), (9, 2)] {
+        calibration.camera.intrinsics = crate::bus::Intrinsics::centred(w, h, 10.0);
+        let mut d = WaysideDetector::new(&quiet(), calibration.clone(), scene.map.clone());
+        for number in 0..14 {
+            let image = GrayImage::from_pixel(w, h, image::Luma([(number * 20) as u8]));
+            let start = SimTime::from_secs(f64::from(number));
+            let _ = d.on_frame(
+                &Frame {
+                    number,
+                    start,
+                    image,
+                },
+                None,
+                None,
+            );
+        }
+    }
+}
+
+/// The feet of pixels: project bed points of straight and curved lines and place them back.
+#[test]
+fn foot_inverts_projection() {
+    for curvature in [0.0, 1.0 / 300.0, -1.0 / 250.0] {
+        let map = tunnel(curvature);
+        let calibration = calibration(&map, 1920, 1080);
+        let sight = Sight::new(
+            &WaysideSettings::default(),
+            calibration.clone(),
+            map.clone(),
+        );
+        let mut seen = 0;
+        for k in 0..60 {
+            let p = crate::track::TrackPoint {
+                s_m: DEVICE_M - 8.0 - f64::from(k),
+                l_m: f64::from(k % 7) * 0.4 - 1.2,
+                h_m: BED_M,
+            };
+            let world = map.alignment.world_from_track(p);
+            let in_camera = calibration
+                .world_from_camera
+                .inverse_transform_point(&world);
+            let i = calibration.camera.intrinsics;
+            let Some(px) = i.project(&in_camera) else {
+                continue;
+            };
+            if px.x < 0.0 || px.y < 0.0 || px.x > 1919.0 || px.y > 1079.0 {
+                continue;
+            }
+            let Some(foot) = sight.foot(px.x, px.y) else {
+                // In a curve the inner wall may hide it.
+                assert!(curvature != 0.0);
+                continue;
+            };
+            seen += 1;
+            assert!((foot.s_m - p.s_m).abs() < 0.02, "{foot:?} {p:?}");
+            assert!((foot.l_m - p.l_m).abs() < 0.005, "{foot:?} {p:?}");
+            let span = sight.gauge_span(px.x, px.y).unwrap();
+            assert!(span.from_m <= p.s_m + 0.5 && span.to_m >= p.s_m - 0.5);
+        }
+        assert!(seen > 20, "curvature {curvature}: {seen}");
+    }
+}
