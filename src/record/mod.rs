@@ -1,1 +1,5 @@
 //! Recordings.
+
+mod settings;
+
+pub use settings::RecordSettings;

@@ -111,7 +111,7 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
 }
 
 fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
-    let mut late = |key: String, what: &str, at_s: f64| {
+    let late = |problems: &mut Vec<Problem>, key: String, what: &str, at_s: f64| {
         if at_s > file.duration_s {
             problems.push(Problem::new(
                 key,
@@ -121,19 +121,22 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         }
     };
     for (k, obstacle) in file.obstacles.iter().enumerate() {
-        late(format!("obstacles[{k}].appears_s"), "it appears", obstacle.appears_s);
+        let key = format!("obstacles[{k}].appears_s");
+        late(problems, key, "it appears", obstacle.appears_s);
     }
     for (k, worker) in file.workers.iter().enumerate() {
-        if let Some(at_s) = worker.puts_down_s {
-            late(format!("workers[{k}].puts_down_s"), "he puts it down", at_s);
-            if worker.carries.is_none() {
-                problems.push(Problem::new(
-                    format!("workers[{k}].puts_down_s"),
-                    "he carries nothing that he could put down",
-                    format!("add [workers.carries] to workers[{k}], or take this out"),
-                ));
-            }
+        let Some(at_s) = worker.puts_down_s else {
+            continue;
+        };
+        let key = format!("workers[{k}].puts_down_s");
+        if worker.carries.is_none() {
+            problems.push(Problem::new(
+                key.clone(),
+                "he carries nothing that he could put down",
+                format!("add [workers.carries] to workers[{k}], or take this out"),
+            ));
         }
+        late(problems, key, "he puts it down", at_s);
     }
 }
 

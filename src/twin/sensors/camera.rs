@@ -121,16 +121,16 @@ pub struct RigSettings {
     /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
     /// Default 22.2.
     pub line_time_us: f64,
-    /// How long every row collects light, us. Longer than a chip of the lamps' code (about 100 us)
+    /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in the shipped tunnels)
     /// it blurs the stripes away. Default 30.
     pub exposure_us: f64,
     /// Pairs of images a second. Default 30.
     pub pairs_per_s: f64,
     /// Left eye, m ahead of the train head (negative: behind the windscreen). Default -0.5.
     pub forward_m: f64,
-    /// Left eye, m to the left of the centreline. Default 1.08.
+    /// Left eye, m to the left of the centreline. Default 1.0.
     pub lateral_m: f64,
-    /// Left eye, m above top of rail. Default 1.75.
+    /// Left eye, m above top of rail. Default 1.7.
     pub height_m: f64,
     /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
     /// Default 39.
@@ -156,8 +156,8 @@ impl Default for RigSettings {
             exposure_us: 30.0,
             pairs_per_s: 30.0,
             forward_m: -0.5,
-            lateral_m: 1.08,
-            height_m: 1.75,
+            lateral_m: 1.0,
+            height_m: 1.7,
             yaw_deg: 39.0,
             pitch_deg: 22.0,
             calibration_error: RigError::default(),
@@ -211,7 +211,7 @@ impl RigSettings {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
-        positive(problems, at, "height_m", self.height_m, "m", 1.75);
+        positive(problems, at, "height_m", self.height_m, "m", 1.7);
         within(problems, at, "forward_m", self.forward_m, "m", 5.0);
         within(problems, at, "lateral_m", self.lateral_m, "m", 2.0);
         within(problems, at, "yaw_deg", self.yaw_deg, "deg", 180.0);
