@@ -132,6 +132,8 @@ pub const RAIL_CENTRES_M: f64 = 1.5;
 
 /// Longest piece of a clothoid.
 const PIECE_M: f64 = 25.0;
+/// No clothoid is cut into more (one of 25 km would have as many).
+const MOST_PIECES: f64 = 1000.0;
 
 /// A stretch of the plan, from `s0` to where the next begins; the first and the last one run on
 /// for ever.
@@ -281,7 +283,7 @@ impl Alignment {
         for element in elements {
             let bends = (element.end_per_m - element.start_per_m).abs() > 0.0;
             let count = if bends {
-                (element.length_m / PIECE_M).ceil()
+                (element.length_m / PIECE_M).ceil().min(MOST_PIECES)
             } else {
                 1.0
             };
