@@ -87,12 +87,9 @@ mod tests {
     /// A lamp's row with edges at 40.3 and 71.8, blurred by a box.
     fn blurred(length: f64) -> Vec<u8> {
         let lit = |u: f64| 20.0 + 150.0 * f64::from(u8::from((40.3..71.8).contains(&u)));
-        let mean = |u: f64| {
-            (0..400)
-                .map(|k| lit(u + (f64::from(k) / 399.0 - 0.5) * (length + 1.0)))
-                .sum::<f64>()
-                / 400.0
-        };
+        let share = |k: i32| (f64::from(k) + 0.5) / 60.0 - 0.5;
+        let pixel = |u: f64| (0..60).map(|k| lit(u + share(k))).sum::<f64>() / 60.0;
+        let mean = |u: f64| (0..60).map(|k| pixel(u + length * share(k))).sum::<f64>() / 60.0;
         (0..110).map(|u| mean(f64::from(u)).round() as u8).collect()
     }
 
