@@ -43,7 +43,8 @@ impl RowExposure {
 
     fn on_share(&self, lamp: &LampLight, first: usize, count: usize) -> f64 {
         let open = self.open_s + first as f64 * self.slot_s;
-        lamp.waveform.on_share(open, open + count as f64 * self.slot_s)
+        lamp.waveform
+            .on_share(open, open + count as f64 * self.slot_s)
     }
 }
 
@@ -51,7 +52,10 @@ impl RowExposure {
 fn seen_from(lamp: &LampLight, pose: &Isometry3<f64>) -> Option<(Point3<f64>, f64)> {
     let centre = pose.inverse_transform_point(&lamp.centre);
     let distance = centre.coords.norm();
-    let cos = -pose.inverse_transform_vector(&lamp.facing).dot(&centre.coords) / distance;
+    let cos = -pose
+        .inverse_transform_vector(&lamp.facing)
+        .dot(&centre.coords)
+        / distance;
     (centre.z > NEAREST_M && distance < LAMP_SIGHT_M && cos > 0.0).then_some((centre, cos))
 }
 
@@ -145,7 +149,12 @@ pub(super) fn add_halo(lamp: &LampLight, view: &View, row: &RowExposure, luminan
     let end = ((c.x + half).max(-1.0).floor() + 1.0) as usize;
     for (u, luminance) in luminances.iter_mut().enumerate().take(end).skip(begin) {
         let outside = (u as f64 - c.x).hypot(dv) - apparent;
-        *luminance += strength * if outside <= 0.0 { 1.0 } else { (-outside / fall).exp() };
+        *luminance += strength
+            * if outside <= 0.0 {
+                1.0
+            } else {
+                (-outside / fall).exp()
+            };
     }
 }
 

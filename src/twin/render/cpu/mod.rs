@@ -188,7 +188,12 @@ impl World {
         let away = |lamp: &LampLight| (lamp.centre - eye).norm();
         // Through a frame a train moves by a few metres.
         let reach = super::surface::LAMP_SIGHT_M + 20.0;
-        let mut lamps: Vec<_> = self.lamps.lamps().iter().filter(|l| away(l) < reach).collect();
+        let mut lamps: Vec<_> = self
+            .lamps
+            .lamps()
+            .iter()
+            .filter(|l| away(l) < reach)
+            .collect();
         lamps.sort_by(|a, b| away(b).total_cmp(&away(a)));
         lamps
     }
@@ -218,7 +223,9 @@ impl World {
             };
         };
         let at = self.tunnel.surface_at(eye, ray, &strike);
-        let sine = (at.normal.dot(ray) / stretch).abs().max(super::surface::MIN_SINE);
+        let sine = (at.normal.dot(ray) / stretch)
+            .abs()
+            .max(super::surface::MIN_SINE);
         let albedo = look::albedo(&at, strike.t * stretch / f_px / sine);
         let lux = self.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
@@ -284,7 +291,9 @@ impl World {
                 let lux = headlights_lx(&job.headlights, &at.position, &at.normal);
                 luminance += ground.albedo * lux / PI;
             }
-            buffers.depths.push(ground.strike.map_or(f64::INFINITY, |s| s.t));
+            buffers
+                .depths
+                .push(ground.strike.map_or(f64::INFINITY, |s| s.t));
             buffers.luminances.push(luminance);
         }
     }
@@ -329,7 +338,10 @@ fn columns_of(solid: &Solid<'_>, camera: &Intrinsics, row: &RowExposure) -> std:
     if corners.iter().all(|c| c.z <= 0.0) {
         return 0..0;
     }
-    let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    let (mut low, mut high) = (
+        Vector3::repeat(f64::INFINITY),
+        Vector3::repeat(f64::NEG_INFINITY),
+    );
     for corner in &corners {
         let Some(p) = camera.project(corner).filter(|_| corner.z > 0.01) else {
             return 0..width;
