@@ -61,13 +61,23 @@ fn digest(seed: u64, renderer: RendererChoice) -> (u64, usize, serde_json::Value
     };
     let mut digest = Digest::default();
     let summary = run(&scenario, &options, &mut [&mut digest]).unwrap();
-    (digest.hasher.finish(), digest.images, without_wall_times(&summary))
+    (
+        digest.hasher.finish(),
+        digest.images,
+        without_wall_times(&summary),
+    )
 }
 
 fn without_wall_times(summary: &Summary) -> serde_json::Value {
     fn strip(value: &mut serde_json::Value) {
         if let Some(object) = value.as_object_mut() {
-            for key in ["wall_s", "real_time_factor", "us_per_step", "ms_per_frame", "wall_shares_s"] {
+            for key in [
+                "wall_s",
+                "real_time_factor",
+                "us_per_step",
+                "ms_per_frame",
+                "wall_shares_s",
+            ] {
                 object.remove(key);
             }
             object.values_mut().for_each(strip);

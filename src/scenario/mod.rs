@@ -35,8 +35,10 @@ mod build;
 mod check;
 mod file;
 mod overrides;
+mod recording;
 pub mod schema;
 
 pub use build::{Scenario, ScenarioError, WaysidePost};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};
+pub use recording::RecordSettings;

@@ -81,6 +81,7 @@ impl<'s> Bench<'s> {
                 wayside: &[],
                 car_half_extents_m: Vector3::zeros(),
                 cars: 0,
+                protection: false,
             })
         })?;
         let end = self.points(options, &mut watchers);
@@ -149,7 +150,8 @@ impl<'s> Bench<'s> {
         let (report, seconds) = self.stack.time(|| positioner.on_pair(&images));
         let left = vehicle * self.camera.rig.vehicle_from_left;
         let intrinsics = self.camera.rig.camera.intrinsics;
-        self.score.report(&report, 1e3 * seconds, &intrinsics, |_| Some(left));
+        self.score
+            .report(&report, 1e3 * seconds, &intrinsics, |_| Some(left));
         for fix in &report.fixes {
             self.score.fix(fix, head_m);
         }

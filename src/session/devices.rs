@@ -36,7 +36,11 @@ pub struct Look {
 impl Device {
     /// All devices of a scenario.
     pub fn all(scenario: &Scenario) -> Vec<Self> {
-        scenario.wayside.iter().map(|post| Self::new(scenario, post)).collect()
+        scenario
+            .wayside
+            .iter()
+            .map(|post| Self::new(scenario, post))
+            .collect()
     }
 
     fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
@@ -96,8 +100,7 @@ impl Device {
         watch: &mut Stopwatch,
     ) -> WaysideReport {
         let detector = &mut self.detector;
-        let (report, seconds) =
-            watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));
+        let (report, seconds) = watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));
         self.score.report(&report, 1e3 * seconds, &look.present);
         if let Some(warning) = self.detector.message(&report) {
             comms.send(now, &self.balise, warning);

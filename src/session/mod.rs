@@ -88,7 +88,9 @@ pub enum SessionError {
     #[error(transparent)]
     Observer(#[from] ObserverError),
     /// A frame is longer than the poses that the world keeps.
-    #[error("the pose of the train at {0:.4} s is no longer known: a frame is longer than the world's memory")]
+    #[error(
+        "the pose of the train at {0:.4} s is no longer known: a frame is longer than the world's memory"
+    )]
     PoseForgotten(f64),
 }
 

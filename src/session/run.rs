@@ -105,7 +105,11 @@ impl<'s> Run<'s> {
         let world = World::new(map.clone(), &scenario.physics, seed, 0)?;
         let imu = Imu::new(&scenario.imu, seed, 0);
         let odometer = Odometer::new(&scenario.odometer, seed, 0);
-        let eyes = (scenario.rig.as_ref().filter(|_| scenario.physics.train.is_some())).map(|rig| Eyes {
+        let eyes = (scenario
+            .rig
+            .as_ref()
+            .filter(|_| scenario.physics.train.is_some()))
+        .map(|rig| Eyes {
             camera: StereoCamera {
                 rig: rig.actual(),
                 sensor: rig.sensor,
@@ -158,7 +162,11 @@ impl<'s> Run<'s> {
     }
 
     fn open(&self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
-        let calibrations: Vec<_> = self.devices.iter().map(|d| d.calibration().clone()).collect();
+        let calibrations: Vec<_> = self
+            .devices
+            .iter()
+            .map(|d| d.calibration().clone())
+            .collect();
         let rig = self.scenario.rig.as_ref().map(|r| r.calibration());
         let opening = Opening {
             scenario: &self.scenario.name,
@@ -168,6 +176,7 @@ impl<'s> Run<'s> {
             wayside: &calibrations,
             car_half_extents_m: self.world.car_half_extents_m().unwrap_or(Vector3::zeros()),
             cars: self.world.train().map_or(0, |t| t.world_from_cars.len()),
+            protection: self.world.head_m().is_some(),
         };
         watchers.each(|o| o.open(&opening))?;
         Ok(())
@@ -343,7 +352,8 @@ impl<'s> Run<'s> {
         let (world, rig) = (&self.world, &eyes.camera.rig);
         let left_at = |t| Some(world.vehicle_at(t)? * rig.vehicle_from_left);
         let intrinsics = rig.camera.intrinsics;
-        eyes.score.report(&report, 1e3 * seconds, &intrinsics, left_at);
+        eyes.score
+            .report(&report, 1e3 * seconds, &intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());
         for fix in &report.fixes {
             let truth_m = world
@@ -359,7 +369,10 @@ impl<'s> Run<'s> {
         Ok(())
     }
 
-    #[allow(clippy::too_many_arguments, reason = "one call, each a plain value of the frame")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "one call, each a plain value of the frame"
+    )]
     fn judge_wayside(
         &mut self,
         now: SimTime,
@@ -448,7 +461,10 @@ impl<'s> Run<'s> {
     }
 
     fn stood_long_enough(&self) -> bool {
-        match (self.scenario.stop_after_standstill_s, self.outcome.standing_since) {
+        match (
+            self.scenario.stop_after_standstill_s,
+            self.outcome.standing_since,
+        ) {
             (Some(limit_s), Some(since)) if self.outcome.has_run => {
                 self.world.time().since(since) >= limit_s
             }
@@ -459,22 +475,28 @@ impl<'s> Run<'s> {
     fn summary(self, end: End, wall_s: f64, record: Stopwatch) -> Summary {
         let simulated_s = self.world.time().secs();
         let head_m = self.world.head_m();
-        let stop_margin_m = head_m.filter(|_| self.outcome.stopped.is_some()).and_then(|head_m| {
-            (self.world.obstacles())
-                .map(|o| o.chainage_m - 0.5 * o.size_m.x - head_m)
-                .filter(|margin_m| *margin_m > -1.0)
-                .min_by(f64::total_cmp)
-        });
+        let stop_margin_m = head_m
+            .filter(|_| self.outcome.stopped.is_some())
+            .and_then(|head_m| {
+                (self.world.obstacles())
+                    .map(|o| o.chainage_m - 0.5 * o.size_m.x - head_m)
+                    .filter(|margin_m| *margin_m > -1.0)
+                    .min_by(f64::total_cmp)
+            });
         let protection = head_m.map(|_| summary::Protection {
             brake_commanded_s: self.outcome.brake_commanded.map(SimTime::secs),
             stopped_s: self.outcome.stopped.map(SimTime::secs),
             stop_margin_m,
             collision: self.world.collision().is_some(),
         });
-        let wayside = self.devices.into_iter().map(Device::into_score).reduce(|mut a, b| {
-            a.add(b);
-            a
-        });
+        let wayside = self
+            .devices
+            .into_iter()
+            .map(Device::into_score)
+            .reduce(|mut a, b| {
+                a.add(b);
+                a
+            });
         Summary {
             scenario: self.scenario.name.clone(),
             seed: self.scenario.seed,

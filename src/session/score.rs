@@ -197,7 +197,9 @@ impl WaysideScore {
         for seen in &report.obstacles {
             let centre_m = 0.5 * (seen.from_chainage_m + seen.to_chainage_m);
             let beside = |p: &Presence| (p.chainage_m - centre_m).abs() - p.half_length_m;
-            let nearest = present.iter().min_by(|a, b| beside(a).total_cmp(&beside(b)));
+            let nearest = present
+                .iter()
+                .min_by(|a, b| beside(a).total_cmp(&beside(b)));
             match nearest.filter(|p| beside(p) < MATCH_M) {
                 None => self.false_alarms += 1,
                 Some(p) => {
