@@ -133,7 +133,7 @@ impl Difference {
                 let (f16, b16) = (u16::from(f), u16::from(b));
                 let expected = ((u32::from(b16 << 8) * u32::from(gain)) >> 16) as u16;
                 let expected = expected.min(255);
-                let limit = threshold + (expected.abs_diff(b16) * distrust >> 8);
+                let limit = threshold + ((expected.abs_diff(b16) * distrust) >> 8);
                 let d = f16.abs_diff(expected);
                 *absolute = d as u8;
                 *raw = u8::from(d >= limit) & u8::from(f <= dazzle) & ok;
