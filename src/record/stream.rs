@@ -9,8 +9,8 @@ use crate::session::ObserverError;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::ChunkBatcherConfig;
 use rerun::{
-    ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder, SerializedComponentColumn, StoreId,
-    StoreKind, TimeCell, TimeColumn,
+    ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder,
+    SerializedComponentColumn, StoreId, StoreKind, TimeCell, TimeColumn,
 };
 use std::error::Error;
 use std::fs;

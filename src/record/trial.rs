@@ -316,7 +316,12 @@ impl Session<'_> {
             },
             position_m: Some(position_m),
             distance_to_obstacle_m: distance_m,
-            text: if warned { "Obstacle reported by W 205" } else { "" }.into(),
+            text: if warned {
+                "Obstacle reported by W 205"
+            } else {
+                ""
+            }
+            .into(),
         };
         let brake = if t_s >= BRAKE_FROM_S {
             BrakeDemand::Service
@@ -355,7 +360,11 @@ impl Session<'_> {
         let truths = vec![run(t_s).0; fixes.len()];
         let [left, right] = [0, 1].map(|k| {
             let image = std::mem::take(&mut eyes[k].0);
-            Frame { number, start, image }
+            Frame {
+                number,
+                start,
+                image,
+            }
         });
         let report = LedReport {
             time: start,
@@ -387,7 +396,10 @@ impl Session<'_> {
     }
 
     /// Image, spots, and the nearest lamp seen.
-    #[allow(clippy::type_complexity, reason = "three things of one image, used once")]
+    #[allow(
+        clippy::type_complexity,
+        reason = "three things of one image, used once"
+    )]
     fn eye(
         &self,
         world_from_eye: &Isometry3<f64>,
