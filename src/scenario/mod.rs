@@ -37,6 +37,7 @@ mod file;
 mod overrides;
 pub mod schema;
 
+pub(crate) use build::{parse_tunnel, read};
 pub use build::{Scenario, ScenarioError, WaysidePost};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};
