@@ -1,9 +1,9 @@
 //! From a file to a checked scenario.
 
+use super::RecordSettings;
 use super::file::{BenchSettings, ScenarioFile, StackSettings};
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
-use crate::record::RecordSettings;
 use crate::track::{FileError, Problem, Tunnel, read_toml};
 use crate::twin::comms::RadioSettings;
 use crate::twin::physics::PhysicsSettings;

@@ -71,6 +71,7 @@ fn at(samples: &[f64], u: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
 
@@ -78,7 +79,11 @@ mod tests {
     #[test]
     fn gaussian_samples_give_its_centre() {
         let gauss = |u: f64| 180.0 * (-(u - 417.3f64).powi(2) / (2.0 * 6.5f64.powi(2))).exp();
-        for u in [[410.0, 417.0, 424.0], [405.0, 418.0, 421.0], [400.0, 402.0, 409.0]] {
+        for u in [
+            [410.0, 417.0, 424.0],
+            [405.0, 418.0, 421.0],
+            [400.0, 402.0, 409.0],
+        ] {
             let c = log_gaussian_centre(u, u.map(gauss)).unwrap();
             assert!((c - 417.3).abs() < 1e-6, "{c}");
         }

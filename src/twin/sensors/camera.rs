@@ -48,7 +48,14 @@ impl Optics {
     }
 
     fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        positive(problems, at, "focal_length_mm", self.focal_length_mm, "mm", 3.9);
+        positive(
+            problems,
+            at,
+            "focal_length_mm",
+            self.focal_length_mm,
+            "mm",
+            3.9,
+        );
         positive(problems, at, "pixel_um", self.pixel_um, "um", 3.75);
         positive(problems, at, "exposure_us", self.exposure_us, "us", 30.0);
         positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
@@ -64,7 +71,10 @@ impl Optics {
         if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
             problems.push(Problem::new(
                 format!("{at}.line_time_us"),
-                format!("a row cannot open {} us after the one before", self.line_time_us),
+                format!(
+                    "a row cannot open {} us after the one before",
+                    self.line_time_us
+                ),
                 "give the time from row to row in us, 0 for a global shutter",
             ));
         }
@@ -84,7 +94,10 @@ impl Optics {
                     "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {}",
                     self.exposure_us, self.frames_per_s, self.rate_key
                 ),
-                format!("expose for less than {frame_us:.0} us, or lower {}", self.rate_key),
+                format!(
+                    "expose for less than {frame_us:.0} us, or lower {}",
+                    self.rate_key
+                ),
             ));
             return;
         }
@@ -220,8 +233,22 @@ impl RigSettings {
         let at = format!("{at}.calibration_error");
         let half_focal = 0.5 * self.focal_length_mm.abs();
         let half_baseline = 0.5 * self.baseline_mm.abs();
-        within(problems, &at, "focal_length_mm", error.focal_length_mm, "mm", half_focal);
-        within(problems, &at, "baseline_mm", error.baseline_mm, "mm", half_baseline);
+        within(
+            problems,
+            &at,
+            "focal_length_mm",
+            error.focal_length_mm,
+            "mm",
+            half_focal,
+        );
+        within(
+            problems,
+            &at,
+            "baseline_mm",
+            error.baseline_mm,
+            "mm",
+            half_baseline,
+        );
         within(problems, &at, "yaw_deg", error.yaw_deg, "deg", 45.0);
         within(problems, &at, "pitch_deg", error.pitch_deg, "deg", 45.0);
     }
@@ -407,7 +434,9 @@ const REACH_STEP_M: f64 = 0.05;
 
 fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
     let n = lamp.facing.into_inner();
-    let across = n.cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
+    let across = n
+        .cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 }))
+        .normalize();
     let along = n.cross(&across);
     std::array::from_fn(|k| {
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / 16.0).sin_cos();
@@ -440,14 +469,7 @@ fn sees(
         })
 }
 
-fn positive(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    unit: &str,
-    usual: f64,
-) {
+fn positive(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, usual: f64) {
     if !(value.is_finite() && value > 0.0) {
         problems.push(Problem::new(
             format!("{at}.{key}"),
@@ -457,14 +479,7 @@ fn positive(
     }
 }
 
-fn within(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    unit: &str,
-    limit: f64,
-) {
+fn within(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, limit: f64) {
     if !(value.abs() <= limit) {
         problems.push(Problem::new(
             format!("{at}.{key}"),

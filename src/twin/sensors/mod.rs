@@ -8,7 +8,9 @@ pub use camera::{RigError, RigSettings, WaysideCameraSettings, ever_sees, visibl
 pub use imu::{Imu, ImuSettings};
 pub use odometer::{Odometer, OdometerSettings};
 /// Stand-in.
-#[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+#[derive(
+    Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
+)]
 pub struct LidarSettings {}
 impl LidarSettings {
     /// None.

@@ -73,7 +73,13 @@ mod tests {
     #[test]
     fn wide_pixels_see_the_mean_of_narrow_ones() {
         for pulse in [surface::RING_JOINT, surface::SLEEPER] {
-            for (s, w) in [(-3.1, 0.2), (0.0, 0.01), (7.45, 1.5), (0.29, 0.4), (12.0, 31.0)] {
+            for (s, w) in [
+                (-3.1, 0.2),
+                (0.0, 0.01),
+                (7.45, 1.5),
+                (0.29, 0.4),
+                (12.0, 31.0),
+            ] {
                 let n = 20_000;
                 let seen = (0..n)
                     .filter(|k| {
@@ -83,7 +89,10 @@ mod tests {
                     })
                     .count();
                 let mean = seen as f64 / f64::from(n);
-                assert!((share_of_marks(&pulse, s, w) - mean).abs() < 1e-3, "{s} {w}");
+                assert!(
+                    (share_of_marks(&pulse, s, w) - mean).abs() < 1e-3,
+                    "{s} {w}"
+                );
             }
         }
     }

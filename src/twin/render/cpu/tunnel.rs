@@ -112,14 +112,20 @@ impl TunnelCaster {
             first_m: first as f64 * RING_M,
             stations,
             slabs,
-            outlines: tunnel.sections.iter().map(|r| Outline::new(&r.section)).collect(),
+            outlines: tunnel
+                .sections
+                .iter()
+                .map(|r| Outline::new(&r.section))
+                .collect(),
         }
     }
 
     /// The slab that a place is in: from a slab close by, or else by search for the nearest
     /// station.
     pub fn slab_of(&self, p: &Point3<f64>, near: Option<usize>) -> usize {
-        let mut k = near.unwrap_or_else(|| self.nearest(p)).min(self.slabs.len() - 1);
+        let mut k = near
+            .unwrap_or_else(|| self.nearest(p))
+            .min(self.slabs.len() - 1);
         for _ in 0..self.slabs.len() {
             if k > 0 && self.ahead_of(k, p) < 0.0 {
                 k -= 1;
@@ -147,9 +153,17 @@ impl TunnelCaster {
 
     /// First surface that the ray o + t d meets for t up to `reach`; `slab` is that of o. Rays
     /// from outside the line's ends meet nothing.
-    pub fn cast(&self, slab: usize, o: &Point3<f64>, d: &Vector3<f64>, reach: f64) -> Option<Strike> {
+    pub fn cast(
+        &self,
+        slab: usize,
+        o: &Point3<f64>,
+        d: &Vector3<f64>,
+        reach: f64,
+    ) -> Option<Strike> {
         if slab >= self.slabs.len()
-            || self.ahead_of(slab, o) < -1e-6 || self.ahead_of(slab + 1, o) > 1e-6 {
+            || self.ahead_of(slab, o) < -1e-6
+            || self.ahead_of(slab + 1, o) > 1e-6
+        {
             return None;
         }
         let (d2, overlap) = (plan(*d), OVERLAP_M / d.norm());
@@ -157,7 +171,10 @@ impl TunnelCaster {
         // Each station's plane is crossed once; the bound is for rays that are not numbers.
         for _ in 0..self.slabs.len() {
             let exit_down = exit(-self.ahead_of(k, o), -self.stations[k].forward.dot(&d2));
-            let exit_up = exit(self.ahead_of(k + 1, o), self.stations[k + 1].forward.dot(&d2));
+            let exit_up = exit(
+                self.ahead_of(k + 1, o),
+                self.stations[k + 1].forward.dot(&d2),
+            );
             let leave = exit_up.min(exit_down);
             let (o_across, d_across) = self.across(k, o, d);
             let (from, to) = ((entry - overlap).max(0.0), leave.min(reach));
@@ -173,7 +190,11 @@ impl TunnelCaster {
             if leave >= reach {
                 return None;
             }
-            let next = if exit_up < exit_down { k + 1 } else { k.wrapping_sub(1) };
+            let next = if exit_up < exit_down {
+                k + 1
+            } else {
+                k.wrapping_sub(1)
+            };
             let beyond = self.slabs.get(next)?;
             if beyond.outline != self.slabs[k].outline
                 && let Some(i) = beyond.outline
@@ -204,7 +225,10 @@ impl TunnelCaster {
         let (o_across, d_across) = self.across(k, o, d);
         let position = o + d * strike.t;
         let lh = o_across + d_across * strike.t;
-        let (past, before) = (self.ahead_of(k, &position), -self.ahead_of(k + 1, &position));
+        let (past, before) = (
+            self.ahead_of(k, &position),
+            -self.ahead_of(k + 1, &position),
+        );
         let edge = &self.outlines[slab.outline.unwrap_or(0)].edges[strike.edge as usize];
         // Across the edge and across the ruling, which climbs with the slope.
         let (n, along) = (edge.normal, -edge.normal.y * slab.slope);
