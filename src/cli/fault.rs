@@ -55,11 +55,10 @@ impl From<ScenarioError> for Failure {
 
 /// Long lines are left to the terminal: a path or key is never broken in two.
 pub(super) fn set_style() {
-    let style = |_: &dyn Diagnostic| {
-        let handler = MietteHandlerOpts::new().wrap_lines(false).build();
-        Box::new(handler) as Box<dyn miette::ReportHandler>
-    };
-    if let Err(error) = miette::set_hook(Box::new(style)) {
+    let set = miette::set_hook(Box::new(|_| {
+        Box::new(MietteHandlerOpts::new().wrap_lines(false).build())
+    }));
+    if let Err(error) = set {
         tracing::debug!("error reports keep their default style: {error}");
     }
 }

@@ -64,7 +64,7 @@ fn lamps(tunnel: &Tunnel) -> String {
 pub(super) fn scenario(scenario: &Scenario) -> String {
     let mut lines = vec![format!("scenario `{}`: {}", scenario.name, scenario.description)];
     lines.push(format!(
-        "{} s on `{}`, seed {}",
+        "{:.1} s on `{}`, seed {}",
         scenario.duration_s, scenario.tunnel.name, scenario.seed
     ));
     if let Some(train) = &scenario.physics.train {
@@ -97,7 +97,9 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         lines.push(format!("{name}: about {count:.0} images{lidar}"));
     }
     let (obstacles, workers) = (&scenario.physics.obstacles, &scenario.physics.workers);
-    lines.push(format!("{} obstacles, {} workers", obstacles.len(), workers.len()));
+    if !(obstacles.is_empty() && workers.is_empty()) {
+        lines.push(format!("obstacles: {}, workers: {}", obstacles.len(), workers.len()));
+    }
     indented(&lines)
 }
 
@@ -131,12 +133,14 @@ fn view(rig: &RigCalibration, scenario: &Scenario) -> String {
         (_, Some(middle), _) => format!("{middle:.1} m"),
         _ => "nowhere".to_owned(),
     };
+    let unseen = match tunnel.lamps.len() - near.len() {
+        0 => String::new(),
+        n => format!("; {n} lamps never"),
+    };
     format!(
-        "a lamp is seen whole by both eyes from {} to {} ahead of the head; {} of {} lamps are",
+        "a lamp is seen whole by both eyes from {} to {} ahead of the head{unseen}",
         text(&near),
         text(&far),
-        near.len(),
-        tunnel.lamps.len()
     )
 }
 
