@@ -151,7 +151,8 @@ fn lamp_inside_the_rock() {
     let (tunnel, file) = on_tunnel(&folder, "test_bench.toml", from, to);
     let words = ["tunnel.toml:", "lateral_m", "4.7", "help:"];
     refused(&folder, &file, &words);
-    refused(&folder, &tunnel, &words[1..1]);
+    let output = metrotwin(&["check", tunnel.to_str().expect("the path is UTF-8")]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
 }
 
 #[test]
