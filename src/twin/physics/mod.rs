@@ -1,10 +1,50 @@
-//! Rigid bodies: the train on its springs, obstacles, workers.
+//! Rigid bodies: the train on its springs and the uneven track, obstacles, workers. The only place
+//! that knows rapier.
+//!
+//! Car bodies and bogies are rigid bodies with six degrees of freedom each. Primary and secondary
+//! suspension, couplers, traction, brakes and resistance are forces put on them in every step;
+//! wheelsets follow the rails (designed alignment, cant, and a random irregularity with one of the
+//! published spectra). Obstacles fall, bounce and rest by rapier's contacts, and a train that hits
+//! one exchanges momentum with it.
+//!
+//! ```
+//! use metrotwin::bus::TrainCommand;
+//! use metrotwin::track::TunnelFile;
+//! use metrotwin::twin::physics::{PhysicsSettings, World};
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! # let tunnel = std::sync::Arc::new(metrotwin::track::Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?);
+//! let mut world = World::new(tunnel, &PhysicsSettings::default(), 1, 0)?;
+//! let go = TrainCommand { permitted_speed_mps: 20.0, ..TrainCommand::default() };
+//! for _ in 0..5000 {
+//!     world.step(&go)?;
+//! }
+//! assert!(world.train().is_some_and(|t| t.speed_mps > 0.5));
+//! # Ok(()) }
+//! ```
+//!
+//! Vehicle parameters: Manchester benchmark vehicle 1 (Iwnicki 1998) and a published metro car.
+//! The step moves positions with the new velocities (symplectic Euler, one solver iteration), so
+//! springs gain no energy.
+//!
+//! Not modelled: creep and hunting, unsprung masses and the track's own give (wheelsets are held
+//! by rigid rails), bump stops, flexible car bodies, wheel slide, air pressure in the tunnel.
+//! Trains run up the line only, and a worker cannot be run over: he is drawn, not collided with.
 
+mod consist;
+mod convert;
+mod driver;
+mod ground;
+mod history;
 mod irregularity;
 mod obstacle;
 mod settings;
+mod suspension;
+#[cfg(test)]
+mod tests;
+mod vehicle;
 mod worker;
 
+pub use history::VehicleMotion;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{ObstacleSettings, ObstacleShape};
 pub(crate) use settings::within;
@@ -13,8 +53,16 @@ pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand};
 use crate::track::{Problem, Tunnel};
-use crate::twin::render::{Body, Headlight};
-use nalgebra::{Isometry3, Vector3};
+use crate::twin::render::{Body, Headlight, Shape};
+use consist::Consist;
+use driver::{Driver, Effort, STANDING_MPS};
+use ground::Ground;
+use history::History;
+use irregularity::Irregularity;
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use obstacle::Obstacle;
+use rapier3d_f64::math::Vector;
+use rapier3d_f64::prelude::PhysicsWorld;
 use std::sync::Arc;
 
 /// Why the world could not be made, or could not go on.
@@ -70,6 +118,8 @@ pub struct Collision {
     pub obstacle: String,
     /// Speed of the train relative to the obstacle just before.
     pub speed_mps: f64,
+    /// Velocity of the obstacle just before, world.
+    pub velocity_before_mps: Vector3<f64>,
     /// Momentum that the obstacle took.
     pub momentum_n_s: f64,
     /// Kinetic energy of the obstacle relative to the train just before.
@@ -91,10 +141,47 @@ pub struct ObstacleTruth<'a> {
     pub resting: bool,
 }
 
+/// A train under way.
+struct Train {
+    consist: Consist,
+    driver: Driver,
+    effort: Effort,
+    history: History,
+}
+
+/// A collision is over after this; until then the obstacle's momentum may still grow.
+const COLLISION_S: f64 = 0.05;
+/// Steps between looks at where a moving obstacle is along the line.
+const LOOK_STEPS: u64 = 50;
+/// A headlight's lens.
+const LENS_RADIUS_M: f64 = 0.09;
+/// Headlights: beside the centreline, over top of rail, looking down to the track ahead.
+const HEADLIGHT_LATERAL_M: f64 = 0.9;
+const HEADLIGHT_HEIGHT_M: f64 = 1.0;
+const HEADLIGHT_DOWN_RAD: f64 = 0.02;
+/// Narrow beam: half its intensity at 9 degrees from the axis.
+const HEADLIGHT_EXPONENT: f64 = 56.0;
+/// Painted steel.
+const CAR_ALBEDO: f64 = 0.5;
+
 /// Everything that moves.
 pub struct World {
     tunnel: Arc<Tunnel>,
+    settings: PhysicsSettings,
+    rapier: PhysicsWorld,
+    irregularity: Irregularity,
+    ground: Ground,
+    train: Option<Train>,
+    obstacles: Vec<Obstacle>,
+    /// Obstacles still to come, the next one last.
+    to_come: Vec<ObstacleSettings>,
+    /// Which workers' loads are down.
+    put_down: Vec<bool>,
+    collision: Option<Collision>,
     time: SimTime,
+    steps: u64,
+    step: SimTime,
+    step_s: f64,
 }
 
 impl World {
@@ -105,20 +192,86 @@ impl World {
         seed: u64,
         index: u64,
     ) -> Result<Self, PhysicsError> {
-        let _ = (seed, index);
         let mut problems = Vec::new();
-        settings.check("physics", &mut problems);
+        settings.check("", &mut problems);
         if !problems.is_empty() {
             return Err(PhysicsError::Settings(problems));
         }
-        Ok(Self {
+        let step = SimTime::from_secs(settings.step_s);
+        let step_s = step.secs();
+        let mut rapier = PhysicsWorld::new();
+        rapier.gravity = Vector::new(0.0, 0.0, -vehicle::GRAVITY_MPS2);
+        rapier.integration_parameters.dt = step_s;
+        // Substeps would move bodies with forces that belong to the step's start.
+        rapier.integration_parameters.num_solver_iterations = 1;
+        let alignment = &tunnel.alignment;
+        let train = settings.train.as_ref().map(|train| {
+            let consist = Consist::new(&mut rapier, alignment, train);
+            let mut history = History::new((settings.history_s / step_s).ceil() as usize + 1);
+            history.push(consist.motion(SimTime::ZERO));
+            Train {
+                consist,
+                driver: Driver::new(train),
+                effort: Effort::default(),
+                history,
+            }
+        });
+        let mut to_come = settings.obstacles.clone();
+        to_come.sort_by(|a, b| b.appears_s.total_cmp(&a.appears_s));
+        let irregularity = Irregularity::new(
+            &settings.track.irregularity,
+            alignment.length_m(),
+            seed,
+            index,
+        );
+        let mut world = Self {
+            put_down: vec![false; settings.workers.len()],
+            settings: settings.clone(),
             tunnel,
+            rapier,
+            irregularity,
+            ground: Ground::default(),
+            train,
+            obstacles: Vec::new(),
+            to_come,
+            collision: None,
             time: SimTime::ZERO,
-        })
+            steps: 0,
+            step,
+            step_s,
+        };
+        world.appear();
+        Ok(world)
     }
 
     /// One step on.
-    pub fn step(&mut self, _command: &TrainCommand) -> Result<(), PhysicsError> {
+    pub fn step(&mut self, command: &TrainCommand) -> Result<(), PhysicsError> {
+        let alignment = &self.tunnel.alignment;
+        if let Some(train) = &mut self.train {
+            let instruments = train.consist.instruments(self.time, alignment);
+            train.effort = train.driver.step(&instruments, command, self.step_s);
+            train.consist.apply_forces(
+                &mut self.rapier,
+                alignment,
+                &self.irregularity,
+                train.effort,
+                self.step_s,
+            );
+        }
+        for obstacle in &mut self.obstacles {
+            if let Some((_, velocity)) = obstacle.state(&self.rapier) {
+                obstacle.velocity_before = velocity;
+            }
+        }
+        self.rapier.step();
+        self.steps += 1;
+        self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
+        if let Some(train) = &mut self.train {
+            train.consist.read(&self.rapier, self.time)?;
+            train.history.push(train.consist.motion(self.time));
+        }
+        self.watch_obstacles()?;
+        self.appear();
         Ok(())
     }
 
@@ -134,47 +287,216 @@ impl World {
 
     /// Length of a step.
     pub fn step_s(&self) -> f64 {
-        0.001
+        self.step_s
     }
 
     /// The train now; `None` where there is none.
     pub fn train(&self) -> Option<TrainState> {
-        None
+        let train = self.train.as_ref()?;
+        let consist = &train.consist;
+        let motion = train.history.latest()?;
+        let guess = consist
+            .instruments(self.time, &self.tunnel.alignment)
+            .chainage_m;
+        let origin = motion.world_from_vehicle.translation.vector.into();
+        let head = self.tunnel.alignment.track_from_world(&origin, guess);
+        let frame = self.tunnel.alignment.at(head.s_m);
+        let along = frame.world_from_line().rotation * Vector3::x();
+        let speed_mps = motion.velocity_mps.dot(&along);
+        Some(TrainState {
+            time: self.time,
+            chainage_m: head.s_m,
+            speed_mps,
+            accel_mps2: consist.accel_mps2(along, self.step_s),
+            world_from_vehicle: motion.world_from_vehicle,
+            world_from_cars: consist.boxes().collect(),
+            floor_accel_mps2: consist.floor_accel_mps2(self.step_s),
+            secondary_travel_m: consist.secondary_travel_m,
+            standing: consist.speed_mps().abs() < STANDING_MPS,
+            traction_mps2: train.effort.traction_mps2,
+            brake_mps2: train.effort.brake_mps2,
+        })
     }
 
     /// Pose of the vehicle frame at a time of the recent past; `None` without a train, after now,
     /// or before what is kept.
-    pub fn vehicle_at(&self, _time: SimTime) -> Option<Isometry3<f64>> {
-        None
+    pub fn vehicle_at(&self, time: SimTime) -> Option<Isometry3<f64>> {
+        self.train.as_ref()?.history.at(time)
+    }
+
+    /// Motion of the vehicle frame now; `None` without a train.
+    pub fn vehicle_motion(&self) -> Option<&VehicleMotion> {
+        self.train.as_ref()?.history.latest()
+    }
+
+    /// Distance that the leading wheelset has run on the rail since the start; `None` without a
+    /// train.
+    pub fn wheel_run_m(&self) -> Option<f64> {
+        Some(self.train.as_ref()?.consist.run_m)
     }
 
     /// Half extents of a car body's box; `None` without a train.
     pub fn car_half_extents_m(&self) -> Option<Vector3<f64>> {
-        None
+        Some(self.train.as_ref()?.consist.half_extents_m())
     }
 
     /// Obstacles and workers that are there now, to draw.
     pub fn bodies(&self) -> Vec<Body> {
-        Vec::new()
+        let drawn = self.obstacles.iter().filter_map(|o| o.draw(&self.rapier));
+        let mut bodies: Vec<Body> = drawn.collect();
+        for worker in &self.settings.workers {
+            worker.draw(&self.tunnel, self.time.secs(), &mut bodies);
+        }
+        bodies
     }
 
     /// The train as boxes with the lenses of its headlights, for cameras that stand outside.
     pub fn train_bodies(&self) -> Vec<Body> {
-        Vec::new()
+        let Some(train) = &self.train else {
+            return Vec::new();
+        };
+        let half = train.consist.half_extents_m();
+        let cars = train.consist.boxes().zip(train.consist.velocities_mps());
+        let mut bodies: Vec<Body> = cars
+            .map(|(world_from_body, velocity_mps)| Body {
+                shape: Shape::Box(half),
+                world_from_body,
+                velocity_mps,
+                albedo: CAR_ALBEDO,
+                luminance_cd_m2: 0.0,
+            })
+            .collect();
+        let velocity_mps = bodies.first().map_or(Vector3::zeros(), |b| b.velocity_mps);
+        let lens_m2 = std::f64::consts::PI * LENS_RADIUS_M.powi(2);
+        bodies.extend(self.headlights().into_iter().map(|light| Body {
+            shape: Shape::Sphere(LENS_RADIUS_M),
+            world_from_body: light.world_from_light,
+            velocity_mps,
+            albedo: CAR_ALBEDO,
+            luminance_cd_m2: light.intensity_cd / lens_m2,
+        }));
+        bodies
     }
 
     /// The train's headlights.
     pub fn headlights(&self) -> Vec<Headlight> {
-        Vec::new()
+        let (Some(train), Some(motion)) = (&self.train, self.vehicle_motion()) else {
+            return Vec::new();
+        };
+        let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), HEADLIGHT_DOWN_RAD);
+        let lights = [HEADLIGHT_LATERAL_M, -HEADLIGHT_LATERAL_M].map(|lateral| Headlight {
+            world_from_light: motion.world_from_vehicle
+                * Isometry3::translation(0.0, lateral, HEADLIGHT_HEIGHT_M)
+                * down,
+            intensity_cd: train.consist.settings.headlight_cd,
+            exponent: HEADLIGHT_EXPONENT,
+        });
+        lights.to_vec()
     }
 
     /// Obstacles that are there now.
     pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
-        std::iter::empty()
+        self.obstacles.iter().filter_map(|obstacle| {
+            let (world_from_body, _) = obstacle.state(&self.rapier)?;
+            let centre = world_from_body.translation.vector.into();
+            let near = obstacle.settings.chainage_m;
+            Some(ObstacleTruth {
+                name: &obstacle.settings.name,
+                size_m: obstacle.settings.body.size_m(),
+                chainage_m: self.tunnel.alignment.track_from_world(&centre, near).s_m,
+                world_from_body,
+                resting: obstacle.resting(),
+            })
+        })
     }
 
     /// The first hit of the train on an obstacle.
     pub fn collision(&self) -> Option<&Collision> {
-        None
+        self.collision.as_ref()
+    }
+
+    /// Lets appear what is due.
+    fn appear(&mut self) {
+        let now = self.time.secs();
+        while let Some(next) = self.to_come.pop_if(|next| next.appears_s <= now) {
+            self.insert(&next);
+        }
+        for k in 0..self.put_down.len() {
+            if !self.put_down[k] {
+                if let Some(load) = self.settings.workers[k].put_down(&self.tunnel, now) {
+                    self.put_down[k] = true;
+                    self.insert(&load);
+                }
+            }
+        }
+    }
+
+    fn insert(&mut self, settings: &ObstacleSettings) {
+        self.ground
+            .lay(&mut self.rapier, &self.tunnel, settings.chainage_m);
+        let alignment = &self.tunnel.alignment;
+        let obstacle = Obstacle::insert(&mut self.rapier, alignment, settings);
+        self.obstacles.push(obstacle);
+    }
+
+    /// After a step: finite states, rest, ground under what flies on, collisions.
+    fn watch_obstacles(&mut self) -> Result<(), PhysicsError> {
+        for k in 0..self.obstacles.len() {
+            let obstacle = &mut self.obstacles[k];
+            if !obstacle.observe(&self.rapier, self.step_s) {
+                return Err(PhysicsError::NonFinite {
+                    body: format!("obstacle {}", obstacle.settings.name),
+                    time: self.time,
+                });
+            }
+            if !obstacle.resting() && self.steps.is_multiple_of(LOOK_STEPS) {
+                let place = obstacle.state(&self.rapier);
+                let centre = place.map(|(pose, _)| pose.translation.vector.into());
+                if let Some(centre) = centre {
+                    let near = obstacle.settings.chainage_m;
+                    let s_m = self.tunnel.alignment.track_from_world(&centre, near).s_m;
+                    obstacle.settings.chainage_m = s_m;
+                    self.ground.lay(&mut self.rapier, &self.tunnel, s_m);
+                }
+            }
+            self.watch_collision(k);
+        }
+        Ok(())
+    }
+
+    /// Records the first contact of the train with obstacle `k`, and what it does to it.
+    fn watch_collision(&mut self, k: usize) {
+        let obstacle = &self.obstacles[k];
+        let (Some(train), Some((_, velocity))) = (&self.train, obstacle.state(&self.rapier)) else {
+            return;
+        };
+        let mass = obstacle.settings.mass_kg;
+        if let Some(collision) = &mut self.collision {
+            let lasts = self.time.since(collision.time) < COLLISION_S;
+            if lasts && collision.obstacle == obstacle.settings.name {
+                let taken = mass * (velocity - collision.velocity_before_mps).norm();
+                collision.momentum_n_s = collision.momentum_n_s.max(taken);
+            }
+            return;
+        }
+        let mut pairs = self
+            .rapier
+            .narrow_phase
+            .contact_pairs_with(obstacle.collider);
+        let hit = pairs.any(|pair| {
+            pair.has_any_active_contact() && train.consist.is_part(pair.collider1, pair.collider2)
+        });
+        if hit {
+            let before = obstacle.velocity_before;
+            let closing = (train.consist.velocity_before_mps() - before).norm();
+            self.collision = Some(Collision {
+                time: self.time,
+                obstacle: obstacle.settings.name.clone(),
+                speed_mps: closing,
+                velocity_before_mps: before,
+                momentum_n_s: mass * (velocity - before).norm(),
+                energy_j: 0.5 * mass * closing * closing,
+            });
+        }
     }
 }

@@ -1,9 +1,16 @@
-//! Things that lie, fall and get hit.
+//! Things that lie, fall and get hit: rigid bodies of rapier that appear at their time.
 
+use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
+use super::convert::{isometry, pose, vector, vector3};
+use super::ground::GROUND_GROUP;
 use super::settings::within;
-use crate::track::Problem;
-use crate::twin::render::Shape;
-use nalgebra::Vector3;
+use crate::track::{Alignment, Problem, TrackPoint};
+use crate::twin::render::{Body, Shape};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rapier3d_f64::prelude::{
+    ColliderBuilder, ColliderHandle, InteractionGroups, InteractionTestMode, PhysicsWorld,
+    RigidBodyBuilder, RigidBodyHandle,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -129,5 +136,112 @@ impl ObstacleSettings {
         for v in self.velocity_mps {
             check("velocity_mps", v, -50.0, 50.0, "m/s");
         }
+    }
+}
+
+/// Slower than this, a body lies still.
+const RESTING_MPS: f64 = 0.02;
+const RESTING_RAD_S: f64 = 0.1;
+/// For this long.
+const RESTING_S: f64 = 0.25;
+/// Extra solver passes for contacts of light bodies with a train.
+const EXTRA_PASSES: usize = 8;
+
+/// An obstacle in the world.
+pub(super) struct Obstacle {
+    pub settings: ObstacleSettings,
+    pub body: RigidBodyHandle,
+    pub collider: ColliderHandle,
+    still_s: f64,
+    /// Before the step, for the record of a collision.
+    pub velocity_before: Vector3<f64>,
+}
+
+impl Obstacle {
+    /// Puts an obstacle where its settings say; its place is the middle of its underside.
+    pub(super) fn insert(
+        world: &mut PhysicsWorld,
+        alignment: &Alignment,
+        settings: &ObstacleSettings,
+    ) -> Self {
+        let half = settings.body.size_m() / 2.0;
+        let frame = alignment.at(settings.chainage_m);
+        let centre = alignment.world_from_track(TrackPoint {
+            s_m: settings.chainage_m,
+            l_m: settings.lateral_m,
+            h_m: settings.height_m + half.z,
+        });
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), frame.heading_rad);
+        let yaw =
+            UnitQuaternion::from_axis_angle(&Vector3::z_axis(), settings.yaw_deg.to_radians());
+        let place = Isometry3::from_parts(Translation3::from(centre), heading * yaw);
+        let velocity = heading * Vector3::from(settings.velocity_mps);
+        let body = world.insert_body(
+            RigidBodyBuilder::dynamic()
+                .pose(pose(&place))
+                .linvel(vector(velocity))
+                .ccd_enabled(true)
+                .additional_solver_iterations(EXTRA_PASSES),
+        );
+        let collider = match settings.body {
+            ObstacleShape::Box { .. } => ColliderBuilder::cuboid(half.x, half.y, half.z),
+            ObstacleShape::Sphere { .. } => ColliderBuilder::ball(half.x),
+            // Rapier's cylinders stand along y, ours along z.
+            ObstacleShape::Cylinder { .. } => ColliderBuilder::cylinder(half.z, half.x)
+                .rotation(vector(Vector3::x() * std::f64::consts::FRAC_PI_2)),
+        };
+        let collider = collider
+            .mass(settings.mass_kg)
+            .friction(settings.friction)
+            .restitution(settings.restitution)
+            .collision_groups(InteractionGroups::new(
+                OBSTACLE_GROUP,
+                OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP,
+                InteractionTestMode::And,
+            ));
+        Self {
+            settings: settings.clone(),
+            body,
+            collider: world.insert_collider(collider, Some(body)),
+            still_s: 0.0,
+            velocity_before: velocity,
+        }
+    }
+
+    /// Notes how it moves; `false` where its state is not finite.
+    pub(super) fn observe(&mut self, world: &PhysicsWorld, dt_s: f64) -> bool {
+        let Some(body) = world.bodies.get(self.body).filter(|b| b.is_enabled()) else {
+            return false;
+        };
+        let still = body.is_sleeping()
+            || body.linvel().length() < RESTING_MPS && body.angvel().length() < RESTING_RAD_S;
+        self.still_s = if still { self.still_s + dt_s } else { 0.0 };
+        true
+    }
+
+    /// It lies still.
+    pub(super) fn resting(&self) -> bool {
+        self.still_s >= RESTING_S
+    }
+
+    /// Where it is and how it moves.
+    pub(super) fn state(&self, world: &PhysicsWorld) -> Option<(Isometry3<f64>, Vector3<f64>)> {
+        let body = world.bodies.get(self.body)?;
+        Some((
+            isometry(body.translation(), *body.rotation()),
+            vector3(body.linvel()),
+        ))
+    }
+
+    /// As the renderer draws it.
+    pub(super) fn draw(&self, world: &PhysicsWorld) -> Option<Body> {
+        let (world_from_body, velocity_mps) = self.state(world)?;
+        Some(Body {
+            shape: self.settings.body.render_shape(),
+            world_from_body,
+            velocity_mps,
+            albedo: self.settings.albedo,
+            luminance_cd_m2: 0.0,
+        })
     }
 }

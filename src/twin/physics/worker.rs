@@ -1,8 +1,11 @@
 //! People on the line: they walk where their path says, and may leave something behind.
 
+use super::ground::floor_m;
 use super::obstacle::ObstacleSettings;
 use super::settings::{join, within};
-use crate::track::Problem;
+use crate::track::{Problem, TrackPoint, Tunnel};
+use crate::twin::render::{Body, Shape};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,8 +29,8 @@ pub struct WorkerSettings {
     pub name: String,
     /// Height of the body, metres.
     pub stature_m: f64,
-    /// Height of the ground he walks on above top of rail, metres.
-    pub ground_m: f64,
+    /// Height of the ground he walks on above top of rail, metres; the tunnel's floor where absent.
+    pub ground_m: Option<f64>,
     /// Share of light that his clothes reflect, 0 to 1.
     pub albedo: f64,
     /// Where he is when.
@@ -43,7 +46,7 @@ impl Default for WorkerSettings {
         Self {
             name: "worker".to_owned(),
             stature_m: 1.75,
-            ground_m: -0.2,
+            ground_m: None,
             albedo: 0.4,
             path: Vec::new(),
             carries: None,
@@ -56,7 +59,9 @@ impl WorkerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         within(problems, at, "stature_m", self.stature_m, 1.0, 2.3, "m");
-        within(problems, at, "ground_m", self.ground_m, -2.0, 2.0, "m");
+        if let Some(ground) = self.ground_m {
+            within(problems, at, "ground_m", ground, -2.0, 2.0, "m");
+        }
         within(problems, at, "albedo", self.albedo, 0.0, 1.0, "");
         if let Some(carried) = &self.carries {
             carried.check(&join(at, "carries"), problems);
@@ -82,6 +87,144 @@ impl WorkerSettings {
             within(problems, &at, "time_s", p.time_s, 0.0, 1e6, "s");
             within(problems, &at, "chainage_m", p.chainage_m, -1e6, 1e6, "m");
             within(problems, &at, "lateral_m", p.lateral_m, -10.0, 10.0, "m");
+        }
+    }
+}
+
+/// A stride (two steps), metres.
+const STRIDE_M: f64 = 1.4;
+/// How far a leg swings out at a walk of 1.4 m/s.
+const SWING_RAD: f64 = 0.45;
+/// Hand beside the body's centre.
+const HAND_M: f64 = 0.38;
+/// What is put down is let go this high over the ground.
+const LET_GO_M: f64 = 0.03;
+
+/// A worker at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stance {
+    s_m: f64,
+    l_m: f64,
+    /// Along the line and to the left.
+    velocity_mps: [f64; 2],
+    /// From the line's direction, to the left.
+    facing_rad: f64,
+    walked_m: f64,
+}
+
+impl WorkerSettings {
+    /// Where he is at a time; `None` before the first waypoint and after the last.
+    fn stance(&self, t_s: f64) -> Option<Stance> {
+        let first = self.path.first()?;
+        if !(first.time_s..=self.path.last()?.time_s).contains(&t_s) {
+            return None;
+        }
+        let mut stance = Stance {
+            s_m: first.chainage_m,
+            l_m: first.lateral_m,
+            velocity_mps: [0.0; 2],
+            facing_rad: 0.0,
+            walked_m: 0.0,
+        };
+        for pair in self.path.windows(2).take_while(|p| p[0].time_s <= t_s) {
+            let span = pair[1].time_s - pair[0].time_s;
+            let share = ((t_s - pair[0].time_s) / span).min(1.0);
+            let way = [
+                pair[1].chainage_m - pair[0].chainage_m,
+                pair[1].lateral_m - pair[0].lateral_m,
+            ];
+            let length = way[0].hypot(way[1]);
+            stance.s_m = pair[0].chainage_m + share * way[0];
+            stance.l_m = pair[0].lateral_m + share * way[1];
+            stance.velocity_mps = way.map(|x| x / span);
+            stance.walked_m += share * length;
+            if length > 1e-6 {
+                // Standing, he looks where he last went.
+                stance.facing_rad = way[1].atan2(way[0]);
+            }
+        }
+        Some(stance)
+    }
+
+    /// What he has put down by now, to be dropped beside him.
+    pub(super) fn put_down(&self, tunnel: &Tunnel, t_s: f64) -> Option<ObstacleSettings> {
+        let (carried, when) = (self.carries.as_ref()?, self.puts_down_s?);
+        if t_s < when {
+            return None;
+        }
+        let stance = self.stance(when)?;
+        let (sin, cos) = stance.facing_rad.sin_cos();
+        // His right hand.
+        let (s_m, l_m) = (stance.s_m + HAND_M * sin, stance.l_m - HAND_M * cos);
+        Some(ObstacleSettings {
+            chainage_m: s_m,
+            lateral_m: l_m,
+            height_m: self.ground(tunnel, s_m, l_m) + LET_GO_M,
+            yaw_deg: stance.facing_rad.to_degrees(),
+            velocity_mps: [0.0; 3],
+            ..carried.clone()
+        })
+    }
+
+    fn ground(&self, tunnel: &Tunnel, s_m: f64, l_m: f64) -> f64 {
+        self.ground_m.unwrap_or_else(|| floor_m(tunnel, s_m, l_m))
+    }
+
+    /// Appends his limbs, and what he still carries.
+    pub(super) fn draw(&self, tunnel: &Tunnel, t_s: f64, bodies: &mut Vec<Body>) {
+        let Some(stance) = self.stance(t_s) else {
+            return;
+        };
+        let frame = tunnel.alignment.at(stance.s_m);
+        let feet = tunnel.alignment.world_from_track(TrackPoint {
+            s_m: stance.s_m,
+            l_m: stance.l_m,
+            h_m: self.ground(tunnel, stance.s_m, stance.l_m),
+        });
+        let turned = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
+        let world_from_feet = Isometry3::from_parts(
+            Translation3::from(feet),
+            turned(frame.heading_rad + stance.facing_rad),
+        );
+        let [along, left] = stance.velocity_mps;
+        let velocity = turned(frame.heading_rad) * Vector3::new(along, left, 0.0);
+        let mut put = |shape, feet_from_part: Isometry3<f64>, albedo| {
+            bodies.push(Body {
+                shape,
+                world_from_body: world_from_feet * feet_from_part,
+                velocity_mps: velocity,
+                albedo,
+                luminance_cd_m2: 0.0,
+            });
+        };
+        let tall = self.stature_m;
+        let hip = 0.52 * tall;
+        let at = |x: f64, y: f64, z: f64| Isometry3::translation(x, y, z);
+        put(
+            Shape::Capsule(0.17, 0.31 * tall / 2.0 - 0.1),
+            at(0.0, 0.0, 0.68 * tall),
+            self.albedo,
+        );
+        put(Shape::Sphere(0.11), at(0.0, 0.0, tall - 0.11), self.albedo);
+        let pace = (along.hypot(left) / 1.4).min(1.2);
+        let phase = std::f64::consts::TAU * stance.walked_m / STRIDE_M;
+        for (side, sign) in [(0.09, 1.0), (-0.09, -1.0)] {
+            let swing = sign * SWING_RAD * pace * phase.sin();
+            // Turned about the hip, forward positive.
+            let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -swing);
+            let leg = Isometry3::from_parts(Translation3::new(0.0, side, hip), turn)
+                * at(0.0, 0.0, -hip / 2.0);
+            put(Shape::Capsule(0.08, hip / 2.0 - 0.08), leg, self.albedo);
+        }
+        let carries = self.puts_down_s.is_none_or(|when| t_s < when);
+        if let Some(carried) = self.carries.as_ref().filter(|_| carries) {
+            let top = 0.42 * tall;
+            let centre = (top - carried.body.size_m().z / 2.0).max(carried.body.size_m().z / 2.0);
+            put(
+                carried.body.render_shape(),
+                at(0.0, -HAND_M, centre),
+                carried.albedo,
+            );
         }
     }
 }

@@ -1,0 +1,128 @@
+//! The automatic driver and the brake.
+//!
+//! The driver aims at the lowest of cruise speed, permitted speed (less a margin) and the way to
+//! the stop mark, with limited acceleration and jerk. The protection's demands go past him:
+//! traction is cut at once and the brake builds up in its time; an emergency brake stays until
+//! the train stands, even where the demand is gone earlier.
+
+use super::settings::TrainSettings;
+use crate::bus::{BrakeDemand, TrainCommand};
+
+/// How far the driver stays under the permitted speed.
+const MARGIN_MPS: f64 = 0.5;
+/// Below this the train stands.
+pub(super) const STANDING_MPS: f64 = 0.01;
+/// Speed error that the driver answers with 1 m/s^2, before the jerk limit.
+const GAIN_PER_S: f64 = 1.5;
+/// Share of the service brake that the driver plans with to stop at the mark.
+const PLANNED_SHARE: f64 = 0.7;
+/// Closer than this to the mark he just holds the brake.
+const AT_MARK_M: f64 = 0.02;
+
+/// What the train does, as the driver's instruments show it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Instruments {
+    pub time_s: f64,
+    pub chainage_m: f64,
+    pub speed_mps: f64,
+    /// Deceleration by gradient and running resistance.
+    pub resistance_mps2: f64,
+}
+
+/// Accelerations asked of the traction and of the brake, both positive.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Effort {
+    pub traction_mps2: f64,
+    pub brake_mps2: f64,
+}
+
+/// Driver and brake control.
+#[derive(Clone, Debug)]
+pub(super) struct Driver {
+    settings: TrainSettings,
+    /// Driver's lever: traction over zero, brake below.
+    lever_mps2: f64,
+    /// Deceleration that the protection's demand has built up.
+    demanded_mps2: f64,
+    emergency: bool,
+}
+
+impl Driver {
+    pub(super) fn new(settings: &TrainSettings) -> Self {
+        let standing = settings.start_speed_kmh < 3.6 * STANDING_MPS;
+        Self {
+            settings: settings.clone(),
+            // A standing train starts with its brake on.
+            lever_mps2: if standing {
+                -settings.service_brake_mps2
+            } else {
+                0.0
+            },
+            demanded_mps2: 0.0,
+            emergency: false,
+        }
+    }
+
+    /// One step of `dt_s`.
+    pub(super) fn step(&mut self, now: &Instruments, command: &TrainCommand, dt_s: f64) -> Effort {
+        let standing = now.speed_mps.abs() < STANDING_MPS;
+        self.emergency = command.brake == BrakeDemand::Emergency || self.emergency && !standing;
+        let demand = if self.emergency {
+            BrakeDemand::Emergency
+        } else {
+            command.brake
+        };
+        self.build_up(demand, dt_s);
+        let mut wanted = self.wanted(now, command.permitted_speed_mps);
+        if demand != BrakeDemand::None {
+            // Traction is cut at once, and the lever stays out of power.
+            self.lever_mps2 = self.lever_mps2.min(0.0);
+            wanted = wanted.min(0.0);
+        }
+        let most = self.settings.jerk_mps3 * dt_s;
+        self.lever_mps2 += (wanted - self.lever_mps2).clamp(-most, most);
+        Effort {
+            traction_mps2: self.lever_mps2.max(0.0),
+            brake_mps2: self.demanded_mps2.max(-self.lever_mps2),
+        }
+    }
+
+    fn build_up(&mut self, demand: BrakeDemand, dt_s: f64) {
+        let s = &self.settings;
+        let (full, time) = match demand {
+            BrakeDemand::Emergency => (s.emergency_brake_mps2, s.emergency_build_up_s),
+            BrakeDemand::Service => (s.service_brake_mps2, s.service_build_up_s),
+            BrakeDemand::None => (0.0, s.service_build_up_s),
+        };
+        let rate = full.max(s.service_brake_mps2) / time.max(dt_s) * dt_s;
+        self.demanded_mps2 += (full - self.demanded_mps2).clamp(-rate, rate);
+    }
+
+    /// Lever position that the driver would like now.
+    fn wanted(&self, now: &Instruments, permitted_mps: f64) -> f64 {
+        let s = &self.settings;
+        let mut target = (permitted_mps - MARGIN_MPS).max(0.0);
+        target = target.min(s.cruise_speed_kmh / 3.6);
+        if now.time_s < s.start_s {
+            target = target.min(s.start_speed_kmh / 3.6);
+        }
+        let error = target - now.speed_mps;
+        // The root keeps the approach within the jerk limit, so that the speed does not overshoot.
+        let answer = (GAIN_PER_S * error.abs()).min((1.5 * s.jerk_mps3 * error.abs()).sqrt());
+        let mut wanted = answer.copysign(error) + now.resistance_mps2;
+        if let Some(stop_m) = s.stop_at_m {
+            let left_m = stop_m - now.chainage_m;
+            let planned = PLANNED_SHARE * s.service_brake_mps2;
+            let needed = now.speed_mps.powi(2) / (2.0 * left_m.max(AT_MARK_M));
+            if left_m < AT_MARK_M {
+                target = 0.0;
+            } else if needed > 0.9 * planned {
+                wanted = wanted.min(now.resistance_mps2 - needed);
+            }
+        }
+        if target < STANDING_MPS && now.speed_mps < 0.1 {
+            return -s.service_brake_mps2;
+        }
+        wanted.clamp(-s.service_brake_mps2, s.accel_mps2)
+    }
+}

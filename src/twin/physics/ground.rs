@@ -1,0 +1,129 @@
+//! What obstacles fall on: slabs behind the tunnel's outline and boxes for the rails, laid along
+//! the line in short lengths, and only where there is something to fall.
+
+use super::consist::OBSTACLE_GROUP;
+use super::convert::{pose, vector};
+use crate::track::{BED_M, CrossSection, Edge, Material, OutlinePoint, Tunnel, rail_boxes};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rapier3d_f64::prelude::{
+    ColliderBuilder, Group, InteractionGroups, InteractionTestMode, PhysicsWorld,
+};
+use std::collections::BTreeSet;
+
+/// The ground is hit by obstacles only.
+pub(super) const GROUND_GROUP: Group = Group::GROUP_3;
+/// Length of a slab: at a radius of 300 m it is 2 mm off the curve.
+const SLAB_M: f64 = 2.0;
+const SLAB_THICKNESS_M: f64 = 0.2;
+/// Concrete.
+const FRICTION: f64 = 0.6;
+/// How far from a place the ground is laid down and up the line; hit by a train, things fly on.
+const BEHIND_M: f64 = 12.0;
+const AHEAD_M: f64 = 60.0;
+
+/// Height of the highest floor at (s, l) that one can step on, over top of rail.
+pub(super) fn floor_m(tunnel: &Tunnel, s_m: f64, l_m: f64) -> f64 {
+    let Some(section) = tunnel.section_at(s_m) else {
+        return BED_M;
+    };
+    let floors = section.edges().filter_map(|e| height_of_floor(&e, l_m));
+    floors.reduce(f64::max).unwrap_or(BED_M)
+}
+
+fn height_of_floor(edge: &Edge, l_m: f64) -> Option<f64> {
+    let walkable = matches!(
+        edge.material,
+        Material::Bed | Material::Walkway | Material::Platform
+    );
+    let (low, high) = (edge.a.l_m.min(edge.b.l_m), edge.a.l_m.max(edge.b.l_m));
+    let level = edge.normal().1 > 0.7;
+    (walkable && level && (low..=high).contains(&l_m)).then(|| {
+        let share = (l_m - edge.a.l_m) / (edge.b.l_m - edge.a.l_m);
+        edge.a.h_m + share * (edge.b.h_m - edge.a.h_m)
+    })
+}
+
+/// The slabs laid so far.
+#[derive(Default)]
+pub(super) struct Ground {
+    laid: BTreeSet<i64>,
+}
+
+impl Ground {
+    /// Lays what is missing around a chainage.
+    pub(super) fn lay(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, s_m: f64) {
+        let first = ((s_m - BEHIND_M) / SLAB_M).floor() as i64;
+        let last = ((s_m + AHEAD_M) / SLAB_M).ceil() as i64;
+        for k in first..last {
+            if self.laid.insert(k) {
+                lay_slabs(world, tunnel, (k as f64 + 0.5) * SLAB_M);
+            }
+        }
+    }
+}
+
+fn lay_slabs(world: &mut PhysicsWorld, tunnel: &Tunnel, s_m: f64) {
+    let frame = tunnel.alignment.at(s_m);
+    let level = frame.world_from_line();
+    match tunnel.section_at(s_m) {
+        Some(section) => lay_section(world, section, &level),
+        None => {
+            let edge = Edge {
+                a: OutlinePoint::new(3.0, BED_M),
+                b: OutlinePoint::new(-3.0, BED_M),
+                material: Material::Bed,
+            };
+            lay_edge(world, &edge, &level);
+        }
+    }
+    let rails = frame.world_from_rails();
+    for (a, b) in rail_boxes() {
+        let half = Vector3::new(
+            0.5 * SLAB_M,
+            0.5 * (a.l_m - b.l_m).abs(),
+            0.5 * (a.h_m - b.h_m).abs(),
+        );
+        let centre = Isometry3::translation(0.0, 0.5 * (a.l_m + b.l_m), 0.5 * (a.h_m + b.h_m));
+        insert(world, half, rails * centre);
+    }
+}
+
+fn lay_section(world: &mut PhysicsWorld, section: &CrossSection, level: &Isometry3<f64>) {
+    for edge in section.edges() {
+        // A slab behind a rail's side would stick out of its other side: rails are boxes.
+        if edge.material != Material::Rail && edge.length_m() > 1e-6 {
+            lay_edge(world, &edge, level);
+        }
+    }
+}
+
+/// A slab whose face is the edge.
+fn lay_edge(world: &mut PhysicsWorld, edge: &Edge, level: &Isometry3<f64>) {
+    let (nl, nh) = edge.normal();
+    let middle = Vector3::new(
+        0.0,
+        0.5 * (edge.a.l_m + edge.b.l_m) - 0.5 * SLAB_THICKNESS_M * nl,
+        0.5 * (edge.a.h_m + edge.b.h_m) - 0.5 * SLAB_THICKNESS_M * nh,
+    );
+    // The slab's z axis is the normal into the tunnel.
+    let roll = UnitQuaternion::from_axis_angle(&Vector3::x_axis(), (-nl).atan2(nh));
+    let half = Vector3::new(0.5 * SLAB_M, 0.5 * edge.length_m(), 0.5 * SLAB_THICKNESS_M);
+    insert(
+        world,
+        half,
+        level * Isometry3::from_parts(Translation3::from(middle), roll),
+    );
+}
+
+fn insert(world: &mut PhysicsWorld, half: Vector3<f64>, place: Isometry3<f64>) {
+    let half = vector(half);
+    let slab = ColliderBuilder::cuboid(half.x, half.y, half.z)
+        .position(pose(&place))
+        .friction(FRICTION)
+        .collision_groups(InteractionGroups::new(
+            GROUND_GROUP,
+            OBSTACLE_GROUP,
+            InteractionTestMode::And,
+        ));
+    world.insert_collider(slab, None);
+}
