@@ -2,17 +2,10 @@
 
 mod camera;
 mod imu;
+mod lidar;
 mod odometer;
 
 pub use camera::{RigError, RigSettings, WaysideCameraSettings, ever_sees, visible_interval};
 pub use imu::{Imu, ImuSettings};
+pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-/// Stand-in.
-#[derive(
-    Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema,
-)]
-pub struct LidarSettings {}
-impl LidarSettings {
-    /// None.
-    pub fn check(&self, _at: &str, _problems: &mut Vec<crate::track::Problem>) {}
-}

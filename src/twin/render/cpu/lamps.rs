@@ -12,6 +12,8 @@ use std::f64::consts::PI;
 const SLOTS: usize = 4;
 /// Sub-pixel positions, each way.
 const SUB_PIXELS: usize = 4;
+/// Surfaces nearer than a disc by less than this do not hide it: it may be flush with its wall.
+const FLUSH_M: f64 = 0.01;
 /// Lamps nearer to the camera's plane than this are not drawn.
 const NEAREST_M: f64 = 0.1;
 
@@ -107,7 +109,7 @@ pub(super) fn draw_disc(
                 let Some(depth) = disc.hit(&ray, lamp.radius_m) else {
                     continue;
                 };
-                if depth > depths[u] {
+                if depth > depths[u] + FLUSH_M {
                     continue;
                 }
                 covered += 1;

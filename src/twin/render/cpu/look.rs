@@ -4,8 +4,14 @@ use super::tunnel::SurfacePoint;
 use crate::twin::random::pcg4d;
 use crate::twin::render::surface::{self, Pulse};
 
-/// Albedo at a point for a pixel that spans `width_m` of the surface.
-pub(super) fn albedo(at: &SurfacePoint, width_m: f64) -> f64 {
+impl SurfacePoint {
+    /// Share of light reflected, for a pixel that spans `width_m` of chainage.
+    pub fn albedo(&self, width_m: f64) -> f64 {
+        albedo(self, width_m)
+    }
+}
+
+fn albedo(at: &SurfacePoint, width_m: f64) -> f64 {
     let look = surface::look(at.material);
     let mark = match look.pulse {
         Some(pulse) if at.l_m.abs() < pulse.half_width_m => {

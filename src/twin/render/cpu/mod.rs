@@ -226,7 +226,7 @@ impl World {
         let sine = (at.normal.dot(ray) / stretch)
             .abs()
             .max(super::surface::MIN_SINE);
-        let albedo = look::albedo(&at, strike.t * stretch / f_px / sine);
+        let albedo = at.albedo(strike.t * stretch / f_px / sine);
         let lux = self.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
             strike: Some(strike),

@@ -202,7 +202,7 @@ fn between_cross_sections_it_is_dark() {
         to_m,
         section,
     };
-    tunnel.sections = vec![range(0.0, 20.0, wide), range(20.0, 40.0, section())];
+    tunnel.sections = vec![range(0.0, 20.3, wide), range(20.3, 40.0, section())];
     let caster = TunnelCaster::new(&tunnel);
     let frame = tunnel.alignment.at(10.0).world_from_line();
     let cast = |l_m: f64, up_m: f64, d: Vector3<f64>| {
@@ -215,6 +215,9 @@ fn between_cross_sections_it_is_dark() {
     assert_eq!(cast(3.4, 1.7, Vector3::x()), None);
     let s_m = cast(0.0, 1.7, Vector3::new(1.0, 0.2, 0.0)).unwrap();
     assert!((s_m - 23.75).abs() < 0.1, "{s_m}");
+    // The wide one ends at 20.3 m and not at a ring.
+    let s_m = cast(0.0, 1.7, Vector3::new(1.0, 4.1 / 10.25, 0.0)).unwrap();
+    assert!((s_m - 20.25).abs() < 0.1, "{s_m}");
     // Out of the end, and from outside.
     assert_eq!(cast(0.0, 1.7, Vector3::x()), None);
     assert_eq!(cast(0.0, 1.7, Vector3::repeat(f64::NAN)), None);
