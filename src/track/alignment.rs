@@ -306,6 +306,8 @@ impl Alignment {
         let lead_in = Piece::new(0.0, begin, heading_rad, straight, Linear::constant(level));
         let mut plan = vec![lead_in];
         let (mut last, mut last_m) = (lead_in, 0.0);
+        // Lengths are summed by element, so that a user finds his own chainages.
+        let mut begin_m = 0.0;
         for e in elements {
             let count = pieces(e);
             let step_m = e.length_m / count;
@@ -314,16 +316,19 @@ impl Alignment {
                 let curvature = Linear::between(e.start_per_m, e.end_per_m, e.length_m, into_m);
                 let cant = Linear::between(e.start_cant_m, e.end_cant_m, e.length_m, into_m);
                 last = last.next(last_m, curvature, cant);
+                last.s0 = begin_m + into_m;
                 last_m = step_m;
                 plan.push(last);
             }
+            begin_m += e.length_m;
         }
-        let lead_out = last.next(last_m, straight, Linear::constant(last.cant(last_m)));
+        let mut lead_out = last.next(last_m, straight, Linear::constant(last.cant(last_m)));
+        lead_out.s0 = begin_m;
         plan.push(lead_out);
         Self {
             plan,
             profile: profile(start.z, grades),
-            length_m: lead_out.s0,
+            length_m: begin_m,
         }
     }
 

@@ -156,7 +156,7 @@ fn site(common: &LampRow, entry: &LampEntry, tunnel: &Tunnel) -> LampSite {
         power_w: entry.power_w.unwrap_or(common.power_w),
         efficacy_lm_per_w: common.efficacy_lm_per_w,
         beam_deg: common.beam_deg,
-        chip_s: common.chip_us * 1e-6,
+        chip_s: common.chip_us / 1e6,
         code: common.code,
     }
 }

@@ -145,7 +145,7 @@ mod tests {
     fn val_shipped_tunnels_have_the_figures_of_the_paper() {
         let line = Tunnel::from_toml(CHENGDU).unwrap();
         assert_eq!(line.lamps.len(), 299);
-        assert!((line.alignment.length_m() - 3000.0).abs() < 1e-9);
+        assert!((line.alignment.length_m() - 3000.0).abs() < 1e-12);
         for pair in line.lamps.windows(2) {
             assert!((pair[1].chainage_m - pair[0].chainage_m - 10.0).abs() < 1e-9);
             assert_eq!(pair[1].uid.lamp, pair[0].uid.lamp + 1);
@@ -301,6 +301,36 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Provokes: a mined section whose arch cannot be built, refused keys, and the defaults.
+    #[test]
+    fn every_kind_of_section_is_read() {
+        let line = "name = 't'\n[[plan]]\nkind = 'straight'\nlength_m = 50.0\n";
+        let with = |section: &str| format!("{line}[[sections]]\nfrom_m = 0.0\n{section}");
+        for kind in ["circular", "horseshoe", "rectangular", "open"] {
+            let tunnel = Tunnel::from_toml(&with(&format!("kind = '{kind}'"))).unwrap();
+            let section = tunnel.section_at(25.0).unwrap();
+            assert_eq!(section.closed, kind != "open");
+            assert!(section.contains(0.0, 3.0) && !section.contains(0.0, -1.0));
+        }
+        let key = |section: &str| problems(&with(section))[0].key.clone();
+        assert_eq!(
+            key("kind = 'horseshoe'\nspringing_m = 4.8"),
+            "sections[0].springing_m"
+        );
+        assert_eq!(
+            key("kind = 'open'\nwalkway = 'left'"),
+            "sections[0].walkway"
+        );
+        assert_eq!(
+            key("kind = 'rectangular'\nplatform_edge_m = 1.5"),
+            "sections[0].platform_edge_m"
+        );
+        assert_eq!(
+            key("kind = 'rectangular'\nplatform = 'left'\nwalkway = 'left'"),
+            "sections[0].walkway"
+        );
     }
 
     #[test]

@@ -81,6 +81,14 @@ fn section(entry: &SectionEntry, k: usize, problems: &mut Vec<Problem>) -> Cross
             let width_m = read.length("width_m", 5.2, 3.4..=20.0);
             let springing_m = read.length("springing_m", 2.4, 0.5..=20.0);
             let crown_m = read.length("ceiling_m", 4.8, 4.0..=30.0);
+            let rise_m = crown_m - springing_m;
+            if !(0.1..=0.5 * width_m).contains(&rise_m) {
+                read.problem(
+                    "springing_m",
+                    &format!("the arch rises {rise_m} m from there to the ceiling"),
+                    &format!("let it rise 0.1 to {} m, half the width", 0.5 * width_m),
+                );
+            }
             CrossSection::horseshoe(width_m, springing_m, crown_m, read.side("walkway"))
         }
         SectionKind::Rectangular => {
