@@ -15,8 +15,9 @@ pub struct EllipseFit {
     pub ellipse: Ellipse,
     /// Root mean square distance of the points from it.
     pub rms_px: f64,
-    /// Points used.
-    pub points: usize,
+    /// Standard deviation of the centre along u, from the scatter of the points: large where only
+    /// an arc is seen.
+    pub centre_sigma_px: f64,
 }
 
 /// Fewer edge points than this say too little about five unknowns.
@@ -39,16 +40,26 @@ struct Fitted {
 }
 
 impl Fitted {
+    fn scaled(&self, p: &Point2<f64>) -> (f64, f64) {
+        (
+            (p.x - self.mean.x) / self.scale,
+            (p.y - self.mean.y) / self.scale,
+        )
+    }
+
+    /// The conic's left side.
+    fn value(&self, p: &Point2<f64>) -> f64 {
+        let [a, b, c, d, e] = self.conic;
+        let (u, v) = self.scaled(p);
+        a * u * u + b * u * v + c * v * v + d * u + e * v + 1.0
+    }
+
     /// First-order distance from the ellipse, positive outside (Sampson's).
     fn distance_px(&self, p: &Point2<f64>) -> f64 {
         let [a, b, c, d, e] = self.conic;
-        let (u, v) = (
-            (p.x - self.mean.x) / self.scale,
-            (p.y - self.mean.y) / self.scale,
-        );
-        let value = a * u * u + b * u * v + c * v * v + d * u + e * v + 1.0;
+        let (u, v) = self.scaled(p);
         let slope = (2.0 * a * u + b * v + d).hypot(b * u + 2.0 * c * v + e);
-        self.scale * value / slope.max(1e-12)
+        self.scale * self.value(p) / slope.max(1e-12)
     }
 }
 
@@ -73,7 +84,8 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
         normal += row * row.transpose();
         right -= row;
     }
-    let solution = normal.cholesky()?.solve(&right);
+    let factor = normal.cholesky()?;
+    let solution = factor.solve(&right);
     let conic = [
         solution[0],
         solution[1],
@@ -85,7 +97,7 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
         fit: EllipseFit {
             ellipse: to_ellipse(conic, &mean, scale)?,
             rms_px: 0.0,
-            points: n,
+            centre_sigma_px: f64::INFINITY,
         },
         mean,
         scale,
@@ -93,7 +105,26 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
     };
     let squares: f64 = chosen().map(|p| fitted.distance_px(p).powi(2)).sum();
     fitted.fit.rms_px = (squares / n as f64).sqrt();
+    // The algebraic residual's variance spreads over the solution by the inverse normal matrix.
+    let freedom = (n - 5) as f64;
+    let algebraic: f64 = chosen().map(|p| fitted.value(p).powi(2)).sum();
+    let slope = centre_u_slope(conic);
+    let variance = algebraic / freedom * slope.dot(&factor.solve(&slope));
+    fitted.fit.centre_sigma_px = scale * variance.max(0.0).sqrt();
     Some(fitted)
+}
+
+/// Derivatives of the centre's u by the conic's five coefficients.
+fn centre_u_slope([a, b, c, d, e]: [f64; 5]) -> Vector5<f64> {
+    let determinant = 4.0 * a * c - b * b;
+    let u = (b * e - 2.0 * c * d) / determinant;
+    Vector5::new(
+        -4.0 * c * u,
+        e + 2.0 * b * u,
+        -2.0 * d - 4.0 * a * u,
+        -2.0 * c,
+        b,
+    ) / determinant
 }
 
 /// Centre and axes of a conic; `None` where it is no real ellipse.
@@ -203,6 +234,27 @@ mod tests {
         points[5] += nalgebra::Vector2::new(9.0, -4.0);
         let f = fit_ellipse(&points).unwrap();
         assert!((f.ellipse.centre - e.centre).norm() < 0.02, "{f:?}");
+    }
+
+    /// The stated sigma of the centre against the scatter over many noisy outlines, whole and cut.
+    #[test]
+    fn the_centres_sigma_is_its_scatter() {
+        let e = sample();
+        let mut noise = crate::stack::led::testing::Noise::new(3);
+        for arc in [TAU, 0.6 * TAU] {
+            let (mut squares, mut stated) = (0.0, 0.0);
+            for _ in 0..300 {
+                let points: Vec<_> = (0..60)
+                    .map(|k| point_at(&e, arc * f64::from(k) / 60.0))
+                    .map(|p| p + nalgebra::Vector2::new(noise.normal(), noise.normal()) * 0.2)
+                    .collect();
+                let f = fit_ellipse(&points).unwrap();
+                squares += (f.ellipse.centre.x - e.centre.x).powi(2) / 300.0;
+                stated += f.centre_sigma_px / 300.0;
+            }
+            let ratio = stated / squares.sqrt();
+            assert!((0.6..1.6).contains(&ratio), "{ratio} at {arc}");
+        }
     }
 
     /// No panic and no ellipse from a line, one point, a hyperbola or nothing.

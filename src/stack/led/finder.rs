@@ -1,6 +1,6 @@
 //! Lamps in an image: the steps in their order.
 
-use super::centroid::marginal_centre;
+use super::centroid::{Chord, GreyCentroid};
 use super::code::{ChipVotes, longest_dark_run};
 use super::ellipse::{EllipseFit, fit_ellipse, roundness};
 use super::median::{MedianScratch, median3};
@@ -44,7 +44,7 @@ pub struct LampFinder {
     filtered: Patch,
     median: MedianScratch,
     outline: Outline,
-    marginal: Vec<f64>,
+    grey: GreyCentroid,
     wiener: Wiener,
     profile: Profile,
     reader: StripeReader,
@@ -79,7 +79,7 @@ impl LampFinder {
             filtered: Patch::default(),
             median: MedianScratch::default(),
             outline: Outline::default(),
-            marginal: Vec::new(),
+            grey: GreyCentroid::default(),
             wiener: Wiener::default(),
             profile: Profile::default(),
             reader: StripeReader::new(chip_s, camera.shutter),
@@ -169,7 +169,7 @@ impl LampFinder {
             Some(e) => roundness(e),
             None => 1.0,
         };
-        let grey = self.grey_centre(black);
+        let grey = self.grey_centre();
         let centre = match (grey, ellipse) {
             (Some(g), Some(e)) => Point2::from(alpha * g.coords + (1.0 - alpha) * e.centre.coords),
             (None, Some(e)) => e.centre,
@@ -182,8 +182,7 @@ impl LampFinder {
             semi_minor_px: 0.5 * f64::from(bounds.u1 - bounds.u0).max(2.0),
             angle_rad: std::f64::consts::FRAC_PI_2,
         });
-        // The centre averages the left and right edges of all rows.
-        let sigma_px = fit.map_or(1.0, |f| f.rms_px / (f.points as f64 / 2.0).sqrt());
+        let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
         Some(LampImage {
             spot: Spot {
                 bounds,
@@ -193,7 +192,7 @@ impl LampFinder {
                 cut,
                 uid: None,
             },
-            sigma_px: if cut { 3.0 * sigma_px } else { sigma_px },
+            sigma_px,
             black,
             shape,
         })
@@ -211,37 +210,13 @@ impl LampFinder {
         })
     }
 
-    /// Log-Gaussian centre of both marginals of the lit rows.
-    fn grey_centre(&mut self, black: f64) -> Option<Point2<f64>> {
-        self.marginal.clear();
-        self.marginal.resize(self.raw.width, 0.0);
+    /// Log-Gaussian centre from the chords of the lit rows.
+    fn grey_centre(&mut self) -> Option<Point2<f64>> {
         let whole = |e: &&(usize, f64, f64)| e.1.is_finite() && e.2.is_finite();
-        for &(v, left, right) in self.outline.edges.iter().filter(whole) {
-            let from = (left - 3.0).max(0.0) as usize;
-            let to = ((right + 4.0) as usize).min(self.raw.width);
-            let row = self.raw.row(v);
-            for u in from..to {
-                self.marginal[u] += (f64::from(row[u]) - black).max(0.0);
-            }
-        }
-        let u = marginal_centre(&self.marginal)?;
-        let first = self.outline.edges.iter().find(whole)?.0;
-        self.marginal.clear();
-        for &(v, left, right) in self.outline.edges.iter().filter(whole) {
-            // Chords of dark rows lie between those of their lit neighbours.
-            let chord = right - left;
-            let last = self.marginal.last().copied().unwrap_or(chord);
-            let missing = v - first + 1 - self.marginal.len();
-            for k in 1..=missing {
-                self.marginal
-                    .push(last + (chord - last) * k as f64 / missing as f64);
-            }
-        }
-        let v = marginal_centre(&self.marginal)?;
-        Some(Point2::new(
-            self.raw.u0 as f64 + u,
-            (self.raw.v0 + first) as f64 + v,
-        ))
+        let edges = self.outline.edges.iter().filter(whole);
+        let chords = edges.map(|&(v, left, right)| Chord { v, left, right });
+        let (u, v) = self.grey.centre(chords)?;
+        Some(Point2::new(self.raw.u0 as f64 + u, self.raw.v0 as f64 + v))
     }
 
     /// Reads the chips of a lamp found in this image.

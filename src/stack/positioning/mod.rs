@@ -49,6 +49,9 @@ mod positioner;
 mod reckoning;
 mod settings;
 mod stereo;
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests;
 
 pub use positioner::LedPositioner;
 pub use settings::LedSettings;

@@ -328,17 +328,13 @@ impl LedPositioner {
             chainage_m = line.track_from_world(&position, chainage_m).s_m;
         }
         let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
-        Some(PositionFix {
+        let heading = line.at(chainage_m).heading_rad;
+        let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, scale_sigma);
+        (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
             time: sighting.time,
             method,
             chainage_m,
-            sigma_m: self.sigma_m(
-                &lamp,
-                &vehicle,
-                &turn,
-                line.at(chainage_m).heading_rad,
-                scale_sigma,
-            ),
+            sigma_m,
             position,
             uid,
             identity,
