@@ -38,6 +38,7 @@ mod overrides;
 mod recording;
 pub mod schema;
 
+pub(crate) use build::{parse_tunnel, read};
 pub use build::{Scenario, ScenarioError, WaysidePost};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};

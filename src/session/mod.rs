@@ -18,7 +18,7 @@
 //! What it does not do: many runs, and files (observers write them).
 
 mod bench;
-mod cameras;
+pub(crate) mod cameras;
 mod devices;
 mod event;
 mod run;
@@ -111,7 +111,7 @@ pub fn run(
 }
 
 /// The renderer of a scenario; says so once where it has to fall back on the plain one.
-fn renderer(
+pub(crate) fn renderer(
     scenario: &Scenario,
     choice: RendererChoice,
 ) -> Result<Box<dyn Renderer>, SessionError> {
