@@ -2,7 +2,8 @@
 //!
 //! Two runs with one seed must give recordings that `rerun rrd compare` finds equal. So the ids
 //! come from scenario and seed, no row carries the wall clock, and batches are cut where simulated
-//! time says, never by a timer.
+//! time says, never by a timer. The sdk puts rows of one entity that hold different components
+//! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
 use crate::bus::SimTime;
 use crate::session::ObserverError;
