@@ -47,11 +47,15 @@ impl Stream {
     pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self, ObserverError> {
         // Viewers keep one layout an application, and each scenario has its own.
         let application = ApplicationId::new_or_unknown(format!("metrotwin-{scenario}"));
-        let id = StoreId::new(
-            StoreKind::Recording,
-            application.clone(),
-            format!("{scenario}-seed-{seed}"),
-        );
+        let id = match target {
+            Target::File(_) => StoreId::new(
+                StoreKind::Recording,
+                application.clone(),
+                format!("{scenario}-seed-{seed}"),
+            ),
+            // A viewer would mix two runs under one id, and nobody compares what it was sent.
+            Target::Viewer(_) => StoreId::random(StoreKind::Recording, application.clone()),
+        };
         let builder = RecordingStreamBuilder::from_store_id(&id)
             .enabled(true)
             .send_properties(false)
