@@ -1,1 +1,7 @@
-fn main() {}
+//! The program `metrotwin`. See the library's [`metrotwin::cli`].
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    metrotwin::cli::main()
+}

@@ -4,6 +4,7 @@ use super::{CameraModel, PixelBox, SimTime};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// One lidar echo, in the lidar's own angles: X = R cos w sin a, Y = R cos w cos a, Z = R sin w,
 /// Y along the lidar's axis, Z up.
@@ -118,7 +119,7 @@ pub struct TrainReport {
     pub time: SimTime,
 }
 
-/// The report of one frame.
+/// The report of one frame. As text it is the list that the paper prints.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct WaysideReport {
     /// Start of the frame.
@@ -152,4 +153,56 @@ pub struct WaysideReport {
     pub difference: Option<GrayImage>,
     /// Binary image, 0 or 255.
     pub binary: Option<GrayImage>,
+}
+
+impl WaysideReport {
+    /// The obstacle with the highest danger, the farthest from the device where several have it.
+    pub fn worst(&self) -> Option<&DetectedObstacle> {
+        self.obstacles
+            .iter()
+            .max_by(|a, b| (a.danger.cmp(&b.danger)).then(a.far_range_m.total_cmp(&b.far_range_m)))
+    }
+}
+
+impl fmt::Display for WaysideReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "time                        {}", self.time)?;
+        if let Some(o) = self.worst() {
+            let angle_deg = o.far_angle_rad.to_degrees();
+            writeln!(f, "angle of the farthest point {angle_deg:.2} deg")?;
+            writeln!(
+                f,
+                "its cosine                  {:.4}",
+                o.far_angle_rad.cos()
+            )?;
+            writeln!(f, "farthest range              {:.2} m", o.far_range_m)?;
+        }
+        if let Some(distance_m) = self.train_distance_m {
+            writeln!(f, "distance to the train head  {distance_m:.2} m")?;
+        }
+        let answer = |yes: bool| if yes { "yes" } else { "no" };
+        let present = answer(!self.obstacles.is_empty());
+        writeln!(f, "obstacle present            {present}")?;
+        writeln!(
+            f,
+            "train affected              {}",
+            answer(self.train_affected)
+        )?;
+        writeln!(
+            f,
+            "normal passage possible     {}",
+            answer(self.passage_possible)
+        )?;
+        writeln!(
+            f,
+            "emergency measure needed    {}",
+            answer(self.emergency_needed)
+        )?;
+        let plan = match self.plan {
+            Plan::Pass => "pass",
+            Plan::WarnDriver => "warn the driver",
+            Plan::BrakeAutomatically => "brake automatically",
+        };
+        write!(f, "plan                        {plan}")
+    }
 }

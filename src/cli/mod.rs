@@ -1,1 +1,99 @@
-//! .
+//! The command line, one file a subcommand.
+//!
+//! Results go to standard output, everything else to standard error. Exit codes: 0 it worked,
+//! 1 a run failed or was broken off, 2 the input is wrong and nothing was begun.
+//!
+//! ```text
+//! metrotwin run SCENARIO      one run: recording.rrd, summary.json, fixes.csv
+//! metrotwin check FILE...     tunnels and scenarios: errors and a short report
+//! metrotwin doctor            graphics adapters, and how fast this machine is
+//! ```
+
+mod check;
+mod doctor;
+mod fault;
+mod report;
+mod run;
+mod table;
+
+use clap::{ArgAction, Parser, Subcommand};
+use fault::Failure;
+use std::io::Write;
+use std::process::ExitCode;
+use tracing::level_filters::LevelFilter;
+
+const ABOUT: &str = "\
+A digital twin of a metro tunnel. A simulated train shakes along a surveyed line; cameras on its
+head and on the tunnel wall see what such cameras would see; the positioning and detection stack
+reads those pixels, never the truth; its decisions act on the train.";
+
+const AFTER: &str = "\
+A first run:
+  metrotwin check scenarios/*.toml                what the shipped scenarios do
+  metrotwin run scenarios/static_bench.toml       writes out/static_bench/
+  rerun out/static_bench/recording.rrd            shows it
+
+Exit codes:
+  0  it worked
+  1  a run failed or was broken off; what it had recorded is kept
+  2  the input is wrong; nothing was begun and nothing written";
+
+#[derive(Parser)]
+#[command(name = "metrotwin", version, about = ABOUT, after_help = AFTER)]
+struct Cli {
+    /// Say more on standard error: -v what happens, -vv in detail
+    #[arg(short, long, action = ArgAction::Count, global = true)]
+    verbose: u8,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Run(run::RunArgs),
+    Check(check::CheckArgs),
+    Doctor(doctor::DoctorArgs),
+}
+
+/// Reads the arguments, does what they say, and gives the exit code.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    start_messages(cli.verbose);
+    let result = match cli.command {
+        Command::Run(args) => run::run(&args),
+        Command::Check(args) => check::check(&args),
+        Command::Doctor(args) => doctor::doctor(&args),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            failure.print();
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn start_messages(verbose: u8) {
+    let level = match verbose {
+        0 => LevelFilter::WARN,
+        1 => LevelFilter::INFO,
+        _ => LevelFilter::DEBUG,
+    };
+    tracing_subscriber::fmt()
+        .with_writer(std::io::stderr)
+        .with_max_level(level)
+        .with_target(verbose > 1)
+        .without_time()
+        .init();
+    fault::set_style();
+}
+
+/// Writes a result to standard output; a closed pipe is no failure.
+fn print(text: &str) -> Result<(), Failure> {
+    match writeln!(std::io::stdout().lock(), "{}", text.trim_end()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Failure::run(anyhow::Error::new(error).context("cannot write to standard output")))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,1 +1,291 @@
-//! Recordings.
+//! What a session shows: a rerun recording with a layout of its own, and tables.
+//!
+//! The only room that knows rerun. A [`Recording`] is an observer: it gets what passes in a
+//! session and cannot change it.
+//!
+//! ```no_run
+//! use metrotwin::record::Recording;
+//! use metrotwin::scenario::RecordSettings;
+//! use metrotwin::session::Observer;
+//!
+//! let mut recording = Recording::to_file("out/run.rrd".as_ref(), &RecordSettings::default());
+//! # fn session(_: &mut dyn Observer) -> Result<(), metrotwin::session::ObserverError> { Ok(()) }
+//! session(&mut recording)?; // calls open, observe, and close in any case
+//! # Ok::<(), metrotwin::session::ObserverError>(())
+//! ```
+//!
+//! Everything lies on the timeline `sim_time`, images and what was found in them also on `frame`.
+//! What is true and what was estimated are siblings: `world/train`, `world/bodies` against
+//! `world/estimate/...`. Two runs with one seed give equal recordings (`rerun rrd compare`): ids
+//! come from scenario and seed, no row carries the wall clock, and batches are cut once every
+//! second of simulated time. Nothing older than that second is held in memory.
+//!
+//! Coordinates are the world's, relative to a point in the middle of the line; rerun's transforms
+//! are single precision (<https://rerun.io/docs/concepts/logging-and-ingestion/transforms>).
+//!
+//! What it does not do: keep every image (see [`RecordSettings`]), nor anything that the stack or
+//! the scores could read back. Tables are for that.
+
+mod blueprint;
+mod images;
+mod moving;
+mod palette;
+mod plots;
+mod scene;
+
+mod stream;
+mod tables;
+mod texts;
+
+pub use tables::FixTable;
+
+use crate::bus::SimTime;
+use crate::scenario::RecordSettings;
+use crate::session::{Event, Observer, ObserverError, Opening};
+use images::Images;
+use moving::Moving;
+use nalgebra::Isometry3;
+use plots::Plots;
+use rerun::{SpawnError, SpawnOptions};
+use scene::Scene;
+use std::path::Path;
+use stream::{Stream, Target};
+use texts::Texts;
+
+/// Simulated time between flushes.
+const FLUSH_S: f64 = 1.0;
+
+/// Why there is no viewer.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewerError {
+    /// The program `rerun` is not installed.
+    #[error(
+        "the rerun viewer is not installed (no program `rerun` on the PATH); \
+         install it with `pip install rerun-sdk==0.36.3`"
+    )]
+    NotInstalled,
+    /// It is, but does not start.
+    #[error("the rerun viewer did not start: {0}")]
+    DidNotStart(String),
+}
+
+/// Writes a session into a rerun recording.
+pub struct Recording {
+    target: Target,
+    settings: RecordSettings,
+    open: Option<Open>,
+}
+
+impl Recording {
+    /// Into a file. It is written as `<path>.part` and gets its name in [`Observer::close`].
+    pub fn to_file(path: &Path, settings: &RecordSettings) -> Self {
+        Self::new(Target::File(path.to_owned()), settings)
+    }
+
+    /// To a viewer that runs already, at `host:port` or a whole `rerun+http://host:port/proxy`.
+    pub fn connect(address: &str, settings: &RecordSettings) -> Self {
+        let url = if address.contains("://") {
+            address.to_owned()
+        } else {
+            format!("rerun+http://{address}/proxy")
+        };
+        Self::new(Target::Viewer(url), settings)
+    }
+
+    /// Starts the viewer on this machine, unless one listens already, and shows the session as it
+    /// runs.
+    pub fn view(settings: &RecordSettings) -> Result<Self, ViewerError> {
+        let viewer = rerun::spawn(&SpawnOptions {
+            wait_for_bind: true,
+            ..SpawnOptions::default()
+        });
+        match viewer {
+            Ok(viewer) => Ok(Self::connect(
+                &format!("127.0.0.1:{}", viewer.port),
+                settings,
+            )),
+            Err(
+                SpawnError::ExecutableNotFoundInPath { .. } | SpawnError::ExecutableNotFound { .. },
+            ) => Err(ViewerError::NotInstalled),
+            Err(error) => Err(ViewerError::DidNotStart(error.to_string())),
+        }
+    }
+
+    fn new(target: Target, settings: &RecordSettings) -> Self {
+        Self {
+            target,
+            settings: settings.clone(),
+            open: None,
+        }
+    }
+}
+
+impl Observer for Recording {
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+        let stream = Stream::open(&self.target, opening.scenario, opening.seed)?;
+        self.open = Some(Open::new(stream, opening, &self.settings)?);
+        Ok(())
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match &mut self.open {
+            Some(open) => open.observe(event),
+            None => Ok(()),
+        }
+    }
+
+    fn close(&mut self) -> Result<(), ObserverError> {
+        match self.open.take() {
+            Some(open) => open.close(),
+            None => Ok(()),
+        }
+    }
+}
+
+/// What a run has, and so what its recording shows.
+struct Contents {
+    rig: bool,
+    train: bool,
+    protection: bool,
+    /// Names of the wayside devices.
+    devices: Vec<String>,
+}
+
+/// A recording in the making.
+struct Open {
+    stream: Stream,
+    contents: Contents,
+    first_camera: Option<Isometry3<f64>>,
+    laid_out: bool,
+    flush_at: SimTime,
+    scene: Scene,
+    moving: Moving,
+    images: Images,
+    plots: Plots,
+    texts: Texts,
+}
+
+impl Open {
+    fn new(
+        stream: Stream,
+        opening: &Opening<'_>,
+        settings: &RecordSettings,
+    ) -> Result<Self, ObserverError> {
+        let devices = opening.wayside.len();
+        let contents = Contents {
+            rig: opening.rig.is_some(),
+            train: opening.cars > 0,
+            protection: opening.protection,
+            devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
+        };
+        let scene = Scene::new(opening.tunnel);
+        scene.draw(&stream, opening, settings)?;
+        Ok(Self {
+            moving: Moving::open(&stream, opening)?,
+            plots: Plots::open(&stream, &contents)?,
+            first_camera: opening.wayside.first().map(|d| d.world_from_camera),
+            laid_out: false,
+            flush_at: SimTime::ZERO.plus(FLUSH_S),
+            images: Images::new(settings, devices),
+            texts: Texts::new(devices),
+            stream,
+            contents,
+            scene,
+        })
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        let (stream, scene) = (&self.stream, &self.scene);
+        let time = match *event {
+            Event::Train(truth) => {
+                self.moving.train(scene, truth);
+                self.plots.train(truth);
+                let head = truth.world_from_vehicle;
+                self.lay_out(self.contents.train.then_some(&head))?;
+                truth.time
+            }
+            Event::Bodies(time, bodies) => {
+                self.moving.bodies(stream, scene, time, bodies)?;
+                time
+            }
+            Event::Pair(pair, report, true_chainages_m) => {
+                self.plots.fixes(report, true_chainages_m);
+                self.images.pair(stream, pair, report)?;
+                self.moving.fixes(stream, scene, report)?;
+                report.time
+            }
+            Event::Wayside(index, time, frame, report) => {
+                let Some(name) = self.contents.devices.get(index) else {
+                    return Ok(());
+                };
+                let device = (index, name.as_str());
+                self.plots.wayside(index, report);
+                self.texts.wayside(stream, device, report)?;
+                self.images.wayside(stream, device, time, frame, report)?;
+                stream.at(time);
+                self.moving
+                    .obstacles(stream, scene, device, &report.obstacles)?;
+                time
+            }
+            Event::Protection(report) => {
+                self.plots.protection(report);
+                self.texts.protection(stream, report)?;
+                report.time
+            }
+            Event::Display(time, display) => {
+                Texts::display(stream, time, display)?;
+                time
+            }
+            Event::Delivery(delivery) => {
+                Texts::delivery(stream, delivery)?;
+                delivery.received
+            }
+            Event::Note(time, text) => {
+                Texts::note(stream, time, text)?;
+                time
+            }
+        };
+        if time >= self.flush_at {
+            self.flush_at = time.plus(FLUSH_S);
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Sends the layout, once: with the first truth, which says where to look.
+    fn lay_out(&mut self, head: Option<&Isometry3<f64>>) -> Result<(), ObserverError> {
+        if self.laid_out {
+            return Ok(());
+        }
+        self.laid_out = true;
+        let eye = self.scene.eye(self.first_camera.as_ref(), head);
+        blueprint::send(&self.stream, &self.contents, eye)
+    }
+
+    /// Rows first, then columns: each batch is cut before the next begins, so that the order in
+    /// the file does not depend on threads.
+    fn flush(&mut self) -> Result<(), ObserverError> {
+        self.lay_out(None)?;
+        self.stream.flush()?;
+        self.moving.flush(&self.stream)?;
+        self.plots.flush(&self.stream)
+    }
+
+    fn close(mut self) -> Result<(), ObserverError> {
+        self.flush()?;
+        self.stream.finish()
+    }
+}
+
+/// A name as one part of an entity path.
+fn slug(name: &str) -> String {
+    let keep = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '.');
+    name.chars()
+        .map(|c| if keep(c) { c } else { '_' })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests;
+#[cfg(test)]
+mod trial;

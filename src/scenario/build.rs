@@ -1,9 +1,9 @@
 //! From a file to a checked scenario.
 
+use super::RecordSettings;
 use super::file::{BenchSettings, ScenarioFile, StackSettings};
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
-use crate::record::RecordSettings;
 use crate::track::{FileError, Problem, Tunnel, read_toml};
 use crate::twin::comms::RadioSettings;
 use crate::twin::physics::PhysicsSettings;
@@ -145,10 +145,22 @@ impl Scenario {
         if !problems.is_empty() {
             return Err(wrong(FileError::Problems(problems)));
         }
-        Ok(Self::new(file, tunnel, wayside))
+        Ok(Self::put_together(file, tunnel, wayside))
     }
 
-    fn new(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
+    /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
+    pub fn new(file: ScenarioFile, tunnel: Tunnel) -> Result<Self, FileError> {
+        let mut problems = Vec::new();
+        check::alone(&file, &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        if problems.is_empty() {
+            Ok(Self::put_together(file, tunnel, wayside))
+        } else {
+            Err(FileError::Problems(problems))
+        }
+    }
+
+    fn put_together(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
         let physics = PhysicsSettings {
             history_s: history_s(&file),
             ..file.physics()

@@ -57,7 +57,13 @@ pub(super) fn in_tunnel(
         let heads: Vec<f64> = bench.heads_m().collect();
         for (key, head) in [("first_m", heads.first()), ("points", heads.last())] {
             if let Some(&head_m) = head {
-                inside_line(&format!("bench.{key}"), "the head", head_m, tunnel, problems);
+                inside_line(
+                    &format!("bench.{key}"),
+                    "the head",
+                    head_m,
+                    tunnel,
+                    problems,
+                );
             }
         }
     }
@@ -111,29 +117,35 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
 }
 
 fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
-    let mut late = |key: String, what: &str, at_s: f64| {
+    let late = |problems: &mut Vec<Problem>, key: String, what: &str, at_s: f64| {
         if at_s > file.duration_s {
             problems.push(Problem::new(
                 key,
-                format!("{what} at {at_s} s, but the run ends at {} s", file.duration_s),
+                format!(
+                    "{what} at {at_s} s, but the run ends at {} s",
+                    file.duration_s
+                ),
                 "choose an earlier time, or a longer duration_s",
             ));
         }
     };
     for (k, obstacle) in file.obstacles.iter().enumerate() {
-        late(format!("obstacles[{k}].appears_s"), "it appears", obstacle.appears_s);
+        let key = format!("obstacles[{k}].appears_s");
+        late(problems, key, "it appears", obstacle.appears_s);
     }
     for (k, worker) in file.workers.iter().enumerate() {
-        if let Some(at_s) = worker.puts_down_s {
-            late(format!("workers[{k}].puts_down_s"), "he puts it down", at_s);
-            if worker.carries.is_none() {
-                problems.push(Problem::new(
-                    format!("workers[{k}].puts_down_s"),
-                    "he carries nothing that he could put down",
-                    format!("add [workers.carries] to workers[{k}], or take this out"),
-                ));
-            }
+        let Some(at_s) = worker.puts_down_s else {
+            continue;
+        };
+        let key = format!("workers[{k}].puts_down_s");
+        if worker.carries.is_none() {
+            problems.push(Problem::new(
+                key.clone(),
+                "he carries nothing that he could put down",
+                format!("add [workers.carries] to workers[{k}], or take this out"),
+            ));
         }
+        late(problems, key, "he puts it down", at_s);
     }
 }
 
@@ -146,7 +158,13 @@ fn check_train(
     let end_m = tunnel.alignment.length_m();
     let head_m = train.start_chainage_m;
     let length_m = f64::from(train.cars) * train.car_length_m;
-    inside_line("train.start_chainage_m", "the train head", head_m, tunnel, problems);
+    inside_line(
+        "train.start_chainage_m",
+        "the train head",
+        head_m,
+        tunnel,
+        problems,
+    );
     if head_m < length_m {
         problems.push(Problem::new(
             "train.start_chainage_m",
@@ -155,7 +173,13 @@ fn check_train(
         ));
     }
     if let Some(stop_m) = train.stop_at_m {
-        inside_line("train.stop_at_m", "the train head", stop_m, tunnel, problems);
+        inside_line(
+            "train.stop_at_m",
+            "the train head",
+            stop_m,
+            tunnel,
+            problems,
+        );
     } else {
         let reach_m = head_m + farthest_run_m(train, duration_s);
         if reach_m > end_m {
@@ -256,7 +280,11 @@ fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
         return;
     }
     let calibration = rig.calibration();
-    if !tunnel.lamps.iter().any(|lamp| ever_sees(&calibration, tunnel, lamp)) {
+    if !tunnel
+        .lamps
+        .iter()
+        .any(|lamp| ever_sees(&calibration, tunnel, lamp))
+    {
         problems.push(Problem::new(
             "rig.yaw_deg",
             format!(
@@ -296,7 +324,11 @@ fn place(
 }
 
 fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Problem {
-    let names: Vec<String> = tunnel.wayside.iter().map(|site| site.name.clone()).collect();
+    let names: Vec<String> = tunnel
+        .wayside
+        .iter()
+        .map(|site| site.name.clone())
+        .collect();
     let remedy = match did_you_mean(&post.device, &names) {
         Some(name) => format!("did you mean `{name}`?"),
         None if names.is_empty() => "add [[wayside]] to the tunnel file".to_owned(),
@@ -304,7 +336,10 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
     };
     Problem::new(
         format!("{at}.device"),
-        format!("tunnel `{}` has no wayside device `{}`", tunnel.name, post.device),
+        format!(
+            "tunnel `{}` has no wayside device `{}`",
+            tunnel.name, post.device
+        ),
         remedy,
     )
 }

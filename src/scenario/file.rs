@@ -1,6 +1,6 @@
 //! A scenario as written.
 
-use crate::record::RecordSettings;
+use super::RecordSettings;
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
@@ -168,7 +168,9 @@ impl Default for BenchSettings {
 impl BenchSettings {
     /// Chainage of the head at each point, in order.
     pub fn heads_m(&self) -> impl Iterator<Item = f64> + use<> {
-        let Self { first_m, step_m, .. } = *self;
+        let Self {
+            first_m, step_m, ..
+        } = *self;
         (0..self.points).map(move |k| first_m + f64::from(k) * step_m)
     }
 
@@ -182,8 +184,20 @@ impl BenchSettings {
         let points = f64::from(self.points);
         let fixes = f64::from(self.fixes_per_point);
         Problem::unless_within(problems, format!("{at}.points"), points, 1.0..=1e5, "");
-        Problem::unless_within(problems, format!("{at}.fixes_per_point"), fixes, 1.0..=1e5, "");
-        Problem::unless_within(problems, format!("{at}.step_m"), self.step_m, -1e3..=1e3, "m");
+        Problem::unless_within(
+            problems,
+            format!("{at}.fixes_per_point"),
+            fixes,
+            1.0..=1e5,
+            "",
+        );
+        Problem::unless_within(
+            problems,
+            format!("{at}.step_m"),
+            self.step_m,
+            -1e3..=1e3,
+            "m",
+        );
     }
 }
 

@@ -35,8 +35,11 @@ mod build;
 mod check;
 mod file;
 mod overrides;
+mod recording;
 pub mod schema;
 
+pub(crate) use build::{parse_tunnel, read};
 pub use build::{Scenario, ScenarioError, WaysidePost};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};
+pub use recording::RecordSettings;

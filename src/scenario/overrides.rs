@@ -28,7 +28,9 @@ pub enum OverrideError {
     #[error("`{0}` is not of the form key=value; give for instance `train.cruise_speed_kmh=80`")]
     Form(String),
     /// A list has no such entry.
-    #[error("`{key}`: the file has {len} entries in `{list}`, so there is no [{index}]; count from 0")]
+    #[error(
+        "`{key}`: the file has {len} entries in `{list}`, so there is no [{index}]; count from 0"
+    )]
     NoEntry {
         /// The whole key.
         key: String,

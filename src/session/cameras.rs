@@ -24,7 +24,10 @@ impl Clock {
 
     /// The next frame's number and time.
     pub fn next(&self) -> (u32, SimTime) {
-        (self.next, SimTime::from_secs(f64::from(self.next) / self.rate_hz))
+        (
+            self.next,
+            SimTime::from_secs(f64::from(self.next) / self.rate_hz),
+        )
     }
 
     /// Moves on to the frame after.

@@ -14,6 +14,8 @@ use nalgebra::{Isometry3, Vector3};
 pub struct Opening<'a> {
     /// Name of the scenario.
     pub scenario: &'a str,
+    /// Seed of the run.
+    pub seed: u64,
     /// The line.
     pub tunnel: &'a Tunnel,
     /// The rig on the train.
@@ -24,6 +26,8 @@ pub struct Opening<'a> {
     pub car_half_extents_m: Vector3<f64>,
     /// Cars of the train, 0 where there is none.
     pub cars: usize,
+    /// A protection runs: its reports and the driver's display will come.
+    pub protection: bool,
 }
 
 /// The train as it really is.

@@ -1,5 +1,144 @@
 //! One run: twin -> bus -> stack -> bus -> twin, step by step, scored against the truth.
+//!
+//! ```no_run
+//! use metrotwin::scenario::Scenario;
+//! use metrotwin::session::{RendererChoice, RunOptions, run};
+//! use std::path::Path;
+//!
+//! let scenario = Scenario::load(Path::new("scenarios/line_run.toml"), &[])?;
+//! let options = RunOptions { renderer: RendererChoice::Cpu, ..RunOptions::default() };
+//! let summary = run(&scenario, &options, &mut [])?;
+//! println!("{}", summary.real_time_factor);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Truth exists here and in the twin only: what goes to the stack is images, samples, scans and
+//! messages. [`Observer`]s watch (a recording, a table of fixes) and cannot change anything.
+//!
+//! What it does not do: many runs, and files (observers write them).
 
+mod bench;
+pub(crate) mod cameras;
+mod devices;
 mod event;
+mod run;
+mod score;
+mod summary;
+mod watch;
 
 pub use event::{Event, Observer, ObserverError, Opening, TrainTruth};
+pub use summary::{
+    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary, WallShares,
+    Wayside,
+};
+
+use crate::bus::Method;
+use crate::scenario::Scenario;
+use crate::twin::physics::PhysicsError;
+use crate::twin::random::Stream;
+use crate::twin::render::cpu::CpuRenderer;
+use crate::twin::render::gpu::GpuRenderer;
+use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What draws the images.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RendererChoice {
+    /// The graphics adapter, or the plain renderer where there is none.
+    #[default]
+    Auto,
+    /// The graphics adapter or nothing.
+    Gpu,
+    /// The plain renderer.
+    Cpu,
+}
+
+/// How to run, apart from what the scenario says.
+#[derive(Clone, Copy, Default)]
+pub struct RunOptions<'a> {
+    /// Which renderer.
+    pub renderer: RendererChoice,
+    /// Set from elsewhere to break the run off.
+    pub stop: Option<&'a AtomicBool>,
+    /// Told the simulated time, in seconds, now and then.
+    pub progress: Option<&'a dyn Fn(f64)>,
+}
+
+/// The positioning methods that a session scores.
+fn methods() -> [Method; 2] {
+    [Method::Paper, Method::Mono]
+}
+
+impl RunOptions<'_> {
+    fn stopped(&self) -> bool {
+        self.stop.is_some_and(|s| s.load(Ordering::Relaxed))
+    }
+}
+
+/// Why a run could not begin or go on.
+#[derive(Debug, thiserror::Error)]
+pub enum SessionError {
+    /// No picture can be drawn.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The world could not be made.
+    #[error(transparent)]
+    Physics(#[from] PhysicsError),
+    /// An observer failed.
+    #[error(transparent)]
+    Observer(#[from] ObserverError),
+    /// A frame is longer than the poses that the world keeps.
+    #[error(
+        "the pose of the train at {0:.4} s is no longer known: a frame is longer than the world's memory"
+    )]
+    PoseForgotten(f64),
+}
+
+/// Runs a scenario to its end. A failure of the world in the middle of the run ends it as
+/// [`End::Failed`], with everything up to there scored and recorded.
+pub fn run(
+    scenario: &Scenario,
+    options: &RunOptions<'_>,
+    observers: &mut [&mut dyn Observer],
+) -> Result<Summary, SessionError> {
+    let renderer = renderer(scenario, options.renderer)?;
+    match (&scenario.bench, &scenario.rig) {
+        (Some(bench), Some(rig)) => {
+            bench::Bench::new(scenario, *bench, rig, renderer).run(options, observers)
+        }
+        _ => run::Run::new(scenario, renderer)?.run(options, observers),
+    }
+}
+
+/// The renderer of a scenario; says so once where it has to fall back on the plain one.
+pub(crate) fn renderer(
+    scenario: &Scenario,
+    choice: RendererChoice,
+) -> Result<Box<dyn Renderer>, SessionError> {
+    let scene = scene(scenario);
+    if choice == RendererChoice::Cpu {
+        return Ok(Box::new(CpuRenderer::new(scene)));
+    }
+    match GpuRenderer::new(scene.clone()) {
+        Ok(renderer) => Ok(Box::new(renderer)),
+        Err(RenderError::NoAdapter(why)) if choice == RendererChoice::Auto => {
+            tracing::warn!(
+                "no Vulkan, Metal or DirectX 12 adapter ({why}): drawing with the plain CPU \
+                 renderer, right but about ten times slower. On Debian or Ubuntu \
+                 `apt-get install mesa-vulkan-drivers` gives a software adapter."
+            );
+            Ok(Box::new(CpuRenderer::new(scene)))
+        }
+        Err(error) => Err(error.into()),
+    }
+}
+
+/// The lamps start to send at times of their own: nobody synchronises them.
+fn scene(scenario: &Scenario) -> Scene {
+    let tunnel = scenario.tunnel.clone();
+    let stream = Stream::new(scenario.seed, 0, "lamp_phase");
+    let lamps = (tunnel.lamps.iter().enumerate())
+        .map(|(k, site)| LampLight::from_site(site, stream.uniform(k as u64)))
+        .collect();
+    Scene { tunnel, lamps }
+}

@@ -197,7 +197,9 @@ impl WaysideScore {
         for seen in &report.obstacles {
             let centre_m = 0.5 * (seen.from_chainage_m + seen.to_chainage_m);
             let beside = |p: &Presence| (p.chainage_m - centre_m).abs() - p.half_length_m;
-            let nearest = present.iter().min_by(|a, b| beside(a).total_cmp(&beside(b)));
+            let nearest = present
+                .iter()
+                .min_by(|a, b| beside(a).total_cmp(&beside(b)));
             match nearest.filter(|p| beside(p) < MATCH_M) {
                 None => self.false_alarms += 1,
                 Some(p) => {
@@ -209,6 +211,17 @@ impl WaysideScore {
                 }
             }
         }
+    }
+
+    /// Takes in the scores of another device.
+    pub fn add(&mut self, other: Self) {
+        for (name, theirs) in other.found {
+            let ours = self.found.entry(name).or_insert(theirs);
+            ours.appeared = ours.appeared.min(theirs.appeared);
+            ours.first = ours.first.into_iter().chain(theirs.first).min();
+        }
+        self.false_alarms += other.false_alarms;
+        self.costs_ms.extend(other.costs_ms);
     }
 
     /// The figures.

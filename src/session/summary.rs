@@ -131,7 +131,10 @@ impl Cost {
     /// Of the values given (sorted in passing); `None` of none.
     pub fn of(values: &mut [f64]) -> Option<Self> {
         values.sort_by(f64::total_cmp);
-        (!values.is_empty()).then(|| Self { p50: quantile(values, 0.50), p99: quantile(values, 0.99) })
+        (!values.is_empty()).then(|| Self {
+            p50: quantile(values, 0.50),
+            p99: quantile(values, 0.99),
+        })
     }
 }
 

@@ -290,7 +290,7 @@ fn last_key(dotted: &str) -> &str {
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test may panic")]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
 #[allow(dead_code, reason = "what is read matters, not what is done with it")]
 mod tests {
     use super::*;

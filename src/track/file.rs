@@ -319,3 +319,30 @@ pub struct StationEntry {
 pub fn tunnel_schema() -> Schema {
     schema_for!(TunnelFile)
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// Provokes: a key without a description in the schema, or one that may be misspelt because
+    /// unknown keys are let through.
+    #[test]
+    fn every_key_of_the_schema_is_described() {
+        let schema = tunnel_schema();
+        let root = schema.as_value();
+        let definitions = root["$defs"].as_object().unwrap().values();
+        let mut keys = 0;
+        for table in definitions.chain([root]) {
+            let Some(properties) = table["properties"].as_object() else {
+                continue;
+            };
+            assert_eq!(table["additionalProperties"], false);
+            for (key, property) in properties {
+                assert!(property["description"].is_string(), "{key}");
+                keys += 1;
+            }
+        }
+        assert!(keys > 60, "{keys}");
+    }
+}

@@ -7,10 +7,10 @@
 //! A chord of length d across an arc of radius R is d^2 / 8R away from it: 0.36 mm for rings 1 m
 //! apart on 350 m.
 
+use super::Tunnel;
 use super::alignment::TrackFrame;
 use super::gauge::{RAIL_CENTRE_M, RAIL_FOOT_M, RAIL_WIDTH_M};
 use super::section::{CrossSection, Edge, Material, OutlinePoint};
-use super::{TrackPoint, Tunnel};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
@@ -349,6 +349,7 @@ fn surface_normal(frame: &TrackFrame, p: OutlinePoint, normal: (f64, f64)) -> Ve
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::track::TrackPoint;
 
     fn chengdu() -> Tunnel {
         Tunnel::from_toml(include_str!("../../tunnels/chengdu_line1.toml")).unwrap()

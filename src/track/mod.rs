@@ -1,11 +1,50 @@
 //! The line as surveyed: where the track runs, what the tunnel looks like around it, and where
 //! its lamps, devices and balises are. Knows nobody.
 //!
+//! ```
+//! use metrotwin::track::Tunnel;
+//!
+//! let tunnel = Tunnel::from_toml(
+//!     r#"
+//!     name = "curve"
+//!
+//!     [[plan]]
+//!     kind = "straight"
+//!     length_m = 100.0
+//!
+//!     [[plan]]
+//!     kind = "clothoid"
+//!     length_m = 60.0
+//!
+//!     [[plan]]
+//!     kind = "arc"
+//!     length_m = 200.0
+//!     radius_m = 500.0
+//!     turn = "left"
+//!     cant_mm = 100.0
+//!
+//!     [lamps]
+//!     from_m = 10.0
+//!     spacing_m = 10.0
+//!     "#,
+//! )?;
+//! assert_eq!(tunnel.lamps.len(), 36);
+//! assert!((tunnel.alignment.at(200.0).curvature_per_m - 1.0 / 500.0).abs() < 1e-15);
+//! # Ok::<(), metrotwin::track::TunnelError>(())
+//! ```
+//!
 //! Coordinates on the line are (s, l, h): s is chainage along the centreline in plan, l metres to
 //! the left of it, h metres above top of rail. Planes of constant s are vertical, so the
-//! conversions are exact both ways. See [`Alignment`].
+//! conversions are exact both ways. See [`Alignment`]. The world is x east, y north, z up.
 //!
-//! The world is x east, y north, z up.
+//! Theory: plan curvature linear in chainage (straight, clothoid, arc) and parabolic vertical
+//! curves, as railways are set out; dimensions, gauge and limits after GB 50157 (code for design
+//! of metro) and CJJ 96 (gauges of metros), simplified where their items say so; lamps and rig
+//! after Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
+//!
+//! Not here: switches and second tracks, rail profiles (rails are boxes), sections that lean with
+//! the cant (only the rails' heads follow it), irregularities of the track (they are the world's,
+//! not the survey's).
 
 mod alignment;
 mod check;
@@ -13,7 +52,6 @@ mod document;
 mod file;
 mod furniture;
 mod gauge;
-mod lamps;
 mod mesh;
 mod problem;
 mod section;

@@ -15,8 +15,9 @@ pub struct EllipseFit {
     pub ellipse: Ellipse,
     /// Root mean square distance of the points from it.
     pub rms_px: f64,
-    /// Points used.
-    pub points: usize,
+    /// Standard deviation of the centre along u, from the scatter of the points: large where only
+    /// an arc is seen.
+    pub centre_sigma_px: f64,
 }
 
 /// Fewer edge points than this say too little about five unknowns.
@@ -39,13 +40,26 @@ struct Fitted {
 }
 
 impl Fitted {
+    fn scaled(&self, p: &Point2<f64>) -> (f64, f64) {
+        (
+            (p.x - self.mean.x) / self.scale,
+            (p.y - self.mean.y) / self.scale,
+        )
+    }
+
+    /// The conic's left side.
+    fn value(&self, p: &Point2<f64>) -> f64 {
+        let [a, b, c, d, e] = self.conic;
+        let (u, v) = self.scaled(p);
+        a * u * u + b * u * v + c * v * v + d * u + e * v + 1.0
+    }
+
     /// First-order distance from the ellipse, positive outside (Sampson's).
     fn distance_px(&self, p: &Point2<f64>) -> f64 {
         let [a, b, c, d, e] = self.conic;
-        let (u, v) = ((p.x - self.mean.x) / self.scale, (p.y - self.mean.y) / self.scale);
-        let value = a * u * u + b * u * v + c * v * v + d * u + e * v + 1.0;
+        let (u, v) = self.scaled(p);
         let slope = (2.0 * a * u + b * v + d).hypot(b * u + 2.0 * c * v + e);
-        self.scale * value / slope.max(1e-12)
+        self.scale * self.value(p) / slope.max(1e-12)
     }
 }
 
@@ -70,13 +84,20 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
         normal += row * row.transpose();
         right -= row;
     }
-    let solution = normal.cholesky()?.solve(&right);
-    let conic = [solution[0], solution[1], solution[2], solution[3], solution[4]];
+    let factor = normal.cholesky()?;
+    let solution = factor.solve(&right);
+    let conic = [
+        solution[0],
+        solution[1],
+        solution[2],
+        solution[3],
+        solution[4],
+    ];
     let mut fitted = Fitted {
         fit: EllipseFit {
             ellipse: to_ellipse(conic, &mean, scale)?,
             rms_px: 0.0,
-            points: n,
+            centre_sigma_px: f64::INFINITY,
         },
         mean,
         scale,
@@ -84,7 +105,26 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
     };
     let squares: f64 = chosen().map(|p| fitted.distance_px(p).powi(2)).sum();
     fitted.fit.rms_px = (squares / n as f64).sqrt();
+    // The algebraic residual's variance spreads over the solution by the inverse normal matrix.
+    let freedom = (n - 5) as f64;
+    let algebraic: f64 = chosen().map(|p| fitted.value(p).powi(2)).sum();
+    let slope = centre_u_slope(conic);
+    let variance = algebraic / freedom * slope.dot(&factor.solve(&slope));
+    fitted.fit.centre_sigma_px = scale * variance.max(0.0).sqrt();
     Some(fitted)
+}
+
+/// Derivatives of the centre's u by the conic's five coefficients.
+fn centre_u_slope([a, b, c, d, e]: [f64; 5]) -> Vector5<f64> {
+    let determinant = 4.0 * a * c - b * b;
+    let u = (b * e - 2.0 * c * d) / determinant;
+    Vector5::new(
+        -4.0 * c * u,
+        e + 2.0 * b * u,
+        -2.0 * d - 4.0 * a * u,
+        -2.0 * c,
+        b,
+    ) / determinant
 }
 
 /// Centre and axes of a conic; `None` where it is no real ellipse.
@@ -120,7 +160,8 @@ fn to_ellipse([a, b, c, d, e]: [f64; 5], mean: &Point2<f64>, scale: f64) -> Opti
 pub fn roundness(ellipse: &Ellipse) -> f64 {
     let (a, b) = (ellipse.semi_major_px, ellipse.semi_minor_px);
     let h = ((a - b) / (a + b)).powi(2);
-    let perimeter = std::f64::consts::PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
+    let perimeter =
+        std::f64::consts::PI * (a + b) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
     4.0 * std::f64::consts::PI.powi(2) * a * b / perimeter.powi(2)
 }
 
@@ -128,7 +169,10 @@ pub fn roundness(ellipse: &Ellipse) -> f64 {
 pub fn point_at(e: &Ellipse, t: f64) -> Point2<f64> {
     let (sin, cos) = e.angle_rad.sin_cos();
     let (x, y) = (e.semi_major_px * t.cos(), e.semi_minor_px * t.sin());
-    Point2::new(e.centre.x + x * cos - y * sin, e.centre.y + x * sin + y * cos)
+    Point2::new(
+        e.centre.x + x * cos - y * sin,
+        e.centre.y + x * sin + y * cos,
+    )
 }
 
 /// Left and right end of an ellipse's chord along row `v`; `None` above and below it.
@@ -136,7 +180,10 @@ pub fn chord(e: &Ellipse, v: f64) -> Option<(f64, f64)> {
     let (sin, cos) = e.angle_rad.sin_cos();
     let (a2, b2) = (e.semi_major_px.powi(2), e.semi_minor_px.powi(2));
     // Variances of the outline: half height squared, half width squared and their covariance.
-    let (uu, vv) = (a2 * cos * cos + b2 * sin * sin, a2 * sin * sin + b2 * cos * cos);
+    let (uu, vv) = (
+        a2 * cos * cos + b2 * sin * sin,
+        a2 * sin * sin + b2 * cos * cos,
+    );
     let uv = (a2 - b2) * sin * cos;
     let dv = v - e.centre.y;
     let left_over = 1.0 - dv * dv / vv;
@@ -148,6 +195,7 @@ pub fn chord(e: &Ellipse, v: f64) -> Option<(f64, f64)> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use std::f64::consts::TAU;
@@ -165,7 +213,9 @@ mod tests {
     #[test]
     fn exact_points_give_the_exact_ellipse() {
         let e = sample();
-        let points: Vec<_> = (0..40).map(|k| point_at(&e, TAU * f64::from(k) / 40.0)).collect();
+        let points: Vec<_> = (0..40)
+            .map(|k| point_at(&e, TAU * f64::from(k) / 40.0))
+            .collect();
         let f = fit_ellipse(&points).unwrap();
         assert!((f.ellipse.centre - e.centre).norm() < 1e-8);
         assert!((f.ellipse.semi_major_px - e.semi_major_px).abs() < 1e-8);
@@ -178,19 +228,46 @@ mod tests {
     #[test]
     fn one_outlier_is_left_out() {
         let e = sample();
-        let mut points: Vec<_> = (0..80).map(|k| point_at(&e, TAU * f64::from(k) / 80.0)).collect();
+        let mut points: Vec<_> = (0..80)
+            .map(|k| point_at(&e, TAU * f64::from(k) / 80.0))
+            .collect();
         points[5] += nalgebra::Vector2::new(9.0, -4.0);
         let f = fit_ellipse(&points).unwrap();
         assert!((f.ellipse.centre - e.centre).norm() < 0.02, "{f:?}");
     }
 
+    /// The stated sigma of the centre against the scatter over many noisy outlines, whole and cut.
+    #[test]
+    fn the_centres_sigma_is_its_scatter() {
+        let e = sample();
+        let mut noise = crate::stack::led::testing::Noise::new(3);
+        for arc in [TAU, 0.6 * TAU] {
+            let (mut squares, mut stated) = (0.0, 0.0);
+            for _ in 0..300 {
+                let points: Vec<_> = (0..60)
+                    .map(|k| point_at(&e, arc * f64::from(k) / 60.0))
+                    .map(|p| p + nalgebra::Vector2::new(noise.normal(), noise.normal()) * 0.2)
+                    .collect();
+                let f = fit_ellipse(&points).unwrap();
+                squares += (f.ellipse.centre.x - e.centre.x).powi(2) / 300.0;
+                stated += f.centre_sigma_px / 300.0;
+            }
+            let ratio = stated / squares.sqrt();
+            assert!((0.6..1.6).contains(&ratio), "{ratio} at {arc}");
+        }
+    }
+
     /// No panic and no ellipse from a line, one point, a hyperbola or nothing.
     #[test]
     fn what_is_no_ellipse_gives_none() {
-        let line: Vec<_> = (0..30).map(|k| Point2::new(f64::from(k), 2.0 * f64::from(k))).collect();
+        let line: Vec<_> = (0..30)
+            .map(|k| Point2::new(f64::from(k), 2.0 * f64::from(k)))
+            .collect();
         let same = vec![Point2::new(3.0, 4.0); 30];
         let hyperbola: Vec<_> = (1..30)
-            .flat_map(|k| [1.0, -1.0].map(|s| Point2::new(s * f64::from(k), s * 40.0 / f64::from(k))))
+            .flat_map(|k| {
+                [1.0, -1.0].map(|s| Point2::new(s * f64::from(k), s * 40.0 / f64::from(k)))
+            })
             .collect();
         for points in [&line[..], &same, &hyperbola, &[]] {
             assert!(fit_ellipse(points).is_none());
@@ -210,7 +287,11 @@ mod tests {
             semi_minor_px: 1.0,
             ..sample()
         };
-        assert!((roundness(&two) - 4.0 * 2.0 * std::f64::consts::PI.powi(2) / 9.688_448_22f64.powi(2)).abs() < 1e-4);
+        assert!(
+            (roundness(&two) - 4.0 * 2.0 * std::f64::consts::PI.powi(2) / 9.688_448_22f64.powi(2))
+                .abs()
+                < 1e-4
+        );
         let e = sample();
         for k in 0..20 {
             let p = point_at(&e, TAU * (f64::from(k) + 0.3) / 20.0);

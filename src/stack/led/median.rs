@@ -59,6 +59,7 @@ fn middle(a: u8, b: u8, c: u8) -> u8 {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use crate::stack::led::testing::Noise;
@@ -90,7 +91,9 @@ mod tests {
         let mut scratch = MedianScratch::default();
         let mut out = Patch::default();
         for (w, h) in [(1, 1), (1, 5), (5, 1), (2, 2), (17, 9), (40, 33)] {
-            let data = (0..w * h).map(|_| (noise.uniform() * 256.0) as u8).collect();
+            let data = (0..w * h)
+                .map(|_| (noise.uniform() * 256.0) as u8)
+                .collect();
             let source = Patch::from_data(0, 0, w, h, data);
             median3(&source, &mut out, &mut scratch);
             assert_eq!(out.data, slow(&source), "{w} x {h}");

@@ -18,7 +18,10 @@ pub struct Split {
 /// the middle of them, away from both classes.
 pub fn otsu(counts: &[u32; 256]) -> Option<Split> {
     let total: f64 = counts.iter().map(|&n| f64::from(n)).sum();
-    let sum: f64 = (0u32..).zip(counts).map(|(g, &n)| f64::from(g) * f64::from(n)).sum();
+    let sum: f64 = (0u32..)
+        .zip(counts)
+        .map(|(g, &n)| f64::from(g) * f64::from(n))
+        .sum();
     let (mut dark_n, mut dark_sum) = (0.0, 0.0);
     let mut best: Option<(f64, Split, u8)> = None;
     for level in 0..255u8 {
@@ -52,6 +55,7 @@ pub fn otsu(counts: &[u32; 256]) -> Option<Split> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
 
@@ -77,12 +81,20 @@ mod tests {
         let within = |t: usize| {
             let class = |levels: std::ops::Range<usize>| {
                 let n: f64 = levels.clone().map(|g| f64::from(counts[g])).sum();
-                let mean = levels.clone().map(|g| g as f64 * f64::from(counts[g])).sum::<f64>() / n;
-                levels.map(|g| f64::from(counts[g]) * (g as f64 - mean).powi(2)).sum::<f64>()
+                let mean = levels
+                    .clone()
+                    .map(|g| g as f64 * f64::from(counts[g]))
+                    .sum::<f64>()
+                    / n;
+                levels
+                    .map(|g| f64::from(counts[g]) * (g as f64 - mean).powi(2))
+                    .sum::<f64>()
             };
             class(0..t + 1) + class(t + 1..256)
         };
-        let best = (0..255).min_by(|&a, &b| within(a).total_cmp(&within(b))).unwrap();
+        let best = (0..255)
+            .min_by(|&a, &b| within(a).total_cmp(&within(b)))
+            .unwrap();
         assert_eq!(usize::from(otsu(&counts).unwrap().threshold), best);
     }
 

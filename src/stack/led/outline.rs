@@ -43,7 +43,8 @@ impl Outline {
         let w = filtered.width;
         self.rows = None;
         self.mask.clear();
-        self.mask.extend(filtered.data.iter().map(|&g| g > threshold));
+        self.mask
+            .extend(filtered.data.iter().map(|&g| g > threshold));
         close_columns(&mut self.mask, w, gap_rows);
         let mut largest = (0, 0);
         let mut labelled = std::mem::take(&mut self.mask);
@@ -85,7 +86,13 @@ impl Outline {
     }
 
     /// Clears a component of the mask and counts its pixels (neighbours share a side or corner).
-    fn flood(&mut self, mask: &mut [bool], w: usize, start: usize, mut each: impl FnMut(usize)) -> usize {
+    fn flood(
+        &mut self,
+        mask: &mut [bool],
+        w: usize,
+        start: usize,
+        mut each: impl FnMut(usize),
+    ) -> usize {
         let h = mask.len() / w;
         let mut area = 0;
         mask[start] = false;
@@ -139,7 +146,8 @@ impl Outline {
             let (du, dv) = (raw.u0 as f64, (raw.v0 + v) as f64);
             let found = left.into_iter().chain(right);
             self.points.extend(found.map(|u| Point2::new(u + du, dv)));
-            self.edges.push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
+            self.edges
+                .push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
         }
     }
 }

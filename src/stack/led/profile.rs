@@ -35,11 +35,18 @@ pub struct Profile {
 }
 
 /// Rows of glare that are looked at above and below the spot.
-const REACH_ROWS: i64 = 40;
+pub const REACH_ROWS: i64 = 40;
 
 impl Profile {
     /// Takes the profile of the spot with this outline ellipse from the patch.
-    pub fn take(&mut self, raw: &Patch, black: f64, spot: &Ellipse, gap_rows: usize, tilt_over_rows: f64) {
+    pub fn take(
+        &mut self,
+        raw: &Patch,
+        black: f64,
+        spot: &Ellipse,
+        gap_rows: usize,
+        tilt_over_rows: f64,
+    ) {
         let half = half_height(spot);
         let first = (spot.centre.y - half).floor() as i64 - REACH_ROWS;
         let last = (spot.centre.y + half).ceil() as i64 + REACH_ROWS;
@@ -47,7 +54,15 @@ impl Profile {
         let mut side = std::mem::take(&mut self.left);
         band(raw, black, spot, (first, last), (0.0, 0.45), 0.0, &mut side);
         let mut other = std::mem::take(&mut self.right);
-        band(raw, black, spot, (first, last), (0.55, 1.0), 0.0, &mut other);
+        band(
+            raw,
+            black,
+            spot,
+            (first, last),
+            (0.55, 1.0),
+            0.0,
+            &mut other,
+        );
         let width = spot.semi_major_px + spot.semi_minor_px;
         let between = 0.275 * width;
         let tilt = shift_between(&side, &other) / between;
@@ -58,7 +73,15 @@ impl Profile {
             0.0
         };
         let mut light = std::mem::take(&mut self.light);
-        band(raw, black, spot, (first, last), (0.0, 1.0), self.tilt, &mut light);
+        band(
+            raw,
+            black,
+            spot,
+            (first, last),
+            (0.0, 1.0),
+            self.tilt,
+            &mut light,
+        );
         self.light = light;
         closing(&self.light, gap_rows, &mut self.work, &mut self.envelope);
     }
@@ -150,16 +173,21 @@ fn mean(raw: &Patch, v: f64, (u0, u1): (f64, f64), (pivot, tilt): (f64, f64)) ->
 /// Rows by which `b` lies below `a`: the best whole shift up to three rows, refined by a parabola.
 fn shift_between(a: &[f64], b: &[f64]) -> f64 {
     let score = |shift: i64| -> f64 {
-        let pairs = (3..a.len() as i64 - 3).filter_map(|k| {
-            Some((a.get(k as usize)?, b.get((k + shift) as usize)?))
-        });
+        let pairs = (3..a.len() as i64 - 3)
+            .filter_map(|k| Some((a.get(k as usize)?, b.get((k + shift) as usize)?)));
         -pairs.map(|(x, y)| (x - y).powi(2)).sum::<f64>()
     };
     let scores: [f64; 7] = std::array::from_fn(|k| score(k as i64 - 3));
-    let best = (1..6).max_by(|&i, &j| scores[i].total_cmp(&scores[j])).unwrap_or(3);
+    let best = (1..6)
+        .max_by(|&i, &j| scores[i].total_cmp(&scores[j]))
+        .unwrap_or(3);
     let (before, top, after) = (scores[best - 1], scores[best], scores[best + 1]);
     let bend = before - 2.0 * top + after;
-    let fraction = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+    let fraction = if bend < 0.0 {
+        0.5 * (before - after) / bend
+    } else {
+        0.0
+    };
     best as f64 - 3.0 + fraction.clamp(-0.5, 0.5)
 }
 
@@ -173,11 +201,15 @@ fn closing(samples: &[f64], gap: usize, work: &mut Vec<f64>, out: &mut Vec<f64>)
     work.extend((0..n).map(|k| samples[window(k, n)].iter().copied().fold(0.0, f64::max)));
     out.clear();
     out.extend((0..n).map(|k| {
-        work[window(k, n)].iter().copied().fold(f64::INFINITY, f64::min)
+        work[window(k, n)]
+            .iter()
+            .copied()
+            .fold(f64::INFINITY, f64::min)
     }));
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use nalgebra::Point2;
@@ -186,7 +218,9 @@ mod tests {
     #[test]
     fn closing_fills_gaps_and_nothing_else() {
         let (mut work, mut out) = (Vec::new(), Vec::new());
-        let samples = [0.0, 0.0, 9.0, 0.0, 0.0, 7.0, 5.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0];
+        let samples = [
+            0.0, 0.0, 9.0, 0.0, 0.0, 7.0, 5.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0,
+        ];
         closing(&samples, 2, &mut work, &mut out);
         assert_eq!(out[2..7], [9.0, 7.0, 7.0, 7.0, 5.0]);
         assert_eq!(out[8], 0.0);
@@ -206,7 +240,8 @@ mod tests {
         let mut data = vec![0u8; w * h];
         for v in 0..h {
             for u in 0..w {
-                let inside = chord(&spot, v as f64).is_some_and(|(l, r)| (l..r).contains(&(u as f64)));
+                let inside =
+                    chord(&spot, v as f64).is_some_and(|(l, r)| (l..r).contains(&(u as f64)));
                 let phase = (v as f64 - tilt * (u as f64 - 80.0)) / 9.0;
                 // Every second stripe is wider, so that a shift by a period is no match.
                 let on = (phase * std::f64::consts::PI).sin() + 0.4 * (phase * 1.37).sin();

@@ -66,7 +66,9 @@ pub fn find_regions(
     // A dim lamp beside a bright one lies under the split: all that stands out of darkness counts.
     let limit = f64::from(split.threshold).min(split.dark_mean + settings.min_contrast_grey);
     scratch.lit.clear();
-    scratch.lit.extend(grid().map(|&grey| f64::from(grey) > limit));
+    scratch
+        .lit
+        .extend(grid().map(|&grey| f64::from(grey) > limit));
     let lit = scratch.lit.iter().filter(|&&lit| lit).count();
     if lit as f64 > MAX_LIT_SHARE * scratch.lit.len() as f64 {
         return split.dark_mean;
@@ -82,15 +84,23 @@ pub fn find_regions(
             }
         }
     }
-    scratch.found.sort_by_key(|&(count, _)| std::cmp::Reverse(count));
+    scratch
+        .found
+        .sort_by_key(|&(count, _)| std::cmp::Reverse(count));
     let (right, bottom) = (image.width() - 1, image.height() - 1);
     let margin = settings.margin_px;
-    regions.extend(scratch.found.iter().take(MAX_REGIONS).map(|(_, b)| PixelBox {
-        u0: b.u0.saturating_sub(margin),
-        v0: b.v0.saturating_sub(margin),
-        u1: (b.u1 + margin).min(right),
-        v1: (b.v1 + margin).min(bottom),
-    }));
+    regions.extend(
+        scratch
+            .found
+            .iter()
+            .take(MAX_REGIONS)
+            .map(|(_, b)| PixelBox {
+                u0: b.u0.saturating_sub(margin),
+                v0: b.v0.saturating_sub(margin),
+                u1: (b.u1 + margin).min(right),
+                v1: (b.v1 + margin).min(bottom),
+            }),
+    );
     split.dark_mean
 }
 
@@ -128,6 +138,7 @@ fn flood(
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use image::Luma;
@@ -140,14 +151,20 @@ mod tests {
 
     fn search(image: &GrayImage) -> Vec<PixelBox> {
         let mut regions = Vec::new();
-        find_regions(image, &SETTINGS, &mut SearchScratch::default(), &mut regions);
+        find_regions(
+            image,
+            &SETTINGS,
+            &mut SearchScratch::default(),
+            &mut regions,
+        );
         regions
     }
 
     /// Stripes with gaps of nine rows are one lamp, another lamp far off is a second.
     #[test]
     fn stripes_are_one_region_and_lamps_are_two() {
-        let mut image = GrayImage::from_fn(640, 360, |u, v| Luma([4 + ((u * 7 + v * 13) % 3) as u8]));
+        let mut image =
+            GrayImage::from_fn(640, 360, |u, v| Luma([4 + ((u * 7 + v * 13) % 3) as u8]));
         for v in 100..160 {
             for u in 200..240 {
                 if v % 13 < 4 {

@@ -1,43 +1,399 @@
 //! The `paper` positioning and its baseline `mono`, from samples to fixes.
 
 use super::LedSettings;
-use crate::bus::{ImuSample, LedReport, OdometerSample, RigCalibration, StereoPair};
-use crate::track::Tunnel;
+use super::naming::{Expected, Followed, Naming, Verdict};
+use super::reckoning::Reckoning;
+use super::stereo::{from_size, triangulate};
+use crate::bus::{
+    Identity, ImuSample, LedReport, Method, OdometerSample, PositionFix, RigCalibration, SimTime,
+    StereoPair,
+};
+use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
+use crate::track::uid::Uid;
+use crate::track::{LampSite, Tunnel};
+use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// Positions the train from stereo pairs of a lamp, as it would on board: raw images, odometer
-/// and inertial samples, the rig's calibration and the surveyed map are all that it gets.
+/// and inertial samples, the rig's calibration and the surveyed map are all that it gets. It
+/// takes the train to run up the line.
 #[derive(Debug)]
 pub struct LedPositioner {
-    _settings: LedSettings,
-    _rig: RigCalibration,
-    _map: Arc<Tunnel>,
+    settings: LedSettings,
+    rig: RigCalibration,
+    map: Arc<Tunnel>,
+    finder: LampFinder,
+    reckoning: Reckoning,
+    naming: Naming,
+    followed: Vec<Followed>,
+    anchor: Option<Anchor>,
+    epoch: Option<SimTime>,
+    left: Vec<LampImage>,
+    right: Vec<LampImage>,
+    reading: StripeReading,
+    alone: ChipVotes,
 }
+
+/// The last fix, to reckon on from.
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    time: SimTime,
+    chainage_m: f64,
+    distance_m: Option<f64>,
+}
+
+/// A lamp seen in a pair.
+#[derive(Clone, Copy, Debug)]
+struct Sighting {
+    left: usize,
+    right: Option<usize>,
+    stereo: Option<Vector3<f64>>,
+    mono: Option<Vector3<f64>>,
+    time: SimTime,
+    named: Option<(Uid, Identity)>,
+}
+
+impl Sighting {
+    fn lamp_in_camera(&self) -> Option<Vector3<f64>> {
+        self.stereo.or(self.mono)
+    }
+}
+
+/// Standard deviation of a lamp's apparent half axis: glare and saturation push its edge outwards.
+const MONO_EDGE_SIGMA_PX: f64 = 0.3;
 
 impl LedPositioner {
     /// For one rig on one line.
     pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Tunnel>) -> Self {
+        let finder = LampFinder::new(settings, &rig.camera, &map.lamps);
         Self {
-            _settings: settings.clone(),
-            _rig: rig,
-            _map: map,
+            reckoning: Reckoning::new(settings),
+            naming: Naming {
+                gate_share: settings.gate_share,
+                agreeing_reads: settings.agreeing_reads,
+            },
+            settings: settings.clone(),
+            rig,
+            map,
+            alone: finder.votes(),
+            finder,
+            followed: Vec::new(),
+            anchor: None,
+            epoch: None,
+            left: Vec::new(),
+            right: Vec::new(),
+            reading: StripeReading::default(),
         }
     }
 
     /// Takes an inertial sample; samples come in order of time.
-    pub fn on_imu(&mut self, _sample: &ImuSample) {}
+    pub fn on_imu(&mut self, sample: &ImuSample) {
+        let chainage_m = self.chainage_m(sample.time);
+        self.reckoning
+            .on_imu(sample, &self.map.alignment, chainage_m);
+    }
 
     /// Takes an odometer sample; samples come in order of time.
-    pub fn on_odometer(&mut self, _sample: &OdometerSample) {}
+    pub fn on_odometer(&mut self, sample: &OdometerSample) {
+        self.reckoning.on_odometer(sample);
+    }
 
-    /// Takes a pair of images, after all samples up to the end of its exposure.
+    /// Takes a pair of images, after the samples up to the end of its exposure.
     pub fn on_pair(&mut self, pair: &StereoPair) -> LedReport {
-        LedReport {
-            time: pair.left.start,
-            number: pair.left.number,
-            left: Vec::new(),
-            right: Vec::new(),
-            fixes: Vec::new(),
+        let start = pair.left.start;
+        let seconds = start.since(*self.epoch.get_or_insert(start));
+        let (mut left, mut right) = (
+            std::mem::take(&mut self.left),
+            std::mem::take(&mut self.right),
+        );
+        let smear = Smear::new(&self.rig, &self.map.lamps, self.reckoning.speed_mps(start));
+        self.finder
+            .find(&pair.left.image, |p| smear.along_row_px(p), &mut left);
+        self.finder
+            .find(&pair.right.image, |p| smear.along_row_px(p), &mut right);
+        self.followed
+            .retain(|f| seconds - f.seen_s <= self.settings.forget_s);
+        let mut best: Option<(PositionFix, Sighting)> = None;
+        for k in 0..left.len() {
+            let mut sighting = self.sight(pair, &left, &right, k);
+            self.name(pair, &mut sighting, seconds, &left, &right);
+            left[k].spot.uid = sighting.named;
+            if let Some(r) = sighting.right {
+                right[r].spot.uid = sighting.named;
+            }
+            if let Some(fix) = self.paper_fix(&sighting, &left, &right)
+                && best.as_ref().is_none_or(|(b, _)| fix.sigma_m < b.sigma_m)
+            {
+                best = Some((fix, sighting));
+            }
         }
+        let mut fixes = Vec::with_capacity(2);
+        if let Some((fix, sighting)) = best {
+            self.anchor = Some(Anchor {
+                time: fix.time,
+                chainage_m: fix.chainage_m,
+                distance_m: self.reckoning.distance_m(fix.time),
+            });
+            fixes.push(fix);
+            fixes.extend(self.mono_fix(&sighting, &left));
+        }
+        let spots = |lamps: &[LampImage]| lamps.iter().map(|l| l.spot.clone()).collect();
+        let report = LedReport {
+            time: start,
+            number: pair.left.number,
+            left: spots(&left),
+            right: spots(&right),
+            fixes,
+        };
+        (self.left, self.right) = (left, right);
+        report
+    }
+
+    /// Where the train takes itself to be at a time.
+    fn chainage_m(&self, time: SimTime) -> Option<f64> {
+        let anchor = self.anchor?;
+        let ran = match (self.reckoning.distance_m(time), anchor.distance_m) {
+            (Some(now), Some(then)) => now - then,
+            _ => self.reckoning.speed_mps(time) * time.since(anchor.time),
+        };
+        Some(anchor.chainage_m + ran)
+    }
+
+    /// Finds the right eye's image of a lamp and where the lamp is.
+    fn sight(
+        &self,
+        pair: &StereoPair,
+        left: &[LampImage],
+        right: &[LampImage],
+        k: usize,
+    ) -> Sighting {
+        let lamp = &left[k].spot;
+        let height = f64::from(lamp.bounds.v1 - lamp.bounds.v0 + 1);
+        let miss = |r: &LampImage| (r.spot.centre.y - lamp.centre.y).abs();
+        let fits = |r: &&(usize, &LampImage)| {
+            miss(r.1) < 4.0 + 0.15 * height
+                && triangulate(&self.rig, &lamp.centre, &r.1.spot.centre).is_some()
+        };
+        let partner = right
+            .iter()
+            .enumerate()
+            .filter(|r| fits(&r))
+            .min_by(|a, b| miss(a.1).total_cmp(&miss(b.1)));
+        let diameter_m = self.map.lamps.first().map_or(0.25, |l| l.diameter_m);
+        let c = &self.rig.camera.intrinsics;
+        let shutter = &self.rig.camera.shutter;
+        Sighting {
+            left: k,
+            right: partner.map(|r| r.0),
+            stereo: partner.and_then(|r| triangulate(&self.rig, &lamp.centre, &r.1.spot.centre)),
+            mono: lamp
+                .ellipse
+                .and_then(|e| from_size(c, &lamp.centre, &e, diameter_m)),
+            time: shutter.row_mid(pair.left.start, lamp.centre.y),
+            named: None,
+        }
+    }
+
+    /// Follows the lamp, reads its stripes, and names it.
+    fn name(
+        &mut self,
+        pair: &StereoPair,
+        sighting: &mut Sighting,
+        seconds: f64,
+        left: &[LampImage],
+        right: &[LampImage],
+    ) {
+        let Some(lamp) = sighting.lamp_in_camera() else {
+            return;
+        };
+        let lamp_m = (self.rig.vehicle_from_left * Point3::from(lamp)).coords;
+        let distance_m = self.reckoning.distance_m(sighting.time).unwrap_or(0.0);
+        let k = self.follow(lamp_m, distance_m, seconds);
+        let decoded = self.read(pair, sighting, seconds, k, left, right);
+        let expected = self.expect(sighting.time, &lamp_m);
+        let verdict = self
+            .naming
+            .judge(&mut self.followed[k], decoded, expected, &self.map);
+        sighting.named = match verdict {
+            Verdict::Named(uid, identity) => Some((uid, identity)),
+            Verdict::Moved(uid, identity) => {
+                self.anchor = None;
+                Some((uid, identity))
+            }
+            Verdict::Unknown => None,
+        };
+    }
+
+    /// Index of the followed lamp that this is.
+    fn follow(&mut self, lamp_m: Vector3<f64>, distance_m: f64, seconds: f64) -> usize {
+        let misses = self.followed.iter().enumerate().filter_map(|(k, f)| {
+            // Two lamps of one pair are two lamps.
+            let free = f.seen_s < seconds;
+            Some((k, f.misses_by(&lamp_m, distance_m).filter(|_| free)?))
+        });
+        if let Some((k, _)) = misses.min_by(|a, b| a.1.total_cmp(&b.1)) {
+            let f = &mut self.followed[k];
+            (f.lamp_m, f.distance_m, f.seen_s) = (lamp_m, distance_m, seconds);
+            return k;
+        }
+        let votes = self.finder.votes();
+        self.followed
+            .push(Followed::new(lamp_m, distance_m, seconds, votes));
+        self.followed.len() - 1
+    }
+
+    /// Reads the left eye's stripes, or the right eye's where the left lamp is cut off.
+    fn read(
+        &mut self,
+        pair: &StereoPair,
+        sighting: &Sighting,
+        seconds: f64,
+        k: usize,
+        left: &[LampImage],
+        right: &[LampImage],
+    ) -> Option<Uid> {
+        let lamp = &left[sighting.left];
+        let whole = |r: &usize| !right[*r].spot.cut;
+        let (frame, lamp) = match sighting.right.filter(whole) {
+            Some(r) if lamp.spot.cut => (&pair.right, &right[r]),
+            _ => (&pair.left, lamp),
+        };
+        if !self.finder.read(&frame.image, lamp, &mut self.reading) {
+            return None;
+        }
+        self.followed[k].votes.add(seconds, &self.reading);
+        self.alone.clear();
+        self.alone.add(seconds, &self.reading);
+        self.alone.decode()
+    }
+
+    /// Chainage where this lamp must stand, from where the train takes itself to be.
+    fn expect(&self, time: SimTime, lamp_m: &Vector3<f64>) -> Option<Expected> {
+        let chainage_m = self.chainage_m(time)?;
+        let line = &self.map.alignment;
+        let turn = self.reckoning.attitude(time, line, chainage_m);
+        let lamp = line.at(chainage_m).origin + turn * lamp_m;
+        Some(Expected {
+            lamp_chainage_m: line.track_from_world(&lamp, chainage_m).s_m,
+        })
+    }
+
+    fn paper_fix(
+        &self,
+        sighting: &Sighting,
+        left: &[LampImage],
+        right: &[LampImage],
+    ) -> Option<PositionFix> {
+        let (stereo, r) = (sighting.stereo?, sighting.right?);
+        let (l, r) = (&left[sighting.left], &right[r]);
+        let disparity = l.spot.centre.x - r.spot.centre.x;
+        let sigma = l
+            .sigma_px
+            .hypot(r.sigma_px)
+            .hypot(self.settings.disparity_sigma_px);
+        self.fix(Method::Paper, sighting, stereo, sigma / disparity)
+    }
+
+    fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
+        let outline = left[sighting.left].spot.ellipse?;
+        let sigma = left[sighting.left].sigma_px.hypot(MONO_EDGE_SIGMA_PX);
+        self.fix(
+            Method::Mono,
+            sighting,
+            sighting.mono?,
+            sigma / outline.semi_major_px,
+        )
+    }
+
+    /// Train = lamp - R (lamp in the vehicle's frame). `scale_sigma` is the relative standard
+    /// deviation of the lamp's distance.
+    fn fix(
+        &self,
+        method: Method,
+        sighting: &Sighting,
+        lamp: Vector3<f64>,
+        scale_sigma: f64,
+    ) -> Option<PositionFix> {
+        let (uid, identity) = sighting.named?;
+        let site = self.map.lamp(uid)?;
+        let line = &self.map.alignment;
+        let vehicle = self.rig.vehicle_from_left * Point3::from(lamp);
+        let expected = self.chainage_m(sighting.time);
+        let mut chainage_m = expected.unwrap_or(site.chainage_m - vehicle.x);
+        let mut position = site.centre;
+        // The attitude depends on the place, weakly: twice is enough.
+        for _ in 0..2 {
+            let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
+            position = site.centre - turn * vehicle.coords;
+            chainage_m = line.track_from_world(&position, chainage_m).s_m;
+        }
+        let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
+        let heading = line.at(chainage_m).heading_rad;
+        let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, scale_sigma);
+        (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
+            time: sighting.time,
+            method,
+            chainage_m,
+            sigma_m,
+            position,
+            uid,
+            identity,
+            lamp_in_camera: lamp,
+        })
+    }
+
+    /// One sigma along the track: distance, bearing, attitude and survey.
+    fn sigma_m(
+        &self,
+        lamp: &Vector3<f64>,
+        vehicle: &Point3<f64>,
+        turn: &UnitQuaternion<f64>,
+        heading_rad: f64,
+        scale_sigma: f64,
+    ) -> f64 {
+        let along = Vector3::new(heading_rad.cos(), heading_rad.sin(), 0.0);
+        let in_world = turn * (self.rig.vehicle_from_left.rotation * lamp);
+        let distance = along.dot(&in_world) * scale_sigma;
+        let bearing = 0.1 * lamp.z / self.rig.camera.intrinsics.fx_px;
+        let lever = along.cross(&(turn * vehicle.coords)).norm();
+        let attitude = lever * self.settings.attitude_sigma_deg.to_radians();
+        let sum = [distance, bearing, attitude, self.settings.survey_sigma_m];
+        sum.iter().map(|s| s * s).sum::<f64>().sqrt()
+    }
+}
+
+/// How far a lamp moves in the image while a row is exposed.
+///
+/// The paper has V cos(psi) f t / W for a lamp at lateral distance W: the speed across the axis
+/// at depth W. Here the depth is that of the lamps' line along the pixel's own ray, which also
+/// holds off the axis: du = V t f (x_x z - x z_x)/z^2 with (x_x, z_x) the running direction in
+/// the camera's frame.
+#[derive(Clone, Copy, Debug)]
+struct Smear {
+    rig: RigCalibration,
+    lateral_m: f64,
+    travel_m: f64,
+}
+
+impl Smear {
+    fn new(rig: &RigCalibration, lamps: &[LampSite], speed_mps: f64) -> Self {
+        let lateral_m = lamps.first().map_or(0.0, |l| l.lateral_m);
+        Self {
+            rig: *rig,
+            lateral_m: lateral_m - rig.vehicle_from_left.translation.y,
+            travel_m: speed_mps * rig.camera.shutter.exposure_s,
+        }
+    }
+
+    fn along_row_px(&self, p: &Point2<f64>) -> f64 {
+        let c = &self.rig.camera.intrinsics;
+        let ray = c.ray(p.x, p.y);
+        let turn = self.rig.vehicle_from_left.rotation;
+        let z = self.lateral_m / (turn * ray).y;
+        if !(0.3..60.0).contains(&z) {
+            return 0.0;
+        }
+        let running = turn.inverse() * Vector3::x();
+        self.travel_m * c.fx_px * (running.x - ray.x * running.z) / z
     }
 }

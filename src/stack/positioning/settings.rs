@@ -37,6 +37,8 @@ pub struct LedSettings {
     pub front_pivot_m: f64,
     /// From the train head back to the leading car's rear bogie pivot, metres.
     pub rear_pivot_m: f64,
+    /// A fix with a larger standard deviation than this is not given, metres.
+    pub max_sigma_m: f64,
     /// Standard deviation of a surveyed lamp position along the track, metres.
     pub survey_sigma_m: f64,
 }
@@ -58,6 +60,7 @@ impl Default for LedSettings {
             attitude_sigma_deg: 0.1,
             front_pivot_m: 3.5,
             rear_pivot_m: 16.1,
+            max_sigma_m: 1.0,
             survey_sigma_m: 0.005,
         }
     }
@@ -118,6 +121,7 @@ impl LedSettings {
             10.0,
         );
         range("front_pivot_m", self.front_pivot_m, " m", 0.0, 30.0);
+        range("max_sigma_m", self.max_sigma_m, " m", 0.01, 100.0);
         range("survey_sigma_m", self.survey_sigma_m, " m", 0.0, 5.0);
         range(
             "rear_pivot_m",
@@ -130,6 +134,7 @@ impl LedSettings {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
 

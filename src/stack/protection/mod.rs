@@ -1,53 +1,235 @@
-//! Onboard warning and control.
+//! Onboard warning and control: supervises the train's speed against the braking curve to the
+//! nearest dangerous obstacle ahead, brakes without the driver where he does not, and holds the
+//! train until the track is clear.
+//!
+//! ```
+//! use metrotwin::bus::{BrakeDemand, DangerLevel, Delivery, ObstacleWarning, OdometerSample,
+//!     SimTime, Via};
+//! use metrotwin::stack::protection::{Protection, ProtectionSettings};
+//! # use metrotwin::track::{Alignment, PlanElement, Tunnel};
+//! # let straight = PlanElement { length_m: 2000.0, start_per_m: 0.0, end_per_m: 0.0,
+//! #     start_cant_m: 0.0, end_cant_m: 0.0 };
+//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(),
+//! #     alignment: Alignment::new(nalgebra::Point3::origin(), 0.0, &[straight], &[]),
+//! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
+//! #     line_number: 1, stations: vec![], ambient_lx: 5.0 });
+//! let settings = ProtectionSettings { initial_chainage_m: Some(500.0), ..Default::default() };
+//! let mut protection = Protection::new(&settings, map);
+//! let time = SimTime::from_secs(1.0);
+//! protection.on_odometer(&OdometerSample { time, distance_m: 0.0, speed_mps: 20.0 });
+//! assert_eq!(protection.cycle(time).command.brake, BrakeDemand::None);
+//! // A device reports an obstacle 150 m ahead: too near for the service brake.
+//! protection.on_delivery(&Delivery {
+//!     received: time,
+//!     via: Via::Radio,
+//!     warning: ObstacleWarning { device: "W1".into(), number: 0, issued: time,
+//!         danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5 },
+//! });
+//! assert_eq!(protection.cycle(time.plus(0.1)).command.brake, BrakeDemand::Emergency);
+//! ```
+//!
+//! # Theory
+//!
+//! Warnings, states and display follow Xiao, Xu and Yu, "Research on Obstacle Detection and Train
+//! Control Technology for Urban Rail Transit", Journal of Ordnance Equipment Engineering 41(10),
+//! 2020, 161-165, which asks for target-distance curves. The curves are those of the safe braking
+//! model of IEEE 1474.1 (see `curve`); margins and times are those of ETCS (SUBSET-026, 3.13):
+//!
+//! ```text
+//!  speed
+//!    |------------------------------.   emergency: worst case stops at the danger point
+//!    |--------------------------.     '.
+//!    |---------------------.      '.     '.   service: stops at the end of the authority
+//!    |   permitted           '.     '.     '.
+//!    |   (driver's time before) '.    '.     '.
+//!    +------------------------------'----'-----'------#### obstacle
+//!                                   end of     danger
+//!                                   authority  point
+//! ```
+//!
+//! The danger point lies `danger_distance_m` before the obstacle. The emergency curve takes the
+//! train's head k sigma further ahead and its speed higher than measured, with traction on until
+//! it is cut. The service curve ends `safety_distance_m` before the obstacle, or earlier where a
+//! large sigma asks for it. Up to the permitted speed nothing happens; over it the driver is
+//! warned, and has `driver_time_s` until the service brake intervenes.
+//!
+//! A high danger ends the authority; a low one only tells the driver. Where the permitted speed
+//! has come down to walking pace, the brake stops and holds the train until the device clears the
+//! warning. Warnings outlive silence of the radio. With no position the train is restricted to
+//! `restricted_kmh`, and any high danger stops it; with no odometer it stops at once.
+//!
+//! # What it does not do
+//!
+//! It does not supervise running backwards, speed restrictions of single sections, doors, or a
+//! train ahead. It trusts the odometer's speed within its stated error: a sliding wheel is not
+//! recognised.
 
+mod curve;
+mod display;
+mod monitor;
+mod obstacles;
+mod position;
 mod settings;
+mod supervision;
+#[cfg(test)]
+mod tests;
 
 pub use settings::ProtectionSettings;
 
-use crate::bus::{Delivery, OdometerSample, PositionFix, ProtectionReport, SimTime, TrainCommand};
+use crate::bus::{
+    BrakeDemand, DangerLevel, Delivery, OdometerSample, PositionFix, ProtectionReport, SimTime,
+    TrainCommand,
+};
 use crate::track::Tunnel;
+use curve::Grades;
+use display::Situation;
+use monitor::BrakeMonitor;
+use obstacles::Obstacles;
+use position::{Estimate, Position};
 use std::sync::Arc;
+use supervision::Supervisor;
 
 /// The protection of one train.
 #[derive(Clone, Debug)]
 pub struct Protection {
     settings: ProtectionSettings,
     map: Arc<Tunnel>,
+    grades: Grades,
+    position: Position,
+    obstacles: Obstacles,
+    supervisor: Supervisor,
+    monitor: BrakeMonitor,
+    brake: BrakeDemand,
+    first_cycle: Option<SimTime>,
 }
 
 impl Protection {
     /// Switched on, with the driver's position setting if there is one.
     pub fn new(settings: &ProtectionSettings, map: Arc<Tunnel>) -> Self {
         Self {
+            grades: Grades::new(&map, settings),
+            position: Position::new(settings),
+            obstacles: Obstacles::default(),
+            supervisor: Supervisor::new(settings),
+            monitor: BrakeMonitor::new(settings),
+            brake: BrakeDemand::None,
+            first_cycle: None,
             settings: settings.clone(),
             map,
         }
     }
 
-    /// Takes a position from the positioning stack. The caller passes the fixes of one method.
-    pub fn on_fix(&mut self, _fix: &PositionFix) {}
+    /// Takes a position from the positioning stack. The caller passes the fixes of one method;
+    /// they may come late.
+    pub fn on_fix(&mut self, fix: &PositionFix) {
+        self.position.on_fix(fix.time, fix.chainage_m, fix.sigma_m);
+    }
 
     /// Takes a sample of the odometer.
-    pub fn on_odometer(&mut self, _sample: &OdometerSample) {}
+    pub fn on_odometer(&mut self, sample: &OdometerSample) {
+        if sample.distance_m.is_finite() && sample.speed_mps.is_finite() {
+            self.position.on_odometer(sample);
+        }
+    }
 
-    /// The antenna on the train head passed over a balise.
-    pub fn on_balise(&mut self, _name: &str, _time: SimTime) {}
+    /// The antenna on the train head passed over a balise at `time`. A balise that the map does
+    /// not know tells nothing. What message it stores comes as a [`Delivery`].
+    pub fn on_balise(&mut self, name: &str, time: SimTime) {
+        if let Some(balise) = self.map.balises.iter().find(|b| b.name == name) {
+            self.position
+                .reset(time, balise.chainage_m, self.settings.balise_sigma_m);
+        }
+    }
 
     /// Takes a message, by balise or by radio.
-    pub fn on_delivery(&mut self, _delivery: &Delivery) {}
+    pub fn on_delivery(&mut self, delivery: &Delivery) {
+        self.obstacles.on_delivery(delivery);
+    }
 
     /// Decides; called 10 times a second.
     pub fn cycle(&mut self, time: SimTime) -> ProtectionReport {
-        let _ = &self.map;
-        let permitted_mps = self.settings.line_speed_kmh / 3.6;
+        let train = self.position.at(time);
+        let speed_mps = self.position.speed_mps();
+        let odometer_lost = self.odometer_lost(time);
+        let head_m = train.map(|t| t.chainage_m);
+        let failed = self
+            .monitor
+            .update(time, self.brake, speed_mps, head_m, &self.grades);
+
+        // With no position every obstacle may be the next one.
+        let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| self.rearmost_m(t));
+        let end_m = self
+            .obstacles
+            .ahead(rearmost_m, DangerLevel::High)
+            .map(|(warning, _)| warning.from_chainage_m);
+        let ceiling_mps = if train.is_some() {
+            self.settings.line_speed_kmh / 3.6
+        } else {
+            self.settings
+                .restricted_kmh
+                .min(self.settings.line_speed_kmh)
+                / 3.6
+        };
+        let limits = self
+            .supervisor
+            .limits(&self.grades, ceiling_mps, train, end_m);
+        let lost = train.is_none() && end_m.is_some();
+        let supervision = self
+            .supervisor
+            .step(limits, speed_mps, lost, odometer_lost || failed);
+        self.brake = supervision::demand(supervision);
+
+        let situation = Situation {
+            position_m: head_m,
+            obstacle: self.nearest(time, train, rearmost_m),
+            supervision,
+            permitted_mps: limits.permitted_mps,
+            brake_failed: failed,
+            odometer_lost,
+            radio_timeout_s: self.settings.radio_timeout_s,
+        };
         ProtectionReport {
             time,
-            permitted_mps,
+            position_m: head_m,
+            sigma_m: train.map(|t| t.sigma_m),
+            speed_mps,
+            permitted_mps: limits.permitted_mps,
+            service_mps: limits.service_mps,
+            emergency_mps: limits.emergency_mps,
+            supervision,
+            authority_end_m: end_m.map(|m| m - self.settings.safety_distance_m),
             command: TrainCommand {
-                permitted_speed_mps: permitted_mps,
-                ..TrainCommand::default()
+                brake: self.brake,
+                permitted_speed_mps: limits.permitted_mps,
             },
-            ..ProtectionReport::default()
+            display: display::display(&situation),
         }
+    }
+
+    /// The head's rearmost possible place: an obstacle counts as passed only behind it.
+    fn rearmost_m(&self, train: Estimate) -> f64 {
+        train.chainage_m - self.settings.position_sigmas * train.sigma_m
+    }
+
+    /// The obstacle that the driver is shown: a dangerous one first.
+    fn nearest(
+        &self,
+        time: SimTime,
+        train: Option<Estimate>,
+        rearmost_m: f64,
+    ) -> Option<(f64, DangerLevel, f64)> {
+        let head_m = train?.chainage_m;
+        let ahead = |danger| self.obstacles.ahead(rearmost_m, danger);
+        let (warning, received) = ahead(DangerLevel::High).or_else(|| ahead(DangerLevel::Low))?;
+        Some((
+            warning.from_chainage_m - head_m,
+            warning.danger,
+            time.since(received),
+        ))
+    }
+
+    fn odometer_lost(&mut self, time: SimTime) -> bool {
+        let since_start = time.since(*self.first_cycle.get_or_insert(time));
+        self.position.age_s(time).unwrap_or(since_start) > self.settings.odometer_timeout_s
     }
 }

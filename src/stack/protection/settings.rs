@@ -11,13 +11,19 @@ use serde::{Deserialize, Serialize};
 pub struct ProtectionSettings {
     /// Speed limit of the line, km/h.
     pub line_speed_kmh: f64,
+    /// Speed limit while the position is unknown, km/h (restricted manual driving).
+    pub restricted_kmh: f64,
     /// Position that the driver set before departure, m of chainage of the train head; without
     /// it the first fix or balise tells.
     pub initial_chainage_m: Option<f64>,
     /// One sigma of that position, m.
     pub initial_sigma_m: f64,
-    /// The train stops at least this far before an obstacle, m.
+    /// The movement authority ends this far before an obstacle, m: room to clear it. The service
+    /// brake stops the train there.
     pub safety_distance_m: f64,
+    /// The emergency brake, in the worst case, stops the train this far before an obstacle, m:
+    /// how well its place is known (10 m, as IEEE 1474.1 wants of a train's).
+    pub danger_distance_m: f64,
     /// How many sigma of its position the train is taken to be ahead of its estimate.
     pub position_sigmas: f64,
     /// Odometer error, share of the distance run (wheel wear, slip).
@@ -47,10 +53,9 @@ pub struct ProtectionSettings {
     pub rotating_mass: f64,
     /// Train length, m.
     pub train_length_m: f64,
-    /// Time that the driver has from the permitted speed to the intervention, s.
+    /// Time that the driver has from the permitted speed, where he is warned, to the
+    /// intervention, s.
     pub driver_time_s: f64,
-    /// Warning comes this long before the intervention, s.
-    pub warning_time_s: f64,
     /// Over the line speed by this: service brake, km/h.
     pub service_margin_kmh: f64,
     /// Over the line speed by this: emergency brake, km/h.
@@ -66,9 +71,11 @@ impl Default for ProtectionSettings {
     fn default() -> Self {
         Self {
             line_speed_kmh: 80.0,
+            restricted_kmh: 25.0,
             initial_chainage_m: None,
             initial_sigma_m: 5.0,
-            safety_distance_m: 20.0,
+            safety_distance_m: 25.0,
+            danger_distance_m: 10.0,
             position_sigmas: 3.0,
             odometer_drift: 0.02,
             speed_error_kmh: 3.0,
@@ -84,7 +91,6 @@ impl Default for ProtectionSettings {
             rotating_mass: 0.08,
             train_length_m: 118.0,
             driver_time_s: 4.0,
-            warning_time_s: 2.0,
             service_margin_kmh: 5.5,
             emergency_margin_kmh: 7.5,
             odometer_timeout_s: 1.0,
@@ -114,9 +120,17 @@ impl ProtectionSettings {
             "safety_distance_m",
             self.safety_distance_m,
             " m",
+            self.danger_distance_m.max(0.0),
+            500.0,
+        );
+        range(
+            "danger_distance_m",
+            self.danger_distance_m,
+            " m",
             0.0,
             500.0,
         );
+        range("restricted_kmh", self.restricted_kmh, " km/h", 1.0, 50.0);
         range("position_sigmas", self.position_sigmas, "", 0.0, 10.0);
         range("odometer_drift", self.odometer_drift, "", 0.0, 0.5);
         range("speed_error_kmh", self.speed_error_kmh, " km/h", 0.0, 20.0);
@@ -138,13 +152,6 @@ impl ProtectionSettings {
         range("rotating_mass", self.rotating_mass, "", 0.0, 0.5);
         range("train_length_m", self.train_length_m, " m", 5.0, 500.0);
         range("driver_time_s", self.driver_time_s, " s", 0.0, 20.0);
-        range(
-            "warning_time_s",
-            self.warning_time_s,
-            " s",
-            0.0,
-            self.driver_time_s.max(0.0),
-        );
         range(
             "service_margin_kmh",
             self.service_margin_kmh,

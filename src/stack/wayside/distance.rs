@@ -134,6 +134,72 @@ mod tests {
         }
     }
 
+    /// The whole way, on maps: an obstacle put on the line by the alignment, its range and angle
+    /// taken in world coordinates. On the straight both answers agree; in the curve they differ
+    /// by the tangent error, device before and behind the obstacle alike.
+    #[test]
+    fn both_distances_on_a_map() {
+        use crate::bus::{Blob, DangerLevel, PixelBox, SimTime};
+        use crate::stack::wayside::test_scene::{calibration, tunnel};
+        use crate::track::TrackPoint;
+        for (curvature, s) in [
+            (0.0, 160.0),
+            (0.0, 230.0),
+            (1.0 / 300.0, 160.0),
+            (-1.0 / 300.0, 230.0),
+        ] {
+            let map = tunnel(curvature);
+            let calibration = calibration(&map, 64, 36);
+            let position = map.alignment.world_from_track(TrackPoint {
+                s_m: s,
+                l_m: 0.0,
+                h_m: 0.0,
+            });
+            let foot = map.alignment.at(calibration.chainage_m);
+            let (sin, cos) = foot.heading_rad.sin_cos();
+            let to = position - calibration.world_from_camera.translation.vector;
+            let range = to.x.hypot(to.y);
+            let angle = (to.y * cos - to.x * sin).atan2(to.x * cos + to.y * sin);
+            let bounds = PixelBox {
+                u0: 0,
+                v0: 0,
+                u1: 1,
+                v1: 1,
+            };
+            let obstacle = DetectedObstacle {
+                blob: Blob { bounds, area_px: 4 },
+                position,
+                near_range_m: range,
+                near_angle_rad: angle,
+                far_range_m: range,
+                far_angle_rad: angle,
+                from_chainage_m: s,
+                to_chainage_m: s,
+                lateral_m: 0.0,
+                width_m: 0.0,
+                height_m: 0.0,
+                danger: DangerLevel::High,
+            };
+            let train = TrainReport {
+                chainage_m: 90.0,
+                speed_mps: 0.0,
+                time: SimTime::ZERO,
+            };
+            let (paper, exact) = train_distance_m(&map, &calibration, train, &obstacle);
+            assert!((exact - (s - 90.0)).abs() < 1e-9);
+            let error = if curvature.abs() > 0.0 {
+                let arc = calibration.chainage_m - s;
+                tangent_error_m(300.0, arc, 0.0)
+            } else {
+                0.0
+            };
+            assert!(
+                (paper - exact - error).abs() < 1e-6,
+                "{paper} {exact} {error}"
+            );
+        }
+    }
+
     /// The limit of a flat curve is the straight formula.
     #[test]
     fn flat_curve_is_straight() {

@@ -28,9 +28,12 @@ pub fn words(a: u32, b: u32, c: u32) -> [u32; 3] {
     v
 }
 
+/// Numbers of the noise table: prime, so that frames do not repeat its rows.
+const NOISE: usize = 99_991;
+
 /// About normal: the sum of six uniform bytes.
-fn normal(a: u32, b: u32, c: u32) -> f64 {
-    let w = words(a, b, c);
+fn normal(k: u32) -> f64 {
+    let w = words(k, 3, 9);
     let bytes = [w[0], w[0] >> 8, w[1], w[1] >> 8, w[2], w[2] >> 8].map(|x| f64::from(x & 0xff));
     (bytes.iter().sum::<f64>() - 765.0) / (6.0f64 * (256.0 * 256.0 - 1.0) / 12.0).sqrt()
 }
@@ -155,6 +158,7 @@ pub struct Scene {
     /// Of every pixel, in line axes.
     rays: Vec<Vector3<f64>>,
     eye: Point3<f64>,
+    noise: Vec<f64>,
 }
 
 impl Scene {
@@ -181,6 +185,7 @@ impl Scene {
             background,
             rays,
             eye,
+            noise: (0..NOISE as u32).map(normal).collect(),
         }
     }
 
@@ -198,9 +203,11 @@ impl Scene {
         for (item, level) in crates {
             self.paint(&mut grey, *item, *level);
         }
+        let first = words(number, 1, 2)[0] as usize % NOISE;
+        let mut noise = self.noise.iter().cycle().skip(first);
         for (k, pixel) in image.iter_mut().enumerate() {
             let (u, v) = (k as u32 % i.width_px, k as u32 / i.width_px);
-            let noise = 1.7 * normal(u, v, number.wrapping_add(1000));
+            let noise = 1.7 * noise.next().unwrap_or(&0.0);
             *pixel = (grey[k] * light(u, v) + noise).round().clamp(0.0, 255.0) as u8;
         }
         Frame {

@@ -10,7 +10,7 @@
 
 use super::{Body, CameraMotion, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View};
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
-use crate::track::uid::Uid;
+use crate::track::uid::{LineCode, Uid};
 use crate::track::{
     Alignment, CrossSection, LampSite, Material, OutlinePoint, PlanElement, SectionRange,
     TrackPoint, Tunnel,
@@ -277,5 +277,6 @@ fn lamp_site(alignment: &Alignment, k: u16) -> LampSite {
         efficacy_lm_per_w: 100.0,
         beam_deg: 60.0,
         chip_s: 100e-6,
+        code: LineCode::Manchester,
     }
 }

@@ -48,7 +48,14 @@ impl Optics {
     }
 
     fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        positive(problems, at, "focal_length_mm", self.focal_length_mm, "mm", 3.9);
+        positive(
+            problems,
+            at,
+            "focal_length_mm",
+            self.focal_length_mm,
+            "mm",
+            3.9,
+        );
         positive(problems, at, "pixel_um", self.pixel_um, "um", 3.75);
         positive(problems, at, "exposure_us", self.exposure_us, "us", 30.0);
         positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
@@ -64,7 +71,10 @@ impl Optics {
         if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
             problems.push(Problem::new(
                 format!("{at}.line_time_us"),
-                format!("a row cannot open {} us after the one before", self.line_time_us),
+                format!(
+                    "a row cannot open {} us after the one before",
+                    self.line_time_us
+                ),
                 "give the time from row to row in us, 0 for a global shutter",
             ));
         }
@@ -84,7 +94,10 @@ impl Optics {
                     "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {}",
                     self.exposure_us, self.frames_per_s, self.rate_key
                 ),
-                format!("expose for less than {frame_us:.0} us, or lower {}", self.rate_key),
+                format!(
+                    "expose for less than {frame_us:.0} us, or lower {}",
+                    self.rate_key
+                ),
             ));
             return;
         }
@@ -121,16 +134,16 @@ pub struct RigSettings {
     /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
     /// Default 22.2.
     pub line_time_us: f64,
-    /// How long every row collects light, us. Longer than a chip of the lamps' code (about 100 us)
+    /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in the shipped tunnels)
     /// it blurs the stripes away. Default 30.
     pub exposure_us: f64,
     /// Pairs of images a second. Default 30.
     pub pairs_per_s: f64,
     /// Left eye, m ahead of the train head (negative: behind the windscreen). Default -0.5.
     pub forward_m: f64,
-    /// Left eye, m to the left of the centreline. Default 1.08.
+    /// Left eye, m to the left of the centreline. Default 1.0.
     pub lateral_m: f64,
-    /// Left eye, m above top of rail. Default 1.75.
+    /// Left eye, m above top of rail. Default 1.7.
     pub height_m: f64,
     /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
     /// Default 39.
@@ -156,8 +169,8 @@ impl Default for RigSettings {
             exposure_us: 30.0,
             pairs_per_s: 30.0,
             forward_m: -0.5,
-            lateral_m: 1.08,
-            height_m: 1.75,
+            lateral_m: 1.0,
+            height_m: 1.7,
             yaw_deg: 39.0,
             pitch_deg: 22.0,
             calibration_error: RigError::default(),
@@ -211,7 +224,7 @@ impl RigSettings {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
-        positive(problems, at, "height_m", self.height_m, "m", 1.75);
+        positive(problems, at, "height_m", self.height_m, "m", 1.7);
         within(problems, at, "forward_m", self.forward_m, "m", 5.0);
         within(problems, at, "lateral_m", self.lateral_m, "m", 2.0);
         within(problems, at, "yaw_deg", self.yaw_deg, "deg", 180.0);
@@ -220,8 +233,22 @@ impl RigSettings {
         let at = format!("{at}.calibration_error");
         let half_focal = 0.5 * self.focal_length_mm.abs();
         let half_baseline = 0.5 * self.baseline_mm.abs();
-        within(problems, &at, "focal_length_mm", error.focal_length_mm, "mm", half_focal);
-        within(problems, &at, "baseline_mm", error.baseline_mm, "mm", half_baseline);
+        within(
+            problems,
+            &at,
+            "focal_length_mm",
+            error.focal_length_mm,
+            "mm",
+            half_focal,
+        );
+        within(
+            problems,
+            &at,
+            "baseline_mm",
+            error.baseline_mm,
+            "mm",
+            half_baseline,
+        );
         within(problems, &at, "yaw_deg", error.yaw_deg, "deg", 45.0);
         within(problems, &at, "pitch_deg", error.pitch_deg, "deg", 45.0);
     }
@@ -407,7 +434,9 @@ const REACH_STEP_M: f64 = 0.05;
 
 fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
     let n = lamp.facing.into_inner();
-    let across = n.cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 })).normalize();
+    let across = n
+        .cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 }))
+        .normalize();
     let along = n.cross(&across);
     std::array::from_fn(|k| {
         let (sin, cos) = (k as f64 * std::f64::consts::TAU / 16.0).sin_cos();
@@ -440,14 +469,7 @@ fn sees(
         })
 }
 
-fn positive(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    unit: &str,
-    usual: f64,
-) {
+fn positive(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, usual: f64) {
     if !(value.is_finite() && value > 0.0) {
         problems.push(Problem::new(
             format!("{at}.{key}"),
@@ -457,14 +479,7 @@ fn positive(
     }
 }
 
-fn within(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    unit: &str,
-    limit: f64,
-) {
+fn within(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, limit: f64) {
     if !(value.abs() <= limit) {
         problems.push(Problem::new(
             format!("{at}.{key}"),

@@ -4,8 +4,14 @@ use super::tunnel::SurfacePoint;
 use crate::twin::random::pcg4d;
 use crate::twin::render::surface::{self, Pulse};
 
-/// Albedo at a point for a pixel that spans `width_m` of the surface.
-pub(super) fn albedo(at: &SurfacePoint, width_m: f64) -> f64 {
+impl SurfacePoint {
+    /// Share of light reflected, for a pixel that spans `width_m` of chainage.
+    pub fn albedo(&self, width_m: f64) -> f64 {
+        albedo(self, width_m)
+    }
+}
+
+fn albedo(at: &SurfacePoint, width_m: f64) -> f64 {
     let look = surface::look(at.material);
     let mark = match look.pulse {
         Some(pulse) if at.l_m.abs() < pulse.half_width_m => {
@@ -73,7 +79,13 @@ mod tests {
     #[test]
     fn wide_pixels_see_the_mean_of_narrow_ones() {
         for pulse in [surface::RING_JOINT, surface::SLEEPER] {
-            for (s, w) in [(-3.1, 0.2), (0.0, 0.01), (7.45, 1.5), (0.29, 0.4), (12.0, 31.0)] {
+            for (s, w) in [
+                (-3.1, 0.2),
+                (0.0, 0.01),
+                (7.45, 1.5),
+                (0.29, 0.4),
+                (12.0, 31.0),
+            ] {
                 let n = 20_000;
                 let seen = (0..n)
                     .filter(|k| {
@@ -83,7 +95,10 @@ mod tests {
                     })
                     .count();
                 let mean = seen as f64 / f64::from(n);
-                assert!((share_of_marks(&pulse, s, w) - mean).abs() < 1e-3, "{s} {w}");
+                assert!(
+                    (share_of_marks(&pulse, s, w) - mean).abs() < 1e-3,
+                    "{s} {w}"
+                );
             }
         }
     }

@@ -31,6 +31,7 @@ pub(super) struct Outline {
     /// Corners of the tunnel itself where it is closed.
     ring: Vec<Vector2<f64>>,
     low: Vector2<f64>,
+    high: Vector2<f64>,
     columns: usize,
     rows: usize,
     /// Edges of cell k: `listed[begins[k]..begins[k + 1]]`.
@@ -38,7 +39,7 @@ pub(super) struct Outline {
     listed: Vec<u16>,
 }
 
-const CELL_M: f64 = 0.25;
+const CELL_M: f64 = 0.4;
 /// Edges reach this far over their ends, so that no ray slips through a corner.
 const OVERHANG_M: f64 = 1e-9;
 
@@ -51,11 +52,19 @@ impl Outline {
             )));
         }
         let ring = if section.closed {
-            section.points.iter().map(|p| Vector2::new(p.l_m, p.h_m)).collect()
+            section
+                .points
+                .iter()
+                .map(|p| Vector2::new(p.l_m, p.h_m))
+                .collect()
         } else {
             Vec::new()
         };
-        let corners = || edges.iter().flat_map(|e| [e.start, e.start + e.along * e.length_m]);
+        let corners = || {
+            edges
+                .iter()
+                .flat_map(|e| [e.start, e.start + e.along * e.length_m])
+        };
         let margin = Vector2::repeat(1e-3);
         let low = corners().fold(Vector2::repeat(f64::INFINITY), |a, b| a.inf(&b)) - margin;
         let high = corners().fold(Vector2::repeat(f64::NEG_INFINITY), |a, b| a.sup(&b)) + margin;
@@ -65,13 +74,18 @@ impl Outline {
         for cell in 0..columns * rows {
             let place = Vector2::new((cell % columns) as f64, (cell / columns) as f64);
             let centre = low + (place + Vector2::repeat(0.5)) * CELL_M;
-            listed.extend((0..edges.len()).filter(|&k| edges[k].touches(&centre)).map(|k| k as u16));
+            listed.extend(
+                (0..edges.len())
+                    .filter(|&k| edges[k].touches(&centre))
+                    .map(|k| k as u16),
+            );
             begins.push(listed.len() as u32);
         }
         Self {
             edges,
             ring,
             low,
+            high,
             columns,
             rows,
             begins,
@@ -87,19 +101,25 @@ impl Outline {
         from: f64,
         to: f64,
     ) -> Option<(f64, u16)> {
-        let size = Vector2::new(self.columns as f64, self.rows as f64) * CELL_M;
-        let (mut begin, mut end) = (from, to);
-        for axis in 0..2 {
-            let (a, b) = crossing(o[axis] - self.low[axis], d[axis], size[axis]);
-            begin = begin.max(a);
-            end = end.min(b);
-        }
+        // No division by nothing: a ray across an axis leaves its cells after 1e300.
+        let slow = d.map(|x| 1.0 / x.abs().max(1e-300).copysign(x));
+        let near = (self.low - o).component_mul(&slow);
+        let far = (self.high - o).component_mul(&slow);
+        let begin = from.max(near.inf(&far).max());
+        let end = to.min(near.sup(&far).min());
         if begin > end {
             return None;
         }
-        let at = (o + d * begin - self.low) / CELL_M;
-        let mut column = (at.x.max(0.0) as usize).min(self.columns - 1);
-        let mut row = (at.y.max(0.0) as usize).min(self.rows - 1);
+        let cell = ((o + d * begin - self.low) / CELL_M).map(|x| x.max(0.0) as usize);
+        let mut column = cell.x.min(self.columns - 1);
+        let mut row = cell.y.min(self.rows - 1);
+        // When the ray leaves the cell to the side and upwards (or downwards).
+        let sides = Vector2::new(
+            column + usize::from(d.x > 0.0),
+            row + usize::from(d.y > 0.0),
+        );
+        let mut leaves = (self.low + sides.map(|n| n as f64) * CELL_M - o).component_mul(&slow);
+        let across = slow.abs() * CELL_M;
         let mut best: Option<(f64, u16)> = None;
         loop {
             let cell = row * self.columns + column;
@@ -111,18 +131,17 @@ impl Outline {
                     best = Some((t, k));
                 }
             }
-            let corner = self.low + Vector2::new(column as f64, row as f64) * CELL_M;
-            let right = crossing(o.x - corner.x, d.x, CELL_M).1;
-            let up = crossing(o.y - corner.y, d.y, CELL_M).1;
-            let leaves = right.min(up);
-            if best.is_some_and(|(t, _)| t <= leaves) || leaves >= end {
+            let leave = leaves.min();
+            if best.is_some_and(|(t, _)| t <= leave) || leave >= end {
                 return best;
             }
             // Off the grid, the index wraps below zero or runs over: no more edges.
-            if right < up {
+            if leaves.x < leaves.y {
                 column = neighbour(column, d.x);
+                leaves.x += across.x;
             } else {
                 row = neighbour(row, d.y);
+                leaves.y += across.y;
             }
             if column >= self.columns || row >= self.rows {
                 return best;
@@ -136,8 +155,7 @@ impl Outline {
         let crossings = (0..n)
             .filter(|&k| {
                 let (a, b) = (self.ring[k], self.ring[(k + 1) % n]);
-                (a.y > p.y) != (b.y > p.y)
-                    && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
+                (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
             })
             .count();
         n == 0 || crossings % 2 == 1
@@ -149,7 +167,8 @@ impl Edge {
         let half = Vector2::repeat(0.5 * CELL_M + 1e-6);
         let end = self.start + self.along * self.length_m;
         let away = self.normal.dot(&(centre - self.start)).abs();
-        let beside = (self.start.inf(&end) - half) <= *centre && *centre <= (self.start.sup(&end) + half);
+        let beside =
+            (self.start.inf(&end) - half) <= *centre && *centre <= (self.start.sup(&end) + half);
         beside && away <= half.x * (self.normal.x.abs() + self.normal.y.abs())
     }
 
@@ -169,7 +188,11 @@ fn edges_of(section: &CrossSection) -> Vec<Edge> {
     let n = section.points.len();
     let mut q_m = 0.0;
     let mut edges = Vec::with_capacity(n);
-    let count = if section.closed { n } else { n.saturating_sub(1) };
+    let count = if section.closed {
+        n
+    } else {
+        n.saturating_sub(1)
+    };
     for (k, &material) in section.materials.iter().enumerate().take(count) {
         let (a, b) = (section.points[k], section.points[(k + 1) % n]);
         let step = Vector2::new(b.l_m - a.l_m, b.h_m - a.h_m);
@@ -188,19 +211,6 @@ fn edges_of(section: &CrossSection) -> Vec<Edge> {
         q_m += length_m;
     }
     edges
-}
-
-/// When x + t d enters and leaves 0..=size.
-fn crossing(x: f64, d: f64, size: f64) -> (f64, f64) {
-    if d.abs() < 1e-300 {
-        return if (0.0..=size).contains(&x) {
-            (f64::NEG_INFINITY, f64::INFINITY)
-        } else {
-            (f64::INFINITY, f64::NEG_INFINITY)
-        };
-    }
-    let (a, b) = (-x / d, (size - x) / d);
-    (a.min(b), a.max(b))
 }
 
 fn neighbour(index: usize, towards: f64) -> usize {

@@ -108,14 +108,22 @@ fn enters(a: f64, b: f64, c: f64) -> Option<f64> {
 }
 
 fn cast_sphere(o: &Vector3<f64>, d: &Vector3<f64>, radius: f64) -> Entry {
-    let t = enters(d.norm_squared(), o.dot(d), o.norm_squared() - radius * radius)?;
+    let t = enters(
+        d.norm_squared(),
+        o.dot(d),
+        o.norm_squared() - radius * radius,
+    )?;
     Some((t, (o + d * t) / radius))
 }
 
 /// The side of a cylinder along z.
 fn cast_tube(o: &Vector3<f64>, d: &Vector3<f64>, radius: f64, half: f64) -> Entry {
     let (o2, d2) = (o.xy(), d.xy());
-    let t = enters(d2.norm_squared(), o2.dot(&d2), o2.norm_squared() - radius * radius)?;
+    let t = enters(
+        d2.norm_squared(),
+        o2.dot(&d2),
+        o2.norm_squared() - radius * radius,
+    )?;
     let p = o + d * t;
     (p.z.abs() <= half).then(|| (t, Vector3::new(p.x / radius, p.y / radius, 0.0)))
 }
@@ -191,7 +199,10 @@ mod tests {
                 match (ours, theirs) {
                     (Some((t, n)), Some(hit)) => {
                         hits += 1;
-                        assert!((t - hit.time_of_impact).abs() < 1e-5, "shape {index} ray {k}");
+                        assert!(
+                            (t - hit.time_of_impact).abs() < 1e-5,
+                            "shape {index} ray {k}"
+                        );
                         let n = moved.inverse_transform_vector(&n);
                         let at = o + d * t;
                         // On an edge either face may be named.
@@ -204,7 +215,10 @@ mod tests {
                     // Grazing rays may go either way in an iterative cast.
                     (ours, theirs) => {
                         let t = ours.map_or_else(|| theirs.unwrap().time_of_impact, |(t, _)| t);
-                        assert!(grazes(&body.shape, &(o + d * t), &d), "shape {index} ray {k}");
+                        assert!(
+                            grazes(&body.shape, &(o + d * t), &d),
+                            "shape {index} ray {k}"
+                        );
                     }
                 }
             }

@@ -1,7 +1,7 @@
 //! A ray down the tunnel.
 //!
 //! The tunnel is a chain of slabs between the vertical planes across the line at its stations,
-//! one a metre. Inside a slab the surface is ruled from station to station, so in the slab's own
+//! one a metre and where a cross-section ends. Inside a slab the surface is ruled from station to station, so in the slab's own
 //! axes (x along the chord, y left, z up less the slope) it is a prism over the outline. A ray is
 //! followed from slab to slab; in each it is a straight line in the plane across.
 //!
@@ -18,7 +18,6 @@ use nalgebra::{Point3, Vector2, Vector3};
 /// The swept tunnel with its rails, ready for rays.
 #[derive(Clone, Debug)]
 pub struct TunnelCaster {
-    first_m: f64,
     stations: Vec<Station>,
     slabs: Vec<Slab>,
     outlines: Vec<Outline>,
@@ -26,6 +25,7 @@ pub struct TunnelCaster {
 
 #[derive(Clone, Debug)]
 struct Station {
+    s_m: f64,
     origin: Point3<f64>,
     /// Up the line in plan: the normal of the station's plane.
     forward: Vector2<f64>,
@@ -76,24 +76,22 @@ fn plan(v: Vector3<f64>) -> Vector2<f64> {
 impl TunnelCaster {
     /// Sweeps the cross-sections of a tunnel along its line.
     pub fn new(tunnel: &Tunnel) -> Self {
-        let begin = tunnel.sections.first().map_or(0.0, |r| r.from_m);
-        let end = tunnel.sections.last().map_or(0.0, |r| r.to_m);
-        let first = (begin / RING_M).floor() as i64;
-        let last = ((end / RING_M).ceil() as i64).max(first + 1);
-        let stations: Vec<_> = (first..=last)
-            .map(|k| {
-                let frame = tunnel.alignment.at(k as f64 * RING_M);
+        let stations: Vec<_> = station_chainages(tunnel)
+            .into_iter()
+            .map(|s_m| {
+                let frame = tunnel.alignment.at(s_m);
                 let (sin, cos) = frame.heading_rad.sin_cos();
                 Station {
+                    s_m,
                     origin: frame.origin,
                     forward: Vector2::new(cos, sin),
                 }
             })
             .collect();
-        let slabs = (first..last)
-            .zip(stations.windows(2))
-            .map(|(k, pair)| {
-                let mid = (k as f64 + 0.5) * RING_M;
+        let slabs = stations
+            .windows(2)
+            .map(|pair| {
+                let mid = 0.5 * (pair[0].s_m + pair[1].s_m);
                 let step = pair[1].origin - pair[0].origin;
                 let length = plan(step).norm();
                 let chord = plan(step) / length;
@@ -109,17 +107,22 @@ impl TunnelCaster {
             })
             .collect();
         Self {
-            first_m: first as f64 * RING_M,
             stations,
             slabs,
-            outlines: tunnel.sections.iter().map(|r| Outline::new(&r.section)).collect(),
+            outlines: tunnel
+                .sections
+                .iter()
+                .map(|r| Outline::new(&r.section))
+                .collect(),
         }
     }
 
     /// The slab that a place is in: from a slab close by, or else by search for the nearest
     /// station.
     pub fn slab_of(&self, p: &Point3<f64>, near: Option<usize>) -> usize {
-        let mut k = near.unwrap_or_else(|| self.nearest(p)).min(self.slabs.len() - 1);
+        let mut k = near
+            .unwrap_or_else(|| self.nearest(p))
+            .min(self.slabs.len() - 1);
         for _ in 0..self.slabs.len() {
             if k > 0 && self.ahead_of(k, p) < 0.0 {
                 k -= 1;
@@ -147,9 +150,17 @@ impl TunnelCaster {
 
     /// First surface that the ray o + t d meets for t up to `reach`; `slab` is that of o. Rays
     /// from outside the line's ends meet nothing.
-    pub fn cast(&self, slab: usize, o: &Point3<f64>, d: &Vector3<f64>, reach: f64) -> Option<Strike> {
+    pub fn cast(
+        &self,
+        slab: usize,
+        o: &Point3<f64>,
+        d: &Vector3<f64>,
+        reach: f64,
+    ) -> Option<Strike> {
         if slab >= self.slabs.len()
-            || self.ahead_of(slab, o) < -1e-6 || self.ahead_of(slab + 1, o) > 1e-6 {
+            || self.ahead_of(slab, o) < -1e-6
+            || self.ahead_of(slab + 1, o) > 1e-6
+        {
             return None;
         }
         let (d2, overlap) = (plan(*d), OVERLAP_M / d.norm());
@@ -157,7 +168,10 @@ impl TunnelCaster {
         // Each station's plane is crossed once; the bound is for rays that are not numbers.
         for _ in 0..self.slabs.len() {
             let exit_down = exit(-self.ahead_of(k, o), -self.stations[k].forward.dot(&d2));
-            let exit_up = exit(self.ahead_of(k + 1, o), self.stations[k + 1].forward.dot(&d2));
+            let exit_up = exit(
+                self.ahead_of(k + 1, o),
+                self.stations[k + 1].forward.dot(&d2),
+            );
             let leave = exit_up.min(exit_down);
             let (o_across, d_across) = self.across(k, o, d);
             let (from, to) = ((entry - overlap).max(0.0), leave.min(reach));
@@ -173,7 +187,11 @@ impl TunnelCaster {
             if leave >= reach {
                 return None;
             }
-            let next = if exit_up < exit_down { k + 1 } else { k.wrapping_sub(1) };
+            let next = if exit_up < exit_down {
+                k + 1
+            } else {
+                k.wrapping_sub(1)
+            };
             let beyond = self.slabs.get(next)?;
             if beyond.outline != self.slabs[k].outline
                 && let Some(i) = beyond.outline
@@ -204,7 +222,11 @@ impl TunnelCaster {
         let (o_across, d_across) = self.across(k, o, d);
         let position = o + d * strike.t;
         let lh = o_across + d_across * strike.t;
-        let (past, before) = (self.ahead_of(k, &position), -self.ahead_of(k + 1, &position));
+        let (near_m, far_m) = (self.stations[k].s_m, self.stations[k + 1].s_m);
+        let (past, before) = (
+            self.ahead_of(k, &position),
+            -self.ahead_of(k + 1, &position),
+        );
         let edge = &self.outlines[slab.outline.unwrap_or(0)].edges[strike.edge as usize];
         // Across the edge and across the ruling, which climbs with the slope.
         let (n, along) = (edge.normal, -edge.normal.y * slab.slope);
@@ -212,12 +234,28 @@ impl TunnelCaster {
         SurfacePoint {
             position,
             normal: Vector3::new(level.x, level.y, n.y).normalize(),
-            s_m: self.first_m + (k as f64 + past / (past + before)) * RING_M,
+            s_m: near_m + (far_m - near_m) * past / (past + before),
             l_m: lh.x,
             q_m: edge.q_m + edge.along.dot(&(lh - edge.start)),
             material: edge.material,
         }
     }
+}
+
+/// Multiples of the ring length, and the ends of cross-sections, which may lie between them.
+fn station_chainages(tunnel: &Tunnel) -> Vec<f64> {
+    let begin = tunnel.sections.first().map_or(0.0, |r| r.from_m);
+    let end = tunnel.sections.last().map_or(0.0, |r| r.to_m);
+    let (first, last) = (
+        (begin / RING_M).ceil() as i64,
+        (end / RING_M).floor() as i64,
+    );
+    let rings = (first..=last).map(|k| k as f64 * RING_M);
+    let ends = tunnel.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
+    let mut all: Vec<f64> = rings.chain(ends).collect();
+    all.sort_by(f64::total_cmp);
+    all.dedup_by(|b, a| *b - *a < 1e-6);
+    all
 }
 
 /// When a point `past` a plane and going past it at `speed` crossed or will cross it.

@@ -1,18 +1,21 @@
 //! Lamps of a tunnel file: from a row and single entries to surveyed sites.
 
-use super::check::{free_standing, on_line};
-use super::file::{LampEntry, LampRow, TunnelFile};
-use super::furniture::LampSite;
-use super::problem::Problem;
-use super::section::OutlinePoint;
-use super::uid::Uid;
-use super::{TrackPoint, Tunnel};
+use super::{free_standing, on_line};
+use crate::track::file::{LampEntry, LampRow, TunnelFile};
+use crate::track::furniture::LampSite;
+use crate::track::problem::Problem;
+use crate::track::section::OutlinePoint;
+use crate::track::uid::Uid;
+use crate::track::{TrackPoint, Tunnel};
 use nalgebra::{Unit, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 /// Lamp numbers have 10 bits.
 const MOST_LAMPS: usize = 1024;
+
+/// A lamp and its place among the file's `[[lamp]]` entries; none for a lamp of the row.
+type Placed = (Option<usize>, LampSite);
 
 /// Places every lamp of the file, in order of chainage.
 pub(super) fn place(
@@ -22,32 +25,32 @@ pub(super) fn place(
 ) -> Vec<LampSite> {
     let common = file.lamps.clone().unwrap_or_default();
     check_common(&common, problems);
-    let length_m = tunnel.alignment.length_m();
-    let mut placed: Vec<(String, LampSite)> = Vec::new();
-    if let Some(row) = &file.lamps {
-        for entry in row_entries(row, length_m, problems) {
-            let site = site(&common, &entry, tunnel);
-            placed.push((format!("lamps (lamp {})", entry.number), site));
-        }
-    }
+    let row = match &file.lamps {
+        Some(row) => row_entries(row, tunnel, problems),
+        None => Vec::new(),
+    };
+    let row = row.iter().map(|entry| (None, site(&common, entry, tunnel)));
+    let mut placed: Vec<Placed> = row.collect();
     for (k, entry) in file.lamp.iter().enumerate() {
-        let key = format!("lamp[{k}]");
+        let number = f64::from(entry.number);
+        let largest = (MOST_LAMPS - 1) as f64;
         Problem::unless_within(
             problems,
-            format!("{key}.number"),
-            entry.number.into(),
-            0.0..=(MOST_LAMPS - 1) as f64,
+            format!("lamp[{k}].number"),
+            number,
+            0.0..=largest,
             "",
         );
         if on_line(
-            &format!("{key}.chainage_m"),
+            format!("lamp[{k}].chainage_m"),
             entry.chainage_m,
-            length_m,
+            tunnel,
             problems,
         ) {
-            placed.push((key, site(&common, entry, tunnel)));
+            placed.push((Some(k), site(&common, entry, tunnel)));
         }
     }
+    check_uids(&placed, problems);
     check_places(&placed, tunnel, problems);
     let mut sites: Vec<LampSite> = placed.into_iter().map(|(_, site)| site).collect();
     sites.sort_by(|a, b| a.chainage_m.total_cmp(&b.chainage_m));
@@ -77,18 +80,13 @@ fn check_common(row: &LampRow, problems: &mut Vec<Problem>) {
 }
 
 /// The row as single lamps; none where its numbers make no sense.
-fn row_entries(row: &LampRow, length_m: f64, problems: &mut Vec<Problem>) -> Vec<LampEntry> {
+fn row_entries(row: &LampRow, tunnel: &Tunnel, problems: &mut Vec<Problem>) -> Vec<LampEntry> {
     let before = problems.len();
-    let to_m = row.to_m.unwrap_or(length_m);
-    Problem::unless_within(
-        problems,
-        "lamps.spacing_m",
-        row.spacing_m,
-        0.1..=10_000.0,
-        "m",
-    );
-    on_line("lamps.from_m", row.from_m, length_m, problems);
-    on_line("lamps.to_m", to_m, length_m, problems);
+    let to_m = row.to_m.unwrap_or(tunnel.alignment.length_m());
+    let spacings = 0.1..=10_000.0;
+    Problem::unless_within(problems, "lamps.spacing_m", row.spacing_m, spacings, "m");
+    on_line("lamps.from_m", row.from_m, tunnel, problems);
+    on_line("lamps.to_m", to_m, tunnel, problems);
     if to_m < row.from_m {
         problems.push(Problem::new(
             "lamps.to_m",
@@ -99,8 +97,9 @@ fn row_entries(row: &LampRow, length_m: f64, problems: &mut Vec<Problem>) -> Vec
     if problems.len() > before {
         return Vec::new();
     }
-    let count = ((to_m - row.from_m) / row.spacing_m + 1e-9).floor() as usize + 1;
-    if usize::from(row.first_number) + count > MOST_LAMPS {
+    // The last lamp may stand at the end in spite of rounding.
+    let count = ((to_m - row.from_m) / row.spacing_m + 1e-9).floor() + 1.0;
+    if f64::from(row.first_number) + count > MOST_LAMPS as f64 {
         problems.push(Problem::new(
             "lamps.spacing_m",
             format!(
@@ -112,10 +111,11 @@ fn row_entries(row: &LampRow, length_m: f64, problems: &mut Vec<Problem>) -> Vec
         ));
         return Vec::new();
     }
+    let count = count as u16;
     (0..count)
         .map(|k| LampEntry {
-            number: row.first_number + k as u16,
-            chainage_m: row.from_m + k as f64 * row.spacing_m,
+            number: row.first_number + k,
+            chainage_m: row.from_m + f64::from(k) * row.spacing_m,
             lateral_m: None,
             height_m: None,
             aim_yaw_deg: None,
@@ -156,32 +156,38 @@ fn site(common: &LampRow, entry: &LampEntry, tunnel: &Tunnel) -> LampSite {
         power_w: entry.power_w.unwrap_or(common.power_w),
         efficacy_lm_per_w: common.efficacy_lm_per_w,
         beam_deg: common.beam_deg,
-        chip_s: common.chip_us * 1e-6,
+        chip_s: common.chip_us / 1e6,
         code: common.code,
     }
 }
 
-/// UIDs that are there twice, discs in the rock or in the train's way. A row repeats the same
-/// fault at every lamp, so only its first is told.
-fn check_places(placed: &[(String, LampSite)], tunnel: &Tunnel, problems: &mut Vec<Problem>) {
-    let mut seen: BTreeMap<Uid, &str> = BTreeMap::new();
-    let mut row_told = false;
-    for (key, lamp) in placed {
-        if let Some(first) = seen.insert(lamp.uid, key) {
+/// UIDs that are there twice. Numbers of the row count up, so only entries can repeat one.
+fn check_uids(placed: &[Placed], problems: &mut Vec<Problem>) {
+    let mut seen: BTreeMap<Uid, Option<usize>> = BTreeMap::new();
+    for (entry, lamp) in placed {
+        if let (Some(first), Some(k)) = (seen.insert(lamp.uid, *entry), entry) {
+            let first = first.map_or("a lamp of the row".to_owned(), |f| format!("lamp[{f}]"));
             problems.push(Problem::new(
-                format!("{key}.number"),
+                format!("lamp[{k}].number"),
                 format!("UID {} is that of {first} too", lamp.uid),
                 "give each lamp a number of its own",
             ));
         }
-        let of_row = key.starts_with("lamps");
-        if of_row && row_told {
+    }
+}
+
+/// Discs in the rock or in the train's way. A row repeats the same fault at many lamps, so only
+/// its first is told.
+fn check_places(placed: &[Placed], tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    let mut row_told = false;
+    for (entry, lamp) in placed {
+        if entry.is_none() && row_told {
             continue;
         }
         let before = problems.len();
-        let key = if of_row { "lamps" } else { key };
-        free_standing(key, tunnel, lamp.chainage_m, &rim(lamp, tunnel), problems);
-        row_told |= of_row && problems.len() > before;
+        let key = entry.map_or("lamps".to_owned(), |k| format!("lamp[{k}]"));
+        free_standing(&key, tunnel, lamp.chainage_m, &rim(lamp, tunnel), problems);
+        row_told |= entry.is_none() && problems.len() > before;
     }
 }
 

@@ -1,0 +1,57 @@
+//! `metrotwin check`: is this file right, and what does it say?
+
+use super::fault::Failure;
+use super::{print, report};
+use crate::scenario::{self, Scenario, ScenarioError};
+use std::path::{Path, PathBuf};
+
+const AFTER: &str = "\
+Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
+A file with any of [[plan]], [[sections]], [lamps] is a tunnel, any other a scenario; of a
+scenario the tunnel that it names is checked too.
+
+Examples:
+  metrotwin check tunnels/chengdu_line1.toml
+  metrotwin check scenarios/*.toml tunnels/*.toml
+
+Exit code 0 where all files are right, 2 where any is wrong.";
+
+/// Check tunnels and scenarios: errors and a short report
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(super) struct CheckArgs {
+    /// Tunnel and scenario files
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+}
+
+/// Checks every file, however many before it are wrong.
+pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
+    let mut wrong = false;
+    for file in &args.files {
+        match report_on(file) {
+            Ok(text) => print(&format!("{}: right\n{text}", file.display()))?,
+            Err(error) => {
+                Failure::from(error).print();
+                wrong = true;
+            }
+        }
+    }
+    if wrong { Err(Failure::Reported) } else { Ok(()) }
+}
+
+fn report_on(path: &Path) -> Result<String, ScenarioError> {
+    let text = scenario::read(path)?;
+    if is_tunnel(&text) {
+        scenario::parse_tunnel(path, &text).map(|tunnel| report::tunnel(&tunnel))
+    } else {
+        Scenario::from_text(path, &text, &[]).map(|scenario| report::scenario(&scenario))
+    }
+}
+
+/// Keys that only tunnels have. What is not TOML is left to the scenario's parser to complain of.
+fn is_tunnel(text: &str) -> bool {
+    let keys = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
+    text.parse::<toml::Table>()
+        .is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
+}

@@ -1,0 +1,164 @@
+//! What a tunnel or scenario says, in a few lines.
+
+use crate::bus::{CameraModel, RigCalibration};
+use crate::scenario::Scenario;
+use crate::track::Tunnel;
+use crate::twin::sensors::visible_interval;
+
+/// Length, radii, grades, sections, lamps, devices.
+pub(super) fn tunnel(tunnel: &Tunnel) -> String {
+    let length_m = tunnel.alignment.length_m();
+    let mut tightest = 0.0f64;
+    let (mut lowest, mut steepest) = (f64::INFINITY, f64::NEG_INFINITY);
+    for s in 0..=length_m as u32 {
+        let frame = tunnel.alignment.at(f64::from(s));
+        tightest = tightest.max(frame.curvature_per_m.abs());
+        lowest = lowest.min(frame.slope * 1e3);
+        steepest = steepest.max(frame.slope * 1e3);
+    }
+    let plan = if tightest < 1e-9 {
+        "straight".to_owned()
+    } else {
+        format!("tightest radius {:.0} m", 1.0 / tightest)
+    };
+    let mut lines = vec![
+        format!("tunnel `{}`, line {}: {length_m:.1} m, {plan}", tunnel.name, tunnel.line_number),
+        format!("grades from {lowest:.1} to {steepest:.1} permille"),
+        format!("{} stretches of cross-section", tunnel.sections.len()),
+        lamps(tunnel),
+    ];
+    lines.extend(tunnel.wayside.iter().map(|d| {
+        format!("wayside device {} at {} m, writes to balise {}", d.name, d.chainage_m, d.balise)
+    }));
+    let named = |what: &str, list: Vec<String>| match list.len() {
+        0 => format!("no {what}"),
+        _ => format!("{what}: {}", list.join(", ")),
+    };
+    let at = |name: &str, chainage_m: f64| format!("{name} at {chainage_m} m");
+    let balises = tunnel.balises.iter().map(|b| at(&b.name, b.chainage_m));
+    let stations = tunnel.stations.iter().map(|(name, s)| at(name, *s));
+    lines.push(named("balises", balises.collect()));
+    lines.push(named("stations", stations.collect()));
+    indented(&lines)
+}
+
+fn lamps(tunnel: &Tunnel) -> String {
+    match (tunnel.lamps.first(), tunnel.lamps.last()) {
+        (Some(first), Some(last)) => {
+            let gaps = tunnel.lamps.windows(2).map(|w| w[1].chainage_m - w[0].chainage_m);
+            let widest = gaps.fold(0.0, f64::max);
+            format!(
+                "{} lamps from {} to {} m, at most {widest:.1} m apart; chips of {:.1} us, {:?} code",
+                tunnel.lamps.len(),
+                first.chainage_m,
+                last.chainage_m,
+                first.chip_s * 1e6,
+                first.code,
+            )
+        }
+        _ => "no lamps".to_owned(),
+    }
+}
+
+/// What it runs, what the rig sees, how many images to expect.
+pub(super) fn scenario(scenario: &Scenario) -> String {
+    let mut lines = vec![format!("scenario `{}`: {}", scenario.name, scenario.description)];
+    lines.push(format!(
+        "{:.1} s on `{}`, seed {}",
+        scenario.duration_s, scenario.tunnel.name, scenario.seed
+    ));
+    if let Some(train) = &scenario.physics.train {
+        let stop = train.stop_at_m.map_or(String::new(), |m| format!(", stops at {m} m"));
+        lines.push(format!(
+            "train of {} cars, head at {} m, cruises at {} km/h{stop}",
+            train.cars, train.start_chainage_m, train.cruise_speed_kmh
+        ));
+    }
+    if let Some(bench) = &scenario.bench {
+        lines.push(format!(
+            "bench: {} points {} m apart from {} m, {} fixes each",
+            bench.points, bench.step_m, bench.first_m, bench.fixes_per_point
+        ));
+    }
+    if let Some(rig) = &scenario.rig {
+        let calibration = rig.calibration();
+        lines.push(format!("rig: {}", frames(&calibration.camera, rig.pairs_per_s)));
+        lines.push(format!("rig: {}", view(&calibration, scenario)));
+        lines.push(format!("rig: {}", stripes(&calibration.camera, &scenario.tunnel)));
+        let pairs = images(scenario.duration_s, rig.pairs_per_s);
+        lines.push(format!("about {pairs:.0} pairs of images"));
+    }
+    for post in &scenario.wayside {
+        let name = &post.calibration.name;
+        let rate = post.camera.frames_per_s;
+        lines.push(format!("{name}: {}", frames(&post.calibration.camera, rate)));
+        let count = images(scenario.duration_s, rate);
+        let lidar = if post.lidar.is_some() { ", with lidar" } else { "" };
+        lines.push(format!("{name}: about {count:.0} images{lidar}"));
+    }
+    let (obstacles, workers) = (&scenario.physics.obstacles, &scenario.physics.workers);
+    if !(obstacles.is_empty() && workers.is_empty()) {
+        lines.push(format!("obstacles: {}, workers: {}", obstacles.len(), workers.len()));
+    }
+    indented(&lines)
+}
+
+fn images(duration_s: f64, per_s: f64) -> f64 {
+    (duration_s * per_s).ceil()
+}
+
+fn frames(camera: &CameraModel, per_s: f64) -> String {
+    let image = &camera.intrinsics;
+    format!(
+        "{} x {} px, {per_s} a second; {} rows take {:.1} of {:.1} ms",
+        image.width_px,
+        image.height_px,
+        image.height_px,
+        camera.shutter.frame_span_s(image.height_px) * 1e3,
+        1e3 / per_s
+    )
+}
+
+/// Visible interval of the lamp in the middle, and how it changes along the line.
+fn view(rig: &RigCalibration, scenario: &Scenario) -> String {
+    let tunnel = &scenario.tunnel;
+    let seen = tunnel.lamps.iter().filter_map(|lamp| visible_interval(rig, tunnel, lamp));
+    let (mut near, mut far): (Vec<f64>, Vec<f64>) = seen.unzip();
+    near.sort_by(f64::total_cmp);
+    far.sort_by(f64::total_cmp);
+    let text = |v: &[f64]| match (v.first(), v.get(v.len() / 2), v.last()) {
+        (Some(least), Some(middle), Some(most)) if most - least > 0.06 => {
+            format!("{middle:.1} m ({least:.1} to {most:.1} along the line)")
+        }
+        (_, Some(middle), _) => format!("{middle:.1} m"),
+        _ => "nowhere".to_owned(),
+    };
+    let unseen = match tunnel.lamps.len() - near.len() {
+        0 => String::new(),
+        n => format!("; {n} lamps never"),
+    };
+    format!(
+        "a lamp is seen whole by both eyes from {} to {} ahead of the head{unseen}",
+        text(&near),
+        text(&far),
+    )
+}
+
+/// How the lamps' code meets the shutter.
+fn stripes(camera: &CameraModel, tunnel: &Tunnel) -> String {
+    let shutter = camera.shutter;
+    match tunnel.lamps.first() {
+        Some(lamp) if shutter.line_time_s > 0.0 => format!(
+            "a chip of {:.1} us makes a stripe of {:.2} rows; a row is exposed for {:.2} of a chip",
+            lamp.chip_s * 1e6,
+            lamp.chip_s / shutter.line_time_s,
+            shutter.exposure_s / lamp.chip_s
+        ),
+        Some(_) => "a global shutter: lamps show no stripes, and cannot be named".to_owned(),
+        None => "no lamps".to_owned(),
+    }
+}
+
+fn indented(lines: &[String]) -> String {
+    lines.iter().map(|line| format!("  {line}\n")).collect()
+}

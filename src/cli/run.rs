@@ -1,0 +1,206 @@
+//! `metrotwin run`: one scenario, from start to summary.
+
+use super::fault::Failure;
+use super::{print, table};
+use crate::record::{FixTable, Recording};
+use crate::scenario::{Override, Scenario};
+use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const AFTER: &str = "\
+Into the output folder go:
+  recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
+  summary.json    the figures
+  fixes.csv       every position, with its truth
+Each is written under a temporary name and renamed when it is complete.
+
+Examples:
+  metrotwin run scenarios/line_run.toml
+  metrotwin run scenarios/line_run.toml --set train.cruise_speed_kmh=80 --out out/at_80
+  metrotwin run scenarios/line_run.toml --set track.irregularity.class=german_high --seed 7
+  metrotwin run scenarios/forgotten_toolbox.toml --view
+  metrotwin run scenarios/static_bench.toml --no-recording --json | jq .positioning
+
+Ctrl-C ends a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at once.
+Exit code 0 for a whole run, 1 for one that failed or was broken off, 2 for wrong input.";
+
+/// Run a scenario: recording, summary, fixes
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(super) struct RunArgs {
+    /// Scenario file
+    scenario: PathBuf,
+    /// Folder for the results [default: out/<scenario name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Everything random follows from it [default: the scenario's]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Change a value of the scenario, e.g. train.cruise_speed_kmh=80; may be given again
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+    /// What draws the images
+    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
+    renderer: RendererArg,
+    /// Write no recording.rrd
+    #[arg(long)]
+    no_recording: bool,
+    /// Print summary.json on standard output, and nothing else there
+    #[arg(long)]
+    json: bool,
+    /// Show the run in the rerun viewer as it goes
+    #[arg(long, conflicts_with = "connect")]
+    view: bool,
+    /// Show the run in a viewer that listens there, e.g. 127.0.0.1:9876
+    #[arg(long, value_name = "ADDR")]
+    connect: Option<String>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum RendererArg {
+    /// The graphics adapter, or the plain renderer where there is none
+    Auto,
+    /// The graphics adapter (a GPU, or a software adapter) or nothing
+    Gpu,
+    /// The plain renderer, on the CPU alone
+    Cpu,
+}
+
+impl From<RendererArg> for RendererChoice {
+    fn from(arg: RendererArg) -> Self {
+        match arg {
+            RendererArg::Auto => Self::Auto,
+            RendererArg::Gpu => Self::Gpu,
+            RendererArg::Cpu => Self::Cpu,
+        }
+    }
+}
+
+/// Set by the first Ctrl-C.
+static STOP: AtomicBool = AtomicBool::new(false);
+
+pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
+    let mut scenario = Scenario::load(&args.scenario, &args.overrides)?;
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    let live = live(args, &scenario)?;
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    prepare(&out).map_err(|error| {
+        let what = format!("cannot write into {}: {error}", out.display());
+        Failure::input(what, "choose another folder with --out, or make that one writable")
+    })?;
+
+    stop_on_ctrl_c();
+    let summary = observed(args, &scenario, live, &out)?;
+    let text = serde_json::to_string_pretty(&summary).map_err(Failure::run)?;
+    write_whole(&out.join("summary.json"), &text)
+        .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write summary.json")))?;
+    if args.json {
+        print(&text)?;
+    } else {
+        print(&table::of(&summary, &out))?;
+    }
+    match &summary.end {
+        End::Complete => Ok(()),
+        End::Interrupted => Err(Failure::Run(anyhow::anyhow!(
+            "the run was broken off at {:.1} s of {:.1} s",
+            summary.simulated_s,
+            scenario.duration_s
+        ))),
+        End::Failed(why) => Err(Failure::Run(anyhow::anyhow!(
+            "the run failed at {:.3} s: {why}",
+            summary.simulated_s
+        ))),
+    }
+}
+
+/// Runs the session with everything that watches it.
+fn observed(
+    args: &RunArgs,
+    scenario: &Scenario,
+    mut live: Option<Recording>,
+    out: &Path,
+) -> Result<Summary, Failure> {
+    let mut file = (!args.no_recording)
+        .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.record));
+    let mut fixes = scenario
+        .rig
+        .as_ref()
+        .map(|_| FixTable::to_file(&out.join("fixes.csv")));
+    let mut observers: Vec<&mut dyn Observer> = Vec::new();
+    observers.extend(file.as_mut().map(|r| r as &mut dyn Observer));
+    observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
+    observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));
+
+    let bar = progress_bar(scenario.duration_s);
+    let progress = |now_s: f64| bar.set_position(millis(now_s));
+    let options = RunOptions {
+        renderer: args.renderer.into(),
+        stop: Some(&STOP),
+        progress: Some(&progress),
+    };
+    let summary = session::run(scenario, &options, &mut observers);
+    bar.finish_and_clear();
+    summary.map_err(Failure::run)
+}
+
+/// The recording that a viewer shows while it is made.
+fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failure> {
+    if let Some(address) = &args.connect {
+        return Ok(Some(Recording::connect(address, &scenario.record)));
+    }
+    if !args.view {
+        return Ok(None);
+    }
+    Recording::view(&scenario.record).map(Some).map_err(|error| {
+        Failure::input(error, "run without --view, and open recording.rrd afterwards")
+    })
+}
+
+/// Makes the folder, and makes sure that files can be written there.
+fn prepare(out: &Path) -> io::Result<()> {
+    fs::create_dir_all(out)?;
+    let probe = out.join(".metrotwin-probe");
+    fs::write(&probe, b"")?;
+    fs::remove_file(&probe)
+}
+
+/// Writes under a temporary name and renames, so that a file is whole or not there.
+fn write_whole(path: &Path, text: &str) -> io::Result<()> {
+    let part = path.with_extension("json.part");
+    fs::write(&part, format!("{text}\n"))?;
+    fs::rename(&part, path)
+}
+
+fn stop_on_ctrl_c() {
+    let handler = || {
+        if STOP.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+        eprintln!("ending the run; Ctrl-C again ends it at once");
+    };
+    if let Err(error) = ctrlc::set_handler(handler) {
+        tracing::warn!("Ctrl-C will end the run at once: {error}");
+    }
+}
+
+/// Drawn on a terminal only.
+fn progress_bar(duration_s: f64) -> ProgressBar {
+    let bar = ProgressBar::new(millis(duration_s));
+    let template = "{bar:40} {percent:>3} % of the run, {elapsed} so far, {eta} to go";
+    match ProgressStyle::with_template(template) {
+        Ok(style) => bar.with_style(style),
+        Err(_) => bar,
+    }
+}
+
+fn millis(seconds: f64) -> u64 {
+    (seconds * 1e3) as u64
+}

@@ -1,0 +1,286 @@
+//! The layout that a recording brings along for the viewer.
+//!
+//! Written as rows of a blueprint store by its published archetypes, because the sdk's own layout
+//! builder draws random ids (two recordings of one run would differ) and cannot say which entity a
+//! 3-D view follows.
+
+use super::images::WaysidePaths;
+use super::stream::{SIM_TIME, Stream, failed};
+use super::{Contents, images, plots, scene, texts};
+use crate::session::ObserverError;
+use rerun::external::re_sdk_types::blueprint::archetypes::{
+    Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
+    TextLogColumns, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+};
+use rerun::external::re_sdk_types::blueprint::components::{
+    BackgroundKind, ContainerKind, Eye3DKind, PanelState, PlayState, RootContainer,
+};
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use rerun::{
+    AsComponents, Color, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId,
+    StoreKind, datatypes,
+};
+
+/// One pane, or several beside or above each other with their shares of the room.
+enum Node {
+    Pane(Pane),
+    Split(ContainerKind, Vec<(f32, Node)>),
+}
+
+/// A view of the viewer.
+struct Pane {
+    class: &'static str,
+    name: String,
+    origin: String,
+    contents: Vec<String>,
+    properties: Vec<(&'static str, Box<dyn AsComponents>)>,
+}
+
+impl Pane {
+    fn new(class: &'static str, name: impl Into<String>, origin: impl Into<String>) -> Self {
+        Self {
+            class,
+            name: name.into(),
+            origin: origin.into(),
+            contents: vec!["+ $origin/**".into()],
+            properties: Vec::new(),
+        }
+    }
+
+    fn with(mut self, name: &'static str, property: impl AsComponents + 'static) -> Self {
+        self.properties.push((name, Box::new(property)));
+        self
+    }
+}
+
+/// Sends the layout for what this run has.
+pub(super) fn send(
+    stream: &Stream,
+    contents: &Contents,
+    eye: ([f32; 3], [f32; 3]),
+) -> Result<(), ObserverError> {
+    let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
+    let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
+        .enabled(true)
+        .send_properties(false)
+        .memory()
+        .map_err(failed("making the layout"))?;
+    rerun.set_log_time_enabled(false);
+    rerun.set_log_tick_enabled(false);
+    rerun.set_time_sequence("blueprint", 0);
+    write(&rerun, &layout(contents, eye)).map_err(failed("writing the layout"))?;
+    stream.blueprint(messages.take(), id);
+    Ok(())
+}
+
+/// The panes for a window of 1600 x 1000: where the train is on the left, what the cameras see and
+/// the stack says on the right.
+fn layout(contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Node {
+    let mut right = Vec::new();
+    if contents.rig {
+        right.push((
+            3.0,
+            row([
+                (
+                    1.0,
+                    Node::Pane(Pane::new("2D", "Left camera", images::LEFT)),
+                ),
+                (
+                    1.0,
+                    Node::Pane(Pane::new("2D", "Right camera", images::RIGHT)),
+                ),
+            ]),
+        ));
+    }
+    if !contents.devices.is_empty() {
+        let devices = contents.devices.iter();
+        let devices = tabbed(devices.map(|name| wayside(name, &WaysidePaths::new(name))));
+        right.push((3.6, devices));
+    }
+    let mut words = vec![(1.9, Node::Pane(events()))];
+    if contents.protection {
+        let display = Pane::new("TextDocument", "Driver's display", texts::DISPLAY);
+        words.insert(0, (1.0, Node::Pane(display)));
+    }
+    right.push((2.6, row(words)));
+
+    let mut left = vec![(4.4, Node::Pane(world(contents, eye)))];
+    let plots = plots::panes(contents);
+    for pair in plots.chunks(2) {
+        let panes = pair.iter().map(|tabs| (1.0, tabbed(tabs.iter().map(plot))));
+        left.push((2.2, row(panes)));
+    }
+    row([(1.0, column(left)), (1.0, column(right))])
+}
+
+fn row(parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
+    Node::Split(ContainerKind::Horizontal, parts.into_iter().collect())
+}
+
+fn column(parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
+    Node::Split(ContainerKind::Vertical, parts.into_iter().collect())
+}
+
+fn wayside(name: &str, paths: &WaysidePaths) -> Node {
+    row([
+        (
+            2.0,
+            Node::Pane(Pane::new(
+                "2D",
+                format!("{name}: camera"),
+                paths.camera.as_str(),
+            )),
+        ),
+        (
+            1.0,
+            column([
+                (
+                    1.0,
+                    Node::Pane(Pane::new("2D", "Difference", paths.difference.as_str())),
+                ),
+                (
+                    1.0,
+                    Node::Pane(Pane::new("2D", "Binary", paths.binary.as_str())),
+                ),
+            ]),
+        ),
+    ])
+}
+
+/// One node as it is, several as tabs.
+fn tabbed(nodes: impl IntoIterator<Item = Node>) -> Node {
+    let nodes: Vec<_> = nodes.into_iter().map(|node| (1.0, node)).collect();
+    match <[_; 1]>::try_from(nodes) {
+        Ok([(_, only)]) => only,
+        Err(nodes) => Node::Split(ContainerKind::Tabs, nodes),
+    }
+}
+
+fn plot(group: &plots::Group) -> Node {
+    let legend = PlotLegend::new().with_corner(group.legend);
+    Node::Pane(Pane::new("TimeSeries", group.title, group.origin).with("PlotLegend", legend))
+}
+
+/// The log without the column that says that each line is of the log.
+fn events() -> Pane {
+    let columns = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body];
+    let columns = columns.map(|kind| TextLogColumn {
+        kind,
+        visible: true.into(),
+    });
+    Pane::new("TextLog", "Events", texts::EVENTS).with(
+        "TextLogColumns",
+        TextLogColumns::new().with_text_log_columns(columns),
+    )
+}
+
+/// The 3-D view. Where there is a train, the eye rides along with its head.
+fn world(contents: &Contents, (position, target): ([f32; 3], [f32; 3])) -> Pane {
+    let mut eye = EyeControls3D::new()
+        .with_kind(Eye3DKind::Orbital)
+        .with_position(position)
+        .with_look_target(target)
+        .with_eye_up([0.0, 0.0, 1.0]);
+    if contents.train {
+        eye = eye.with_tracking_entity(scene::HEAD);
+    }
+    Pane::new("3D", "Tunnel", "world")
+        .with("EyeControls3D", eye)
+        .with("LineGrid3D", LineGrid3D::new().with_visible(false))
+        .with(
+            "Background",
+            Background::new(BackgroundKind::SolidColor).with_color(Color::from_rgb(14, 17, 22)),
+        )
+}
+
+fn write(rerun: &RecordingStream, root: &Node) -> RecordingStreamResult<()> {
+    let mut next = 0;
+    let root = write_node(rerun, root, &mut next)?;
+    rerun.log(
+        "viewport",
+        &ViewportBlueprint::new()
+            .with_root_container(RootContainer(datatypes::Uuid { bytes: root }))
+            .with_auto_layout(false)
+            .with_auto_views(false),
+    )?;
+    for panel in ["blueprint_panel", "selection_panel"] {
+        rerun.log(
+            panel,
+            &PanelBlueprint::new().with_state(PanelState::Collapsed),
+        )?;
+    }
+    // At the latest time: a run is followed as it goes, and a file opens at its end, with all that
+    // was plotted and said.
+    rerun.log(
+        "time_panel",
+        &TimePanelBlueprint::new()
+            .with_state(PanelState::Collapsed)
+            .with_timeline(SIM_TIME)
+            .with_play_state(PlayState::Following),
+    )
+}
+
+/// Writes a node after its children; returns its id.
+fn write_node(
+    rerun: &RecordingStream,
+    node: &Node,
+    next: &mut u64,
+) -> RecordingStreamResult<[u8; 16]> {
+    let id = |next: &mut u64| {
+        *next += 1;
+        (u128::from(*next)).to_be_bytes()
+    };
+    match node {
+        Node::Pane(pane) => {
+            let id = id(next);
+            write_pane(rerun, pane, &node_path(node, id))?;
+            Ok(id)
+        }
+        Node::Split(kind, parts) => {
+            let mut paths = Vec::with_capacity(parts.len());
+            for (_, part) in parts {
+                let id = write_node(rerun, part, next)?;
+                paths.push(node_path(part, id));
+            }
+            let id = id(next);
+            let shares = parts.iter().map(|(share, _)| *share);
+            let container = ContainerBlueprint::new(*kind).with_contents(paths);
+            let container = match kind {
+                ContainerKind::Vertical => container.with_row_shares(shares),
+                _ => container.with_col_shares(shares),
+            };
+            rerun.log(node_path(node, id), &container)?;
+            Ok(id)
+        }
+    }
+}
+
+fn write_pane(rerun: &RecordingStream, pane: &Pane, path: &str) -> RecordingStreamResult<()> {
+    let contents = ViewContents::new(pane.contents.iter().map(String::as_str));
+    rerun.log(format!("{path}/ViewContents"), &contents)?;
+    let view = ViewBlueprint::new(pane.class)
+        .with_display_name(pane.name.as_str())
+        .with_space_origin(pane.origin.as_str());
+    rerun.log(path, &view)?;
+    for (name, property) in &pane.properties {
+        rerun.log(format!("{path}/{name}"), property.as_ref())?;
+    }
+    Ok(())
+}
+
+/// Where the viewer looks for a node: its id in the usual notation of a UUID.
+fn node_path(node: &Node, id: [u8; 16]) -> String {
+    let kind = match node {
+        Node::Pane(_) => "view",
+        Node::Split(..) => "container",
+    };
+    let hex: String = id.iter().map(|byte| format!("{byte:02x}")).collect();
+    let (a, b, c, d, e) = (
+        &hex[..8],
+        &hex[8..12],
+        &hex[12..16],
+        &hex[16..20],
+        &hex[20..],
+    );
+    format!("{kind}/{a}-{b}-{c}-{d}-{e}")
+}

@@ -1,0 +1,328 @@
+//! Camera images, and what the stack found in them.
+//!
+//! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
+//! an image moves by half a pixel.
+
+use super::palette;
+use super::scene::ui;
+use super::slug;
+use super::stream::{Stream, failed};
+use crate::bus::{
+    DangerLevel, DetectedObstacle, Ellipse, Intrinsics, LedReport, PixelBox, SimTime, Spot,
+    StereoPair, WaysideReport,
+};
+use crate::scenario::RecordSettings;
+use crate::session::ObserverError;
+use image::codecs::png::{CompressionType, FilterType, PngEncoder};
+use image::{ExtendedColorType, GrayImage, ImageEncoder};
+use jpeg_encoder::{ColorType, Encoder};
+use rerun::{Boxes2D, EncodedImage, LineStrips2D, MediaType, Pinhole, Points2D};
+
+/// The left eye's frame, with its image plane under it.
+pub(super) const LEFT: &str = "world/rig/left";
+/// The right eye's.
+pub(super) const RIGHT: &str = "world/rig/right";
+
+const PIXEL_CENTRE: f32 = 0.5;
+
+/// Where the things of one wayside device go.
+pub(super) struct WaysidePaths {
+    /// Its mark in the 3-D view.
+    pub(super) device: String,
+    /// Its camera's frame, with its image plane under it.
+    pub(super) camera: String,
+    /// Difference image.
+    pub(super) difference: String,
+    /// Binary image.
+    pub(super) binary: String,
+}
+
+impl WaysidePaths {
+    /// Of the device with this name.
+    pub(super) fn new(name: &str) -> Self {
+        let name = slug(name);
+        Self {
+            device: format!("world/wayside/{name}"),
+            camera: format!("world/wayside/{name}/camera"),
+            difference: format!("wayside/{name}/difference"),
+            binary: format!("wayside/{name}/binary"),
+        }
+    }
+}
+
+/// A camera's frustum, drawn `depth_m` deep.
+pub(super) fn pinhole(intrinsics: &Intrinsics, depth_m: f32) -> Pinhole {
+    let focal = [intrinsics.fx_px as f32, intrinsics.fy_px as f32];
+    let size = [intrinsics.width_px as f32, intrinsics.height_px as f32];
+    let centre = [intrinsics.cx_px, intrinsics.cy_px].map(|c| c as f32 + PIXEL_CENTRE);
+    Pinhole::from_focal_length_and_resolution(focal, size)
+        .with_principal_point(centre)
+        .with_image_plane_distance(depth_m)
+        .with_color(palette::CAMERA)
+}
+
+/// What is said of an obstacle wherever it is drawn.
+pub(super) fn obstacle_label(o: &DetectedObstacle) -> String {
+    let danger = match o.danger {
+        DangerLevel::None => "clear",
+        DangerLevel::Low => "low",
+        DangerLevel::High => "HIGH",
+    };
+    // The viewer wraps labels to the width of their box, except at these spaces.
+    format!(
+        "{:.1}\u{a0}m\u{a0}{danger}\n{:.2}\u{a0}x\u{a0}{:.2}\u{a0}m",
+        o.near_range_m, o.width_m, o.height_m
+    )
+}
+
+/// Lets through the first of each interval of a fixed rate.
+#[derive(Clone, Copy)]
+struct Rate {
+    hz: f64,
+    last: Option<i64>,
+}
+
+impl Rate {
+    fn new(hz: f64) -> Self {
+        Self { hz, last: None }
+    }
+
+    fn due(&mut self, time: SimTime) -> bool {
+        if self.hz <= 0.0 {
+            return false;
+        }
+        // A frame may start a hair before the interval that it belongs to.
+        let interval = (time.secs() * self.hz + 1e-6).floor() as i64;
+        self.last.replace(interval) != Some(interval)
+    }
+}
+
+/// The image part of a recording.
+pub(super) struct Images {
+    quality: u8,
+    gain: f64,
+    every_frame: bool,
+    stereo: Rate,
+    wayside: Vec<Rate>,
+    scaled: GrayImage,
+}
+
+impl Images {
+    /// For so many wayside devices.
+    pub(super) fn new(settings: &RecordSettings, devices: usize) -> Self {
+        Self {
+            quality: settings.jpeg_quality,
+            gain: settings.difference_gain,
+            every_frame: settings.overlay_every_frame,
+            stereo: Rate::new(settings.stereo_image_hz),
+            wayside: vec![Rate::new(settings.wayside_image_hz); devices],
+            scaled: GrayImage::default(),
+        }
+    }
+
+    /// A pair of the train's cameras.
+    pub(super) fn pair(
+        &mut self,
+        stream: &Stream,
+        pair: &StereoPair,
+        report: &LedReport,
+    ) -> Result<(), ObserverError> {
+        let keep = self.stereo.due(pair.left.start);
+        if !keep && !self.every_frame {
+            return Ok(());
+        }
+        let eyes = [
+            (LEFT, &pair.left, &report.left),
+            (RIGHT, &pair.right, &report.right),
+        ];
+        for (path, frame, spots) in eyes {
+            stream.at_frame(frame.start, frame.number);
+            if keep {
+                self.jpeg(stream, &format!("{path}/image"), &frame.image)?;
+            }
+            draw_spots(stream, path, spots)?;
+        }
+        Ok(())
+    }
+
+    /// A frame of a wayside camera.
+    pub(super) fn wayside(
+        &mut self,
+        stream: &Stream,
+        device: (usize, &str),
+        start: SimTime,
+        frame: &GrayImage,
+        report: &WaysideReport,
+    ) -> Result<(), ObserverError> {
+        let keep = self.wayside.get_mut(device.0).is_some_and(|r| r.due(start));
+        if !keep && !self.every_frame {
+            return Ok(());
+        }
+        let paths = WaysidePaths::new(device.1);
+        stream.at_frame(start, report.number);
+        if keep {
+            self.jpeg(stream, &format!("{}/image", paths.camera), frame)?;
+            if let Some(difference) = &report.difference {
+                self.brighten(difference);
+                self.jpeg(stream, &paths.difference, &self.scaled)?;
+            }
+            if let Some(binary) = &report.binary {
+                png(stream, &paths.binary, binary)?;
+            }
+        }
+        draw_obstacles(stream, &paths.camera, report)
+    }
+
+    fn brighten(&mut self, difference: &GrayImage) {
+        self.scaled.clone_from(difference);
+        for grey in self.scaled.iter_mut() {
+            *grey = (f64::from(*grey) * self.gain).min(255.0) as u8;
+        }
+    }
+
+    fn jpeg(&self, stream: &Stream, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
+        // 65535 pixels a side is the limit of JPEG itself.
+        let (Ok(width), Ok(height)) = (image.width().try_into(), image.height().try_into()) else {
+            return png(stream, path, image);
+        };
+        let mut bytes = Vec::with_capacity(image.len() / 4);
+        Encoder::new(&mut bytes, self.quality)
+            .encode(image.as_raw(), width, height, ColorType::Luma)
+            .map_err(failed(path))?;
+        let encoded = EncodedImage::new(bytes).with_media_type(MediaType::jpeg());
+        stream.log(path, &encoded)
+    }
+}
+
+fn png(stream: &Stream, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
+    let mut bytes = Vec::new();
+    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
+        .write_image(image, image.width(), image.height(), ExtendedColorType::L8)
+        .map_err(failed(path))?;
+    let encoded = EncodedImage::new(bytes).with_media_type(MediaType::png());
+    stream.log(path, &encoded)
+}
+
+/// Boxes of lamps, with names where they have one, fitted ellipses and centres.
+fn draw_spots(stream: &Stream, path: &str, spots: &[Spot]) -> Result<(), ObserverError> {
+    let unnamed = spots.iter().filter(|spot| spot.uid.is_none());
+    let boxes = boxes(unnamed.map(|spot| spot.bounds)).with_colors([palette::UNNAMED]);
+    stream.log(&format!("{path}/unnamed"), &boxes)?;
+
+    let named = spots
+        .iter()
+        .filter_map(|spot| Some((spot.bounds, spot.uid?)));
+    let (bounds, names): (Vec<_>, Vec<_>) = named.unzip();
+    let boxes = self::boxes(bounds)
+        .with_colors(names.iter().map(|(_, how)| palette::identity(*how)))
+        .with_labels(names.iter().map(|(uid, _)| uid.to_string()));
+    stream.log(&format!("{path}/lamps"), &boxes)?;
+
+    let ellipses = spots.iter().filter_map(|spot| spot.ellipse.map(outline));
+    let ellipses = LineStrips2D::new(ellipses)
+        .with_radii([ui(1.0)])
+        .with_colors([palette::CAMERA]);
+    stream.log(&format!("{path}/ellipses"), &ellipses)?;
+
+    let centres = spots.iter().map(|spot| pixel(spot.centre.x, spot.centre.y));
+    let centres = Points2D::new(centres)
+        .with_radii([ui(2.5)])
+        .with_colors([palette::TRUTH]);
+    stream.log(&format!("{path}/centres"), &centres)
+}
+
+/// Boxes of obstacles with what is known of them, and of the other regions found.
+fn draw_obstacles(
+    stream: &Stream,
+    path: &str,
+    report: &WaysideReport,
+) -> Result<(), ObserverError> {
+    let is_obstacle = |bounds: PixelBox| report.obstacles.iter().any(|o| o.blob.bounds == bounds);
+    let others = report.blobs.iter().map(|blob| blob.bounds);
+    let others = boxes(others.filter(|bounds| !is_obstacle(*bounds)));
+    stream.log(
+        &format!("{path}/blobs"),
+        &others.with_colors([palette::BLOB]),
+    )?;
+
+    let found = boxes(report.obstacles.iter().map(|o| o.blob.bounds))
+        .with_colors(report.obstacles.iter().map(|o| palette::danger(o.danger)))
+        .with_labels(report.obstacles.iter().map(obstacle_label));
+    stream.log(&format!("{path}/obstacles"), &found)
+}
+
+fn boxes(bounds: impl IntoIterator<Item = PixelBox>) -> Boxes2D {
+    let (centres, halves): (Vec<_>, Vec<_>) = bounds
+        .into_iter()
+        .map(|b| {
+            let (u0, v0) = (b.u0 as f32, b.v0 as f32);
+            // Both corners are inside: the right edge is that of the last pixel.
+            let (u1, v1) = (b.u1 as f32 + 1.0, b.v1 as f32 + 1.0);
+            (
+                [(u0 + u1) / 2.0, (v0 + v1) / 2.0],
+                [(u1 - u0) / 2.0, (v1 - v0) / 2.0],
+            )
+        })
+        .unzip();
+    Boxes2D::from_centers_and_half_sizes(centres, halves).with_radii([ui(1.2)])
+}
+
+fn outline(e: Ellipse) -> Vec<[f32; 2]> {
+    const STEPS: u32 = 48;
+    let (sin, cos) = e.angle_rad.sin_cos();
+    let point = |k: u32| {
+        let t = std::f64::consts::TAU * f64::from(k) / f64::from(STEPS);
+        let (x, y) = (e.semi_major_px * t.cos(), e.semi_minor_px * t.sin());
+        pixel(
+            e.centre.x + x * cos - y * sin,
+            e.centre.y + x * sin + y * cos,
+        )
+    };
+    (0..=STEPS).map(point).collect()
+}
+
+fn pixel(u: f64, v: f64) -> [f32; 2] {
+    [u as f32 + PIXEL_CENTRE, v as f32 + PIXEL_CENTRE]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    /// Rates that do not divide, and frames that start a little early or late, must neither skip
+    /// nor double an interval.
+    #[test]
+    fn a_rate_lets_one_frame_an_interval_through() {
+        for (camera_hz, hz, expected) in [(30.0, 5.0, 50), (25.0, 10.0, 100), (30.0, 100.0, 300)] {
+            let mut rate = Rate::new(hz);
+            let frames = (0..(10.0 * camera_hz) as u32).filter(|k| {
+                let early = if k % 2 == 0 { -1e-9 } else { 1e-9 };
+                rate.due(SimTime::from_secs(f64::from(*k) / camera_hz).plus(early))
+            });
+            assert_eq!(frames.count(), expected, "{camera_hz} Hz down to {hz} Hz");
+        }
+        assert!(!Rate::new(0.0).due(SimTime::ZERO));
+    }
+
+    /// A wrong sign of the angle, swapped axes or a forgotten half pixel put points off the
+    /// ellipse.
+    #[test]
+    fn an_outline_lies_on_its_ellipse() {
+        let e = Ellipse {
+            centre: Point2::new(100.0, 50.0),
+            semi_major_px: 20.0,
+            semi_minor_px: 8.0,
+            angle_rad: 0.3,
+        };
+        let points = outline(e);
+        assert_eq!(points.first(), points.last());
+        for [u, v] in points {
+            let (du, dv) = (f64::from(u) - 100.5, f64::from(v) - 50.5);
+            let (sin, cos) = e.angle_rad.sin_cos();
+            let (along, across) = (du * cos + dv * sin, dv * cos - du * sin);
+            let r = (along / 20.0).hypot(across / 8.0);
+            assert!((r - 1.0).abs() < 1e-5, "({u}, {v}) is at {r}");
+        }
+    }
+}

@@ -1,0 +1,335 @@
+//! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
+
+use super::palette;
+use super::scene::{HEAD, Scene, turn, ui};
+use super::stream::{Stream, failed};
+use super::{images, slug};
+use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
+use crate::session::{ObserverError, Opening, TrainTruth};
+use crate::track::TrackPoint;
+use crate::twin::render::{Body, Shape};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rerun::components::RotationQuat;
+use rerun::{
+    Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Transform3D,
+};
+
+const SIGHT: &str = "world/estimate/sight";
+
+/// Poses of one entity that wait to be sent.
+struct Poses {
+    path: String,
+    times_ns: Vec<i64>,
+    places: Vec<[f32; 3]>,
+    turns: Vec<RotationQuat>,
+}
+
+impl Poses {
+    fn of(path: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            times_ns: Vec::new(),
+            places: Vec::new(),
+            turns: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, scene: &Scene, time: SimTime, pose: &Isometry3<f64>) {
+        self.times_ns.push(time.nanos());
+        self.places.push(scene.place(pose));
+        self.turns.push(turn(pose));
+    }
+
+    fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+        if self.times_ns.is_empty() {
+            return Ok(());
+        }
+        let columns = Transform3D::update_fields()
+            .with_many_translation(self.places.drain(..))
+            .with_many_quaternion(self.turns.drain(..))
+            .columns_of_unit_batches()
+            .map_err(failed(self.path.as_str()))?;
+        stream.columns(&self.path, &self.times_ns, columns)?;
+        self.times_ns.clear();
+        Ok(())
+    }
+}
+
+/// The moving part of the 3-D view.
+pub(super) struct Moving {
+    /// Both eyes, where there is a rig.
+    rig: Option<(RigCalibration, [Poses; 2])>,
+    /// The head, then the cars; empty where there is no train.
+    train: Vec<Poses>,
+    left: Option<Isometry3<f64>>,
+    /// Which kinds of bodies are on show: boxes, cylinders, spheres, capsules.
+    shown: [bool; 4],
+    sight_shown: bool,
+    methods: Vec<Method>,
+    obstacles_shown: Vec<bool>,
+}
+
+impl Moving {
+    /// Draws the train, and makes ready for its motion.
+    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+        let half = opening.car_half_extents_m.map(|x| x as f32);
+        for car in 0..opening.cars {
+            let body = Boxes3D::from_half_sizes([[half.x, half.y, half.z]])
+                .with_colors([palette::TRAIN])
+                .with_fill_mode(FillMode::TransparentFillMajorWireframe);
+            stream.log_static(&car_path(car), &body)?;
+        }
+        let eyes = [images::LEFT, images::RIGHT];
+        if let Some(rig) = opening.rig {
+            let pinhole = images::pinhole(&rig.camera.intrinsics, 1.2);
+            for eye in eyes {
+                stream.log_static(eye, &pinhole)?;
+            }
+        }
+        let mut train = Vec::new();
+        if opening.cars > 0 {
+            train.push(Poses::of(HEAD));
+            train.extend((0..opening.cars).map(|car| Poses::of(car_path(car))));
+            let (mast, tip) = mast(6.0, "true");
+            // On the head itself: the viewer's eye can follow only what has a shape of its own.
+            stream.log_static(HEAD, &mast.with_colors([palette::TRUTH]))?;
+            stream.log_static(HEAD, &tip.with_colors([palette::TRUTH]))?;
+        }
+        Ok(Self {
+            rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
+            train,
+            left: None,
+            shown: [false; 4],
+            sight_shown: false,
+            methods: Vec::new(),
+            obstacles_shown: vec![false; opening.wayside.len()],
+        })
+    }
+
+    /// Keeps the train's pose for the next flush.
+    pub(super) fn train(&mut self, scene: &Scene, truth: &TrainTruth) {
+        let head_and_cars =
+            std::iter::once(&truth.world_from_vehicle).chain(&truth.world_from_cars);
+        for (poses, pose) in self.train.iter_mut().zip(head_and_cars) {
+            poses.push(scene, truth.time, pose);
+        }
+        if let (Some(left), Some((rig, eyes))) = (truth.world_from_left, &mut self.rig) {
+            let right = left * Isometry3::translation(rig.baseline_m, 0.0, 0.0);
+            for (poses, pose) in eyes.iter_mut().zip([left, right]) {
+                poses.push(scene, truth.time, &pose);
+            }
+        }
+        self.left = truth.world_from_left;
+    }
+
+    /// Sends the poses kept.
+    pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+        let eyes = self.rig.iter_mut().flat_map(|(_, eyes)| eyes);
+        self.train
+            .iter_mut()
+            .chain(eyes)
+            .try_for_each(|poses| poses.flush(stream))
+    }
+
+    /// Shows obstacles, workers and whatever else is solid.
+    pub(super) fn bodies(
+        &mut self,
+        stream: &Stream,
+        scene: &Scene,
+        time: SimTime,
+        bodies: &[Body],
+    ) -> Result<(), ObserverError> {
+        stream.at(time);
+        let mut groups: [Solids; 4] = Default::default();
+        for body in bodies {
+            groups[kind(&body.shape)].push(scene, body);
+        }
+        for (kind, group) in groups.into_iter().enumerate() {
+            let any = !group.sizes.is_empty();
+            // An empty row once, where there were some, takes the last ones away.
+            if any || self.shown[kind] {
+                group.log(stream, kind)?;
+            }
+            self.shown[kind] = any;
+        }
+        Ok(())
+    }
+
+    /// Marks where the stack takes the train to be, and the lamp that it looked at.
+    pub(super) fn fixes(
+        &mut self,
+        stream: &Stream,
+        scene: &Scene,
+        report: &LedReport,
+    ) -> Result<(), ObserverError> {
+        for fix in &report.fixes {
+            stream.at_frame(fix.time, report.number);
+            let (name, height_m) = match fix.method {
+                Method::Fused => ("fused", 7.2),
+                Method::Paper => ("paper", 8.4),
+                Method::Mono => ("mono", 9.6),
+            };
+            let path = format!("world/estimate/{name}");
+            let place = Transform3D::from_translation(scene.local(&fix.position));
+            stream.log(&path, &place)?;
+            // Drawn with the first fix: before it, there is nothing to show.
+            if !self.methods.contains(&fix.method) {
+                self.methods.push(fix.method);
+                let (mast, tip) = mast(height_m, name);
+                let colour = palette::method(fix.method);
+                stream.log(&path, &mast.with_colors([colour]))?;
+                stream.log(&path, &tip.with_colors([colour]))?;
+            }
+        }
+        let seen = report.fixes.first().and_then(|fix| {
+            let lamp = scene.lamp(fix.uid)?;
+            let eye = scene.place(&self.left?);
+            Some((fix, [eye, scene.local(lamp)]))
+        });
+        stream.at_frame(report.time, report.number);
+        if let Some((fix, line)) = seen {
+            let colour = palette::identity(fix.identity);
+            let sight = LineStrips3D::new([line])
+                .with_radii([ui(1.5)])
+                .with_colors([colour])
+                .with_labels([format!("lamp {}", fix.uid)]);
+            stream.log(SIGHT, &sight)?;
+        } else if self.sight_shown {
+            stream.log(SIGHT, &LineStrips3D::new([[[0.0f32; 3]; 0]; 0]))?;
+        }
+        self.sight_shown = seen.is_some();
+        Ok(())
+    }
+
+    /// Shows where a wayside device takes obstacles to be. The time must have been set.
+    pub(super) fn obstacles(
+        &mut self,
+        stream: &Stream,
+        scene: &Scene,
+        device: (usize, &str),
+        obstacles: &[DetectedObstacle],
+    ) -> Result<(), ObserverError> {
+        let Some(shown) = self.obstacles_shown.get_mut(device.0) else {
+            return Ok(());
+        };
+        let before = std::mem::replace(shown, !obstacles.is_empty());
+        if obstacles.is_empty() && !before {
+            return Ok(());
+        }
+        let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
+        for o in obstacles {
+            let frame = scene
+                .alignment()
+                .at(0.5 * (o.from_chainage_m + o.to_chainage_m));
+            let foot = TrackPoint {
+                s_m: frame.s_m,
+                l_m: o.lateral_m,
+                h_m: 0.0,
+            };
+            let centre = scene.alignment().world_from_track(foot);
+            let centre = Point3::new(centre.x, centre.y, o.position.z + 0.5 * o.height_m);
+            let length_m = (o.to_chainage_m - o.from_chainage_m).abs();
+            places.push(scene.local(&centre));
+            sizes.push([length_m, o.width_m, o.height_m].map(|x| (0.5 * x) as f32));
+            turns.push(turn(&frame.world_from_line()));
+        }
+        let boxes = Boxes3D::from_centers_and_half_sizes(places, sizes)
+            .with_quaternions(turns)
+            .with_colors(obstacles.iter().map(|o| palette::danger(o.danger)))
+            .with_labels(obstacles.iter().map(images::obstacle_label));
+        stream.log(
+            &format!("world/estimate/obstacles/{}", slug(device.1)),
+            &boxes,
+        )
+    }
+}
+
+fn car_path(car: usize) -> String {
+    format!("world/train/car_{}", car + 1)
+}
+
+/// A mast over the vehicle frame's origin with its name on top: estimates stand in the train,
+/// where a point would be hidden.
+fn mast(height_m: f32, name: &str) -> (LineStrips3D, Points3D) {
+    let top = [0.0, 0.0, height_m];
+    (
+        LineStrips3D::new([[[0.0; 3], top]]).with_radii([0.05]),
+        Points3D::new([top]).with_radii([0.12]).with_labels([name]),
+    )
+}
+
+/// Bodies of one kind of shape.
+#[derive(Default)]
+struct Solids {
+    places: Vec<[f32; 3]>,
+    turns: Vec<RotationQuat>,
+    sizes: Vec<[f32; 3]>,
+    colours: Vec<rerun::Color>,
+}
+
+fn kind(shape: &Shape) -> usize {
+    match shape {
+        Shape::Box(_) => 0,
+        Shape::Cylinder(..) => 1,
+        Shape::Sphere(_) => 2,
+        Shape::Capsule(..) => 3,
+    }
+}
+
+impl Solids {
+    fn push(&mut self, scene: &Scene, body: &Body) {
+        let (size, shift_m) = match body.shape {
+            Shape::Box(half) => (half, 0.0),
+            Shape::Cylinder(radius, half) => (Vector3::new(radius, 2.0 * half, 0.0), 0.0),
+            Shape::Sphere(radius) => (Vector3::repeat(radius), 0.0),
+            // rerun's capsule starts at its origin, ours is centred on it.
+            Shape::Capsule(radius, half) => (Vector3::new(radius, 2.0 * half, 0.0), -half),
+        };
+        let place = body.world_from_body * Point3::new(0.0, 0.0, shift_m);
+        self.places.push(scene.local(&place));
+        self.turns.push(turn(&body.world_from_body));
+        self.sizes
+            .push([size.x as f32, size.y as f32, size.z as f32]);
+        self.colours.push(if body.luminance_cd_m2 > 0.0 {
+            palette::LAMP
+        } else {
+            palette::BODY
+        });
+    }
+
+    fn log(self, stream: &Stream, kind: usize) -> Result<(), ObserverError> {
+        let (radii, lengths): (Vec<f32>, Vec<f32>) =
+            self.sizes.iter().map(|size| (size[0], size[1])).unzip();
+        match kind {
+            0 => stream.log(
+                "world/bodies/boxes",
+                &Boxes3D::from_centers_and_half_sizes(self.places, self.sizes)
+                    .with_quaternions(self.turns)
+                    .with_colors(self.colours)
+                    .with_fill_mode(FillMode::Solid),
+            ),
+            1 => stream.log(
+                "world/bodies/cylinders",
+                &Cylinders3D::from_lengths_and_radii(lengths, radii)
+                    .with_centers(self.places)
+                    .with_quaternions(self.turns)
+                    .with_colors(self.colours)
+                    .with_fill_mode(FillMode::Solid),
+            ),
+            2 => stream.log(
+                "world/bodies/spheres",
+                &Ellipsoids3D::from_centers_and_half_sizes(self.places, self.sizes)
+                    .with_colors(self.colours)
+                    .with_fill_mode(FillMode::Solid),
+            ),
+            _ => stream.log(
+                "world/bodies/capsules",
+                &Capsules3D::from_lengths_and_radii(lengths, radii)
+                    .with_translations(self.places)
+                    .with_quaternions(self.turns)
+                    .with_colors(self.colours)
+                    .with_fill_mode(FillMode::Solid),
+            ),
+        }
+    }
+}

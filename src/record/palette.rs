@@ -1,0 +1,80 @@
+//! Colours, the same for the same thing in every pane.
+
+use crate::bus::{DangerLevel, Identity, Lamp, Method};
+use crate::track::Material;
+use rerun::Color;
+
+/// As it really is.
+pub(super) const TRUTH: Color = rgb(240, 240, 240);
+/// Cars.
+pub(super) const TRAIN: Color = rgb(70, 130, 200);
+/// Obstacles as they really are.
+pub(super) const BODY: Color = rgb(205, 120, 60);
+/// Lamps on the wall.
+pub(super) const LAMP: Color = rgb(255, 236, 150);
+/// Camera frusta.
+pub(super) const CAMERA: Color = rgb(120, 220, 255);
+/// Rails.
+pub(super) const RAIL: Color = rgb(190, 195, 205);
+/// Balises.
+pub(super) const BALISE: Color = rgb(250, 200, 0);
+/// A lamp in an image that has no name.
+pub(super) const UNNAMED: Color = rgb(255, 150, 60);
+/// A region of a wayside image that is not (yet) an obstacle.
+pub(super) const BLOB: Color = rgb(130, 160, 190);
+
+const fn rgb(r: u8, g: u8, b: u8) -> Color {
+    Color(rerun::datatypes::Rgba32(u32::from_be_bytes([r, g, b, 255])))
+}
+
+/// Of an estimator.
+pub(super) fn method(method: Method) -> Color {
+    match method {
+        Method::Paper => rgb(255, 110, 180),
+        Method::Mono => rgb(255, 190, 70),
+        Method::Fused => rgb(90, 230, 120),
+    }
+}
+
+/// Of a lamp's name, by how it was found.
+pub(super) fn identity(identity: Identity) -> Color {
+    match identity {
+        Identity::Decoded => rgb(90, 230, 120),
+        Identity::Joined => rgb(90, 200, 255),
+        Identity::Predicted => rgb(255, 230, 90),
+    }
+}
+
+/// Of an obstacle.
+pub(super) fn danger(danger: DangerLevel) -> Color {
+    match danger {
+        DangerLevel::None => rgb(120, 220, 140),
+        DangerLevel::Low => rgb(255, 190, 60),
+        DangerLevel::High => rgb(255, 70, 70),
+    }
+}
+
+/// Of the driver's lamp, with its name.
+pub(super) fn driver_lamp(lamp: Lamp) -> (&'static str, &'static str) {
+    match lamp {
+        Lamp::NormalGreen => ("green", "line clear"),
+        Lamp::BrakeWarningRed => ("RED + buzzer", "obstacle ahead"),
+        Lamp::Emergency => ("EMERGENCY + buzzer", "brake by hand"),
+    }
+}
+
+/// Of a surface. Every other ring is darker, so that one sees distance and motion.
+pub(super) fn material(material: Material, ring: usize) -> Color {
+    let [r, g, b] = match material {
+        Material::Lining => [112, 116, 122],
+        Material::Bed => [78, 72, 66],
+        Material::Walkway => [132, 124, 104],
+        Material::Rail => [170, 175, 185],
+        Material::Platform => [150, 135, 115],
+    };
+    if ring % 2 == 0 {
+        Color::from_rgb(r, g, b)
+    } else {
+        Color::from_rgb(r - r / 4, g - g / 4, b - b / 4)
+    }
+}

@@ -1,0 +1,302 @@
+//! What stands still in the 3-D view: tunnel, rails, lamps, balises, wayside cameras.
+
+use super::images::{WaysidePaths, pinhole};
+use super::palette;
+use super::stream::Stream;
+use crate::scenario::RecordSettings;
+use crate::session::{ObserverError, Opening};
+use crate::track::uid::Uid;
+use crate::track::{Alignment, CrossSection, RAIL_CENTRES_M, SectionRange, TrackPoint, Tunnel};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rerun::components::{MeshFaceRendering, RotationQuat};
+use rerun::{
+    Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, Radius, Transform3D,
+    ViewCoordinates,
+};
+use std::collections::BTreeMap;
+
+/// The vehicle frame of the leading car.
+pub(super) const HEAD: &str = "world/train/head";
+
+/// A tunnel drawn from more rings than this costs more than it shows.
+const MAX_RINGS: f64 = 2000.0;
+
+/// UIDs of more lamps than this would cover the picture.
+const MAX_LAMP_LABELS: usize = 12;
+
+/// The recording's own coordinates: the world's, from a point in the middle of the line, so that
+/// single precision is good to a millimetre up to 10 km away.
+pub(super) struct Scene {
+    origin: Vector3<f64>,
+    alignment: Alignment,
+    lamps: BTreeMap<Uid, Point3<f64>>,
+}
+
+impl Scene {
+    /// Of a line.
+    pub(super) fn new(tunnel: &Tunnel) -> Self {
+        let alignment = tunnel.alignment.clone();
+        let middle = alignment.at(alignment.length_m() / 2.0).origin;
+        Self {
+            origin: middle.coords.map(f64::round),
+            alignment,
+            lamps: tunnel.lamps.iter().map(|l| (l.uid, l.centre)).collect(),
+        }
+    }
+
+    /// The line.
+    pub(super) fn alignment(&self) -> &Alignment {
+        &self.alignment
+    }
+
+    /// Where a lamp was surveyed.
+    pub(super) fn lamp(&self, uid: Uid) -> Option<&Point3<f64>> {
+        self.lamps.get(&uid)
+    }
+
+    /// World to recording.
+    pub(super) fn local(&self, p: &Point3<f64>) -> [f32; 3] {
+        let d = p.coords - self.origin;
+        [d.x as f32, d.y as f32, d.z as f32]
+    }
+
+    /// As [`Self::local`], of where a pose is.
+    pub(super) fn place(&self, pose: &Isometry3<f64>) -> [f32; 3] {
+        self.local(&pose.translation.vector.into())
+    }
+
+    /// A pose as a transform of the recording.
+    pub(super) fn transform(&self, pose: &Isometry3<f64>) -> Transform3D {
+        Transform3D::from_translation(self.place(pose)).with_quaternion(turn(pose))
+    }
+
+    /// Draws all that stands still.
+    pub(super) fn draw(
+        &self,
+        stream: &Stream,
+        opening: &Opening<'_>,
+        settings: &RecordSettings,
+    ) -> Result<(), ObserverError> {
+        stream.log_static("world", &ViewCoordinates::RIGHT_HAND_Z_UP())?;
+        self.draw_tunnel(stream, opening.tunnel, settings.ring_step_m)?;
+        self.draw_furniture(stream, opening.tunnel)?;
+        for device in opening.wayside {
+            let paths = WaysidePaths::new(&device.name);
+            stream.log_static(&paths.camera, &self.transform(&device.world_from_camera))?;
+            stream.log_static(&paths.camera, &pinhole(&device.camera.intrinsics, 2.5))?;
+            let place = self.place(&device.world_from_camera);
+            let point = Points3D::new([place])
+                .with_radii([0.15])
+                .with_colors([palette::CAMERA])
+                .with_labels([device.name.as_str()]);
+            stream.log_static(&paths.device, &point)?;
+        }
+        Ok(())
+    }
+
+    fn draw_tunnel(
+        &self,
+        stream: &Stream,
+        tunnel: &Tunnel,
+        ring_step_m: f64,
+    ) -> Result<(), ObserverError> {
+        let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
+        let mut mesh = Sweep::default();
+        for range in &tunnel.sections {
+            mesh.sweep(self, range, step_m);
+        }
+        stream.log_static("world/tunnel", &mesh.finish())?;
+
+        let rails = [0.5, -0.5].map(|side| {
+            let strip = rings(0.0, self.alignment.length_m(), step_m).map(|s_m| {
+                let rail = Point3::new(0.0, side * RAIL_CENTRES_M, 0.0);
+                self.local(&(self.alignment.at(s_m).world_from_rails() * rail))
+            });
+            strip.collect::<Vec<_>>()
+        });
+        let rails = LineStrips3D::new(rails)
+            .with_radii([0.04])
+            .with_colors([palette::RAIL]);
+        stream.log_static("world/rails", &rails)
+    }
+
+    fn draw_furniture(&self, stream: &Stream, tunnel: &Tunnel) -> Result<(), ObserverError> {
+        let lamps = &tunnel.lamps;
+        if !lamps.is_empty() {
+            let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))
+                .with_radii([ui(3.0)])
+                .with_colors([palette::LAMP])
+                .with_labels(lamps.iter().map(|l| l.uid.to_string()))
+                .with_show_labels(lamps.len() <= MAX_LAMP_LABELS);
+            stream.log_static("world/lamps", &points)?;
+        }
+        if !tunnel.balises.is_empty() {
+            let poses = tunnel.balises.iter().map(|balise| {
+                let frame = self.alignment.at(balise.chainage_m).world_from_rails();
+                (self.place(&frame), turn(&frame))
+            });
+            let (places, turns): (Vec<_>, Vec<_>) = poses.unzip();
+            // A Eurobalise is some 0.5 m by 0.4 m and lies between the rails.
+            let boxes = Boxes3D::from_centers_and_half_sizes(places, [[0.25, 0.2, 0.04]])
+                .with_quaternions(turns)
+                .with_colors([palette::BALISE])
+                .with_fill_mode(FillMode::Solid)
+                .with_labels(tunnel.balises.iter().map(|b| b.name.as_str()))
+                .with_show_labels(tunnel.balises.len() <= MAX_LAMP_LABELS);
+            stream.log_static("world/balises", &boxes)?;
+        }
+        Ok(())
+    }
+
+    /// Where the viewer's eye starts and what it looks at: from outside through the wall, which
+    /// shows its inner side only, at the train's head, else at the first wayside camera's field,
+    /// else at the middle of the line.
+    pub(super) fn eye(
+        &self,
+        camera: Option<&Isometry3<f64>>,
+        head: Option<&Isometry3<f64>>,
+    ) -> ([f32; 3], [f32; 3]) {
+        let (frame, eye, target) = match (head, camera) {
+            (Some(head), _) => (*head, [-9.0, -13.0, 9.0], [8.0, 0.0, 1.5]),
+            (None, Some(camera)) => (*camera, [-6.0, -6.0, -8.0], [0.0, 2.0, 20.0]),
+            (None, None) => {
+                let middle = self.alignment.at(self.alignment.length_m() / 2.0);
+                (
+                    middle.world_from_line(),
+                    [-20.0, -20.0, 12.0],
+                    [0.0, 0.0, 1.5],
+                )
+            }
+        };
+        [eye, target]
+            .map(|p| self.local(&(frame * Point3::from(p))))
+            .into()
+    }
+}
+
+/// Rotation of a pose.
+pub(super) fn turn(pose: &Isometry3<f64>) -> RotationQuat {
+    let q = pose.rotation.coords;
+    RotationQuat(Quaternion([q.x as f32, q.y as f32, q.z as f32, q.w as f32]))
+}
+
+/// Chainages from one to another at most `step_m` apart, both included.
+fn rings(from_m: f64, to_m: f64, step_m: f64) -> impl Iterator<Item = f64> {
+    let steps = ((to_m - from_m) / step_m).ceil().clamp(1.0, MAX_RINGS);
+    (0..=steps as usize).map(move |k| from_m + (to_m - from_m) * k as f64 / steps)
+}
+
+/// Triangles of the tunnel's inner side. Flat faces: an edge of the outline has corners of its own.
+#[derive(Default)]
+struct Sweep {
+    corners: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    colours: Vec<Color>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Sweep {
+    fn sweep(&mut self, scene: &Scene, range: &SectionRange, step_m: f64) {
+        let section = &range.section;
+        for (edge, [from, to]) in edges(section).enumerate() {
+            let Some(&material) = section.materials.get(edge) else {
+                continue;
+            };
+            let (dl, dh) = (to.0 - from.0, to.1 - from.1);
+            let length = dl.hypot(dh).max(1e-9);
+            let first = self.corners.len() as u32;
+            for (ring, s_m) in rings(range.from_m, range.to_m, step_m).enumerate() {
+                let heading = scene.alignment.at(s_m).heading_rad;
+                // The inside is on the left of an edge looked at up the line.
+                let (nl, nh) = (dh / length, -dl / length);
+                let normal = [-nl * heading.sin(), nl * heading.cos(), nh].map(|x| x as f32);
+                for (l_m, h_m) in [from, to] {
+                    let p = TrackPoint { s_m, l_m, h_m };
+                    self.corners
+                        .push(scene.local(&scene.alignment.world_from_track(p)));
+                    self.normals.push(normal);
+                    self.colours.push(palette::material(material, ring));
+                }
+            }
+            let last = self.corners.len() as u32;
+            for a in (first..last - 2).step_by(2) {
+                self.triangles.push([a, a + 1, a + 3]);
+                self.triangles.push([a, a + 3, a + 2]);
+            }
+        }
+    }
+
+    fn finish(self) -> Mesh3D {
+        Mesh3D::new(self.corners)
+            .with_vertex_normals(self.normals)
+            .with_vertex_colors(self.colours)
+            .with_triangle_indices(self.triangles)
+            .with_face_rendering(MeshFaceRendering::Front)
+    }
+}
+
+/// Both ends (l, h) of each edge of an outline.
+fn edges(section: &CrossSection) -> impl Iterator<Item = [(f64, f64); 2]> {
+    let points = &section.points;
+    let count = if section.closed {
+        points.len()
+    } else {
+        points.len().saturating_sub(1)
+    };
+    (0..count).map(|k| [&points[k], &points[(k + 1) % points.len()]].map(|p| (p.l_m, p.h_m)))
+}
+
+/// A line's width on the screen, whatever the distance.
+pub(super) fn ui(points: f32) -> Radius {
+    Radius::new_ui_points(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::trial::tunnel;
+
+    /// The viewer hides what it sees from behind. A flipped triangle would hide the far wall and
+    /// show the near one; a normal that disagrees would light it from outside.
+    #[test]
+    fn the_tunnel_shows_its_inner_side() {
+        let tunnel = tunnel();
+        let scene = Scene::new(&tunnel);
+        let mut sweep = Sweep::default();
+        sweep.sweep(&scene, &tunnel.sections[0], 5.0);
+        // 29 edges, 80 stretches, two triangles each.
+        assert_eq!(sweep.triangles.len(), 29 * 80 * 2);
+        let corner = |k: u32| Vector3::from(sweep.corners[k as usize]);
+        for t in &sweep.triangles {
+            let [a, b, c] = t.map(corner);
+            let face = (b - a).cross(&(c - a)).normalize();
+            let normal = Vector3::from(sweep.normals[t[0] as usize]);
+            // Chords of 5 m in a curve of 400 m turn by 0.0125 rad, the grade adds 0.01.
+            assert!(
+                face.dot(&normal) > 0.999,
+                "face {face:?}, normal {normal:?}"
+            );
+            let near_s_m = 200.0;
+            let world = Point3::from(a.cast::<f64>() + scene.origin);
+            let s_m = scene.alignment.track_from_world(&world, near_s_m).s_m;
+            let axis = TrackPoint {
+                s_m,
+                l_m: 0.0,
+                h_m: 1.9,
+            };
+            let axis = scene.local(&scene.alignment.world_from_track(axis));
+            assert!(face.dot(&(Vector3::from(axis) - a)) > 0.0);
+        }
+    }
+
+    /// Single precision far from the world's origin would shake lamps by centimetres.
+    #[test]
+    fn coordinates_are_good_to_a_millimetre() {
+        let tunnel = tunnel();
+        let scene = Scene::new(&tunnel);
+        for lamp in &tunnel.lamps {
+            let back = Vector3::from(scene.local(&lamp.centre)).cast::<f64>() + scene.origin;
+            assert!((back - lamp.centre.coords).norm() < 1e-3);
+        }
+    }
+}

@@ -1,0 +1,177 @@
+//! The rerun stream under a recording: where it goes, on which timelines, and when it is flushed.
+//!
+//! Two runs with one seed must give recordings that `rerun rrd compare` finds equal. So the ids
+//! come from scenario and seed, no row carries the wall clock, and batches are cut where simulated
+//! time says, never by a timer.
+
+use crate::bus::SimTime;
+use crate::session::ObserverError;
+use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
+use rerun::log::ChunkBatcherConfig;
+use rerun::{
+    ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder,
+    SerializedComponentColumn, StoreId, StoreKind, TimeCell, TimeColumn,
+};
+use std::error::Error;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Simulated time since the scenario's start.
+pub(super) const SIM_TIME: &str = "sim_time";
+/// Number of the camera frame.
+pub(super) const FRAME: &str = "frame";
+
+/// How long a viewer may take to answer before the recording gives up on it.
+const VIEWER_PATIENCE: Duration = Duration::from_secs(10);
+
+/// Where a recording goes.
+#[derive(Clone, Debug)]
+pub(super) enum Target {
+    /// Into this file.
+    File(PathBuf),
+    /// To the viewer that listens at this address.
+    Viewer(String),
+}
+
+/// An open stream.
+pub(super) struct Stream {
+    rerun: RecordingStream,
+    file: Option<PathBuf>,
+    application: ApplicationId,
+}
+
+impl Stream {
+    /// Opens the stream of one run. A file is written beside its final name until [`Self::finish`].
+    pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self, ObserverError> {
+        // Viewers keep one layout an application, and each scenario has its own.
+        let application = ApplicationId::new_or_unknown(format!("metrotwin-{scenario}"));
+        let id = StoreId::new(
+            StoreKind::Recording,
+            application.clone(),
+            format!("{scenario}-seed-{seed}"),
+        );
+        let builder = RecordingStreamBuilder::from_store_id(&id)
+            .enabled(true)
+            .send_properties(false)
+            .batcher_config(ChunkBatcherConfig::NEVER);
+        let (rerun, file) = match target {
+            Target::File(path) => {
+                if let Some(folder) = path.parent() {
+                    fs::create_dir_all(folder).map_err(failed("making the recording's folder"))?;
+                }
+                (builder.save(part_name(path)), Some(path.clone()))
+            }
+            Target::Viewer(url) => (builder.connect_grpc_opts(url.as_str()), None),
+        };
+        let rerun = rerun.map_err(failed("opening the recording"))?;
+        rerun.set_log_time_enabled(false);
+        rerun.set_log_tick_enabled(false);
+        rerun
+            .send_recording_name(format!("{scenario}, seed {seed}"))
+            .map_err(failed("naming the recording"))?;
+        let stream = Self {
+            rerun,
+            file,
+            application,
+        };
+        stream.flush()?;
+        Ok(stream)
+    }
+
+    /// The name that viewers file this recording and its layout under.
+    pub(super) fn application(&self) -> &ApplicationId {
+        &self.application
+    }
+
+    /// All rows from here on happen at this time.
+    pub(super) fn at(&self, time: SimTime) {
+        self.rerun.reset_time();
+        self.rerun
+            .set_time(SIM_TIME, TimeCell::from_duration_nanos(time.nanos()));
+    }
+
+    /// As [`Self::at`], of a numbered camera frame.
+    pub(super) fn at_frame(&self, time: SimTime, number: u32) {
+        self.at(time);
+        self.rerun.set_time_sequence(FRAME, number);
+    }
+
+    /// One row.
+    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result<(), ObserverError> {
+        self.rerun.log(path, what).map_err(failed(path))
+    }
+
+    /// What holds for the whole run.
+    pub(super) fn log_static(
+        &self,
+        path: &str,
+        what: &dyn AsComponents,
+    ) -> Result<(), ObserverError> {
+        self.rerun.log_static(path, what).map_err(failed(path))
+    }
+
+    /// Many rows at once.
+    pub(super) fn columns(
+        &self,
+        path: &str,
+        times_ns: &[i64],
+        columns: impl IntoIterator<Item = SerializedComponentColumn>,
+    ) -> Result<(), ObserverError> {
+        let times = TimeColumn::new_duration_nanos(SIM_TIME, times_ns.iter().copied());
+        self.rerun
+            .send_columns(path, [times], columns)
+            .map_err(failed(path))
+    }
+
+    /// A layout for the viewer.
+    pub(super) fn blueprint(&self, messages: Vec<LogMsg>, id: StoreId) {
+        let activation = BlueprintActivationCommand {
+            blueprint_id: id,
+            make_active: true,
+            make_default: true,
+        };
+        self.rerun.send_blueprint(messages, activation);
+    }
+
+    /// Cuts the batches here and passes them on.
+    pub(super) fn flush(&self) -> Result<(), ObserverError> {
+        let flushed = match self.file {
+            Some(_) => self.rerun.flush_blocking(),
+            None => self.rerun.flush_with_timeout(VIEWER_PATIENCE),
+        };
+        flushed.map_err(failed(match self.file {
+            Some(_) => "writing the recording",
+            None => "sending the recording to the viewer",
+        }))
+    }
+
+    /// Ends the stream; a file gets its index and its final name.
+    pub(super) fn finish(self) -> Result<(), ObserverError> {
+        self.flush()?;
+        self.rerun.finalize_deferred_sinks();
+        match self.file {
+            Some(path) => fs::rename(part_name(&path), &path)
+                .map_err(failed("giving the recording its final name")),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Name of a file while it is written.
+pub(super) fn part_name(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".part");
+    PathBuf::from(name)
+}
+
+/// Turns an error into an observer's, saying what was being done.
+pub(super) fn failed<E: Into<Box<dyn Error + Send + Sync>>>(
+    what: impl Into<String>,
+) -> impl FnOnce(E) -> ObserverError {
+    let what = what.into();
+    move |source| ObserverError {
+        what,
+        source: source.into(),
+    }
+}

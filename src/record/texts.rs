@@ -1,0 +1,170 @@
+//! The event log and the driver's display.
+
+use super::palette;
+use super::stream::Stream;
+use crate::bus::{
+    BrakeDemand, DangerLevel, Delivery, DriverDisplay, ProtectionReport, SimTime, Via,
+    WaysideReport,
+};
+use crate::session::ObserverError;
+use rerun::{Color, TextDocument, TextLog, TextLogLevel};
+use std::fmt::Write;
+
+/// The log.
+pub(super) const EVENTS: &str = "events";
+/// The display.
+pub(super) const DISPLAY: &str = "display";
+
+/// Turns what happens into words; says again only what changed.
+pub(super) struct Texts {
+    brake: BrakeDemand,
+    danger: Vec<DangerLevel>,
+}
+
+impl Texts {
+    /// For so many wayside devices.
+    pub(super) fn new(devices: usize) -> Self {
+        Self {
+            brake: BrakeDemand::None,
+            danger: vec![DangerLevel::None; devices],
+        }
+    }
+
+    /// Anything.
+    pub(super) fn note(stream: &Stream, time: SimTime, text: &str) -> Result<(), ObserverError> {
+        log(stream, time, TextLogLevel::INFO, text)
+    }
+
+    /// A message reached the train.
+    pub(super) fn delivery(stream: &Stream, delivery: &Delivery) -> Result<(), ObserverError> {
+        let warning = &delivery.warning;
+        let via = match delivery.via {
+            Via::Balise => "balise",
+            Via::Radio => "radio",
+        };
+        let (device, number) = (&warning.device, warning.number);
+        let delay_s = delivery.received.since(warning.issued);
+        let (level, what) = match warning.danger {
+            DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
+            danger => (
+                level(danger),
+                format!(
+                    "danger {}, km {:.4} to {:.4}",
+                    danger_name(danger),
+                    warning.from_chainage_m / 1000.0,
+                    warning.to_chainage_m / 1000.0,
+                ),
+            ),
+        };
+        let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
+        log(stream, delivery.received, level, &text)
+    }
+
+    /// A wayside device changed its mind about the danger.
+    pub(super) fn wayside(
+        &mut self,
+        stream: &Stream,
+        device: (usize, &str),
+        report: &WaysideReport,
+    ) -> Result<(), ObserverError> {
+        let Some(danger) = self.danger.get_mut(device.0) else {
+            return Ok(());
+        };
+        if *danger == report.danger {
+            return Ok(());
+        }
+        *danger = report.danger;
+        let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
+        for o in &report.obstacles {
+            // Writing to a String cannot fail.
+            let _ = write!(
+                text,
+                "; {:.2} x {:.2} m at km {:.4}",
+                o.width_m,
+                o.height_m,
+                o.from_chainage_m / 1000.0
+            );
+        }
+        log(stream, report.time, level(report.danger), &text)
+    }
+
+    /// The protection changed its demand.
+    pub(super) fn protection(
+        &mut self,
+        stream: &Stream,
+        report: &ProtectionReport,
+    ) -> Result<(), ObserverError> {
+        if self.brake == report.command.brake {
+            return Ok(());
+        }
+        self.brake = report.command.brake;
+        let (level, what) = match self.brake {
+            BrakeDemand::None => (TextLogLevel::INFO, "brake released"),
+            BrakeDemand::Service => (TextLogLevel::WARN, "service brake"),
+            BrakeDemand::Emergency => (TextLogLevel::ERROR, "emergency brake"),
+        };
+        let speed_kmh = report.speed_mps * 3.6;
+        let text = format!("{what} at {speed_kmh:.1} km/h");
+        log(stream, report.time, level, &text)
+    }
+
+    /// The display changed.
+    pub(super) fn display(
+        stream: &Stream,
+        time: SimTime,
+        display: &DriverDisplay,
+    ) -> Result<(), ObserverError> {
+        stream.at(time);
+        let document = TextDocument::from_markdown(markdown(display));
+        stream.log(DISPLAY, &document)
+    }
+}
+
+fn markdown(display: &DriverDisplay) -> String {
+    let (lamp, meaning) = palette::driver_lamp(display.lamp);
+    let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.1} m"));
+    let power = if display.power { "on" } else { "off" };
+    let (position, distance) = (
+        metres(display.position_m),
+        metres(display.distance_to_obstacle_m),
+    );
+    let text = &display.text;
+    format!(
+        "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\
+         | Position | {position} |\n| Distance to obstacle | {distance} |\n"
+    )
+}
+
+fn danger_name(danger: DangerLevel) -> &'static str {
+    match danger {
+        DangerLevel::None => "none",
+        DangerLevel::Low => "low",
+        DangerLevel::High => "high",
+    }
+}
+
+fn level(danger: DangerLevel) -> &'static str {
+    match danger {
+        DangerLevel::None => TextLogLevel::INFO,
+        DangerLevel::Low => TextLogLevel::WARN,
+        DangerLevel::High => TextLogLevel::ERROR,
+    }
+}
+
+fn log(
+    stream: &Stream,
+    time: SimTime,
+    level: &'static str,
+    text: &str,
+) -> Result<(), ObserverError> {
+    stream.at(time);
+    let colour = match level {
+        TextLogLevel::ERROR => palette::danger(DangerLevel::High),
+        TextLogLevel::WARN => palette::danger(DangerLevel::Low),
+        _ => Color::from_rgb(210, 215, 220),
+    };
+    stream.log(
+        EVENTS,
+        &TextLog::new(text).with_level(level).with_color(colour),
+    )
+}

@@ -1,0 +1,242 @@
+//! Lamps in an image: the steps in their order.
+
+use super::centroid::{Chord, GreyCentroid};
+use super::code::{ChipVotes, longest_dark_run};
+use super::ellipse::{EllipseFit, fit_ellipse, roundness};
+use super::median::{MedianScratch, median3};
+use super::otsu::otsu;
+use super::outline::Outline;
+use super::patch::Patch;
+use super::profile::{Profile, REACH_ROWS};
+use super::search::{SearchScratch, SearchSettings, find_regions};
+use super::stripes::{StripeReader, StripeReading};
+use super::wiener::Wiener;
+use crate::bus::{CameraModel, Ellipse, PixelBox, Spot};
+use crate::stack::positioning::LedSettings;
+use crate::track::LampSite;
+use crate::track::uid::LineCode;
+use image::GrayImage;
+use nalgebra::Point2;
+
+/// A lamp in an image, with what the fix needs beyond the report's [`Spot`].
+#[derive(Clone, Debug)]
+pub struct LampImage {
+    /// As reported.
+    pub spot: Spot,
+    /// Standard deviation of the centre along u.
+    pub sigma_px: f64,
+    /// Level of darkness around it.
+    black: f64,
+    /// Outline to read the profile in, fitted or from the bounds.
+    shape: Ellipse,
+}
+
+/// Finds lamps and reads their stripes; owns all buffers.
+#[derive(Debug)]
+pub struct LampFinder {
+    settings: LedSettings,
+    search: SearchSettings,
+    chip_s: f64,
+    code: LineCode,
+    scratch: SearchScratch,
+    regions: Vec<PixelBox>,
+    raw: Patch,
+    filtered: Patch,
+    median: MedianScratch,
+    outline: Outline,
+    grey: GreyCentroid,
+    wiener: Wiener,
+    profile: Profile,
+    reader: StripeReader,
+}
+
+/// Rows and columns around a region in which its outline may lie.
+const MARGIN_PX: u32 = 14;
+/// An outline that misses its ellipse by more than this share of its size is no lamp's.
+const MAX_MISFIT: f64 = 0.08;
+
+impl LampFinder {
+    /// For lamps of the first lamp's chip time and code, as a line has one kind of lamp.
+    pub fn new(settings: &LedSettings, camera: &CameraModel, lamps: &[LampSite]) -> Self {
+        let (chip_s, code) = lamps
+            .first()
+            .map_or((45e-6, LineCode::default()), |l| (l.chip_s, l.code));
+        let frames = lamps.iter().map(|l| l.uid.frame(code));
+        let line_s = camera.shutter.line_time_s.max(1e-7);
+        let dark_s = f64::from(longest_dark_run(frames).max(2)) * chip_s;
+        Self {
+            settings: settings.clone(),
+            search: SearchSettings {
+                min_contrast_grey: settings.min_contrast_grey,
+                gap_rows: ((dark_s / line_s).ceil() as usize + 2).min(200),
+                margin_px: MARGIN_PX,
+            },
+            chip_s,
+            code,
+            scratch: SearchScratch::default(),
+            regions: Vec::new(),
+            raw: Patch::default(),
+            filtered: Patch::default(),
+            median: MedianScratch::default(),
+            outline: Outline::default(),
+            grey: GreyCentroid::default(),
+            wiener: Wiener::default(),
+            profile: Profile::default(),
+            reader: StripeReader::new(chip_s, camera.shutter),
+        }
+    }
+
+    /// Empty votes for these lamps' code.
+    pub fn votes(&self) -> ChipVotes {
+        ChipVotes::new(self.code, self.chip_s)
+    }
+
+    /// Finds the lamps of an image. `smear_px` tells how far a lamp at a pixel moves along the row
+    /// during the exposure.
+    pub fn find(
+        &mut self,
+        image: &GrayImage,
+        smear_px: impl Fn(&Point2<f64>) -> f64,
+        out: &mut Vec<LampImage>,
+    ) {
+        out.clear();
+        let mut regions = std::mem::take(&mut self.regions);
+        let black = find_regions(image, &self.search, &mut self.scratch, &mut regions);
+        for region in &regions {
+            if let Some(lamp) = self.measure(image, region, black, &smear_px) {
+                let known = |l: &LampImage| {
+                    let b = &l.spot.bounds;
+                    let (u, v) = (lamp.spot.centre.x, lamp.spot.centre.y);
+                    (f64::from(b.u0)..=f64::from(b.u1)).contains(&u)
+                        && (f64::from(b.v0)..=f64::from(b.v1)).contains(&v)
+                };
+                if !out.iter().any(known) {
+                    out.push(lamp);
+                }
+            }
+        }
+        self.regions = regions;
+    }
+
+    fn measure(
+        &mut self,
+        image: &GrayImage,
+        region: &PixelBox,
+        black: f64,
+        smear_px: &impl Fn(&Point2<f64>) -> f64,
+    ) -> Option<LampImage> {
+        self.raw.cut(image, region);
+        median3(&self.raw, &mut self.filtered, &mut self.median);
+        let split = otsu(&self.filtered.histogram())?;
+        if split.bright_mean - split.dark_mean < self.settings.min_contrast_grey {
+            return None;
+        }
+        let gap = self.search.gap_rows;
+        if !self.outline.find(&self.filtered, split.threshold, gap)
+            || (self.outline.area_px as f64) < self.settings.min_area_px
+        {
+            return None;
+        }
+        let bounds = self.bounds()?;
+        let middle = |a: u32, b: u32| 0.5 * (f64::from(a) + f64::from(b));
+        let rough = Point2::new(middle(bounds.u0, bounds.u1), middle(bounds.v0, bounds.v1));
+        let smear = smear_px(&rough).abs();
+        if smear > self.settings.deblur_over_px {
+            self.wiener
+                .prepare(smear, self.settings.wiener_noise_to_signal);
+            self.wiener.apply(&mut self.raw);
+        }
+        let size = (image.width() as usize, image.height() as usize);
+        self.outline.trace(&self.raw, black, split.threshold, size);
+        let fit = fit_ellipse(&self.outline.points)
+            .filter(|f| f.rms_px < 0.3 + MAX_MISFIT * f.ellipse.semi_minor_px);
+        self.describe(bounds, rough, fit, black)
+    }
+
+    /// Weighs the two centres.
+    fn describe(
+        &mut self,
+        bounds: PixelBox,
+        rough: Point2<f64>,
+        fit: Option<EllipseFit>,
+        black: f64,
+    ) -> Option<LampImage> {
+        let cut = self.outline.cut;
+        let ellipse = fit.map(|f| f.ellipse);
+        // What the border cuts off pulls the grey centroid, not the ellipse.
+        let alpha = match &ellipse {
+            Some(_) if cut => 0.0,
+            Some(e) => roundness(e),
+            None => 1.0,
+        };
+        let grey = self.grey_centre();
+        let centre = match (grey, ellipse) {
+            (Some(g), Some(e)) => Point2::from(alpha * g.coords + (1.0 - alpha) * e.centre.coords),
+            (None, Some(e)) => e.centre,
+            (Some(g), None) => g,
+            (None, None) => return None,
+        };
+        let shape = ellipse.unwrap_or(Ellipse {
+            centre: rough,
+            semi_major_px: 0.5 * f64::from(bounds.v1 - bounds.v0).max(2.0),
+            semi_minor_px: 0.5 * f64::from(bounds.u1 - bounds.u0).max(2.0),
+            angle_rad: std::f64::consts::FRAC_PI_2,
+        });
+        let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
+        Some(LampImage {
+            spot: Spot {
+                bounds,
+                centre,
+                ellipse,
+                roundness: ellipse.map_or(0.0, |e| roundness(&e)),
+                cut,
+                uid: None,
+            },
+            sigma_px,
+            black,
+            shape,
+        })
+    }
+
+    fn bounds(&self) -> Option<PixelBox> {
+        let (first, last) = self.outline.rows?;
+        let left = self.outline.extents.iter().map(|e| e.0).min()?;
+        let right = self.outline.extents.iter().map(|e| e.1).max()?;
+        Some(PixelBox {
+            u0: (self.raw.u0 + left) as u32,
+            v0: (self.raw.v0 + first) as u32,
+            u1: (self.raw.u0 + right) as u32,
+            v1: (self.raw.v0 + last) as u32,
+        })
+    }
+
+    /// Log-Gaussian centre from the chords of the lit rows.
+    fn grey_centre(&mut self) -> Option<Point2<f64>> {
+        let whole = |e: &&(usize, f64, f64)| e.1.is_finite() && e.2.is_finite();
+        let edges = self.outline.edges.iter().filter(whole);
+        let chords = edges.map(|&(v, left, right)| Chord { v, left, right });
+        let (u, v) = self.grey.centre(chords)?;
+        Some(Point2::new(self.raw.u0 as f64 + u, self.raw.v0 as f64 + v))
+    }
+
+    /// Reads the chips of a lamp found in this image.
+    pub fn read(&mut self, image: &GrayImage, lamp: &LampImage, out: &mut StripeReading) -> bool {
+        let reach = REACH_ROWS as u32 + 4;
+        let around = PixelBox {
+            u0: lamp.spot.bounds.u0.saturating_sub(MARGIN_PX),
+            v0: lamp.spot.bounds.v0.saturating_sub(reach),
+            u1: lamp.spot.bounds.u1 + MARGIN_PX,
+            v1: lamp.spot.bounds.v1 + reach,
+        };
+        self.raw.cut(image, &around);
+        let tilt = self.settings.tilt_over_rows;
+        self.profile.take(
+            &self.raw,
+            lamp.black,
+            &lamp.shape,
+            self.search.gap_rows,
+            tilt,
+        );
+        self.reader.read(&self.profile, lamp.black, out)
+    }
+}

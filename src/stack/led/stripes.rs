@@ -1,0 +1,175 @@
+//! From a row profile to chips: stripe edges, their clock, and the levels between them.
+//!
+//! Row v sees the mean of the lamp's light from `v * line` to `v * line + exposure`, so light over
+//! envelope crosses one half at the mid-exposure time of a switching. A crossing is interpolated
+//! between rows.
+//!
+//! **Broadening.** A saturated row is white as soon as the lamp was on for a small part of its
+//! exposure: bright stripes then begin early and end late, by one time delta, at most half the
+//! exposure. On the circle of one chip time the rising edges then lie at phi - delta and the
+//! falling ones at phi + delta. With R and F the sums of unit vectors of either kind,
+//! 2 delta = arg(F conj R), taken into [-0.2, 0.8) chips, and phi is the argument of the edges'
+//! sum after every one has been moved back by its delta. The resultant's length tells how well
+//! the edges keep to the clock: light that does not blink in this clock is no lamp.
+//!
+//! Knowing phi, every edge has an integer chip number, and a stripe's width in chips is the
+//! difference of two: an error of one width does not shift the chips after it.
+
+use super::profile::Profile;
+use crate::bus::Shutter;
+use std::f64::consts::TAU;
+
+/// Chips of one spot in one frame.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StripeReading {
+    /// Time of the boundary before chip 0, seconds from the opening of the frame's row 0.
+    pub phase_s: f64,
+    /// Levels of chips 0, 1, 2 ...; `None` where the stripes say nothing.
+    pub chips: Vec<Option<bool>>,
+    /// Length of the edges' mean unit vector: 1 when all keep to one clock.
+    pub coherence: f64,
+    /// Edges used.
+    pub edges: usize,
+}
+
+/// An edge between two rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Edge {
+    time_s: f64,
+    rising: bool,
+    saturated: bool,
+}
+
+/// Grey level (raw) from which on a row counts as saturated.
+const SATURATED_GREY: f64 = 245.0;
+/// The envelope must stand this far over darkness, in grey levels.
+const ENVELOPE_FLOOR: f64 = 3.0;
+/// Edges less coherent than this are no lamp's.
+const MIN_COHERENCE: f64 = 0.5;
+/// Fewer edges than this set no clock.
+const MIN_EDGES: usize = 4;
+/// More chips than this do not fit into any frame of interest.
+const MAX_CHIPS: usize = 1024;
+
+/// Reads stripes; owns what it needs from frame to frame.
+#[derive(Debug)]
+pub struct StripeReader {
+    chip_s: f64,
+    shutter: Shutter,
+    edges: Vec<Edge>,
+}
+
+impl StripeReader {
+    /// For lamps of one chip time seen through one shutter.
+    pub fn new(chip_s: f64, shutter: Shutter) -> Self {
+        Self {
+            chip_s,
+            shutter,
+            edges: Vec::new(),
+        }
+    }
+
+    /// Reads the chips of a profile into `out`. `false` where there is no code in it.
+    pub fn read(&mut self, profile: &Profile, black: f64, out: &mut StripeReading) -> bool {
+        out.chips.clear();
+        (out.coherence, out.edges) = (0.0, 0);
+        let Some((first, last)) = profile.lit_stretch(ENVELOPE_FLOOR) else {
+            return false;
+        };
+        self.find_edges(profile, black, (first, last));
+        if self.edges.len() < MIN_EDGES {
+            return false;
+        }
+        let phase = self.set_clock(out);
+        if out.coherence < MIN_COHERENCE {
+            return false;
+        }
+        let lit = |k: usize| profile.light[k] > 0.5 * profile.envelope[k];
+        let row_time = |k: usize| self.row_mid_s(profile.first_row + k as f64);
+        self.fill(phase, (row_time(first), row_time(last)), lit(first), out)
+    }
+
+    fn row_mid_s(&self, row: f64) -> f64 {
+        row * self.shutter.line_time_s + 0.5 * self.shutter.exposure_s
+    }
+
+    fn find_edges(&mut self, profile: &Profile, black: f64, (first, last): (usize, usize)) {
+        self.edges.clear();
+        let share = |k: usize| profile.light[k] / profile.envelope[k];
+        for k in first..last {
+            let (a, b) = (share(k), share(k + 1));
+            if (a > 0.5) != (b > 0.5) {
+                let row = profile.first_row + k as f64 + (0.5 - a) / (b - a);
+                let bright = profile.light[k].max(profile.light[k + 1]);
+                self.edges.push(Edge {
+                    time_s: self.row_mid_s(row),
+                    rising: b > a,
+                    saturated: bright + black > SATURATED_GREY,
+                });
+            }
+        }
+    }
+
+    /// Moves broadened edges back and gives the clock's phase, seconds in [0, chip).
+    fn set_clock(&mut self, out: &mut StripeReading) -> f64 {
+        let sum = |edges: &[Edge], chosen: fn(&Edge) -> bool| {
+            edges
+                .iter()
+                .filter(|e| chosen(e))
+                .fold((0.0, 0.0), |(x, y), e| {
+                    let (sin, cos) = (TAU * e.time_s / self.chip_s).sin_cos();
+                    (x + cos, y + sin)
+                })
+        };
+        let rising = sum(&self.edges, |e| e.saturated && e.rising);
+        let falling = sum(&self.edges, |e| e.saturated && !e.rising);
+        let cross = falling.1 * rising.0 - falling.0 * rising.1;
+        let dot = falling.0 * rising.0 + falling.1 * rising.1;
+        let both = rising.0.hypot(rising.1) > 0.5 && falling.0.hypot(falling.1) > 0.5;
+        let turn = if both { cross.atan2(dot) / TAU } else { 0.0 };
+        let broadening_s = 0.5 * ((turn + 0.2).rem_euclid(1.0) - 0.2) * self.chip_s;
+        for edge in self.edges.iter_mut().filter(|e| e.saturated) {
+            edge.time_s += if edge.rising {
+                broadening_s
+            } else {
+                -broadening_s
+            };
+        }
+        let (x, y) = sum(&self.edges, |_| true);
+        out.edges = self.edges.len();
+        out.coherence = x.hypot(y) / out.edges as f64;
+        y.atan2(x) / TAU * self.chip_s
+    }
+
+    /// Writes the levels between edges. A stretch that ends without an edge counts for the chips
+    /// that it certainly covers.
+    fn fill(
+        &self,
+        phase_s: f64,
+        (from_s, to_s): (f64, f64),
+        lit_first: bool,
+        out: &mut StripeReading,
+    ) -> bool {
+        let chip = |t: f64| (t - phase_s) / self.chip_s;
+        let start = (chip(from_s) - 0.25).ceil() as i64;
+        let end = (chip(to_s) + 0.25).floor() as i64;
+        let length = end - start;
+        if length < 2 || length > MAX_CHIPS as i64 {
+            return false;
+        }
+        out.phase_s = phase_s + start as f64 * self.chip_s;
+        out.chips.resize(length as usize, None);
+        let (mut at, mut level) = (start, lit_first);
+        let inner = self
+            .edges
+            .iter()
+            .map(|e| (chip(e.time_s).round() as i64, e.rising));
+        for (boundary, rising) in inner.chain([(end, !level)]) {
+            for k in at.max(start)..boundary.min(end) {
+                out.chips[(k - start) as usize] = Some(level);
+            }
+            (at, level) = (boundary.max(at), rising);
+        }
+        true
+    }
+}

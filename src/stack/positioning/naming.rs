@@ -1,0 +1,257 @@
+//! Which lamp is it: names read from stripes, held against the position that is expected.
+//!
+//! A lamp is followed from pair to pair by where it is in front of the train: it comes nearer by
+//! what the odometer ran. What was read of its code is collected as long as it is followed. A name
+//! counts when it is on the map, and
+//! - with a position to expect: when the lamp then is where the map has it, within a gate of under
+//!   half the spacing; a name that contradicts is not used, until it has been read so often that
+//!   the expectation must be wrong;
+//! - without one: when enough pairs have read the same name.
+//!
+//! A lamp of which nothing is read yet takes the name of the map's lamp that is expected there.
+
+use crate::bus::Identity;
+use crate::stack::led::ChipVotes;
+use crate::track::Tunnel;
+use crate::track::uid::Uid;
+use nalgebra::Vector3;
+
+/// A followed lamp may be this far from where it is expected, along and across the train.
+const FOLLOW_ALONG_M: f64 = 3.0;
+const FOLLOW_ACROSS_M: f64 = 1.5;
+
+/// A lamp followed from pair to pair.
+#[derive(Debug)]
+pub struct Followed {
+    /// Where it was when last seen, vehicle frame.
+    pub lamp_m: Vector3<f64>,
+    /// Odometer then.
+    pub distance_m: f64,
+    /// Seconds since the first pair, then.
+    pub seen_s: f64,
+    /// What was read of its code.
+    pub votes: ChipVotes,
+    read: Option<(Uid, u32)>,
+    believed: Option<Uid>,
+}
+
+impl Followed {
+    /// A lamp seen for the first time.
+    pub fn new(lamp_m: Vector3<f64>, distance_m: f64, seen_s: f64, votes: ChipVotes) -> Self {
+        Self {
+            lamp_m,
+            distance_m,
+            seen_s,
+            votes,
+            read: None,
+            believed: None,
+        }
+    }
+
+    /// How far a lamp seen now is from where this one should be; `None` beyond the gate.
+    pub fn misses_by(&self, lamp_m: &Vector3<f64>, distance_m: f64) -> Option<f64> {
+        let miss = lamp_m - self.lamp_m + Vector3::x() * (distance_m - self.distance_m);
+        let near = miss.x.abs() < FOLLOW_ALONG_M && miss.y.hypot(miss.z) < FOLLOW_ACROSS_M;
+        near.then(|| miss.norm())
+    }
+
+    /// Notes that a name was read, and how many pairs in a row read the same.
+    fn note(&mut self, uid: Uid) -> u32 {
+        let times = match self.read {
+            Some((last, times)) if last == uid => times + 1,
+            _ => 1,
+        };
+        self.read = Some((uid, times));
+        times
+    }
+}
+
+/// What is expected at the time of a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct Expected {
+    /// Chainage at which the lamp must stand if the train is where it takes itself to be.
+    pub lamp_chainage_m: f64,
+}
+
+/// What to make of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// It has this name.
+    Named(Uid, Identity),
+    /// It has this name, and the train is not where it took itself to be.
+    Moved(Uid, Identity),
+    /// Not known, or contradicted.
+    Unknown,
+}
+
+/// How readily names are believed.
+#[derive(Clone, Copy, Debug)]
+pub struct Naming {
+    /// Share of the lamps' spacing within which a lamp is where it is expected.
+    pub gate_share: f64,
+    /// Equal readings that count as proof.
+    pub agreeing_reads: u32,
+}
+
+impl Naming {
+    /// Names a followed lamp. `decoded` is the name in this pair's stripes alone.
+    pub fn judge(
+        &self,
+        followed: &mut Followed,
+        decoded: Option<Uid>,
+        expected: Option<Expected>,
+        map: &Tunnel,
+    ) -> Verdict {
+        let on_map = |uid: &Uid| map.lamp(*uid).is_some();
+        let own = decoded.filter(on_map).map(|uid| (uid, Identity::Decoded));
+        let joined = || followed.votes.decode().filter(on_map);
+        let read = own.or_else(|| joined().map(|uid| (uid, Identity::Joined)));
+        let Some((uid, identity)) = read else {
+            return self.without_reading(followed, expected, map);
+        };
+        let proven = followed.note(uid) >= self.agreeing_reads;
+        let verdict = match expected {
+            Some(e) if self.stands_there(uid, e, map) => Verdict::Named(uid, identity),
+            Some(_) if proven => Verdict::Moved(uid, identity),
+            None if proven => Verdict::Named(uid, identity),
+            _ => Verdict::Unknown,
+        };
+        followed.believed = (verdict != Verdict::Unknown).then_some(uid);
+        verdict
+    }
+
+    fn without_reading(
+        &self,
+        followed: &Followed,
+        expected: Option<Expected>,
+        map: &Tunnel,
+    ) -> Verdict {
+        if let Some(uid) = followed.believed {
+            return Verdict::Named(uid, Identity::Joined);
+        }
+        let nearest = expected.and_then(|e| nearest_lamp(map, e.lamp_chainage_m).map(|k| (e, k)));
+        match nearest {
+            Some((e, k)) if self.stands_there(map.lamps[k].uid, e, map) => {
+                Verdict::Named(map.lamps[k].uid, Identity::Predicted)
+            }
+            _ => Verdict::Unknown,
+        }
+    }
+
+    fn stands_there(&self, uid: Uid, expected: Expected, map: &Tunnel) -> bool {
+        let Some(k) = map.lamps.iter().position(|l| l.uid == uid) else {
+            return false;
+        };
+        let off = (map.lamps[k].chainage_m - expected.lamp_chainage_m).abs();
+        off < self.gate_share * spacing_m(map, k)
+    }
+}
+
+fn nearest_lamp(map: &Tunnel, chainage_m: f64) -> Option<usize> {
+    let off = |k: &usize| (map.lamps[*k].chainage_m - chainage_m).abs();
+    (0..map.lamps.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
+}
+
+/// Distance to the nearer neighbour, 10 m for a lamp alone.
+fn spacing_m(map: &Tunnel, k: usize) -> f64 {
+    let to = |other: Option<usize>| {
+        let neighbour = other.and_then(|o| map.lamps.get(o))?;
+        Some((neighbour.chainage_m - map.lamps[k].chainage_m).abs())
+    };
+    let nearer = [to(k.checked_sub(1)), to(Some(k + 1))]
+        .into_iter()
+        .flatten();
+    let nearest = nearer.fold(f64::INFINITY, f64::min);
+    if nearest.is_finite() { nearest } else { 10.0 }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::stack::led::testing::tunnel;
+    use crate::track::uid::LineCode;
+
+    const NAMING: Naming = Naming {
+        gate_share: 0.4,
+        agreeing_reads: 2,
+    };
+
+    fn followed() -> Followed {
+        let votes = ChipVotes::new(LineCode::Manchester, 45e-6);
+        Followed::new(Vector3::new(6.0, 2.7, 3.2), 0.0, 0.0, votes)
+    }
+
+    fn at(lamp_chainage_m: f64) -> Option<Expected> {
+        Some(Expected { lamp_chainage_m })
+    }
+
+    /// A wrong name that passes the check sum once must not move the train.
+    #[test]
+    fn one_wrong_reading_is_not_believed() {
+        let map = tunnel("manchester");
+        let (a, b) = (map.lamps[20].uid, map.lamps[90].uid);
+        let s = map.lamps[20].chainage_m;
+        let mut lamp = followed();
+        assert_eq!(
+            NAMING.judge(&mut lamp, Some(b), at(s + 1.0), &map),
+            Verdict::Unknown
+        );
+        assert_eq!(
+            NAMING.judge(&mut lamp, Some(a), at(s + 1.0), &map),
+            Verdict::Named(a, Identity::Decoded)
+        );
+        assert_eq!(
+            NAMING.judge(&mut lamp, Some(b), None, &map),
+            Verdict::Unknown
+        );
+        let stranger = Uid { line: 9, lamp: 3 };
+        assert_eq!(
+            NAMING.judge(&mut followed(), Some(stranger), None, &map),
+            Verdict::Unknown
+        );
+    }
+
+    /// Two equal readings start a position, and end a wrong one.
+    #[test]
+    fn agreeing_readings_are() {
+        let map = tunnel("manchester");
+        let uid = map.lamps[20].uid;
+        for (expected, verdict) in [
+            (None, Verdict::Named(uid, Identity::Decoded)),
+            (at(700.0), Verdict::Moved(uid, Identity::Decoded)),
+        ] {
+            let mut lamp = followed();
+            assert_eq!(
+                NAMING.judge(&mut lamp, Some(uid), expected, &map),
+                Verdict::Unknown
+            );
+            assert_eq!(NAMING.judge(&mut lamp, Some(uid), expected, &map), verdict);
+            // Once believed it keeps its name while it is followed.
+            let kept = NAMING.judge(&mut lamp, None, expected, &map);
+            assert_eq!(kept, Verdict::Named(uid, Identity::Joined));
+        }
+    }
+
+    /// Within the gate the expected lamp, between two lamps none.
+    #[test]
+    fn a_far_lamp_takes_the_expected_name() {
+        let map = tunnel("manchester");
+        let s = map.lamps[20].chainage_m;
+        let named = Verdict::Named(map.lamps[20].uid, Identity::Predicted);
+        for off in [-3.9, 0.0, 3.9] {
+            assert_eq!(
+                NAMING.judge(&mut followed(), None, at(s + off), &map),
+                named
+            );
+        }
+        assert_eq!(
+            NAMING.judge(&mut followed(), None, at(s + 4.5), &map),
+            Verdict::Unknown
+        );
+        assert_eq!(
+            NAMING.judge(&mut followed(), None, None, &map),
+            Verdict::Unknown
+        );
+    }
+}

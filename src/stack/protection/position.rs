@@ -1,0 +1,245 @@
+//! Where the train is: the last accepted fix, carried on by the odometer, with a sigma that
+//! grows with the distance run.
+//!
+//! The odometer's error is mostly one of scale (wheel diameter), so it grows in proportion to the
+//! distance and not to its root: sigma^2 = sigma_fix^2 + (drift x distance)^2. A fix is taken at
+//! the time when it was true, by the odometer's reading then, and fused by inverse variance; one
+//! too far off is refused. Five refused ones in a row that agree with each other mean that the
+//! train is not where it was thought to be: the last of them is taken.
+
+use super::ProtectionSettings;
+use crate::bus::{OdometerSample, SimTime};
+use std::collections::VecDeque;
+
+/// Odometer samples remembered, for fixes that come late.
+const HISTORY: usize = 256;
+/// Refused fixes in a row that overrule the estimate.
+const OVERRULE: u32 = 5;
+
+/// A chainage and the odometer's reading there.
+#[derive(Clone, Copy, Debug)]
+struct Anchor {
+    chainage_m: f64,
+    sigma_m: f64,
+    odometer_m: f64,
+}
+
+impl Anchor {
+    fn carried(&self, odometer_m: f64, drift: f64) -> Estimate {
+        let run_m = odometer_m - self.odometer_m;
+        Estimate {
+            chainage_m: self.chainage_m + run_m,
+            sigma_m: self.sigma_m.hypot(drift * run_m),
+        }
+    }
+}
+
+/// Chainage of the train head and one sigma of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Estimate {
+    pub chainage_m: f64,
+    pub sigma_m: f64,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Position {
+    drift: f64,
+    floor_m: f64,
+    gate: f64,
+    samples: VecDeque<OdometerSample>,
+    anchor: Option<Anchor>,
+    /// Refused in a row, and the last of them.
+    refused: u32,
+    refused_anchor: Option<Anchor>,
+}
+
+impl Position {
+    pub fn new(settings: &ProtectionSettings) -> Self {
+        Self {
+            drift: settings.odometer_drift,
+            floor_m: settings.sigma_floor_m,
+            gate: settings.gate_sigmas,
+            samples: VecDeque::with_capacity(HISTORY),
+            anchor: settings.initial_chainage_m.map(|chainage_m| Anchor {
+                chainage_m,
+                sigma_m: settings.initial_sigma_m,
+                odometer_m: 0.0,
+            }),
+            refused: 0,
+            refused_anchor: None,
+        }
+    }
+
+    pub fn on_odometer(&mut self, sample: &OdometerSample) {
+        let Some(last) = self.samples.back() else {
+            // Whatever it counted before, the position setting holds here.
+            if let Some(anchor) = &mut self.anchor {
+                anchor.odometer_m = sample.distance_m;
+            }
+            self.samples.push_back(*sample);
+            return;
+        };
+        if sample.time <= last.time {
+            return;
+        }
+        if self.samples.len() == HISTORY {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(*sample);
+    }
+
+    /// A position that may be wrong (from the lamps).
+    pub fn on_fix(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
+        if !(chainage_m.is_finite() && sigma_m.is_finite() && sigma_m >= 0.0) {
+            return;
+        }
+        let fix = Anchor {
+            chainage_m,
+            sigma_m: sigma_m.max(self.floor_m),
+            odometer_m: self.odometer_at(time),
+        };
+        let Some(anchor) = self.anchor else {
+            self.anchor = Some(fix);
+            return;
+        };
+        let predicted = anchor.carried(fix.odometer_m, self.drift);
+        let off_m = fix.chainage_m - predicted.chainage_m;
+        if off_m.abs() > self.gate * predicted.sigma_m.hypot(fix.sigma_m) {
+            self.refuse(fix);
+            return;
+        }
+        let (p, r) = (predicted.sigma_m.powi(2), fix.sigma_m.powi(2));
+        let gain = p / (p + r);
+        self.accept(Anchor {
+            chainage_m: predicted.chainage_m + gain * off_m,
+            sigma_m: (p * r / (p + r)).sqrt().max(self.floor_m),
+            odometer_m: fix.odometer_m,
+        });
+    }
+
+    /// A position that is right within its sigma (from a balise).
+    pub fn reset(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
+        let odometer_m = self.odometer_at(time);
+        self.accept(Anchor {
+            chainage_m,
+            sigma_m,
+            odometer_m,
+        });
+    }
+
+    fn accept(&mut self, anchor: Anchor) {
+        self.anchor = Some(anchor);
+        self.refused = 0;
+        self.refused_anchor = None;
+    }
+
+    fn refuse(&mut self, fix: Anchor) {
+        let agrees = self.refused_anchor.is_some_and(|before| {
+            let expected = before.carried(fix.odometer_m, self.drift);
+            (expected.chainage_m - fix.chainage_m).abs()
+                <= self.gate * expected.sigma_m.hypot(fix.sigma_m)
+        });
+        self.refused = if agrees { self.refused + 1 } else { 1 };
+        self.refused_anchor = Some(fix);
+        if self.refused >= OVERRULE {
+            self.accept(fix);
+        }
+    }
+
+    pub fn at(&self, time: SimTime) -> Option<Estimate> {
+        self.anchor
+            .map(|a| a.carried(self.odometer_at(time), self.drift))
+    }
+
+    /// Speed of the last sample.
+    pub fn speed_mps(&self) -> f64 {
+        self.samples.back().map_or(0.0, |s| s.speed_mps.max(0.0))
+    }
+
+    /// Time since the last sample.
+    pub fn age_s(&self, time: SimTime) -> Option<f64> {
+        self.samples.back().map(|s| time.since(s.time))
+    }
+
+    /// The odometer's reading at a time, between samples by their speeds.
+    fn odometer_at(&self, time: SimTime) -> f64 {
+        let Some(last) = self.samples.back() else {
+            return 0.0;
+        };
+        if time >= last.time {
+            // Samples come often; a longer silence is the supervision's business.
+            return last.distance_m + last.speed_mps * time.since(last.time).min(1.0);
+        }
+        let k = self.samples.partition_point(|s| s.time <= time);
+        let Some(before) = k.checked_sub(1).and_then(|k| self.samples.get(k)) else {
+            return self.samples.front().map_or(0.0, |s| s.distance_m);
+        };
+        let after = self.samples.get(k).unwrap_or(last);
+        let share = time.since(before.time) / after.time.since(before.time);
+        before.distance_m + share * (after.distance_m - before.distance_m)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+    use super::*;
+
+    fn driven(settings: &ProtectionSettings, seconds: f64, speed_mps: f64) -> Position {
+        let mut p = Position::new(settings);
+        for k in 0..=(seconds * 20.0).round() as i64 {
+            let t = k as f64 * 0.05;
+            p.on_odometer(&OdometerSample {
+                time: SimTime::from_secs(t),
+                distance_m: 1000.0 + speed_mps * t,
+                speed_mps,
+            });
+        }
+        p
+    }
+
+    /// Sigma must grow with distance, in proportion: 2 % of 400 m is 8 m, with 5 m at the start
+    /// 9.4 m. And the odometer's own count (here from 1000 m) must not matter.
+    #[test]
+    fn sigma_grows_with_the_way() {
+        let settings = ProtectionSettings {
+            initial_chainage_m: Some(50.0),
+            ..Default::default()
+        };
+        let p = driven(&settings, 20.0, 20.0);
+        let e = p.at(SimTime::from_secs(20.0)).unwrap();
+        assert!((e.chainage_m - 450.0).abs() < 1e-9);
+        assert!((e.sigma_m - 5f64.hypot(8.0)).abs() < 1e-9);
+    }
+
+    /// A fix of a second ago counts where it was true, not where the train is now.
+    #[test]
+    fn a_late_fix_is_carried() {
+        let mut p = driven(&ProtectionSettings::default(), 20.0, 20.0);
+        assert_eq!(p.at(SimTime::from_secs(20.0)), None);
+        p.on_fix(SimTime::from_secs(19.01), 700.0, 0.4);
+        let e = p.at(SimTime::from_secs(20.0)).unwrap();
+        assert!((e.chainage_m - 719.8).abs() < 1e-9);
+    }
+
+    /// Fusion by inverse variance, one outlier refused, five that agree believed.
+    #[test]
+    fn fixes_are_gated() {
+        let mut p = driven(&ProtectionSettings::default(), 1.0, 0.0);
+        let t = SimTime::from_secs(1.0);
+        p.on_fix(t, 100.0, 2.0);
+        p.on_fix(t, 103.0, 1.0);
+        let e = p.at(t).unwrap();
+        assert!((e.chainage_m - 102.4).abs() < 1e-9);
+        assert!((e.sigma_m - 0.8f64.sqrt()).abs() < 1e-9);
+        for _ in 0..4 {
+            p.on_fix(t, 160.0, 1.0);
+        }
+        assert!((p.at(t).unwrap().chainage_m - 102.4).abs() < 1e-9);
+        p.on_fix(t, 160.0, 1.0);
+        assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
+        // Not a number changes nothing.
+        p.on_fix(t, f64::NAN, 1.0);
+        assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,345 @@
+//! From the file as written to a [`Tunnel`]: every number checked, every problem collected.
+
+mod devices;
+mod lamps;
+mod line;
+mod sections;
+
+use super::file::TunnelFile;
+use super::gauge::Gauge;
+use super::problem::{FileError, Problem};
+use super::section::OutlinePoint;
+use super::{Tunnel, read_toml};
+use std::path::Path;
+
+/// Chainages closer than this are the same place.
+const SAME_M: f64 = 1e-6;
+/// No line is longer: chainages stay exact to a nanometre.
+const LONGEST_M: f64 = 1e6;
+
+impl Tunnel {
+    /// Reads and checks a tunnel file.
+    pub fn load(path: impl AsRef<Path>) -> Result<Self, FileError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| FileError::Read {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::from_toml(&text)
+    }
+
+    /// Reads and checks the text of a tunnel file. [`super::locate`] finds the keys of the
+    /// problems in the text again.
+    pub fn from_toml(text: &str) -> Result<Self, FileError> {
+        Self::from_file(&read_toml(text)?)
+    }
+
+    /// Checks a tunnel as written.
+    pub fn from_file(file: &TunnelFile) -> Result<Self, FileError> {
+        let mut problems = Vec::new();
+        let tunnel = check(file, &mut problems);
+        if problems.is_empty() {
+            Ok(tunnel)
+        } else {
+            Err(FileError::Problems(problems))
+        }
+    }
+}
+
+fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
+    if file.name.trim().is_empty() {
+        problems.push(Problem::new("name", "is empty", "give the tunnel a name"));
+    }
+    let line_number = f64::from(file.line_number);
+    Problem::unless_within(problems, "line_number", line_number, 0.0..=15.0, "");
+    Problem::unless_within(problems, "ambient_lx", file.ambient_lx, 0.0..=1e5, "lx");
+    let alignment = line::alignment(file, problems);
+    let sections = sections::sections(&file.sections, alignment.length_m(), problems);
+    let mut tunnel = Tunnel {
+        name: file.name.clone(),
+        alignment,
+        sections,
+        lamps: Vec::new(),
+        wayside: Vec::new(),
+        balises: devices::balises(file),
+        base_stations: devices::base_stations(file),
+        line_number: file.line_number,
+        stations: devices::stations(file),
+        ambient_lx: file.ambient_lx,
+    };
+    tunnel.lamps = lamps::place(file, &tunnel, problems);
+    tunnel.wayside = devices::wayside(file, &tunnel, problems);
+    devices::check(file, &tunnel, problems);
+    tunnel
+}
+
+/// Whether a chainage is on the line; a problem if not.
+fn on_line(key: impl Into<String>, s_m: f64, tunnel: &Tunnel, problems: &mut Vec<Problem>) -> bool {
+    let length_m = tunnel.alignment.length_m();
+    let on = (-SAME_M..=length_m + SAME_M).contains(&s_m);
+    if !on {
+        problems.push(Problem::new(
+            key,
+            format!("{s_m} m is outside of the line"),
+            format!("give 0 to {length_m} m"),
+        ));
+    }
+    on
+}
+
+/// Problems where any of some points (l, h) lies in the rock or where the train runs.
+fn free_standing(
+    key: &str,
+    tunnel: &Tunnel,
+    s_m: f64,
+    points: &[OutlinePoint],
+    problems: &mut Vec<Problem>,
+) {
+    let Some(section) = tunnel.section_at(s_m) else {
+        return;
+    };
+    let gauge = Gauge::b1(tunnel.alignment.at(s_m).curvature_per_m);
+    if let Some(p) = points.iter().find(|p| !section.contains(p.l_m, p.h_m)) {
+        problems.push(Problem::new(
+            key,
+            format!(
+                "at chainage {s_m} m its point l = {:.3} m, h = {:.3} m is inside the rock, {:.3} m \
+                 behind the wall",
+                p.l_m,
+                p.h_m,
+                section.distance_m(p.l_m, p.h_m)
+            ),
+            "move it into the tunnel: smaller `lateral_m`, or another `height_m`",
+        ));
+    } else if let Some(p) = points.iter().find(|p| gauge.contains(p.l_m, p.h_m)) {
+        problems.push(Problem::new(
+            key,
+            format!(
+                "at chainage {s_m} m its point l = {:.3} m, h = {:.3} m is inside the structure gauge",
+                p.l_m, p.h_m
+            ),
+            "move it towards the wall: larger `lateral_m`",
+        ));
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::track::TrackPoint;
+
+    const CHENGDU: &str = include_str!("../../../tunnels/chengdu_line1.toml");
+    const BENCH: &str = include_str!("../../../tunnels/test_bench.toml");
+
+    fn problems(text: &str) -> Vec<Problem> {
+        match Tunnel::from_toml(text) {
+            Err(FileError::Problems(problems)) => problems,
+            Err(other) => panic!("{other}"),
+            Ok(_) => Vec::new(),
+        }
+    }
+
+    /// Distances of the paper's rig: its camera hangs 1.7 m aside of the lamps and 1.5 m below.
+    #[test]
+    fn val_shipped_tunnels_have_the_figures_of_the_paper() {
+        let line = Tunnel::from_toml(CHENGDU).unwrap();
+        assert_eq!(line.lamps.len(), 299);
+        assert!((line.alignment.length_m() - 3000.0).abs() < 1e-12);
+        for pair in line.lamps.windows(2) {
+            assert!((pair[1].chainage_m - pair[0].chainage_m - 10.0).abs() < 1e-9);
+            assert_eq!(pair[1].uid.lamp, pair[0].uid.lamp + 1);
+        }
+        for device in &line.wayside {
+            let ahead_m = device.chainage_m - line.balise(&device.balise).unwrap().chainage_m;
+            assert!((300.0..=500.0).contains(&ahead_m));
+        }
+        let bench = Tunnel::from_toml(BENCH).unwrap();
+        assert_eq!(bench.lamps.len(), 1);
+        for lamp in line.lamps.iter().chain(&bench.lamps) {
+            let camera = (lamp.lateral_m - 1.7, lamp.height_m - 1.5);
+            assert!(camera.0.abs() < 1.4 && (1.1..3.8).contains(&camera.1));
+            assert!((lamp.power_w - 21.0).abs() < 1e-12 && (lamp.beam_deg - 60.0).abs() < 1e-12);
+        }
+    }
+
+    /// Provokes: a lamp that faces the wall, or trains that go away from it.
+    #[test]
+    fn lamps_face_the_trains_that_come() {
+        let line = Tunnel::from_toml(CHENGDU).unwrap();
+        for lamp in &line.lamps {
+            let back = TrackPoint {
+                s_m: lamp.chainage_m - 5.0,
+                l_m: 1.0,
+                h_m: 1.7,
+            };
+            let to_camera = line.alignment.world_from_track(back) - lamp.centre;
+            assert!(lamp.facing.dot(&to_camera.normalize()) > 30f64.to_radians().cos());
+            let at = line
+                .alignment
+                .track_from_world(&lamp.centre, lamp.chainage_m);
+            assert!((at.s_m - lamp.chainage_m).abs() < 1e-9);
+            assert!((at.l_m - 2.70).abs() < 1e-9 && (at.h_m - 3.20).abs() < 1e-9);
+        }
+    }
+
+    /// Clothoids take their ends from their neighbours, and cant goes with curvature.
+    #[test]
+    fn clothoids_join_their_neighbours() {
+        let line = Tunnel::from_toml(CHENGDU).unwrap().alignment;
+        let middle = line.at(430.0);
+        assert!((middle.curvature_per_m - 0.5 / 500.0).abs() < 1e-12);
+        assert!((middle.roll_rad + (0.05f64 / 1.5).asin()).abs() < 1e-12);
+        assert!((line.at(1900.0).curvature_per_m + 1.0 / 350.0).abs() < 1e-15);
+    }
+
+    /// Provokes: a checker that stops at the first fault, or that passes one of them.
+    #[test]
+    fn every_fault_is_told_with_its_key() {
+        let cases: [(&str, &str, &str); 16] = [
+            ("spacing_m = 10.0", "spacing_mm = 10.0", "lamps.spacing_mm"),
+            ("radius_m = 500.0", "radius_m = -500.0", "plan[2].radius_m"),
+            (
+                "from_m = 60.0",
+                "from_m = 60.0\nto_m = 200.0",
+                "sections[2].from_m",
+            ),
+            ("lateral_m = 2.70", "lateral_m = 2.95", "lamps"),
+            ("lateral_m = 2.70", "lateral_m = 1.20", "lamps"),
+            ("spacing_m = 10.0", "spacing_m = 2.0", "lamps.spacing_m"),
+            (
+                "balise = \"B1110\"",
+                "balise = \"B1111\"",
+                "wayside[0].balise",
+            ),
+            (
+                "chainage_m = 2000.0",
+                "chainage_m = 3200.0",
+                "balises[2].chainage_m",
+            ),
+            (
+                "grade_permille = 28.0",
+                "grade_permille = 72.0",
+                "grades[4].grade_permille",
+            ),
+            (
+                "vertical_radius_m = 3000.0",
+                "vertical_radius_m = 90000.0",
+                "grades[2].from_m",
+            ),
+            ("cant_mm = 100.0", "cant_mm = 180.0", "plan[2].cant_mm"),
+            ("line_number = 1", "line_number = 16", "line_number"),
+            ("name = \"B2600\"", "name = \"B2000\"", "balises[3].name"),
+            (
+                "first_number = 1",
+                "first_number = \"x\"",
+                "lamps.first_number",
+            ),
+            ("turn = \"left\"", "turn = \"lefd\"", "plan[2].turn"),
+            (
+                "platform = \"right\"",
+                "radius_m = 3.0",
+                "sections[1].radius_m",
+            ),
+        ];
+        for (right, wrong, key) in cases {
+            assert!(CHENGDU.contains(right), "{right}");
+            let text = CHENGDU.replacen(right, wrong, 1);
+            let found = problems(&text);
+            assert!(found.iter().any(|p| p.key == key), "{wrong}: {found:?}");
+        }
+    }
+
+    /// Provokes: faults of different tables that hide each other.
+    #[test]
+    fn faults_are_collected() {
+        let text = CHENGDU
+            .replacen("radius_m = 500.0", "radius_m = -500.0", 1)
+            .replacen("grade_permille = 28.0", "grade_permille = 72.0", 1)
+            .replacen("lateral_m = 2.70", "lateral_m = 2.95", 1)
+            .replacen("balise = \"B1110\"", "balise = \"B1111\"", 1);
+        let found = problems(&text);
+        assert_eq!(found.len(), 4, "{found:#?}");
+        for p in &found {
+            assert!(crate::track::locate(&text, &p.key).is_some());
+        }
+        assert!(found.iter().any(|p| p.remedy == "did you mean \"B1110\"?"));
+    }
+
+    #[test]
+    fn single_lamps_are_checked_too() {
+        let more = |lamp: &str| problems(&format!("{CHENGDU}\n[[lamp]]\n{lamp}"));
+        let found = more("number = 7\nchainage_m = 1234.0");
+        assert_eq!(found[0].key, "lamp[0].number");
+        let found = more("number = 1024\nchainage_m = 4321.0");
+        assert_eq!(found.len(), 2);
+        assert_eq!(
+            more("number = 500\nchainage_m = 1234.0\nlateral_m = -0.5")[0].key,
+            "lamp[0]"
+        );
+        assert!(more("number = 500\nchainage_m = 1234.0\nlateral_m = -2.6").is_empty());
+    }
+
+    /// Provokes: a panic, a hang or a huge allocation by any number of a file.
+    #[test]
+    fn no_number_makes_it_panic() {
+        for text in [CHENGDU, BENCH] {
+            for (at, _) in text.match_indices(" = ").map(|(at, m)| (at + m.len(), m)) {
+                let rest = &text[at..];
+                let end = rest.find(['\n', ' ']).unwrap_or(rest.len());
+                if rest[..end].parse::<f64>().is_err() {
+                    continue;
+                }
+                for odd in [
+                    "nan", "inf", "-inf", "-1.0", "0.0", "1e300", "1e-300", "65535",
+                ] {
+                    let odd_text = format!("{}{odd}{}", &text[..at], &rest[end..]);
+                    if let Ok(tunnel) = Tunnel::from_toml(&odd_text) {
+                        let s_m = 0.5 * tunnel.alignment.length_m();
+                        assert!(tunnel.alignment.at(s_m).origin.x.is_finite());
+                    }
+                }
+            }
+        }
+    }
+
+    /// Provokes: a mined section whose arch cannot be built, refused keys, and the defaults.
+    #[test]
+    fn every_kind_of_section_is_read() {
+        let line = "name = 't'\n[[plan]]\nkind = 'straight'\nlength_m = 50.0\n";
+        let with = |section: &str| format!("{line}[[sections]]\nfrom_m = 0.0\n{section}");
+        for kind in ["circular", "horseshoe", "rectangular", "open"] {
+            let tunnel = Tunnel::from_toml(&with(&format!("kind = '{kind}'"))).unwrap();
+            let section = tunnel.section_at(25.0).unwrap();
+            assert_eq!(section.closed, kind != "open");
+            assert!(section.contains(0.0, 3.0) && !section.contains(0.0, -1.0));
+        }
+        let key = |section: &str| problems(&with(section))[0].key.clone();
+        assert_eq!(
+            key("kind = 'horseshoe'\nspringing_m = 4.8"),
+            "sections[0].springing_m"
+        );
+        assert_eq!(
+            key("kind = 'open'\nwalkway = 'left'"),
+            "sections[0].walkway"
+        );
+        assert_eq!(
+            key("kind = 'rectangular'\nplatform_edge_m = 1.5"),
+            "sections[0].platform_edge_m"
+        );
+        assert_eq!(
+            key("kind = 'rectangular'\nplatform = 'left'\nwalkway = 'left'"),
+            "sections[0].walkway"
+        );
+    }
+
+    #[test]
+    fn a_file_that_is_not_there_is_told() {
+        let error = Tunnel::load("/no/such/tunnel.toml").unwrap_err();
+        assert!(
+            error
+                .to_string()
+                .starts_with("cannot read /no/such/tunnel.toml")
+        );
+    }
+}

@@ -1,0 +1,246 @@
+//! The program as a user meets it: wrong input is named with file, key and remedy, ends with
+//! exit code 2, and leaves nothing behind.
+#![cfg(feature = "twin")]
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
+
+/// A folder of its own for each test, empty at the start.
+fn folder(test: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
+    if folder.exists() {
+        fs::remove_dir_all(&folder).expect("old results can be removed");
+    }
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    folder
+}
+
+fn metrotwin(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_metrotwin"))
+        .args(args)
+        .current_dir(REPOSITORY)
+        .env("NO_COLOR", "1")
+        .output()
+        .expect("the program starts")
+}
+
+/// A right scenario on the test bench, in which `from` is replaced by `to`.
+fn scenario(folder: &Path, from: &str, to: &str) -> PathBuf {
+    let tunnel = Path::new(REPOSITORY).join("tunnels/test_bench.toml");
+    let text = format!(
+        "name = \"wrong\"\n\
+         tunnel = '{}'\n\
+         duration_s = 0.2\n\
+         [train]\n\
+         start_chainage_m = 150.0\n\
+         cruise_speed_kmh = 30.0\n\
+         [rig]\n\
+         yaw_deg = 39.0\n\
+         exposure_us = 30.0\n",
+        tunnel.display()
+    );
+    assert!(text.contains(from), "the scenario has no `{from}`");
+    let file = folder.join("wrong.toml");
+    fs::write(&file, text.replace(from, to)).expect("the scenario can be written");
+    file
+}
+
+/// A shipped tunnel in which the first `from` is replaced by `to`, and a scenario on it.
+fn on_tunnel(folder: &Path, shipped: &str, from: &str, to: &str) -> (PathBuf, PathBuf) {
+    let path = Path::new(REPOSITORY).join("tunnels").join(shipped);
+    let text = fs::read_to_string(path).expect("the shipped tunnel can be read");
+    assert!(text.contains(from), "{shipped} has no `{from}`");
+    let tunnel = folder.join("tunnel.toml");
+    fs::write(&tunnel, text.replacen(from, to, 1)).expect("the tunnel can be written");
+    let file = folder.join("on_tunnel.toml");
+    let text = "name = \"on_tunnel\"\ntunnel = \"tunnel.toml\"\nduration_s = 0.2\n[train]\n";
+    fs::write(&file, text).expect("the scenario can be written");
+    (tunnel, file)
+}
+
+/// `run` and `check` both refuse the scenario, and say each of `words`; nothing is written.
+fn refused(folder: &Path, file: &Path, words: &[&str]) {
+    let file = file.to_str().expect("the path is UTF-8");
+    let out = folder.join("out");
+    let out_text = out.to_str().expect("the path is UTF-8");
+    for args in [vec!["run", file, "--out", out_text], vec!["check", file]] {
+        let output = metrotwin(&args);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{args:?} said: {said}");
+        for word in words {
+            assert!(said.contains(word), "{args:?} does not say `{word}`, but: {said}");
+        }
+        assert!(output.stdout.is_empty(), "{args:?} printed a result");
+    }
+    assert!(!out.exists(), "the folder of results was touched");
+}
+
+/// What the cases below replace must be right before.
+#[test]
+fn the_scenario_of_these_tests_is_right() {
+    let folder = folder("right");
+    let file = scenario(&folder, "0.2", "0.2");
+    let output = metrotwin(&["check", file.to_str().expect("the path is UTF-8")]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+}
+
+#[test]
+fn unknown_key() {
+    let folder = folder("unknown_key");
+    let file = scenario(&folder, "cruise_speed_kmh", "cruse_speed_kmh");
+    let words = ["wrong.toml:6", "train.cruse_speed_kmh", "did you mean `cruise_speed_kmh`"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn wrong_unit() {
+    let folder = folder("wrong_unit");
+    let file = scenario(&folder, "exposure_us = 30.0", "exposure_ms = 0.03");
+    let words = ["wrong.toml:9", "rig.exposure_ms", "did you mean `exposure_us`"];
+    refused(&folder, &file, &words);
+}
+
+/// Several wrong values are shown at once, each with its own place.
+#[test]
+fn all_problems_at_once() {
+    let folder = folder("all_problems");
+    let file = scenario(&folder, "exposure_us = 30.0", "exposure_us = 50_000.0\npixel_um = -1.0");
+    let exposure = "rig.exposure_us: an exposure of 50000 us is longer than the frame";
+    let words = [exposure, "expose for less than 33333 us", "rig.pixel_um", "3.75"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn more_rows_than_a_frame_has_time_for() {
+    let folder = folder("rows");
+    let file = scenario(&folder, "exposure_us = 30.0", "line_time_us = 50.0");
+    let words = ["rig.height_px", "720 rows of 50 us", "read at most 667 rows"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn missing_file() {
+    let folder = folder("missing_file");
+    let words = ["cannot read", "nowhere.toml", "check the path"];
+    refused(&folder, &folder.join("nowhere.toml"), &words);
+}
+
+#[test]
+fn missing_tunnel() {
+    let folder = folder("missing_tunnel");
+    let file = scenario(&folder, "test_bench.toml", "test_bunch.toml");
+    let words = ["wrong.toml:2", "tunnel: cannot read", "test_bunch.toml", "give the path"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn not_toml() {
+    let folder = folder("not_toml");
+    let file = scenario(&folder, "[rig]", "[rig");
+    refused(&folder, &file, &["wrong.toml:7", "not TOML"]);
+}
+
+#[test]
+fn lamp_inside_the_rock() {
+    let folder = folder("lamp_in_rock");
+    let (from, to) = ("lateral_m = 2.70", "lateral_m = 4.70");
+    let (tunnel, file) = on_tunnel(&folder, "test_bench.toml", from, to);
+    let words = ["tunnel.toml:", "lateral_m", "4.7", "help:"];
+    refused(&folder, &file, &words);
+    let output = metrotwin(&["check", tunnel.to_str().expect("the path is UTF-8")]);
+    assert_eq!(output.status.code(), Some(2), "{output:?}");
+}
+
+#[test]
+fn negative_radius() {
+    let folder = folder("negative_radius");
+    let (from, to) = ("radius_m = 500.0", "radius_m = -500.0");
+    let (_, file) = on_tunnel(&folder, "chengdu_line1.toml", from, to);
+    let words = ["tunnel.toml:", "plan[2].radius_m", "-500", "help:"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn rig_that_never_sees_a_lamp() {
+    let folder = folder("blind_rig");
+    let file = scenario(&folder, "yaw_deg = 39.0", "yaw_deg = -120.0");
+    let words = ["wrong.toml:8", "rig.yaw_deg", "never sees a whole lamp", "yaw_deg = 39"];
+    refused(&folder, &file, &words);
+}
+
+#[test]
+fn train_that_begins_outside() {
+    let folder = folder("outside");
+    let file = scenario(&folder, "150.0", "100.0");
+    let words = ["train.start_chainage_m", "begins outside", "start at 118.0 m"];
+    refused(&folder, &file, &words);
+}
+
+/// The file is right, so the message must not point into it.
+#[test]
+fn wrong_override() {
+    let folder = folder("wrong_override");
+    let file = scenario(&folder, "0.2", "0.2");
+    let file = file.to_str().expect("the path is UTF-8");
+    let out = folder.join("out");
+    let out_text = out.to_str().expect("the path is UTF-8");
+    for (change, words) in [
+        ("train.cars=9", ["train.cars: 9 cars", "(--set train.cars=9)", "use 1 to 6"]),
+        ("train.crs=9", ["right by itself, but not with --set", "train.crs", "did you mean `cars`"]),
+        ("obstacles[0].mass_kg=1", ["--set", "obstacles", "no keys of its own"]),
+        ("train.cars", ["key=value", "train.cars", "--set"]),
+    ] {
+        let output = metrotwin(&["run", file, "--out", out_text, "--set", change]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{change} said: {said}");
+        for word in words {
+            assert!(said.contains(word), "{change} does not say `{word}`, but: {said}");
+        }
+        assert!(!said.contains("wrong.toml:"), "{change} is blamed on the file: {said}");
+    }
+    assert!(!out.exists(), "the folder of results was touched");
+}
+
+/// A file stands where a folder should: that stops the superuser too.
+#[test]
+fn unwritable_out_folder() {
+    let folder = folder("unwritable");
+    let file = scenario(&folder, "0.2", "0.2");
+    let obstacle = folder.join("obstacle");
+    fs::write(&obstacle, "kept").expect("a file can be written");
+    let out = obstacle.join("results");
+    let output = metrotwin(&[
+        "run",
+        file.to_str().expect("the path is UTF-8"),
+        "--out",
+        out.to_str().expect("the path is UTF-8"),
+    ]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "said: {said}");
+    for word in ["cannot write into", "results", "--out"] {
+        assert!(said.contains(word), "does not say `{word}`, but: {said}");
+    }
+    assert_eq!(fs::read_to_string(&obstacle).ok().as_deref(), Some("kept"));
+}
+
+/// Every shipped file is right, and the report has the figures that a user plans with.
+#[test]
+fn shipped_files_are_right() {
+    let output = metrotwin(&[
+        "check",
+        "scenarios/static_bench.toml",
+        "scenarios/line_run.toml",
+        "scenarios/forgotten_toolbox.toml",
+        "tunnels/test_bench.toml",
+        "tunnels/chengdu_line1.toml",
+    ]);
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    for word in ["about 200 pairs", "seen whole by both eyes", "299 lamps", "radius 350 m", "W1530"] {
+        assert!(said.contains(word), "the report does not say `{word}`: {said}");
+    }
+}

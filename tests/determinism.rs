@@ -1,0 +1,109 @@
+//! Same seed, same bytes: images, words of the stack, figures. Provokes: noise or threads that
+//! depend on order, wall time that leaks into results, seeds that are not used.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use metrotwin::scenario::Scenario;
+use metrotwin::session::{
+    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Summary, run,
+};
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::path::Path;
+
+/// Hashes every image and everything said of it.
+#[derive(Default)]
+struct Digest {
+    hasher: DefaultHasher,
+    images: usize,
+}
+
+impl Observer for Digest {
+    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
+        Ok(())
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match event {
+            Event::Pair(pair, report, truths_m) => {
+                pair.left.image.as_raw().hash(&mut self.hasher);
+                pair.right.image.as_raw().hash(&mut self.hasher);
+                format!("{report:?}{truths_m:?}").hash(&mut self.hasher);
+                self.images += 2;
+            }
+            Event::Wayside(_, time, image, report) => {
+                image.as_raw().hash(&mut self.hasher);
+                format!("{time:?}{:?}{:?}", report.blobs, report.obstacles).hash(&mut self.hasher);
+                self.images += 1;
+            }
+            other => format!("{other:?}").hash(&mut self.hasher),
+        }
+        Ok(())
+    }
+
+    fn close(&mut self) -> Result<(), ObserverError> {
+        Ok(())
+    }
+}
+
+/// The first second and a half of the toolbox case, with the train already on its way.
+fn digest(seed: u64, renderer: RendererChoice) -> (u64, usize, serde_json::Value) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios/forgotten_toolbox.toml");
+    let overrides = [
+        format!("seed={seed}"),
+        "duration_s=1.0".to_owned(),
+        "train.start_speed_kmh=60".to_owned(),
+    ];
+    let overrides: Vec<_> = overrides.iter().map(|o| o.parse().unwrap()).collect();
+    let scenario = Scenario::load(&path, &overrides).unwrap();
+    let options = RunOptions {
+        renderer,
+        ..RunOptions::default()
+    };
+    let mut digest = Digest::default();
+    let summary = run(&scenario, &options, &mut [&mut digest]).unwrap();
+    (
+        digest.hasher.finish(),
+        digest.images,
+        without_wall_times(&summary),
+    )
+}
+
+fn without_wall_times(summary: &Summary) -> serde_json::Value {
+    fn strip(value: &mut serde_json::Value) {
+        if let Some(object) = value.as_object_mut() {
+            for key in [
+                "wall_s",
+                "real_time_factor",
+                "us_per_step",
+                "ms_per_frame",
+                "wall_shares_s",
+            ] {
+                object.remove(key);
+            }
+            object.values_mut().for_each(strip);
+        }
+    }
+    let mut value = serde_json::to_value(summary).unwrap();
+    strip(&mut value);
+    value
+}
+
+fn same_seed_same_bytes(renderer: RendererChoice) {
+    let (first, images, summary) = digest(7, renderer);
+    assert!(images > 60, "only {images} images were compared");
+    let (second, _, again) = digest(7, renderer);
+    assert_eq!(first, second, "two runs with one seed differ");
+    assert_eq!(summary, again);
+    let (other, ..) = digest(8, renderer);
+    assert_ne!(first, other, "the seed changes nothing");
+}
+
+#[test]
+fn same_seed_same_bytes_on_the_graphics_adapter() {
+    same_seed_same_bytes(RendererChoice::Gpu);
+}
+
+#[test]
+fn same_seed_same_bytes_on_the_plain_renderer() {
+    same_seed_same_bytes(RendererChoice::Cpu);
+}
