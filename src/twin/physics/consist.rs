@@ -213,8 +213,7 @@ impl Consist {
     /// Half extents of a car's box, from its underside to its roof.
     pub(super) fn half_extents_m(&self) -> Vector3<f64> {
         let s = &self.settings;
-        // Half a metre of gangway between the cars.
-        Vector3::new(s.car_length_m - 0.5, s.width_m, s.height_m - UNDERSIDE_M) / 2.0
+        Vector3::new(s.car_length_m, s.width_m, s.height_m - UNDERSIDE_M) / 2.0
     }
 
     /// Centre of a car's box over its centre of gravity.

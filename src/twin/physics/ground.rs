@@ -21,28 +21,6 @@ const FRICTION: f64 = 0.6;
 const BEHIND_M: f64 = 12.0;
 const AHEAD_M: f64 = 60.0;
 
-/// Height of the highest floor at (s, l) that one can step on, over top of rail.
-pub(super) fn floor_m(tunnel: &Tunnel, s_m: f64, l_m: f64) -> f64 {
-    let Some(section) = tunnel.section_at(s_m) else {
-        return BED_M;
-    };
-    let floors = section.edges().filter_map(|e| height_of_floor(&e, l_m));
-    floors.reduce(f64::max).unwrap_or(BED_M)
-}
-
-fn height_of_floor(edge: &Edge, l_m: f64) -> Option<f64> {
-    let walkable = matches!(
-        edge.material,
-        Material::Bed | Material::Walkway | Material::Platform
-    );
-    let (low, high) = (edge.a.l_m.min(edge.b.l_m), edge.a.l_m.max(edge.b.l_m));
-    let level = edge.normal().1 > 0.7;
-    (walkable && level && (low..=high).contains(&l_m)).then(|| {
-        let share = (l_m - edge.a.l_m) / (edge.b.l_m - edge.a.l_m);
-        edge.a.h_m + share * (edge.b.h_m - edge.a.h_m)
-    })
-}
-
 /// The slabs laid so far.
 #[derive(Default)]
 pub(super) struct Ground {

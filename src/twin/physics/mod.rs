@@ -345,7 +345,7 @@ impl World {
         let drawn = self.obstacles.iter().filter_map(|o| o.draw(&self.rapier));
         let mut bodies: Vec<Body> = drawn.collect();
         for worker in &self.settings.workers {
-            worker.draw(&self.tunnel, self.time.secs(), &mut bodies);
+            worker.draw(&self.tunnel.alignment, self.time.secs(), &mut bodies);
         }
         bodies
     }
@@ -423,7 +423,7 @@ impl World {
         }
         for k in 0..self.put_down.len() {
             if !self.put_down[k] {
-                if let Some(load) = self.settings.workers[k].put_down(&self.tunnel, now) {
+                if let Some(load) = self.settings.workers[k].put_down(now) {
                     self.put_down[k] = true;
                     self.insert(&load);
                 }

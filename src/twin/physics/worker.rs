@@ -1,9 +1,8 @@
 //! People on the line: they walk where their path says, and may leave something behind.
 
-use super::ground::floor_m;
 use super::obstacle::ObstacleSettings;
 use super::settings::{join, within};
-use crate::track::{Problem, TrackPoint, Tunnel};
+use crate::track::{Alignment, BED_M, Problem, TrackPoint};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -29,8 +28,8 @@ pub struct WorkerSettings {
     pub name: String,
     /// Height of the body, metres.
     pub stature_m: f64,
-    /// Height of the ground he walks on above top of rail, metres; the tunnel's floor where absent.
-    pub ground_m: Option<f64>,
+    /// Height of the ground he walks on above top of rail, metres: the track bed's where absent.
+    pub ground_m: f64,
     /// Share of light that his clothes reflect, 0 to 1.
     pub albedo: f64,
     /// Where he is when.
@@ -46,7 +45,7 @@ impl Default for WorkerSettings {
         Self {
             name: "worker".to_owned(),
             stature_m: 1.75,
-            ground_m: None,
+            ground_m: BED_M,
             albedo: 0.4,
             path: Vec::new(),
             carries: None,
@@ -59,9 +58,7 @@ impl WorkerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         within(problems, at, "stature_m", self.stature_m, 1.0, 2.3, "m");
-        if let Some(ground) = self.ground_m {
-            within(problems, at, "ground_m", ground, -2.0, 2.0, "m");
-        }
+        within(problems, at, "ground_m", self.ground_m, -2.0, 2.0, "m");
         within(problems, at, "albedo", self.albedo, 0.0, 1.0, "");
         if let Some(carried) = &self.carries {
             carried.check(&join(at, "carries"), problems);
@@ -147,7 +144,7 @@ impl WorkerSettings {
     }
 
     /// What he has put down by now, to be dropped beside him.
-    pub(super) fn put_down(&self, tunnel: &Tunnel, t_s: f64) -> Option<ObstacleSettings> {
+    pub(super) fn put_down(&self, t_s: f64) -> Option<ObstacleSettings> {
         let (carried, when) = (self.carries.as_ref()?, self.puts_down_s?);
         if t_s < when {
             return None;
@@ -159,27 +156,23 @@ impl WorkerSettings {
         Some(ObstacleSettings {
             chainage_m: s_m,
             lateral_m: l_m,
-            height_m: self.ground(tunnel, s_m, l_m) + LET_GO_M,
+            height_m: self.ground_m + LET_GO_M,
             yaw_deg: stance.facing_rad.to_degrees(),
             velocity_mps: [0.0; 3],
             ..carried.clone()
         })
     }
 
-    fn ground(&self, tunnel: &Tunnel, s_m: f64, l_m: f64) -> f64 {
-        self.ground_m.unwrap_or_else(|| floor_m(tunnel, s_m, l_m))
-    }
-
     /// Appends his limbs, and what he still carries.
-    pub(super) fn draw(&self, tunnel: &Tunnel, t_s: f64, bodies: &mut Vec<Body>) {
+    pub(super) fn draw(&self, alignment: &Alignment, t_s: f64, bodies: &mut Vec<Body>) {
         let Some(stance) = self.stance(t_s) else {
             return;
         };
-        let frame = tunnel.alignment.at(stance.s_m);
-        let feet = tunnel.alignment.world_from_track(TrackPoint {
+        let frame = alignment.at(stance.s_m);
+        let feet = alignment.world_from_track(TrackPoint {
             s_m: stance.s_m,
             l_m: stance.l_m,
-            h_m: self.ground(tunnel, stance.s_m, stance.l_m),
+            h_m: self.ground_m,
         });
         let turned = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
         let world_from_feet = Isometry3::from_parts(
