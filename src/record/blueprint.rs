@@ -10,11 +10,12 @@ use super::{Contents, images, plots, scene, texts};
 use crate::session::ObserverError;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
-    TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+    TextLogColumns, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
-    BackgroundKind, ContainerKind, Corner2D, Eye3DKind, PanelState, PlayState, RootContainer,
+    BackgroundKind, ContainerKind, Eye3DKind, PanelState, PlayState, RootContainer,
 };
+use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::{
     AsComponents, Color, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId,
     StoreKind, datatypes,
@@ -48,11 +49,6 @@ impl Pane {
 
     fn with(mut self, name: &'static str, property: impl AsComponents + 'static) -> Self {
         self.properties.push((name, Box::new(property)));
-        self
-    }
-
-    fn without(mut self, path: impl AsRef<str>) -> Self {
-        self.contents.push(format!("- /{}/**", path.as_ref()));
         self
     }
 }
@@ -98,42 +94,21 @@ fn layout(contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Node {
     }
     if !contents.devices.is_empty() {
         let devices = contents.devices.iter();
-        let devices = devices.map(|name| (1.0, wayside(name, &WaysidePaths::new(name))));
-        let devices: Vec<_> = devices.collect();
-        right.push((
-            3.6,
-            match <[_; 1]>::try_from(devices) {
-                Ok([(_, only)]) => only,
-                Err(devices) => Node::Split(ContainerKind::Tabs, devices),
-            },
-        ));
+        let devices = tabbed(devices.map(|name| wayside(name, &WaysidePaths::new(name))));
+        right.push((3.6, devices));
     }
-    let mut words = vec![(
-        1.4,
-        Node::Pane(Pane::new("TextLog", "Events", texts::EVENTS)),
-    )];
+    let mut words = vec![(1.9, Node::Pane(events()))];
     if contents.protection {
-        words.insert(
-            0,
-            (
-                1.0,
-                Node::Pane(Pane::new(
-                    "TextDocument",
-                    "Driver's display",
-                    texts::DISPLAY,
-                )),
-            ),
-        );
+        let display = Pane::new("TextDocument", "Driver's display", texts::DISPLAY);
+        words.insert(0, (1.0, Node::Pane(display)));
     }
-    right.push((2.2, row(words)));
+    right.push((2.6, row(words)));
 
-    let mut left = vec![(5.0, Node::Pane(world(contents, eye)))];
-    let plots = plots::groups(contents);
+    let mut left = vec![(4.4, Node::Pane(world(contents, eye)))];
+    let plots = plots::panes(contents);
     for pair in plots.chunks(2) {
-        left.push((
-            2.0,
-            row(pair.iter().map(|group| (1.0, Node::Pane(plot(group))))),
-        ));
+        let panes = pair.iter().map(|tabs| (1.0, tabbed(tabs.iter().map(plot))));
+        left.push((2.2, row(panes)));
     }
     row([(1.0, column(left)), (1.0, column(right))])
 }
@@ -172,14 +147,34 @@ fn wayside(name: &str, paths: &WaysidePaths) -> Node {
     ])
 }
 
-fn plot(group: &plots::Group) -> Pane {
-    Pane::new("TimeSeries", group.title, group.origin).with(
-        "PlotLegend",
-        PlotLegend::new().with_corner(Corner2D::LeftTop),
+/// One node as it is, several as tabs.
+fn tabbed(nodes: impl IntoIterator<Item = Node>) -> Node {
+    let nodes: Vec<_> = nodes.into_iter().map(|node| (1.0, node)).collect();
+    match <[_; 1]>::try_from(nodes) {
+        Ok([(_, only)]) => only,
+        Err(nodes) => Node::Split(ContainerKind::Tabs, nodes),
+    }
+}
+
+fn plot(group: &plots::Group) -> Node {
+    let legend = PlotLegend::new().with_corner(group.legend);
+    Node::Pane(Pane::new("TimeSeries", group.title, group.origin).with("PlotLegend", legend))
+}
+
+/// The log without the column that says that each line is of the log.
+fn events() -> Pane {
+    let columns = [TextLogColumnKind::LogLevel, TextLogColumnKind::Body];
+    let columns = columns.map(|kind| TextLogColumn {
+        kind,
+        visible: true.into(),
+    });
+    Pane::new("TextLog", "Events", texts::EVENTS).with(
+        "TextLogColumns",
+        TextLogColumns::new().with_text_log_columns(columns),
     )
 }
 
-/// The 3-D view: rides along ahead of the train and looks back at its head, or looks at the rig.
+/// The 3-D view. Where there is a train, the eye rides along with its head.
 fn world(contents: &Contents, (position, target): ([f32; 3], [f32; 3])) -> Pane {
     let mut eye = EyeControls3D::new()
         .with_kind(Eye3DKind::Orbital)
@@ -214,12 +209,14 @@ fn write(rerun: &RecordingStream, root: &Node) -> RecordingStreamResult<()> {
             &PanelBlueprint::new().with_state(PanelState::Collapsed),
         )?;
     }
+    // At the latest time: a run is followed as it goes, and a file opens at its end, with all that
+    // was plotted and said.
     rerun.log(
         "time_panel",
         &TimePanelBlueprint::new()
             .with_state(PanelState::Collapsed)
             .with_timeline(SIM_TIME)
-            .with_play_state(PlayState::Paused),
+            .with_play_state(PlayState::Following),
     )
 }
 

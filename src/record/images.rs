@@ -68,9 +68,10 @@ pub(super) fn obstacle_label(o: &DetectedObstacle) -> String {
         DangerLevel::Low => "low",
         DangerLevel::High => "HIGH",
     };
+    // The viewer wraps labels to the width of their box, except at these spaces.
     format!(
-        "{:.2} x {:.2} m at {:.1} m, {danger}",
-        o.width_m, o.height_m, o.near_range_m
+        "{:.1}\u{a0}m\u{a0}{danger}\n{:.2}\u{a0}x\u{a0}{:.2}\u{a0}m",
+        o.near_range_m, o.width_m, o.height_m
     )
 }
 
@@ -282,4 +283,46 @@ fn outline(e: Ellipse) -> Vec<[f32; 2]> {
 
 fn pixel(u: f64, v: f64) -> [f32; 2] {
     [u as f32 + PIXEL_CENTRE, v as f32 + PIXEL_CENTRE]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Point2;
+
+    /// Rates that do not divide, and frames that start a little early or late, must neither skip
+    /// nor double an interval.
+    #[test]
+    fn a_rate_lets_one_frame_an_interval_through() {
+        for (camera_hz, hz, expected) in [(30.0, 5.0, 50), (25.0, 10.0, 100), (30.0, 100.0, 300)] {
+            let mut rate = Rate::new(hz);
+            let frames = (0..(10.0 * camera_hz) as u32).filter(|k| {
+                let early = if k % 2 == 0 { -1e-9 } else { 1e-9 };
+                rate.due(SimTime::from_secs(f64::from(*k) / camera_hz).plus(early))
+            });
+            assert_eq!(frames.count(), expected, "{camera_hz} Hz down to {hz} Hz");
+        }
+        assert!(!Rate::new(0.0).due(SimTime::ZERO));
+    }
+
+    /// A wrong sign of the angle, swapped axes or a forgotten half pixel put points off the
+    /// ellipse.
+    #[test]
+    fn an_outline_lies_on_its_ellipse() {
+        let e = Ellipse {
+            centre: Point2::new(100.0, 50.0),
+            semi_major_px: 20.0,
+            semi_minor_px: 8.0,
+            angle_rad: 0.3,
+        };
+        let points = outline(e);
+        assert_eq!(points.first(), points.last());
+        for [u, v] in points {
+            let (du, dv) = (f64::from(u) - 100.5, f64::from(v) - 50.5);
+            let (sin, cos) = e.angle_rad.sin_cos();
+            let (along, across) = (du * cos + dv * sin, dv * cos - du * sin);
+            let r = (along / 20.0).hypot(across / 8.0);
+            assert!((r - 1.0).abs() < 1e-5, "({u}, {v}) is at {r}");
+        }
+    }
 }

@@ -219,7 +219,7 @@ impl Open {
                     return Ok(());
                 };
                 let device = (index, name.as_str());
-                self.plots.wayside(report);
+                self.plots.wayside(index, report);
                 self.texts.wayside(stream, device, report)?;
                 self.images.wayside(stream, device, time, frame, report)?;
                 stream.at(time);

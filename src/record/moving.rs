@@ -2,7 +2,7 @@
 
 use super::palette;
 use super::scene::{HEAD, Scene, turn, ui};
-use super::stream::Stream;
+use super::stream::{Stream, failed};
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
 use crate::session::{ObserverError, Opening, TrainTruth};
@@ -13,30 +13,60 @@ use rerun::components::RotationQuat;
 use rerun::{
     Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Transform3D,
 };
-use std::collections::BTreeMap;
-
-use super::stream::failed;
 
 const SIGHT: &str = "world/estimate/sight";
 
 /// Poses of one entity that wait to be sent.
-#[derive(Default)]
 struct Poses {
+    path: String,
     times_ns: Vec<i64>,
     places: Vec<[f32; 3]>,
     turns: Vec<RotationQuat>,
 }
 
+impl Poses {
+    fn of(path: impl Into<String>) -> Self {
+        Self {
+            path: path.into(),
+            times_ns: Vec::new(),
+            places: Vec::new(),
+            turns: Vec::new(),
+        }
+    }
+
+    fn push(&mut self, scene: &Scene, time: SimTime, pose: &Isometry3<f64>) {
+        self.times_ns.push(time.nanos());
+        self.places.push(scene.place(pose));
+        self.turns.push(turn(pose));
+    }
+
+    fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+        if self.times_ns.is_empty() {
+            return Ok(());
+        }
+        let columns = Transform3D::update_fields()
+            .with_many_translation(self.places.drain(..))
+            .with_many_quaternion(self.turns.drain(..))
+            .columns_of_unit_batches()
+            .map_err(failed(self.path.as_str()))?;
+        stream.columns(&self.path, &self.times_ns, columns)?;
+        self.times_ns.clear();
+        Ok(())
+    }
+}
+
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
-    rig: Option<RigCalibration>,
-    poses: BTreeMap<String, Poses>,
+    /// Both eyes, where there is a rig.
+    rig: Option<(RigCalibration, [Poses; 2])>,
+    /// The head, then the cars; empty where there is no train.
+    train: Vec<Poses>,
     left: Option<Isometry3<f64>>,
     /// Which kinds of bodies are on show: boxes, cylinders, spheres, capsules.
     shown: [bool; 4],
     sight_shown: bool,
     methods: Vec<Method>,
-    obstacles_shown: BTreeMap<usize, bool>,
+    obstacles_shown: Vec<bool>,
 }
 
 impl Moving {
@@ -49,71 +79,56 @@ impl Moving {
                 .with_fill_mode(FillMode::TransparentFillMajorWireframe);
             stream.log_static(&car_path(car), &body)?;
         }
+        let eyes = [images::LEFT, images::RIGHT];
         if let Some(rig) = opening.rig {
             let pinhole = images::pinhole(&rig.camera.intrinsics, 1.2);
-            for eye in [images::LEFT, images::RIGHT] {
+            for eye in eyes {
                 stream.log_static(eye, &pinhole)?;
             }
         }
+        let mut train = Vec::new();
         if opening.cars > 0 {
-            let (mast, tip) = mast(6.0, "truth");
-            stream.log_static(
-                "world/train/head/truth",
-                &mast.with_colors([palette::TRUTH]),
-            )?;
-            stream.log_static("world/train/head/truth", &tip.with_colors([palette::TRUTH]))?;
+            train.push(Poses::of(HEAD));
+            train.extend((0..opening.cars).map(|car| Poses::of(car_path(car))));
+            let (mast, tip) = mast(6.0, "true");
+            // On the head itself: the viewer's eye can follow only what has a shape of its own.
+            stream.log_static(HEAD, &mast.with_colors([palette::TRUTH]))?;
+            stream.log_static(HEAD, &tip.with_colors([palette::TRUTH]))?;
         }
         Ok(Self {
-            rig: opening.rig.copied(),
-            poses: BTreeMap::new(),
+            rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
+            train,
             left: None,
             shown: [false; 4],
             sight_shown: false,
             methods: Vec::new(),
-            obstacles_shown: BTreeMap::new(),
+            obstacles_shown: vec![false; opening.wayside.len()],
         })
     }
 
     /// Keeps the train's pose for the next flush.
     pub(super) fn train(&mut self, scene: &Scene, truth: &TrainTruth) {
-        self.push(HEAD, scene, truth.time, &truth.world_from_vehicle);
-        for (car, pose) in truth.world_from_cars.iter().enumerate() {
-            self.push(&car_path(car), scene, truth.time, pose);
+        let head_and_cars =
+            std::iter::once(&truth.world_from_vehicle).chain(&truth.world_from_cars);
+        for (poses, pose) in self.train.iter_mut().zip(head_and_cars) {
+            poses.push(scene, truth.time, pose);
         }
-        if let (Some(left), Some(rig)) = (truth.world_from_left, self.rig) {
+        if let (Some(left), Some((rig, eyes))) = (truth.world_from_left, &mut self.rig) {
             let right = left * Isometry3::translation(rig.baseline_m, 0.0, 0.0);
-            self.push(images::LEFT, scene, truth.time, &left);
-            self.push(images::RIGHT, scene, truth.time, &right);
+            for (poses, pose) in eyes.iter_mut().zip([left, right]) {
+                poses.push(scene, truth.time, &pose);
+            }
         }
         self.left = truth.world_from_left;
     }
 
-    fn push(&mut self, path: &str, scene: &Scene, time: SimTime, pose: &Isometry3<f64>) {
-        if !self.poses.contains_key(path) {
-            self.poses.insert(path.to_owned(), Poses::default());
-        }
-        if let Some(poses) = self.poses.get_mut(path) {
-            poses.times_ns.push(time.nanos());
-            poses.places.push(scene.place(pose));
-            poses.turns.push(turn(pose));
-        }
-    }
-
     /// Sends the poses kept.
     pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
-        for (path, poses) in &mut self.poses {
-            if poses.times_ns.is_empty() {
-                continue;
-            }
-            let columns = Transform3D::update_fields()
-                .with_many_translation(poses.places.drain(..))
-                .with_many_quaternion(poses.turns.drain(..))
-                .columns_of_unit_batches()
-                .map_err(failed(path.as_str()))?;
-            stream.columns(path, &poses.times_ns, columns)?;
-            poses.times_ns.clear();
-        }
-        Ok(())
+        let eyes = self.rig.iter_mut().flat_map(|(_, eyes)| eyes);
+        self.train
+            .iter_mut()
+            .chain(eyes)
+            .try_for_each(|poses| poses.flush(stream))
     }
 
     /// Shows obstacles, workers and whatever else is solid.
@@ -150,9 +165,9 @@ impl Moving {
         for fix in &report.fixes {
             stream.at_frame(fix.time, report.number);
             let (name, height_m) = match fix.method {
-                Method::Fused => ("fused", 6.7),
-                Method::Paper => ("paper", 7.4),
-                Method::Mono => ("mono", 8.1),
+                Method::Fused => ("fused", 7.2),
+                Method::Paper => ("paper", 8.4),
+                Method::Mono => ("mono", 9.6),
             };
             let path = format!("world/estimate/{name}");
             let place = Transform3D::from_translation(scene.local(&fix.position));
@@ -194,11 +209,13 @@ impl Moving {
         device: (usize, &str),
         obstacles: &[DetectedObstacle],
     ) -> Result<(), ObserverError> {
-        let shown = self.obstacles_shown.entry(device.0).or_default();
-        if obstacles.is_empty() && !*shown {
+        let Some(shown) = self.obstacles_shown.get_mut(device.0) else {
+            return Ok(());
+        };
+        let before = std::mem::replace(shown, !obstacles.is_empty());
+        if obstacles.is_empty() && !before {
             return Ok(());
         }
-        *shown = !obstacles.is_empty();
         let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
         for o in obstacles {
             let frame = scene

@@ -63,13 +63,18 @@ pub(super) fn driver_lamp(lamp: Lamp) -> (&'static str, &'static str) {
     }
 }
 
-/// Of a surface.
-pub(super) fn material(material: Material) -> Color {
-    match material {
-        Material::Lining => rgb(105, 108, 112),
-        Material::Bed => rgb(74, 68, 62),
-        Material::Walkway => rgb(128, 120, 100),
-        Material::Rail => rgb(170, 175, 185),
-        Material::Platform => rgb(150, 135, 115),
+/// Of a surface. Every other ring is darker, so that one sees distance and motion.
+pub(super) fn material(material: Material, ring: usize) -> Color {
+    let [r, g, b] = match material {
+        Material::Lining => [112, 116, 122],
+        Material::Bed => [78, 72, 66],
+        Material::Walkway => [132, 124, 104],
+        Material::Rail => [170, 175, 185],
+        Material::Platform => [150, 135, 115],
+    };
+    if ring % 2 == 0 {
+        Color::from_rgb(r, g, b)
+    } else {
+        Color::from_rgb(r - r / 4, g - g / 4, b - b / 4)
     }
 }

@@ -1,9 +1,10 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
 use super::stream::{Stream, failed};
-use super::{Contents, palette};
+use super::{Contents, palette, slug};
 use crate::bus::{LedReport, Method, ProtectionReport, SimTime, WaysideReport};
 use crate::session::{ObserverError, TrainTruth};
+use rerun::external::re_sdk_types::blueprint::components::Corner2D;
 use rerun::{Color, Scalars, SeriesLines};
 use std::collections::BTreeMap;
 
@@ -16,6 +17,8 @@ pub(super) struct Group {
     pub(super) title: &'static str,
     /// Over its series.
     pub(super) origin: &'static str,
+    /// Where the legend covers least.
+    pub(super) legend: Corner2D,
     lines: &'static [Line],
 }
 
@@ -38,14 +41,10 @@ const fn line(path: &'static str, name: &'static str, rgb: (u8, u8, u8), width: 
 const SPEED: Group = Group {
     title: "Speed, km/h",
     origin: "plots/speed",
+    legend: Corner2D::RightTop,
     lines: &[
-        line(
-            "plots/speed/emergency",
-            "emergency brake",
-            (255, 70, 70),
-            1.5,
-        ),
-        line("plots/speed/service", "service brake", (255, 170, 60), 1.5),
+        line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5),
+        line("plots/speed/service", "service", (255, 170, 60), 1.5),
         line("plots/speed/permitted", "permitted", (235, 225, 100), 1.5),
         line("plots/speed/estimated", "estimated", (90, 230, 120), 2.0),
         line("plots/speed/true", "true", (240, 240, 240), 2.0),
@@ -55,6 +54,7 @@ const SPEED: Group = Group {
 const VIBRATION: Group = Group {
     title: "Floor acceleration, m/s²",
     origin: "plots/vibration",
+    legend: Corner2D::RightTop,
     lines: &[
         line("plots/vibration/vertical", "vertical", (120, 180, 255), 1.0),
         line("plots/vibration/lateral", "lateral", (255, 170, 60), 1.0),
@@ -64,6 +64,7 @@ const VIBRATION: Group = Group {
 const SUSPENSION: Group = Group {
     title: "Suspension travel, mm",
     origin: "plots/suspension",
+    legend: Corner2D::RightTop,
     lines: &[line(
         "plots/suspension/travel",
         "secondary, front bogie",
@@ -75,55 +76,51 @@ const SUSPENSION: Group = Group {
 const DISTANCE: Group = Group {
     title: "Distance to obstacle, m",
     origin: "plots/distance",
-    lines: &[
-        line(
-            "plots/distance/formula",
-            "wayside, formula",
-            (255, 170, 60),
-            1.5,
-        ),
-        line(
-            "plots/distance/alignment",
-            "wayside, along the line",
-            (90, 200, 255),
-            1.5,
-        ),
-        line(
-            "plots/distance/display",
-            "driver's display",
-            (240, 240, 240),
-            2.0,
-        ),
-    ],
+    legend: Corner2D::LeftBottom,
+    lines: &[line(
+        "plots/distance/display",
+        "driver's display",
+        (240, 240, 240),
+        2.0,
+    )],
 };
 
+/// Of wayside devices, in turn.
+const DEVICE_RGB: [(u8, u8, u8); 4] = [
+    (90, 200, 255),
+    (255, 170, 60),
+    (170, 220, 130),
+    (220, 130, 255),
+];
+
 const ERROR: Group = Group {
-    title: "Position error and 2σ bounds, m",
+    title: "Position error and ±2σ, m",
     origin: "plots/position_error",
+    legend: Corner2D::RightTop,
     lines: &[],
 };
 
-/// The plots of a run, in the order of their panes.
-pub(super) fn groups(contents: &Contents) -> Vec<Group> {
-    let mut groups = Vec::new();
+const METHODS: [Method; 3] = [Method::Paper, Method::Mono, Method::Fused];
+
+/// The plots of a run by panes; plots of one pane are its tabs.
+pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
+    let mut panes = Vec::new();
     if contents.train {
-        groups.push(SPEED);
+        panes.push(vec![SPEED]);
     }
     if contents.rig {
-        groups.push(ERROR);
+        panes.push(vec![ERROR]);
     }
     if !contents.devices.is_empty() {
-        groups.push(DISTANCE);
+        panes.push(vec![DISTANCE]);
     }
     if contents.train {
-        groups.push(VIBRATION);
-        groups.push(SUSPENSION);
+        panes.push(vec![VIBRATION, SUSPENSION]);
     }
-    groups
+    panes
 }
 
 /// Values of one series that wait to be sent.
-#[derive(Default)]
 struct Series {
     times_ns: Vec<i64>,
     values: Vec<f64>,
@@ -133,13 +130,19 @@ struct Series {
 
 /// The series of a recording.
 pub(super) struct Plots {
-    series: BTreeMap<&'static str, Series>,
+    series: BTreeMap<String, Series>,
+    /// Distances by the wayside devices: along the line, and by the paper's formula.
+    devices: Vec<[String; 2]>,
 }
 
 impl Plots {
     /// Names and colours the series.
     pub(super) fn open(stream: &Stream, contents: &Contents) -> Result<Self, ObserverError> {
-        for line in groups(contents).iter().flat_map(|group| group.lines) {
+        for line in panes(contents)
+            .iter()
+            .flatten()
+            .flat_map(|group| group.lines)
+        {
             let (r, g, b) = line.rgb;
             style(
                 stream,
@@ -150,19 +153,30 @@ impl Plots {
             )?;
         }
         if contents.rig {
-            for method in [Method::Paper, Method::Mono, Method::Fused] {
+            for method in METHODS {
                 let [error, upper, lower] = error_paths(method);
                 let name = error.rsplit('/').next().unwrap_or(error);
                 let colour = palette::method(method);
                 let [r, g, b, _] = colour.to_array();
                 let faint = Color::from_rgb(r / 2, g / 2, b / 2);
                 style(stream, error, name, colour, 1.5)?;
-                style(stream, upper, &format!("{name} +2σ"), faint, 1.0)?;
-                style(stream, lower, &format!("{name} -2σ"), faint, 1.0)?;
+                // One entry of the legend for both.
+                for bound in [upper, lower] {
+                    style(stream, bound, &format!("{name} 2σ"), faint, 1.0)?;
+                }
             }
+        }
+        let devices = contents.devices.iter();
+        let devices: Vec<_> = devices.map(|name| distance_paths(name)).collect();
+        for (k, ([line, formula], name)) in devices.iter().zip(&contents.devices).enumerate() {
+            let (r, g, b) = DEVICE_RGB[k % DEVICE_RGB.len()];
+            let faint = Color::from_rgb(r / 2, g / 2, b / 2);
+            style(stream, line, name, Color::from_rgb(r, g, b), 1.5)?;
+            style(stream, formula, &format!("{name}, formula"), faint, 1.5)?;
         }
         Ok(Self {
             series: BTreeMap::new(),
+            devices,
         })
     }
 
@@ -182,7 +196,8 @@ impl Plots {
         self.push("plots/speed/permitted", t, report.permitted_mps * KMH);
         self.push("plots/speed/service", t, report.service_mps * KMH);
         self.push("plots/speed/emergency", t, report.emergency_mps * KMH);
-        self.push_or_gap(
+        push_or_gap(
+            &mut self.series,
             "plots/distance/display",
             t,
             report.display.distance_to_obstacle_m,
@@ -200,17 +215,13 @@ impl Plots {
     }
 
     /// How far a wayside device takes the train to be from the obstacle.
-    pub(super) fn wayside(&mut self, report: &WaysideReport) {
-        self.push_or_gap(
-            "plots/distance/formula",
-            report.time,
-            report.train_distance_m,
-        );
-        self.push_or_gap(
-            "plots/distance/alignment",
-            report.time,
-            report.train_distance_exact_m,
-        );
+    pub(super) fn wayside(&mut self, device: usize, report: &WaysideReport) {
+        let Some([line, formula]) = self.devices.get(device) else {
+            return;
+        };
+        let t = report.time;
+        push_or_gap(&mut self.series, line, t, report.train_distance_exact_m);
+        push_or_gap(&mut self.series, formula, t, report.train_distance_m);
     }
 
     /// Sends the values kept.
@@ -221,29 +232,40 @@ impl Plots {
             }
             let columns = Scalars::new(series.values.drain(..))
                 .columns_of_unit_batches()
-                .map_err(failed(*path))?;
+                .map_err(failed(path.as_str()))?;
             stream.columns(path, &series.times_ns, columns)?;
             series.times_ns.clear();
         }
         Ok(())
     }
 
-    fn push(&mut self, path: &'static str, time: SimTime, value: f64) {
-        let series = self.series.entry(path).or_default();
-        series.times_ns.push(time.nanos());
-        series.values.push(value);
-        series.gap = value.is_nan();
+    fn push(&mut self, path: &str, time: SimTime, value: f64) {
+        push_or_gap(&mut self.series, path, time, Some(value));
     }
+}
 
-    /// A NaN breaks the line where there is nothing to plot; one is enough.
-    fn push_or_gap(&mut self, path: &'static str, time: SimTime, value: Option<f64>) {
-        let in_gap = self.series.get(path).is_none_or(|series| series.gap);
-        match value {
-            Some(value) => self.push(path, time, value),
-            None if !in_gap => self.push(path, time, f64::NAN),
-            None => {}
+/// A NaN breaks the line where there is nothing to plot; one is enough, and none at its start.
+fn push_or_gap(all: &mut BTreeMap<String, Series>, path: &str, time: SimTime, value: Option<f64>) {
+    let Some(series) = all.get_mut(path) else {
+        if let Some(value) = value {
+            let series = Series {
+                times_ns: vec![time.nanos()],
+                values: vec![value],
+                gap: false,
+            };
+            all.insert(path.to_owned(), series);
         }
+        return;
+    };
+    if value.is_some() || !series.gap {
+        series.times_ns.push(time.nanos());
+        series.values.push(value.unwrap_or(f64::NAN));
     }
+    series.gap = value.is_none();
+}
+
+fn distance_paths(device: &str) -> [String; 2] {
+    ["line", "formula"].map(|what| format!("plots/distance/{}/{what}", slug(device)))
 }
 
 fn style(
@@ -278,5 +300,26 @@ fn error_paths(method: Method) -> [&'static str; 3] {
             "plots/position_error/fused/upper",
             "plots/position_error/fused/lower",
         ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two values with silence before, between and after: the line must break once in each gap
+    /// after a value, and not begin with one.
+    #[test]
+    fn a_gap_is_one_nan() {
+        let mut all = BTreeMap::new();
+        let said = [None, Some(1.0), None, None, Some(2.0), Some(3.0), None];
+        for (k, value) in said.into_iter().enumerate() {
+            push_or_gap(&mut all, "x", SimTime::from_secs(k as f64), value);
+        }
+        let series = &all["x"];
+        let times_s: Vec<_> = series.times_ns.iter().map(|t| t / 1_000_000_000).collect();
+        assert_eq!(times_s, [1, 2, 4, 5, 6]);
+        let gaps: Vec<_> = series.values.iter().map(|v| v.is_nan()).collect();
+        assert_eq!(gaps, [false, true, false, false, true]);
     }
 }

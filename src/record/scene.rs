@@ -6,7 +6,7 @@ use super::stream::Stream;
 use crate::scenario::RecordSettings;
 use crate::session::{ObserverError, Opening};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, CrossSection, RAIL_CENTRES_M, SectionRange, Tunnel};
+use crate::track::{Alignment, CrossSection, RAIL_CENTRES_M, SectionRange, TrackPoint, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::{MeshFaceRendering, RotationQuat};
 use rerun::{
@@ -124,7 +124,7 @@ impl Scene {
         let lamps = &tunnel.lamps;
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))
-                .with_radii(lamps.iter().map(|l| (l.diameter_m / 2.0) as f32))
+                .with_radii([ui(3.0)])
                 .with_colors([palette::LAMP])
                 .with_labels(lamps.iter().map(|l| l.uid.to_string()))
                 .with_show_labels(lamps.len() <= MAX_LAMP_LABELS);
@@ -157,7 +157,7 @@ impl Scene {
         head: Option<&Isometry3<f64>>,
     ) -> ([f32; 3], [f32; 3]) {
         let (frame, eye, target) = match (head, camera) {
-            (Some(head), _) => (*head, [16.0, -15.0, 9.0], [2.0, 0.0, 1.5]),
+            (Some(head), _) => (*head, [-9.0, -13.0, 9.0], [8.0, 0.0, 1.5]),
             (None, Some(camera)) => (*camera, [-6.0, -6.0, -8.0], [0.0, 2.0, 20.0]),
             (None, None) => {
                 let middle = self.alignment.at(self.alignment.length_m() / 2.0);
@@ -205,17 +205,17 @@ impl Sweep {
             let (dl, dh) = (to.0 - from.0, to.1 - from.1);
             let length = dl.hypot(dh).max(1e-9);
             let first = self.corners.len() as u32;
-            for s_m in rings(range.from_m, range.to_m, step_m) {
+            for (ring, s_m) in rings(range.from_m, range.to_m, step_m).enumerate() {
                 let heading = scene.alignment.at(s_m).heading_rad;
                 // The inside is on the left of an edge looked at up the line.
                 let (nl, nh) = (dh / length, -dl / length);
                 let normal = [-nl * heading.sin(), nl * heading.cos(), nh].map(|x| x as f32);
                 for (l_m, h_m) in [from, to] {
-                    let p = crate::track::TrackPoint { s_m, l_m, h_m };
+                    let p = TrackPoint { s_m, l_m, h_m };
                     self.corners
                         .push(scene.local(&scene.alignment.world_from_track(p)));
                     self.normals.push(normal);
-                    self.colours.push(palette::material(material));
+                    self.colours.push(palette::material(material, ring));
                 }
             }
             let last = self.corners.len() as u32;
@@ -249,4 +249,54 @@ fn edges(section: &CrossSection) -> impl Iterator<Item = [(f64, f64); 2]> {
 /// A line's width on the screen, whatever the distance.
 pub(super) fn ui(points: f32) -> Radius {
     Radius::new_ui_points(points)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::trial::tunnel;
+
+    /// The viewer hides what it sees from behind. A flipped triangle would hide the far wall and
+    /// show the near one; a normal that disagrees would light it from outside.
+    #[test]
+    fn the_tunnel_shows_its_inner_side() {
+        let tunnel = tunnel();
+        let scene = Scene::new(&tunnel);
+        let mut sweep = Sweep::default();
+        sweep.sweep(&scene, &tunnel.sections[0], 5.0);
+        // 29 edges, 80 stretches, two triangles each.
+        assert_eq!(sweep.triangles.len(), 29 * 80 * 2);
+        let corner = |k: u32| Vector3::from(sweep.corners[k as usize]);
+        for t in &sweep.triangles {
+            let [a, b, c] = t.map(corner);
+            let face = (b - a).cross(&(c - a)).normalize();
+            let normal = Vector3::from(sweep.normals[t[0] as usize]);
+            // Chords of 5 m in a curve of 400 m turn by 0.0125 rad, the grade adds 0.01.
+            assert!(
+                face.dot(&normal) > 0.999,
+                "face {face:?}, normal {normal:?}"
+            );
+            let near_s_m = 200.0;
+            let world = Point3::from(a.cast::<f64>() + scene.origin);
+            let s_m = scene.alignment.track_from_world(&world, near_s_m).s_m;
+            let axis = TrackPoint {
+                s_m,
+                l_m: 0.0,
+                h_m: 1.9,
+            };
+            let axis = scene.local(&scene.alignment.world_from_track(axis));
+            assert!(face.dot(&(Vector3::from(axis) - a)) > 0.0);
+        }
+    }
+
+    /// Single precision far from the world's origin would shake lamps by centimetres.
+    #[test]
+    fn coordinates_are_good_to_a_millimetre() {
+        let tunnel = tunnel();
+        let scene = Scene::new(&tunnel);
+        for lamp in &tunnel.lamps {
+            let back = Vector3::from(scene.local(&lamp.centre)).cast::<f64>() + scene.origin;
+            assert!((back - lamp.centre.coords).norm() < 1e-3);
+        }
+    }
 }

@@ -49,14 +49,14 @@ impl Texts {
             danger => (
                 level(danger),
                 format!(
-                    "obstacle from {:.1} m to {:.1} m, danger {}",
-                    warning.from_chainage_m,
-                    warning.to_chainage_m,
+                    "danger {}, km {:.4} to {:.4}",
                     danger_name(danger),
+                    warning.from_chainage_m / 1000.0,
+                    warning.to_chainage_m / 1000.0,
                 ),
             ),
         };
-        let text = format!("{device} #{number} by {via} after {delay_s:.2} s: {what}");
+        let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
         log(stream, delivery.received, level, &text)
     }
 
@@ -74,13 +74,15 @@ impl Texts {
             return Ok(());
         }
         *danger = report.danger;
-        let mut text = format!("{} sees danger {}", device.1, danger_name(report.danger));
+        let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
         for o in &report.obstacles {
             // Writing to a String cannot fail.
             let _ = write!(
                 text,
-                "; {:.2} m wide, {:.2} m high at chainage {:.1} m",
-                o.width_m, o.height_m, o.from_chainage_m
+                "; {:.2} x {:.2} m at km {:.4}",
+                o.width_m,
+                o.height_m,
+                o.from_chainage_m / 1000.0
             );
         }
         log(stream, report.time, level(report.danger), &text)
@@ -128,7 +130,7 @@ fn markdown(display: &DriverDisplay) -> String {
     );
     let text = &display.text;
     format!(
-        "# {lamp}: {meaning}\n\n{text}\n\n| | |\n|---|---|\n| Power | {power} |\n\
+        "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\
          | Position | {position} |\n| Distance to obstacle | {distance} |\n"
     )
 }
