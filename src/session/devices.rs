@@ -51,10 +51,12 @@ impl Device {
             sensor: post.camera.sensor,
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
-            lidar: post.lidar.as_ref().map(|settings| {
-                let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
-                Lidar::new(settings, scenario.tunnel.clone(), stream)
-            }),
+            lidar: (post.lidar.as_ref().zip(post.calibration.world_from_lidar)).map(
+                |(settings, pose)| {
+                    let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
+                    Lidar::new(settings, &scenario.tunnel, &pose, stream)
+                },
+            ),
             detector: WaysideDetector::new(
                 &scenario.stack.wayside,
                 post.calibration.clone(),
@@ -74,15 +76,12 @@ impl Device {
     }
 
     /// Echoes and truth of the same moment.
-    pub fn look(&mut self, world: &World, start: SimTime, number: u32) -> Look {
-        let scan = match (&mut self.lidar, self.calibration.world_from_lidar) {
-            (Some(lidar), Some(pose)) => {
-                let mut bodies = world.bodies();
-                bodies.extend(world.train_bodies());
-                Some(lidar.scan(&pose, start, number, &bodies))
-            }
-            _ => None,
-        };
+    pub fn look(&self, world: &World, start: SimTime, number: u32) -> Look {
+        let scan = self.lidar.as_ref().map(|lidar| {
+            let mut bodies = world.bodies();
+            bodies.extend(world.train_bodies());
+            lidar.scan(start, number, world.time(), &bodies)
+        });
         Look {
             scan,
             present: present(world),
@@ -131,22 +130,19 @@ fn present(world: &World) -> Vec<Presence> {
     });
     let workers = world.workers().map(|w| Presence {
         name: w.name.to_owned(),
-        size_m: w.height_m,
+        size_m: w.stature_m,
         chainage_m: w.chainage_m,
         half_length_m: 0.4,
         at_rest: false,
         obstacle: false,
     });
-    let train = world.train().map(|t| {
-        let half_length_m = 0.5 * world.train_length_m();
-        Presence {
-            name: "train".into(),
-            size_m: 2.0 * half_length_m,
-            chainage_m: t.chainage_m - half_length_m,
-            half_length_m,
-            at_rest: false,
-            obstacle: false,
-        }
+    let train = (world.head_m().zip(world.train_length_m())).map(|(head_m, length_m)| Presence {
+        name: "train".into(),
+        size_m: length_m,
+        chainage_m: head_m - 0.5 * length_m,
+        half_length_m: 0.5 * length_m,
+        at_rest: false,
+        obstacle: false,
     });
     obstacles.chain(workers).chain(train).collect()
 }

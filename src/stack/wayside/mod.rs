@@ -28,7 +28,7 @@
 //!     chainage_m: 200.0,
 //!     balise_chainage_m: 0.0,
 //! };
-//! let settings = WaysideSettings { reference_frames: 1, ..Default::default() };
+//! let settings = WaysideSettings { reference_frames: 2, ..Default::default() };
 //! let mut detector = WaysideDetector::new(&settings, calibration, map);
 //! let mut image = image::GrayImage::from_pixel(640, 360, image::Luma([90]));
 //! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
@@ -38,7 +38,7 @@
 //! assert!(report(&mut detector, 0, &image).learning);
 //! assert!(report(&mut detector, 1, &image).passage_possible);
 //! // Something dark lies on the track from now on; the third frame confirms it.
-//! for (u, v) in (390..410).flat_map(|u| (190..210).map(move |v| (u, v))) {
+//! for (u, v) in (250..270).flat_map(|u| (190..210).map(move |v| (u, v))) {
 //!     image.put_pixel(u, v, image::Luma([30]));
 //! }
 //! assert!(report(&mut detector, 2, &image).obstacles.is_empty());

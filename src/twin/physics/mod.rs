@@ -39,6 +39,7 @@ mod irregularity;
 mod obstacle;
 mod settings;
 mod suspension;
+mod truth;
 #[cfg(test)]
 mod tests;
 mod vehicle;
@@ -49,6 +50,7 @@ pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{ObstacleSettings, ObstacleShape};
 pub(crate) use settings::within;
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings, VehicleSet};
+pub use truth::WorkerTruth;
 pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand};

@@ -110,6 +110,11 @@ struct Stance {
 }
 
 impl WorkerSettings {
+    /// Where he is along the line at a time, while he is there.
+    pub(super) fn chainage_m(&self, t_s: f64) -> Option<f64> {
+        self.stance(t_s).map(|stance| stance.s_m)
+    }
+
     /// Where he is at a time; `None` before the first waypoint and after the last.
     fn stance(&self, t_s: f64) -> Option<Stance> {
         let first = self.path.first()?;
