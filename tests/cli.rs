@@ -11,7 +11,9 @@ const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
 
 /// A folder of its own for each test, empty at the start.
 fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli").join(test);
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
+        .join("cli")
+        .join(test);
     if folder.exists() {
         fs::remove_dir_all(&folder).expect("old results can be removed");
     }
@@ -72,7 +74,10 @@ fn refused(folder: &Path, file: &Path, words: &[&str]) {
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{args:?} said: {said}");
         for word in words {
-            assert!(said.contains(word), "{args:?} does not say `{word}`, but: {said}");
+            assert!(
+                said.contains(word),
+                "{args:?} does not say `{word}`, but: {said}"
+            );
         }
         assert!(output.stdout.is_empty(), "{args:?} printed a result");
     }
@@ -92,7 +97,11 @@ fn the_scenario_of_these_tests_is_right() {
 fn unknown_key() {
     let folder = folder("unknown_key");
     let file = scenario(&folder, "cruise_speed_kmh", "cruse_speed_kmh");
-    let words = ["wrong.toml:6", "train.cruse_speed_kmh", "did you mean `cruise_speed_kmh`"];
+    let words = [
+        "wrong.toml:6",
+        "train.cruse_speed_kmh",
+        "did you mean `cruise_speed_kmh`",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -100,7 +109,11 @@ fn unknown_key() {
 fn wrong_unit() {
     let folder = folder("wrong_unit");
     let file = scenario(&folder, "exposure_us = 30.0", "exposure_ms = 0.03");
-    let words = ["wrong.toml:9", "rig.exposure_ms", "did you mean `exposure_us`"];
+    let words = [
+        "wrong.toml:9",
+        "rig.exposure_ms",
+        "did you mean `exposure_us`",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -108,9 +121,18 @@ fn wrong_unit() {
 #[test]
 fn all_problems_at_once() {
     let folder = folder("all_problems");
-    let file = scenario(&folder, "exposure_us = 30.0", "exposure_us = 50_000.0\npixel_um = -1.0");
+    let file = scenario(
+        &folder,
+        "exposure_us = 30.0",
+        "exposure_us = 50_000.0\npixel_um = -1.0",
+    );
     let exposure = "rig.exposure_us: an exposure of 50000 us is longer than the frame";
-    let words = [exposure, "expose for less than 33333 us", "rig.pixel_um", "3.75"];
+    let words = [
+        exposure,
+        "expose for less than 33333 us",
+        "rig.pixel_um",
+        "3.75",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -118,7 +140,11 @@ fn all_problems_at_once() {
 fn more_rows_than_a_frame_has_time_for() {
     let folder = folder("rows");
     let file = scenario(&folder, "exposure_us = 30.0", "line_time_us = 50.0");
-    let words = ["rig.height_px", "720 rows of 50 us", "read at most 667 rows"];
+    let words = [
+        "rig.height_px",
+        "720 rows of 50 us",
+        "read at most 667 rows",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -133,7 +159,12 @@ fn missing_file() {
 fn missing_tunnel() {
     let folder = folder("missing_tunnel");
     let file = scenario(&folder, "test_bench.toml", "test_bunch.toml");
-    let words = ["wrong.toml:2", "tunnel: cannot read", "test_bunch.toml", "give the path"];
+    let words = [
+        "wrong.toml:2",
+        "tunnel: cannot read",
+        "test_bunch.toml",
+        "give the path",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -168,7 +199,12 @@ fn negative_radius() {
 fn rig_that_never_sees_a_lamp() {
     let folder = folder("blind_rig");
     let file = scenario(&folder, "yaw_deg = 39.0", "yaw_deg = -120.0");
-    let words = ["wrong.toml:8", "rig.yaw_deg", "never sees a whole lamp", "yaw_deg = 39"];
+    let words = [
+        "wrong.toml:8",
+        "rig.yaw_deg",
+        "never sees a whole lamp",
+        "yaw_deg = 39",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -176,7 +212,11 @@ fn rig_that_never_sees_a_lamp() {
 fn train_that_begins_outside() {
     let folder = folder("outside");
     let file = scenario(&folder, "150.0", "100.0");
-    let words = ["train.start_chainage_m", "begins outside", "start at 118.0 m"];
+    let words = [
+        "train.start_chainage_m",
+        "begins outside",
+        "start at 118.0 m",
+    ];
     refused(&folder, &file, &words);
 }
 
@@ -189,18 +229,37 @@ fn wrong_override() {
     let out = folder.join("out");
     let out_text = out.to_str().expect("the path is UTF-8");
     for (change, words) in [
-        ("train.cars=9", ["train.cars: 9 cars", "(--set train.cars=9)", "use 1 to 6"]),
-        ("train.crs=9", ["right by itself, but not with --set", "train.crs", "did you mean `cars`"]),
-        ("obstacles[0].mass_kg=1", ["--set", "obstacles", "no keys of its own"]),
+        (
+            "train.cars=0",
+            ["train.cars: 0 cars", "(--set train.cars=0)", "use 1 to 6"],
+        ),
+        (
+            "train.crs=9",
+            [
+                "right by itself, but not with --set",
+                "train.crs",
+                "did you mean `cars`",
+            ],
+        ),
+        (
+            "obstacles[0].mass_kg=1",
+            ["--set", "obstacles", "no keys of its own"],
+        ),
         ("train.cars", ["key=value", "train.cars", "--set"]),
     ] {
         let output = metrotwin(&["run", file, "--out", out_text, "--set", change]);
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(2), "{change} said: {said}");
         for word in words {
-            assert!(said.contains(word), "{change} does not say `{word}`, but: {said}");
+            assert!(
+                said.contains(word),
+                "{change} does not say `{word}`, but: {said}"
+            );
         }
-        assert!(!said.contains("wrong.toml:"), "{change} is blamed on the file: {said}");
+        assert!(
+            !said.contains("wrong.toml:"),
+            "{change} is blamed on the file: {said}"
+        );
     }
     assert!(!out.exists(), "the folder of results was touched");
 }
@@ -227,6 +286,45 @@ fn unwritable_out_folder() {
     assert_eq!(fs::read_to_string(&obstacle).ok().as_deref(), Some("kept"));
 }
 
+/// The shortest run there is: every result is whole, `--json` prints the summary and nothing
+/// else, and no temporary file is left.
+#[test]
+fn a_run_writes_whole_files() {
+    let folder = folder("run");
+    let out = folder.join("results");
+    let output = metrotwin(&[
+        "run",
+        "scenarios/static_bench.toml",
+        "--out",
+        out.to_str().expect("the path is UTF-8"),
+        "--set",
+        "bench.points=1",
+        "--set",
+        "bench.fixes_per_point=2",
+        "--seed",
+        "7",
+        "--renderer",
+        "cpu",
+        "--json",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    let printed: serde_json::Value =
+        serde_json::from_slice(&output.stdout).expect("standard output is JSON");
+    let kept = fs::read(out.join("summary.json")).expect("there is a summary");
+    let kept: serde_json::Value = serde_json::from_slice(&kept).expect("the summary is JSON");
+    assert_eq!(printed, kept);
+    assert_eq!(printed["scenario"], "static_bench");
+    assert_eq!(printed["seed"], 7);
+    assert!(printed["stereo_frames"].as_u64() >= Some(2));
+    assert_eq!(printed["renderer"]["backend"], "cpu");
+    let mut files: Vec<String> = fs::read_dir(&out)
+        .expect("there is a folder")
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .collect();
+    files.sort();
+    assert_eq!(files, ["fixes.csv", "recording.rrd", "summary.json"]);
+}
+
 /// Every shipped file is right, and the report has the figures that a user plans with.
 #[test]
 fn shipped_files_are_right() {
@@ -240,7 +338,16 @@ fn shipped_files_are_right() {
     ]);
     let said = String::from_utf8_lossy(&output.stdout);
     assert_eq!(output.status.code(), Some(0), "{output:?}");
-    for word in ["about 200 pairs", "seen whole by both eyes", "299 lamps", "radius 350 m", "W1530"] {
-        assert!(said.contains(word), "the report does not say `{word}`: {said}");
+    for word in [
+        "about 200 pairs",
+        "seen whole by both eyes",
+        "299 lamps",
+        "radius 350 m",
+        "W1530",
+    ] {
+        assert!(
+            said.contains(word),
+            "the report does not say `{word}`: {said}"
+        );
     }
 }

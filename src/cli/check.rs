@@ -37,7 +37,11 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
             }
         }
     }
-    if wrong { Err(Failure::Reported) } else { Ok(()) }
+    if wrong {
+        Err(Failure::Reported)
+    } else {
+        Ok(())
+    }
 }
 
 fn report_on(path: &Path) -> Result<String, ScenarioError> {

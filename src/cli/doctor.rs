@@ -91,8 +91,16 @@ fn table(s: &Speeds) -> String {
     let mut line = |what: &str, value: f64, unit: &str| {
         text += &format!("{what:34} {value:9.2} {unit}\n");
     };
-    line("stereo pairs, 2 x 1280 x 720", s.stereo_pairs_per_s, "a second");
-    line("wayside frames, 1920 x 1080", s.wayside_frames_per_s, "a second");
+    line(
+        "stereo pairs, 2 x 1280 x 720",
+        s.stereo_pairs_per_s,
+        "a second",
+    );
+    line(
+        "wayside frames, 1920 x 1080",
+        s.wayside_frames_per_s,
+        "a second",
+    );
     line("physics, six cars", s.physics_us_per_step, "us a step");
     line("lamp positioning", s.led_ms_per_pair, "ms a pair");
     line("wayside detection", s.wayside_ms_per_frame, "ms a frame");
@@ -111,12 +119,7 @@ fn measure() -> anyhow::Result<Speeds> {
     let drawn_by = renderer.backend();
     let rounds = if drawn_by.backend == "cpu" { 1 } else { ROUNDS };
 
-    let mut world = World::new(
-        scenario.tunnel.clone(),
-        &scenario.physics,
-        scenario.seed,
-        0,
-    )?;
+    let mut world = World::new(scenario.tunnel.clone(), &scenario.physics, scenario.seed, 0)?;
     let train = train_seconds(&scenario, &mut world, renderer.as_mut(), rounds)?;
     let wayside = wayside_seconds(&scenario, &world, renderer.as_mut(), rounds)?;
     Ok(Speeds {
@@ -162,10 +165,12 @@ fn train_seconds(
     let mut steps = 0;
     // One pair more than is timed: the first one also builds what later ones use.
     while times.draw_s.len() <= rounds * ROUND {
-        let (step, seconds) = timed(|| world.step(&TrainCommand {
-            permitted_speed_mps: 80.0 / 3.6,
-            ..TrainCommand::default()
-        }));
+        let (step, seconds) = timed(|| {
+            world.step(&TrainCommand {
+                permitted_speed_mps: 80.0 / 3.6,
+                ..TrainCommand::default()
+            })
+        });
         step?;
         batch_s += seconds;
         steps += 1;
@@ -179,7 +184,10 @@ fn train_seconds(
             next_imu = next_imu.plus(imu.period_s());
         }
         if now >= next_odometer {
-            odometer.sample(world).iter().for_each(|s| positioner.on_odometer(s));
+            odometer
+                .sample(world)
+                .iter()
+                .for_each(|s| positioner.on_odometer(s));
             next_odometer = next_odometer.plus(odometer.period_s());
         }
         let number = times.draw_s.len() as u32;

@@ -85,11 +85,15 @@ impl Diagnostic for Fault {
     }
 
     fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.remedy.as_ref().map(|r| Box::new(r) as Box<dyn fmt::Display>)
+        self.remedy
+            .as_ref()
+            .map(|r| Box::new(r) as Box<dyn fmt::Display>)
     }
 
     fn source_code(&self) -> Option<&dyn miette::SourceCode> {
-        self.place.as_ref().map(|p| &p.source as &dyn miette::SourceCode)
+        self.place
+            .as_ref()
+            .map(|p| &p.source as &dyn miette::SourceCode)
     }
 
     fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
@@ -100,7 +104,8 @@ impl Diagnostic for Fault {
 
     fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
         (!self.others.is_empty()).then(|| {
-            Box::new(self.others.iter().map(|f| f as &dyn Diagnostic)) as Box<dyn Iterator<Item = _>>
+            Box::new(self.others.iter().map(|f| f as &dyn Diagnostic))
+                as Box<dyn Iterator<Item = _>>
         })
     }
 }

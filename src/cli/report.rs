@@ -22,13 +22,19 @@ pub(super) fn tunnel(tunnel: &Tunnel) -> String {
         format!("tightest radius {:.0} m", 1.0 / tightest)
     };
     let mut lines = vec![
-        format!("tunnel `{}`, line {}: {length_m:.1} m, {plan}", tunnel.name, tunnel.line_number),
+        format!(
+            "tunnel `{}`, line {}: {length_m:.1} m, {plan}",
+            tunnel.name, tunnel.line_number
+        ),
         format!("grades from {lowest:.1} to {steepest:.1} permille"),
         format!("{} stretches of cross-section", tunnel.sections.len()),
         lamps(tunnel),
     ];
     lines.extend(tunnel.wayside.iter().map(|d| {
-        format!("wayside device {} at {} m, writes to balise {}", d.name, d.chainage_m, d.balise)
+        format!(
+            "wayside device {} at {} m, writes to balise {}",
+            d.name, d.chainage_m, d.balise
+        )
     }));
     let named = |what: &str, list: Vec<String>| match list.len() {
         0 => format!("no {what}"),
@@ -45,7 +51,10 @@ pub(super) fn tunnel(tunnel: &Tunnel) -> String {
 fn lamps(tunnel: &Tunnel) -> String {
     match (tunnel.lamps.first(), tunnel.lamps.last()) {
         (Some(first), Some(last)) => {
-            let gaps = tunnel.lamps.windows(2).map(|w| w[1].chainage_m - w[0].chainage_m);
+            let gaps = tunnel
+                .lamps
+                .windows(2)
+                .map(|w| w[1].chainage_m - w[0].chainage_m);
             let widest = gaps.fold(0.0, f64::max);
             format!(
                 "{} lamps from {} to {} m, at most {widest:.1} m apart; chips of {:.1} us, {:?} code",
@@ -62,13 +71,18 @@ fn lamps(tunnel: &Tunnel) -> String {
 
 /// What it runs, what the rig sees, how many images to expect.
 pub(super) fn scenario(scenario: &Scenario) -> String {
-    let mut lines = vec![format!("scenario `{}`: {}", scenario.name, scenario.description)];
+    let mut lines = vec![format!(
+        "scenario `{}`: {}",
+        scenario.name, scenario.description
+    )];
     lines.push(format!(
         "{:.1} s on `{}`, seed {}",
         scenario.duration_s, scenario.tunnel.name, scenario.seed
     ));
     if let Some(train) = &scenario.physics.train {
-        let stop = train.stop_at_m.map_or(String::new(), |m| format!(", stops at {m} m"));
+        let stop = train
+            .stop_at_m
+            .map_or(String::new(), |m| format!(", stops at {m} m"));
         lines.push(format!(
             "train of {} cars, head at {} m, cruises at {} km/h{stop}",
             train.cars, train.start_chainage_m, train.cruise_speed_kmh
@@ -82,23 +96,40 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
     }
     if let Some(rig) = &scenario.rig {
         let calibration = rig.calibration();
-        lines.push(format!("rig: {}", frames(&calibration.camera, rig.pairs_per_s)));
+        lines.push(format!(
+            "rig: {}",
+            frames(&calibration.camera, rig.pairs_per_s)
+        ));
         lines.push(format!("rig: {}", view(&calibration, scenario)));
-        lines.push(format!("rig: {}", stripes(&calibration.camera, &scenario.tunnel)));
+        lines.push(format!(
+            "rig: {}",
+            stripes(&calibration.camera, &scenario.tunnel)
+        ));
         let pairs = images(scenario.duration_s, rig.pairs_per_s);
         lines.push(format!("about {pairs:.0} pairs of images"));
     }
     for post in &scenario.wayside {
         let name = &post.calibration.name;
         let rate = post.camera.frames_per_s;
-        lines.push(format!("{name}: {}", frames(&post.calibration.camera, rate)));
+        lines.push(format!(
+            "{name}: {}",
+            frames(&post.calibration.camera, rate)
+        ));
         let count = images(scenario.duration_s, rate);
-        let lidar = if post.lidar.is_some() { ", with lidar" } else { "" };
+        let lidar = if post.lidar.is_some() {
+            ", with lidar"
+        } else {
+            ""
+        };
         lines.push(format!("{name}: about {count:.0} images{lidar}"));
     }
     let (obstacles, workers) = (&scenario.physics.obstacles, &scenario.physics.workers);
     if !(obstacles.is_empty() && workers.is_empty()) {
-        lines.push(format!("obstacles: {}, workers: {}", obstacles.len(), workers.len()));
+        lines.push(format!(
+            "obstacles: {}, workers: {}",
+            obstacles.len(),
+            workers.len()
+        ));
     }
     indented(&lines)
 }
@@ -122,7 +153,10 @@ fn frames(camera: &CameraModel, per_s: f64) -> String {
 /// Visible interval of the lamp in the middle, and how it changes along the line.
 fn view(rig: &RigCalibration, scenario: &Scenario) -> String {
     let tunnel = &scenario.tunnel;
-    let seen = tunnel.lamps.iter().filter_map(|lamp| visible_interval(rig, tunnel, lamp));
+    let seen = tunnel
+        .lamps
+        .iter()
+        .filter_map(|lamp| visible_interval(rig, tunnel, lamp));
     let (mut near, mut far): (Vec<f64>, Vec<f64>) = seen.unzip();
     near.sort_by(f64::total_cmp);
     far.sort_by(f64::total_cmp);

@@ -94,7 +94,10 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         .unwrap_or_else(|| Path::new("out").join(&scenario.name));
     prepare(&out).map_err(|error| {
         let what = format!("cannot write into {}: {error}", out.display());
-        Failure::input(what, "choose another folder with --out, or make that one writable")
+        Failure::input(
+            what,
+            "choose another folder with --out, or make that one writable",
+        )
     })?;
 
     stop_on_ctrl_c();
@@ -159,9 +162,14 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
     if !args.view {
         return Ok(None);
     }
-    Recording::view(&scenario.record).map(Some).map_err(|error| {
-        Failure::input(error, "run without --view, and open recording.rrd afterwards")
-    })
+    Recording::view(&scenario.record)
+        .map(Some)
+        .map_err(|error| {
+            Failure::input(
+                error,
+                "run without --view, and open recording.rrd afterwards",
+            )
+        })
 }
 
 /// Makes the folder, and makes sure that files can be written there.

@@ -73,7 +73,10 @@ fn wayside(text: &mut String, s: &Summary) -> std::fmt::Result {
     let Some(w) = &s.wayside else {
         return Ok(());
     };
-    writeln!(text, "\nobstacle, size      first seen   after   distance error")?;
+    writeln!(
+        text,
+        "\nobstacle, size      first seen   after   distance error"
+    )?;
     for o in &w.obstacles {
         let value = |x: Option<f64>, unit: &str| match x {
             Some(x) => format!("{x:.2} {unit}"),
@@ -89,7 +92,12 @@ fn wayside(text: &mut String, s: &Summary) -> std::fmt::Result {
             value(o.distance_error_m, "m"),
         )?;
     }
-    writeln!(text, "{} false alarms, {} a frame", w.false_alarms, cost(w.ms_per_frame))
+    writeln!(
+        text,
+        "{} false alarms, {} a frame",
+        w.false_alarms,
+        cost(w.ms_per_frame)
+    )
 }
 
 fn protection(text: &mut String, s: &Summary) -> std::fmt::Result {
@@ -106,5 +114,13 @@ fn protection(text: &mut String, s: &Summary) -> std::fmt::Result {
     if let Some(margin) = p.stop_margin_m {
         write!(text, ", {margin:.1} m before the obstacle")?;
     }
-    writeln!(text, "{}", if p.collision { "; COLLISION" } else { "; no collision" })
+    writeln!(
+        text,
+        "{}",
+        if p.collision {
+            "; COLLISION"
+        } else {
+            "; no collision"
+        }
+    )
 }

@@ -38,8 +38,8 @@ mod overrides;
 mod recording;
 pub mod schema;
 
-pub(crate) use build::{parse_tunnel, read};
 pub use build::{Scenario, ScenarioError, WaysidePost};
+pub(crate) use build::{parse_tunnel, read};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};
 pub use recording::RecordSettings;
