@@ -131,14 +131,18 @@ impl World {
         }
         // A table of normal numbers, entered anew for every row, keeps the tests fast.
         let table: Vec<f64> = (0..4096).map(|_| noise.normal()).collect();
+        let seen = |light: f64, normal: f64| {
+            let light = light.min(1016.0);
+            let sigma = (light / 40.0 + 0.4).sqrt();
+            (4.0 + light + sigma * normal).round().clamp(0.0, 255.0) as u8
+        };
+        let dark: Vec<u8> = table.iter().map(|&normal| seen(0.0, normal)).collect();
         let mut image = GrayImage::new(c.width_px, c.height_px);
         for (pixels, light) in image.chunks_exact_mut(w).zip(grey.chunks_exact(w)) {
             let from = (noise.uniform() * 2048.0) as usize;
-            let numbers = table.iter().skip(from).cycle();
-            for ((pixel, &light), normal) in pixels.iter_mut().zip(light).zip(numbers) {
-                let light = light.min(1016.0);
-                let sigma = (light / 40.0 + 0.4).sqrt();
-                *pixel = (4.0 + light + sigma * normal).round().clamp(0.0, 255.0) as u8;
+            pixels.copy_from_slice(&dark[from..from + w]);
+            for (u, &light) in light.iter().enumerate().filter(|(_, light)| **light > 0.0) {
+                pixels[u] = seen(light, table[from + u]);
             }
         }
         image
