@@ -307,11 +307,12 @@ fn crossings(polygon: &[Point2<f64>], row: f64) -> (f64, f64) {
     (left, right)
 }
 
-/// A lamp that is always on, bright as `grey`, alone in a dark tunnel.
+/// A lamp that is always on, bright as `grey`, alone in the dark.
 fn lone_lamp(view: &View, grey: f64) -> Scene {
     let mut scene = sample::scene();
     let mut tunnel = (*scene.tunnel).clone();
     tunnel.ambient_lx = 0.0;
+    tunnel.sections.clear();
     scene.tunnel = tunnel.into();
     scene.lamps.retain(|lamp| {
         let p = view.motion.poses[0].inverse_transform_point(&lamp.centre);
