@@ -73,6 +73,9 @@ pub const SLEEPER: Pulse = Pulse {
     half_width_m: 1.25,
 };
 
+/// All marks, in the order in which shaders number them (from 1; 0 is none).
+pub const PULSES: [Pulse; 2] = [RING_JOINT, SLEEPER];
+
 /// The look of one material.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Look {
@@ -135,6 +138,16 @@ pub fn wgsl() -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(text, "const {name}: f32 = {value:?};");
     }
+    // Period, width, factor; the first stands for no mark.
+    text.push_str("const PULSES = array(vec3f(1.0, 0.5, 1.0)");
+    for p in PULSES {
+        let _ = write!(
+            text,
+            ", vec3f({:?}, {:?}, {:?})",
+            p.period_m, p.width_m, p.factor
+        );
+    }
+    text.push_str(");\n");
     text
 }
 

@@ -1,1 +1,239 @@
-//! The wgpu renderer.
+//! The renderer on a graphics adapter, off screen.
+//!
+//! ```no_run
+//! use metrotwin::twin::render::{Renderer, gpu::GpuRenderer, sample};
+//! let scene = sample::scene();
+//! let job = sample::stereo_job(&scene.tunnel, 40.0, 60.0 / 3.6);
+//! let mut renderer = GpuRenderer::new(scene)?;
+//! renderer.submit(&job)?;
+//! // ... other work ...
+//! let images = renderer.collect()?;
+//! images[0].save("left.png").unwrap();
+//! # Ok::<(), metrotwin::twin::render::RenderError>(())
+//! ```
+//!
+//! # How a picture is made
+//!
+//! 1. *Background.* Tunnel, rails and bodies are rasterised with a depth buffer. A rolling shutter
+//!    exposes every row at a time of its own, so a vertex lands on the row v for which
+//!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
+//!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
+//!    headlights are added in every pixel.
+//! 2. *Lamps.* Discs are ray-cast in every pixel with four instants in the exposure and 4 x 4
+//!    sub-pixels; where the disc is and how long it is on comes row by row from double precision.
+//!    Then the glare is added.
+//! 3. *Sensor.* Shot and read noise, 8 bits.
+//!
+//! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
+//!
+//! # What it does not do
+//!
+//! Shadows, reflections in wet or polished surfaces, lens distortion, and the end walls where two
+//! cross-sections meet (dark). Between vertices positions run straight, so a large triangle close
+//! to a fast camera is not bent as the shutter would bend it; lamps are exact.
+
+mod adapter;
+mod chunks;
+mod lamps;
+pub mod layout;
+mod mesh;
+mod passes;
+mod pipeline;
+mod target;
+mod tunnel;
+mod view;
+
+pub use adapter::adapters;
+pub use pipeline::shader_source;
+
+use super::light::LampField;
+use super::scene::{Job, Scene};
+use super::{Backend, RenderError, Renderer};
+use adapter::Gpu;
+use chunks::Chunks;
+use image::GrayImage;
+use lamps::LampTable;
+use layout::{Placement, Pose};
+use mesh::Mesh;
+use nalgebra::Point3;
+use passes::{BodyBuffers, ViewBuffers, ViewData};
+use pipeline::Pipelines;
+use std::collections::VecDeque;
+use target::{ReadBack, Target};
+use tunnel::ChunkKey;
+use view::{Framed, single};
+
+/// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
+pub struct GpuRenderer {
+    gpu: Gpu,
+    pipelines: Pipelines,
+    scene: Scene,
+    field: LampField,
+    chunks: Chunks,
+    bodies: BodyBuffers,
+    views: Vec<ViewBuffers>,
+    targets: Vec<Target>,
+    spare: Vec<ReadBack>,
+    in_flight: VecDeque<InFlight>,
+    scratch: Scratch,
+}
+
+struct InFlight {
+    images: Vec<ReadBack>,
+    submission: wgpu::SubmissionIndex,
+}
+
+/// Buffers used again for every view.
+#[derive(Default)]
+struct Scratch {
+    mesh: Mesh,
+    poses: Vec<Pose>,
+    placements: Vec<Placement>,
+    lamps: LampTable,
+    keys: Vec<ChunkKey>,
+}
+
+impl GpuRenderer {
+    /// Opens the preferred adapter and compiles the shaders.
+    pub fn new(scene: Scene) -> Result<Self, RenderError> {
+        let gpu = Gpu::open()?;
+        let pipelines = Pipelines::new(&gpu.device);
+        gpu.check()?;
+        Ok(Self {
+            pipelines,
+            field: LampField::new(&scene.lamps),
+            scene,
+            chunks: Chunks::default(),
+            bodies: BodyBuffers::new(&gpu),
+            views: Vec::new(),
+            targets: Vec::new(),
+            spare: Vec::new(),
+            in_flight: VecDeque::new(),
+            scratch: Scratch::default(),
+            gpu,
+        })
+    }
+
+    fn upload_bodies(&mut self, job: &Job) {
+        let mesh = &mut self.scratch.mesh;
+        mesh.vertices.clear();
+        mesh.indices.clear();
+        self.bodies.ranges.clear();
+        for body in &job.bodies {
+            let first = mesh.indices.len() as u32;
+            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx);
+            self.bodies.ranges.push(first..mesh.indices.len() as u32);
+        }
+        self.bodies.write(&self.gpu, mesh);
+    }
+
+    /// Records all passes of view `k` and the copy of its image.
+    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job, k: usize) -> ReadBack {
+        let framed = Framed::new(&job.views[k]);
+        self.upload_view(&framed, job, k);
+        let lens = &framed.view.camera.intrinsics;
+        let size_px = (lens.width_px, lens.height_px);
+        let (gpu, pipelines) = (&self.gpu, &self.pipelines);
+        if !self.targets.iter().any(|t| t.size_px == size_px) {
+            self.targets.push(Target::new(&gpu.device, size_px));
+        }
+        let back = match self.spare.iter().position(|b| b.fits(size_px)) {
+            Some(at) => self.spare.swap_remove(at),
+            None => ReadBack::new(&gpu.device, size_px),
+        };
+        if let Some(target) = self.targets.iter().find(|t| t.size_px == size_px) {
+            let buffers = &self.views[k];
+            let sight = (&self.chunks, self.scratch.keys.as_slice());
+            buffers.draw_background(gpu, pipelines, encoder, target, sight, &self.bodies);
+            buffers.draw_lamps(gpu, pipelines, encoder, target);
+            buffers.draw_sensor(gpu, pipelines, encoder, target);
+            target.copy_to(encoder, &back);
+        }
+        back
+    }
+
+    fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
+        let (gpu, tunnel, scratch) = (&self.gpu, &self.scene.tunnel, &mut self.scratch);
+        self.chunks
+            .in_sight(gpu, tunnel, &self.field, framed, &mut scratch.keys);
+        let reference = framed.reference();
+        scratch.placements.clear();
+        for key in &scratch.keys {
+            if let Some(chunk) = self.chunks.get(*key) {
+                scratch.placements.push(Placement {
+                    offset_m: single(&(chunk.origin - reference)),
+                    first_cell: key.first_cell(),
+                    ..Placement::default()
+                });
+            }
+        }
+        scratch
+            .placements
+            .extend(job.bodies.iter().map(|body| Placement {
+                offset_m: single(
+                    &(Point3::from(body.world_from_body.translation.vector) - reference),
+                ),
+                velocity_mps: single(&body.velocity_mps),
+                ..Placement::default()
+            }));
+        scratch
+            .lamps
+            .fill(framed, &self.scene.lamps, tunnel.ambient_lx);
+        let constants = framed.constants(job, &mut scratch.poses);
+        while self.views.len() <= k {
+            self.views.push(ViewBuffers::new(gpu));
+        }
+        self.views[k].write(
+            gpu,
+            &ViewData {
+                constants,
+                poses: &scratch.poses,
+                placements: &scratch.placements,
+                lamps: &scratch.lamps.lamps,
+                rows: &scratch.lamps.rows,
+            },
+        );
+    }
+}
+
+impl Renderer for GpuRenderer {
+    fn backend(&self) -> Backend {
+        self.gpu.backend.clone()
+    }
+
+    fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
+        self.chunks.next_job();
+        self.upload_bodies(job);
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let images: Vec<_> = (0..job.views.len())
+            .map(|k| self.record(&mut encoder, job, k))
+            .collect();
+        let submission = self.gpu.queue.submit([encoder.finish()]);
+        for image in &images {
+            image.request();
+        }
+        self.in_flight.push_back(InFlight { images, submission });
+        self.gpu.check()
+    }
+
+    fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
+        let job = self
+            .in_flight
+            .pop_front()
+            .ok_or(RenderError::NothingSubmitted)?;
+        self.gpu
+            .device
+            .poll(wgpu::PollType::Wait {
+                submission_index: Some(job.submission),
+                timeout: None,
+            })
+            .map_err(|e| RenderError::Device(e.to_string()))?;
+        self.gpu.check()?;
+        let images = job.images.iter().map(ReadBack::image).collect();
+        self.spare.extend(job.images);
+        images
+    }
+}

@@ -1,0 +1,63 @@
+// What every shader shares: the view, and the hash. Prepended to each of the other files, after
+// the constants written by twin/render/surface.rs.
+
+const PI: f32 = 3.14159265;
+// Depth is reversed: 1 at this optical depth, 0 at infinity.
+const NEAR_M: f32 = 0.05;
+const MAX_HEADLIGHTS: u32 = 8u;
+
+struct Headlight {
+    // Relative to the view's reference point.
+    position_m: vec3f,
+    intensity_cd: f32,
+    axis: vec3f,
+    exponent: f32,
+}
+
+struct View {
+    focal_px: vec2f,
+    centre_px: vec2f,
+    size_px: vec2f,
+    key: vec2u,
+    // Steps of the table of poses a row; the first pose is that of row 0 in mid-exposure.
+    pose_per_row: f32,
+    // From the bodies' time to the first pose, and from pose to pose.
+    time_first_s: f32,
+    pose_step_s: f32,
+    pose_last: f32,
+    grey_per_cd_m2: f32,
+    black_grey: f32,
+    electrons_per_grey: f32,
+    read_variance_grey2: f32,
+    noise: u32,
+    frame: u32,
+    headlight_count: u32,
+    halo_px: f32,
+    headlights: array<Headlight, MAX_HEADLIGHTS>,
+}
+
+@group(0) @binding(0) var<uniform> view: View;
+
+// Jarzynski and Olano, JCGT 9(3), 2020; the same as twin/random.rs.
+fn pcg4d(seed: vec4u) -> vec4u {
+    var v = seed * 1664525u + 1013904223u;
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    v ^= v >> vec4u(16u);
+    v.x += v.y * v.w;
+    v.y += v.z * v.x;
+    v.z += v.x * v.y;
+    v.w += v.y * v.z;
+    return v;
+}
+
+// Two triangles that span `low` to `high`, in pixels with pixel centres at integers.
+fn rectangle(corner: u32, low: vec2f, high: vec2f) -> vec4f {
+    let right = corner == 1u || corner == 2u || corner == 4u;
+    let down = corner >= 2u && corner != 3u;
+    let at = vec2f(select(low.x, high.x, right), select(low.y, high.y, down));
+    let ndc = (at + 0.5) * 2.0 / view.size_px - 1.0;
+    return vec4f(ndc.x, -ndc.y, 0.0, 1.0);
+}

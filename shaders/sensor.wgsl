@@ -1,0 +1,42 @@
+// Shot noise, read noise and eight bits. Every fragment makes four neighbouring pixels of a row,
+// packed in one RGBA texel: the target's bytes are the image, and one hash serves four pixels.
+
+@group(0) @binding(1) var signal: texture_2d<f32>;
+
+@vertex
+fn whole(@builtin(vertex_index) k: u32) -> @builtin(position) vec4f {
+    return rectangle(k, vec2f(-0.5), view.size_px - 0.5);
+}
+
+// In (0, 1): the upper 24 bits, which f32 holds.
+fn unit(word: vec2u) -> vec2f {
+    return (vec2f(word >> vec2u(8u)) + 0.5) / 16777216.0;
+}
+
+// Four standard normal numbers by Box and Muller's transform.
+fn normals(counter: u32) -> vec4f {
+    let word = pcg4d(vec4u(view.key, view.frame, counter));
+    let radius = sqrt(-2.0 * log(unit(word.xz)));
+    let turn = 2.0 * PI * unit(word.yw);
+    return vec4f(radius * cos(turn), radius * sin(turn));
+}
+
+@fragment
+fn develop(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let x = 4 * i32(at.x);
+    let y = i32(at.y);
+    let s = vec4f(
+        textureLoad(signal, vec2i(x, y), 0).r,
+        textureLoad(signal, vec2i(x + 1, y), 0).r,
+        textureLoad(signal, vec2i(x + 2, y), 0).r,
+        textureLoad(signal, vec2i(x + 3, y), 0).r,
+    );
+    var grey = min(s + view.black_grey, vec4f(SATURATION_GREY));
+    if view.noise != 0u {
+        let shot = max(grey - view.black_grey, vec4f(0.0)) / view.electrons_per_grey;
+        let per_row = (u32(view.size_px.x) + 3u) / 4u;
+        let n = normals(u32(y) * per_row + u32(at.x));
+        grey += sqrt(shot + view.read_variance_grey2) * n;
+    }
+    return round(clamp(grey, vec4f(0.0), vec4f(255.0))) / 255.0;
+}

@@ -1,0 +1,83 @@
+//! Finding and opening a graphics adapter.
+
+use crate::twin::render::{Backend, RenderError};
+use std::sync::{Arc, Mutex};
+
+/// The opened adapter.
+pub struct Gpu {
+    /// Makes buffers, textures and pipelines.
+    pub device: wgpu::Device,
+    /// Takes work.
+    pub queue: wgpu::Queue,
+    /// What it is.
+    pub backend: Backend,
+    failure: Arc<Mutex<Option<String>>>,
+}
+
+/// All adapters of this machine, the preferred one first.
+pub fn adapters() -> Vec<Backend> {
+    found().iter().map(|a| describe(&a.get_info())).collect()
+}
+
+impl Gpu {
+    /// Opens the preferred adapter.
+    pub fn open() -> Result<Self, RenderError> {
+        let adapter = found().into_iter().next().ok_or_else(|| {
+            RenderError::NoAdapter(
+                "install a Vulkan driver; on a machine without graphics hardware, on Debian or \
+                 Ubuntu: apt-get install mesa-vulkan-drivers"
+                    .into(),
+            )
+        })?;
+        let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
+            label: Some("metrotwin"),
+            ..Default::default()
+        }))
+        .map_err(|e| RenderError::Device(e.to_string()))?;
+        let failure = Arc::new(Mutex::new(None));
+        let noted = Arc::clone(&failure);
+        device.on_uncaptured_error(Arc::new(move |e: wgpu::Error| {
+            let mut first = noted.lock().unwrap_or_else(|e| e.into_inner());
+            first.get_or_insert(e.to_string());
+        }));
+        Ok(Self {
+            device,
+            queue,
+            backend: describe(&adapter.get_info()),
+            failure,
+        })
+    }
+
+    /// The first error that the adapter has reported, if any.
+    pub fn check(&self) -> Result<(), RenderError> {
+        let failure = self.failure.lock().unwrap_or_else(|e| e.into_inner());
+        match failure.as_ref() {
+            Some(text) => Err(RenderError::Device(text.clone())),
+            None => Ok(()),
+        }
+    }
+}
+
+/// Hardware before software.
+fn found() -> Vec<wgpu::Adapter> {
+    let instance = wgpu::Instance::new(wgpu::InstanceDescriptor {
+        backends: wgpu::Backends::PRIMARY,
+        ..wgpu::InstanceDescriptor::new_without_display_handle()
+    });
+    let mut all = pollster::block_on(instance.enumerate_adapters(wgpu::Backends::PRIMARY));
+    all.sort_by_key(|a| match a.get_info().device_type {
+        wgpu::DeviceType::DiscreteGpu => 0,
+        wgpu::DeviceType::IntegratedGpu => 1,
+        wgpu::DeviceType::VirtualGpu => 2,
+        wgpu::DeviceType::Cpu => 3,
+        wgpu::DeviceType::Other => 4,
+    });
+    all
+}
+
+fn describe(info: &wgpu::AdapterInfo) -> Backend {
+    Backend {
+        backend: info.backend.to_string(),
+        adapter: info.name.clone(),
+    }
+}

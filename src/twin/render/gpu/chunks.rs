@@ -1,0 +1,161 @@
+//! Chunks of the tunnel on the adapter: meshed when first seen, dropped when long unseen.
+
+use super::adapter::Gpu;
+use super::tunnel::{CHUNK_M, ChunkKey, chunk_mesh};
+use super::view::Framed;
+use crate::track::Tunnel;
+use crate::twin::render::light::LampField;
+use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
+use wgpu::util::DeviceExt;
+
+/// Range drawn before and behind a camera.
+const AHEAD_M: f64 = 160.0;
+const BEHIND_M: f64 = 20.0;
+/// Chunks from here on are drawn coarse.
+const COARSE_FROM_M: f64 = 60.0;
+/// Jobs after which an unseen chunk is dropped.
+const KEEP_JOBS: u64 = 200;
+/// Steps of the search for a camera far from where one was last.
+const SEARCH_STEP_M: f64 = 20.0;
+/// Farther from the line than this the chainage found is not believed.
+const NEAR_LINE_M: f64 = 30.0;
+
+/// A mesh on the adapter.
+pub struct Chunk {
+    /// Its origin in the world.
+    pub origin: Point3<f64>,
+    /// Distance of the farthest vertex from the origin.
+    pub radius_m: f64,
+    /// Corners.
+    pub vertices: wgpu::Buffer,
+    /// Triangles.
+    pub indices: wgpu::Buffer,
+    /// Number of indices.
+    pub count: u32,
+    seen_in: u64,
+}
+
+/// All chunks in use.
+#[derive(Default)]
+pub struct Chunks {
+    made: BTreeMap<ChunkKey, Option<Chunk>>,
+    last_seen_s_m: f64,
+    job: u64,
+}
+
+impl Chunks {
+    /// Begins a job; what has not been seen for long goes.
+    pub fn next_job(&mut self) {
+        self.job += 1;
+        let job = self.job;
+        self.made
+            .retain(|_, c| c.as_ref().is_none_or(|c| job - c.seen_in < KEEP_JOBS));
+    }
+
+    /// Puts the keys of the chunks in sight into `keys`, near ones first, and makes them.
+    pub fn in_sight(
+        &mut self,
+        gpu: &Gpu,
+        tunnel: &Tunnel,
+        lamps: &LampField,
+        framed: &Framed<'_>,
+        keys: &mut Vec<ChunkKey>,
+    ) {
+        keys.clear();
+        let eye = framed.reference();
+        let s_m = self.locate(tunnel, &eye);
+        let frame = tunnel.alignment.at(s_m);
+        let ahead = framed.middle.rotation * Vector3::z();
+        let (sin, cos) = frame.heading_rad.sin_cos();
+        let (back_m, forth_m) = if ahead.x * cos + ahead.y * sin >= 0.0 {
+            (BEHIND_M, AHEAD_M)
+        } else {
+            (AHEAD_M, BEHIND_M)
+        };
+        let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
+        let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
+        let slack_m = framed.slack_m();
+        for index in first..=last {
+            let from_m = index as f64 * CHUNK_M;
+            let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
+            let key = ChunkKey {
+                index,
+                coarse: away_m > COARSE_FROM_M,
+            };
+            let job = self.job;
+            let chunk = self
+                .made
+                .entry(key)
+                .or_insert_with(|| upload(gpu, tunnel, lamps, key));
+            if let Some(chunk) = chunk
+                && framed.may_see(&chunk.origin, chunk.radius_m, slack_m)
+            {
+                chunk.seen_in = job;
+                keys.push(key);
+            }
+        }
+        keys.sort_by(|a, b| f64::total_cmp(&middle_away_m(*a, s_m), &middle_away_m(*b, s_m)));
+    }
+
+    /// A chunk that [`Self::in_sight`] has named.
+    pub fn get(&self, key: ChunkKey) -> Option<&Chunk> {
+        self.made.get(&key).and_then(Option::as_ref)
+    }
+
+    /// Chainage of a camera: by Newton's method from where the last one was, else by search.
+    fn locate(&mut self, tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
+        let on_line = |s_m: f64| {
+            let t = tunnel.alignment.track_from_world(eye, s_m);
+            (t.l_m.abs() < NEAR_LINE_M && (t.s_m - s_m).abs() < 4.0 * SEARCH_STEP_M)
+                .then_some(t.s_m)
+        };
+        let s_m = on_line(self.last_seen_s_m).unwrap_or_else(|| {
+            let near = nearest_station(tunnel, eye);
+            on_line(near).unwrap_or(near)
+        });
+        self.last_seen_s_m = s_m;
+        s_m
+    }
+}
+
+fn middle_away_m(key: ChunkKey, s_m: f64) -> f64 {
+    (key.from_m() + 0.5 * CHUNK_M - s_m).abs()
+}
+
+fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
+    let from_m = tunnel.sections.first().map_or(0.0, |r| r.from_m);
+    let to_m = tunnel.sections.last().map_or(0.0, |r| r.to_m);
+    let steps = ((to_m - from_m) / SEARCH_STEP_M).ceil().clamp(1.0, 1e5) as u32;
+    (0..=steps)
+        .map(|k| from_m + (to_m - from_m) * f64::from(k) / f64::from(steps))
+        .map(|s_m| ((tunnel.alignment.at(s_m).origin - eye).norm(), s_m))
+        .min_by(|a, b| f64::total_cmp(&a.0, &b.0))
+        .map_or(from_m, |(_, s_m)| s_m)
+}
+
+fn upload(gpu: &Gpu, tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Option<Chunk> {
+    let (origin, mesh) = chunk_mesh(tunnel, lamps, key);
+    let buffer = |contents: &[u8], usage| {
+        gpu.device
+            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
+                label: Some("tunnel"),
+                contents,
+                usage,
+            })
+    };
+    (!mesh.indices.is_empty()).then(|| Chunk {
+        origin,
+        radius_m: mesh.radius_m(),
+        vertices: buffer(
+            bytemuck::cast_slice(&mesh.vertices),
+            wgpu::BufferUsages::VERTEX,
+        ),
+        indices: buffer(
+            bytemuck::cast_slice(&mesh.indices),
+            wgpu::BufferUsages::INDEX,
+        ),
+        count: mesh.indices.len() as u32,
+        seen_in: 0,
+    })
+}

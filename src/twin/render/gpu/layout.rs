@@ -1,0 +1,147 @@
+//! The structs that Rust and the shaders share, laid out as WGSL lays them out. `tests/shaders.rs`
+//! holds every offset against the shader's.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Headlights beyond this many do not light a view; the nearest ones do.
+pub const MAX_HEADLIGHTS: usize = 8;
+
+/// A corner of a surface.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Vertex {
+    /// From the mesh's origin, world axes.
+    pub position_m: [f32; 3],
+    /// By lamps and ambient light.
+    pub irradiance_lx: f32,
+    /// Unit normal on the lit side, world axes.
+    pub normal: [f32; 3],
+    /// Share of light reflected, before any pattern.
+    pub albedo: f32,
+    /// Chainage from the mesh's origin, and metres along the outline.
+    pub pattern_m: [f32; 2],
+    /// Own luminance.
+    pub luminance_cd_m2: f32,
+    /// Material in bits 0-7, pulse in bits 8-15, stains in bit 16.
+    pub look: u32,
+}
+
+/// Where one mesh is drawn.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Placement {
+    /// The mesh's origin from the view's reference point, world axes.
+    pub offset_m: [f32; 3],
+    /// Stain cell at the mesh's origin.
+    pub first_cell: i32,
+    /// Where the mesh goes, world axes.
+    pub velocity_mps: [f32; 3],
+    /// Fills the stride.
+    pub unused: u32,
+}
+
+/// `camera_from_world` at one time, relative to the view's reference point: rows of the matrix,
+/// the translation last.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Pose {
+    /// First row.
+    pub x: [f32; 4],
+    /// Second row.
+    pub y: [f32; 4],
+    /// Third row.
+    pub z: [f32; 4],
+}
+
+/// A headlight.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Headlight {
+    /// From the view's reference point, world axes.
+    pub position_m: [f32; 3],
+    /// Intensity along the axis.
+    pub intensity_cd: f32,
+    /// Unit vector, world axes.
+    pub axis: [f32; 3],
+    /// Exponent of the pattern.
+    pub exponent: f32,
+}
+
+/// All that is the same for a whole view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct View {
+    /// Focal lengths.
+    pub focal_px: [f32; 2],
+    /// Principal point.
+    pub centre_px: [f32; 2],
+    /// Width and height.
+    pub size_px: [f32; 2],
+    /// Key of the noise.
+    pub key: [u32; 2],
+    /// Steps of the table of poses a row; the first pose is that of row 0.
+    pub pose_per_row: f32,
+    /// From the bodies' time to the first pose.
+    pub time_first_s: f32,
+    /// From pose to pose.
+    pub pose_step_s: f32,
+    /// Index of the last pose.
+    pub pose_last: f32,
+    /// Signal of 1 cd/m^2.
+    pub grey_per_cd_m2: f32,
+    /// Grey level of darkness.
+    pub black_grey: f32,
+    /// Electrons a grey level.
+    pub electrons_per_grey: f32,
+    /// Square of the read noise in grey levels.
+    pub read_variance_grey2: f32,
+    /// Whether to draw noise.
+    pub noise: u32,
+    /// Frame number of the noise.
+    pub frame: u32,
+    /// Headlights in use.
+    pub headlight_count: u32,
+    /// Decay length of the glare.
+    pub halo_px: f32,
+    /// Headlights.
+    pub headlights: [Headlight; MAX_HEADLIGHTS],
+}
+
+/// A lamp in a view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Lamp {
+    /// Upper left bound of its disc.
+    pub disc_low: [f32; 2],
+    /// Lower right bound of its disc.
+    pub disc_high: [f32; 2],
+    /// Upper left bound of its glare.
+    pub halo_low: [f32; 2],
+    /// Lower right bound of its glare.
+    pub halo_high: [f32; 2],
+    /// First row that its table has.
+    pub first_row: i32,
+    /// Entry of the table for that row.
+    pub table: u32,
+    /// Radius of the disc.
+    pub radius_m: f32,
+    /// Exponent of luminance against the cosine.
+    pub exponent: f32,
+    /// Signal of the disc while off.
+    pub dark_grey: f32,
+    /// Fills the stride.
+    pub unused: [u32; 1],
+}
+
+/// A lamp while one row is exposed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct LampRow {
+    /// Centre in the camera's frame in the middle of each quarter of the exposure, and the signal
+    /// along the normal in that quarter.
+    pub quarters: [[f32; 4]; 4],
+    /// Normal in the camera's frame, and the signal of the glare on the rim.
+    pub normal_halo: [f32; 4],
+    /// Centre and apparent radius in the image.
+    pub image_px: [f32; 4],
+}

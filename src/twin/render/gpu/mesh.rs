@@ -1,0 +1,234 @@
+//! Triangles, and the triangles of the bodies' shapes.
+
+use super::layout::Vertex;
+use crate::twin::render::light::LampField;
+use crate::twin::render::scene::{Body, Shape};
+use nalgebra::{Point3, Vector3};
+use std::f64::consts::{FRAC_PI_2, TAU};
+
+/// Faces and straight sides are cut to this size, so that light varies little over one cell.
+const CELL_M: f64 = 0.5;
+const MAX_CELLS: f64 = 48.0;
+/// Corners around a round shape: its outline errs by under 0.5 % of its radius.
+const SECTORS: usize = 32;
+/// Rings from a pole to the equator of a round end.
+const RINGS: usize = 8;
+
+/// Vertices, and triangles as triples of them.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Corners.
+    pub vertices: Vec<Vertex>,
+    /// Three a triangle.
+    pub indices: Vec<u32>,
+}
+
+impl Mesh {
+    /// Two triangles for each cell of a grid of `rows` by `columns` vertices that starts at vertex
+    /// `first`.
+    pub fn add_quads(&mut self, first: u32, rows: u32, columns: u32) {
+        for r in 1..rows {
+            for c in 1..columns {
+                let d = first + r * columns + c;
+                let (a, b) = (d - columns - 1, d - columns);
+                self.indices.extend([a, b, d - 1, d - 1, b, d]);
+            }
+        }
+    }
+
+    /// Distance of the farthest vertex from the origin.
+    pub fn radius_m(&self) -> f64 {
+        self.vertices
+            .iter()
+            .map(|v| Vector3::from(v.position_m).norm())
+            .fold(0.0, f32::max)
+            .into()
+    }
+
+    /// Appends a body, lit where it stands.
+    pub fn add_body(&mut self, body: &Body, lamps: &LampField, ambient_lx: f64) {
+        let mut corner = |p: Vector3<f64>, n: Vector3<f64>| {
+            let at = body.world_from_body * Point3::from(p);
+            let normal = body.world_from_body * n;
+            let out = body.world_from_body.rotation * p;
+            self.vertices.push(Vertex {
+                position_m: out.map(|x| x as f32).into(),
+                irradiance_lx: (lamps.irradiance_lx(&at, &normal) + ambient_lx) as f32,
+                normal: normal.map(|x| x as f32).into(),
+                albedo: body.albedo as f32,
+                luminance_cd_m2: body.luminance_cd_m2 as f32,
+                ..Vertex::default()
+            });
+        };
+        let grids = match &body.shape {
+            Shape::Box(half) => box_grids(half, &mut corner),
+            Shape::Cylinder(r, h) => turned(&cylinder_profile(*r, *h), &mut corner),
+            Shape::Sphere(r) => turned(&capsule_profile(*r, 0.0), &mut corner),
+            Shape::Capsule(r, h) => turned(&capsule_profile(*r, *h), &mut corner),
+        };
+        let total: usize = grids.iter().map(|(rows, columns)| rows * columns).sum();
+        let mut first = self.vertices.len() - total;
+        for (rows, columns) in grids {
+            self.add_quads(first as u32, rows as u32, columns as u32);
+            first += rows * columns;
+        }
+    }
+}
+
+/// Rows and columns of a grid of vertices.
+type Grid = (usize, usize);
+
+fn cells(length_m: f64) -> usize {
+    (length_m / CELL_M).ceil().clamp(1.0, MAX_CELLS) as usize
+}
+
+fn box_grids(
+    half: &Vector3<f64>,
+    corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>),
+) -> Vec<Grid> {
+    let mut grids = Vec::with_capacity(6);
+    for axis in 0..3 {
+        let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+        let (rows, columns) = (cells(2.0 * half[i]), cells(2.0 * half[j]));
+        for side in [-1.0, 1.0] {
+            let mut normal = Vector3::zeros();
+            normal[axis] = side;
+            for r in 0..=rows {
+                for c in 0..=columns {
+                    let mut p = normal * half[axis];
+                    p[i] = half[i] * (2.0 * r as f64 / rows as f64 - 1.0);
+                    p[j] = half[j] * (2.0 * c as f64 / columns as f64 - 1.0);
+                    corner(p, normal);
+                }
+            }
+            grids.push((rows + 1, columns + 1));
+        }
+    }
+    grids
+}
+
+/// A point of the outline of a body of revolution: radius, height, and its normal in that plane.
+struct ProfilePoint {
+    radius_m: f64,
+    z_m: f64,
+    normal: [f64; 2],
+}
+
+/// Bottom to top: one line for every smooth piece.
+fn cylinder_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
+    let point = |radius_m, z_m, normal| ProfilePoint {
+        radius_m,
+        z_m,
+        normal,
+    };
+    let steps = cells(2.0 * half_m);
+    let cap = |side: f64| {
+        [0.0, radius_m]
+            .map(|r| point(r, side * half_m, [0.0, side]))
+            .into()
+    };
+    let side = (0..=steps)
+        .map(|k| half_m * (2.0 * k as f64 / steps as f64 - 1.0))
+        .map(|z| point(radius_m, z, [1.0, 0.0]))
+        .collect();
+    vec![cap(-1.0), side, cap(1.0)]
+}
+
+fn capsule_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
+    let dome = |side: f64| {
+        (0..=RINGS).map(move |k| {
+            let k = if side < 0.0 { k } else { RINGS - k };
+            let (up, out) = (FRAC_PI_2 * (1.0 - k as f64 / RINGS as f64)).sin_cos();
+            ProfilePoint {
+                radius_m: radius_m * out,
+                z_m: side * (half_m + radius_m * up),
+                normal: [out, side * up],
+            }
+        })
+    };
+    let steps = cells(2.0 * half_m);
+    let side = (1..steps).map(|k| ProfilePoint {
+        radius_m,
+        z_m: half_m * (2.0 * k as f64 / steps as f64 - 1.0),
+        normal: [1.0, 0.0],
+    });
+    vec![dome(-1.0).chain(side).chain(dome(1.0)).collect()]
+}
+
+/// Turns outlines about z.
+fn turned(
+    pieces: &[Vec<ProfilePoint>],
+    corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>),
+) -> Vec<Grid> {
+    for point in pieces.iter().flatten() {
+        for k in 0..=SECTORS {
+            let (sin, cos) = (TAU * (k % SECTORS) as f64 / SECTORS as f64).sin_cos();
+            let around = |r: f64, z: f64| Vector3::new(r * cos, r * sin, z);
+            corner(
+                around(point.radius_m, point.z_m),
+                around(point.normal[0], point.normal[1]),
+            );
+        }
+    }
+    pieces.iter().map(|p| (p.len(), SECTORS + 1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Isometry3;
+
+    fn mesh(shape: Shape) -> Mesh {
+        let body = Body {
+            shape,
+            world_from_body: Isometry3::translation(5.0, 6.0, 7.0),
+            velocity_mps: Vector3::zeros(),
+            albedo: 0.5,
+            luminance_cd_m2: 0.0,
+        };
+        let mut mesh = Mesh::default();
+        mesh.add_body(&body, &LampField::new(&[]), 1.0);
+        mesh
+    }
+
+    /// Volume by the divergence theorem over triangles turned outwards by their normals.
+    fn volume(mesh: &Mesh) -> f64 {
+        mesh.indices
+            .chunks(3)
+            .map(|t| {
+                let corner =
+                    |k: u32| Vector3::from(mesh.vertices[k as usize].position_m).cast::<f64>();
+                let (a, b, c) = (corner(t[0]), corner(t[1]), corner(t[2]));
+                let area = (b - a).cross(&(c - a)) * 0.5;
+                let normal: Vector3<f64> = t
+                    .iter()
+                    .map(|k| Vector3::from(mesh.vertices[*k as usize].normal).cast::<f64>())
+                    .sum();
+                area.dot(&normal).signum() * area.dot(&(a + b + c)) / 9.0
+            })
+            .sum()
+    }
+
+    /// Provokes holes, wrong sizes and normals that point inwards.
+    #[test]
+    fn volumes_are_those_of_the_shapes() {
+        let pi = std::f64::consts::PI;
+        let cases = [
+            (Shape::Box(Vector3::new(0.5, 1.0, 2.0)), 8.0, 1e-6),
+            (Shape::Cylinder(0.5, 1.5), pi * 0.25 * 3.0, 0.01),
+            (Shape::Sphere(2.0), pi * 32.0 / 3.0, 0.02),
+            (
+                Shape::Capsule(0.5, 1.0),
+                pi * (0.25 * 2.0 + 0.5 / 3.0),
+                0.02,
+            ),
+        ];
+        for (shape, exact, tolerance) in cases {
+            let v = volume(&mesh(shape.clone()));
+            assert!(
+                (v / exact - 1.0).abs() < tolerance,
+                "{shape:?}: {v} {exact}"
+            );
+        }
+    }
+}

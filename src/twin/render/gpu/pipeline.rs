@@ -1,0 +1,214 @@
+//! Shaders and the four pipelines made of them.
+
+use super::layout::{Placement, Vertex};
+use crate::twin::render::surface;
+use std::mem::{offset_of, size_of};
+
+/// Signal in grey levels over black; half precision keeps 11 bits, finer than the noise anywhere.
+pub const SIGNAL: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
+/// Reversed depth.
+pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Four grey pixels a texel.
+pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// Name and text of every file in `shaders/`.
+const FILES: [(&str, &str); 4] = [
+    ("common", include_str!("../../../../shaders/common.wgsl")),
+    (
+        "background",
+        include_str!("../../../../shaders/background.wgsl"),
+    ),
+    ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
+    ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
+];
+
+/// The complete source of `shaders/<name>.wgsl`: constants, what is common, and the file.
+pub fn shader_source(name: &str) -> Option<String> {
+    let (_, text) = FILES.iter().find(|(n, _)| *n == name)?;
+    let mut source = surface::wgsl();
+    if name != FILES[0].0 {
+        source.push_str(FILES[0].1);
+    }
+    source.push_str(text);
+    Some(source)
+}
+
+/// One pipeline a pass.
+pub struct Pipelines {
+    /// Tunnel and bodies.
+    pub background: wgpu::RenderPipeline,
+    /// Lamps' discs, over the background by coverage.
+    pub discs: wgpu::RenderPipeline,
+    /// Lamps' glare, added.
+    pub halos: wgpu::RenderPipeline,
+    /// Noise and quantisation.
+    pub sensor: wgpu::RenderPipeline,
+}
+
+struct Stage<'a> {
+    shader: &'a wgpu::ShaderModule,
+    entries: [&'a str; 2],
+    buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    depth: Option<wgpu::DepthStencilState>,
+    target: wgpu::ColorTargetState,
+}
+
+impl Pipelines {
+    /// Compiles all shaders.
+    pub fn new(device: &wgpu::Device) -> Self {
+        let shader = |name: &str| {
+            device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
+            })
+        };
+        let (background, lamps, sensor) = (shader("background"), shader("lamps"), shader("sensor"));
+        let lamp_stage = |entries, blend| Stage {
+            shader: &lamps,
+            entries,
+            buffers: &[],
+            depth: None,
+            target: target(SIGNAL, Some(blend)),
+        };
+        Self {
+            background: pipeline(
+                device,
+                Stage {
+                    shader: &background,
+                    entries: ["project", "shade"],
+                    buffers: &[
+                        Some(wgpu::VertexBufferLayout {
+                            array_stride: size_of::<Vertex>() as u64,
+                            step_mode: wgpu::VertexStepMode::Vertex,
+                            attributes: &VERTEX,
+                        }),
+                        Some(wgpu::VertexBufferLayout {
+                            array_stride: size_of::<Placement>() as u64,
+                            step_mode: wgpu::VertexStepMode::Instance,
+                            attributes: &PLACEMENT,
+                        }),
+                    ],
+                    depth: Some(wgpu::DepthStencilState {
+                        format: DEPTH,
+                        depth_write_enabled: Some(true),
+                        depth_compare: Some(wgpu::CompareFunction::Greater),
+                        stencil: wgpu::StencilState::default(),
+                        bias: wgpu::DepthBiasState::default(),
+                    }),
+                    target: target(SIGNAL, None),
+                },
+            ),
+            discs: pipeline(
+                device,
+                lamp_stage(
+                    ["disc_corner", "disc"],
+                    wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING,
+                ),
+            ),
+            halos: pipeline(
+                device,
+                lamp_stage(
+                    ["halo_corner", "halo"],
+                    wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING,
+                ),
+            ),
+            sensor: pipeline(
+                device,
+                Stage {
+                    shader: &sensor,
+                    entries: ["whole", "develop"],
+                    buffers: &[],
+                    depth: None,
+                    target: target(PACKED, None),
+                },
+            ),
+        }
+    }
+}
+
+/// The resources of group 0, in the order of their bindings.
+pub fn bind(
+    device: &wgpu::Device,
+    pipeline: &wgpu::RenderPipeline,
+    resources: &[wgpu::BindingResource<'_>],
+) -> wgpu::BindGroup {
+    let entries: Vec<_> = resources
+        .iter()
+        .zip(0u32..)
+        .map(|(resource, binding)| wgpu::BindGroupEntry {
+            binding,
+            resource: resource.clone(),
+        })
+        .collect();
+    device.create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
+    })
+}
+
+const fn attribute(
+    format: wgpu::VertexFormat,
+    offset: usize,
+    shader_location: u32,
+) -> wgpu::VertexAttribute {
+    wgpu::VertexAttribute {
+        format,
+        offset: offset as u64,
+        shader_location,
+    }
+}
+
+const VERTEX: [wgpu::VertexAttribute; 7] = {
+    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32};
+    [
+        attribute(Float32x3, offset_of!(Vertex, position_m), 0),
+        attribute(Float32, offset_of!(Vertex, irradiance_lx), 1),
+        attribute(Float32x3, offset_of!(Vertex, normal), 2),
+        attribute(Float32, offset_of!(Vertex, albedo), 3),
+        attribute(Float32x2, offset_of!(Vertex, pattern_m), 4),
+        attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 5),
+        attribute(Uint32, offset_of!(Vertex, look), 6),
+    ]
+};
+
+const PLACEMENT: [wgpu::VertexAttribute; 3] = {
+    use wgpu::VertexFormat::{Float32x3, Sint32};
+    [
+        attribute(Float32x3, offset_of!(Placement, offset_m), 7),
+        attribute(Sint32, offset_of!(Placement, first_cell), 8),
+        attribute(Float32x3, offset_of!(Placement, velocity_mps), 9),
+    ]
+};
+
+fn target(format: wgpu::TextureFormat, blend: Option<wgpu::BlendState>) -> wgpu::ColorTargetState {
+    wgpu::ColorTargetState {
+        format,
+        blend,
+        write_mask: wgpu::ColorWrites::ALL,
+    }
+}
+
+fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(stage.entries[1]),
+        layout: None,
+        vertex: wgpu::VertexState {
+            module: stage.shader,
+            entry_point: Some(stage.entries[0]),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: stage.buffers,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: stage.depth,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module: stage.shader,
+            entry_point: Some(stage.entries[1]),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(stage.target)],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

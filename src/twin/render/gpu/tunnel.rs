@@ -1,0 +1,252 @@
+//! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
+
+use super::layout::Vertex;
+use super::mesh::Mesh;
+use crate::track::{CrossSection, Material, OutlinePoint, SectionRange, TrackPoint, Tunnel};
+use crate::twin::render::light::LampField;
+use crate::twin::render::surface;
+use nalgebra::{Point3, Vector3};
+
+/// Length of a chunk: a whole number of rings, joints, sleepers and stain cells, so that every
+/// pattern starts afresh at a chunk's origin and chainage stays exact in f32.
+pub const CHUNK_M: f64 = 30.0;
+/// Facets are cut to this width, so that light varies little over one.
+const FACET_M: f64 = 0.5;
+/// Stations of a coarse mesh.
+const COARSE_RING_M: f64 = 5.0;
+
+/// Which mesh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct ChunkKey {
+    /// Covers chainage from `index * CHUNK_M` over `CHUNK_M`.
+    pub index: i64,
+    /// With stations far apart.
+    pub coarse: bool,
+}
+
+impl ChunkKey {
+    /// Chainage of its origin.
+    pub fn from_m(self) -> f64 {
+        self.index as f64 * CHUNK_M
+    }
+
+    /// Stain cell at its origin.
+    pub fn first_cell(self) -> i32 {
+        self.index as i32 * (CHUNK_M / surface::STAIN_CELL_M) as i32
+    }
+
+    fn step_m(self) -> f64 {
+        if self.coarse {
+            COARSE_RING_M
+        } else {
+            surface::RING_M
+        }
+    }
+}
+
+/// A strip along the line between two corners of an outline.
+struct Facet {
+    ends: [OutlinePoint; 2],
+    q_m: [f64; 2],
+    albedo: f64,
+    look: u32,
+}
+
+/// Origin and mesh of a chunk; empty where there is no tunnel.
+pub fn chunk_mesh(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> (Point3<f64>, Mesh) {
+    let (from_m, to_m) = (key.from_m(), key.from_m() + CHUNK_M);
+    let origin = tunnel.alignment.at(from_m).origin;
+    let mut mesh = Mesh::default();
+    for range in &tunnel.sections {
+        let stations = stations(range, from_m, to_m, key.step_m());
+        if stations.len() < 2 {
+            continue;
+        }
+        for facet in facets_of(range) {
+            add_strip(&mut mesh, tunnel, lamps, &facet, &stations, from_m, &origin);
+        }
+    }
+    (origin, mesh)
+}
+
+/// Ends of the range inside the chunk, and all multiples of `step_m` between them.
+fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f64> {
+    let (from, to) = (from_m.max(range.from_m), to_m.min(range.to_m));
+    if to <= from {
+        return Vec::new();
+    }
+    let first = (from / step_m).floor() as i64 + 1;
+    let last = (to / step_m).ceil() as i64;
+    let inside = (first..last).map(|k| k as f64 * step_m);
+    std::iter::once(from).chain(inside).chain([to]).collect()
+}
+
+fn facets_of(range: &SectionRange) -> Vec<Facet> {
+    let mut facets = Vec::new();
+    add_outline(&mut facets, &range.section);
+    for side in [1.0, -1.0] {
+        add_outline(
+            &mut facets,
+            &surface::rail_outline(side * surface::RAIL_OFFSET_M),
+        );
+    }
+    facets
+}
+
+fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection) {
+    let points = &section.points;
+    let edges = points.len().saturating_sub(usize::from(!section.closed));
+    let mut q_m = 0.0;
+    for k in 0..edges {
+        let (a, b) = (points[k], points[(k + 1) % points.len()]);
+        let length_m = (b.l_m - a.l_m).hypot(b.h_m - a.h_m);
+        if length_m > 0.0 {
+            cut_edge(facets, [a, b], q_m, length_m, section.materials[k]);
+        }
+        q_m += length_m;
+    }
+}
+
+/// Cuts an edge into facets, also where the marks on it end.
+fn cut_edge(
+    facets: &mut Vec<Facet>,
+    [a, b]: [OutlinePoint; 2],
+    q_m: f64,
+    length_m: f64,
+    material: Material,
+) {
+    let look = surface::look(material);
+    let pieces = (length_m / FACET_M).ceil().max(1.0) as usize;
+    let mut cuts: Vec<f64> = (0..=pieces).map(|k| k as f64 / pieces as f64).collect();
+    if let Some(pulse) = look.pulse {
+        let ends = [pulse.half_width_m, -pulse.half_width_m];
+        cuts.extend(
+            ends.map(|end| (end - a.l_m) / (b.l_m - a.l_m))
+                .into_iter()
+                .filter(|t| *t > 0.0 && *t < 1.0),
+        );
+        cuts.sort_by(f64::total_cmp);
+    }
+    let at = |t: f64| OutlinePoint {
+        l_m: a.l_m + t * (b.l_m - a.l_m),
+        h_m: a.h_m + t * (b.h_m - a.h_m),
+    };
+    for pair in cuts.windows(2) {
+        let ends = [at(pair[0]), at(pair[1])];
+        let middle_m = 0.5 * (ends[0].l_m + ends[1].l_m);
+        let pulse = look
+            .pulse
+            .filter(|p| middle_m.abs() < p.half_width_m)
+            .and_then(|p| surface::PULSES.iter().position(|q| *q == p))
+            .map_or(0, |k| k as u32 + 1);
+        facets.push(Facet {
+            ends,
+            q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
+            albedo: look.albedo,
+            look: look.id | pulse << 8 | 1 << 16,
+        });
+    }
+}
+
+fn add_strip(
+    mesh: &mut Mesh,
+    tunnel: &Tunnel,
+    lamps: &LampField,
+    facet: &Facet,
+    stations: &[f64],
+    from_m: f64,
+    origin: &Point3<f64>,
+) {
+    let first = mesh.vertices.len() as u32;
+    for &s_m in stations {
+        let normal = facet_normal(tunnel, facet, s_m);
+        for (end, q_m) in facet.ends.iter().zip(facet.q_m) {
+            let p = tunnel.alignment.world_from_track(TrackPoint {
+                s_m,
+                l_m: end.l_m,
+                h_m: end.h_m,
+            });
+            mesh.vertices.push(Vertex {
+                position_m: (p - origin).map(|x| x as f32).into(),
+                irradiance_lx: (lamps.irradiance_lx(&p, &normal) + tunnel.ambient_lx) as f32,
+                normal: normal.map(|x| x as f32).into(),
+                albedo: facet.albedo as f32,
+                pattern_m: [(s_m - from_m) as f32, q_m as f32],
+                luminance_cd_m2: 0.0,
+                look: facet.look,
+            });
+        }
+    }
+    mesh.add_quads(first, stations.len() as u32, 2);
+}
+
+/// Normal of a facet on the side of the tunnel's inside.
+fn facet_normal(tunnel: &Tunnel, facet: &Facet, s_m: f64) -> Vector3<f64> {
+    let frame = tunnel.alignment.at(s_m);
+    let (sin, cos) = frame.heading_rad.sin_cos();
+    let along = Vector3::new(cos, sin, frame.slope);
+    let [a, b] = facet.ends;
+    let left_m = b.l_m - a.l_m;
+    let across = Vector3::new(-left_m * sin, left_m * cos, b.h_m - a.h_m);
+    // On the straight this is (h, -l) in track axes: to the left of an edge seen up the line.
+    across.cross(&along).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::render::sample;
+
+    fn chunk(index: i64, coarse: bool) -> (Point3<f64>, Mesh) {
+        let scene = sample::scene();
+        let lamps = LampField::new(&scene.lamps);
+        chunk_mesh(&scene.tunnel, &lamps, ChunkKey { index, coarse })
+    }
+
+    /// Provokes facets that face the rock: every normal of the lining points to the axis.
+    #[test]
+    fn lining_faces_inwards() {
+        let (origin, mesh) = chunk(2, false);
+        let tunnel = sample::tunnel();
+        let mut seen = 0;
+        for v in mesh.vertices.iter().filter(|v| v.look & 0xff == 0) {
+            let p = origin + Vector3::from(v.position_m).cast::<f64>();
+            let t = tunnel.alignment.track_from_world(&p, 75.0);
+            let axis = tunnel.alignment.world_from_track(TrackPoint {
+                l_m: 0.0,
+                h_m: 1.7,
+                ..t
+            });
+            assert!((axis - p).dot(&Vector3::from(v.normal).cast()) > 3.0);
+            seen += 1;
+        }
+        assert!(seen > 1000);
+    }
+
+    /// Provokes gaps between chunks: the last ring of one is the first ring of the next.
+    #[test]
+    fn chunks_meet() {
+        for coarse in [false, true] {
+            let (a, before) = chunk(10, coarse);
+            let (b, after) = chunk(11, coarse);
+            let rings = before.vertices.len() / after.vertices.len();
+            assert_eq!(rings, 1);
+            let per_strip = if coarse { 14 } else { 62 };
+            for k in 0..before.vertices.len() / per_strip {
+                let last = before.vertices[(k + 1) * per_strip - 1];
+                let first = after.vertices[k * per_strip + 1];
+                let gap = (a + Vector3::from(last.position_m).cast::<f64>())
+                    - (b + Vector3::from(first.position_m).cast::<f64>());
+                assert!(gap.norm() < 1e-5, "{gap}");
+            }
+        }
+    }
+
+    /// Provokes meshes beyond the ends of the tunnel, or none at its ends.
+    #[test]
+    fn chunks_end_with_the_tunnel() {
+        assert!(chunk(-1, false).1.vertices.is_empty());
+        assert!(!chunk(19, false).1.vertices.is_empty());
+        assert!(chunk(20, false).1.vertices.is_empty());
+    }
+}

@@ -1,0 +1,158 @@
+//! What one view needs on the adapter: its constants and the poses of its rows, all relative to
+//! the camera's place in mid-frame so that f32 suffices.
+
+use super::layout::{self, MAX_HEADLIGHTS, Pose};
+use crate::twin::render::scene::{Headlight, Job, View};
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// Poses in the table lie this close in time, far closer than any motion of a train bends.
+const POSE_STEP_S: f64 = 50e-6;
+const MAX_POSES: f64 = 1024.0;
+
+/// A view with its reference point.
+pub struct Framed<'a> {
+    /// What was asked for.
+    pub view: &'a View,
+    /// `world_from_camera` in mid-frame.
+    pub middle: Isometry3<f64>,
+}
+
+impl<'a> Framed<'a> {
+    /// Finds the reference point.
+    pub fn new(view: &'a View) -> Self {
+        let rows = f64::from(view.camera.intrinsics.height_px);
+        let at = view.camera.shutter.row_mid(view.start, 0.5 * rows);
+        Self {
+            view,
+            middle: view.motion.pose_at(at),
+        }
+    }
+
+    /// The point that offsets count from.
+    pub fn reference(&self) -> Point3<f64> {
+        Point3::from(self.middle.translation.vector)
+    }
+
+    /// Signal of a luminance of 1 cd/m^2.
+    pub fn grey_per_cd_m2(&self) -> f64 {
+        self.view.sensor.grey_per_cd_s * self.view.camera.shutter.exposure_s
+    }
+
+    /// Fills the table of poses and gives the view's constants.
+    pub fn constants(&self, job: &Job, poses: &mut Vec<Pose>) -> layout::View {
+        let (camera, sensor) = (&self.view.camera, &self.view.sensor);
+        let (lens, shutter) = (&camera.intrinsics, &camera.shutter);
+        let first = shutter.row_mid(self.view.start, 0.0);
+        let span_s = f64::from(lens.height_px.max(2) - 1) * shutter.line_time_s;
+        let steps = if self.view.motion.poses.len() > 1 {
+            (span_s / POSE_STEP_S).ceil().clamp(1.0, MAX_POSES)
+        } else {
+            1.0
+        };
+        let step_s = span_s / steps;
+        let reference = self.reference().coords;
+        poses.clear();
+        poses.extend((0..=steps as u32).map(|k| {
+            let pose = self.view.motion.pose_at(first.plus(f64::from(k) * step_s));
+            relative_pose(&pose, &reference)
+        }));
+        let mut constants = layout::View {
+            focal_px: [lens.fx_px as f32, lens.fy_px as f32],
+            centre_px: [lens.cx_px as f32, lens.cy_px as f32],
+            size_px: [lens.width_px as f32, lens.height_px as f32],
+            pose_per_row: if step_s > 0.0 {
+                (shutter.line_time_s / step_s) as f32
+            } else {
+                0.0
+            },
+            time_first_s: first.since(job.time) as f32,
+            pose_step_s: step_s as f32,
+            pose_last: steps as f32,
+            grey_per_cd_m2: self.grey_per_cd_m2() as f32,
+            black_grey: sensor.black_level_grey as f32,
+            electrons_per_grey: sensor.electrons_per_grey as f32,
+            read_variance_grey2: (sensor.read_noise_e / sensor.electrons_per_grey).powi(2) as f32,
+            noise: u32::from(sensor.noise),
+            key: self.view.noise.stream.key,
+            frame: self.view.noise.frame,
+            halo_px: sensor.halo_px as f32,
+            ..layout::View::default()
+        };
+        self.place_headlights(&job.headlights, &mut constants);
+        constants
+    }
+
+    fn place_headlights(&self, headlights: &[Headlight], constants: &mut layout::View) {
+        let from_here =
+            |h: &Headlight| h.world_from_light.translation.vector - self.reference().coords;
+        let mut nearest: Vec<&Headlight> = headlights.iter().collect();
+        nearest.sort_by(|a, b| f64::total_cmp(&from_here(a).norm(), &from_here(b).norm()));
+        nearest.truncate(MAX_HEADLIGHTS);
+        constants.headlight_count = nearest.len() as u32;
+        for (slot, light) in constants.headlights.iter_mut().zip(nearest) {
+            *slot = layout::Headlight {
+                position_m: single(&from_here(light)),
+                intensity_cd: light.intensity_cd as f32,
+                axis: single(&(light.world_from_light.rotation * Vector3::x())),
+                exponent: light.exponent as f32,
+            };
+        }
+    }
+
+    /// Whether a ball may be in the picture at all; `slack_m` covers the camera's way in the frame.
+    pub fn may_see(&self, centre: &Point3<f64>, radius_m: f64, slack_m: f64) -> bool {
+        let c = self.middle.inverse_transform_point(centre);
+        let lens = &self.view.camera.intrinsics;
+        let radius_m = radius_m + slack_m;
+        let corner = [
+            lens.ray(-0.5, -0.5),
+            lens.ray(
+                f64::from(lens.width_px) - 0.5,
+                f64::from(lens.height_px) - 0.5,
+            ),
+        ];
+        // Inside normals of the four planes through the image's borders.
+        let planes = [
+            Vector3::new(1.0, 0.0, -corner[0].x),
+            Vector3::new(-1.0, 0.0, corner[1].x),
+            Vector3::new(0.0, 1.0, -corner[0].y),
+            Vector3::new(0.0, -1.0, corner[1].y),
+        ];
+        c.z > -radius_m
+            && planes
+                .iter()
+                .all(|n| n.dot(&c.coords) > -radius_m * n.norm())
+    }
+
+    /// How far the camera gets in half a frame.
+    pub fn slack_m(&self) -> f64 {
+        let shutter = &self.view.camera.shutter;
+        let rows = f64::from(self.view.camera.intrinsics.height_px);
+        [0.0, rows]
+            .map(|v| {
+                let pose = self
+                    .view
+                    .motion
+                    .pose_at(shutter.row_mid(self.view.start, v));
+                (pose.translation.vector - self.middle.translation.vector).norm()
+            })
+            .into_iter()
+            .fold(0.1, f64::max)
+    }
+}
+
+/// To f32.
+pub fn single(v: &Vector3<f64>) -> [f32; 3] {
+    v.map(|x| x as f32).into()
+}
+
+fn relative_pose(world_from_camera: &Isometry3<f64>, reference: &Vector3<f64>) -> Pose {
+    let r = world_from_camera.rotation.inverse().to_rotation_matrix();
+    let t = r * (reference - world_from_camera.translation.vector);
+    let row = |k: usize| [r[(k, 0)], r[(k, 1)], r[(k, 2)], t[k]].map(|x| x as f32);
+    Pose {
+        x: row(0),
+        y: row(1),
+        z: row(2),
+    }
+}

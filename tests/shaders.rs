@@ -1,0 +1,138 @@
+//! Shaders without a GPU: every file in `shaders/` parses and validates with the constants that
+//! Rust writes, and the structs that both sides share have the same layout on both.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![cfg(feature = "twin")]
+
+use metrotwin::twin::render::gpu::{layout, shader_source};
+use metrotwin::twin::render::surface;
+use std::mem::{offset_of, size_of};
+
+fn parse(name: &str) -> naga::Module {
+    let source = shader_source(name).unwrap_or_else(|| panic!("{name} is not used by any pass"));
+    let module = naga::front::wgsl::parse_str(&source)
+        .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+    naga::valid::Validator::new(
+        naga::valid::ValidationFlags::all(),
+        naga::valid::Capabilities::empty(),
+    )
+    .validate(&module)
+    .unwrap_or_else(|e| panic!("{name}: {}", e.emit_to_string(&source)));
+    module
+}
+
+/// Provokes a shader that only a GPU would refuse, and one that no pass uses.
+#[test]
+fn every_file_validates() {
+    let mut files = 0;
+    for entry in std::fs::read_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders")).unwrap() {
+        let path = entry.unwrap().path();
+        assert_eq!(path.extension().unwrap(), "wgsl", "{path:?}");
+        parse(path.file_stem().unwrap().to_str().unwrap());
+        files += 1;
+    }
+    assert!(files > 0, "no shaders found");
+}
+
+/// Provokes a constant that a shader spells out with a value of its own.
+#[test]
+fn constants_have_one_source() {
+    assert_eq!(constant("MAX_HEADLIGHTS"), layout::MAX_HEADLIGHTS as f64);
+    let from_rust = surface::wgsl();
+    for name in ["STAIN_CELL_M", "STAIN_CONTRAST", "HALO_REACH", "PULSES"] {
+        assert!(from_rust.contains(&format!("const {name}")));
+        for file in ["common", "background", "lamps", "sensor"] {
+            let times = shader_source(file)
+                .unwrap()
+                .matches(&format!("const {name}"))
+                .count();
+            assert_eq!(times, 1, "{name} in {file}");
+        }
+    }
+}
+
+fn constant(name: &str) -> f64 {
+    let module = parse("common");
+    let (_, c) = module
+        .constants
+        .iter()
+        .find(|(_, c)| c.name.as_deref() == Some(name))
+        .unwrap();
+    match module.global_expressions[c.init] {
+        naga::Expression::Literal(naga::Literal::U32(x)) => f64::from(x),
+        ref other => panic!("{name}: {other:?}"),
+    }
+}
+
+/// Holds a struct of a shader against a list of (member, offset) and a size.
+fn same_layout(shader: &str, name: &str, members: &[(&str, usize)], size: usize) {
+    let module = parse(shader);
+    let (_, found) = module
+        .types
+        .iter()
+        .find(|(_, t)| t.name.as_deref() == Some(name))
+        .unwrap_or_else(|| panic!("no struct {name} in {shader}"));
+    let naga::TypeInner::Struct {
+        members: theirs,
+        span,
+    } = &found.inner
+    else {
+        panic!("{name} is no struct");
+    };
+    let theirs: Vec<_> = theirs
+        .iter()
+        .map(|m| (m.name.as_deref().unwrap(), m.offset as usize))
+        .collect();
+    assert_eq!(theirs, members, "{name}");
+    assert_eq!(*span as usize, size, "{name}");
+}
+
+macro_rules! same_layout {
+    ($shader:literal, $name:ident, $($member:ident),+) => {
+        same_layout(
+            $shader,
+            stringify!($name),
+            &[$((stringify!($member), offset_of!(layout::$name, $member))),+],
+            size_of::<layout::$name>(),
+        )
+    };
+}
+
+/// Provokes a member that is added, moved or retyped on one side only.
+#[test]
+fn structs_agree() {
+    same_layout!(
+        "common",
+        View,
+        focal_px,
+        centre_px,
+        size_px,
+        key,
+        pose_per_row,
+        time_first_s,
+        pose_step_s,
+        pose_last,
+        grey_per_cd_m2,
+        black_grey,
+        electrons_per_grey,
+        read_variance_grey2,
+        noise,
+        frame,
+        headlight_count,
+        halo_px,
+        headlights
+    );
+    same_layout!(
+        "common",
+        Headlight,
+        position_m,
+        intensity_cd,
+        axis,
+        exponent
+    );
+    same_layout!("background", Pose, x, y, z);
+    same_layout!(
+        "lamps", Lamp, disc_low, disc_high, halo_low, halo_high, first_row, table, radius_m,
+        exponent, dark_grey
+    );
+    same_layout!("lamps", LampRow, quarters, normal_halo, image_px);
+}
