@@ -1,0 +1,300 @@
+#![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+use super::*;
+use crate::bus::{Shutter, SimTime};
+use crate::track::uid::{ChipFrame, Uid, Waveform};
+use crate::track::{
+    Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
+};
+use crate::twin::random::Stream;
+use crate::twin::render::{CameraMotion, NoiseKey, SensorSettings, Shape, sample};
+use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
+use std::sync::Arc;
+
+const AMBIENT_LX: f64 = 50.0;
+const WALL_ALBEDO: f64 = 0.35;
+
+/// A straight box, 8 m wide and 10 m high, up the x axis, of plain walkway concrete.
+fn hall() -> Tunnel {
+    let corner = |l_m: f64, h_m: f64| OutlinePoint { l_m, h_m };
+    Tunnel {
+        name: "hall".into(),
+        alignment: Alignment::new(
+            Point3::origin(),
+            0.0,
+            &[PlanElement {
+                length_m: 100.0,
+                start_per_m: 0.0,
+                end_per_m: 0.0,
+                start_cant_m: 0.0,
+                end_cant_m: 0.0,
+            }],
+            &[],
+        ),
+        sections: vec![SectionRange {
+            from_m: 0.0,
+            to_m: 100.0,
+            section: CrossSection {
+                points: vec![
+                    corner(4.0, -5.0),
+                    corner(-4.0, -5.0),
+                    corner(-4.0, 5.0),
+                    corner(4.0, 5.0),
+                ],
+                materials: vec![Material::Walkway; 4],
+                closed: true,
+            },
+        }],
+        lamps: Vec::new(),
+        wayside: Vec::new(),
+        balises: Vec::new(),
+        base_stations: Vec::new(),
+        line_number: 1,
+        stations: Vec::new(),
+        ambient_lx: AMBIENT_LX,
+    }
+}
+
+fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
+    CpuRenderer::new(Scene {
+        tunnel: Arc::new(hall()),
+        lamps,
+    })
+}
+
+/// Looks to the left from (50, 0, 1): image right is up the line.
+fn looking_left() -> Isometry3<f64> {
+    let world_from_camera = Matrix3::new(
+        1.0, 0.0, 0.0, //
+        0.0, 0.0, 1.0, //
+        0.0, -1.0, 0.0,
+    );
+    Isometry3::from_parts(
+        Translation3::new(50.0, 0.0, 1.0),
+        UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(world_from_camera)),
+    )
+}
+
+fn view(intrinsics: Intrinsics) -> View {
+    View {
+        camera: CameraModel {
+            intrinsics,
+            shutter: Shutter {
+                line_time_s: 20e-6,
+                exposure_s: 30e-6,
+            },
+        },
+        start: SimTime::from_secs(0.5),
+        motion: CameraMotion::still(looking_left()),
+        sensor: SensorSettings {
+            noise: false,
+            ..SensorSettings::default()
+        },
+        noise: NoiseKey {
+            stream: Stream::new(1, 2, "test"),
+            frame: 3,
+        },
+    }
+}
+
+fn lamp(waveform: Waveform) -> LampLight {
+    LampLight {
+        centre: Point3::new(50.0, 2.0, 1.0),
+        facing: Unit::new_unchecked(-Vector3::y()),
+        radius_m: 0.5,
+        luminance_cd_m2: 5000.0,
+        exponent: 1.0,
+        waveform,
+    }
+}
+
+fn always_on() -> Waveform {
+    Waveform {
+        frame: ChipFrame { bits: 1, len: 1 },
+        chip_s: 1.0,
+        phase_s: 0.0,
+    }
+}
+
+fn grey_of(view: &View, luminance: f64) -> f64 {
+    let sensor = &view.sensor;
+    sensor.black_level_grey + sensor.grey_per_cd_s * view.camera.shutter.exposure_s * luminance
+}
+
+/// Fails where light, albedo, pi or gain is lost on the way: a wall lit by a lamp behind the
+/// camera and by ambient light, seen by pixels too coarse for stains.
+#[test]
+fn a_wall_has_the_luminance_of_the_closed_form() {
+    let mut light = lamp(always_on());
+    light.centre = Point3::new(50.0, -1.0, 1.0);
+    light.facing = Unit::new_unchecked(Vector3::y());
+    let intensity = light.axial_intensity_cd();
+    let mut view = view(Intrinsics::centred(9, 9, 6.0));
+    view.sensor.grey_per_cd_s = 5e5;
+    let image = renderer(vec![light]).draw(&Job::default(), &view);
+    for (u, v, pixel) in image.enumerate_pixels() {
+        let ray = view.camera.intrinsics.ray(f64::from(u), f64::from(v));
+        let (x, z) = (4.0 * ray.x, -4.0 * ray.y);
+        let d2 = 25.0 + x * x + z * z;
+        // cos(out) = cos(in) = 5 / d.
+        let lux = AMBIENT_LX + 0.5 * intensity * 25.0 / (d2 * d2);
+        let expected = grey_of(&view, WALL_ALBEDO * lux / PI);
+        assert!(
+            (f64::from(pixel[0]) - expected).abs() <= 0.5 + 1e-6,
+            "{u} {v}: {expected}"
+        );
+    }
+    assert!(image.get_pixel(4, 4)[0] > image.get_pixel(0, 0)[0] + 50);
+}
+
+/// Fails where a row sees the lamp at another time than its own, or through a pose of its own
+/// instead of a waveform: rows inside a large lamp are the waveform's exact integral.
+#[test]
+fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
+    let waveform = Waveform {
+        frame: Uid { line: 3, lamp: 77 }.manchester(),
+        chip_s: 70e-6,
+        phase_s: 0.123_456,
+    };
+    let mut light = lamp(waveform);
+    light.luminance_cd_m2 = 7000.0;
+    let mut view = view(Intrinsics::centred(200, 300, 700.0));
+    view.sensor.halo_share = 0.0;
+    let image = renderer(vec![light]).draw(&Job::default(), &view);
+    let (mut low, mut high) = (255.0f64, 0.0f64);
+    for v in 0..300 {
+        let open = 0.5 + 20e-6 * f64::from(v);
+        let expected = grey_of(&view, 7000.0 * waveform.on_share(open, open + 30e-6));
+        let mean = (50..150)
+            .map(|u| f64::from(image.get_pixel(u, v)[0]))
+            .sum::<f64>()
+            / 100.0;
+        assert!(
+            (mean - expected).abs() < 0.01 * 255.0,
+            "row {v}: {mean} {expected}"
+        );
+        (low, high) = (low.min(mean), high.max(mean));
+    }
+    assert!(low < 10.0 && high > 200.0, "no stripes: {low} to {high}");
+}
+
+/// Fails where a body is drawn where it was at the job's time: rows from top to bottom see the
+/// edge of a fast box walk along.
+#[test]
+fn rows_see_moving_bodies_where_they_are_by_then() {
+    let mut view = view(Intrinsics::centred(400, 300, 400.0));
+    view.camera.shutter.line_time_s = 40e-6;
+    view.sensor.grey_per_cd_s = 1e5;
+    let job = Job {
+        time: SimTime::from_secs(0.49),
+        bodies: vec![Body {
+            shape: Shape::Box(Vector3::new(2.0, 1e-6, 4.0)),
+            // A board whose right side is at x = 49.5 at the job's time.
+            world_from_body: Isometry3::translation(47.5, 2.0, 1.0),
+            velocity_mps: Vector3::new(30.0, 0.0, 0.0),
+            albedo: 0.0,
+            luminance_cd_m2: 60.0,
+        }],
+        ..Job::default()
+    };
+    let image = renderer(Vec::new()).draw(&job, &view);
+    let bright = grey_of(&view, 60.0).round() as u8;
+    for v in 0..300 {
+        let seen = (0..400)
+            .filter(|u| image.get_pixel(*u, v)[0] == bright)
+            .count() as f64;
+        let time = 0.5 + 40e-6 * f64::from(v) + 15e-6 - 0.49;
+        let edge = 400.0 * (49.5 + 30.0 * time - 50.0) / 2.0 + 199.5;
+        assert!((seen - 1.0 - edge).abs() <= 1.0, "row {v}: {seen} {edge}");
+    }
+}
+
+/// Fails where noise has the wrong strength or is the same in all pixels, rows or frames.
+#[test]
+fn noise_has_the_mean_and_variance_of_the_sensor() {
+    let mut view = view(Intrinsics::centred(300, 200, 300.0));
+    view.sensor.noise = true;
+    view.sensor.grey_per_cd_s = 1e5;
+    for luminance in [0.0, 5.0, 60.0] {
+        let job = Job {
+            time: view.start,
+            bodies: vec![Body {
+                shape: Shape::Box(Vector3::new(30.0, 0.5, 30.0)),
+                world_from_body: Isometry3::translation(50.0, 2.5, 1.0),
+                velocity_mps: Vector3::zeros(),
+                albedo: 0.0,
+                luminance_cd_m2: luminance,
+            }],
+            ..Job::default()
+        };
+        let mut renderer = renderer(Vec::new());
+        let image = renderer.draw(&job, &view);
+        let n = image.len() as f64;
+        let mean = image.iter().map(|p| f64::from(*p)).sum::<f64>() / n;
+        let deviation = |p: &u8| f64::from(*p) - mean;
+        let variance = image.iter().map(|p| deviation(p).powi(2)).sum::<f64>() / n;
+        let expected = (grey_of(&view, luminance) - 4.0) / 40.0 + (25.0f64 / 40.0).powi(2);
+        // Five standard errors of mean and variance; rounding adds 1/12.
+        assert!((mean - grey_of(&view, luminance)).abs() < 5.0 * (expected / n).sqrt());
+        assert!((variance - expected - 1.0 / 12.0).abs() < 5.0 * expected * (2.0 / n).sqrt());
+        let neighbours = image
+            .windows(2)
+            .map(|w| deviation(&w[0]) * deviation(&w[1]));
+        assert!((neighbours.sum::<f64>() / n).abs() < 5.0 * variance / n.sqrt());
+        view.noise.frame += 1;
+        assert_ne!(image, renderer.draw(&job, &view));
+    }
+}
+
+/// Fails where a row depends on the thread that draws it, or where what is kept of a still
+/// camera's view is not what it would see now.
+#[test]
+fn threads_and_kept_views_change_no_byte() {
+    let mut job = sample::wayside_job(&sample::tunnel(), 280.0);
+    job.views[0].camera.intrinsics = Intrinsics::centred(320, 180, 180.0);
+    job.headlights.push(Headlight {
+        world_from_light: sample::on_bed(&sample::tunnel(), 270.0, 0.0, 1.5),
+        intensity_cd: 40_000.0,
+        exponent: 30.0,
+    });
+    // Two equal poses are a camera that might move: nothing is kept.
+    let mut moving = job.clone();
+    let pose = moving.views[0].motion.poses[0];
+    moving.views[0].motion.poses.push(pose);
+    let draw = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.unwrap().install(|| {
+            let mut renderer = CpuRenderer::new(sample::scene());
+            for job in [&job, &moving, &job] {
+                renderer.submit(job).unwrap();
+            }
+            [(); 3].map(|()| renderer.collect().unwrap().remove(0))
+        })
+    };
+    let [first, fresh, kept] = draw(1);
+    assert!(first.iter().max() > Some(&100) && first.iter().min() < Some(&20));
+    assert_eq!(first, fresh);
+    assert_eq!(first, kept);
+    assert_eq!(draw(3), [first, fresh, kept]);
+}
+
+/// Fails where a job without pixels or poses brings the renderer down.
+#[test]
+fn empty_jobs_give_empty_images() {
+    let mut renderer = renderer(Vec::new());
+    assert!(matches!(
+        renderer.collect(),
+        Err(RenderError::NothingSubmitted)
+    ));
+    let mut none = view(Intrinsics::centred(0, 0, 100.0));
+    assert_eq!(renderer.draw(&Job::default(), &none).len(), 0);
+    none = view(Intrinsics::centred(4, 4, 100.0));
+    none.motion.poses.clear();
+    assert!(
+        renderer
+            .draw(&Job::default(), &none)
+            .iter()
+            .all(|p| *p == 0)
+    );
+    none.motion = CameraMotion::still(Isometry3::translation(f64::NAN, 0.0, 0.0));
+    assert_eq!(renderer.draw(&Job::default(), &none).len(), 16);
+}
