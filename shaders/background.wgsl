@@ -7,6 +7,9 @@ struct Pose {
     z: vec4f,
 }
 
+// Fixed when the pipeline is made: software adapters run a loop's body even for a count of 0.
+override HEADLIGHTS: u32 = 0u;
+
 @group(0) @binding(1) var<storage, read> poses: array<Pose>;
 
 struct Vertex {
@@ -18,12 +21,15 @@ struct Vertex {
     // Chainage from the mesh's origin, and metres along the outline.
     @location(4) pattern_m: vec2f,
     @location(5) luminance_cd_m2: f32,
-    // Material in bits 0-7, pulse in bits 8-15, stains in bit 16.
-    @location(6) look: u32,
-    // Of the mesh: its origin from the reference point, its first stain cell, its velocity.
-    @location(7) offset_m: vec3f,
-    @location(8) first_cell: i32,
-    @location(9) velocity_mps: vec3f,
+    @location(6) pulse: u32,
+    // Of the facet that the vertex begins: lower left corner of its two stain cells, and the
+    // stains at their corners: three along the line, then three beside them, then 1 if any.
+    @location(7) stain_cell: vec2f,
+    @location(8) stains_a: vec4f,
+    @location(9) stains_b: vec4f,
+    // Of the mesh: its origin from the reference point, and its velocity.
+    @location(10) offset_m: vec3f,
+    @location(11) velocity_mps: vec3f,
 }
 
 struct Surface {
@@ -31,13 +37,14 @@ struct Surface {
     @location(0) position_m: vec3f,
     @location(1) irradiance_lx: f32,
     @location(2) pattern_m: vec2f,
-    @location(3) @interpolate(flat, either) normal: vec3f,
-    @location(4) @interpolate(flat, either) albedo: f32,
-    @location(5) @interpolate(flat, either) luminance_cd_m2: f32,
-    @location(6) @interpolate(flat, either) look: u32,
-    @location(7) @interpolate(flat, either) first_cell: i32,
+    @location(3) @interpolate(flat) normal: vec3f,
+    @location(4) @interpolate(flat) albedo: f32,
+    @location(5) @interpolate(flat) luminance_cd_m2: f32,
+    @location(6) @interpolate(flat) stain_cell: vec2f,
+    @location(7) @interpolate(flat) stains_a: vec4f,
+    @location(8) @interpolate(flat) stains_b: vec4f,
     // Marks a metre, their share of it, and what they add to albedo 1.
-    @location(8) @interpolate(flat, either) pulse: vec3f,
+    @location(9) @interpolate(flat) pulse: vec3f,
 }
 
 // The point in the camera's frame while row `v` is in mid-exposure.
@@ -83,9 +90,10 @@ fn project(in: Vertex) -> Surface {
     out.normal = in.normal;
     out.albedo = in.albedo;
     out.luminance_cd_m2 = in.luminance_cd_m2;
-    out.look = in.look;
-    out.first_cell = in.first_cell;
-    let pulse = PULSES[(in.look >> 8u) & 0xffu];
+    out.stain_cell = in.stain_cell;
+    out.stains_a = in.stains_a;
+    out.stains_b = in.stains_b;
+    let pulse = PULSES[in.pulse];
     out.pulse = vec3f(1.0 / pulse.x, pulse.y / pulse.x, pulse.z - 1.0);
     return out;
 }
@@ -96,24 +104,19 @@ fn pulses(x: f32, duty: f32) -> f32 {
     return whole * duty + min(x - whole, duty);
 }
 
-fn lattice(i: vec2i, material: u32) -> f32 {
-    return f32(pcg4d(vec4u(vec2u(i), material, 0u)).x) / 4294967296.0;
-}
-
-fn stains(s: f32, q: f32, first_cell: i32, material: u32) -> f32 {
-    let at = vec2f(s, q) / STAIN_CELL_M;
-    let cell = floor(at);
-    let i = vec2i(cell) + vec2i(first_cell, 0);
-    let t = at - cell;
+// Value noise at a place in two cells side by side.
+fn stains(at: vec2f, a: vec4f, b: vec4f) -> f32 {
+    let second = at.x >= 1.0;
+    let t = clamp(at - vec2f(select(0.0, 1.0, second), 0.0), vec2f(0.0), vec2f(1.0));
     let f = t * t * (3.0 - 2.0 * t);
-    let near = mix(lattice(i, material), lattice(i + vec2i(1, 0), material), f.x);
-    let far = mix(lattice(i + vec2i(0, 1), material), lattice(i + vec2i(1, 1), material), f.x);
+    let near = mix(select(a.x, a.y, second), select(a.y, a.z, second), f.x);
+    let far = mix(select(a.w, b.x, second), select(b.x, b.y, second), f.x);
     return mix(near, far, f.y);
 }
 
 fn headlights_lx(p: vec3f, n: vec3f) -> f32 {
     var sum = 0.0;
-    for (var k = 0u; k < min(view.headlight_count, MAX_HEADLIGHTS); k++) {
+    for (var k = 0u; k < HEADLIGHTS; k++) {
         let light = view.headlights[k];
         let d = p - light.position_m;
         let inverse = inverseSqrt(max(dot(d, d), 1e-4));
@@ -137,8 +140,8 @@ fn shade(in: Surface) -> @location(0) vec4f {
     let begin = in.pattern_m.x * in.pulse.x + 0.5 * (in.pulse.y - span);
     let share = (pulses(begin + span, in.pulse.y) - pulses(begin, in.pulse.y)) / span;
 
-    let fade = clamp(2.0 - footprint / STAIN_FADE_M, 0.0, 1.0) * f32(in.look >> 16u);
-    let noise = stains(in.pattern_m.x, in.pattern_m.y, in.first_cell, in.look & 0xffu);
+    let fade = clamp(2.0 - footprint / STAIN_FADE_M, 0.0, 1.0) * in.stains_b.z;
+    let noise = stains(in.pattern_m / STAIN_CELL_M - in.stain_cell, in.stains_a, in.stains_b);
     let albedo = in.albedo * (1.0 + in.pulse.z * share)
         * (1.0 + STAIN_CONTRAST * fade * (noise - 0.5));
 

@@ -31,8 +31,8 @@ struct View {
     read_variance_grey2: f32,
     noise: u32,
     frame: u32,
-    headlight_count: u32,
     halo_px: f32,
+    unused: u32,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

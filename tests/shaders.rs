@@ -117,8 +117,8 @@ fn structs_agree() {
         read_variance_grey2,
         noise,
         frame,
-        headlight_count,
         halo_px,
+        unused,
         headlights
     );
     same_layout!(

@@ -8,6 +8,8 @@ use crate::twin::render::surface;
 use nalgebra::{Isometry3, Point3};
 use std::f64::consts::PI;
 
+/// Glare fainter than this is not drawn: eight bits cannot show it.
+const FAINT_GREY: f64 = 0.01;
 /// No disc nearer than this in optical depth is drawn.
 const MIN_DEPTH_M: f64 = 0.1;
 
@@ -131,8 +133,13 @@ impl Bounds {
         }
         let centre = lens.project(&c)?;
         let apparent_px = lens.fx_px * lamp.radius_m * cosine.sqrt() / c.z;
-        let halo_reach_px = if sensor.halo_share > 0.0 {
-            apparent_px + surface::HALO_REACH * sensor.halo_px
+        let axial_grey = lamp.luminance_cd_m2 * grey_per_cd_m2;
+        let glare_grey =
+            sensor.halo_share * axial_grey * cosine.powf(lamp.exponent - 1.0) * apparent_px.powi(2)
+                / (apparent_px.powi(2) + sensor.halo_px.powi(2));
+        let decays = (glare_grey / FAINT_GREY).ln().min(surface::HALO_REACH);
+        let halo_reach_px = if decays > 0.0 {
+            apparent_px + decays * sensor.halo_px
         } else {
             0.0
         };
@@ -157,19 +164,13 @@ impl Bounds {
         if off_px <= halo_reach_px {
             self.halo.add(centre.x, halo_reach_px, v);
         }
-        let axial_grey = lamp.luminance_cd_m2 * grey_per_cd_m2;
         let on = |from: f64, to: f64| {
             lamp.waveform.on_share(
                 poses.open_s + from * exposure_s,
                 poses.open_s + to * exposure_s,
             )
         };
-        let glare = sensor.halo_share
-            * axial_grey
-            * cosine.powf(lamp.exponent - 1.0)
-            * on(0.0, 1.0)
-            * apparent_px.powi(2)
-            / (apparent_px.powi(2) + sensor.halo_px.powi(2));
+        let glare = glare_grey * on(0.0, 1.0);
         let mut row = LampRow {
             normal_halo: [normal.x, normal.y, normal.z, glare].map(|x| x as f32),
             image_px: [centre.x, centre.y, apparent_px, 0.0].map(|x| x as f32),

@@ -22,9 +22,19 @@ pub struct Vertex {
     pub pattern_m: [f32; 2],
     /// Own luminance.
     pub luminance_cd_m2: f32,
-    /// Material in bits 0-7, pulse in bits 8-15, stains in bit 16.
-    pub look: u32,
+    /// Number of the repeating mark, 0 for none.
+    pub pulse: u32,
+    /// Lower left corner of the stain cells of the facet that this vertex begins, in cells.
+    pub stain_cell: [f32; 2],
+    /// Stains at the corners of its two cells, over 65535: three along the line, then three beside
+    /// them, [`STAIN_NONE`] in the seventh where there are none.
+    pub stains: [u16; 8],
 }
+
+/// Seventh entry of a vertex's stains on a surface that has none.
+pub const STAIN_NONE: u16 = 0;
+/// Seventh entry on a surface that has some.
+pub const STAIN_SOME: u16 = u16::MAX;
 
 /// Where one mesh is drawn.
 #[repr(C)]
@@ -32,12 +42,12 @@ pub struct Vertex {
 pub struct Placement {
     /// The mesh's origin from the view's reference point, world axes.
     pub offset_m: [f32; 3],
-    /// Stain cell at the mesh's origin.
-    pub first_cell: i32,
+    /// Fills up to the alignment of what follows.
+    pub unused: u32,
     /// Where the mesh goes, world axes.
     pub velocity_mps: [f32; 3],
     /// Fills the stride.
-    pub unused: u32,
+    pub unused_too: u32,
 }
 
 /// `camera_from_world` at one time, relative to the view's reference point: rows of the matrix,
@@ -99,10 +109,10 @@ pub struct View {
     pub noise: u32,
     /// Frame number of the noise.
     pub frame: u32,
-    /// Headlights in use.
-    pub headlight_count: u32,
     /// Decay length of the glare.
     pub halo_px: f32,
+    /// Fills up to the alignment of what follows.
+    pub unused: u32,
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }

@@ -25,13 +25,13 @@ pub struct Mesh {
 
 impl Mesh {
     /// Two triangles for each cell of a grid of `rows` by `columns` vertices that starts at vertex
-    /// `first`.
+    /// `first`. Both begin with the cell's lowest vertex, whose flat attributes hold for the cell.
     pub fn add_quads(&mut self, first: u32, rows: u32, columns: u32) {
         for r in 1..rows {
             for c in 1..columns {
                 let d = first + r * columns + c;
                 let (a, b) = (d - columns - 1, d - columns);
-                self.indices.extend([a, b, d - 1, d - 1, b, d]);
+                self.indices.extend([a, b, d, a, d, d - 1]);
             }
         }
     }

@@ -133,7 +133,7 @@ impl GpuRenderer {
         self.upload_view(&framed, job, k);
         let lens = &framed.view.camera.intrinsics;
         let size_px = (lens.width_px, lens.height_px);
-        let (gpu, pipelines) = (&self.gpu, &self.pipelines);
+        let gpu = &self.gpu;
         if !self.targets.iter().any(|t| t.size_px == size_px) {
             self.targets.push(Target::new(&gpu.device, size_px));
         }
@@ -144,7 +144,9 @@ impl GpuRenderer {
         if let Some(target) = self.targets.iter().find(|t| t.size_px == size_px) {
             let buffers = &self.views[k];
             let sight = (&self.chunks, self.scratch.keys.as_slice());
-            buffers.draw_background(gpu, pipelines, encoder, target, sight, &self.bodies);
+            let background = self.pipelines.background(&gpu.device, job.headlights.len());
+            buffers.draw_background(gpu, background, encoder, target, sight, &self.bodies);
+            let pipelines = &self.pipelines;
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_sensor(gpu, pipelines, encoder, target);
             target.copy_to(encoder, &back);
@@ -162,7 +164,6 @@ impl GpuRenderer {
             if let Some(chunk) = self.chunks.get(*key) {
                 scratch.placements.push(Placement {
                     offset_m: single(&(chunk.origin - reference)),
-                    first_cell: key.first_cell(),
                     ..Placement::default()
                 });
             }

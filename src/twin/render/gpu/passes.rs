@@ -127,7 +127,7 @@ impl ViewBuffers {
     pub fn draw_background(
         &self,
         gpu: &Gpu,
-        pipelines: &Pipelines,
+        pipeline: &wgpu::RenderPipeline,
         encoder: &mut wgpu::CommandEncoder,
         target: &Target,
         (chunks, keys): (&Chunks, &[ChunkKey]),
@@ -135,7 +135,7 @@ impl ViewBuffers {
     ) {
         let group = bind(
             &gpu.device,
-            &pipelines.background,
+            pipeline,
             &[self.view.binding(), self.poses.binding()],
         );
         let mut pass = begin(
@@ -144,7 +144,7 @@ impl ViewBuffers {
             wgpu::LoadOp::Clear(wgpu::Color::BLACK),
             Some(&target.depth),
         );
-        pass.set_pipeline(&pipelines.background);
+        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
         let mut instance = 0;

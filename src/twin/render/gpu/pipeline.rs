@@ -1,6 +1,6 @@
 //! Shaders and the four pipelines made of them.
 
-use super::layout::{Placement, Vertex};
+use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use crate::twin::render::surface;
 use std::mem::{offset_of, size_of};
 
@@ -35,8 +35,9 @@ pub fn shader_source(name: &str) -> Option<String> {
 
 /// One pipeline a pass.
 pub struct Pipelines {
-    /// Tunnel and bodies.
-    pub background: wgpu::RenderPipeline,
+    /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
+    backgrounds: Vec<Option<wgpu::RenderPipeline>>,
+    background: wgpu::ShaderModule,
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added.
@@ -51,6 +52,7 @@ struct Stage<'a> {
     buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     depth: Option<wgpu::DepthStencilState>,
     target: wgpu::ColorTargetState,
+    constants: &'a [(&'a str, f64)],
 }
 
 impl Pipelines {
@@ -62,68 +64,74 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (background, lamps, sensor) = (shader("background"), shader("lamps"), shader("sensor"));
-        let lamp_stage = |entries, blend| Stage {
-            shader: &lamps,
-            entries,
-            buffers: &[],
-            depth: None,
-            target: target(SIGNAL, Some(blend)),
+        let (lamps, sensor) = (shader("lamps"), shader("sensor"));
+        let flat = |shader, entries, target| {
+            let stage = Stage {
+                shader,
+                entries,
+                buffers: &[],
+                depth: None,
+                target,
+                constants: &[],
+            };
+            pipeline(device, stage)
         };
+        let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Self {
-            background: pipeline(
-                device,
-                Stage {
-                    shader: &background,
-                    entries: ["project", "shade"],
-                    buffers: &[
-                        Some(wgpu::VertexBufferLayout {
-                            array_stride: size_of::<Vertex>() as u64,
-                            step_mode: wgpu::VertexStepMode::Vertex,
-                            attributes: &VERTEX,
-                        }),
-                        Some(wgpu::VertexBufferLayout {
-                            array_stride: size_of::<Placement>() as u64,
-                            step_mode: wgpu::VertexStepMode::Instance,
-                            attributes: &PLACEMENT,
-                        }),
-                    ],
-                    depth: Some(wgpu::DepthStencilState {
-                        format: DEPTH,
-                        depth_write_enabled: Some(true),
-                        depth_compare: Some(wgpu::CompareFunction::Greater),
-                        stencil: wgpu::StencilState::default(),
-                        bias: wgpu::DepthBiasState::default(),
-                    }),
-                    target: target(SIGNAL, None),
-                },
-            ),
-            discs: pipeline(
-                device,
-                lamp_stage(
-                    ["disc_corner", "disc"],
-                    wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING,
-                ),
-            ),
-            halos: pipeline(
-                device,
-                lamp_stage(
-                    ["halo_corner", "halo"],
-                    wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING,
-                ),
-            ),
-            sensor: pipeline(
-                device,
-                Stage {
-                    shader: &sensor,
-                    entries: ["whole", "develop"],
-                    buffers: &[],
-                    depth: None,
-                    target: target(PACKED, None),
-                },
-            ),
+            backgrounds: vec![None; MAX_HEADLIGHTS + 1],
+            background: shader("background"),
+            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
+            halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
+            sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
         }
     }
+
+    /// The pipeline that draws tunnel and bodies under so many headlights.
+    pub fn background(
+        &mut self,
+        device: &wgpu::Device,
+        headlights: usize,
+    ) -> &wgpu::RenderPipeline {
+        let headlights = headlights.min(MAX_HEADLIGHTS);
+        self.backgrounds[headlights]
+            .get_or_insert_with(|| background(device, &self.background, headlights))
+    }
+}
+
+fn background(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    headlights: usize,
+) -> wgpu::RenderPipeline {
+    let layout = |stride, step_mode, attributes| {
+        Some(wgpu::VertexBufferLayout {
+            array_stride: stride as u64,
+            step_mode,
+            attributes,
+        })
+    };
+    let stage = Stage {
+        shader,
+        entries: ["project", "shade"],
+        buffers: &[
+            layout(size_of::<Vertex>(), wgpu::VertexStepMode::Vertex, &VERTEX),
+            layout(
+                size_of::<Placement>(),
+                wgpu::VertexStepMode::Instance,
+                &PLACEMENT,
+            ),
+        ],
+        depth: Some(wgpu::DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(wgpu::CompareFunction::Greater),
+            stencil: wgpu::StencilState::default(),
+            bias: wgpu::DepthBiasState::default(),
+        }),
+        target: target(SIGNAL, None),
+        constants: &[("HEADLIGHTS", headlights as f64)],
+    };
+    pipeline(device, stage)
 }
 
 /// The resources of group 0, in the order of their bindings.
@@ -159,8 +167,8 @@ const fn attribute(
     }
 }
 
-const VERTEX: [wgpu::VertexAttribute; 7] = {
-    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32};
+const VERTEX: [wgpu::VertexAttribute; 10] = {
+    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32, Unorm16x4};
     [
         attribute(Float32x3, offset_of!(Vertex, position_m), 0),
         attribute(Float32, offset_of!(Vertex, irradiance_lx), 1),
@@ -168,16 +176,18 @@ const VERTEX: [wgpu::VertexAttribute; 7] = {
         attribute(Float32, offset_of!(Vertex, albedo), 3),
         attribute(Float32x2, offset_of!(Vertex, pattern_m), 4),
         attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 5),
-        attribute(Uint32, offset_of!(Vertex, look), 6),
+        attribute(Uint32, offset_of!(Vertex, pulse), 6),
+        attribute(Float32x2, offset_of!(Vertex, stain_cell), 7),
+        attribute(Unorm16x4, offset_of!(Vertex, stains), 8),
+        attribute(Unorm16x4, offset_of!(Vertex, stains) + 8, 9),
     ]
 };
 
-const PLACEMENT: [wgpu::VertexAttribute; 3] = {
-    use wgpu::VertexFormat::{Float32x3, Sint32};
+const PLACEMENT: [wgpu::VertexAttribute; 2] = {
+    use wgpu::VertexFormat::Float32x3;
     [
-        attribute(Float32x3, offset_of!(Placement, offset_m), 7),
-        attribute(Sint32, offset_of!(Placement, first_cell), 8),
-        attribute(Float32x3, offset_of!(Placement, velocity_mps), 9),
+        attribute(Float32x3, offset_of!(Placement, offset_m), 10),
+        attribute(Float32x3, offset_of!(Placement, velocity_mps), 11),
     ]
 };
 
@@ -190,13 +200,17 @@ fn target(format: wgpu::TextureFormat, blend: Option<wgpu::BlendState>) -> wgpu:
 }
 
 fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
+    let options = wgpu::PipelineCompilationOptions {
+        constants: stage.constants,
+        ..Default::default()
+    };
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(stage.entries[1]),
         layout: None,
         vertex: wgpu::VertexState {
             module: stage.shader,
             entry_point: Some(stage.entries[0]),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: options.clone(),
             buffers: stage.buffers,
         },
         primitive: wgpu::PrimitiveState::default(),
@@ -205,7 +219,7 @@ fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
         fragment: Some(wgpu::FragmentState {
             module: stage.shader,
             entry_point: Some(stage.entries[1]),
-            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            compilation_options: options,
             targets: &[Some(stage.target)],
         }),
         multiview_mask: None,

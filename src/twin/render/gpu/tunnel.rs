@@ -1,18 +1,18 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
-use super::layout::Vertex;
+use super::layout::{STAIN_NONE, STAIN_SOME, Vertex};
 use super::mesh::Mesh;
 use crate::track::{CrossSection, Material, OutlinePoint, SectionRange, TrackPoint, Tunnel};
+use crate::twin::random::pcg4d;
 use crate::twin::render::light::LampField;
 use crate::twin::render::surface;
+use crate::twin::render::surface::STAIN_CELL_M;
 use nalgebra::{Point3, Vector3};
 
 /// Length of a chunk: a whole number of rings, joints, sleepers and stain cells, so that every
 /// pattern starts afresh at a chunk's origin and chainage stays exact in f32.
 pub const CHUNK_M: f64 = 30.0;
-/// Facets are cut to this width, so that light varies little over one.
-const FACET_M: f64 = 0.5;
-/// Stations of a coarse mesh.
+/// Stations of a coarse mesh, which has no stains: no pixel resolves them from that far.
 const COARSE_RING_M: f64 = 5.0;
 
 /// Which mesh.
@@ -30,11 +30,6 @@ impl ChunkKey {
         self.index as f64 * CHUNK_M
     }
 
-    /// Stain cell at its origin.
-    pub fn first_cell(self) -> i32 {
-        self.index as i32 * (CHUNK_M / surface::STAIN_CELL_M) as i32
-    }
-
     fn step_m(self) -> f64 {
         if self.coarse {
             COARSE_RING_M
@@ -49,7 +44,26 @@ struct Facet {
     ends: [OutlinePoint; 2],
     q_m: [f64; 2],
     albedo: f64,
-    look: u32,
+    material: u32,
+    pulse: u32,
+}
+
+impl Facet {
+    /// Row of stain cells that it lies in.
+    fn stain_row(&self) -> f64 {
+        (0.5 * (self.q_m[0] + self.q_m[1]) / STAIN_CELL_M).floor()
+    }
+
+    /// Stains around the ring that begins at stain cell `column`.
+    fn stains(&self, column: f64) -> [u16; 8] {
+        let row = self.stain_row();
+        let corner = |i: u32, j: u32| {
+            let at = [column + f64::from(i), row + f64::from(j)].map(|x| x as i64 as u32);
+            (pcg4d([at[0], at[1], self.material, 0])[0] >> 16) as u16
+        };
+        let [a, b] = [0, 1].map(|j| [0, 1, 2].map(|i| corner(i, j)));
+        [a[0], a[1], a[2], b[0], b[1], b[2], STAIN_SOME, 0]
+    }
 }
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
@@ -63,7 +77,7 @@ pub fn chunk_mesh(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> (Point3<
             continue;
         }
         for facet in facets_of(range) {
-            add_strip(&mut mesh, tunnel, lamps, &facet, &stations, from_m, &origin);
+            add_strip(&mut mesh, tunnel, lamps, &facet, &stations, key, &origin);
         }
     }
     (origin, mesh)
@@ -107,7 +121,8 @@ fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection) {
     }
 }
 
-/// Cuts an edge into facets, also where the marks on it end.
+/// Cuts an edge into facets: where it leaves a row of stain cells, which also keeps facets narrow
+/// enough for the light at their corners, and where the marks on it end.
 fn cut_edge(
     facets: &mut Vec<Facet>,
     [a, b]: [OutlinePoint; 2],
@@ -116,8 +131,12 @@ fn cut_edge(
     material: Material,
 ) {
     let look = surface::look(material);
-    let pieces = (length_m / FACET_M).ceil().max(1.0) as usize;
-    let mut cuts: Vec<f64> = (0..=pieces).map(|k| k as f64 / pieces as f64).collect();
+    let lines = (q_m / STAIN_CELL_M).floor() as i64 + 1..;
+    let mut cuts: Vec<f64> = lines
+        .map(|k| (k as f64 * STAIN_CELL_M - q_m) / length_m)
+        .take_while(|t| *t < 1.0)
+        .collect();
+    cuts.extend([0.0, 1.0]);
     if let Some(pulse) = look.pulse {
         let ends = [pulse.half_width_m, -pulse.half_width_m];
         cuts.extend(
@@ -125,8 +144,8 @@ fn cut_edge(
                 .into_iter()
                 .filter(|t| *t > 0.0 && *t < 1.0),
         );
-        cuts.sort_by(f64::total_cmp);
     }
+    cuts.sort_by(f64::total_cmp);
     let at = |t: f64| OutlinePoint {
         l_m: a.l_m + t * (b.l_m - a.l_m),
         h_m: a.h_m + t * (b.h_m - a.h_m),
@@ -143,7 +162,8 @@ fn cut_edge(
             ends,
             q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
             albedo: look.albedo,
-            look: look.id | pulse << 8 | 1 << 16,
+            material: look.id,
+            pulse,
         });
     }
 }
@@ -154,12 +174,23 @@ fn add_strip(
     lamps: &LampField,
     facet: &Facet,
     stations: &[f64],
-    from_m: f64,
+    key: ChunkKey,
     origin: &Point3<f64>,
 ) {
+    let from_m = key.from_m();
     let first = mesh.vertices.len() as u32;
     for &s_m in stations {
         let normal = facet_normal(tunnel, facet, s_m);
+        let ring_m = (s_m / surface::RING_M).floor() * surface::RING_M;
+        let stain_cell = [
+            ((ring_m - from_m) / STAIN_CELL_M) as f32,
+            facet.stain_row() as f32,
+        ];
+        let stains = if key.coarse {
+            [STAIN_NONE; 8]
+        } else {
+            facet.stains(ring_m / STAIN_CELL_M)
+        };
         for (end, q_m) in facet.ends.iter().zip(facet.q_m) {
             let p = tunnel.alignment.world_from_track(TrackPoint {
                 s_m,
@@ -173,7 +204,9 @@ fn add_strip(
                 albedo: facet.albedo as f32,
                 pattern_m: [(s_m - from_m) as f32, q_m as f32],
                 luminance_cd_m2: 0.0,
-                look: facet.look,
+                pulse: facet.pulse,
+                stain_cell,
+                stains,
             });
         }
     }
@@ -209,7 +242,7 @@ mod tests {
         let (origin, mesh) = chunk(2, false);
         let tunnel = sample::tunnel();
         let mut seen = 0;
-        for v in mesh.vertices.iter().filter(|v| v.look & 0xff == 0) {
+        for v in mesh.vertices.iter().filter(|v| v.albedo == 0.3) {
             let p = origin + Vector3::from(v.position_m).cast::<f64>();
             let t = tunnel.alignment.track_from_world(&p, 75.0);
             let axis = tunnel.alignment.world_from_track(TrackPoint {

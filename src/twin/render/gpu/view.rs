@@ -88,7 +88,6 @@ impl<'a> Framed<'a> {
         let mut nearest: Vec<&Headlight> = headlights.iter().collect();
         nearest.sort_by(|a, b| f64::total_cmp(&from_here(a).norm(), &from_here(b).norm()));
         nearest.truncate(MAX_HEADLIGHTS);
-        constants.headlight_count = nearest.len() as u32;
         for (slot, light) in constants.headlights.iter_mut().zip(nearest) {
             *slot = layout::Headlight {
                 position_m: single(&from_here(light)),
