@@ -204,3 +204,55 @@ fn crossing(row: &[u8], columns: impl Iterator<Item = usize>, level: f64) -> Opt
     }
     None
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::Ellipse;
+    use crate::stack::led::ellipse::{chord, fit_ellipse};
+
+    /// Stripes of a slanting ellipse, one on its upper end: one spot, edges on the outline.
+    #[test]
+    fn edges_of_a_striped_lamp_lie_on_its_outline() {
+        let lamp = Ellipse {
+            centre: Point2::new(52.3, 47.6),
+            semi_major_px: 30.0,
+            semi_minor_px: 21.0,
+            angle_rad: 0.6,
+        };
+        let (w, h) = (110, 100);
+        let mut data = vec![4; w * h];
+        for v in (0..h).filter(|v| v % 9 > 4) {
+            let Some((left, right)) = chord(&lamp, v as f64) else {
+                continue;
+            };
+            for u in 0..w {
+                let cover = (u as f64 + 0.5).min(right) - (u as f64 - 0.5).max(left);
+                data[v * w + u] = (4.0 + 120.0 * cover.clamp(0.0, 1.0)).round() as u8;
+            }
+        }
+        // A bright speck far off is another component.
+        data[3 * w + 100] = 250;
+        let patch = Patch::from_data(1000, 300, w, h, data);
+        let mut outline = Outline::default();
+        assert!(outline.find(&patch, 60, 9));
+        outline.trace(&patch, 4.0, 60, (1280, 720));
+        assert!(!outline.cut);
+        assert!(outline.extents.iter().all(|e| e.1 < 100));
+        let fit = fit_ellipse(&outline.points).map(|f| f.ellipse.centre);
+        let miss = fit.map(|c| (c - lamp.centre - nalgebra::Vector2::new(1000.0, 300.0)).norm());
+        assert!(miss.is_some_and(|m| m < 0.05), "{miss:?}");
+    }
+
+    /// Gaps are filled up to their limit and not beyond.
+    #[test]
+    fn closing_joins_up_to_the_gap() {
+        let column = |gap: usize| {
+            let mut mask = vec![false; 20];
+            (mask[3], mask[3 + gap + 1]) = (true, true);
+            close_columns(&mut mask, 1, 5);
+            mask.iter().filter(|&&lit| lit).count()
+        };
+        assert_eq!([column(4), column(5), column(6)], [6, 7, 2]);
+    }
+}
