@@ -1,7 +1,7 @@
 //! Chunks of the tunnel on the adapter: meshed when first seen, dropped when long unseen.
 
 use super::adapter::Gpu;
-use super::tunnel::{CHUNK_M, ChunkKey, chunk_mesh};
+use super::tunnel::{CHUNK_M, ChunkKey, Detail, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::render::light::LampField;
@@ -12,8 +12,9 @@ use wgpu::util::DeviceExt;
 /// Range drawn before and behind a camera.
 const AHEAD_M: f64 = 160.0;
 const BEHIND_M: f64 = 20.0;
-/// Chunks from here on are drawn coarse.
-const COARSE_FROM_M: f64 = 60.0;
+/// Chunks from here on are drawn ring by ring, and coarsely.
+const MIDDLE_FROM_M: f64 = 5.0;
+const FAR_FROM_M: f64 = 60.0;
 /// Jobs after which an unseen chunk is dropped.
 const KEEP_JOBS: u64 = 200;
 /// Steps of the search for a camera far from where one was last.
@@ -81,7 +82,13 @@ impl Chunks {
             let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
             let key = ChunkKey {
                 index,
-                coarse: away_m > COARSE_FROM_M,
+                detail: if away_m > FAR_FROM_M {
+                    Detail::Far
+                } else if away_m > MIDDLE_FROM_M {
+                    Detail::Middle
+                } else {
+                    Detail::Near
+                },
             };
             let job = self.job;
             let chunk = self
@@ -120,7 +127,7 @@ impl Chunks {
 }
 
 fn middle_away_m(key: ChunkKey, s_m: f64) -> f64 {
-    (key.from_m() + 0.5 * CHUNK_M - s_m).abs()
+    (key.start_m() + 0.5 * CHUNK_M - s_m).abs()
 }
 
 fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {

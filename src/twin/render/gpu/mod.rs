@@ -29,8 +29,9 @@
 //! # What it does not do
 //!
 //! Shadows, reflections in wet or polished surfaces, lens distortion, and the end walls where two
-//! cross-sections meet (dark). Between vertices positions run straight, so a large triangle close
-//! to a fast camera is not bent as the shutter would bend it; lamps are exact.
+//! cross-sections meet (dark). Between vertices positions run straight, so edges close to a fast
+//! camera are bent by the shutter only facet by facet (0.5 m); lamps are exact. Stains end 60 m
+//! away, the tunnel 160 m ahead of the camera; glare under 0.01 grey levels is not drawn.
 
 mod adapter;
 mod chunks;

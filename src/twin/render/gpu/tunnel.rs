@@ -11,31 +11,42 @@ use nalgebra::{Point3, Vector3};
 
 /// Length of a chunk: a whole number of rings, joints, sleepers and stain cells, so that every
 /// pattern starts afresh at a chunk's origin and chainage stays exact in f32.
-pub const CHUNK_M: f64 = 30.0;
-/// Stations of a coarse mesh, which has no stains: no pixel resolves them from that far.
-const COARSE_RING_M: f64 = 5.0;
+pub const CHUNK_M: f64 = 15.0;
+
+/// How finely a chunk is meshed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Detail {
+    /// Every ring halved: where the rolling shutter bends what is straight.
+    Near,
+    /// Ring by ring.
+    Middle,
+    /// Stations far apart and no stains: no pixel resolves them from there.
+    Far,
+}
+
+impl Detail {
+    fn step_m(self) -> f64 {
+        match self {
+            Self::Near => 0.5 * surface::RING_M,
+            Self::Middle => surface::RING_M,
+            Self::Far => 5.0 * surface::RING_M,
+        }
+    }
+}
 
 /// Which mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ChunkKey {
     /// Covers chainage from `index * CHUNK_M` over `CHUNK_M`.
     pub index: i64,
-    /// With stations far apart.
-    pub coarse: bool,
+    /// How fine.
+    pub detail: Detail,
 }
 
 impl ChunkKey {
     /// Chainage of its origin.
-    pub fn from_m(self) -> f64 {
+    pub fn start_m(self) -> f64 {
         self.index as f64 * CHUNK_M
-    }
-
-    fn step_m(self) -> f64 {
-        if self.coarse {
-            COARSE_RING_M
-        } else {
-            surface::RING_M
-        }
     }
 }
 
@@ -54,7 +65,7 @@ impl Facet {
         (0.5 * (self.q_m[0] + self.q_m[1]) / STAIN_CELL_M).floor()
     }
 
-    /// Stains around the ring that begins at stain cell `column`.
+    /// Stains at the corners of the stain cells `column` and the next.
     fn stains(&self, column: f64) -> [u16; 8] {
         let row = self.stain_row();
         let corner = |i: u32, j: u32| {
@@ -68,11 +79,11 @@ impl Facet {
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
 pub fn chunk_mesh(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> (Point3<f64>, Mesh) {
-    let (from_m, to_m) = (key.from_m(), key.from_m() + CHUNK_M);
+    let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let origin = tunnel.alignment.at(from_m).origin;
     let mut mesh = Mesh::default();
     for range in &tunnel.sections {
-        let stations = stations(range, from_m, to_m, key.step_m());
+        let stations = stations(range, from_m, to_m, key.detail.step_m());
         if stations.len() < 2 {
             continue;
         }
@@ -177,26 +188,22 @@ fn add_strip(
     key: ChunkKey,
     origin: &Point3<f64>,
 ) {
-    let from_m = key.from_m();
+    let from_m = key.start_m();
     let first = mesh.vertices.len() as u32;
     for &s_m in stations {
         let normal = facet_normal(tunnel, facet, s_m);
-        let ring_m = (s_m / surface::RING_M).floor() * surface::RING_M;
+        let column = (s_m / STAIN_CELL_M).floor();
         let stain_cell = [
-            ((ring_m - from_m) / STAIN_CELL_M) as f32,
+            (column - from_m / STAIN_CELL_M) as f32,
             facet.stain_row() as f32,
         ];
-        let stains = if key.coarse {
+        let stains = if key.detail == Detail::Far {
             [STAIN_NONE; 8]
         } else {
-            facet.stains(ring_m / STAIN_CELL_M)
+            facet.stains(column)
         };
         for (end, q_m) in facet.ends.iter().zip(facet.q_m) {
-            let p = tunnel.alignment.world_from_track(TrackPoint {
-                s_m,
-                l_m: end.l_m,
-                h_m: end.h_m,
-            });
+            let p = ruled(tunnel, s_m, *end, key.detail);
             mesh.vertices.push(Vertex {
                 position_m: (p - origin).map(|x| x as f32).into(),
                 irradiance_lx: (lamps.irradiance_lx(&p, &normal) + tunnel.ambient_lx) as f32,
@@ -211,6 +218,24 @@ fn add_strip(
         }
     }
     mesh.add_quads(first, stations.len() as u32, 2);
+}
+
+/// A point of the surface, which runs straight from ring to ring.
+fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3<f64> {
+    let at = |s_m: f64| {
+        tunnel.alignment.world_from_track(TrackPoint {
+            s_m,
+            l_m: end.l_m,
+            h_m: end.h_m,
+        })
+    };
+    let ring = s_m / surface::RING_M;
+    let share = ring - ring.floor();
+    if detail != Detail::Near || share <= 0.0 {
+        return at(s_m);
+    }
+    let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * surface::RING_M));
+    a + (b - a) * share
 }
 
 /// Normal of a facet on the side of the tunnel's inside.
@@ -230,21 +255,25 @@ mod tests {
     use super::*;
     use crate::twin::render::sample;
 
-    fn chunk(index: i64, coarse: bool) -> (Point3<f64>, Mesh) {
+    fn chunk(index: i64, detail: Detail) -> (Point3<f64>, Mesh) {
         let scene = sample::scene();
         let lamps = LampField::new(&scene.lamps);
-        chunk_mesh(&scene.tunnel, &lamps, ChunkKey { index, coarse })
+        chunk_mesh(&scene.tunnel, &lamps, ChunkKey { index, detail })
     }
 
     /// Provokes facets that face the rock: every normal of the lining points to the axis.
     #[test]
     fn lining_faces_inwards() {
-        let (origin, mesh) = chunk(2, false);
+        let (origin, mesh) = chunk(4, Detail::Near);
         let tunnel = sample::tunnel();
         let mut seen = 0;
-        for v in mesh.vertices.iter().filter(|v| v.albedo == 0.3) {
+        for v in mesh
+            .vertices
+            .iter()
+            .filter(|v| (v.albedo - 0.3).abs() < 1e-6)
+        {
             let p = origin + Vector3::from(v.position_m).cast::<f64>();
-            let t = tunnel.alignment.track_from_world(&p, 75.0);
+            let t = tunnel.alignment.track_from_world(&p, 67.0);
             let axis = tunnel.alignment.world_from_track(TrackPoint {
                 l_m: 0.0,
                 h_m: 1.7,
@@ -259,12 +288,12 @@ mod tests {
     /// Provokes gaps between chunks: the last ring of one is the first ring of the next.
     #[test]
     fn chunks_meet() {
-        for coarse in [false, true] {
-            let (a, before) = chunk(10, coarse);
-            let (b, after) = chunk(11, coarse);
+        for (detail, stations) in [(Detail::Near, 31), (Detail::Middle, 16), (Detail::Far, 4)] {
+            let (a, before) = chunk(20, detail);
+            let (b, after) = chunk(21, detail);
             let rings = before.vertices.len() / after.vertices.len();
             assert_eq!(rings, 1);
-            let per_strip = if coarse { 14 } else { 62 };
+            let per_strip = 2 * stations;
             for k in 0..before.vertices.len() / per_strip {
                 let last = before.vertices[(k + 1) * per_strip - 1];
                 let first = after.vertices[k * per_strip + 1];
@@ -278,8 +307,8 @@ mod tests {
     /// Provokes meshes beyond the ends of the tunnel, or none at its ends.
     #[test]
     fn chunks_end_with_the_tunnel() {
-        assert!(chunk(-1, false).1.vertices.is_empty());
-        assert!(!chunk(19, false).1.vertices.is_empty());
-        assert!(chunk(20, false).1.vertices.is_empty());
+        assert!(chunk(-1, Detail::Middle).1.vertices.is_empty());
+        assert!(!chunk(39, Detail::Middle).1.vertices.is_empty());
+        assert!(chunk(40, Detail::Middle).1.vertices.is_empty());
     }
 }
