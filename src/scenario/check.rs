@@ -2,7 +2,7 @@
 
 use super::WaysidePost;
 use super::file::{ScenarioFile, WaysidePostSettings};
-use crate::track::{BED_M, Problem, Tunnel, did_you_mean};
+use crate::track::{Problem, Tunnel, did_you_mean};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{RigSettings, ever_sees};
 
@@ -222,7 +222,7 @@ fn check_workers(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Proble
             let at = format!("workers[{k}].path[{j}]");
             let key = format!("{at}.chainage_m");
             if inside_line(&key, "he", p.chainage_m, tunnel, problems) {
-                let middle_m = worker.ground_m.unwrap_or(BED_M) + 0.5 * worker.stature_m;
+                let middle_m = worker.ground_m + 0.5 * worker.stature_m;
                 let at = format!("{at}.lateral_m");
                 in_the_open(&at, p.chainage_m, p.lateral_m, middle_m, tunnel, problems);
             }
