@@ -36,6 +36,8 @@ struct Surface {
     @location(5) @interpolate(flat, either) luminance_cd_m2: f32,
     @location(6) @interpolate(flat, either) look: u32,
     @location(7) @interpolate(flat, either) first_cell: i32,
+    // Marks a metre, their share of it, and what they add to albedo 1.
+    @location(8) @interpolate(flat, either) pulse: vec3f,
 }
 
 // The point in the camera's frame while row `v` is in mid-exposure.
@@ -83,6 +85,8 @@ fn project(in: Vertex) -> Surface {
     out.luminance_cd_m2 = in.luminance_cd_m2;
     out.look = in.look;
     out.first_cell = in.first_cell;
+    let pulse = PULSES[(in.look >> 8u) & 0xffu];
+    out.pulse = vec3f(1.0 / pulse.x, pulse.y / pulse.x, pulse.z - 1.0);
     return out;
 }
 
@@ -123,23 +127,22 @@ fn headlights_lx(p: vec3f, n: vec3f) -> f32 {
 @fragment
 fn shade(in: Surface) -> @location(0) vec4f {
     let p = in.position_m;
-    let distance = length(p);
-    let sine = max(abs(dot(in.normal, p)) / distance, MIN_SINE);
-    let footprint = distance / (view.focal_px.x * sine);
+    let square = dot(p, p);
+    let inverse = inverseSqrt(square);
+    let sine = max(abs(dot(in.normal, p)) * inverse, MIN_SINE);
+    let footprint = square * inverse / (view.focal_px.x * sine);
 
-    let pulse = PULSES[(in.look >> 8u) & 0xffu];
-    let period = pulse.x;
-    let duty = pulse.y / period;
-    let begin = (in.pattern_m.x + 0.5 * (pulse.y - footprint)) / period;
-    let span = footprint / period;
-    let share = (pulses(begin + span, duty) - pulses(begin, duty)) / span;
+    // Mean of the marks over the footprint.
+    let span = footprint * in.pulse.x;
+    let begin = in.pattern_m.x * in.pulse.x + 0.5 * (in.pulse.y - span);
+    let share = (pulses(begin + span, in.pulse.y) - pulses(begin, in.pulse.y)) / span;
 
     let fade = clamp(2.0 - footprint / STAIN_FADE_M, 0.0, 1.0) * f32(in.look >> 16u);
     let noise = stains(in.pattern_m.x, in.pattern_m.y, in.first_cell, in.look & 0xffu);
-    let albedo = in.albedo * (1.0 + (pulse.z - 1.0) * share)
+    let albedo = in.albedo * (1.0 + in.pulse.z * share)
         * (1.0 + STAIN_CONTRAST * fade * (noise - 0.5));
 
     let light = in.irradiance_lx + headlights_lx(p, in.normal);
-    let luminance = albedo * light / PI + in.luminance_cd_m2;
+    let luminance = albedo * light * (1.0 / PI) + in.luminance_cd_m2;
     return vec4f(min(luminance * view.grey_per_cd_m2, SATURATION_GREY), 0.0, 0.0, 1.0);
 }

@@ -68,9 +68,8 @@ pub(super) fn obstacle_label(o: &DetectedObstacle) -> String {
         DangerLevel::Low => "low",
         DangerLevel::High => "HIGH",
     };
-    // The viewer wraps labels to the width of their box, except at these spaces.
     format!(
-        "{:.1}\u{a0}m\u{a0}{danger}\n{:.2}\u{a0}x\u{a0}{:.2}\u{a0}m",
+        "{:.1} m {danger}, {:.2} x {:.2} m",
         o.near_range_m, o.width_m, o.height_m
     )
 }
@@ -245,10 +244,25 @@ fn draw_obstacles(
         &others.with_colors([palette::BLOB]),
     )?;
 
-    let found = boxes(report.obstacles.iter().map(|o| o.blob.bounds))
-        .with_colors(report.obstacles.iter().map(|o| palette::danger(o.danger)))
+    let colours: Vec<_> = report
+        .obstacles
+        .iter()
+        .map(|o| palette::danger(o.danger))
+        .collect();
+    let found =
+        boxes(report.obstacles.iter().map(|o| o.blob.bounds)).with_colors(colours.iter().copied());
+    stream.log(&format!("{path}/obstacles"), &found)?;
+
+    // Under the box: labels of boxes are wrapped to their width.
+    let under = report.obstacles.iter().map(|o| {
+        let b = o.blob.bounds;
+        pixel(0.5 * (f64::from(b.u0) + f64::from(b.u1)), f64::from(b.v1))
+    });
+    let labels = Points2D::new(under)
+        .with_radii([ui(1.0)])
+        .with_colors(colours)
         .with_labels(report.obstacles.iter().map(obstacle_label));
-    stream.log(&format!("{path}/obstacles"), &found)
+    stream.log(&format!("{path}/obstacles/labels"), &labels)
 }
 
 fn boxes(bounds: impl IntoIterator<Item = PixelBox>) -> Boxes2D {

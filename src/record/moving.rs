@@ -11,7 +11,8 @@ use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::RotationQuat;
 use rerun::{
-    Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D, Points3D, Transform3D,
+    AsComponents, Boxes3D, Capsules3D, Color, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D,
+    Points3D, Transform3D,
 };
 
 const SIGHT: &str = "world/estimate/sight";
@@ -90,10 +91,10 @@ impl Moving {
         if opening.cars > 0 {
             train.push(Poses::of(HEAD));
             train.extend((0..opening.cars).map(|car| Poses::of(car_path(car))));
-            let (mast, tip) = mast(6.0, "true");
-            // On the head itself: the viewer's eye can follow only what has a shape of its own.
-            stream.log_static(HEAD, &mast.with_colors([palette::TRUTH]))?;
-            stream.log_static(HEAD, &tip.with_colors([palette::TRUTH]))?;
+            // On the head itself: the viewer's eye can follow only what has a shape of its own,
+            // and keeps a distance that fits its size.
+            let (mast, tip) = mast(8.4, "true", palette::TRUTH);
+            stream.log_static(HEAD, &[&mast as &dyn AsComponents, &tip])?;
         }
         Ok(Self {
             rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
@@ -165,9 +166,9 @@ impl Moving {
         for fix in &report.fixes {
             stream.at_frame(fix.time, report.number);
             let (name, height_m) = match fix.method {
-                Method::Fused => ("fused", 7.2),
-                Method::Paper => ("paper", 8.4),
-                Method::Mono => ("mono", 9.6),
+                Method::Fused => ("fused", 9.6),
+                Method::Paper => ("paper", 10.8),
+                Method::Mono => ("mono", 12.0),
             };
             let path = format!("world/estimate/{name}");
             let place = Transform3D::from_translation(scene.local(&fix.position));
@@ -175,10 +176,9 @@ impl Moving {
             // Drawn with the first fix: before it, there is nothing to show.
             if !self.methods.contains(&fix.method) {
                 self.methods.push(fix.method);
-                let (mast, tip) = mast(height_m, name);
-                let colour = palette::method(fix.method);
-                stream.log(&path, &mast.with_colors([colour]))?;
-                stream.log(&path, &tip.with_colors([colour]))?;
+                let (mast, tip) = mast(height_m, name, palette::method(fix.method));
+                let mast = [&mast as &dyn AsComponents, &tip];
+                stream.log(&format!("{path}/mast"), &mast)?;
             }
         }
         let seen = report.fixes.first().and_then(|fix| {
@@ -186,16 +186,15 @@ impl Moving {
             let eye = scene.place(&self.left?);
             Some((fix, [eye, scene.local(lamp)]))
         });
-        stream.at_frame(report.time, report.number);
-        if let Some((fix, line)) = seen {
-            let colour = palette::identity(fix.identity);
-            let sight = LineStrips3D::new([line])
+        if seen.is_some() || self.sight_shown {
+            let label = seen.map(|(fix, _)| format!("lamp {}", fix.uid));
+            let colour = seen.map(|(fix, _)| palette::identity(fix.identity));
+            let sight = LineStrips3D::new(seen.map(|(_, line)| line))
                 .with_radii([ui(1.5)])
-                .with_colors([colour])
-                .with_labels([format!("lamp {}", fix.uid)]);
+                .with_colors(colour)
+                .with_labels(label);
+            stream.at_frame(report.time, report.number);
             stream.log(SIGHT, &sight)?;
-        } else if self.sight_shown {
-            stream.log(SIGHT, &LineStrips3D::new([[[0.0f32; 3]; 0]; 0]))?;
         }
         self.sight_shown = seen.is_some();
         Ok(())
@@ -250,12 +249,16 @@ fn car_path(car: usize) -> String {
 
 /// A mast over the vehicle frame's origin with its name on top: estimates stand in the train,
 /// where a point would be hidden.
-fn mast(height_m: f32, name: &str) -> (LineStrips3D, Points3D) {
+fn mast(height_m: f32, name: &str, colour: Color) -> (LineStrips3D, Points3D) {
     let top = [0.0, 0.0, height_m];
-    (
-        LineStrips3D::new([[[0.0; 3], top]]).with_radii([0.05]),
-        Points3D::new([top]).with_radii([0.12]).with_labels([name]),
-    )
+    let mast = LineStrips3D::new([[[0.0; 3], top]])
+        .with_radii([ui(1.5)])
+        .with_colors([colour]);
+    let tip = Points3D::new([top])
+        .with_radii([0.12])
+        .with_colors([colour])
+        .with_labels([name]);
+    (mast, tip)
 }
 
 /// Bodies of one kind of shape.
@@ -264,7 +267,7 @@ struct Solids {
     places: Vec<[f32; 3]>,
     turns: Vec<RotationQuat>,
     sizes: Vec<[f32; 3]>,
-    colours: Vec<rerun::Color>,
+    colours: Vec<Color>,
 }
 
 fn kind(shape: &Shape) -> usize {

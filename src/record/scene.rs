@@ -10,8 +10,8 @@ use crate::track::{Alignment, CrossSection, RAIL_CENTRES_M, SectionRange, TrackP
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::{MeshFaceRendering, RotationQuat};
 use rerun::{
-    Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, Radius, Transform3D,
-    ViewCoordinates,
+    AsComponents, Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, Radius,
+    Transform3D, ViewCoordinates,
 };
 use std::collections::BTreeMap;
 
@@ -82,8 +82,9 @@ impl Scene {
         self.draw_furniture(stream, opening.tunnel)?;
         for device in opening.wayside {
             let paths = WaysidePaths::new(&device.name);
-            stream.log_static(&paths.camera, &self.transform(&device.world_from_camera))?;
-            stream.log_static(&paths.camera, &pinhole(&device.camera.intrinsics, 2.5))?;
+            let pose = self.transform(&device.world_from_camera);
+            let pinhole = pinhole(&device.camera.intrinsics, 2.5);
+            stream.log_static(&paths.camera, &[&pose as &dyn AsComponents, &pinhole])?;
             let place = self.place(&device.world_from_camera);
             let point = Points3D::new([place])
                 .with_radii([0.15])

@@ -2,7 +2,8 @@
 //!
 //! Two runs with one seed must give recordings that `rerun rrd compare` finds equal. So the ids
 //! come from scenario and seed, no row carries the wall clock, and batches are cut where simulated
-//! time says, never by a timer.
+//! time says, never by a timer. The sdk puts rows of one entity that hold different components
+//! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
 use crate::bus::SimTime;
 use crate::session::ObserverError;
@@ -46,11 +47,15 @@ impl Stream {
     pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self, ObserverError> {
         // Viewers keep one layout an application, and each scenario has its own.
         let application = ApplicationId::new_or_unknown(format!("metrotwin-{scenario}"));
-        let id = StoreId::new(
-            StoreKind::Recording,
-            application.clone(),
-            format!("{scenario}-seed-{seed}"),
-        );
+        let id = match target {
+            Target::File(_) => StoreId::new(
+                StoreKind::Recording,
+                application.clone(),
+                format!("{scenario}-seed-{seed}"),
+            ),
+            // A viewer would mix two runs under one id, and nobody compares what it was sent.
+            Target::Viewer(_) => StoreId::random(StoreKind::Recording, application.clone()),
+        };
         let builder = RecordingStreamBuilder::from_store_id(&id)
             .enabled(true)
             .send_properties(false)

@@ -73,7 +73,7 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
     let mean = Point2::from(sum / n as f64);
     let spread: f64 = chosen().map(|p| (p - mean).norm_squared()).sum();
     let scale = (spread / n as f64).sqrt();
-    if !(scale > 1e-9) {
+    if !scale.is_finite() || scale <= 1e-9 {
         return None;
     }
     let mut normal = Matrix5::zeros();
@@ -130,7 +130,7 @@ fn centre_u_slope([a, b, c, d, e]: [f64; 5]) -> Vector5<f64> {
 /// Centre and axes of a conic; `None` where it is no real ellipse.
 fn to_ellipse([a, b, c, d, e]: [f64; 5], mean: &Point2<f64>, scale: f64) -> Option<Ellipse> {
     let determinant = 4.0 * a * c - b * b;
-    if !(determinant > 1e-9 * (a * a + b * b + c * c)) {
+    if !determinant.is_finite() || determinant <= 1e-9 * (a * a + b * b + c * c) {
         return None;
     }
     let u = (b * e - 2.0 * c * d) / determinant;

@@ -15,8 +15,9 @@
 use super::patch::Patch;
 use std::f64::consts::{PI, TAU};
 
-/// Longest half of a filter.
-const MAX_HALF: usize = 24;
+/// Longest half of a filter. A box has zeros in its response, about which the inverse rings on for
+/// many lengths: cut off at 3 of them it does more harm than the blur.
+const MAX_HALF: usize = 64;
 /// Frequencies over which the response is inverted.
 const FREQUENCIES: usize = 256;
 
@@ -39,7 +40,7 @@ impl Wiener {
             return;
         }
         (self.length_px, self.noise_to_signal) = (length_px, noise_to_signal);
-        let half = ((3.0 * length_px).ceil() as usize + 4).min(MAX_HALF);
+        let half = ((12.0 * length_px).ceil() as usize + 8).min(MAX_HALF);
         let response = |f: f64| {
             let x = PI * f * length_px;
             let h = if x < 1e-9 { 1.0 } else { x.sin() / x };
@@ -93,50 +94,31 @@ mod tests {
         (0..110).map(|u| mean(f64::from(u)).round() as u8).collect()
     }
 
-    fn steepest(row: &[u8]) -> i32 {
-        row.windows(2)
-            .map(|p| (i32::from(p[1]) - i32::from(p[0])).abs())
-            .max()
-            .unwrap()
-    }
-
-    /// The filter must bring back steep edges, keep the plateau, and not move the middle.
+    /// The filter must come near the sharp row and not move the middle.
     #[test]
     fn a_known_blur_is_undone() {
-        let row = blurred(5.0);
-        let mut patch = Patch::from_data(0, 0, row.len(), 1, row.clone());
-        let mut wiener = Wiener::default();
-        wiener.prepare(5.0, 0.003);
-        wiener.apply(&mut patch);
-        assert!(
-            steepest(&patch.data) > 2 * steepest(&row),
-            "{} {}",
-            steepest(&patch.data),
-            steepest(&row)
-        );
-        let middle = |row: &[u8]| {
-            let weights = row.iter().map(|&g| f64::from(g) - 20.0);
-            let sum: f64 = weights.clone().sum();
-            weights.enumerate().map(|(u, g)| u as f64 * g).sum::<f64>() / sum
-        };
-        assert!(
-            (middle(&patch.data) - 56.05).abs() < 0.1,
-            "{}",
-            middle(&patch.data)
-        );
-        let squares = |row: &[u8]| -> f64 {
-            let sharp = blurred(0.0);
-            row.iter()
-                .zip(sharp)
-                .map(|(&a, b)| (f64::from(a) - f64::from(b)).powi(2))
-                .sum()
-        };
-        assert!(
-            squares(&patch.data) < 0.5 * squares(&row),
-            "{} {}",
-            squares(&patch.data),
-            squares(&row)
-        );
+        let sharp = blurred(0.0);
+        for length in [1.5, 3.0, 5.0] {
+            let row = blurred(length);
+            let mut patch = Patch::from_data(0, 0, row.len(), 1, row.clone());
+            let mut wiener = Wiener::default();
+            wiener.prepare(length, 0.003);
+            wiener.apply(&mut patch);
+            let middle = |row: &[u8]| {
+                let weights = row.iter().map(|&g| f64::from(g) - 20.0);
+                let sum: f64 = weights.clone().sum();
+                weights.enumerate().map(|(u, g)| u as f64 * g).sum::<f64>() / sum
+            };
+            assert!((middle(&patch.data) - 56.05).abs() < 0.1);
+            let squares = |row: &[u8]| -> i32 {
+                let pairs = row.iter().zip(&sharp);
+                pairs
+                    .map(|(&a, &b)| (i32::from(a) - i32::from(b)).pow(2))
+                    .sum()
+            };
+            let (before, after) = (squares(&row), squares(&patch.data));
+            assert!(4 * after < before, "{length} px: {before} to {after}");
+        }
     }
 
     #[test]

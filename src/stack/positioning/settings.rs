@@ -60,7 +60,7 @@ impl Default for LedSettings {
             attitude_sigma_deg: 0.1,
             front_pivot_m: 3.5,
             rear_pivot_m: 16.1,
-            max_sigma_m: 1.0,
+            max_sigma_m: 0.25,
             survey_sigma_m: 0.005,
         }
     }
