@@ -93,6 +93,7 @@ fn lamp(alignment: &Alignment, k: u16) -> LampSite {
         efficacy_lm_per_w: 100.0,
         beam_deg: 60.0,
         chip_s: 1e-4,
+        code: uid::LineCode::Manchester,
     }
 }
 
@@ -341,6 +342,7 @@ impl Session<'_> {
                 permitted_speed_mps: permitted_mps,
             },
             display,
+            ..ProtectionReport::default()
         };
         self.tell(&Event::Protection(&report));
         self.tell(&Event::Display(time, &report.display));
@@ -462,6 +464,7 @@ impl Session<'_> {
             plan: Plan::Pass,
             difference: None,
             binary: None,
+            ..WaysideReport::default()
         };
         let position = self.tunnel.alignment.world_from_track(TrackPoint {
             s_m: OBSTACLE_M,

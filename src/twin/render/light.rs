@@ -190,6 +190,7 @@ mod tests {
                 efficacy_lm_per_w: 100.0,
                 beam_deg: 60.0,
                 chip_s: 66.6e-6,
+                code: crate::track::uid::LineCode::Manchester,
             },
             0.0,
         )

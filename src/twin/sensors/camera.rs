@@ -488,3 +488,84 @@ fn within(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &s
         ));
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    fn bench() -> Tunnel {
+        Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml")).unwrap()
+    }
+
+    /// A turn to the wrong side, pitch before yaw, mirrored camera axes.
+    #[test]
+    fn yaw_is_to_the_left_and_pitch_is_up() {
+        let rig = RigSettings::default();
+        let vehicle_from_left = rig.calibration().vehicle_from_left;
+        let (yaw, pitch) = (rig.yaw_deg.to_radians(), rig.pitch_deg.to_radians());
+        let axis = Vector3::new(
+            pitch.cos() * yaw.cos(),
+            pitch.cos() * yaw.sin(),
+            pitch.sin(),
+        );
+        assert!((vehicle_from_left * Vector3::z() - axis).norm() < 1e-12);
+        // Rows stay level: the right hand axis has no height, and points to the right.
+        let right = Vector3::new(yaw.sin(), -yaw.cos(), 0.0);
+        assert!((vehicle_from_left * Vector3::x() - right).norm() < 1e-12);
+    }
+
+    /// What the defaults are chosen for: a whole unit of 10 m, and the figures of the header.
+    #[test]
+    fn the_reference_rig_sees_a_whole_unit() {
+        let tunnel = bench();
+        let rig = RigSettings::default();
+        let see = |rig: &RigSettings| {
+            visible_interval(&rig.calibration(), &tunnel, &tunnel.lamps[0]).unwrap()
+        };
+        let (near_m, far_m) = see(&rig);
+        // The eye is 0.5 m behind the head; steps of 5 cm.
+        assert!((near_m - (1.04 - 0.5)).abs() < 0.1, "{near_m}");
+        assert!((far_m - (11.46 - 0.5)).abs() < 0.1, "{far_m}");
+        assert!(far_m - near_m > 10.0);
+        // With the paper's psi = 49 deg no pitch does it.
+        for pitch_deg in [0.0, 10.0, 18.0, 22.0, 26.0, 30.0] {
+            let (near_m, far_m) = see(&RigSettings {
+                yaw_deg: 41.0,
+                pitch_deg,
+                ..rig.clone()
+            });
+            assert!(
+                far_m - near_m < 8.5,
+                "pitch {pitch_deg}: {near_m} to {far_m}"
+            );
+        }
+    }
+
+    /// The error belongs to the rig as built, not to its calibration sheet.
+    #[test]
+    fn calibration_error_moves_the_actual_rig_only() {
+        let mut rig = RigSettings::default();
+        rig.calibration_error.baseline_mm = 1.0;
+        assert!((rig.calibration().baseline_m - 0.120).abs() < 1e-12);
+        assert!((rig.actual().baseline_m - 0.121).abs() < 1e-12);
+    }
+
+    /// Camera and lidar of a housing look the same way, which is the site's yaw and pitch.
+    #[test]
+    fn a_wayside_housing_looks_where_its_site_says() {
+        let text = include_str!("../../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let site = &tunnel.wayside[0];
+        let device = WaysideCameraSettings::default()
+            .calibration(site, &tunnel, true)
+            .unwrap();
+        let axis = device.world_from_camera * Vector3::z();
+        let lidar = device.world_from_lidar.unwrap();
+        assert!((axis - lidar * Vector3::y()).norm() < 1e-12);
+        assert!((axis.z - site.pitch_rad.sin()).abs() < 1e-12);
+        let line = tunnel.alignment.at(site.chainage_m).world_from_line() * Vector3::x();
+        let along = axis.dot(&Vector3::new(line.x, line.y, 0.0).normalize());
+        assert!((along - site.pitch_rad.cos() * site.yaw_rad.cos()).abs() < 1e-9);
+    }
+}
