@@ -48,7 +48,7 @@ impl Device {
         Self {
             calibration: post.calibration.clone(),
             balise: post.balise.clone(),
-            sensor: post.camera.sensor,
+            sensor: post.camera.sensor_behind_lens(),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
             lidar: (post.lidar.as_ref().zip(post.calibration.world_from_lidar)).map(

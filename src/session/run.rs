@@ -413,7 +413,9 @@ impl<'s> Run<'s> {
             let text = format!("protection: {:?}", report.command.brake);
             watchers.show(&Event::Note(now, &text))?;
         }
-        if report.command.brake != BrakeDemand::None {
+        // A driver who obeys brakes before the equipment has to.
+        let lowered = report.authority_end_m.is_some() && report.permitted_mps < report.speed_mps;
+        if lowered || report.command.brake != BrakeDemand::None {
             self.outcome.brake_commanded.get_or_insert(now);
         }
         self.command = report.command;

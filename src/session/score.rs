@@ -1,7 +1,9 @@
 //! The stack's words held against the truth.
 
 use super::summary::{Cost, Distribution, ObstacleScore, Positioning, Wayside};
-use crate::bus::{Identity, Intrinsics, LedReport, Method, PositionFix, SimTime, WaysideReport};
+use crate::bus::{
+    DangerLevel, Identity, Intrinsics, LedReport, Method, PositionFix, SimTime, WaysideReport,
+};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;
 use nalgebra::{Isometry3, Point2, Point3};
@@ -194,7 +196,8 @@ impl WaysideScore {
                 ..Found::default()
             });
         }
-        for seen in &report.obstacles {
+        // What the device itself calls clear of the gauge is no alarm.
+        for seen in (report.obstacles.iter()).filter(|o| o.danger != DangerLevel::None) {
             let centre_m = 0.5 * (seen.from_chainage_m + seen.to_chainage_m);
             let beside = |p: &Presence| (p.chainage_m - centre_m).abs() - p.half_length_m;
             let nearest = present

@@ -151,7 +151,7 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 pub struct Wayside {
     /// Every obstacle that came to lie in view.
     pub obstacles: Vec<ObstacleScore>,
-    /// Reported obstacles, a frame each, that match nothing real.
+    /// Dangers reported, counted once a frame, where nothing real is.
     pub false_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,

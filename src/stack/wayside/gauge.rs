@@ -10,14 +10,20 @@ pub(super) struct Extent {
     pub right_m: f64,
     /// Leftmost point.
     pub left_m: f64,
+    /// Where its foot stands.
+    pub foot_m: f64,
     /// Highest point over top of rail.
     pub top_m: f64,
 }
 
 /// High: the train would hit it, or could ride over it. Low: near the gauge, or in it but too
-/// low to be hit. None: clear of it.
+/// low to be hit. None: clear of it, or seen to begin on the wall, where nothing stands: light
+/// that moves over the lining does.
 pub(super) fn danger(settings: &WaysideSettings, extent: Extent) -> DangerLevel {
     let within = |half_width: f64| extent.right_m <= half_width && extent.left_m >= -half_width;
+    if extent.foot_m.abs() > settings.gauge_half_width_m + settings.near_gauge_m {
+        return DangerLevel::None;
+    }
     if within(settings.gauge_half_width_m) && extent.top_m >= settings.dangerous_height_m {
         DangerLevel::High
     } else if within(settings.gauge_half_width_m + settings.near_gauge_m) {
@@ -41,6 +47,7 @@ mod tests {
                 Extent {
                     right_m,
                     left_m,
+                    foot_m: 0.5 * (right_m + left_m),
                     top_m,
                 },
             )
@@ -54,5 +61,14 @@ mod tests {
         assert_eq!(level(w + 0.01, w + 0.5, 1.0), DangerLevel::Low);
         assert_eq!(level(-w - 0.5, -w - 0.01, 1.0), DangerLevel::Low);
         assert_eq!(level(w + near + 0.01, w + 1.0, 1.0), DangerLevel::None);
+        // A patch of light 5 m wide that begins on the wall reaches into the gauge, but stands on
+        // nothing.
+        let patch = Extent {
+            right_m: 0.0,
+            left_m: 5.0,
+            foot_m: w + near + 0.01,
+            top_m: 2.0,
+        };
+        assert_eq!(danger(&settings, patch), DangerLevel::None);
     }
 }

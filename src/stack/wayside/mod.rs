@@ -69,9 +69,9 @@
 //!
 //! It enters the view, and its headlights come before it. While a train is reported within
 //! [`HEADLIGHT_M`] of the device, grey levels are compensated by the local gain (see
-//! `difference`). Where the train is reported to be, with a margin, lines of sight that pass the
-//! gauge there are blind: nothing is found by them, and what was confirmed there stays confirmed
-//! until they see again. Without reports of the train it is an obstacle like any other.
+//! `difference`). Where the train is reported to be, and in the glare of its lamps ahead, lines of
+//! sight that pass the gauge are blind: nothing is found by them, and what was confirmed there
+//! stays confirmed until they see again. Without reports of the train it is an obstacle like any other.
 //!
 //! # What it does not do
 //!
@@ -118,6 +118,9 @@ use std::sync::Arc;
 pub const HEADLIGHT_M: f64 = 200.0;
 /// A train's place is known to this; its halo reaches as far.
 const TRAIN_MARGIN_M: f64 = 10.0;
+/// Ahead of its head a train lights bed and rails too steeply for a local gain to follow. What
+/// newly appears there is too near for braking anyway: 40 m is the way to stop from 32 km/h.
+const GLARE_M: f64 = 40.0;
 
 /// One wayside device.
 #[derive(Clone, Debug)]
@@ -232,11 +235,11 @@ impl WaysideDetector {
         }
     }
 
-    /// Tail and head of a train, with margin.
+    /// What a train covers and dazzles: from its tail to where its glare ends.
     fn occupied_m(&self, train: TrainReport) -> (f64, f64) {
         (
             train.chainage_m - self.settings.train_length_m - TRAIN_MARGIN_M,
-            train.chainage_m + TRAIN_MARGIN_M,
+            train.chainage_m + GLARE_M,
         )
     }
 

@@ -246,6 +246,7 @@ impl Outline {
                 Extent {
                     right_m,
                     left_m,
+                    foot_m: place.l_m,
                     top_m,
                 },
             ),

@@ -39,9 +39,9 @@ mod irregularity;
 mod obstacle;
 mod settings;
 mod suspension;
-mod truth;
 #[cfg(test)]
 mod tests;
+mod truth;
 mod vehicle;
 mod worker;
 

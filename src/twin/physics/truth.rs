@@ -45,9 +45,16 @@ impl World {
     }
 
     fn chainage_of(&self, world_from_vehicle: &Isometry3<f64>) -> Option<f64> {
-        let near = self.train.as_ref()?.consist.instruments(self.time, &self.tunnel.alignment);
+        let near = self
+            .train
+            .as_ref()?
+            .consist
+            .instruments(self.time, &self.tunnel.alignment);
         let origin = world_from_vehicle.translation.vector.into();
-        let head = self.tunnel.alignment.track_from_world(&origin, near.chainage_m);
+        let head = self
+            .tunnel
+            .alignment
+            .track_from_world(&origin, near.chainage_m);
         Some(head.s_m)
     }
 }

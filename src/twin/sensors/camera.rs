@@ -285,6 +285,9 @@ pub struct WaysideCameraSettings {
     pub exposure_us: f64,
     /// Frames a second. Default 10.
     pub frames_per_s: f64,
+    /// Light that its lens collects, as a multiple of what `sensor.grey_per_cd_s` is meant for.
+    /// Default 8: f/1.0, where the rig has f/2.8.
+    pub lens_gain: f64,
     /// From light to grey levels.
     pub sensor: SensorSettings,
 }
@@ -299,6 +302,7 @@ impl Default for WaysideCameraSettings {
             line_time_us: 14.8,
             exposure_us: 8000.0,
             frames_per_s: 10.0,
+            lens_gain: 8.0,
             sensor: SensorSettings::default(),
         }
     }
@@ -308,6 +312,14 @@ impl WaysideCameraSettings {
     /// The camera alone.
     pub fn camera(&self) -> CameraModel {
         self.optics().camera()
+    }
+
+    /// From light to grey levels, behind its lens.
+    pub fn sensor_behind_lens(&self) -> SensorSettings {
+        SensorSettings {
+            grey_per_cd_s: self.lens_gain * self.sensor.grey_per_cd_s,
+            ..self.sensor
+        }
     }
 
     /// The device as surveyed: this camera at that site, with a lidar in the same housing where
@@ -333,6 +345,7 @@ impl WaysideCameraSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        positive(problems, at, "lens_gain", self.lens_gain, "", 8.0);
     }
 
     fn optics(&self) -> Optics {
