@@ -1,6 +1,6 @@
 //! Same seed, same bytes: images, words of the stack, figures. Provokes: noise or threads that
 //! depend on order, wall time that leaks into results, seeds that are not used.
-
+#![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use metrotwin::scenario::Scenario;
