@@ -72,7 +72,7 @@ pub(super) fn material(material: Material, ring: usize) -> Color {
         Material::Rail => [170, 175, 185],
         Material::Platform => [150, 135, 115],
     };
-    if ring % 2 == 0 {
+    if ring.is_multiple_of(2) {
         Color::from_rgb(r, g, b)
     } else {
         Color::from_rgb(r - r / 4, g - g / 4, b - b / 4)

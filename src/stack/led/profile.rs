@@ -223,7 +223,7 @@ mod tests {
         ];
         closing(&samples, 2, &mut work, &mut out);
         assert_eq!(out[2..7], [9.0, 7.0, 7.0, 7.0, 5.0]);
-        assert_eq!([out[8], out[11]], [0.0, 4.0]);
+        assert_eq!((out[8], out[11]), (0.0, 4.0));
     }
 
     /// Stripes drawn with a known shear; the measured one is undone.

@@ -271,7 +271,8 @@ mod tests {
         let mut steady = profile(&other, 80.0);
         steady.light.fill(80.0);
         let mut dark = profile(&other, 80.0);
-        (dark.light.fill(0.0), dark.envelope.fill(0.0));
+        dark.light.fill(0.0);
+        dark.envelope.fill(0.0);
         for profile in [steady, dark, profile(&other, 80.0)] {
             assert!(!reader.read(&profile, 4.0, &mut reading));
         }

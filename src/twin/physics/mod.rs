@@ -424,11 +424,11 @@ impl World {
             self.insert(&next);
         }
         for k in 0..self.put_down.len() {
-            if !self.put_down[k] {
-                if let Some(load) = self.settings.workers[k].put_down(now) {
-                    self.put_down[k] = true;
-                    self.insert(&load);
-                }
+            if !self.put_down[k]
+                && let Some(load) = self.settings.workers[k].put_down(now)
+            {
+                self.put_down[k] = true;
+                self.insert(&load);
             }
         }
     }

@@ -150,8 +150,8 @@ fn val_bounce_frequency() {
         let got = std::f64::consts::TAU * periods as f64 / span;
         eprintln!(
             "{set:?}: bounce {:.4} Hz, closed form {:.4} Hz",
-            got / 6.2832,
-            wanted / 6.2832
+            got / std::f64::consts::TAU,
+            wanted / std::f64::consts::TAU
         );
         assert!(periods >= 3 && (got / wanted - 1.0).abs() < 0.02);
     }

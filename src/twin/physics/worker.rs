@@ -71,7 +71,8 @@ impl WorkerSettings {
             ));
         }
         for (k, pair) in self.path.windows(2).enumerate() {
-            if !(pair[1].time_s > pair[0].time_s) {
+            let in_order = pair[1].time_s > pair[0].time_s;
+            if !in_order {
                 problems.push(Problem::new(
                     join(at, &format!("path[{}].time_s", k + 1)),
                     format!("{} s is not after {} s", pair[1].time_s, pair[0].time_s),

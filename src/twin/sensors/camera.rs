@@ -495,7 +495,7 @@ fn positive(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: 
 }
 
 fn within(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, limit: f64) {
-    if !(value.abs() <= limit) {
+    if !(-limit..=limit).contains(&value) {
         problems.push(Problem::new(
             format!("{at}.{key}"),
             format!("{value} {unit} is out of range"),
