@@ -174,14 +174,14 @@ fn events() -> Pane {
     )
 }
 
-/// The 3-D view. Where there is a train, the eye rides along with its head.
+/// The 3-D view. The eye rides along with the head.
 fn world(contents: &Contents, (position, target): ([f32; 3], [f32; 3])) -> Pane {
     let mut eye = EyeControls3D::new()
         .with_kind(Eye3DKind::Orbital)
         .with_position(position)
         .with_look_target(target)
         .with_eye_up([0.0, 0.0, 1.0]);
-    if contents.train {
+    if contents.head() {
         eye = eye.with_tracking_entity(scene::HEAD);
     }
     Pane::new("3D", "Tunnel", "world")

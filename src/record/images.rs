@@ -62,16 +62,19 @@ pub(super) fn pinhole(intrinsics: &Intrinsics, depth_m: f32) -> Pinhole {
 }
 
 /// What is said of an obstacle wherever it is drawn.
-pub(super) fn obstacle_label(o: &DetectedObstacle) -> String {
+pub(super) fn danger_label(o: &DetectedObstacle) -> String {
     let danger = match o.danger {
         DangerLevel::None => "clear",
         DangerLevel::Low => "low",
         DangerLevel::High => "HIGH",
     };
-    format!(
-        "{:.1} m {danger}, {:.2} x {:.2} m",
-        o.near_range_m, o.width_m, o.height_m
-    )
+    format!("{:.1} m {danger}", o.near_range_m)
+}
+
+/// What is said of a danger in the image.
+fn obstacle_label(o: &DetectedObstacle) -> String {
+    let range_and_danger = danger_label(o);
+    format!("{range_and_danger}, {:.2} x {:.2} m", o.width_m, o.height_m)
 }
 
 /// Lets through the first of each interval of a fixed rate.
@@ -169,7 +172,7 @@ impl Images {
                 png(stream, &paths.binary, binary)?;
             }
         }
-        draw_obstacles(stream, &paths.camera, report)
+        draw_obstacles(stream, &paths.camera, report, frame.height())
     }
 
     fn brighten(&mut self, difference: &GrayImage) {
@@ -235,6 +238,7 @@ fn draw_obstacles(
     stream: &Stream,
     path: &str,
     report: &WaysideReport,
+    height_px: u32,
 ) -> Result<(), ObserverError> {
     let is_obstacle = |bounds: PixelBox| report.obstacles.iter().any(|o| o.blob.bounds == bounds);
     let others = report.blobs.iter().map(|blob| blob.bounds);
@@ -244,25 +248,39 @@ fn draw_obstacles(
         &others.with_colors([palette::BLOB]),
     )?;
 
-    let colours: Vec<_> = report
-        .obstacles
-        .iter()
-        .map(|o| palette::danger(o.danger))
-        .collect();
-    let found =
-        boxes(report.obstacles.iter().map(|o| o.blob.bounds)).with_colors(colours.iter().copied());
+    let found = boxes(report.obstacles.iter().map(|o| o.blob.bounds))
+        .with_colors(report.obstacles.iter().map(|o| palette::danger(o.danger)));
     stream.log(&format!("{path}/obstacles"), &found)?;
 
-    // Under the box: labels of boxes are wrapped to their width.
-    let under = report.obstacles.iter().map(|o| {
-        let b = o.blob.bounds;
-        pixel(0.5 * (f64::from(b.u0) + f64::from(b.u1)), f64::from(b.v1))
-    });
-    let labels = Points2D::new(under)
+    let (places, dangers) = label_places(&report.obstacles, height_px);
+    let labels = Points2D::new(places)
         .with_radii([ui(1.0)])
-        .with_colors(colours)
-        .with_labels(report.obstacles.iter().map(obstacle_label));
+        .with_colors(dangers.iter().map(|o| palette::danger(o.danger)))
+        .with_labels(dangers.iter().map(|o| obstacle_label(o)));
     stream.log(&format!("{path}/obstacles/labels"), &labels)
+}
+
+/// Where the labels of the dangers go: under the box, because labels of boxes are wrapped to their
+/// width, and under each other, because obstacles far away lie close together in the image.
+fn label_places(
+    obstacles: &[DetectedObstacle],
+    height_px: u32,
+) -> (Vec<[f32; 2]>, Vec<&DetectedObstacle>) {
+    /// Of a label's line to the image, as a pane a quarter of a window high shows it.
+    const LINE: f64 = 0.08;
+    let mut dangers: Vec<_> = obstacles
+        .iter()
+        .filter(|o| o.danger != DangerLevel::None)
+        .collect();
+    dangers.sort_by_key(|o| o.blob.bounds.v1);
+    let mut free_px = 0.0_f64;
+    let places = dangers.iter().map(|o| {
+        let b = o.blob.bounds;
+        let v = free_px.max(f64::from(b.v1));
+        free_px = v + LINE * f64::from(height_px);
+        pixel(0.5 * (f64::from(b.u0) + f64::from(b.u1)), v)
+    });
+    (places.collect(), dangers)
 }
 
 fn boxes(bounds: impl IntoIterator<Item = PixelBox>) -> Boxes2D {
@@ -302,7 +320,8 @@ fn pixel(u: f64, v: f64) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Point2;
+    use crate::bus::Blob;
+    use nalgebra::{Point2, Point3};
 
     /// Rates that do not divide, and frames that start a little early or late, must neither skip
     /// nor double an interval.
@@ -317,6 +336,44 @@ mod tests {
             assert_eq!(frames.count(), expected, "{camera_hz} Hz down to {hz} Hz");
         }
         assert!(!Rate::new(0.0).due(SimTime::ZERO));
+    }
+
+    /// Two dangers and the train between them, all within a few pixels: labels written over each
+    /// other, or one for the train that hides them.
+    #[test]
+    fn labels_keep_clear_of_each_other() {
+        let at = |v1: u32, danger: DangerLevel| DetectedObstacle {
+            blob: Blob {
+                bounds: PixelBox {
+                    u0: 300,
+                    v0: 200,
+                    u1: 310,
+                    v1,
+                },
+                area_px: 100,
+            },
+            position: Point3::origin(),
+            near_range_m: 25.0,
+            near_angle_rad: 0.0,
+            far_range_m: 26.0,
+            far_angle_rad: 0.0,
+            from_chainage_m: 100.0,
+            to_chainage_m: 101.0,
+            lateral_m: 0.0,
+            width_m: 0.5,
+            height_m: 0.25,
+            danger,
+        };
+        let obstacles = [
+            at(214, DangerLevel::High),
+            at(212, DangerLevel::None),
+            at(210, DangerLevel::Low),
+        ];
+        let (places, dangers) = label_places(&obstacles, 500);
+        let levels: Vec<_> = dangers.iter().map(|o| o.danger).collect();
+        assert_eq!(levels, [DangerLevel::Low, DangerLevel::High]);
+        let rows: Vec<_> = places.iter().map(|[_, v]| *v).collect();
+        assert_eq!(rows, [210.5, 250.5]);
     }
 
     /// A wrong sign of the angle, swapped axes or a forgotten half pixel put points off the

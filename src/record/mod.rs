@@ -151,6 +151,13 @@ struct Contents {
     devices: Vec<String>,
 }
 
+impl Contents {
+    /// Something has the head's pose: a train, or a rig on a bench.
+    fn head(&self) -> bool {
+        self.train || self.rig
+    }
+}
+
 /// A recording in the making.
 struct Open {
     stream: Stream,
@@ -187,7 +194,7 @@ impl Open {
             laid_out: false,
             flush_at: SimTime::ZERO.plus(FLUSH_S),
             images: Images::new(settings, devices),
-            texts: Texts::new(devices),
+            texts: Texts::open(&stream, opening)?,
             stream,
             contents,
             scene,
@@ -201,7 +208,7 @@ impl Open {
                 self.moving.train(scene, truth);
                 self.plots.train(truth);
                 let head = truth.world_from_vehicle;
-                self.lay_out(self.contents.train.then_some(&head))?;
+                self.lay_out(Some(&head))?;
                 truth.time
             }
             Event::Bodies(time, bodies) => {
@@ -230,14 +237,15 @@ impl Open {
             Event::Protection(report) => {
                 self.plots.protection(report);
                 self.texts.protection(stream, report)?;
+                self.texts.display(stream, report.time, &report.display)?;
                 report.time
             }
             Event::Display(time, display) => {
-                Texts::display(stream, time, display)?;
+                self.texts.display(stream, time, display)?;
                 time
             }
             Event::Delivery(delivery) => {
-                Texts::delivery(stream, delivery)?;
+                self.texts.delivery(stream, delivery)?;
                 delivery.received
             }
             Event::Note(time, text) => {

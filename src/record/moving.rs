@@ -60,7 +60,7 @@ impl Poses {
 pub(super) struct Moving {
     /// Both eyes, where there is a rig.
     rig: Option<(RigCalibration, [Poses; 2])>,
-    /// The head, then the cars; empty where there is no train.
+    /// The head, then the cars; empty where there is neither train nor rig.
     train: Vec<Poses>,
     left: Option<Isometry3<f64>>,
     /// Which kinds of bodies are on show: boxes, cylinders, spheres, capsules.
@@ -88,7 +88,7 @@ impl Moving {
             }
         }
         let mut train = Vec::new();
-        if opening.cars > 0 {
+        if opening.cars > 0 || opening.rig.is_some() {
             train.push(Poses::of(HEAD));
             train.extend((0..opening.cars).map(|car| Poses::of(car_path(car))));
             // On the head itself: the viewer's eye can follow only what has a shape of its own,
@@ -235,7 +235,7 @@ impl Moving {
         let boxes = Boxes3D::from_centers_and_half_sizes(places, sizes)
             .with_quaternions(turns)
             .with_colors(obstacles.iter().map(|o| palette::danger(o.danger)))
-            .with_labels(obstacles.iter().map(images::obstacle_label));
+            .with_labels(obstacles.iter().map(images::danger_label));
         stream.log(
             &format!("world/estimate/obstacles/{}", slug(device.1)),
             &boxes,

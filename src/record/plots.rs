@@ -41,7 +41,7 @@ const fn line(path: &'static str, name: &'static str, rgb: (u8, u8, u8), width: 
 const SPEED: Group = Group {
     title: "Speed, km/h",
     origin: "plots/speed",
-    legend: Corner2D::RightTop,
+    legend: Corner2D::LeftBottom,
     lines: &[
         line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5),
         line("plots/speed/service", "service", (255, 170, 60), 1.5),

@@ -150,7 +150,7 @@ impl Scene {
     }
 
     /// Where the viewer's eye starts and what it looks at: from outside through the wall, which
-    /// shows its inner side only, at the train's head, else at the first wayside camera's field,
+    /// shows its inner side only, at the head, else at the first wayside camera's field,
     /// else at the middle of the line.
     pub(super) fn eye(
         &self,

@@ -9,8 +9,10 @@
 use super::stream::part_name;
 use super::trial::{Size, play};
 use super::{FixTable, Recording};
+use crate::bus::{DangerLevel, Delivery, ObstacleWarning, SimTime, Via};
 use crate::scenario::RecordSettings;
-use crate::session::Observer;
+use crate::session::{Event, Observer, Opening};
+use crate::track::Tunnel;
 use rerun::StoreKind;
 use rerun::components::Name;
 use rerun::external::re_log_encoding::DecoderApp;
@@ -196,6 +198,57 @@ fn the_layout_leaves_out_what_is_missing() {
     }
 }
 
+/// What a run without rig, train and devices opens with.
+fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
+    Opening {
+        scenario,
+        seed: 0,
+        tunnel,
+        rig: None,
+        wayside: &[],
+        car_half_extents_m: nalgebra::Vector3::zeros(),
+        cars: 0,
+        protection: false,
+    }
+}
+
+/// A device repeats its warning every second; the log filled up with it.
+#[test]
+fn regress_the_log_tells_a_repeated_warning_once() {
+    let folder = Folder::new("repeated");
+    let path = folder.file("run.rrd");
+    let mut recording = Recording::to_file(&path, &RecordSettings::default());
+    let tunnel = super::trial::tunnel();
+    recording.open(&bare("repeated", &tunnel)).unwrap();
+    for number in 0..6 {
+        let cleared = number == 5;
+        let delivery = Delivery {
+            received: SimTime::from_secs(f64::from(number)),
+            via: Via::Radio,
+            warning: ObstacleWarning {
+                device: "W1".into(),
+                number,
+                issued: SimTime::from_secs(f64::from(number)),
+                danger: if cleared {
+                    DangerLevel::None
+                } else {
+                    DangerLevel::High
+                },
+                from_chainage_m: 100.0,
+                to_chainage_m: 101.0,
+            },
+        };
+        recording.observe(&Event::Delivery(&delivery)).unwrap();
+    }
+    recording.close().unwrap();
+    let rows = chunks(&path, StoreKind::Recording);
+    let events = rows
+        .iter()
+        .filter(|c| c.entity_path().to_string() == "/events");
+    // What is run, the warning, the all clear.
+    assert_eq!(events.map(Chunk::num_rows).sum::<usize>(), 3);
+}
+
 /// A folder that cannot be made is an error at once, not a silent loss.
 #[test]
 fn an_impossible_file_is_an_error() {
@@ -205,17 +258,7 @@ fn an_impossible_file_is_an_error() {
     fs::write(&blocked, "not a folder").unwrap();
     let mut recording = Recording::to_file(&blocked.join("run.rrd"), &RecordSettings::default());
     let tunnel = super::trial::tunnel();
-    let opening = crate::session::Opening {
-        scenario: "impossible",
-        seed: 0,
-        tunnel: &tunnel,
-        rig: None,
-        wayside: &[],
-        car_half_extents_m: nalgebra::Vector3::zeros(),
-        cars: 0,
-        protection: false,
-    };
-    let error = recording.open(&opening).unwrap_err();
+    let error = recording.open(&bare("impossible", &tunnel)).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
     // Closing what never opened is nothing to fail at.
     recording.close().unwrap();

@@ -6,8 +6,9 @@ use crate::bus::{
     BrakeDemand, DangerLevel, Delivery, DriverDisplay, ProtectionReport, SimTime, Via,
     WaysideReport,
 };
-use crate::session::ObserverError;
+use crate::session::{ObserverError, Opening};
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
+use std::collections::BTreeMap;
 use std::fmt::Write;
 
 /// The log.
@@ -18,16 +19,34 @@ pub(super) const DISPLAY: &str = "display";
 /// Turns what happens into words; says again only what changed.
 pub(super) struct Texts {
     brake: BrakeDemand,
-    danger: Vec<DangerLevel>,
+    /// Of each wayside device, with the number of its obstacles.
+    danger: Vec<(DangerLevel, usize)>,
+    /// What each device last sent each way.
+    sent: BTreeMap<(String, &'static str), DangerLevel>,
+    /// What the display shows.
+    shown: String,
 }
 
 impl Texts {
-    /// For so many wayside devices.
-    pub(super) fn new(devices: usize) -> Self {
-        Self {
+    /// Begins the log with what is run.
+    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+        let tunnel = opening.tunnel;
+        let text = format!(
+            "{}, seed {}: {:.0} m of line, {} lamps, {} balises, {} wayside devices",
+            opening.scenario,
+            opening.seed,
+            tunnel.alignment.length_m(),
+            tunnel.lamps.len(),
+            tunnel.balises.len(),
+            opening.wayside.len(),
+        );
+        Self::note(stream, SimTime::ZERO, &text)?;
+        Ok(Self {
             brake: BrakeDemand::None,
-            danger: vec![DangerLevel::None; devices],
-        }
+            danger: vec![(DangerLevel::None, 0); opening.wayside.len()],
+            sent: BTreeMap::new(),
+            shown: String::new(),
+        })
     }
 
     /// Anything.
@@ -35,14 +54,22 @@ impl Texts {
         log(stream, time, TextLogLevel::INFO, text)
     }
 
-    /// A message reached the train.
-    pub(super) fn delivery(stream: &Stream, delivery: &Delivery) -> Result<(), ObserverError> {
+    /// A message reached the train. Devices repeat theirs; the log does not.
+    pub(super) fn delivery(
+        &mut self,
+        stream: &Stream,
+        delivery: &Delivery,
+    ) -> Result<(), ObserverError> {
         let warning = &delivery.warning;
         let via = match delivery.via {
             Via::Balise => "balise",
             Via::Radio => "radio",
         };
         let (device, number) = (&warning.device, warning.number);
+        let before = self.sent.insert((device.clone(), via), warning.danger);
+        if before == Some(warning.danger) {
+            return Ok(());
+        }
         let delay_s = delivery.received.since(warning.issued);
         let (level, what) = match warning.danger {
             DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
@@ -60,7 +87,7 @@ impl Texts {
         log(stream, delivery.received, level, &text)
     }
 
-    /// A wayside device changed its mind about the danger.
+    /// A wayside device changed its mind about the danger, or about how many things lie there.
     pub(super) fn wayside(
         &mut self,
         stream: &Stream,
@@ -70,10 +97,10 @@ impl Texts {
         let Some(danger) = self.danger.get_mut(device.0) else {
             return Ok(());
         };
-        if *danger == report.danger {
+        let now = (report.danger, report.obstacles.len());
+        if std::mem::replace(danger, now) == now {
             return Ok(());
         }
-        *danger = report.danger;
         let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
         for o in &report.obstacles {
             // Writing to a String cannot fail.
@@ -108,15 +135,21 @@ impl Texts {
         log(stream, report.time, level, &text)
     }
 
-    /// The display changed.
+    /// What the driver sees, when it changed.
     pub(super) fn display(
+        &mut self,
         stream: &Stream,
         time: SimTime,
         display: &DriverDisplay,
     ) -> Result<(), ObserverError> {
+        let text = markdown(display);
+        if text == self.shown {
+            return Ok(());
+        }
         stream.at(time);
-        let document = TextDocument::from_markdown(markdown(display));
-        stream.log(DISPLAY, &document)
+        stream.log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
+        self.shown = text;
+        Ok(())
     }
 }
 

@@ -345,7 +345,6 @@ impl Session<'_> {
             ..ProtectionReport::default()
         };
         self.tell(&Event::Protection(&report));
-        self.tell(&Event::Display(time, &report.display));
     }
 
     fn pair(&mut self, t_s: f64, number: u32) {
