@@ -241,5 +241,6 @@ fn history_s(file: &ScenarioFile) -> f64 {
         let camera = rig.calibration().camera;
         camera.shutter.frame_span_s(camera.intrinsics.height_px)
     });
-    (2.0 * span_s).max(PhysicsSettings::default().history_s)
+    // A fix is scored when it has gone through the stack.
+    (2.0 * span_s + 1e-3 * file.stack.latency_ms + 0.1).max(PhysicsSettings::default().history_s)
 }

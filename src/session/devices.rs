@@ -3,7 +3,7 @@
 use super::cameras::{Clock, wayside_view};
 use super::score::{Presence, WaysideScore};
 use super::watch::Stopwatch;
-use crate::bus::{Frame, LidarScan, SimTime, TrainReport, WaysideCalibration, WaysideReport};
+use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
 use crate::track::Tunnel;
@@ -93,11 +93,11 @@ impl Device {
         &mut self,
         frame: &Frame,
         look: &Look,
-        train: Option<TrainReport>,
         now: SimTime,
         comms: &mut Comms,
         watch: &mut Stopwatch,
     ) -> WaysideReport {
+        let train = comms.train_report(now);
         let detector = &mut self.detector;
         let (report, seconds) = watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));
         self.score.report(&report, 1e3 * seconds, &look.present);

@@ -133,12 +133,21 @@ pub(crate) fn renderer(
     }
 }
 
-/// The lamps start to send at times of their own: nobody synchronises them.
+/// One sigma of a lamp's clock: a crystal without temperature compensation.
+const LAMP_CLOCK_SIGMA: f64 = 20e-6;
+
+/// The lamps start to send at times of their own, by clocks of their own.
 fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
-    let stream = Stream::new(scenario.seed, 0, "lamp_phase");
-    let lamps = (tunnel.lamps.iter().enumerate())
-        .map(|(k, site)| LampLight::from_site(site, stream.uniform(k as u64)))
+    let phase = Stream::new(scenario.seed, 0, "lamp phase");
+    let clock = Stream::new(scenario.seed, 0, "lamp clock");
+    let lamps = (0u64..)
+        .zip(&tunnel.lamps)
+        .map(|(k, site)| {
+            let mut lamp = LampLight::from_site(site, phase.uniform(k));
+            lamp.waveform.chip_s *= 1.0 + LAMP_CLOCK_SIGMA * clock.normal(k);
+            lamp
+        })
         .collect();
     Scene { tunnel, lamps }
 }

@@ -72,7 +72,6 @@ pub struct Run<'s> {
     truth_clock: Clock,
     bodies_clock: Clock,
     pending: VecDeque<Pending>,
-    train_report: Option<TrainReport>,
     outcome: Outcome,
     cost: Costs,
 }
@@ -138,7 +137,6 @@ impl<'s> Run<'s> {
             truth_clock: Clock::new(TRUTH_HZ),
             bodies_clock: Clock::new(BODIES_HZ),
             pending: VecDeque::new(),
-            train_report: None,
             outcome: Outcome::default(),
             cost: Costs::default(),
         })
@@ -224,17 +222,20 @@ impl<'s> Run<'s> {
 
     /// Inertial unit and odometer.
     fn sample_motion(&mut self, now: SimTime) {
-        let Some(eyes) = &mut self.eyes else { return };
+        let mut positioner = self.eyes.as_mut().map(|e| &mut e.positioner);
         if self.imu_clock.due(now, 0.0).is_some()
             && let Some(sample) = self.imu.sample(&self.world)
+            && let Some(positioner) = &mut positioner
         {
-            eyes.positioner.on_imu(&sample);
+            positioner.on_imu(&sample);
         }
         if self.odometer_clock.due(now, 0.0).is_some()
             && let Some(sample) = self.odometer.sample(&self.world)
         {
-            eyes.positioner.on_odometer(&sample);
             self.protection.on_odometer(&sample);
+            if let Some(positioner) = &mut positioner {
+                positioner.on_odometer(&sample);
+            }
         }
     }
 
@@ -394,7 +395,7 @@ impl<'s> Run<'s> {
             image,
         };
         let (comms, watch) = (&mut self.comms, &mut self.cost.stack);
-        let report = self.devices[k].judge(&frame, look, self.train_report, now, comms, watch);
+        let report = self.devices[k].judge(&frame, look, now, comms, watch);
         watchers.show(&Event::Wayside(k, start, &frame.image, &report))?;
         Ok(())
     }
@@ -416,11 +417,14 @@ impl<'s> Run<'s> {
             self.outcome.brake_commanded.get_or_insert(now);
         }
         self.command = report.command;
-        self.train_report = report.position_m.map(|chainage_m| TrainReport {
-            chainage_m,
-            speed_mps: report.speed_mps,
-            time: now,
-        });
+        if let (Some(chainage_m), Some(head_m)) = (report.position_m, self.world.head_m()) {
+            let train = TrainReport {
+                chainage_m,
+                speed_mps: report.speed_mps,
+                time: now,
+            };
+            self.comms.report_train(now, head_m, train);
+        }
         watchers.show(&Event::Protection(&report))?;
         if report.display != self.display {
             watchers.show(&Event::Display(now, &report.display))?;

@@ -165,8 +165,8 @@ pub struct Presence {
     pub obstacle: bool,
 }
 
-/// A report this far along the line from anything real is a false alarm.
-const MATCH_M: f64 = 3.0;
+/// A report further than this, along the line, from the end of anything real is a false alarm.
+const MATCH_M: f64 = 1.5;
 
 /// Scores wayside detection.
 #[derive(Debug, Default)]
@@ -205,7 +205,12 @@ impl WaysideScore {
                 .min_by(|a, b| beside(a).total_cmp(&beside(b)));
             match nearest.filter(|p| beside(p) < MATCH_M) {
                 None => self.false_alarms += 1,
+                // Beside a worker nobody can tell which of the two was seen.
                 Some(p) => {
+                    let worker = |w: &Presence| !w.obstacle && beside(w) < MATCH_M;
+                    if p.obstacle && present.iter().any(worker) {
+                        continue;
+                    }
                     if let Some(found) = self.found.get_mut(&p.name) {
                         found.first.get_or_insert(report.time);
                         found.error_sum_m += centre_m - p.chainage_m;

@@ -5,7 +5,7 @@
 //! reaches the train. A balise keeps the last message written to it and gives it to a train whose
 //! antenna passes over it.
 
-use crate::bus::{Delivery, ObstacleWarning, SimTime, Via};
+use crate::bus::{Delivery, ObstacleWarning, SimTime, TrainReport, Via};
 use crate::track::{BaseStation, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
@@ -76,6 +76,9 @@ impl RadioSettings {
     }
 }
 
+/// A train that has not reported for this long may be anywhere.
+const REPORT_LIFE_S: f64 = 5.0;
+
 /// Messages on their way.
 #[derive(Clone, Debug)]
 pub struct Comms {
@@ -84,6 +87,8 @@ pub struct Comms {
     stream: Stream,
     sent: u64,
     in_the_air: VecDeque<Delivery>,
+    /// Reports of the train to the devices, with their times of arrival.
+    reports: VecDeque<(SimTime, TrainReport)>,
     stored: BTreeMap<String, ObstacleWarning>,
 }
 
@@ -96,6 +101,7 @@ impl Comms {
             stream,
             sent: 0,
             in_the_air: VecDeque::new(),
+            reports: VecDeque::new(),
             stored: BTreeMap::new(),
         }
     }
@@ -103,10 +109,7 @@ impl Comms {
     /// A device sends a message: it is written to its balise and goes on the air.
     pub fn send(&mut self, now: SimTime, balise: &str, warning: ObstacleWarning) {
         self.stored.insert(balise.to_owned(), warning.clone());
-        let lost = self.stream.uniform(self.sent) < self.settings.loss;
-        self.sent += 1;
-        let out = |o: &Outage| (o.from_s..o.to_s).contains(&now.secs());
-        if lost || self.settings.outages.iter().any(out) {
+        if self.lost(now) {
             return;
         }
         self.in_the_air.push_back(Delivery {
@@ -116,12 +119,40 @@ impl Comms {
         });
     }
 
+    /// A train at `chainage_m` tells the devices where it takes itself to be.
+    pub fn report_train(&mut self, now: SimTime, chainage_m: f64, report: TrainReport) {
+        if !self.lost(now) && self.covered(chainage_m) {
+            let arrival = now.plus(self.settings.latency_ms * 1e-3);
+            self.reports.push_back((arrival, report));
+        }
+    }
+
+    /// The last report that has arrived, while it is younger than [`REPORT_LIFE_S`].
+    pub fn train_report(&mut self, now: SimTime) -> Option<TrainReport> {
+        while self.reports.get(1).is_some_and(|next| next.0 <= now) {
+            self.reports.pop_front();
+        }
+        let (arrival, report) = *self.reports.front()?;
+        (arrival <= now && now.since(report.time) <= REPORT_LIFE_S).then_some(report)
+    }
+
+    fn lost(&mut self, now: SimTime) -> bool {
+        let lost = self.stream.uniform(self.sent) < self.settings.loss;
+        self.sent += 1;
+        let out = |o: &Outage| (o.from_s..o.to_s).contains(&now.secs());
+        lost || self.settings.outages.iter().any(out)
+    }
+
+    fn covered(&self, chainage_m: f64) -> bool {
+        let reached = |b: &BaseStation| (b.chainage_m - chainage_m).abs() <= b.reach_m;
+        self.stations.iter().any(reached)
+    }
+
     /// The next message that has arrived by radio at a train at `chainage_m`.
     pub fn receive(&mut self, now: SimTime, chainage_m: f64) -> Option<Delivery> {
         while self.in_the_air.front().is_some_and(|d| d.received <= now) {
             let delivery = self.in_the_air.pop_front()?;
-            let reached = |b: &BaseStation| (b.chainage_m - chainage_m).abs() <= b.reach_m;
-            if self.stations.iter().any(reached) {
+            if self.covered(chainage_m) {
                 return Some(delivery);
             }
         }

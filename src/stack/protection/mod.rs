@@ -149,7 +149,8 @@ impl Protection {
     /// Decides; called 10 times a second.
     pub fn cycle(&mut self, time: SimTime) -> ProtectionReport {
         let train = self.position.at(time);
-        let speed_mps = self.position.speed_mps();
+        let speed = self.position.speed_mps();
+        let speed_mps = speed.unwrap_or(0.0);
         let odometer_lost = self.odometer_lost(time);
         let head_m = train.map(|t| t.chainage_m);
         let failed = self
@@ -176,7 +177,7 @@ impl Protection {
         let lost = train.is_none() && end_m.is_some();
         let supervision = self
             .supervisor
-            .step(limits, speed_mps, lost, odometer_lost || failed);
+            .step(limits, speed, lost, odometer_lost || failed);
         self.brake = supervision::demand(supervision);
 
         let situation = Situation {

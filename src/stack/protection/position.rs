@@ -13,6 +13,8 @@ use std::collections::VecDeque;
 
 /// Odometer samples remembered, for fixes that come late.
 const HISTORY: usize = 256;
+/// Distance over this time gives the speed.
+const SPEED_WINDOW_S: f64 = 0.5;
 /// Refused fixes in a row that overrule the estimate.
 const OVERRULE: u32 = 5;
 
@@ -151,9 +153,20 @@ impl Position {
             .map(|a| a.carried(self.odometer_at(time), self.drift))
     }
 
-    /// Speed of the last sample.
-    pub fn speed_mps(&self) -> f64 {
-        self.samples.back().map_or(0.0, |s| s.speed_mps.max(0.0))
+    /// Speed over the last [`SPEED_WINDOW_S`]; `None` before the first sample. A wheel gives one
+    /// pulse every 21 mm or so: over a single interval of 20 ms that would be steps of 1 m/s, and
+    /// no deceleration could be told from them. The lag is on the safe side while braking.
+    pub fn speed_mps(&self) -> Option<f64> {
+        let last = self.samples.back()?;
+        let age_s = |s: &OdometerSample| last.time.since(s.time);
+        let old = (self.samples.iter().rev())
+            .take_while(|s| age_s(s) <= SPEED_WINDOW_S)
+            .last()
+            .filter(|s| age_s(s) > 0.0);
+        let speed = old.map_or(last.speed_mps, |s| {
+            (last.distance_m - s.distance_m) / age_s(s)
+        });
+        Some(speed.max(0.0))
     }
 
     /// Time since the last sample.

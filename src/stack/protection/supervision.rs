@@ -92,16 +92,17 @@ impl Supervisor {
     }
 
     /// The state after this cycle. `must_stop` brakes whatever the speed, up to the emergency
-    /// brake when `at_once`.
+    /// brake when `at_once`. A train of unknown speed is taken to move.
     pub fn step(
         &mut self,
         limits: Limits,
-        speed_mps: f64,
+        speed_mps: Option<f64>,
         must_stop: bool,
         at_once: bool,
     ) -> Supervision {
         let hold = must_stop || (limits.by_obstacle && limits.permitted_mps < HOLD_UNDER_MPS);
-        let moving = speed_mps > STANDING_MPS;
+        let moving = speed_mps.is_none_or(|v| v > STANDING_MPS);
+        let speed_mps = speed_mps.unwrap_or(0.0);
         let wanted = if moving && (at_once || speed_mps > limits.emergency_mps) {
             Supervision::Emergency
         } else if hold || at_once || speed_mps > limits.service_mps {

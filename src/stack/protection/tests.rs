@@ -7,6 +7,9 @@ use crate::track::uid::Uid;
 use crate::track::{Alignment, Balise, Grade, PlanElement};
 use nalgebra::{Point3, Vector3};
 
+/// Distance of one odometer pulse: 128 a turn of a wheel of 0.43 m radius.
+const PULSE_M: f64 = std::f64::consts::TAU * 0.43 / 128.0;
+
 /// 4 km of straight line on a constant gradient.
 pub(super) fn map(permille: f64) -> Arc<Tunnel> {
     let straight = PlanElement {
@@ -170,16 +173,21 @@ fn drive(
         ..TrainCommand::default()
     };
     let mut outcome = Outcome::default();
+    let mut before_m = 0.0;
     protection.on_delivery(&warning(0, SimTime::ZERO, DangerLevel::High, obstacle_m));
     let dt = 0.01;
     for k in 0..20_000 {
         let time = SimTime::from_secs(f64::from(k) * dt);
-        if k % 5 == 0 {
+        // As a wheel with 128 pulses a turn gives it, 50 times a second: distance in whole
+        // pulses, speed in pulses an interval.
+        if k % 2 == 0 {
+            let counted = (train.travelled * train.odometer_scale / PULSE_M).floor() * PULSE_M;
             protection.on_odometer(&OdometerSample {
                 time,
-                distance_m: train.travelled * train.odometer_scale,
-                speed_mps: train.v * train.odometer_scale,
+                distance_m: counted,
+                speed_mps: (counted - before_m) / 0.02,
             });
+            before_m = counted;
         }
         if k % 10 == 0 {
             let report = protection.cycle(time);
@@ -388,7 +396,15 @@ fn low_dangers_warn_only() {
 #[test]
 fn the_ceiling_speed_has_its_margins() {
     let mut b = Bench::new(&at(500.0, 0.5));
-    let mut state = |kmh: f64| b.cycle(0.0, kmh / 3.6).supervision;
+    // Speed is measured over half a second: it takes as long to be known.
+    let mut run_m = 0.0;
+    let mut state = |kmh: f64| {
+        let states = [(); 6].map(|()| {
+            run_m += 0.1 * kmh / 3.6;
+            b.cycle(run_m, kmh / 3.6).supervision
+        });
+        states[5]
+    };
     assert_eq!(state(99.9), Supervision::Permitted);
     assert_eq!(state(102.0), Supervision::Warning);
     assert_eq!(state(105.6), Supervision::Service);

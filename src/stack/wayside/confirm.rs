@@ -1,5 +1,6 @@
 //! Confirmation over frames: an obstacle counts when it was found in k of the last n frames, and
-//! is gone when it was found in none of them.
+//! is gone when it was found in none of a longer time: to clear the line too early is worse than
+//! to clear it late.
 
 use super::WaysideSettings;
 use super::cells::Cells;
@@ -20,7 +21,9 @@ pub(super) struct Confirmation {
     candidates: Vec<Candidate>,
     taken: Vec<bool>,
     needed: u32,
+    /// Bits of the history that count for confirmation, and for staying confirmed.
     memory: u64,
+    clear_memory: u64,
 }
 
 impl Confirmation {
@@ -31,6 +34,7 @@ impl Confirmation {
             taken: Vec::new(),
             needed: settings.confirm_frames.clamp(1, of),
             memory: u64::MAX >> (64 - of),
+            clear_memory: u64::MAX >> (64 - settings.clear_frames.clamp(of, 64)),
         }
     }
 
@@ -43,15 +47,17 @@ impl Confirmation {
             if best.is_none() && cells.is_blind(candidate.obstacle.blob.bounds) {
                 continue;
             }
-            candidate.history = candidate.history << 1 & self.memory;
+            candidate.history <<= 1;
             if let Some(k) = best {
                 self.taken[k] = true;
                 candidate.history |= 1;
                 candidate.obstacle = found[k].clone();
             }
-            candidate.confirmed |= candidate.history.count_ones() >= self.needed;
+            candidate.confirmed |= (candidate.history & self.memory).count_ones() >= self.needed;
         }
-        self.candidates.retain(|c| c.history != 0);
+        let (memory, clear_memory) = (self.memory, self.clear_memory);
+        let remembered = |c: &Candidate| if c.confirmed { clear_memory } else { memory };
+        self.candidates.retain(|c| c.history & remembered(c) != 0);
         for (obstacle, _) in found.iter().zip(&self.taken).filter(|(_, taken)| !**taken) {
             self.candidates.push(Candidate {
                 obstacle: obstacle.clone(),

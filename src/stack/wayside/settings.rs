@@ -27,9 +27,10 @@ pub struct WaysideSettings {
     pub reach_m: f64,
     /// Frames, of the last `confirm_of`, in which an obstacle must be found to be confirmed.
     pub confirm_frames: u32,
-    /// Length of the memory for confirmation, frames (64 at most). An obstacle that is not found
-    /// in any of them is gone.
+    /// Length of the memory for confirmation, frames (64 at most).
     pub confirm_of: u32,
+    /// A confirmed obstacle is gone when it was not found in this many frames in a row (64 at most).
+    pub clear_frames: u32,
     /// Half width of the structure gauge, clearance included, m from the centreline.
     pub gauge_half_width_m: f64,
     /// Height of the structure gauge over top of rail, m.
@@ -60,6 +61,7 @@ impl Default for WaysideSettings {
             reach_m: 80.0,
             confirm_frames: 3,
             confirm_of: 5,
+            clear_frames: 10,
             gauge_half_width_m: 1.6,
             gauge_height_m: 3.9,
             near_gauge_m: 0.5,
@@ -98,6 +100,7 @@ impl WaysideSettings {
         range("min_size_m", self.min_size_m, " m", 0.0, 5.0);
         range("reach_m", self.reach_m, " m", 5.0, 500.0);
         range("confirm_of", f64::from(self.confirm_of), "", 1.0, 64.0);
+        range("clear_frames", f64::from(self.clear_frames), "", 1.0, 64.0);
         range(
             "confirm_frames",
             f64::from(self.confirm_frames),

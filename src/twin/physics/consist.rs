@@ -24,8 +24,8 @@ use rapier3d_f64::prelude::{
 /// What trains hit and are hit by: obstacles only.
 pub(super) const TRAIN_GROUP: Group = Group::GROUP_1;
 pub(super) const OBSTACLE_GROUP: Group = Group::GROUP_2;
-/// Lowest parts of a car over top of rail (obstacle deflectors hang some 0.1 m over the rails).
-const UNDERSIDE_M: f64 = 0.10;
+/// Lowest parts of a car over top of rail: guard irons hang 60 mm over the rails.
+const UNDERSIDE_M: f64 = 0.06;
 /// Brake discs and pads give by this before they slip.
 const BRAKE_STIFFNESS_N_M: f64 = 5.0e6;
 const BRAKE_DAMPING_N_S_M: f64 = 3.0e5;

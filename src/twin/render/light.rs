@@ -38,11 +38,17 @@ impl LampLight {
             luminance_cd_m2: flux_lm * (exponent + 1.0) / (TAU * PI * radius_m * radius_m),
             exponent,
             waveform: Waveform {
-                frame: site.uid.manchester(),
+                frame: site.uid.frame(site.code),
                 chip_s: site.chip_s,
                 phase_s,
             },
         }
+    }
+
+    /// Share of the time that it is on.
+    pub fn duty(&self) -> f64 {
+        let frame = self.waveform.frame;
+        f64::from(frame.bits.count_ones()) / f64::from(frame.len.max(1))
     }
 
     /// Intensity along the normal while on.
@@ -71,7 +77,7 @@ impl LampLight {
         if d.norm_squared() > LAMP_REACH_M * LAMP_REACH_M {
             return 0.0;
         }
-        LAMP_DUTY
+        self.duty()
             * point_source_lx(
                 self.axial_intensity_cd(),
                 self.exponent,
