@@ -4,7 +4,8 @@
 //! camera on the tunnel wall see what such cameras would see; the positioning and detection
 //! stack reads those pixels, never the truth; its decisions act on the train.
 //!
-//! The rooms, in the order a user meets them. Imports point up this list only:
+//! The rooms, from the ground up. Imports point up this list only, and stack and twin never import
+//! each other:
 //!
 //! | room | what it holds |
 //! |---|---|

@@ -150,7 +150,7 @@ pub struct BenchSettings {
     pub first_m: f64,
     /// From point to point, m. Default 0.5.
     pub step_m: f64,
-    /// Pairs of images at each point. Default 10.
+    /// Fixes to take at each point, or as many as 5 s yield. Default 10.
     pub fixes_per_point: u32,
 }
 

@@ -24,7 +24,8 @@
 //! # Ok::<(), metrotwin::track::FileError>(())
 //! ```
 //!
-//! The settings of each part are declared beside its own code; this room only puts them together.
+//! The settings of each part are declared beside its own code; this room puts them together, and
+//! declares those that belong to no part below it: bench, recording, latency.
 //! `--set key=value` overrides are applied to the document before it is parsed ([`Override`]), so
 //! that they meet the same checks as the file.
 //!

@@ -12,7 +12,7 @@ use super::summary::{self, Summary};
 use super::watch::{Stopwatch, Watchers, now};
 use super::{End, Event, Observer, Opening, Physics, RunOptions, SessionError, TrainTruth};
 use super::{WallShares, methods};
-use crate::bus::{BrakeDemand, Frame, Method, SimTime, TrainCommand, TrainReport};
+use crate::bus::{BrakeDemand, DriverDisplay, Frame, Method, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::stack::protection::Protection;
@@ -68,6 +68,7 @@ pub struct Run<'s> {
     protection: Protection,
     protection_clock: Clock,
     command: TrainCommand,
+    display: DriverDisplay,
     truth_clock: Clock,
     bodies_clock: Clock,
     pending: VecDeque<Pending>,
@@ -133,6 +134,7 @@ impl<'s> Run<'s> {
             protection: Protection::new(&scenario.stack.protection, map),
             protection_clock: Clock::new(PROTECTION_HZ),
             command: TrainCommand::default(),
+            display: DriverDisplay::default(),
             truth_clock: Clock::new(TRUTH_HZ),
             bodies_clock: Clock::new(BODIES_HZ),
             pending: VecDeque::new(),
@@ -408,11 +410,6 @@ impl<'s> Run<'s> {
         }
         let protection = &mut self.protection;
         let report = self.cost.stack.time(|| protection.cycle(now)).0;
-        let changed = report.command.brake != self.command.brake;
-        if changed {
-            let text = format!("protection: {:?}", report.command.brake);
-            watchers.show(&Event::Note(now, &text))?;
-        }
         // A driver who obeys brakes before the equipment has to.
         let lowered = report.authority_end_m.is_some() && report.permitted_mps < report.speed_mps;
         if lowered || report.command.brake != BrakeDemand::None {
@@ -425,6 +422,10 @@ impl<'s> Run<'s> {
             time: now,
         });
         watchers.show(&Event::Protection(&report))?;
+        if report.display != self.display {
+            watchers.show(&Event::Display(now, &report.display))?;
+            self.display = report.display;
+        }
         Ok(())
     }
 

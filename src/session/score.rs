@@ -219,9 +219,14 @@ impl WaysideScore {
     /// Takes in the scores of another device.
     pub fn add(&mut self, other: Self) {
         for (name, theirs) in other.found {
+            let new = !self.found.contains_key(&name);
             let ours = self.found.entry(name).or_insert(theirs);
             ours.appeared = ours.appeared.min(theirs.appeared);
             ours.first = ours.first.into_iter().chain(theirs.first).min();
+            if !new {
+                ours.error_sum_m += theirs.error_sum_m;
+                ours.errors += theirs.errors;
+            }
         }
         self.false_alarms += other.false_alarms;
         self.costs_ms.extend(other.costs_ms);

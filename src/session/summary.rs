@@ -175,7 +175,8 @@ pub struct ObstacleScore {
 /// Train protection.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Protection {
-    /// When the equipment first braked.
+    /// When the equipment first made the train slow down: it braked, or lowered the permitted speed
+    /// under the train's.
     pub brake_commanded_s: Option<f64>,
     /// When the train then stood.
     pub stopped_s: Option<f64>,

@@ -77,7 +77,8 @@
 //!
 //! It finds nothing whose grey is within T of what is behind, nor anything smaller than the noise
 //! filter lets through; it needs a clear track at the start; it takes a region's lowest edge for
-//! its foot, so that something above the bed is placed too far away.
+//! its foot, so that something above the bed is placed too far away. What falls on the line less
+//! than 100 m ahead of a train, in the light of its headlights, it does not see.
 
 mod announce;
 mod cells;
@@ -118,9 +119,9 @@ use std::sync::Arc;
 pub const HEADLIGHT_M: f64 = 200.0;
 /// A train's place is known to this; its halo reaches as far.
 const TRAIN_MARGIN_M: f64 = 10.0;
-/// Ahead of its head a train lights bed and rails too steeply for a local gain to follow. What
-/// newly appears there is too near for braking anyway: 40 m is the way to stop from 32 km/h.
-const GLARE_M: f64 = 40.0;
+/// So far ahead of its head a train's headlights (40,000 cd) light bed, rails and walkway edge
+/// more than the lamps do, and more steeply than a local gain can follow: 4 lx at 100 m.
+const GLARE_M: f64 = 100.0;
 
 /// One wayside device.
 #[derive(Clone, Debug)]

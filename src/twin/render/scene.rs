@@ -1,7 +1,7 @@
 //! What there is to see, and through which camera.
 
 use crate::bus::{CameraModel, SimTime};
-use crate::track::Tunnel;
+use crate::track::{Problem, Tunnel};
 use crate::track::uid::Waveform;
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
@@ -119,7 +119,7 @@ pub struct SensorSettings {
     pub black_level_grey: f64,
     /// Electrons a grey level (sets the shot noise).
     pub electrons_per_grey: f64,
-    /// Read noise.
+    /// Read noise, electrons.
     pub read_noise_e: f64,
     /// Share of a lamp's light that glare spreads around it.
     pub halo_share: f64,
@@ -127,6 +127,21 @@ pub struct SensorSettings {
     pub halo_px: f64,
     /// Draw noise at all.
     pub noise: bool,
+}
+
+impl SensorSettings {
+    /// Appends what is wrong, with keys below `at`.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut within = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
+            Problem::unless_within(problems, format!("{at}.{key}"), value, low..=high, unit);
+        };
+        within("grey_per_cd_s", self.grey_per_cd_s, 1e-3, 1e9, "");
+        within("black_level_grey", self.black_level_grey, 0.0, 255.0, "");
+        within("electrons_per_grey", self.electrons_per_grey, 1e-3, 1e6, "e");
+        within("read_noise_e", self.read_noise_e, 0.0, 1e5, "e");
+        within("halo_share", self.halo_share, 0.0, 1.0, "");
+        within("halo_px", self.halo_px, 0.1, 1e3, "px");
+    }
 }
 
 impl Default for SensorSettings {

@@ -223,6 +223,7 @@ impl RigSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
         within(problems, at, "forward_m", self.forward_m, "m", 5.0);
@@ -345,6 +346,7 @@ impl WaysideCameraSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "lens_gain", self.lens_gain, "", 8.0);
     }
 
