@@ -2,7 +2,11 @@
 //! figures: Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
 
 #![cfg(feature = "twin")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may fail by panicking, and prints its figures"
+)]
 
 use metrotwin::bus::Method;
 use metrotwin::scenario::Scenario;
@@ -33,13 +37,10 @@ impl Observer for ErrorByDistance {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         if let Event::Pair(_, report, truths_m) = event {
             let fixes = report.fixes.iter().zip(*truths_m);
-            self.0.extend(
-                fixes
-                    .filter(|(fix, _)| fix.method == Method::Paper)
-                    .map(|(fix, truth_m)| {
-                        (fix.lamp_in_camera.norm(), (fix.chainage_m - truth_m).abs())
-                    }),
-            );
+            self.0
+                .extend(fixes.filter(|(fix, _)| fix.method == Method::Paper).map(
+                    |(fix, truth_m)| (fix.lamp_in_camera.norm(), (fix.chainage_m - truth_m).abs()),
+                ));
         }
         Ok(())
     }
@@ -75,7 +76,11 @@ fn val_static_bench() {
 fn val_line_run_at_60_kmh() {
     let scenario = scenario(
         "line_run",
-        &["duration_s=30", "train.start_speed_kmh=60", "train.start_chainage_m=400"],
+        &[
+            "duration_s=30",
+            "train.start_speed_kmh=60",
+            "train.start_chainage_m=400",
+        ],
     );
     let summary = figures(&scenario, &mut ErrorByDistance::default());
     let paper = &summary.positioning[&Method::Paper];
@@ -87,9 +92,16 @@ fn val_line_run_at_60_kmh() {
 /// The wayside paper's case, from the worker's first step to the standing train.
 #[test]
 fn val_forgotten_toolbox() {
-    let summary = figures(&scenario("forgotten_toolbox", &[]), &mut ErrorByDistance::default());
+    let summary = figures(
+        &scenario("forgotten_toolbox", &[]),
+        &mut ErrorByDistance::default(),
+    );
     let wayside = summary.wayside.unwrap();
-    let toolbox = wayside.obstacles.iter().find(|o| o.name == "toolbox").unwrap();
+    let toolbox = wayside
+        .obstacles
+        .iter()
+        .find(|o| o.name == "toolbox")
+        .unwrap();
     assert!(toolbox.latency_s.unwrap() < 1.0);
     assert!(toolbox.distance_error_m.unwrap().abs() < 1.0);
     let protection = summary.protection.unwrap();

@@ -1,8 +1,8 @@
 //! What there is to see, and through which camera.
 
 use crate::bus::{CameraModel, SimTime};
-use crate::track::{Problem, Tunnel};
 use crate::track::uid::Waveform;
+use crate::track::{Problem, Tunnel};
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use schemars::JsonSchema;
@@ -137,7 +137,13 @@ impl SensorSettings {
         };
         within("grey_per_cd_s", self.grey_per_cd_s, 1e-3, 1e9, "");
         within("black_level_grey", self.black_level_grey, 0.0, 255.0, "");
-        within("electrons_per_grey", self.electrons_per_grey, 1e-3, 1e6, "e");
+        within(
+            "electrons_per_grey",
+            self.electrons_per_grey,
+            1e-3,
+            1e6,
+            "e",
+        );
         within("read_noise_e", self.read_noise_e, 0.0, 1e5, "e");
         within("halo_share", self.halo_share, 0.0, 1.0, "");
         within("halo_px", self.halo_px, 0.1, 1e3, "px");
