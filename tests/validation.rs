@@ -2,7 +2,11 @@
 //! figures: Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
 
 #![cfg(feature = "twin")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may fail by panicking, and prints its figures"
+)]
 
 use metrotwin::bus::Method;
 use metrotwin::scenario::Scenario;
