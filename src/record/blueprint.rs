@@ -10,10 +10,10 @@ use super::{Contents, images, plots, scene, texts};
 use crate::session::ObserverError;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
-    TextLogColumns, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
+    TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
 use rerun::external::re_sdk_types::blueprint::components::{
-    BackgroundKind, ContainerKind, Eye3DKind, PanelState, PlayState, RootContainer,
+    BackgroundKind, ContainerKind, Eye3DKind, PanelState, PlayState, RootContainer, TimeRange,
 };
 use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
 use rerun::{
@@ -158,7 +158,11 @@ fn tabbed(nodes: impl IntoIterator<Item = Node>) -> Node {
 
 fn plot(group: &plots::Group) -> Node {
     let legend = PlotLegend::new().with_corner(group.legend);
-    Node::Pane(Pane::new("TimeSeries", group.title, group.origin).with("PlotLegend", legend))
+    // All of the run. Left alone, a plot scrolls with the time, and one of more than a minute opens
+    // half empty.
+    let whole = TimeAxis::new().with_view_range(TimeRange(datatypes::TimeRange::EVERYTHING));
+    let pane = Pane::new("TimeSeries", group.title, group.origin);
+    Node::Pane(pane.with("PlotLegend", legend).with("TimeAxis", whole))
 }
 
 /// The log without the column that says that each line is of the log.

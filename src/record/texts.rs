@@ -32,13 +32,12 @@ impl Texts {
     pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
         let tunnel = opening.tunnel;
         let text = format!(
-            "{}, seed {}: {:.0} m of line, {} lamps, {} balises, {} wayside devices",
+            "{}, seed {}: {:.0} m of line, {} lamps, {} balises",
             opening.scenario,
             opening.seed,
             tunnel.alignment.length_m(),
             tunnel.lamps.len(),
             tunnel.balises.len(),
-            opening.wayside.len(),
         );
         Self::note(stream, SimTime::ZERO, &text)?;
         Ok(Self {
