@@ -36,6 +36,32 @@ impl Mesh {
         }
     }
 
+    /// Triangles between two lines of vertices, one after the other from vertex `first` on, at
+    /// ascending `places` along them that need not be the same. Each begins with its lowest
+    /// vertex, whose flat attributes hold for it.
+    pub fn add_ribbon(&mut self, first: u32, places: [&[f64]; 2]) {
+        let [left, right] = places;
+        let (mut i, mut j) = (0, 0);
+        while i + 1 < left.len() || j + 1 < right.len() {
+            let (a, b) = (first + i as u32, first + (left.len() + j) as u32);
+            let right_next = match (left.get(i + 1), right.get(j + 1)) {
+                (Some(l), Some(r)) => r <= l,
+                (_, r) => r.is_some(),
+            };
+            let next = if right_next { b + 1 } else { a + 1 };
+            self.indices.extend(if right[j] < left[i] {
+                [b, next, a]
+            } else {
+                [a, b, next]
+            });
+            if right_next {
+                j += 1;
+            } else {
+                i += 1;
+            }
+        }
+    }
+
     /// Distance of the farthest vertex from the origin.
     pub fn radius_m(&self) -> f64 {
         self.vertices

@@ -7,11 +7,17 @@ use crate::twin::random::pcg4d;
 use crate::twin::render::light::LampField;
 use crate::twin::render::surface;
 use crate::twin::render::surface::STAIN_CELL_M;
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point3, Vector2, Vector3};
 
 /// Length of a chunk: a whole number of rings, joints, sleepers and stain cells, so that every
 /// pattern starts afresh at a chunk's origin and chainage stays exact in f32.
 pub const CHUNK_M: f64 = 15.0;
+
+/// A cell of the mesh is halved until it is smaller than this share of its distance from the
+/// nearest lamp: light falls with a power of that distance, and is interpolated over the cell.
+const CELL_PER_LAMP_DISTANCE: f64 = 0.25;
+/// No cell is smaller, however near its lamp.
+const FINEST_CELL_M: f64 = 0.06;
 
 /// How finely a chunk is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -81,17 +87,64 @@ impl Facet {
 pub fn chunk_mesh(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> (Point3<f64>, Mesh) {
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let origin = tunnel.alignment.at(from_m).origin;
+    let near = lamps_near(tunnel, lamps, key);
     let mut mesh = Mesh::default();
     for range in &tunnel.sections {
         let stations = stations(range, from_m, to_m, key.detail.step_m());
         if stations.len() < 2 {
             continue;
         }
-        for facet in facets_of(range) {
-            add_strip(&mut mesh, tunnel, lamps, &facet, &stations, key, &origin);
+        for facet in facets_of(range, &near) {
+            add_strip(
+                &mut mesh, tunnel, lamps, &near, &facet, &stations, key, &origin,
+            );
         }
     }
     (origin, mesh)
+}
+
+/// Where lamps are that a chunk may need finer cells for.
+fn lamps_near(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Vec<TrackPoint> {
+    let middle_m = key.start_m() + 0.5 * CHUNK_M;
+    let middle = tunnel.alignment.at(middle_m).origin;
+    lamps
+        .near(&middle)
+        .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
+        .collect()
+}
+
+/// Halves the interval `[from, to]` until every piece `fits`; puts the ends of the pieces into
+/// `cuts`, all but the first. Cuts of coarser pieces are among those of finer ones.
+fn halve(from: f64, to: f64, fits: &impl Fn(f64, f64) -> bool, cuts: &mut Vec<f64>) {
+    if fits(from, to) {
+        cuts.push(to);
+        return;
+    }
+    let middle = 0.5 * (from + to);
+    halve(from, middle, fits, cuts);
+    halve(middle, to, fits, cuts);
+}
+
+/// Whether light varies little over a cell this long, this far from a lamp.
+fn is_fine(cell_m: f64, away_m: f64) -> bool {
+    cell_m <= CELL_PER_LAMP_DISTANCE * away_m || cell_m < 2.0 * FINEST_CELL_M
+}
+
+/// The stations, with more of them where the line through `at` passes lamps. What shares the line
+/// shares its stations, so that no gap opens between strips of different fineness.
+fn finer_stations(stations: &[f64], at: OutlinePoint, near: &[TrackPoint]) -> Vec<f64> {
+    let mut finer = vec![stations[0]];
+    for pair in stations.windows(2) {
+        let fits = |from_m: f64, to_m: f64| {
+            near.iter().all(|lamp| {
+                let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
+                let across_m = (at.l_m - lamp.l_m).hypot(at.h_m - lamp.h_m);
+                is_fine(to_m - from_m, along_m.hypot(across_m))
+            })
+        };
+        halve(pair[0], pair[1], &fits, &mut finer);
+    }
+    finer
 }
 
 /// Ends of the range inside the chunk, and all multiples of `step_m` between them.
@@ -106,19 +159,20 @@ fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f6
     std::iter::once(from).chain(inside).chain([to]).collect()
 }
 
-fn facets_of(range: &SectionRange) -> Vec<Facet> {
+fn facets_of(range: &SectionRange, near: &[TrackPoint]) -> Vec<Facet> {
     let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section);
+    add_outline(&mut facets, &range.section, near);
     for side in [1.0, -1.0] {
         add_outline(
             &mut facets,
             &surface::rail_outline(side * surface::RAIL_OFFSET_M),
+            near,
         );
     }
     facets
 }
 
-fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection) {
+fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection, near: &[TrackPoint]) {
     let points = &section.points;
     let edges = points.len().saturating_sub(usize::from(!section.closed));
     let mut q_m = 0.0;
@@ -126,20 +180,21 @@ fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection) {
         let (a, b) = (points[k], points[(k + 1) % points.len()]);
         let length_m = (b.l_m - a.l_m).hypot(b.h_m - a.h_m);
         if length_m > 0.0 {
-            cut_edge(facets, [a, b], q_m, length_m, section.materials[k]);
+            cut_edge(facets, [a, b], q_m, length_m, section.materials[k], near);
         }
         q_m += length_m;
     }
 }
 
-/// Cuts an edge into facets: where it leaves a row of stain cells, which also keeps facets narrow
-/// enough for the light at their corners, and where the marks on it end.
+/// Cuts an edge into facets: where it leaves a row of stain cells, where the marks on it end, and
+/// where it passes lamps.
 fn cut_edge(
     facets: &mut Vec<Facet>,
     [a, b]: [OutlinePoint; 2],
     q_m: f64,
     length_m: f64,
     material: Material,
+    near: &[TrackPoint],
 ) {
     let look = surface::look(material);
     let lines = (q_m / STAIN_CELL_M).floor() as i64 + 1..;
@@ -161,7 +216,16 @@ fn cut_edge(
         l_m: a.l_m + t * (b.l_m - a.l_m),
         h_m: a.h_m + t * (b.h_m - a.h_m),
     };
+    let fits = |from: f64, to: f64| {
+        let ends = [at(from), at(to)];
+        near.iter()
+            .all(|lamp| is_fine((to - from) * length_m, across_m(ends, lamp)))
+    };
+    let mut finer = vec![0.0];
     for pair in cuts.windows(2) {
+        halve(pair[0], pair[1], &fits, &mut finer);
+    }
+    for pair in finer.windows(2) {
         let ends = [at(pair[0]), at(pair[1])];
         let middle_m = 0.5 * (ends[0].l_m + ends[1].l_m);
         let pulse = look
@@ -179,10 +243,20 @@ fn cut_edge(
     }
 }
 
+/// Distance of a lamp from the straight between two points of an outline.
+fn across_m([a, b]: [OutlinePoint; 2], lamp: &TrackPoint) -> f64 {
+    let edge = Vector2::new(b.l_m - a.l_m, b.h_m - a.h_m);
+    let to_lamp = Vector2::new(lamp.l_m - a.l_m, lamp.h_m - a.h_m);
+    let share = (edge.dot(&to_lamp) / edge.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+    (to_lamp - edge * share).norm()
+}
+
+#[allow(clippy::too_many_arguments, reason = "what a strip is made of")]
 fn add_strip(
     mesh: &mut Mesh,
     tunnel: &Tunnel,
     lamps: &LampField,
+    near: &[TrackPoint],
     facet: &Facet,
     stations: &[f64],
     key: ChunkKey,
@@ -190,19 +264,22 @@ fn add_strip(
 ) {
     let from_m = key.start_m();
     let first = mesh.vertices.len() as u32;
-    for &s_m in stations {
-        let normal = facet_normal(tunnel, facet, s_m);
-        let column = (s_m / STAIN_CELL_M).floor();
-        let stain_cell = [
-            (column - from_m / STAIN_CELL_M) as f32,
-            facet.stain_row() as f32,
-        ];
-        let stains = if key.detail == Detail::Far {
-            [STAIN_NONE; 8]
+    let sides = facet.ends.map(|end| {
+        if key.detail == Detail::Far {
+            stations.to_vec()
         } else {
-            facet.stains(column)
-        };
-        for (end, q_m) in facet.ends.iter().zip(facet.q_m) {
+            finer_stations(stations, end, near)
+        }
+    });
+    for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
+        for &s_m in side {
+            let normal = facet_normal(tunnel, facet, s_m);
+            let column = (s_m / STAIN_CELL_M).floor();
+            let stains = if key.detail == Detail::Far {
+                [STAIN_NONE; 8]
+            } else {
+                facet.stains(column)
+            };
             let p = ruled(tunnel, s_m, *end, key.detail);
             mesh.vertices.push(Vertex {
                 position_m: (p - origin).map(|x| x as f32).into(),
@@ -212,12 +289,15 @@ fn add_strip(
                 pattern_m: [(s_m - from_m) as f32, q_m as f32],
                 luminance_cd_m2: 0.0,
                 pulse: facet.pulse,
-                stain_cell,
+                stain_cell: [
+                    (column - from_m / STAIN_CELL_M) as f32,
+                    facet.stain_row() as f32,
+                ],
                 stains,
             });
         }
     }
-    mesh.add_quads(first, stations.len() as u32, 2);
+    mesh.add_ribbon(first, [&sides[0], &sides[1]]);
 }
 
 /// A point of the surface, which runs straight from ring to ring.
@@ -231,7 +311,7 @@ fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3
     };
     let ring = s_m / surface::RING_M;
     let share = ring - ring.floor();
-    if detail != Detail::Near || share <= 0.0 {
+    if detail == Detail::Far || share <= 0.0 {
         return at(s_m);
     }
     let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * surface::RING_M));
@@ -288,18 +368,19 @@ mod tests {
     /// Provokes gaps between chunks: the last ring of one is the first ring of the next.
     #[test]
     fn chunks_meet() {
-        for (detail, stations) in [(Detail::Near, 31), (Detail::Middle, 16), (Detail::Far, 4)] {
-            let (a, before) = chunk(20, detail);
-            let (b, after) = chunk(21, detail);
-            let rings = before.vertices.len() / after.vertices.len();
-            assert_eq!(rings, 1);
-            let per_strip = 2 * stations;
-            for k in 0..before.vertices.len() / per_strip {
-                let last = before.vertices[(k + 1) * per_strip - 1];
-                let first = after.vertices[k * per_strip + 1];
-                let gap = (a + Vector3::from(last.position_m).cast::<f64>())
-                    - (b + Vector3::from(first.position_m).cast::<f64>());
-                assert!(gap.norm() < 1e-5, "{gap}");
+        for detail in [Detail::Near, Detail::Middle, Detail::Far] {
+            let at_end = |index: i64, end_m: f64| {
+                let (origin, mesh) = chunk(index, detail);
+                let at = |v: &Vertex| origin + Vector3::from(v.position_m).cast::<f64>();
+                let on_end = |v: &&Vertex| (f64::from(v.pattern_m[0]) - end_m).abs() < 1e-6;
+                let points: Vec<_> = mesh.vertices.iter().filter(on_end).map(at).collect();
+                points
+            };
+            let (before, after) = (at_end(20, CHUNK_M), at_end(21, 0.0));
+            assert!(before.len() > 100);
+            assert_eq!(before.len(), after.len());
+            for (last, first) in before.iter().zip(&after) {
+                assert!((last - first).norm() < 1e-5, "{last} {first}");
             }
         }
     }
