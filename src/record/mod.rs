@@ -240,10 +240,6 @@ impl Open {
                 self.texts.display(stream, report.time, &report.display)?;
                 report.time
             }
-            Event::Display(time, display) => {
-                self.texts.display(stream, time, display)?;
-                time
-            }
             Event::Delivery(delivery) => {
                 self.texts.delivery(stream, delivery)?;
                 delivery.received

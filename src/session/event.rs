@@ -1,8 +1,8 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
 use crate::bus::{
-    Delivery, DriverDisplay, LedReport, ProtectionReport, RigCalibration, SimTime, StereoPair,
-    WaysideCalibration, WaysideReport,
+    Delivery, LedReport, ProtectionReport, RigCalibration, SimTime, StereoPair, WaysideCalibration,
+    WaysideReport,
 };
 use crate::track::Tunnel;
 use crate::twin::render::Body;
@@ -66,8 +66,6 @@ pub enum Event<'a> {
     Wayside(usize, SimTime, &'a GrayImage, &'a WaysideReport),
     /// A cycle of the protection.
     Protection(&'a ProtectionReport),
-    /// The display changed.
-    Display(SimTime, &'a DriverDisplay),
     /// A message arrived at the train.
     Delivery(&'a Delivery),
     /// Anything worth a line in the log.

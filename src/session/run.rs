@@ -12,7 +12,7 @@ use super::summary::{self, Summary};
 use super::watch::{Stopwatch, Watchers, now};
 use super::{End, Event, Observer, Opening, Physics, RunOptions, SessionError, TrainTruth};
 use super::{WallShares, methods};
-use crate::bus::{BrakeDemand, DriverDisplay, Frame, Method, SimTime, TrainCommand, TrainReport};
+use crate::bus::{BrakeDemand, Frame, Method, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::stack::protection::Protection;
@@ -68,7 +68,6 @@ pub struct Run<'s> {
     protection: Protection,
     protection_clock: Clock,
     command: TrainCommand,
-    display: DriverDisplay,
     truth_clock: Clock,
     bodies_clock: Clock,
     pending: VecDeque<Pending>,
@@ -133,7 +132,6 @@ impl<'s> Run<'s> {
             protection: Protection::new(&scenario.stack.protection, map),
             protection_clock: Clock::new(PROTECTION_HZ),
             command: TrainCommand::default(),
-            display: DriverDisplay::default(),
             truth_clock: Clock::new(TRUTH_HZ),
             bodies_clock: Clock::new(BODIES_HZ),
             pending: VecDeque::new(),
@@ -426,10 +424,6 @@ impl<'s> Run<'s> {
             self.comms.report_train(now, head_m, train);
         }
         watchers.show(&Event::Protection(&report))?;
-        if report.display != self.display {
-            watchers.show(&Event::Display(now, &report.display))?;
-            self.display = report.display;
-        }
         Ok(())
     }
 
