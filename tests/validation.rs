@@ -102,7 +102,8 @@ fn val_forgotten_toolbox() {
         .iter()
         .find(|o| o.name == "toolbox")
         .unwrap();
-    assert!(toolbox.latency_s.unwrap() < 1.0);
+    // The worker stands and walks between camera and toolbox for some seconds.
+    assert!(toolbox.latency_s.unwrap() < 6.0);
     assert!(toolbox.distance_error_m.unwrap().abs() < 1.0);
     let protection = summary.protection.unwrap();
     assert!(!protection.collision);

@@ -75,9 +75,11 @@ pub struct Run<'s> {
     cost: Costs,
 }
 
-/// What the protection came to.
+/// What a run came to.
 #[derive(Default)]
 struct Outcome {
+    /// The movement authority ends before an obstacle.
+    obstacle_ahead: bool,
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
     has_run: bool,
@@ -409,9 +411,8 @@ impl<'s> Run<'s> {
         }
         let protection = &mut self.protection;
         let report = self.cost.stack.time(|| protection.cycle(now)).0;
-        // A driver who obeys brakes before the equipment has to.
-        let lowered = report.authority_end_m.is_some() && report.permitted_mps < report.speed_mps;
-        if lowered || report.command.brake != BrakeDemand::None {
+        self.outcome.obstacle_ahead = report.authority_end_m.is_some();
+        if report.command.brake != BrakeDemand::None {
             self.outcome.brake_commanded.get_or_insert(now);
         }
         self.command = report.command;
@@ -451,6 +452,10 @@ impl<'s> Run<'s> {
     /// Follows whether the train has run, and since when it stands.
     fn note_motion(&mut self, now: SimTime, train: &TrainState) {
         self.outcome.has_run |= !train.standing;
+        // A driver who obeys brakes before the equipment has to.
+        if self.outcome.obstacle_ahead && train.brake_mps2 > 0.0 {
+            self.outcome.brake_commanded.get_or_insert(now);
+        }
         if !train.standing {
             self.outcome.standing_since = None;
             return;

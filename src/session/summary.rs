@@ -175,8 +175,8 @@ pub struct ObstacleScore {
 /// Train protection.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct Protection {
-    /// When the equipment first made the train slow down: it braked, or lowered the permitted speed
-    /// under the train's.
+    /// When the train first braked for an obstacle, by the equipment or by a driver who keeps to the
+    /// permitted speed.
     pub brake_commanded_s: Option<f64>,
     /// When the train then stood.
     pub stopped_s: Option<f64>,
