@@ -78,8 +78,8 @@ pub struct Run<'s> {
 /// What a run came to.
 #[derive(Default)]
 struct Outcome {
-    /// The movement authority ends before an obstacle.
-    obstacle_ahead: bool,
+    /// An obstacle ahead permits less than the driver aims at.
+    slowed_by_obstacle: bool,
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
     has_run: bool,
@@ -411,7 +411,10 @@ impl<'s> Run<'s> {
         }
         let protection = &mut self.protection;
         let report = self.cost.stack.time(|| protection.cycle(now)).0;
-        self.outcome.obstacle_ahead = report.authority_end_m.is_some();
+        let aim_mps = (self.scenario.physics.train.as_ref())
+            .map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6);
+        self.outcome.slowed_by_obstacle =
+            report.authority_end_m.is_some() && report.permitted_mps < aim_mps;
         if report.command.brake != BrakeDemand::None {
             self.outcome.brake_commanded.get_or_insert(now);
         }
@@ -453,7 +456,7 @@ impl<'s> Run<'s> {
     fn note_motion(&mut self, now: SimTime, train: &TrainState) {
         self.outcome.has_run |= !train.standing;
         // A driver who obeys brakes before the equipment has to.
-        if self.outcome.obstacle_ahead && train.brake_mps2 > 0.0 {
+        if self.outcome.slowed_by_obstacle && train.brake_mps2 > 0.0 {
             self.outcome.brake_commanded.get_or_insert(now);
         }
         if !train.standing {

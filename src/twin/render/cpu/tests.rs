@@ -129,14 +129,14 @@ fn a_wall_has_the_luminance_of_the_closed_form() {
     light.facing = Unit::new_unchecked(Vector3::y());
     let intensity = light.axial_intensity_cd();
     let mut view = view(Intrinsics::centred(9, 9, 6.0));
-    view.sensor.grey_per_cd_s = 5e5;
+    view.sensor.grey_per_cd_s = 2.5e5;
     let image = renderer(vec![light]).draw(&Job::default(), &view);
     for (u, v, pixel) in image.enumerate_pixels() {
         let ray = view.camera.intrinsics.ray(f64::from(u), f64::from(v));
         let (x, z) = (4.0 * ray.x, -4.0 * ray.y);
         let d2 = 25.0 + x * x + z * z;
         // cos(out) = cos(in) = 5 / d.
-        let lux = AMBIENT_LX + 0.5 * intensity * 25.0 / (d2 * d2);
+        let lux = AMBIENT_LX + intensity * 25.0 / (d2 * d2);
         let expected = grey_of(&view, WALL_ALBEDO * lux / PI);
         assert!(
             (f64::from(pixel[0]) - expected).abs() <= 0.5 + 1e-6,
