@@ -127,7 +127,7 @@ impl Comms {
         }
     }
 
-    /// The last report that has arrived, while it is younger than [`REPORT_LIFE_S`].
+    /// The last report that has arrived, while it is younger than 5 s.
     pub fn train_report(&mut self, now: SimTime) -> Option<TrainReport> {
         while self.reports.get(1).is_some_and(|next| next.0 <= now) {
             self.reports.pop_front();
