@@ -149,11 +149,7 @@ fn train_seconds(
     rounds: usize,
 ) -> anyhow::Result<Times> {
     let rig = scenario.rig.as_ref().context("the scene has a rig")?;
-    let camera = StereoCamera {
-        rig: rig.actual(),
-        sensor: rig.sensor,
-        streams: ["left", "right"].map(|eye| Stream::new(scenario.seed, 0, eye)),
-    };
+    let camera = StereoCamera::new(rig, scenario.seed);
     let map = scenario.tunnel.clone();
     let mut positioner = LedPositioner::new(&scenario.stack.led, rig.calibration(), map);
     let mut imu = Imu::new(&scenario.imu, scenario.seed, 0);

@@ -14,7 +14,6 @@ use super::{
 use crate::bus::{Method, SimTime};
 use crate::scenario::{BenchSettings, Scenario};
 use crate::stack::positioning::LedPositioner;
-use crate::twin::random::Stream;
 use crate::twin::render::{Job, Renderer};
 use crate::twin::sensors::RigSettings;
 use nalgebra::{Isometry3, Vector3};
@@ -44,16 +43,11 @@ impl<'s> Bench<'s> {
         rig: &'s RigSettings,
         renderer: Box<dyn Renderer>,
     ) -> Self {
-        let stream = |name: &str| Stream::new(scenario.seed, 0, name);
         Self {
             scenario,
             settings,
             rig,
-            camera: StereoCamera {
-                rig: rig.actual(),
-                sensor: rig.sensor,
-                streams: [stream("stereo/left"), stream("stereo/right")],
-            },
+            camera: StereoCamera::new(rig, scenario.seed),
             renderer,
             score: PositioningScore::new(scenario.tunnel.clone(), &methods()),
             clock: Clock::new(rig.pairs_per_s),

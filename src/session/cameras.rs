@@ -3,6 +3,7 @@
 use crate::bus::{Frame, RigCalibration, SimTime, StereoPair, WaysideCalibration};
 use crate::twin::random::Stream;
 use crate::twin::render::{CameraMotion, NoiseKey, SensorSettings, View};
+use crate::twin::sensors::RigSettings;
 use image::GrayImage;
 use nalgebra::{Isometry3, Translation3};
 
@@ -62,6 +63,15 @@ pub struct StereoCamera {
 }
 
 impl StereoCamera {
+    /// The rig as it really is, with the noise of a run's seed.
+    pub fn new(rig: &RigSettings, seed: u64) -> Self {
+        Self {
+            rig: rig.actual(),
+            sensor: rig.sensor,
+            streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
+        }
+    }
+
     /// From the opening of the first row to the last pose that drawing a pair needs.
     pub fn delay_s(&self) -> f64 {
         let shutter = self.rig.camera.shutter;

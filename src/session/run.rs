@@ -111,11 +111,7 @@ impl<'s> Run<'s> {
             .as_ref()
             .filter(|_| scenario.physics.train.is_some()))
         .map(|rig| Eyes {
-            camera: StereoCamera {
-                rig: rig.actual(),
-                sensor: rig.sensor,
-                streams: [stream("stereo/left"), stream("stereo/right")],
-            },
+            camera: StereoCamera::new(rig, seed),
             clock: Clock::new(rig.pairs_per_s),
             positioner: LedPositioner::new(&scenario.stack.led, rig.calibration(), map.clone()),
             score: PositioningScore::new(map.clone(), &methods()),
