@@ -46,7 +46,7 @@ fn gpu(scene: Scene) -> Box<dyn Renderer> {
 }
 
 fn cpu(scene: Scene) -> Box<dyn Renderer> {
-    Box::new(CpuRenderer::new(scene))
+    Box::new(CpuRenderer::oracle(scene))
 }
 
 fn draw(renderer: &mut dyn Renderer, job: &Job) -> Vec<GrayImage> {

@@ -117,7 +117,7 @@ pub(crate) fn renderer(
 ) -> Result<Box<dyn Renderer>, SessionError> {
     let scene = scene(scenario);
     if choice == RendererChoice::Cpu {
-        return Ok(Box::new(CpuRenderer::new(scene)));
+        return Ok(Box::new(CpuRenderer::quick(scene)));
     }
     match GpuRenderer::new(scene.clone()) {
         Ok(renderer) => Ok(Box::new(renderer)),
@@ -127,7 +127,7 @@ pub(crate) fn renderer(
                  renderer, right but about ten times slower. On Debian or Ubuntu \
                  `apt-get install mesa-vulkan-drivers` gives a software adapter."
             );
-            Ok(Box::new(CpuRenderer::new(scene)))
+            Ok(Box::new(CpuRenderer::quick(scene)))
         }
         Err(error) => Err(error.into()),
     }

@@ -61,13 +61,14 @@ fn seen_from(lamp: &LampLight, pose: &Isometry3<f64>) -> Option<(Point3<f64>, f6
     (centre.z > NEAREST_M && distance < LAMP_SIGHT_M && cos > 0.0).then_some((centre, cos))
 }
 
-/// Puts the disc of a lamp over the row's luminances, where nothing in `depths` is nearer.
+/// Puts the disc of a lamp over the row's luminances, where nothing is nearer than it at
+/// `depth_of(u)`.
 pub(super) fn draw_disc(
     lamp: &LampLight,
     view: &View,
     row: &RowExposure,
     ambient_lx: f64,
-    depths: &[f64],
+    mut depth_of: impl FnMut(usize) -> f64,
     luminances: &mut [f64],
 ) {
     let Some((centre, _)) = seen_from(lamp, &row.mid) else {
@@ -98,7 +99,7 @@ pub(super) fn draw_disc(
     let end = (columns.1 * camera.fx_px + camera.cx_px + 2.0).max(0.0) as usize;
     let samples = (SLOTS * SUB_PIXELS * SUB_PIXELS) as f64;
     for u in begin..end.min(luminances.len()) {
-        let (mut covered, mut light) = (0u32, 0.0);
+        let (mut covered, mut light, mut behind) = (0u32, 0.0, None);
         for sub in 0..SUB_PIXELS * SUB_PIXELS {
             let shift = |k: usize| (k as f64 + 0.5) / SUB_PIXELS as f64 - 0.5;
             let ray = camera.ray(
@@ -109,7 +110,7 @@ pub(super) fn draw_disc(
                 let Some(depth) = disc.hit(&ray, lamp.radius_m) else {
                     continue;
                 };
-                if depth > depths[u] + FLUSH_M {
+                if depth > *behind.get_or_insert_with(|| depth_of(u)) + FLUSH_M {
                     continue;
                 }
                 covered += 1;

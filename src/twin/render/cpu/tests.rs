@@ -6,7 +6,7 @@ use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
 use crate::twin::random::Stream;
-use crate::twin::render::{CameraMotion, NoiseKey, SensorSettings, Shape, sample};
+use crate::twin::render::{Body, CameraMotion, NoiseKey, SensorSettings, Shape, sample};
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
 use std::sync::Arc;
 
@@ -55,7 +55,7 @@ fn hall() -> Tunnel {
 }
 
 fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
-    CpuRenderer::new(Scene {
+    CpuRenderer::oracle(Scene {
         tunnel: Arc::new(hall()),
         lamps,
     })
@@ -263,7 +263,7 @@ fn threads_and_kept_views_change_no_byte() {
     let draw = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         pool.unwrap().install(|| {
-            let mut renderer = CpuRenderer::new(sample::scene());
+            let mut renderer = CpuRenderer::oracle(sample::scene());
             for job in [&job, &moving, &job] {
                 renderer.submit(job).unwrap();
             }
@@ -297,4 +297,34 @@ fn empty_jobs_give_empty_images() {
     );
     none.motion = CameraMotion::still(Isometry3::translation(f64::NAN, 0.0, 0.0));
     assert_eq!(renderer.draw(&Job::default(), &none).len(), 16);
+}
+
+/// Fails where the quick renderer leaves out something that shows: a bright place between dark
+/// corners, a body before a dark wall, a lamp behind a body.
+#[test]
+fn the_quick_renderer_draws_what_the_oracle_draws() {
+    let tunnel = sample::tunnel();
+    for k in 0..6 {
+        let s_m = 60.0 + 31.7 * f64::from(k);
+        let mut job = sample::stereo_job(&tunnel, s_m, 27.8);
+        job.bodies = sample::worker(&tunnel, s_m + 4.0, 1.4);
+        job.headlights = vec![Headlight {
+            world_from_light: sample::on_bed(&tunnel, s_m, 0.0, 1.5),
+            intensity_cd: 40_000.0,
+            exponent: 30.0,
+        }];
+        let view = &mut job.views[0];
+        view.sensor.noise = k % 2 == 1;
+        let view = view.clone();
+        let oracle = CpuRenderer::oracle(sample::scene()).draw(&job, &view);
+        let quick = CpuRenderer::quick(sample::scene()).draw(&job, &view);
+        let away = oracle.iter().zip(quick.iter()).map(|(a, b)| a.abs_diff(*b));
+        let (worst, off) = away.fold((0, 0usize), |(worst, off), d| {
+            (worst.max(d), off + usize::from(d > 0))
+        });
+        let share = off as f64 / oracle.len() as f64;
+        println!("{s_m} m: {worst} grey levels, {share:.5} of the pixels differ");
+        assert!(oracle.iter().max() > Some(&250));
+        assert!(worst <= 1 && share < 0.01, "{s_m} m: {worst} in {share}");
+    }
 }
