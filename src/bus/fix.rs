@@ -13,8 +13,11 @@ pub enum Method {
     Paper,
     /// One camera, range from the lamp's apparent size.
     Mono,
-    /// The best estimate from everything.
-    Fused,
+}
+
+impl Method {
+    /// Every method.
+    pub const ALL: [Self; 2] = [Self::Paper, Self::Mono];
 }
 
 /// How a lamp got its name.

@@ -166,7 +166,6 @@ impl Moving {
         for fix in &report.fixes {
             stream.at_frame(fix.time, report.number);
             let (name, height_m) = match fix.method {
-                Method::Fused => ("fused", 9.6),
                 Method::Paper => ("paper", 10.8),
                 Method::Mono => ("mono", 12.0),
             };

@@ -32,7 +32,6 @@ pub(super) fn method(method: Method) -> Color {
     match method {
         Method::Paper => rgb(255, 110, 180),
         Method::Mono => rgb(255, 190, 70),
-        Method::Fused => rgb(90, 230, 120),
     }
 }
 

@@ -100,8 +100,6 @@ const ERROR: Group = Group {
     lines: &[],
 };
 
-const METHODS: [Method; 3] = [Method::Paper, Method::Mono, Method::Fused];
-
 /// The plots of a run by panes; plots of one pane are its tabs.
 pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
     let mut panes = Vec::new();
@@ -153,7 +151,7 @@ impl Plots {
             )?;
         }
         if contents.rig {
-            for method in METHODS {
+            for method in Method::ALL {
                 let [error, upper, lower] = error_paths(method);
                 let name = error.rsplit('/').next().unwrap_or(error);
                 let colour = palette::method(method);
@@ -294,11 +292,6 @@ fn error_paths(method: Method) -> [&'static str; 3] {
             "plots/position_error/mono",
             "plots/position_error/mono/upper",
             "plots/position_error/mono/lower",
-        ],
-        Method::Fused => [
-            "plots/position_error/fused",
-            "plots/position_error/fused/upper",
-            "plots/position_error/fused/lower",
         ],
     }
 }

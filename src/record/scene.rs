@@ -6,7 +6,7 @@ use super::stream::Stream;
 use crate::scenario::RecordSettings;
 use crate::session::{ObserverError, Opening};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, CrossSection, RAIL_CENTRES_M, SectionRange, TrackPoint, Tunnel};
+use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::{MeshFaceRendering, RotationQuat};
 use rerun::{
@@ -108,9 +108,9 @@ impl Scene {
         }
         stream.log_static("world/tunnel", &mesh.finish())?;
 
-        let rails = [0.5, -0.5].map(|side| {
+        let rails = [RAIL_OFFSET_M, -RAIL_OFFSET_M].map(|centre_m| {
             let strip = rings(0.0, self.alignment.length_m(), step_m).map(|s_m| {
-                let rail = Point3::new(0.0, side * RAIL_CENTRES_M, 0.0);
+                let rail = Point3::new(0.0, centre_m, 0.0);
                 self.local(&(self.alignment.at(s_m).world_from_rails() * rail))
             });
             strip.collect::<Vec<_>>()
@@ -198,25 +198,17 @@ struct Sweep {
 
 impl Sweep {
     fn sweep(&mut self, scene: &Scene, range: &SectionRange, step_m: f64) {
-        let section = &range.section;
-        for (edge, [from, to]) in edges(section).enumerate() {
-            let Some(&material) = section.materials.get(edge) else {
-                continue;
-            };
-            let (dl, dh) = (to.0 - from.0, to.1 - from.1);
-            let length = dl.hypot(dh).max(1e-9);
+        for edge in range.section.edges() {
             let first = self.corners.len() as u32;
             for (ring, s_m) in rings(range.from_m, range.to_m, step_m).enumerate() {
-                let heading = scene.alignment.at(s_m).heading_rad;
-                // The inside is on the left of an edge looked at up the line.
-                let (nl, nh) = (dh / length, -dl / length);
-                let normal = [-nl * heading.sin(), nl * heading.cos(), nh].map(|x| x as f32);
-                for (l_m, h_m) in [from, to] {
-                    let p = TrackPoint { s_m, l_m, h_m };
+                let frame = scene.alignment.at(s_m);
+                let (nl, nh) = edge.normal();
+                let normal = (frame.left() * nl + Vector3::z() * nh).map(|x| x as f32);
+                for p in [edge.a, edge.b] {
                     self.corners
-                        .push(scene.local(&scene.alignment.world_from_track(p)));
-                    self.normals.push(normal);
-                    self.colours.push(palette::material(material, ring));
+                        .push(scene.local(&frame.world_from_section(p.l_m, p.h_m)));
+                    self.normals.push(normal.into());
+                    self.colours.push(palette::material(edge.material, ring));
                 }
             }
             let last = self.corners.len() as u32;
@@ -236,17 +228,6 @@ impl Sweep {
     }
 }
 
-/// Both ends (l, h) of each edge of an outline.
-fn edges(section: &CrossSection) -> impl Iterator<Item = [(f64, f64); 2]> {
-    let points = &section.points;
-    let count = if section.closed {
-        points.len()
-    } else {
-        points.len().saturating_sub(1)
-    };
-    (0..count).map(|k| [&points[k], &points[(k + 1) % points.len()]].map(|p| (p.l_m, p.h_m)))
-}
-
 /// A line's width on the screen, whatever the distance.
 pub(super) fn ui(points: f32) -> Radius {
     Radius::new_ui_points(points)
@@ -256,6 +237,7 @@ pub(super) fn ui(points: f32) -> Radius {
 mod tests {
     use super::*;
     use crate::record::trial::tunnel;
+    use crate::track::TrackPoint;
 
     /// The viewer hides what it sees from behind. A flipped triangle would hide the far wall and
     /// show the near one; a normal that disagrees would light it from outside.

@@ -80,7 +80,6 @@ fn method_name(method: Method) -> &'static str {
     match method {
         Method::Paper => "paper",
         Method::Mono => "mono",
-        Method::Fused => "fused",
     }
 }
 

@@ -9,7 +9,7 @@ use super::score::PositioningScore;
 use super::watch::{Stopwatch, Watchers, now};
 use super::{
     End, Event, Observer, Opening, Physics, RunOptions, SessionError, Summary, TrainTruth,
-    WallShares, methods,
+    WallShares,
 };
 use crate::bus::{Method, SimTime};
 use crate::scenario::{BenchSettings, Scenario};
@@ -49,7 +49,7 @@ impl<'s> Bench<'s> {
             rig,
             camera: StereoCamera::new(rig, scenario.seed),
             renderer,
-            score: PositioningScore::new(scenario.tunnel.clone(), &methods()),
+            score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
             clock: Clock::new(rig.pairs_per_s),
             submit: Stopwatch::default(),
             wait: Stopwatch::default(),

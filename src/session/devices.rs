@@ -6,7 +6,6 @@ use super::watch::Stopwatch;
 use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
-use crate::track::Tunnel;
 use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -145,11 +144,4 @@ fn present(world: &World) -> Vec<Presence> {
         obstacle: false,
     });
     obstacles.chain(workers).chain(train).collect()
-}
-
-/// Names of the balises that the head passed between two chainages, up the line.
-pub fn passed_balises(tunnel: &Tunnel, from_m: f64, to_m: f64) -> impl Iterator<Item = &str> {
-    (tunnel.balises.iter())
-        .filter(move |b| b.chainage_m > from_m && b.chainage_m <= to_m)
-        .map(|b| b.name.as_str())
 }

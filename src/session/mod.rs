@@ -32,7 +32,6 @@ pub use summary::{
     Wayside,
 };
 
-use crate::bus::Method;
 use crate::scenario::Scenario;
 use crate::twin::physics::PhysicsError;
 use crate::twin::random::Stream;
@@ -62,11 +61,6 @@ pub struct RunOptions<'a> {
     pub stop: Option<&'a AtomicBool>,
     /// Told the simulated time, in seconds, now and then.
     pub progress: Option<&'a dyn Fn(f64)>,
-}
-
-/// The positioning methods that a session scores.
-fn methods() -> [Method; 2] {
-    [Method::Paper, Method::Mono]
 }
 
 impl RunOptions<'_> {

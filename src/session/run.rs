@@ -5,13 +5,13 @@
 //! `latency_ms` later; the renderer draws in between, while the world goes on. So the order of
 //! things does not depend on how fast anything is.
 
+use super::WallShares;
 use super::cameras::{Clock, StereoCamera, pair};
-use super::devices::{Device, Look, passed_balises};
+use super::devices::{Device, Look};
 use super::score::PositioningScore;
 use super::summary::{self, Summary};
 use super::watch::{Stopwatch, Watchers, now};
 use super::{End, Event, Observer, Opening, Physics, RunOptions, SessionError, TrainTruth};
-use super::{WallShares, methods};
 use crate::bus::{BrakeDemand, Frame, Method, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
@@ -114,7 +114,7 @@ impl<'s> Run<'s> {
             camera: StereoCamera::new(rig, seed),
             clock: Clock::new(rig.pairs_per_s),
             positioner: LedPositioner::new(&scenario.stack.led, rig.calibration(), map.clone()),
-            score: PositioningScore::new(map.clone(), &methods()),
+            score: PositioningScore::new(map.clone(), &Method::ALL),
         });
         Ok(Self {
             scenario,
@@ -246,7 +246,7 @@ impl<'s> Run<'s> {
             return Ok(());
         };
         let tunnel = self.scenario.tunnel.clone();
-        for name in passed_balises(&tunnel, before_m, head_m) {
+        for name in tunnel.balises_passed(before_m, head_m) {
             self.protection.on_balise(name, now);
             if let Some(delivery) = self.comms.read_balise(now, name) {
                 self.protection.on_delivery(&delivery);

@@ -130,8 +130,9 @@ impl TrackFrame {
     }
 }
 
-/// Distance between the rail centre lines, which turns cant into roll.
-pub const RAIL_CENTRES_M: f64 = 1.5;
+/// The base over which cant is measured: nominally the distance of the rails' centre lines
+/// (EN 13848-1), whatever the width of their heads.
+pub const CANT_BASE_M: f64 = 1.5;
 
 /// Terms of the position's power series.
 const TERMS: usize = 16;
@@ -351,7 +352,7 @@ impl Alignment {
             heading_rad: piece.heading(ds),
             slope,
             curvature_per_m: piece.curvature(ds),
-            roll_rad: -(piece.cant(ds) / RAIL_CENTRES_M).clamp(-1.0, 1.0).asin(),
+            roll_rad: -(piece.cant(ds) / CANT_BASE_M).clamp(-1.0, 1.0).asin(),
         }
     }
 

@@ -5,23 +5,29 @@
 //! here eight keep their governing widths (platform edge at 1.5 m below floor level, equipment at
 //! 1.6 m above it, 0.2 m over the roof). In curves it widens by what a car's ends swing out.
 
-use super::section::OutlinePoint;
+use super::section::{CrossSection, Material, OutlinePoint};
 
 /// Height of a rail: its foot is this far under top of rail (176 mm for 60 kg/m rail, rounded).
 pub const RAIL_FOOT_M: f64 = -0.17;
 /// Distance of a rail's centre from the centreline (1435 mm gauge and a 70 mm head).
-pub const RAIL_CENTRE_M: f64 = 0.7525;
+pub const RAIL_OFFSET_M: f64 = 0.7525;
 /// Width of a rail's head; rails are drawn as boxes of it.
 pub const RAIL_WIDTH_M: f64 = 0.07;
 
-/// The rails as rectangles: left, bottom, right and top as (l, h) of two opposite corners.
-pub fn rail_boxes() -> [(OutlinePoint, OutlinePoint); 2] {
-    [RAIL_CENTRE_M, -RAIL_CENTRE_M].map(|l| {
-        (
-            OutlinePoint::new(l + 0.5 * RAIL_WIDTH_M, RAIL_FOOT_M),
-            OutlinePoint::new(l - 0.5 * RAIL_WIDTH_M, 0.0),
-        )
-    })
+/// Outline of a rail whose centre is `centre_m` left of the centreline, under the conventions of
+/// [`CrossSection`]: up its left side, over the head, down its right side.
+pub fn rail_outline(centre_m: f64) -> CrossSection {
+    let (left_m, right_m) = (centre_m + 0.5 * RAIL_WIDTH_M, centre_m - 0.5 * RAIL_WIDTH_M);
+    CrossSection {
+        points: vec![
+            OutlinePoint::new(left_m, RAIL_FOOT_M),
+            OutlinePoint::new(left_m, 0.0),
+            OutlinePoint::new(right_m, 0.0),
+            OutlinePoint::new(right_m, RAIL_FOOT_M),
+        ],
+        materials: vec![Material::Rail; 4],
+        closed: false,
+    }
 }
 
 /// Throw of a B1 car's end in a curve of 1 m radius: (19.52^2 - 12.6^2) / 8, with the length over
@@ -75,22 +81,6 @@ impl Gauge {
         self.half_width_m(h_m).is_some_and(|w| l_m.abs() <= w)
     }
 
-    /// Whether any of a box (between two opposite corners) is inside.
-    pub fn meets(&self, a: OutlinePoint, b: OutlinePoint) -> bool {
-        let nearest_l = if a.l_m * b.l_m <= 0.0 {
-            0.0
-        } else {
-            a.l_m.abs().min(b.l_m.abs())
-        };
-        let (low, high) = (a.h_m.min(b.h_m), a.h_m.max(b.h_m));
-        // The half width is linear between corners: its largest value is at an end or a corner.
-        [low, high]
-            .into_iter()
-            .chain(HALF_WIDTHS.iter().map(|w| w.0))
-            .filter(|h| (low..=high).contains(h))
-            .any(|h| self.contains(nearest_l, h))
-    }
-
     /// Its corners: up the right side, down the left one.
     pub fn outline(&self) -> Vec<OutlinePoint> {
         let corner = |sign: f64| {
@@ -120,37 +110,23 @@ mod tests {
         assert!(!gauge.contains(0.0, -0.1) && !gauge.contains(0.0, 4.1));
     }
 
-    /// Provokes: a box that surrounds the gauge or lies across it being missed.
-    #[test]
-    fn boxes_meet_it_as_dense_samples_do() {
-        let gauge = Gauge::b1(1.0 / 400.0);
-        let boxes = [
-            (-3.0, -1.0, 3.0, 6.0),
-            (1.55, 1.0, 1.8, 4.0),
-            (1.75, 0.0, 2.0, 4.0),
-            (-0.2, -0.17, 0.2, -0.05),
-            (-0.2, -0.17, 0.2, 0.23),
-            (1.45, 3.5, 2.0, 3.9),
-            (1.6, 3.2, 2.0, 3.4),
-        ];
-        for (l0, h0, l1, h1) in boxes {
-            let sampled = (0..=400).any(|i| {
-                (0..=400).any(|k| {
-                    gauge.contains(
-                        l0 + (l1 - l0) * f64::from(i) / 400.0,
-                        h0 + (h1 - h0) * f64::from(k) / 400.0,
-                    )
-                })
-            });
-            let met = gauge.meets(OutlinePoint::new(l0, h0), OutlinePoint::new(l1, h1));
-            assert_eq!(met, sampled, "{l0} {h0} {l1} {h1}");
-        }
-    }
-
     /// Provokes: a rail drawn at the wrong gauge: 1435 mm between the heads' inner faces.
     #[test]
     fn val_rails_are_standard_gauge() {
-        let [(_, left_inner), (right_inner, _)] = rail_boxes();
-        assert!((left_inner.l_m - right_inner.l_m - 1.435).abs() < 1e-12);
+        let [left, right] = [RAIL_OFFSET_M, -RAIL_OFFSET_M].map(|c| rail_outline(c).points);
+        assert!((left[2].l_m - right[1].l_m - 1.435).abs() < 1e-12);
+    }
+
+    /// Provokes: a rail whose faces look inwards: going round it, the metal is on the right.
+    #[test]
+    fn rails_face_outwards() {
+        for edge in rail_outline(RAIL_OFFSET_M).edges() {
+            let (l, h) = (
+                0.5 * (edge.a.l_m + edge.b.l_m),
+                0.5 * (edge.a.h_m + edge.b.h_m),
+            );
+            let (nl, nh) = edge.normal();
+            assert!((l - RAIL_OFFSET_M) * nl + (h - 0.5 * RAIL_FOOT_M) * nh > 0.0);
+        }
     }
 }

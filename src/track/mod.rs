@@ -52,20 +52,18 @@ mod document;
 mod file;
 mod furniture;
 mod gauge;
-mod mesh;
 mod problem;
 mod section;
 pub mod uid;
 
-pub use alignment::{Alignment, Grade, PlanElement, RAIL_CENTRES_M, TrackFrame, TrackPoint};
+pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
 pub use document::{did_you_mean, locate, read_toml};
 pub use file::{
     BaliseEntry, BaseStationEntry, GradeEntry, LampEntry, LampRow, PlanEntry, PlanKind,
     SectionEntry, SectionKind, StartEntry, StationEntry, TunnelFile, WaysideEntry, tunnel_schema,
 };
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
-pub use gauge::{Gauge, RAIL_CENTRE_M, RAIL_FOOT_M, RAIL_WIDTH_M, rail_boxes};
-pub use mesh::{Mesh, RING_M, sweep};
+pub use gauge::{Gauge, RAIL_FOOT_M, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use problem::{FileError, Problem};
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
@@ -118,5 +116,13 @@ impl Tunnel {
     /// The balise with a name.
     pub fn balise(&self, name: &str) -> Option<&Balise> {
         self.balises.iter().find(|b| b.name == name)
+    }
+
+    /// Names of the balises that a train passes whose head runs up the line from one chainage to
+    /// another.
+    pub fn balises_passed(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &str> {
+        (self.balises.iter())
+            .filter(move |b| b.chainage_m > from_m && b.chainage_m <= to_m)
+            .map(|b| b.name.as_str())
     }
 }

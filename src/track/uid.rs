@@ -153,14 +153,6 @@ impl LineCode {
             Self::Nrz => (0b011_1111, 7),
         }
     }
-
-    /// The longest run of equal chips that data can make.
-    pub fn longest_data_run(self) -> u32 {
-        match self {
-            Self::Manchester => 2,
-            Self::Nrz => 5,
-        }
-    }
 }
 
 impl Uid {
@@ -320,10 +312,10 @@ mod tests {
         for uid in all() {
             let manchester = runs(uid.frame(LineCode::Manchester));
             assert!(manchester[0] == 4 && (3..=4).contains(&manchester[1]));
-            assert!(manchester[2] <= LineCode::Manchester.longest_data_run());
+            assert!(manchester[2] <= 2);
             let nrz = runs(uid.frame(LineCode::Nrz));
             assert_eq!(nrz[0], 6);
-            assert!(nrz[1] <= LineCode::Nrz.longest_data_run());
+            assert!(nrz[1] <= 5);
         }
     }
 

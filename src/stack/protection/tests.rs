@@ -59,7 +59,7 @@ fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> De
 fn fix(time: SimTime, chainage_m: f64, sigma_m: f64) -> PositionFix {
     PositionFix {
         time,
-        method: Method::Fused,
+        method: Method::Paper,
         chainage_m,
         sigma_m,
         position: Point3::origin(),

@@ -10,7 +10,6 @@ use super::gauge::Gauge;
 use super::problem::{FileError, Problem};
 use super::section::OutlinePoint;
 use super::{Tunnel, read_toml};
-use std::path::Path;
 
 /// Chainages closer than this are the same place.
 const SAME_M: f64 = 1e-6;
@@ -18,16 +17,6 @@ const SAME_M: f64 = 1e-6;
 const LONGEST_M: f64 = 1e6;
 
 impl Tunnel {
-    /// Reads and checks a tunnel file.
-    pub fn load(path: impl AsRef<Path>) -> Result<Self, FileError> {
-        let path = path.as_ref();
-        let text = std::fs::read_to_string(path).map_err(|source| FileError::Read {
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::from_toml(&text)
-    }
-
     /// Reads and checks the text of a tunnel file. [`super::locate`] finds the keys of the
     /// problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
@@ -330,16 +319,6 @@ mod tests {
         assert_eq!(
             key("kind = 'rectangular'\nplatform = 'left'\nwalkway = 'left'"),
             "sections[0].walkway"
-        );
-    }
-
-    #[test]
-    fn a_file_that_is_not_there_is_told() {
-        let error = Tunnel::load("/no/such/tunnel.toml").unwrap_err();
-        assert!(
-            error
-                .to_string()
-                .starts_with("cannot read /no/such/tunnel.toml")
         );
     }
 }

@@ -3,7 +3,9 @@
 
 use super::consist::OBSTACLE_GROUP;
 use super::convert::{pose, vector};
-use crate::track::{BED_M, CrossSection, Edge, Material, OutlinePoint, Tunnel, rail_boxes};
+use crate::track::{
+    BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Tunnel, rail_outline,
+};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::{
     ColliderBuilder, Group, InteractionGroups, InteractionTestMode, PhysicsWorld,
@@ -55,7 +57,9 @@ fn lay_slabs(world: &mut PhysicsWorld, tunnel: &Tunnel, s_m: f64) {
         }
     }
     let rails = frame.world_from_rails();
-    for (a, b) in rail_boxes() {
+    for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
+        let corners = rail_outline(centre_m).points;
+        let (a, b) = (corners[0], corners[2]);
         let half = Vector3::new(
             0.5 * SLAB_M,
             0.5 * (a.l_m - b.l_m).abs(),

@@ -15,7 +15,7 @@
 //! that of the line.
 
 use super::settings::within;
-use crate::track::{Problem, RAIL_CENTRES_M};
+use crate::track::{CANT_BASE_M, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -171,9 +171,7 @@ impl Spectra {
                     Signal::Lateral => lateral * shape / o2,
                     // Given as the height of one rail over the other.
                     Signal::CrossLevel => {
-                        4.0 * vertical * shape
-                            / (o2 + cross_corner.powi(2))
-                            / RAIL_CENTRES_M.powi(2)
+                        4.0 * vertical * shape / (o2 + cross_corner.powi(2)) / CANT_BASE_M.powi(2)
                     }
                 }
             }

@@ -282,16 +282,6 @@ impl World {
         self.time
     }
 
-    /// The line it stands on.
-    pub fn tunnel(&self) -> &Tunnel {
-        &self.tunnel
-    }
-
-    /// Length of a step.
-    pub fn step_s(&self) -> f64 {
-        self.step_s
-    }
-
     /// The train now; `None` where there is none.
     pub fn train(&self) -> Option<TrainState> {
         let train = self.train.as_ref()?;

@@ -14,9 +14,6 @@ use crate::track::{LampSite, uid::Waveform};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
-/// Mean share of time that a Manchester-coded lamp is on.
-pub const LAMP_DUTY: f64 = 0.5;
-
 /// Lamps farther than this from a surface do not light it.
 pub const LAMP_REACH_M: f64 = 30.0;
 
@@ -54,21 +51,6 @@ impl LampLight {
     /// Intensity along the normal while on.
     pub fn axial_intensity_cd(&self) -> f64 {
         self.luminance_cd_m2 * PI * self.radius_m * self.radius_m
-    }
-
-    /// Luminous flux while on.
-    pub fn flux_lm(&self) -> f64 {
-        TAU * self.axial_intensity_cd() / (self.exponent + 1.0)
-    }
-
-    /// Luminance while on, seen along `to_viewer` (unit); 0 from behind.
-    pub fn luminance_towards(&self, to_viewer: &Vector3<f64>) -> f64 {
-        let cos = self.facing.dot(to_viewer);
-        if cos > 0.0 {
-            self.luminance_cd_m2 * cos.powf(self.exponent - 1.0)
-        } else {
-            0.0
-        }
     }
 
     /// Mean illuminance of a surface at `p` with unit normal `n`, lux; 0 out of reach.
@@ -207,7 +189,6 @@ mod tests {
     #[test]
     fn a_sphere_around_a_lamp_catches_its_mean_flux() {
         let lamp = lamp(Point3::new(4.0, 5.0, 6.0), Vector3::new(0.2, 1.0, -0.4));
-        assert!((lamp.flux_lm() - 2100.0).abs() < 1e-9);
         assert!((lamp.exponent - 4.818).abs() < 1e-3);
         let (radius, bands) = (7.0, 400);
         let side = lamp
@@ -227,7 +208,7 @@ mod tests {
                 flux += lamp.irradiance_lx(&(lamp.centre + out * radius), &-out) * patch;
             }
         }
-        assert!((flux / (LAMP_DUTY * 2100.0) - 1.0).abs() < 1e-4, "{flux}");
+        assert!((flux / (0.5 * 2100.0) - 1.0).abs() < 1e-4, "{flux}");
     }
 
     /// Fails where distance or incidence has the wrong power.
@@ -235,7 +216,7 @@ mod tests {
     fn light_falls_with_distance_squared_and_incidence() {
         let lamp = lamp(Point3::origin(), Vector3::x());
         let at = |d: f64, n: Vector3<f64>| lamp.irradiance_lx(&Point3::new(d, 0.0, 0.0), &n);
-        let axial = LAMP_DUTY * lamp.axial_intensity_cd();
+        let axial = 0.5 * lamp.axial_intensity_cd();
         assert!((at(3.0, -Vector3::x()) - axial / 9.0).abs() < 1e-9);
         assert!((at(6.0, -Vector3::x()) * 4.0 - at(3.0, -Vector3::x())).abs() < 1e-9);
         let slanted = Vector3::new(-0.5, 0.75f64.sqrt(), 0.0);
@@ -247,20 +228,6 @@ mod tests {
         let half = Point3::new(30f64.to_radians().cos(), 30f64.to_radians().sin(), 0.0);
         let inwards = -half.coords;
         assert!((lamp.irradiance_lx(&half, &inwards) - 0.5 * axial).abs() < 1e-9);
-    }
-
-    /// Fails where luminance and intensity disagree: luminance times apparent area.
-    #[test]
-    fn luminance_times_apparent_area_is_intensity() {
-        let lamp = lamp(Point3::origin(), Vector3::z());
-        for degrees in [0.0, 20.0, 45.0, 80.0f64] {
-            let (sin, cos) = degrees.to_radians().sin_cos();
-            let area = PI * lamp.radius_m * lamp.radius_m * cos;
-            let intensity = lamp.luminance_towards(&Vector3::new(sin, 0.0, cos)) * area;
-            let expected = lamp.axial_intensity_cd() * cos.powf(lamp.exponent);
-            assert!((intensity / expected - 1.0).abs() < 1e-12);
-        }
-        assert!(lamp.luminance_towards(&-Vector3::z()).abs() < 1e-300);
     }
 
     /// Fails where the grid loses a lamp: the same sum over all lamps.

@@ -21,7 +21,8 @@
 //! `pcg4d([i as u32, j as u32, material, 0])` over 2^32, between lattice points runs smoothstep,
 //! and the albedo is multiplied by 1 + contrast * (noise - 0.5) * clamp(2 - w / fade, 0, 1).
 
-use crate::track::{CrossSection, Material, OutlinePoint};
+use crate::track::Material;
+pub use crate::track::{RAIL_OFFSET_M, rail_outline};
 use std::fmt::Write;
 
 /// Stations of the tunnel surface lie at multiples of this chainage; between them it is ruled.
@@ -99,30 +100,6 @@ pub const fn look(material: Material) -> Look {
     Look { id, albedo, pulse }
 }
 
-/// From the centreline to the centre of either rail.
-pub const RAIL_OFFSET_M: f64 = 0.7525;
-/// Width of a rail's head; the rail is drawn as a box.
-pub const RAIL_WIDTH_M: f64 = 0.07;
-/// From top of rail down to the bed.
-pub const RAIL_HEIGHT_M: f64 = 0.17;
-
-/// Outline of a rail whose centre is `centre_m` left of the centreline, under the conventions of
-/// [`CrossSection`]: up its left side, over the head, down its right side.
-pub fn rail_outline(centre_m: f64) -> CrossSection {
-    let half = 0.5 * RAIL_WIDTH_M;
-    let corner = |l_m: f64, h_m: f64| OutlinePoint { l_m, h_m };
-    CrossSection {
-        points: vec![
-            corner(centre_m + half, -RAIL_HEIGHT_M),
-            corner(centre_m + half, 0.0),
-            corner(centre_m - half, 0.0),
-            corner(centre_m - half, -RAIL_HEIGHT_M),
-        ],
-        materials: vec![Material::Rail; 4],
-        closed: false,
-    }
-}
-
 /// The constants that the shaders need, as WGSL declarations to stand in front of every shader.
 pub fn wgsl() -> String {
     let mut text = String::from("// Written by twin/render/surface.rs.\n");
@@ -171,21 +148,6 @@ mod tests {
             if let Some(p) = look(*m).pulse {
                 assert!(p.width_m < p.period_m && p.factor * look(*m).albedo < 1.0);
             }
-        }
-    }
-
-    /// Provokes a rail whose faces look inwards: going round it, the metal is on the right.
-    #[test]
-    fn rails_face_outwards() {
-        let rail = rail_outline(RAIL_OFFSET_M);
-        for pair in rail.points.windows(2) {
-            let (dl, dh) = (pair[1].l_m - pair[0].l_m, pair[1].h_m - pair[0].h_m);
-            let mid = (
-                0.5 * (pair[0].l_m + pair[1].l_m) - RAIL_OFFSET_M,
-                0.5 * (pair[0].h_m + pair[1].h_m) + 0.5 * RAIL_HEIGHT_M,
-            );
-            // Normal (dh, -dl) is towards free space; see CrossSection.
-            assert!(mid.0 * dh - mid.1 * dl > 0.0);
         }
     }
 }

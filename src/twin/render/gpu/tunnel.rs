@@ -2,7 +2,9 @@
 
 use super::layout::{STAIN_NONE, STAIN_SOME, Vertex};
 use super::mesh::Mesh;
-use crate::track::{CrossSection, Material, OutlinePoint, SectionRange, TrackPoint, Tunnel};
+use crate::track::{
+    CrossSection, Edge, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel, rail_outline,
+};
 use crate::twin::random::pcg4d;
 use crate::twin::render::light::LampField;
 use crate::twin::render::surface;
@@ -162,40 +164,26 @@ fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f6
 fn facets_of(range: &SectionRange, near: &[TrackPoint]) -> Vec<Facet> {
     let mut facets = Vec::new();
     add_outline(&mut facets, &range.section, near);
-    for side in [1.0, -1.0] {
-        add_outline(
-            &mut facets,
-            &surface::rail_outline(side * surface::RAIL_OFFSET_M),
-            near,
-        );
+    for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
+        add_outline(&mut facets, &rail_outline(centre_m), near);
     }
     facets
 }
 
 fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection, near: &[TrackPoint]) {
-    let points = &section.points;
-    let edges = points.len().saturating_sub(usize::from(!section.closed));
     let mut q_m = 0.0;
-    for k in 0..edges {
-        let (a, b) = (points[k], points[(k + 1) % points.len()]);
-        let length_m = (b.l_m - a.l_m).hypot(b.h_m - a.h_m);
-        if length_m > 0.0 {
-            cut_edge(facets, [a, b], q_m, length_m, section.materials[k], near);
+    for edge in section.edges() {
+        if edge.length_m() > 0.0 {
+            cut_edge(facets, &edge, q_m, near);
         }
-        q_m += length_m;
+        q_m += edge.length_m();
     }
 }
 
 /// Cuts an edge into facets: where it leaves a row of stain cells, where the marks on it end, and
 /// where it passes lamps.
-fn cut_edge(
-    facets: &mut Vec<Facet>,
-    [a, b]: [OutlinePoint; 2],
-    q_m: f64,
-    length_m: f64,
-    material: Material,
-    near: &[TrackPoint],
-) {
+fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint]) {
+    let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
     let look = surface::look(material);
     let lines = (q_m / STAIN_CELL_M).floor() as i64 + 1..;
     let mut cuts: Vec<f64> = lines
