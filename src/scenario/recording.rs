@@ -1,6 +1,6 @@
 //! What a recording holds, and how finely.
 
-use crate::track::Problem;
+use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -39,40 +39,13 @@ impl Default for RecordSettings {
 impl RecordSettings {
     /// Appends what is wrong, with keys under `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let rates = [
-            ("stereo_image_hz", self.stereo_image_hz),
-            ("wayside_image_hz", self.wayside_image_hz),
-        ];
-        for (key, hz) in rates {
-            if !(0.0..=1000.0).contains(&hz) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("{hz} images a second"),
-                    "give 0 to 1000",
-                ));
-            }
-        }
-        if !(1..=100).contains(&self.jpeg_quality) {
-            problems.push(Problem::new(
-                format!("{at}.jpeg_quality"),
-                format!("a JPEG quality of {}", self.jpeg_quality),
-                "give 1 to 100",
-            ));
-        }
-        if !(1.0..=255.0).contains(&self.difference_gain) {
-            problems.push(Problem::new(
-                format!("{at}.difference_gain"),
-                format!("a gain of {}", self.difference_gain),
-                "give 1 to 255",
-            ));
-        }
-        if !(0.1..=1000.0).contains(&self.ring_step_m) {
-            problems.push(Problem::new(
-                format!("{at}.ring_step_m"),
-                format!("tunnel rings {} m apart", self.ring_step_m),
-                "give 0.1 m to 1000 m",
-            ));
-        }
+        let mut check = Checker::new(at, problems);
+        check.within("stereo_image_hz", self.stereo_image_hz, 0.0..=1e3, "Hz");
+        check.within("wayside_image_hz", self.wayside_image_hz, 0.0..=1e3, "Hz");
+        let quality = f64::from(self.jpeg_quality);
+        check.within("jpeg_quality", quality, 1.0..=100.0, "");
+        check.within("difference_gain", self.difference_gain, 1.0..=255.0, "");
+        check.within("ring_step_m", self.ring_step_m, 0.1..=1e3, "m");
     }
 }
 

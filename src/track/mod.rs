@@ -64,7 +64,7 @@ pub use file::{
 };
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
 pub use gauge::{Gauge, RAIL_FOOT_M, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
-pub use problem::{FileError, Problem};
+pub use problem::{Checker, FileError, Problem, key_below};
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,

@@ -46,6 +46,44 @@ impl Problem {
     }
 }
 
+/// Dotted key of `key` below `at`, which is empty for the whole file.
+pub fn key_below(at: &str, key: &str) -> String {
+    if at.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{at}.{key}")
+    }
+}
+
+/// Checks the numbers of one part of a file.
+///
+/// ```
+/// use metrotwin::track::Checker;
+///
+/// let mut problems = Vec::new();
+/// let mut check = Checker::new("train", &mut problems);
+/// check.within("cars", 0.0, 1.0..=6.0, "cars");
+/// assert_eq!(problems[0].to_string(), "train.cars: 0 cars is out of range; give 1 to 6 cars");
+/// ```
+#[derive(Debug)]
+pub struct Checker<'a> {
+    at: &'a str,
+    problems: &'a mut Vec<Problem>,
+}
+
+impl<'a> Checker<'a> {
+    /// Of what stands under the dotted key `at`; adds to `problems`.
+    pub fn new(at: &'a str, problems: &'a mut Vec<Problem>) -> Self {
+        Self { at, problems }
+    }
+
+    /// As [`Problem::unless_within`].
+    pub fn within(&mut self, key: &str, value: f64, range: RangeInclusive<f64>, unit: &str) {
+        let key = key_below(self.at, key);
+        Problem::unless_within(self.problems, key, value, range, unit);
+    }
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}; {}", self.key, self.what, self.remedy)

@@ -6,7 +6,7 @@
 //! antenna passes over it.
 
 use crate::bus::{Delivery, ObstacleWarning, SimTime, TrainReport, Via};
-use crate::track::{BaseStation, Problem};
+use crate::track::{BaseStation, Checker, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -54,13 +54,7 @@ impl RadioSettings {
                 "give 0 or more milliseconds",
             ));
         }
-        if !(0.0..=1.0).contains(&self.loss) {
-            problems.push(Problem::new(
-                format!("{at}.loss"),
-                format!("{} is no probability", self.loss),
-                "give a number from 0 (nothing is lost) to 1 (everything is)",
-            ));
-        }
+        Checker::new(at, problems).within("loss", self.loss, 0.0..=1.0, "");
         for (k, outage) in self.outages.iter().enumerate() {
             if outage.from_s.is_nan() || outage.to_s.is_nan() || outage.from_s >= outage.to_s {
                 problems.push(Problem::new(

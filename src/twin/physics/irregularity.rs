@@ -14,8 +14,7 @@
 //! wavelength bounds and nothing outside. The table is periodic in its length, which is over
 //! that of the line.
 
-use super::settings::within;
-use crate::track::{CANT_BASE_M, Problem};
+use crate::track::{CANT_BASE_M, Checker, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -71,17 +70,10 @@ impl Default for IrregularitySettings {
 impl IrregularitySettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        within(problems, at, "shortest_m", self.shortest_m, 0.5, 100.0, "m");
+        let mut check = Checker::new(at, problems);
+        check.within("shortest_m", self.shortest_m, 0.5..=100.0, "m");
         let longest = self.longest_m;
-        within(
-            problems,
-            at,
-            "longest_m",
-            longest,
-            2.0 * self.shortest_m,
-            300.0,
-            "m",
-        );
+        check.within("longest_m", longest, 2.0 * self.shortest_m..=300.0, "m");
     }
 }
 

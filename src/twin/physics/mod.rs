@@ -48,7 +48,7 @@ mod worker;
 pub use history::VehicleMotion;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{ObstacleSettings, ObstacleShape};
-pub(crate) use settings::within;
+
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings, VehicleSet};
 pub use truth::WorkerTruth;
 pub use worker::{Waypoint, WorkerSettings};

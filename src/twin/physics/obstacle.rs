@@ -3,8 +3,7 @@
 use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
 use super::ground::GROUND_GROUP;
-use super::settings::within;
-use crate::track::{Alignment, Problem, TrackPoint};
+use crate::track::{Alignment, Checker, Problem, TrackPoint};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::{
@@ -118,23 +117,21 @@ impl Default for ObstacleSettings {
 impl ObstacleSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            within(problems, at, key, value, low, high, unit);
-        };
+        let mut check = Checker::new(at, problems);
         for size in self.body.size_m().iter() {
-            check("body", *size, 0.01, 10.0, "m");
+            check.within("body", *size, 0.01..=10.0, "m");
         }
-        check("mass_kg", self.mass_kg, 0.01, 1e5, "kg");
-        check("friction", self.friction, 0.0, 2.0, "");
-        check("restitution", self.restitution, 0.0, 1.0, "");
-        check("albedo", self.albedo, 0.0, 1.0, "");
-        check("chainage_m", self.chainage_m, -1e6, 1e6, "m");
-        check("lateral_m", self.lateral_m, -10.0, 10.0, "m");
-        check("height_m", self.height_m, -1.0, 10.0, "m");
-        check("yaw_deg", self.yaw_deg, -360.0, 360.0, "deg");
-        check("appears_s", self.appears_s, 0.0, 1e6, "s");
+        check.within("mass_kg", self.mass_kg, 0.01..=1e5, "kg");
+        check.within("friction", self.friction, 0.0..=2.0, "");
+        check.within("restitution", self.restitution, 0.0..=1.0, "");
+        check.within("albedo", self.albedo, 0.0..=1.0, "");
+        check.within("chainage_m", self.chainage_m, -1e6..=1e6, "m");
+        check.within("lateral_m", self.lateral_m, -10.0..=10.0, "m");
+        check.within("height_m", self.height_m, -1.0..=10.0, "m");
+        check.within("yaw_deg", self.yaw_deg, -360.0..=360.0, "deg");
+        check.within("appears_s", self.appears_s, 0.0..=1e6, "s");
         for v in self.velocity_mps {
-            check("velocity_mps", v, -50.0, 50.0, "m/s");
+            check.within("velocity_mps", v, -50.0..=50.0, "m/s");
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
 use super::worker::WorkerSettings;
-use crate::track::Problem;
+use crate::track::{Checker, Problem, key_below};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,19 +41,20 @@ impl Default for PhysicsSettings {
 impl PhysicsSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        within(problems, at, "step_s", self.step_s, 1e-4, 2e-3, "s");
-        within(problems, at, "history_s", self.history_s, 0.01, 60.0, "s");
+        let mut check = Checker::new(at, problems);
+        check.within("step_s", self.step_s, 1e-4..=2e-3, "s");
+        check.within("history_s", self.history_s, 0.01..=60.0, "s");
         self.track
             .irregularity
-            .check(&join(at, "track.irregularity"), problems);
+            .check(&key_below(at, "track.irregularity"), problems);
         if let Some(train) = &self.train {
-            train.check(&join(at, "train"), problems);
+            train.check(&key_below(at, "train"), problems);
         }
         for (k, obstacle) in self.obstacles.iter().enumerate() {
-            obstacle.check(&join(at, &format!("obstacles[{k}]")), problems);
+            obstacle.check(&key_below(at, &format!("obstacles[{k}]")), problems);
         }
         for (k, worker) in self.workers.iter().enumerate() {
-            worker.check(&join(at, &format!("workers[{k}]")), problems);
+            worker.check(&key_below(at, &format!("workers[{k}]")), problems);
         }
     }
 }
@@ -156,95 +157,59 @@ impl Default for TrainSettings {
 impl TrainSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            within(problems, at, key, value, low, high, unit);
-        };
-        check("cars", f64::from(self.cars), 1.0, 6.0, "cars");
+        let mut check = Checker::new(at, problems);
+        check.within("cars", f64::from(self.cars), 1.0..=6.0, "cars");
         // A car must hold two bogies 17.5 m (or 19 m) apart.
-        check("car_length_m", self.car_length_m, 19.2, 30.0, "m");
-        check("width_m", self.width_m, 2.0, 3.6, "m");
-        check("height_m", self.height_m, 3.0, 5.0, "m");
-        check("start_chainage_m", self.start_chainage_m, -1e6, 1e6, "m");
-        check("start_speed_kmh", self.start_speed_kmh, 0.0, 160.0, "km/h");
-        check("start_s", self.start_s, 0.0, 1e6, "s");
-        check(
+        check.within("car_length_m", self.car_length_m, 19.2..=30.0, "m");
+        check.within("width_m", self.width_m, 2.0..=3.6, "m");
+        check.within("height_m", self.height_m, 3.0..=5.0, "m");
+        check.within("start_chainage_m", self.start_chainage_m, -1e6..=1e6, "m");
+        check.within("start_speed_kmh", self.start_speed_kmh, 0.0..=160.0, "km/h");
+        check.within("start_s", self.start_s, 0.0..=1e6, "s");
+        check.within(
             "cruise_speed_kmh",
             self.cruise_speed_kmh,
-            0.0,
-            160.0,
+            0.0..=160.0,
             "km/h",
         );
         if let Some(stop) = self.stop_at_m {
-            check("stop_at_m", stop, self.start_chainage_m, 1e6, "m");
+            check.within("stop_at_m", stop, self.start_chainage_m..=1e6, "m");
         }
-        check("accel_mps2", self.accel_mps2, 0.05, 2.0, "m/s^2");
-        check(
+        check.within("accel_mps2", self.accel_mps2, 0.05..=2.0, "m/s^2");
+        check.within(
             "service_brake_mps2",
             self.service_brake_mps2,
-            0.1,
-            2.5,
+            0.1..=2.5,
             "m/s^2",
         );
-        check(
+        check.within(
             "emergency_brake_mps2",
             self.emergency_brake_mps2,
-            0.1,
-            3.0,
+            0.1..=3.0,
             "m/s^2",
         );
-        check("jerk_mps3", self.jerk_mps3, 0.05, 10.0, "m/s^3");
-        check(
+        check.within("jerk_mps3", self.jerk_mps3, 0.05..=10.0, "m/s^3");
+        check.within(
             "service_build_up_s",
             self.service_build_up_s,
-            0.0,
-            10.0,
+            0.0..=10.0,
             "s",
         );
-        check(
+        check.within(
             "emergency_build_up_s",
             self.emergency_build_up_s,
-            0.0,
-            10.0,
+            0.0..=10.0,
             "s",
         );
-        check(
+        check.within(
             "rotating_mass_share",
             self.rotating_mass_share,
-            0.0,
-            0.3,
+            0.0..=0.3,
             "",
         );
-        check("davis_a_mps2", self.davis_a_mps2, 0.0, 1.0, "m/s^2");
-        check("davis_b_per_s", self.davis_b_per_s, 0.0, 0.1, "1/s");
-        check("davis_c_per_m", self.davis_c_per_m, 0.0, 0.01, "1/m");
-        check("headlight_cd", self.headlight_cd, 0.0, 1e7, "cd");
-    }
-}
-
-/// Dotted key below `at`.
-pub(super) fn join(at: &str, key: &str) -> String {
-    if at.is_empty() {
-        key.to_owned()
-    } else {
-        format!("{at}.{key}")
-    }
-}
-
-/// Complains unless `low <= value <= high` (so also of NaN).
-pub(crate) fn within(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    low: f64,
-    high: f64,
-    unit: &str,
-) {
-    if !(low..=high).contains(&value) {
-        problems.push(Problem::new(
-            join(at, key),
-            format!("{value} {unit} is out of range"),
-            format!("use {low} to {high} {unit}"),
-        ));
+        check.within("davis_a_mps2", self.davis_a_mps2, 0.0..=1.0, "m/s^2");
+        check.within("davis_b_per_s", self.davis_b_per_s, 0.0..=0.1, "1/s");
+        check.within("davis_c_per_m", self.davis_c_per_m, 0.0..=0.01, "1/m");
+        check.within("headlight_cd", self.headlight_cd, 0.0..=1e7, "cd");
     }
 }

@@ -1,8 +1,7 @@
 //! People on the line: they walk where their path says, and may leave something behind.
 
 use super::obstacle::ObstacleSettings;
-use super::settings::{join, within};
-use crate::track::{Alignment, BED_M, Problem, TrackPoint};
+use crate::track::{Alignment, BED_M, Checker, Problem, TrackPoint, key_below};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -57,15 +56,16 @@ impl Default for WorkerSettings {
 impl WorkerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        within(problems, at, "stature_m", self.stature_m, 1.0, 2.3, "m");
-        within(problems, at, "ground_m", self.ground_m, -2.0, 2.0, "m");
-        within(problems, at, "albedo", self.albedo, 0.0, 1.0, "");
+        let mut check = Checker::new(at, problems);
+        check.within("stature_m", self.stature_m, 1.0..=2.3, "m");
+        check.within("ground_m", self.ground_m, -2.0..=2.0, "m");
+        check.within("albedo", self.albedo, 0.0..=1.0, "");
         if let Some(carried) = &self.carries {
-            carried.check(&join(at, "carries"), problems);
+            carried.check(&key_below(at, "carries"), problems);
         }
         if self.path.is_empty() {
             problems.push(Problem::new(
-                join(at, "path"),
+                key_below(at, "path"),
                 "there is no waypoint",
                 "give at least one { time_s, chainage_m, lateral_m }",
             ));
@@ -74,17 +74,18 @@ impl WorkerSettings {
             let in_order = pair[1].time_s > pair[0].time_s;
             if !in_order {
                 problems.push(Problem::new(
-                    join(at, &format!("path[{}].time_s", k + 1)),
+                    key_below(at, &format!("path[{}].time_s", k + 1)),
                     format!("{} s is not after {} s", pair[1].time_s, pair[0].time_s),
                     "put the waypoints in order of time",
                 ));
             }
         }
         for (k, p) in self.path.iter().enumerate() {
-            let at = join(at, &format!("path[{k}]"));
-            within(problems, &at, "time_s", p.time_s, 0.0, 1e6, "s");
-            within(problems, &at, "chainage_m", p.chainage_m, -1e6, 1e6, "m");
-            within(problems, &at, "lateral_m", p.lateral_m, -10.0, 10.0, "m");
+            let at = key_below(at, &format!("path[{k}]"));
+            let mut check = Checker::new(&at, problems);
+            check.within("time_s", p.time_s, 0.0..=1e6, "s");
+            check.within("chainage_m", p.chainage_m, -1e6..=1e6, "m");
+            check.within("lateral_m", p.lateral_m, -10.0..=10.0, "m");
         }
     }
 }

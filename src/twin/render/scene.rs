@@ -2,7 +2,7 @@
 
 use crate::bus::{CameraModel, SimTime};
 use crate::track::uid::Waveform;
-use crate::track::{Problem, Tunnel};
+use crate::track::{Checker, Problem, Tunnel};
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use schemars::JsonSchema;
@@ -132,21 +132,18 @@ pub struct SensorSettings {
 impl SensorSettings {
     /// Appends what is wrong, with keys below `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut within = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            Problem::unless_within(problems, format!("{at}.{key}"), value, low..=high, unit);
-        };
-        within("grey_per_cd_s", self.grey_per_cd_s, 1e-3, 1e9, "");
-        within("black_level_grey", self.black_level_grey, 0.0, 255.0, "");
-        within(
+        let mut check = Checker::new(at, problems);
+        check.within("grey_per_cd_s", self.grey_per_cd_s, 1e-3..=1e9, "");
+        check.within("black_level_grey", self.black_level_grey, 0.0..=255.0, "");
+        check.within(
             "electrons_per_grey",
             self.electrons_per_grey,
-            1e-3,
-            1e6,
+            1e-3..=1e6,
             "e",
         );
-        within("read_noise_e", self.read_noise_e, 0.0, 1e5, "e");
-        within("halo_share", self.halo_share, 0.0, 1.0, "");
-        within("halo_px", self.halo_px, 0.1, 1e3, "px");
+        check.within("read_noise_e", self.read_noise_e, 0.0..=1e5, "e");
+        check.within("halo_share", self.halo_share, 0.0..=1.0, "");
+        check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
     }
 }
 

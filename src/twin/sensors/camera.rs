@@ -14,7 +14,7 @@
 
 use super::super::render::SensorSettings;
 use crate::bus::{CameraModel, Intrinsics, RigCalibration, Shutter, WaysideCalibration};
-use crate::track::{LampSite, Problem, TrackPoint, Tunnel, WaysideSite};
+use crate::track::{Checker, LampSite, Problem, TrackPoint, Tunnel, WaysideSite};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -59,14 +59,9 @@ impl Optics {
         positive(problems, at, "pixel_um", self.pixel_um, "um", 3.75);
         positive(problems, at, "exposure_us", self.exposure_us, "us", 30.0);
         positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
+        let mut check = Checker::new(at, problems);
         for (key, value) in [("width_px", self.width_px), ("height_px", self.height_px)] {
-            if !(16..=8192).contains(&value) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("{value} px is no size of an image"),
-                    "give 16 to 8192 px",
-                ));
-            }
+            check.within(key, f64::from(value), 16.0..=8192.0, "px");
         }
         if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
             problems.push(Problem::new(
@@ -226,32 +221,30 @@ impl RigSettings {
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
-        within(problems, at, "forward_m", self.forward_m, "m", 5.0);
-        within(problems, at, "lateral_m", self.lateral_m, "m", 2.0);
-        within(problems, at, "yaw_deg", self.yaw_deg, "deg", 180.0);
-        within(problems, at, "pitch_deg", self.pitch_deg, "deg", 89.0);
+        let mut check = Checker::new(at, problems);
+        check.within("forward_m", self.forward_m, -5.0..=5.0, "m");
+        check.within("lateral_m", self.lateral_m, -2.0..=2.0, "m");
+        check.within("yaw_deg", self.yaw_deg, -180.0..=180.0, "deg");
+        check.within("pitch_deg", self.pitch_deg, -89.0..=89.0, "deg");
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let half_focal = 0.5 * self.focal_length_mm.abs();
         let half_baseline = 0.5 * self.baseline_mm.abs();
-        within(
-            problems,
-            &at,
+        let mut check = Checker::new(&at, problems);
+        check.within(
             "focal_length_mm",
             error.focal_length_mm,
+            -half_focal..=half_focal,
             "mm",
-            half_focal,
         );
-        within(
-            problems,
-            &at,
+        check.within(
             "baseline_mm",
             error.baseline_mm,
+            -half_baseline..=half_baseline,
             "mm",
-            half_baseline,
         );
-        within(problems, &at, "yaw_deg", error.yaw_deg, "deg", 45.0);
-        within(problems, &at, "pitch_deg", error.pitch_deg, "deg", 45.0);
+        check.within("yaw_deg", error.yaw_deg, -45.0..=45.0, "deg");
+        check.within("pitch_deg", error.pitch_deg, -45.0..=45.0, "deg");
     }
 
     fn optics(&self) -> Optics {
@@ -490,16 +483,6 @@ fn positive(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: 
             format!("{at}.{key}"),
             format!("{value} {unit} is not greater than 0"),
             format!("give a positive number of {unit}, usually {usual}"),
-        ));
-    }
-}
-
-fn within(problems: &mut Vec<Problem>, at: &str, key: &str, value: f64, unit: &str, limit: f64) {
-    if !(-limit..=limit).contains(&value) {
-        problems.push(Problem::new(
-            format!("{at}.{key}"),
-            format!("{value} {unit} is out of range"),
-            format!("give {} to {limit} {unit}", -limit),
         ));
     }
 }

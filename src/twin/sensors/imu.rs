@@ -6,8 +6,8 @@
 //! at a random value of its own; IEEE Std 952 describes the model.
 
 use crate::bus::ImuSample;
-use crate::track::Problem;
-use crate::twin::physics::{VehicleMotion, World, within};
+use crate::track::{Checker, Problem};
+use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
@@ -65,35 +65,36 @@ impl Default for ImuSettings {
 impl ImuSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            within(problems, at, key, value, low, high, unit);
-        };
+        let mut check = Checker::new(at, problems);
         // The data sheet's fastest is 2460 a second; the physics steps a thousand times.
-        check("rate_hz", self.rate_hz, 1.0, 1000.0, "Hz");
+        check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
         for p in self.position_m {
-            check("position_m", p, -30.0, 10.0, "m");
+            check.within("position_m", p, -30.0..=10.0, "m");
         }
-        check("gyro_bias_deg_h", self.gyro_bias_deg_h, 0.0, 1e5, "deg/h");
+        check.within("gyro_bias_deg_h", self.gyro_bias_deg_h, 0.0..=1e5, "deg/h");
         let walk = self.angle_random_walk_deg_sqrt_h;
-        check(
+        check.within(
             "angle_random_walk_deg_sqrt_h",
             walk,
-            0.0,
-            1e3,
+            0.0..=1e3,
             "deg/sqrt(h)",
         );
-        check("gyro_range_deg_s", self.gyro_range_deg_s, 1.0, 1e5, "deg/s");
-        check("accel_bias_mg", self.accel_bias_mg, 0.0, 1e4, "mg");
+        check.within(
+            "gyro_range_deg_s",
+            self.gyro_range_deg_s,
+            1.0..=1e5,
+            "deg/s",
+        );
+        check.within("accel_bias_mg", self.accel_bias_mg, 0.0..=1e4, "mg");
         let walk = self.velocity_random_walk_mps_sqrt_h;
-        check(
+        check.within(
             "velocity_random_walk_mps_sqrt_h",
             walk,
-            0.0,
-            1e3,
+            0.0..=1e3,
             "m/s/sqrt(h)",
         );
-        check("accel_range_g", self.accel_range_g, 1.5, 1e4, "g");
-        check("bias_time_s", self.bias_time_s, 1.0, 1e9, "s");
+        check.within("accel_range_g", self.accel_range_g, 1.5..=1e4, "g");
+        check.within("bias_time_s", self.bias_time_s, 1.0..=1e9, "s");
     }
 }
 

@@ -7,7 +7,7 @@
 //! below the detector's threshold there is no echo. No beam divergence, no mixed echoes at edges.
 
 use crate::bus::{LidarReturn, LidarScan, SimTime};
-use crate::track::{Problem, Tunnel};
+use crate::track::{Checker, Problem, Tunnel};
 use crate::twin::random::Stream;
 use crate::twin::render::Body;
 use crate::twin::render::cpu::{Solid, TunnelCaster};
@@ -63,35 +63,25 @@ impl Default for LidarSettings {
 impl LidarSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut within = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            if !(low..=high).contains(&value) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("{value} {unit} is out of range"),
-                    format!("use {low} to {high} {unit}"),
-                ));
-            }
-        };
-        within("channels", f64::from(self.channels), 1.0, 256.0, "beams");
-        within("lowest_deg", self.lowest_deg, -89.0, 89.0, "deg");
-        within(
+        let mut check = Checker::new(at, problems);
+        check.within("channels", f64::from(self.channels), 1.0..=256.0, "beams");
+        check.within("lowest_deg", self.lowest_deg, -89.0..=89.0, "deg");
+        check.within(
             "highest_deg",
             self.highest_deg,
-            self.lowest_deg,
-            89.0,
+            self.lowest_deg..=89.0,
             "deg",
         );
-        within("half_sector_deg", self.half_sector_deg, 0.0, 180.0, "deg");
-        within("step_deg", self.step_deg, 0.01, 10.0, "deg");
-        within("rate_hz", self.rate_hz, 0.1, 100.0, "Hz");
-        within("range_noise_m", self.range_noise_m, 0.0, 1.0, "m");
-        within("min_range_m", self.min_range_m, 0.0, self.max_range_m, "m");
-        within("max_range_m", self.max_range_m, 1.0, 500.0, "m");
-        within(
+        check.within("half_sector_deg", self.half_sector_deg, 0.0..=180.0, "deg");
+        check.within("step_deg", self.step_deg, 0.01..=10.0, "deg");
+        check.within("rate_hz", self.rate_hz, 0.1..=100.0, "Hz");
+        check.within("range_noise_m", self.range_noise_m, 0.0..=1.0, "m");
+        check.within("min_range_m", self.min_range_m, 0.0..=self.max_range_m, "m");
+        check.within("max_range_m", self.max_range_m, 1.0..=500.0, "m");
+        check.within(
             "threshold_reflectance",
             self.threshold_reflectance,
-            0.0,
-            1.0,
+            0.0..=1.0,
             "of 1",
         );
     }

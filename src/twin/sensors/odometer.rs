@@ -5,8 +5,8 @@
 //! no slip or slide.
 
 use crate::bus::{OdometerSample, SimTime};
-use crate::track::Problem;
-use crate::twin::physics::{World, within};
+use crate::track::{Checker, Problem};
+use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -41,14 +41,17 @@ impl Default for OdometerSettings {
 impl OdometerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = |key: &str, value: f64, low: f64, high: f64, unit: &str| {
-            within(problems, at, key, value, low, high, unit);
-        };
-        check("rate_hz", self.rate_hz, 1.0, 1000.0, "Hz");
+        let mut check = Checker::new(at, problems);
+        check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
         let pulses = f64::from(self.pulses_per_turn);
-        check("pulses_per_turn", pulses, 1.0, 1e5, "pulses");
-        check("wheel_radius_m", self.wheel_radius_m, 0.2, 0.7, "m");
-        check("radius_error_share", self.radius_error_share, 0.0, 0.05, "");
+        check.within("pulses_per_turn", pulses, 1.0..=1e5, "pulses");
+        check.within("wheel_radius_m", self.wheel_radius_m, 0.2..=0.7, "m");
+        check.within(
+            "radius_error_share",
+            self.radius_error_share,
+            0.0..=0.05,
+            "",
+        );
     }
 }
 
