@@ -204,12 +204,12 @@ impl Open {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         let (stream, scene) = (&self.stream, &self.scene);
         let time = match *event {
-            Event::Train(truth) => {
-                self.moving.train(scene, truth);
-                self.plots.train(truth);
-                let head = truth.world_from_vehicle;
+            Event::Train(train, left) => {
+                self.moving.train(scene, train, left);
+                self.plots.train(train);
+                let head = train.world_from_vehicle;
                 self.lay_out(Some(&head))?;
-                truth.time
+                train.time
             }
             Event::Bodies(time, bodies) => {
                 self.moving.bodies(stream, scene, time, bodies)?;

@@ -5,8 +5,9 @@ use super::scene::{HEAD, Scene, turn, ui};
 use super::stream::{Stream, failed};
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
-use crate::session::{ObserverError, Opening, TrainTruth};
+use crate::session::{ObserverError, Opening};
 use crate::track::TrackPoint;
+use crate::twin::physics::TrainState;
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::RotationQuat;
@@ -108,19 +109,24 @@ impl Moving {
     }
 
     /// Keeps the train's pose for the next flush.
-    pub(super) fn train(&mut self, scene: &Scene, truth: &TrainTruth) {
+    pub(super) fn train(
+        &mut self,
+        scene: &Scene,
+        truth: &TrainState,
+        world_from_left: Option<&Isometry3<f64>>,
+    ) {
         let head_and_cars =
             std::iter::once(&truth.world_from_vehicle).chain(&truth.world_from_cars);
         for (poses, pose) in self.train.iter_mut().zip(head_and_cars) {
             poses.push(scene, truth.time, pose);
         }
-        if let (Some(left), Some((rig, eyes))) = (truth.world_from_left, &mut self.rig) {
+        if let (Some(left), Some((rig, eyes))) = (world_from_left, &mut self.rig) {
             let right = left * Isometry3::translation(rig.baseline_m, 0.0, 0.0);
-            for (poses, pose) in eyes.iter_mut().zip([left, right]) {
+            for (poses, pose) in eyes.iter_mut().zip([*left, right]) {
                 poses.push(scene, truth.time, &pose);
             }
         }
-        self.left = truth.world_from_left;
+        self.left = world_from_left.copied();
     }
 
     /// Sends the poses kept.

@@ -3,7 +3,8 @@
 use super::stream::{Stream, failed};
 use super::{Contents, palette, slug};
 use crate::bus::{LedReport, Method, ProtectionReport, SimTime, WaysideReport};
-use crate::session::{ObserverError, TrainTruth};
+use crate::session::ObserverError;
+use crate::twin::physics::TrainState;
 use rerun::external::re_sdk_types::blueprint::components::Corner2D;
 use rerun::{Color, Scalars, SeriesLines};
 use std::collections::BTreeMap;
@@ -179,7 +180,7 @@ impl Plots {
     }
 
     /// True speed and shaking.
-    pub(super) fn train(&mut self, truth: &TrainTruth) {
+    pub(super) fn train(&mut self, truth: &TrainState) {
         let t = truth.time;
         self.push("plots/speed/true", t, truth.speed_mps * KMH);
         self.push("plots/vibration/vertical", t, truth.floor_accel_mps2.z);

@@ -8,9 +8,10 @@
 )]
 
 use crate::bus::*;
-use crate::session::{Event, Observer, Opening, TrainTruth};
+use crate::session::{Event, Observer, Opening};
 use crate::track::uid::Uid;
 use crate::track::*;
+use crate::twin::physics::TrainState;
 use crate::twin::random::Stream as Random;
 use crate::twin::render::{Body, Shape};
 use image::{GrayImage, Luma};
@@ -253,13 +254,11 @@ impl Session<'_> {
             self.tunnel.alignment.at(middle).world_from_line()
                 * Isometry3::translation(0.0, 0.0, 2.1)
         };
-        let truth = TrainTruth {
+        let truth = TrainState {
             time: SimTime::from_secs(t_s),
             chainage_m,
             speed_mps,
-            accel_mps2: 0.0,
             world_from_vehicle: self.vehicle(t_s),
-            world_from_left: Some(self.vehicle(t_s) * self.rig.vehicle_from_left),
             world_from_cars: (0..self.cars).map(car).collect(),
             floor_accel_mps2: Vector3::new(
                 0.0,
@@ -267,8 +266,10 @@ impl Session<'_> {
                 0.5 * (t_s * 23.0).sin() * (t_s * 3.0).cos(),
             ),
             secondary_travel_m: 0.012 * (t_s * 7.0).sin(),
+            ..TrainState::default()
         };
-        self.tell(&Event::Train(&truth));
+        let left = truth.world_from_vehicle * self.rig.vehicle_from_left;
+        self.tell(&Event::Train(&truth, Some(&left)));
     }
 
     fn bodies(&mut self, t_s: f64) {

@@ -5,6 +5,7 @@ use crate::bus::{
     WaysideReport,
 };
 use crate::track::Tunnel;
+use crate::twin::physics::TrainState;
 use crate::twin::render::Body;
 use image::GrayImage;
 use nalgebra::{Isometry3, Vector3};
@@ -30,34 +31,12 @@ pub struct Opening<'a> {
     pub protection: bool,
 }
 
-/// The train as it really is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TrainTruth {
-    /// When.
-    pub time: SimTime,
-    /// Chainage of the head.
-    pub chainage_m: f64,
-    /// Speed along the line.
-    pub speed_mps: f64,
-    /// Acceleration along the line.
-    pub accel_mps2: f64,
-    /// Pose of the vehicle frame of the leading car.
-    pub world_from_vehicle: Isometry3<f64>,
-    /// Pose of the left camera, where there is a rig.
-    pub world_from_left: Option<Isometry3<f64>>,
-    /// Poses of the centres of all car bodies, leading car first.
-    pub world_from_cars: Vec<Isometry3<f64>>,
-    /// Vertical and lateral acceleration of the leading car's floor over its first bogie.
-    pub floor_accel_mps2: Vector3<f64>,
-    /// Vertical travel of the leading car's secondary suspension, front bogie.
-    pub secondary_travel_m: f64,
-}
-
 /// One thing that happened. Events come in order of their time of completion.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
-    /// Regular truth, 50 times a second.
-    Train(&'a TrainTruth),
+    /// The train as it really is and the pose of its left camera, where it has a rig; 50 times a
+    /// second.
+    Train(&'a TrainState, Option<&'a Isometry3<f64>>),
     /// Everything solid but the train, 10 times a second.
     Bodies(SimTime, &'a [Body]),
     /// A pair of images, what the stack said of it, and the true chainage at each fix's time.

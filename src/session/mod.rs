@@ -21,12 +21,15 @@ mod bench;
 pub(crate) mod cameras;
 mod devices;
 mod event;
+mod eyes;
+mod outcome;
 mod run;
 mod score;
+mod shots;
 mod summary;
 mod watch;
 
-pub use event::{Event, Observer, ObserverError, Opening, TrainTruth};
+pub use event::{Event, Observer, ObserverError, Opening};
 pub use summary::{
     Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary, WallShares,
     Wayside,

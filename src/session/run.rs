@@ -1,29 +1,23 @@
 //! A run with a train: every step the world moves, sensors sample, cameras trigger, images that
 //! are due reach the stack, and what the stack decides acts on the train.
-//!
-//! An image is handed to the renderer when its last row has closed, and reaches the stack
-//! `latency_ms` later; the renderer draws in between, while the world goes on. So the order of
-//! things does not depend on how fast anything is.
 
-use super::WallShares;
-use super::cameras::{Clock, StereoCamera, pair};
+use super::cameras::Clock;
 use super::devices::{Device, Look};
-use super::score::PositioningScore;
-use super::summary::{self, Summary};
-use super::watch::{Stopwatch, Watchers, now};
-use super::{End, Event, Observer, Opening, Physics, RunOptions, SessionError, TrainTruth};
-use crate::bus::{BrakeDemand, Frame, Method, SimTime, TrainCommand, TrainReport};
+use super::eyes::Eyes;
+use super::outcome::Outcome;
+use super::shots::{Shot, Shots, What};
+use super::watch::{Costs, Watchers};
+use super::{End, Event, Observer, Opening, RunOptions, SessionError, Summary};
+use crate::bus::{Frame, Method, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
-use crate::stack::positioning::LedPositioner;
 use crate::stack::protection::Protection;
 use crate::twin::comms::Comms;
-use crate::twin::physics::{TrainState, World};
+use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::{Job, Renderer, View};
 use crate::twin::sensors::{Imu, Odometer};
 use image::GrayImage;
-use nalgebra::{Isometry3, Vector3};
-use std::collections::VecDeque;
+use nalgebra::Vector3;
 
 /// Cycles of the protection a second.
 const PROTECTION_HZ: f64 = 10.0;
@@ -32,32 +26,11 @@ const TRUTH_HZ: f64 = 50.0;
 /// Positions of everything else shown to observers a second.
 const BODIES_HZ: f64 = 10.0;
 
-/// Images on their way from shutter to stack.
-struct Pending {
-    number: u32,
-    start: SimTime,
-    deliver: SimTime,
-    what: What,
-}
-
-enum What {
-    Pair,
-    Wayside(usize, Look),
-}
-
-/// The eyes on the train and what reads them.
-struct Eyes {
-    camera: StereoCamera,
-    clock: Clock,
-    positioner: LedPositioner,
-    score: PositioningScore,
-}
-
 /// One run under way.
 pub struct Run<'s> {
     scenario: &'s Scenario,
     world: World,
-    renderer: Box<dyn Renderer>,
+    shots: Shots,
     imu: Imu,
     imu_clock: Clock,
     odometer: Odometer,
@@ -70,31 +43,9 @@ pub struct Run<'s> {
     command: TrainCommand,
     truth_clock: Clock,
     bodies_clock: Clock,
-    pending: VecDeque<Pending>,
+    wayside_frames: u32,
     outcome: Outcome,
     cost: Costs,
-}
-
-/// What a run came to.
-#[derive(Default)]
-struct Outcome {
-    /// An obstacle ahead permits less than the driver aims at.
-    slowed_by_obstacle: bool,
-    brake_commanded: Option<SimTime>,
-    stopped: Option<SimTime>,
-    has_run: bool,
-    standing_since: Option<SimTime>,
-    stereo_frames: u32,
-    wayside_frames: u32,
-    steps: u64,
-}
-
-#[derive(Default)]
-struct Costs {
-    physics: Stopwatch,
-    submit: Stopwatch,
-    wait: Stopwatch,
-    stack: Stopwatch,
 }
 
 impl<'s> Run<'s> {
@@ -106,20 +57,14 @@ impl<'s> Run<'s> {
         let world = World::new(map.clone(), &scenario.physics, seed, 0)?;
         let imu = Imu::new(&scenario.imu, seed, 0);
         let odometer = Odometer::new(&scenario.odometer, seed, 0);
-        let eyes = (scenario
-            .rig
-            .as_ref()
-            .filter(|_| scenario.physics.train.is_some()))
-        .map(|rig| Eyes {
-            camera: StereoCamera::new(rig, seed),
-            clock: Clock::new(rig.pairs_per_s),
-            positioner: LedPositioner::new(&scenario.stack.led, rig.calibration(), map.clone()),
-            score: PositioningScore::new(map.clone(), &Method::ALL),
-        });
+        let rig = scenario.rig.as_ref();
+        let eyes = rig
+            .filter(|_| scenario.physics.train.is_some())
+            .map(|rig| Eyes::new(scenario, rig));
         Ok(Self {
             scenario,
             world,
-            renderer,
+            shots: Shots::new(renderer, scenario.stack.latency_ms),
             imu_clock: Clock::new(1.0 / imu.period_s()),
             imu,
             odometer_clock: Clock::new(1.0 / odometer.period_s()),
@@ -132,7 +77,7 @@ impl<'s> Run<'s> {
             command: TrainCommand::default(),
             truth_clock: Clock::new(TRUTH_HZ),
             bodies_clock: Clock::new(BODIES_HZ),
-            pending: VecDeque::new(),
+            wayside_frames: 0,
             outcome: Outcome::default(),
             cost: Costs::default(),
         })
@@ -144,7 +89,6 @@ impl<'s> Run<'s> {
         options: &RunOptions<'_>,
         observers: &mut [&mut dyn Observer],
     ) -> Result<Summary, SessionError> {
-        let begin = now();
         let mut watchers = Watchers::new(observers);
         self.open(&mut watchers)?;
         let end = self.steps(options, &mut watchers);
@@ -154,7 +98,7 @@ impl<'s> Run<'s> {
             Err(SessionError::Physics(error)) => End::Failed(error.to_string()),
             Err(other) => return Err(other),
         };
-        Ok(self.summary(end, begin.elapsed().as_secs_f64(), watchers.watch))
+        Ok(self.summary(end, &watchers))
     }
 
     fn open(&self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
@@ -204,13 +148,12 @@ impl<'s> Run<'s> {
         let before_m = self.world.head_m();
         let (world, command) = (&mut self.world, &self.command);
         self.cost.physics.time(|| world.step(command)).0?;
-        self.outcome.steps += 1;
         let now = self.world.time();
         self.sample_motion(now);
         self.meet_messages(now, before_m, watchers)?;
         self.trigger(now)?;
-        while self.pending.front().is_some_and(|p| p.deliver <= now) {
-            self.deliver(now, watchers)?;
+        while let Some((shot, images)) = self.shots.due(now, &mut self.cost)? {
+            self.deliver(now, shot, images, watchers)?;
         }
         self.protect(now, watchers)?;
         self.show_truth(now, watchers)
@@ -270,29 +213,32 @@ impl<'s> Run<'s> {
                 .camera
                 .views(number, start, |t| world.vehicle_at(t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
-            self.submit(now, number, start, views.into(), What::Pair)?;
-            self.outcome.stereo_frames += 1;
+            let what = What::Pair;
+            let shot = Shot {
+                number,
+                start,
+                what,
+            };
+            self.submit(now, views.into(), shot)?;
         }
         for k in 0..self.devices.len() {
             if let Some((number, start, view)) = self.devices[k].due(now) {
-                let look = self.devices[k].look(&self.world, start, number);
-                self.submit(now, number, start, vec![view], What::Wayside(k, look))?;
-                self.outcome.wayside_frames += 1;
+                let what = What::Wayside(k, self.devices[k].look(&self.world, start, number));
+                let shot = Shot {
+                    number,
+                    start,
+                    what,
+                };
+                self.submit(now, vec![view], shot)?;
+                self.wayside_frames += 1;
             }
         }
         Ok(())
     }
 
-    fn submit(
-        &mut self,
-        now: SimTime,
-        number: u32,
-        start: SimTime,
-        views: Vec<View>,
-        what: What,
-    ) -> Result<(), SessionError> {
+    fn submit(&mut self, now: SimTime, views: Vec<View>, shot: Shot) -> Result<(), SessionError> {
         let mut bodies = self.world.bodies();
-        if matches!(what, What::Wayside(..)) {
+        if matches!(shot.what, What::Wayside(..)) {
             bodies.extend(self.world.train_bodies());
         }
         let job = Job {
@@ -301,98 +247,75 @@ impl<'s> Run<'s> {
             headlights: self.world.headlights(),
             views,
         };
-        let renderer = &mut self.renderer;
-        self.cost.submit.time(|| renderer.submit(&job)).0?;
-        // Results arrive in the order of submission, so none is due before the one ahead of it.
-        let own = now.plus(1e-3 * self.scenario.stack.latency_ms);
-        let ahead = self.pending.back().map_or(own, |p| p.deliver);
-        self.pending.push_back(Pending {
-            number,
-            start,
-            deliver: own.max(ahead),
-            what,
-        });
-        Ok(())
+        Ok(self.shots.submit(&job, shot, &mut self.cost)?)
     }
 
-    /// The oldest images reach the stack.
+    /// Images reach the stack.
     fn deliver(
         &mut self,
         now: SimTime,
+        shot: Shot,
+        mut images: Vec<GrayImage>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        let Some(pending) = self.pending.pop_front() else {
-            return Ok(());
-        };
-        let renderer = &mut self.renderer;
-        let images = self.cost.wait.time(|| renderer.collect()).0?;
-        let (number, start) = (pending.number, pending.start);
-        match pending.what {
-            What::Pair => self.judge_pair(number, start, images, watchers),
-            What::Wayside(k, look) => {
-                self.judge_wayside(now, k, number, start, &look, images, watchers)
-            }
+        let Shot {
+            number,
+            start,
+            what,
+        } = shot;
+        match what {
+            What::Pair => self.judge_pair((number, start), images, watchers),
+            What::Wayside(k, look) => match images.pop() {
+                Some(image) => {
+                    let frame = Frame {
+                        number,
+                        start,
+                        image,
+                    };
+                    self.judge_wayside(now, k, &frame, &look, watchers)
+                }
+                None => Ok(()),
+            },
         }
     }
 
     fn judge_pair(
         &mut self,
-        number: u32,
-        start: SimTime,
+        frame: (u32, SimTime),
         images: Vec<GrayImage>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        let (Some(eyes), Ok(images)) = (&mut self.eyes, images.try_into()) else {
+        let (Some(eyes), world) = (&mut self.eyes, &self.world) else {
             return Ok(());
         };
-        let images = pair(number, start, images);
-        let positioner = &mut eyes.positioner;
-        let (report, seconds) = self.cost.stack.time(|| positioner.on_pair(&images));
-        let (world, rig) = (&self.world, &eyes.camera.rig);
-        let left_at = |t| Some(world.vehicle_at(t)? * rig.vehicle_from_left);
-        let intrinsics = rig.camera.intrinsics;
-        eyes.score
-            .report(&report, 1e3 * seconds, &intrinsics, left_at);
-        let mut truths_m = Vec::with_capacity(report.fixes.len());
-        for fix in &report.fixes {
-            let truth_m = world
-                .chainage_at(fix.time)
-                .ok_or(SessionError::PoseForgotten(fix.time.secs()))?;
-            eyes.score.fix(fix, truth_m);
-            truths_m.push(truth_m);
-            if fix.method == Method::Paper {
-                self.protection.on_fix(fix);
-            }
+        let watch = &mut self.cost.stack;
+        let (vehicle_at, head_at) = (|t| world.vehicle_at(t), |t| world.chainage_at(t));
+        let Some(read) = eyes.read(frame, images, watch, vehicle_at, head_at)? else {
+            return Ok(());
+        };
+        for fix in read
+            .report
+            .fixes
+            .iter()
+            .filter(|f| f.method == Method::Paper)
+        {
+            self.protection.on_fix(fix);
         }
-        watchers.show(&Event::Pair(&images, &report, &truths_m))?;
+        watchers.show(&Event::Pair(&read.images, &read.report, &read.truths_m))?;
         Ok(())
     }
 
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "one call, each a plain value of the frame"
-    )]
     fn judge_wayside(
         &mut self,
         now: SimTime,
         k: usize,
-        number: u32,
-        start: SimTime,
+        frame: &Frame,
         look: &Look,
-        mut images: Vec<GrayImage>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        let Some(image) = images.pop() else {
-            return Ok(());
-        };
-        let frame = Frame {
-            number,
-            start,
-            image,
-        };
         let (comms, watch) = (&mut self.comms, &mut self.cost.stack);
-        let report = self.devices[k].judge(&frame, look, now, comms, watch);
-        watchers.show(&Event::Wayside(k, start, &frame.image, &report))?;
+        let report = self.devices[k].judge(frame, look, now, comms, watch);
+        watchers.show(&Event::Wayside(k, frame.start, &frame.image, &report))?;
         Ok(())
     }
 
@@ -409,11 +332,7 @@ impl<'s> Run<'s> {
         let report = self.cost.stack.time(|| protection.cycle(now)).0;
         let aim_mps = (self.scenario.physics.train.as_ref())
             .map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6);
-        self.outcome.slowed_by_obstacle =
-            report.authority_end_m.is_some() && report.permitted_mps < aim_mps;
-        if report.command.brake != BrakeDemand::None {
-            self.outcome.brake_commanded.get_or_insert(now);
-        }
+        self.outcome.on_cycle(now, &report, aim_mps);
         self.command = report.command;
         if let (Some(chainage_m), Some(head_m)) = (report.position_m, self.world.head_m()) {
             let train = TrainReport {
@@ -435,12 +354,13 @@ impl<'s> Run<'s> {
         if self.truth_clock.due(now, 0.0).is_some()
             && let Some(train) = self.world.train()
         {
-            self.note_motion(now, &train);
+            self.outcome.on_motion(&train);
             if let Some(eyes) = &mut self.eyes {
                 eyes.score.head_at(train.chainage_m);
             }
-            let rig = self.eyes.as_ref().map(|e| e.camera.rig.vehicle_from_left);
-            watchers.show(&Event::Train(&truth(train, rig)))?;
+            let vehicle_from_left = self.eyes.as_ref().map(|e| e.camera.rig.vehicle_from_left);
+            let left = vehicle_from_left.map(|v| train.world_from_vehicle * v);
+            watchers.show(&Event::Train(&train, left.as_ref()))?;
         }
         if self.bodies_clock.due(now, 0.0).is_some() {
             watchers.show(&Event::Bodies(now, &self.world.bodies()))?;
@@ -448,52 +368,15 @@ impl<'s> Run<'s> {
         Ok(())
     }
 
-    /// Follows whether the train has run, and since when it stands.
-    fn note_motion(&mut self, now: SimTime, train: &TrainState) {
-        self.outcome.has_run |= !train.standing;
-        // A driver who obeys brakes before the equipment has to.
-        if self.outcome.slowed_by_obstacle && train.brake_mps2 > 0.0 {
-            self.outcome.brake_commanded.get_or_insert(now);
-        }
-        if !train.standing {
-            self.outcome.standing_since = None;
-            return;
-        }
-        self.outcome.standing_since.get_or_insert(now);
-        if self.outcome.brake_commanded.is_some() {
-            self.outcome.stopped.get_or_insert(now);
-        }
-    }
-
     fn stood_long_enough(&self) -> bool {
-        match (
-            self.scenario.stop_after_standstill_s,
-            self.outcome.standing_since,
-        ) {
-            (Some(limit_s), Some(since)) if self.outcome.has_run => {
-                self.world.time().since(since) >= limit_s
-            }
-            _ => false,
-        }
+        let stood_s = self.outcome.stood_s(self.world.time());
+        let limit_s = self.scenario.stop_after_standstill_s;
+        limit_s
+            .zip(stood_s)
+            .is_some_and(|(limit, stood)| stood >= limit)
     }
 
-    fn summary(self, end: End, wall_s: f64, record: Stopwatch) -> Summary {
-        let simulated_s = self.world.time().secs();
-        let head_m = self.world.head_m();
-        let stop_margin_m = head_m
-            .filter(|_| self.outcome.stopped.is_some())
-            .and_then(|head_m| {
-                (self.world.obstacles())
-                    .map(|o| o.chainage_m - 0.5 * o.size_m.x - head_m)
-                    .filter(|margin_m| *margin_m > -1.0)
-                    .min_by(f64::total_cmp)
-            });
-        let protection = head_m.map(|_| summary::Protection {
-            brake_commanded_s: self.outcome.brake_commanded.map(SimTime::secs),
-            stopped_s: self.outcome.stopped.map(SimTime::secs),
-            stop_margin_m,
-            collision: self.world.collision().is_some(),
-        });
+    fn summary(self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
         let wayside = self
             .devices
             .into_iter()
@@ -502,44 +385,22 @@ impl<'s> Run<'s> {
                 a.add(b);
                 a
             });
+        let simulated_s = self.world.time().secs();
+        let backend = self.shots.backend();
         Summary {
-            scenario: self.scenario.name.clone(),
-            seed: self.scenario.seed,
-            end,
-            simulated_s,
-            wall_s,
-            real_time_factor: simulated_s / wall_s,
-            renderer: self.renderer.backend(),
-            stereo_frames: self.outcome.stereo_frames,
-            wayside_frames: self.outcome.wayside_frames,
-            physics: Physics {
-                us_per_step: 1e6 * self.cost.physics.total_s / self.outcome.steps.max(1) as f64,
-            },
-            wall_shares_s: WallShares {
-                physics_s: self.cost.physics.total_s,
-                submit_s: self.cost.submit.total_s,
-                wait_s: self.cost.wait.total_s,
-                stack_s: self.cost.stack.total_s,
-                record_s: record.total_s,
-            },
+            stereo_frames: self.eyes.as_ref().map_or(0, |e| e.clock.next().0),
+            wayside_frames: self.wayside_frames,
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),
-            protection,
+            protection: self.outcome.protection(&self.world),
+            ..Summary::new(
+                self.scenario,
+                end,
+                simulated_s,
+                backend,
+                &self.cost,
+                watchers,
+            )
         }
-    }
-}
-
-/// The truth as observers see it.
-fn truth(train: TrainState, vehicle_from_left: Option<Isometry3<f64>>) -> TrainTruth {
-    TrainTruth {
-        time: train.time,
-        chainage_m: train.chainage_m,
-        speed_mps: train.speed_mps,
-        accel_mps2: train.accel_mps2,
-        world_from_vehicle: train.world_from_vehicle,
-        world_from_left: vehicle_from_left.map(|v| train.world_from_vehicle * v),
-        world_from_cars: train.world_from_cars,
-        floor_accel_mps2: train.floor_accel_mps2,
-        secondary_travel_m: train.secondary_travel_m,
     }
 }

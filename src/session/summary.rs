@@ -1,6 +1,8 @@
 //! What a session comes to, as `summary.json` has it.
 
+use super::watch::{Costs, Watchers};
 use crate::bus::Method;
+use crate::scenario::Scenario;
 use crate::twin::render::Backend;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -38,6 +40,44 @@ pub struct Summary {
     pub protection: Option<Protection>,
 }
 
+impl Summary {
+    /// Of a run of which nothing but its speed is known.
+    pub(super) fn new(
+        scenario: &Scenario,
+        end: End,
+        simulated_s: f64,
+        renderer: Backend,
+        cost: &Costs,
+        watchers: &Watchers<'_, '_>,
+    ) -> Self {
+        let wall_s = watchers.wall_s();
+        Self {
+            scenario: scenario.name.clone(),
+            seed: scenario.seed,
+            end,
+            simulated_s,
+            wall_s,
+            real_time_factor: simulated_s / wall_s,
+            renderer,
+            stereo_frames: 0,
+            wayside_frames: 0,
+            physics: Physics {
+                us_per_step: 1e6 * cost.physics.total_s / f64::from(cost.physics.times.max(1)),
+            },
+            wall_shares_s: WallShares {
+                physics_s: cost.physics.total_s,
+                submit_s: cost.submit.total_s,
+                wait_s: cost.wait.total_s,
+                stack_s: cost.stack.total_s,
+                record_s: watchers.watch.total_s,
+            },
+            positioning: BTreeMap::new(),
+            wayside: None,
+            protection: None,
+        }
+    }
+}
+
 /// How a run ended.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -51,14 +91,14 @@ pub enum End {
 }
 
 /// Cost of the physics.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct Physics {
     /// Microseconds of wall time a step of the world.
     pub us_per_step: f64,
 }
 
 /// Where the wall time went.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize)]
 pub struct WallShares {
     /// Stepping the world.
     pub physics_s: f64,

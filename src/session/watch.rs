@@ -7,6 +7,8 @@ use super::{Event, Observer, ObserverError};
 pub struct Stopwatch {
     /// Seconds so far.
     pub total_s: f64,
+    /// Pieces of work so far.
+    pub times: u32,
 }
 
 impl Stopwatch {
@@ -16,8 +18,22 @@ impl Stopwatch {
         let result = work();
         let seconds = begin.elapsed().as_secs_f64();
         self.total_s += seconds;
+        self.times += 1;
         (result, seconds)
     }
+}
+
+/// What a run spends its wall time on.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Costs {
+    /// Steps of the world.
+    pub physics: Stopwatch,
+    /// Handing scenes to the renderer.
+    pub submit: Stopwatch,
+    /// Waiting for images.
+    pub wait: Stopwatch,
+    /// The stack at work.
+    pub stack: Stopwatch,
 }
 
 /// The wall clock, for figures of speed only.
@@ -25,12 +41,13 @@ impl Stopwatch {
     clippy::disallowed_methods,
     reason = "how long a run takes is one of its figures; no result depends on it"
 )]
-pub fn now() -> std::time::Instant {
+fn now() -> std::time::Instant {
     std::time::Instant::now()
 }
 
 /// All observers as one, timed.
 pub struct Watchers<'a, 'b> {
+    begin: std::time::Instant,
     observers: &'a mut [&'b mut dyn Observer],
     /// Time spent in them.
     pub watch: Stopwatch,
@@ -40,9 +57,15 @@ impl<'a, 'b> Watchers<'a, 'b> {
     /// Of these observers.
     pub fn new(observers: &'a mut [&'b mut dyn Observer]) -> Self {
         Self {
+            begin: now(),
             observers,
             watch: Stopwatch::default(),
         }
+    }
+
+    /// Seconds since the first of them was called in.
+    pub fn wall_s(&self) -> f64 {
+        self.begin.elapsed().as_secs_f64()
     }
 
     /// Shows an event to all.

@@ -84,7 +84,7 @@ pub enum PhysicsError {
 }
 
 /// The train as it really is.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainState {
     /// When.
     pub time: SimTime,

@@ -1,0 +1,86 @@
+//! The eyes of a train: its stereo camera, the stack that reads it, and how well it does.
+
+use super::SessionError;
+use super::cameras::{Clock, StereoCamera, pair};
+use super::score::PositioningScore;
+use super::watch::Stopwatch;
+use crate::bus::{LedReport, Method, SimTime, StereoPair};
+use crate::scenario::Scenario;
+use crate::stack::positioning::LedPositioner;
+use crate::twin::sensors::RigSettings;
+use image::GrayImage;
+use nalgebra::Isometry3;
+
+/// One rig and what belongs to it.
+pub struct Eyes {
+    /// The rig as it really is.
+    pub camera: StereoCamera,
+    /// When it takes pairs.
+    pub clock: Clock,
+    /// What reads them.
+    pub positioner: LedPositioner,
+    /// The positions given, held against the truth.
+    pub score: PositioningScore,
+}
+
+/// A pair that the stack has read.
+pub struct Reading {
+    /// The pair.
+    pub images: StereoPair,
+    /// What the stack says of it.
+    pub report: LedReport,
+    /// Chainage of the head at the time of each fix.
+    pub truths_m: Vec<f64>,
+}
+
+impl Eyes {
+    /// Before the first pair.
+    pub fn new(scenario: &Scenario, rig: &RigSettings) -> Self {
+        Self {
+            camera: StereoCamera::new(rig, scenario.seed),
+            clock: Clock::new(rig.pairs_per_s),
+            positioner: positioner(scenario, rig),
+            score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
+        }
+    }
+
+    /// The stack reads a pair and is scored against where vehicle and head really were. `None`
+    /// of anything but two images.
+    pub fn read(
+        &mut self,
+        (number, start): (u32, SimTime),
+        images: Vec<GrayImage>,
+        watch: &mut Stopwatch,
+        vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
+        head_at: impl Fn(SimTime) -> Option<f64>,
+    ) -> Result<Option<Reading>, SessionError> {
+        let Ok(images) = images.try_into() else {
+            return Ok(None);
+        };
+        let images = pair(number, start, images);
+        let positioner = &mut self.positioner;
+        let (report, seconds) = watch.time(|| positioner.on_pair(&images));
+        let rig = &self.camera.rig;
+        let left_at = |t| Some(vehicle_at(t)? * rig.vehicle_from_left);
+        let intrinsics = rig.camera.intrinsics;
+        self.score
+            .report(&report, 1e3 * seconds, &intrinsics, left_at);
+        let mut truths_m = Vec::with_capacity(report.fixes.len());
+        for fix in &report.fixes {
+            let truth_m = head_at(fix.time).ok_or(SessionError::PoseForgotten(fix.time.secs()))?;
+            self.score.fix(fix, truth_m);
+            truths_m.push(truth_m);
+        }
+        Ok(Some(Reading {
+            images,
+            report,
+            truths_m,
+        }))
+    }
+}
+
+/// The stack as it is switched on, with the rig's calibration sheet.
+pub fn positioner(scenario: &Scenario, rig: &RigSettings) -> LedPositioner {
+    let map = scenario.tunnel.clone();
+    LedPositioner::new(&scenario.stack.led, rig.calibration(), map)
+}

@@ -1,0 +1,79 @@
+//! Images on their way from the shutter to the stack.
+//!
+//! An image is handed to the renderer when its last row has closed, and reaches the stack
+//! `latency_ms` later; the renderer draws in between, while the world goes on. So the order of
+//! things does not depend on how fast anything is.
+
+use super::devices::Look;
+use super::watch::Costs;
+use crate::bus::SimTime;
+use crate::twin::render::{Backend, Job, RenderError, Renderer};
+use image::GrayImage;
+use std::collections::VecDeque;
+
+/// One exposure.
+pub struct Shot {
+    /// Number of the frame.
+    pub number: u32,
+    /// Its first row opened.
+    pub start: SimTime,
+    /// Whose.
+    pub what: What,
+}
+
+/// Whose images they are.
+pub enum What {
+    /// The rig's pair.
+    Pair,
+    /// A wayside device's, with what there was to be seen.
+    Wayside(usize, Look),
+}
+
+/// The renderer and what waits for its images.
+pub struct Shots {
+    renderer: Box<dyn Renderer>,
+    latency_s: f64,
+    /// With the times when they reach the stack.
+    waiting: VecDeque<(SimTime, Shot)>,
+}
+
+impl Shots {
+    /// None on the way.
+    pub fn new(renderer: Box<dyn Renderer>, latency_ms: f64) -> Self {
+        Self {
+            renderer,
+            latency_s: 1e-3 * latency_ms,
+            waiting: VecDeque::new(),
+        }
+    }
+
+    /// What draws.
+    pub fn backend(&self) -> Backend {
+        self.renderer.backend()
+    }
+
+    /// The images of a shot that was over at the time of the job.
+    pub fn submit(&mut self, job: &Job, shot: Shot, cost: &mut Costs) -> Result<(), RenderError> {
+        let renderer = &mut self.renderer;
+        cost.submit.time(|| renderer.submit(job)).0?;
+        // Results arrive in the order of submission, so none is due before the one ahead of it.
+        let own = job.time.plus(self.latency_s);
+        let ahead = self.waiting.back().map_or(own, |(due, _)| *due);
+        self.waiting.push_back((own.max(ahead), shot));
+        Ok(())
+    }
+
+    /// The oldest shot with its images, where it is due.
+    pub fn due(
+        &mut self,
+        now: SimTime,
+        cost: &mut Costs,
+    ) -> Result<Option<(Shot, Vec<GrayImage>)>, RenderError> {
+        let Some((_, shot)) = self.waiting.pop_front_if(|(due, _)| *due <= now) else {
+            return Ok(None);
+        };
+        let renderer = &mut self.renderer;
+        let images = cost.wait.time(|| renderer.collect()).0?;
+        Ok(Some((shot, images)))
+    }
+}
