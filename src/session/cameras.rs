@@ -47,7 +47,7 @@ impl Clock {
 }
 
 /// How many poses, [`POSE_STEP_S`] apart, cover a frame of `span_s`.
-pub fn poses_in(span_s: f64) -> usize {
+fn poses_in(span_s: f64) -> usize {
     (span_s / POSE_STEP_S).ceil() as usize + 1
 }
 

@@ -18,7 +18,7 @@
 //! What it does not do: many runs, and files (observers write them).
 
 mod bench;
-pub(crate) mod cameras;
+mod cameras;
 mod devices;
 mod event;
 mod eyes;
@@ -26,10 +26,12 @@ mod outcome;
 mod run;
 mod score;
 mod shots;
+mod speed;
 mod summary;
 mod watch;
 
 pub use event::{Event, Observer, ObserverError, Opening};
+pub use speed::{Speeds, measure};
 pub use summary::{
     Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary, WallShares,
     Wayside,
@@ -108,7 +110,7 @@ pub fn run(
 }
 
 /// The renderer of a scenario; says so once where it has to fall back on the plain one.
-pub(crate) fn renderer(
+fn renderer(
     scenario: &Scenario,
     choice: RendererChoice,
 ) -> Result<Box<dyn Renderer>, SessionError> {

@@ -52,11 +52,11 @@ impl<'s> Run<'s> {
     /// At time zero.
     pub fn new(scenario: &'s Scenario, renderer: Box<dyn Renderer>) -> Result<Self, SessionError> {
         let seed = scenario.seed;
-        let stream = |name: &str| Stream::new(seed, 0, name);
         let map = scenario.tunnel.clone();
         let world = World::new(map.clone(), &scenario.physics, seed, 0)?;
         let imu = Imu::new(&scenario.imu, seed, 0);
         let odometer = Odometer::new(&scenario.odometer, seed, 0);
+        let radio = Stream::new(seed, 0, "radio");
         let rig = scenario.rig.as_ref();
         let eyes = rig
             .filter(|_| scenario.physics.train.is_some())
@@ -71,7 +71,7 @@ impl<'s> Run<'s> {
             odometer,
             eyes,
             devices: Device::all(scenario),
-            comms: Comms::new(&scenario.radio, &map.base_stations, stream("radio")),
+            comms: Comms::new(&scenario.radio, &map.base_stations, radio),
             protection: Protection::new(&scenario.stack.protection, map),
             protection_clock: Clock::new(PROTECTION_HZ),
             command: TrainCommand::default(),
@@ -102,11 +102,8 @@ impl<'s> Run<'s> {
     }
 
     fn open(&self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
-        let calibrations: Vec<_> = self
-            .devices
-            .iter()
-            .map(|d| d.calibration().clone())
-            .collect();
+        let devices = self.devices.iter();
+        let calibrations: Vec<_> = devices.map(|d| d.calibration().clone()).collect();
         let rig = self.scenario.rig.as_ref().map(|r| r.calibration());
         let opening = Opening {
             scenario: &self.scenario.name,
@@ -377,14 +374,11 @@ impl<'s> Run<'s> {
     }
 
     fn summary(self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
-        let wayside = self
-            .devices
-            .into_iter()
-            .map(Device::into_score)
-            .reduce(|mut a, b| {
-                a.add(b);
-                a
-            });
+        let scores = self.devices.into_iter().map(Device::into_score);
+        let wayside = scores.reduce(|mut a, b| {
+            a.add(b);
+            a
+        });
         let simulated_s = self.world.time().secs();
         let backend = self.shots.backend();
         Summary {

@@ -62,7 +62,7 @@ impl Summary {
             stereo_frames: 0,
             wayside_frames: 0,
             physics: Physics {
-                us_per_step: 1e6 * cost.physics.total_s / f64::from(cost.physics.times.max(1)),
+                us_per_step: 1e6 * cost.physics.total_s / cost.physics.times.max(1) as f64,
             },
             wall_shares_s: WallShares {
                 physics_s: cost.physics.total_s,

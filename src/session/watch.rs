@@ -8,7 +8,7 @@ pub struct Stopwatch {
     /// Seconds so far.
     pub total_s: f64,
     /// Pieces of work so far.
-    pub times: u32,
+    pub times: u64,
 }
 
 impl Stopwatch {

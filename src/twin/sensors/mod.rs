@@ -4,8 +4,10 @@ mod camera;
 mod imu;
 mod lidar;
 mod odometer;
+mod rig;
 
-pub use camera::{RigError, RigSettings, WaysideCameraSettings, ever_sees, visible_interval};
+pub use camera::WaysideCameraSettings;
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
+pub use rig::{RigError, RigSettings, ever_sees, visible_interval};
