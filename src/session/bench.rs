@@ -141,18 +141,12 @@ impl<'s> Bench<'s> {
 
     fn summary(self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
         let (pairs, next) = self.eyes.clock.next();
-        let backend = self.renderer.backend();
+        let (backend, cost) = (self.renderer.backend(), &self.cost);
+        let speed = Summary::new(self.scenario, end, next.secs(), backend, cost, watchers);
         Summary {
             stereo_frames: pairs,
             positioning: self.eyes.score.finish(),
-            ..Summary::new(
-                self.scenario,
-                end,
-                next.secs(),
-                backend,
-                &self.cost,
-                watchers,
-            )
+            ..speed
         }
     }
 }

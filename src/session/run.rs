@@ -381,20 +381,15 @@ impl<'s> Run<'s> {
         });
         let simulated_s = self.world.time().secs();
         let backend = self.shots.backend();
+        let cost = &self.cost;
+        let speed = Summary::new(self.scenario, end, simulated_s, backend, cost, watchers);
         Summary {
             stereo_frames: self.eyes.as_ref().map_or(0, |e| e.clock.next().0),
             wayside_frames: self.wayside_frames,
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),
             protection: self.outcome.protection(&self.world),
-            ..Summary::new(
-                self.scenario,
-                end,
-                simulated_s,
-                backend,
-                &self.cost,
-                watchers,
-            )
+            ..speed
         }
     }
 }
