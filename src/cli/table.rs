@@ -73,10 +73,11 @@ fn wayside(text: &mut String, s: &Summary) -> std::fmt::Result {
     let Some(w) = &s.wayside else {
         return Ok(());
     };
-    writeln!(
-        text,
-        "\nobstacle, size      first seen   after   distance error"
-    )?;
+    let heading = match w.obstacles.is_empty() {
+        true => "no obstacle",
+        false => "obstacle, size      first seen   after   distance error",
+    };
+    writeln!(text, "\n{heading}")?;
     for o in &w.obstacles {
         let value = |x: Option<f64>, unit: &str| match x {
             Some(x) => format!("{x:.2} {unit}"),

@@ -52,9 +52,6 @@ use std::path::Path;
 use stream::{Stream, Target};
 use texts::Texts;
 
-/// Simulated time between flushes.
-const FLUSH_S: f64 = 1.0;
-
 /// Why there is no viewer.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewerError {
@@ -192,7 +189,7 @@ impl Open {
             plots: Plots::open(&stream, &contents)?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
-            flush_at: SimTime::ZERO.plus(FLUSH_S),
+            flush_at: SimTime::ZERO.plus(stream.batch_s()),
             images: Images::new(settings, devices),
             texts: Texts::open(&stream, opening)?,
             stream,
@@ -250,7 +247,7 @@ impl Open {
             }
         };
         if time >= self.flush_at {
-            self.flush_at = time.plus(FLUSH_S);
+            self.flush_at = time.plus(self.stream.batch_s());
             self.flush()?;
         }
         Ok(())

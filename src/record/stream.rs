@@ -35,6 +35,12 @@ pub(super) enum Target {
     Viewer(String),
 }
 
+/// Simulated time between batches of a file. The file's index takes some kilobytes a batch, in
+/// memory until the end: ten times as many batches and a run of half an hour grows by 300 MB.
+const FILE_BATCH_S: f64 = 10.0;
+/// Simulated time between batches to a viewer, where somebody waits for them.
+const VIEWER_BATCH_S: f64 = 1.0;
+
 /// An open stream.
 pub(super) struct Stream {
     rerun: RecordingStream,
@@ -137,6 +143,14 @@ impl Stream {
             make_default: true,
         };
         self.rerun.send_blueprint(messages, activation);
+    }
+
+    /// How often to [`Self::flush`].
+    pub(super) fn batch_s(&self) -> f64 {
+        match self.file {
+            Some(_) => FILE_BATCH_S,
+            None => VIEWER_BATCH_S,
+        }
     }
 
     /// Cuts the batches here and passes them on.

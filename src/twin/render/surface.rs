@@ -22,7 +22,6 @@
 //! and the albedo is multiplied by 1 + contrast * (noise - 0.5) * clamp(2 - w / fade, 0, 1).
 
 use crate::track::Material;
-pub use crate::track::{RAIL_OFFSET_M, rail_outline};
 use std::fmt::Write;
 
 /// Stations of the tunnel surface lie at multiples of this chainage; between them it is ruled.

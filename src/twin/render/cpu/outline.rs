@@ -4,8 +4,7 @@
 //! outline lists the edges of each cell; a ray visits the cells on its way (Amanatides and Woo,
 //! "A fast voxel traversal algorithm for ray tracing", Eurographics 1987).
 
-use super::super::surface;
-use crate::track::{CrossSection, Material};
+use crate::track::{CrossSection, Material, RAIL_OFFSET_M, rail_outline};
 use nalgebra::Vector2;
 
 /// A straight piece of outline, seen from its free side only.
@@ -47,9 +46,7 @@ impl Outline {
     pub fn new(section: &CrossSection) -> Self {
         let mut edges = edges_of(section);
         for side in [1.0, -1.0] {
-            edges.extend(edges_of(&surface::rail_outline(
-                side * surface::RAIL_OFFSET_M,
-            )));
+            edges.extend(edges_of(&rail_outline(side * RAIL_OFFSET_M)));
         }
         let ring = if section.closed {
             section

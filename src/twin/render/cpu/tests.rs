@@ -323,7 +323,6 @@ fn the_quick_renderer_draws_what_the_oracle_draws() {
             (worst.max(d), off + usize::from(d > 0))
         });
         let share = off as f64 / oracle.len() as f64;
-        println!("{s_m} m: {worst} grey levels, {share:.5} of the pixels differ");
         assert!(oracle.iter().max() > Some(&250));
         assert!(worst <= 1 && share < 0.01, "{s_m} m: {worst} in {share}");
     }

@@ -1,10 +1,11 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
 use crate::track::{
-    Alignment, CrossSection, Grade, OutlinePoint, PlanElement, SectionRange, TrackPoint,
+    Alignment, CrossSection, Grade, OutlinePoint, PlanElement, RAIL_OFFSET_M, SectionRange,
+    TrackPoint, rail_outline,
 };
 use crate::twin::random::Stream;
-use crate::twin::render::surface;
+
 use parry3d_f64::math::Vector as DVec3;
 use parry3d_f64::query::{Ray, RayCast};
 use parry3d_f64::shape::TriMesh;
@@ -83,7 +84,7 @@ fn tunnel() -> Tunnel {
 /// The same surface as triangles between stations.
 fn mesh(tunnel: &Tunnel) -> TriMesh {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-    let rails = [1.0, -1.0].map(|side| surface::rail_outline(side * surface::RAIL_OFFSET_M));
+    let rails = [1.0, -1.0].map(|side| rail_outline(side * RAIL_OFFSET_M));
     for outline in [section()].into_iter().chain(rails) {
         let n = outline.points.len() as u32;
         let base = vertices.len() as u32;
