@@ -28,7 +28,10 @@ pub enum Identity {
     Decoded,
     /// Read from the stripes of several frames joined.
     Joined,
-    /// Followed from the position that earlier fixes predict.
+    /// Read in earlier frames, and the lamp followed from there to this one, which by itself tells
+    /// no name.
+    Followed,
+    /// Never read: the lamp that the map has where earlier fixes let expect one.
     Predicted,
 }
 

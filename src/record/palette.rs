@@ -40,6 +40,7 @@ pub(super) fn identity(identity: Identity) -> Color {
     match identity {
         Identity::Decoded => rgb(90, 230, 120),
         Identity::Joined => rgb(90, 200, 255),
+        Identity::Followed => rgb(150, 160, 255),
         Identity::Predicted => rgb(255, 230, 90),
     }
 }

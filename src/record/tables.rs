@@ -87,6 +87,7 @@ fn identity_name(identity: Identity) -> &'static str {
     match identity {
         Identity::Decoded => "decoded",
         Identity::Joined => "joined",
+        Identity::Followed => "followed",
         Identity::Predicted => "predicted",
     }
 }

@@ -8,7 +8,8 @@
 //!   the expectation must be wrong;
 //! - without one: when enough pairs have read the same name.
 //!
-//! A lamp of which nothing is read yet takes the name of the map's lamp that is expected there.
+//! A lamp keeps a name once believed for as long as it is followed, whether its stripes can be read
+//! again or not. One of which nothing is read yet takes the name of the map's lamp that is expected there.
 
 use crate::bus::Identity;
 use crate::stack::led::ChipVotes;
@@ -127,7 +128,7 @@ impl Naming {
         map: &Tunnel,
     ) -> Verdict {
         if let Some(uid) = followed.believed {
-            return Verdict::Named(uid, Identity::Joined);
+            return Verdict::Named(uid, Identity::Followed);
         }
         let nearest = expected.and_then(|e| nearest_lamp(map, e.lamp_chainage_m).map(|k| (e, k)));
         match nearest {
@@ -229,7 +230,7 @@ mod tests {
             assert_eq!(NAMING.judge(&mut lamp, Some(uid), expected, &map), verdict);
             // Once believed it keeps its name while it is followed.
             let kept = NAMING.judge(&mut lamp, None, expected, &map);
-            assert_eq!(kept, Verdict::Named(uid, Identity::Joined));
+            assert_eq!(kept, Verdict::Named(uid, Identity::Followed));
         }
     }
 
