@@ -23,8 +23,13 @@ use nalgebra::Point2;
 pub struct LampImage {
     /// As reported.
     pub spot: Spot,
-    /// Standard deviation of the centre along u.
+    /// Standard deviation of the centre along u, from the scatter of the edge points about the
+    /// ellipse: noise, exposure, pixel size and what smear leaves are in it.
     pub sigma_px: f64,
+    /// The lamp's own outline: the fitted one less the spill of its saturated rows.
+    pub own_outline: Option<Ellipse>,
+    /// Standard deviation of that outline's half axes.
+    pub axis_sigma_px: f64,
     /// Level of darkness around it.
     black: f64,
     /// Outline to read the profile in, fitted or from the bounds.
@@ -188,7 +193,16 @@ impl LampFinder {
             angle_rad: std::f64::consts::FRAC_PI_2,
         });
         let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
+        let spill = self.outline.spill_px;
         Some(LampImage {
+            own_outline: ellipse
+                .filter(|e| e.semi_minor_px > spill)
+                .map(|e| Ellipse {
+                    semi_major_px: e.semi_major_px - spill,
+                    semi_minor_px: e.semi_minor_px - spill,
+                    ..e
+                }),
+            axis_sigma_px: sigma_px.hypot(self.outline.spill_sigma_px),
             spot: Spot {
                 bounds,
                 centre,

@@ -10,8 +10,11 @@
 //!
 //! An edge lies where the row crosses half of its own plateau, between two pixels by linear
 //! interpolation; so a row that caught the lamp switching, at half its brightness, gives the same
-//! edge. Where the sensor saturates the plateau is too low and the edge lies up to half a pixel
-//! outside, left and right alike.
+//! edge. Where the sensor saturates the plateau is too low and the edge lies outside, left and
+//! right alike, by up to half a pixel, and more in the lamp's glare. That spill is bounded by where the row leaves saturation. A lamp that just
+//! saturates covers the outermost saturated pixel wholly, one that is brighter without limit covers
+//! any share of it, half on average. So the lamp's own edge lies, on average, 0 to 0.5 px beyond
+//! that pixel's centre, and the spill is the rest of the way to the edge found.
 
 use super::patch::Patch;
 use nalgebra::Point2;
@@ -30,6 +33,12 @@ pub struct Outline {
     pub edges: Vec<(usize, f64, f64)>,
     /// Edge points in image coordinates.
     pub points: Vec<Point2<f64>>,
+    /// How far the edges lie outside of the lamp's own because rows are saturated, along the
+    /// outline's normal: mean over all edges.
+    pub spill_px: f64,
+    /// Standard deviation of that mean: how far the lamp saturates is not known, for all edges
+    /// alike.
+    pub spill_sigma_px: f64,
     /// It touches the image's border.
     pub cut: bool,
     mask: Vec<bool>,
@@ -119,6 +128,7 @@ impl Outline {
         self.edges.clear();
         self.points.clear();
         self.cut = false;
+        (self.spill_px, self.spill_sigma_px) = (0.0, 0.0);
         let Some((first, last)) = self.rows else {
             return;
         };
@@ -131,7 +141,8 @@ impl Outline {
             let Some((u0, u1)) = lit_core(row, u0, u1, threshold) else {
                 continue;
             };
-            let level = black + 0.5 * (plateau(row, u0, u1) - black);
+            let top = plateau(row, u0, u1);
+            let level = black + 0.5 * (top - black);
             let left = if at_left && u0 == 0 {
                 None
             } else {
@@ -142,6 +153,15 @@ impl Outline {
             } else {
                 crossing(row, (u0 + u1) / 2..raw.width, level)
             };
+            if top >= SATURATED_GREY {
+                // Sine of the outline's slope at this row, as of a circle's.
+                let height = (2 * v) as f64 - (first + last) as f64;
+                let sine = (1.0 - (height / (last - first + 1) as f64).powi(2)).sqrt();
+                for edge in left.into_iter().chain(right) {
+                    self.spill_px += sine * (beyond_saturation_px(row, edge) - 0.25).max(0.0);
+                    self.spill_sigma_px += sine * SPILL_SIGMA_PX;
+                }
+            }
             self.cut |= (at_left && u0 == 0) || (at_right && u1 + 1 == raw.width);
             let (du, dv) = (raw.u0 as f64, (raw.v0 + v) as f64);
             let found = left.into_iter().chain(right);
@@ -149,6 +169,9 @@ impl Outline {
             self.edges
                 .push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
         }
+        let edges = self.points.len().max(1) as f64;
+        self.spill_px /= edges;
+        self.spill_sigma_px /= edges;
     }
 }
 
@@ -183,6 +206,24 @@ fn lit_core(row: &[u8], u0: usize, u1: usize, threshold: u8) -> Option<(usize, u
     (lit >= 4 && lit * 10 >= (u1 + 1 - u0) * 6).then_some((first, last))
 }
 
+/// Over this a pixel tells no more than that it is bright.
+const SATURATED_GREY: f64 = 250.0;
+
+/// Evenly anywhere within half a pixel.
+const SPILL_SIGMA_PX: f64 = 0.5 * 0.288_675_134_594_812_9;
+
+/// From the centre of the outermost saturated pixel of a row to the edge beside it.
+fn beyond_saturation_px(row: &[u8], edge: f64) -> f64 {
+    let saturated = |u: &usize| f64::from(row[*u]) >= SATURATED_GREY;
+    let below = (0..=edge as usize).rev().find(saturated);
+    let above = (edge.ceil() as usize..row.len()).find(saturated);
+    let nearest = below
+        .into_iter()
+        .chain(above)
+        .map(|u| (edge - u as f64).abs());
+    nearest.reduce(f64::min).unwrap_or(0.0)
+}
+
 /// Mean of the middle half of a lit row.
 fn plateau(row: &[u8], u0: usize, u1: usize) -> f64 {
     let quarter = (u1 - u0) / 4;
@@ -210,6 +251,7 @@ mod tests {
     use super::*;
     use crate::bus::Ellipse;
     use crate::stack::led::ellipse::{chord, fit_ellipse};
+    use crate::stack::led::otsu::otsu;
 
     /// Stripes of a slanting ellipse, one on its upper end: one spot, edges on the outline.
     #[test]
@@ -242,6 +284,40 @@ mod tests {
         let fit = fit_ellipse(&outline.points).map(|f| f.ellipse.centre);
         let miss = fit.map(|c| (c - lamp.centre - nalgebra::Vector2::new(1000.0, 300.0)).norm());
         assert!(miss.is_some_and(|m| m < 0.05), "{miss:?}");
+    }
+
+    /// Discs of light that saturate the sensor up to tenfold, in their glare: the edges are too far
+    /// out, and the spill tells by how much. A dim one does not spill.
+    #[test]
+    fn the_spill_of_a_saturated_lamp_is_known() {
+        for (bright, radius) in [(120.0, 30.2), (400.0, 30.2), (1200.0, 30.7), (2500.0, 21.4)] {
+            let (w, h, centre) = (120usize, 120usize, 60.3);
+            let pixel = |u: usize, v: usize| {
+                let sub = |k: usize| (k as f64 + 0.5) / 8.0 - 0.5;
+                let away = |x: f64, y: f64| (x - centre).hypot(y - centre) - radius;
+                let inside = (0..64)
+                    .filter(|k| away(u as f64 + sub(k % 8), v as f64 + sub(k / 8)) < 0.0)
+                    .count();
+                let glare = 0.02 * bright * (-away(u as f64, v as f64).max(0.0) / 12.0).exp();
+                (4.0 + bright * inside as f64 / 64.0 + glare).min(255.0) as u8
+            };
+            let data = (0..w * h).map(|k| pixel(k % w, k / w)).collect();
+            let patch = Patch::from_data(0, 0, w, h, data);
+            let mut outline = Outline::default();
+            let threshold = otsu(&patch.histogram()).map_or(0, |split| split.threshold);
+            assert!(outline.find(&patch, threshold, 9));
+            outline.trace(&patch, 4.0, threshold, (1280, 720));
+            let found = fit_ellipse(&outline.points).map(|f| f.ellipse.semi_major_px);
+            let true_spill = found.map_or(f64::NAN, |f| f - radius);
+            let miss = outline.spill_px - true_spill;
+            let sigma = outline.spill_sigma_px.hypot(0.05);
+            assert!(
+                miss.abs() < 2.0 * sigma,
+                "{bright}: {} for {true_spill}",
+                outline.spill_px
+            );
+            assert_eq!(outline.spill_px > 0.0, bright > 250.0);
+        }
     }
 
     /// Gaps are filled up to their limit and not beyond.

@@ -39,6 +39,15 @@
 //! A curve needs care: the car's length axis is the chord between its pivots, not the tangent at
 //! the head.
 //!
+//! **Sigma.** Of each fix along the track, from what its pixels scatter by (the fit of the lamp's
+//! outline tells, in each eye) and from the stated uncertainties of calibration, attitude and survey
+//! ([`LedSettings`]). Nothing is scaled to agree with a result.
+//!
+//! **What `mono` shares with `paper`.** Its distance comes from the left eye alone, and it chooses
+//! its lamp by its own sigma. But there is one equipment that names lamps: the name, the position
+//! that a lamp is expected by, and the track's attitude at it come from the `paper` fixes before. So
+//! `mono` shows what one camera measures, not what a train with one camera would do.
+//!
 //! **What it does not do.** One fix rests on one pair and one lamp: nothing is filtered over time,
 //! as in the paper; earlier fixes serve to expect the next lamp and the track's attitude only.
 //! It takes the train to run up the line, its rails to be where the map has them, and roll and

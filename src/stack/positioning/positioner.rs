@@ -3,7 +3,7 @@
 use super::LedSettings;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
-use super::stereo::{from_size, triangulate};
+use super::stereo::{at_rest, from_size, triangulate};
 use crate::bus::{
     Identity, ImuSample, LedReport, Method, OdometerSample, PositionFix, RigCalibration, SimTime,
     StereoPair,
@@ -59,8 +59,14 @@ impl Sighting {
     }
 }
 
-/// Standard deviation of a lamp's apparent half axis: glare and saturation push its edge outwards.
-const MONO_EDGE_SIGMA_PX: f64 = 0.3;
+/// How well a lamp was measured in the images alone.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    /// Standard deviation of its distance, as a share of it.
+    distance: f64,
+    /// Standard deviation of its image, pixels.
+    image_px: f64,
+}
 
 impl LedPositioner {
     /// For one rig on one line.
@@ -113,7 +119,7 @@ impl LedPositioner {
             .find(&pair.right.image, |p| smear.along_row_px(p), &mut right);
         self.followed
             .retain(|f| seconds - f.seen_s <= self.settings.forget_s);
-        let mut best: Option<(PositionFix, Sighting)> = None;
+        let (mut paper, mut mono) = (None, None);
         for k in 0..left.len() {
             let mut sighting = self.sight(pair, &left, &right, k);
             self.name(pair, &mut sighting, seconds, &left, &right);
@@ -121,22 +127,17 @@ impl LedPositioner {
             if let Some(r) = sighting.right {
                 right[r].spot.uid = sighting.named;
             }
-            if let Some(fix) = self.paper_fix(&sighting, &left, &right)
-                && best.as_ref().is_none_or(|(b, _)| fix.sigma_m < b.sigma_m)
-            {
-                best = Some((fix, sighting));
-            }
+            keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
+            keep_surer(&mut mono, self.mono_fix(&sighting, &left));
         }
-        let mut fixes = Vec::with_capacity(2);
-        if let Some((fix, sighting)) = best {
+        if let Some(fix) = &paper {
             self.anchor = Some(Anchor {
                 time: fix.time,
                 chainage_m: fix.chainage_m,
                 distance_m: self.reckoning.distance_m(fix.time),
             });
-            fixes.push(fix);
-            fixes.extend(self.mono_fix(&sighting, &left));
         }
+        let fixes = paper.into_iter().chain(mono).collect();
         let spots = |lamps: &[LampImage]| lamps.iter().map(|l| l.spot.clone()).collect();
         let report = LedReport {
             time: start,
@@ -179,19 +180,26 @@ impl LedPositioner {
             .enumerate()
             .filter(|r| fits(&r))
             .min_by(|a, b| miss(a.1).total_cmp(&miss(b.1)));
-        let diameter_m = self.map.lamps.first().map_or(0.25, |l| l.diameter_m);
-        let c = &self.rig.camera.intrinsics;
         let shutter = &self.rig.camera.shutter;
+        let time = shutter.row_mid(pair.left.start, lamp.centre.y);
         Sighting {
             left: k,
             right: partner.map(|r| r.0),
             stereo: partner.and_then(|r| triangulate(&self.rig, &lamp.centre, &r.1.spot.centre)),
-            mono: lamp
-                .ellipse
-                .and_then(|e| from_size(c, &lamp.centre, &e, diameter_m)),
-            time: shutter.row_mid(pair.left.start, lamp.centre.y),
+            mono: self.by_size(&left[k], time),
+            time,
             named: None,
         }
+    }
+
+    /// Where a lamp is by its size in one image.
+    fn by_size(&self, lamp: &LampImage, time: SimTime) -> Option<Vector3<f64>> {
+        let (camera, outline) = (&self.rig.camera, lamp.own_outline?);
+        let diameter_m = self.map.lamps.first()?.diameter_m;
+        let place = |e| from_size(&camera.intrinsics, &lamp.spot.centre, e, diameter_m);
+        let run = Vector3::x() * self.reckoning.speed_mps(time);
+        let velocity = -(self.rig.vehicle_from_left.rotation.inverse() * run);
+        place(&at_rest(camera, &outline, &place(&outline)?, &velocity)?)
     }
 
     /// Follows the lamp, reads its stripes, and names it.
@@ -287,32 +295,31 @@ impl LedPositioner {
         let (stereo, r) = (sighting.stereo?, sighting.right?);
         let (l, r) = (&left[sighting.left], &right[r]);
         let disparity = l.spot.centre.x - r.spot.centre.x;
-        let sigma = l
-            .sigma_px
-            .hypot(r.sigma_px)
-            .hypot(self.settings.disparity_sigma_px);
-        self.fix(Method::Paper, sighting, stereo, sigma / disparity)
+        let baseline_mm = 1e3 * self.rig.baseline_m;
+        let spread = Spread {
+            distance: (l.sigma_px.hypot(r.sigma_px) / disparity)
+                .hypot(self.settings.baseline_sigma_mm / baseline_mm),
+            image_px: l.sigma_px,
+        };
+        self.fix(Method::Paper, sighting, stereo, spread)
     }
 
     fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
-        let outline = left[sighting.left].spot.ellipse?;
-        let sigma = left[sighting.left].sigma_px.hypot(MONO_EDGE_SIGMA_PX);
-        self.fix(
-            Method::Mono,
-            sighting,
-            sighting.mono?,
-            sigma / outline.semi_major_px,
-        )
+        let lamp = &left[sighting.left];
+        let spread = Spread {
+            distance: lamp.axis_sigma_px / lamp.own_outline?.semi_major_px,
+            image_px: lamp.sigma_px,
+        };
+        self.fix(Method::Mono, sighting, sighting.mono?, spread)
     }
 
-    /// Train = lamp - R (lamp in the vehicle's frame). `scale_sigma` is the relative standard
-    /// deviation of the lamp's distance.
+    /// Train = lamp - R (lamp in the vehicle's frame).
     fn fix(
         &self,
         method: Method,
         sighting: &Sighting,
         lamp: Vector3<f64>,
-        scale_sigma: f64,
+        spread: Spread,
     ) -> Option<PositionFix> {
         let (uid, identity) = sighting.named?;
         let site = self.map.lamp(uid)?;
@@ -329,7 +336,7 @@ impl LedPositioner {
         }
         let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
         let heading = line.at(chainage_m).heading_rad;
-        let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, scale_sigma);
+        let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, spread);
         (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
             time: sighting.time,
             method,
@@ -342,23 +349,40 @@ impl LedPositioner {
         })
     }
 
-    /// One sigma along the track: distance, bearing, attitude and survey.
+    /// One sigma along the track: of what was measured in the images (distance, bearing), of the
+    /// rig's calibration (focal length, attitude of the mount; an error of the first scales depths
+    /// alone, as x = (u - cx) b / d), of the car's attitude, and of the survey.
     fn sigma_m(
         &self,
         lamp: &Vector3<f64>,
         vehicle: &Point3<f64>,
         turn: &UnitQuaternion<f64>,
         heading_rad: f64,
-        scale_sigma: f64,
+        spread: Spread,
     ) -> f64 {
         let along = Vector3::new(heading_rad.cos(), heading_rad.sin(), 0.0);
-        let in_world = turn * (self.rig.vehicle_from_left.rotation * lamp);
-        let distance = along.dot(&in_world) * scale_sigma;
-        let bearing = 0.1 * lamp.z / self.rig.camera.intrinsics.fx_px;
-        let lever = along.cross(&(turn * vehicle.coords)).norm();
-        let attitude = lever * self.settings.attitude_sigma_deg.to_radians();
-        let sum = [distance, bearing, attitude, self.settings.survey_sigma_m];
-        sum.iter().map(|s| s * s).sum::<f64>().sqrt()
+        let world_from_camera = turn * self.rig.vehicle_from_left.rotation;
+        let in_world = world_from_camera * lamp;
+        let depth = world_from_camera * Vector3::new(0.0, 0.0, lamp.z);
+        let turned_by = |arm: &Vector3<f64>, deg: f64| along.cross(arm).norm() * deg.to_radians();
+        let s = &self.settings;
+        let terms = [
+            along.dot(&in_world) * spread.distance,
+            spread.image_px * lamp.z / self.rig.camera.intrinsics.fx_px,
+            along.dot(&depth) * s.focal_sigma_share,
+            turned_by(&in_world, s.mount_sigma_deg),
+            turned_by(&(turn * vehicle.coords), s.attitude_sigma_deg),
+            s.survey_sigma_m,
+        ];
+        terms.iter().map(|t| t * t).sum::<f64>().sqrt()
+    }
+}
+
+/// Keeps the fix with the smaller sigma.
+fn keep_surer(best: &mut Option<PositionFix>, fix: Option<PositionFix>) {
+    let surer = |fix: &PositionFix| best.as_ref().is_none_or(|b| fix.sigma_m < b.sigma_m);
+    if let Some(fix) = fix.filter(surer) {
+        *best = Some(fix);
     }
 }
 

@@ -18,8 +18,6 @@ pub struct LedSettings {
     pub deblur_over_px: f64,
     /// Noise-to-signal power ratio of the Wiener filter.
     pub wiener_noise_to_signal: f64,
-    /// Smallest standard deviation of a disparity, pixels, however well the outline fits.
-    pub disparity_sigma_px: f64,
     /// A lamp is taken for the predicted one within this share of the lamps' spacing (under 0.5).
     pub gate_share: f64,
     /// Without a prediction, as many frames must read the same name before it is believed; as
@@ -31,15 +29,24 @@ pub struct LedSettings {
     pub odometer_sigma_share: f64,
     /// Time constant in seconds with which the gyro's deviation from the track's attitude fades.
     pub imu_fade_s: f64,
-    /// Standard deviation of the attitude that remains, degrees.
+    /// Standard deviation of the car's attitude after that, degrees about any axis. 0.03: gyro bias
+    /// 6.25 deg/h and random walk 0.3 deg/sqrt(h) over 10 s make 0.017 and 0.011, rails that are 1.6
+    /// mm (rms, waves of 25 to 70 m) off the map's 0.015.
     pub attitude_sigma_deg: f64,
+    /// Standard deviation of the rig's calibrated attitude on the car, degrees about any axis.
+    pub mount_sigma_deg: f64,
+    /// Standard deviation of the calibrated baseline, mm.
+    pub baseline_sigma_mm: f64,
+    /// Standard deviation of the calibrated focal length, as a share of it.
+    pub focal_sigma_share: f64,
     /// From the train head back to the leading car's front bogie pivot, metres.
     pub front_pivot_m: f64,
     /// From the train head back to the leading car's rear bogie pivot, metres.
     pub rear_pivot_m: f64,
     /// A fix with a larger standard deviation than this is not given, metres.
     pub max_sigma_m: f64,
-    /// Standard deviation of a surveyed lamp position along the track, metres.
+    /// Standard deviation of a surveyed lamp position along the track, metres. 0.015: total station
+    /// or laser scanning from control points.
     pub survey_sigma_m: f64,
 }
 
@@ -51,17 +58,19 @@ impl Default for LedSettings {
             tilt_over_rows: 0.5,
             deblur_over_px: 0.5,
             wiener_noise_to_signal: 0.01,
-            disparity_sigma_px: 0.08,
             gate_share: 0.4,
             agreeing_reads: 2,
             forget_s: 0.5,
             odometer_sigma_share: 0.01,
             imu_fade_s: 10.0,
-            attitude_sigma_deg: 0.1,
+            attitude_sigma_deg: 0.03,
+            mount_sigma_deg: 0.05,
+            baseline_sigma_mm: 0.05,
+            focal_sigma_share: 0.001,
             front_pivot_m: 3.5,
             rear_pivot_m: 16.1,
             max_sigma_m: 0.25,
-            survey_sigma_m: 0.005,
+            survey_sigma_m: 0.015,
         }
     }
 }
@@ -89,13 +98,6 @@ impl LedSettings {
             1e-6,
             1.0,
         );
-        range(
-            "disparity_sigma_px",
-            self.disparity_sigma_px,
-            " px",
-            1e-3,
-            10.0,
-        );
         range("gate_share", self.gate_share, "", 0.01, 0.49);
         range(
             "agreeing_reads",
@@ -120,6 +122,15 @@ impl LedSettings {
             0.0,
             10.0,
         );
+        range("mount_sigma_deg", self.mount_sigma_deg, " deg", 0.0, 10.0);
+        range(
+            "baseline_sigma_mm",
+            self.baseline_sigma_mm,
+            " mm",
+            0.0,
+            50.0,
+        );
+        range("focal_sigma_share", self.focal_sigma_share, "", 0.0, 0.5);
         range("front_pivot_m", self.front_pivot_m, " m", 0.0, 30.0);
         range("max_sigma_m", self.max_sigma_m, " m", 0.01, 100.0);
         range("survey_sigma_m", self.survey_sigma_m, " m", 0.0, 5.0);
