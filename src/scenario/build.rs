@@ -10,6 +10,7 @@ use crate::twin::physics::PhysicsSettings;
 use crate::twin::sensors::{
     ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
 };
+use crate::twin::survey::SurveySettings;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -26,8 +27,10 @@ pub struct Scenario {
     pub duration_s: f64,
     /// End earlier, once the train has run and then stood for this long.
     pub stop_after_standstill_s: Option<f64>,
-    /// The line.
+    /// The line as it really is.
     pub tunnel: Arc<Tunnel>,
+    /// How well the stack's map of it was surveyed.
+    pub survey: SurveySettings,
     /// Train, track, obstacles, workers.
     pub physics: PhysicsSettings,
     /// A still rig moved from point to point, in place of a train.
@@ -53,6 +56,8 @@ pub struct Scenario {
 pub struct WaysidePost {
     /// As surveyed and calibrated.
     pub calibration: WaysideCalibration,
+    /// As it really hangs and looks.
+    pub actual: WaysideCalibration,
     /// Name of the balise that gets its messages.
     pub balise: String,
     /// Its camera's settings.
@@ -160,6 +165,11 @@ impl Scenario {
         }
     }
 
+    /// The map of the line that the stack is given.
+    pub fn map(&self) -> Arc<Tunnel> {
+        Arc::new(self.survey.map(&self.tunnel, self.seed))
+    }
+
     fn put_together(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
         let physics = PhysicsSettings {
             history_s: history_s(&file),
@@ -175,6 +185,7 @@ impl Scenario {
             seed: file.seed,
             stop_after_standstill_s: file.stop_after_standstill_s,
             tunnel: Arc::new(tunnel),
+            survey: file.survey,
             physics,
             bench: file.bench,
             rig: file.rig,

@@ -16,6 +16,7 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         Problem::unless_within(problems, key, standstill, 0.0..=86_400.0, "s");
     }
     file.physics().check("", problems);
+    file.survey.check("survey", problems);
     file.imu.check("imu", problems);
     file.odometer.check("odometer", problems);
     file.radio.check("radio", problems);
@@ -307,7 +308,9 @@ fn place(
         problems.push(unknown_device(post, at, tunnel));
         return None;
     };
-    let calibration = post.camera.calibration(site, tunnel, post.lidar.is_some());
+    let with_lidar = post.lidar.is_some();
+    let calibration = post.camera.calibration(site, tunnel, with_lidar);
+    let actual = post.camera.actual(site, tunnel, with_lidar);
     if calibration.is_none() {
         problems.push(Problem::new(
             format!("{at}.device"),
@@ -315,8 +318,9 @@ fn place(
             "name a balise of the tunnel in the tunnel file",
         ));
     }
-    calibration.map(|calibration| WaysidePost {
+    (calibration.zip(actual)).map(|(calibration, actual)| WaysidePost {
         calibration,
+        actual,
         balise: site.balise.clone(),
         camera: post.camera.clone(),
         lidar: post.lidar.clone(),

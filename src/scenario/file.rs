@@ -12,6 +12,7 @@ use crate::twin::physics::{
 use crate::twin::sensors::{
     ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
 };
+use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,10 @@ pub struct ScenarioFile {
     /// Time step of the physics, s. Default 0.001.
     #[serde(default = "default_step_s")]
     pub step_s: f64,
+    /// How well the lamps of the map that the stack is given were surveyed. Default: without
+    /// error.
+    #[serde(default)]
+    pub survey: SurveySettings,
     /// How even the track is. Default: German spectra, low disturbance.
     #[serde(default)]
     pub track: TrackSettings,

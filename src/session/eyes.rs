@@ -79,8 +79,7 @@ impl Eyes {
     }
 }
 
-/// The stack as it is switched on, with the rig's calibration sheet.
+/// The stack as it is switched on, with the rig's calibration sheet and the surveyed map.
 pub fn positioner(scenario: &Scenario, rig: &RigSettings) -> LedPositioner {
-    let map = scenario.tunnel.clone();
-    LedPositioner::new(&scenario.stack.led, rig.calibration(), map)
+    LedPositioner::new(&scenario.stack.led, rig.calibration(), scenario.map())
 }

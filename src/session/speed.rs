@@ -163,7 +163,7 @@ fn wayside_seconds(
     let stream = Stream::new(scenario.seed, 0, "doctor");
     let learning = scenario.stack.wayside.reference_frames as usize;
     let settings = &scenario.stack.wayside;
-    let map = scenario.tunnel.clone();
+    let map = scenario.map();
     let mut detector = WaysideDetector::new(settings, post.calibration.clone(), map);
     let mut times = Times::default();
     for k in 0..(learning + 1 + rounds * ROUND) as u32 {

@@ -5,3 +5,4 @@ pub mod physics;
 pub mod random;
 pub mod render;
 pub mod sensors;
+pub mod survey;

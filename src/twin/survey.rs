@@ -14,7 +14,7 @@
 //! share (a control point that has moved) is not modelled, nor are errors of track and balises.
 
 use super::random::Stream;
-use crate::track::{Problem, TrackPoint, Tunnel};
+use crate::track::{Checker, Problem, TrackPoint, Tunnel};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,13 +34,11 @@ pub struct SurveySettings {
 impl SurveySettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        for (key, sigma_m) in [
-            ("along_sigma_m", self.along_sigma_m),
-            ("across_sigma_m", self.across_sigma_m),
-            ("height_sigma_m", self.height_sigma_m),
-        ] {
-            Problem::unless_within(problems, format!("{at}.{key}"), sigma_m, 0.0..=0.5, "m");
-        }
+        let mut check = Checker::new(at, problems);
+        let mut sigma = |key: &str, sigma_m: f64| check.within(key, sigma_m, 0.0..=0.5, "m");
+        sigma("along_sigma_m", self.along_sigma_m);
+        sigma("across_sigma_m", self.across_sigma_m);
+        sigma("height_sigma_m", self.height_sigma_m);
     }
 
     /// The map of a tunnel as it was surveyed, with the errors of a run's seed.

@@ -121,6 +121,9 @@ pub struct WaysideCameraSettings {
     pub exposure_us: f64,
     /// Frames a second. Default 10.
     pub frames_per_s: f64,
+    /// By how much the device really differs from the calibration that the stack is given.
+    /// Default: not at all.
+    pub calibration_error: WaysideError,
     /// Light that its lens collects, as a multiple of what `sensor.grey_per_cd_s` is meant for.
     /// Default 8: f/1.0, where the rig has f/2.8.
     pub lens_gain: f64,
@@ -138,10 +141,30 @@ impl Default for WaysideCameraSettings {
             line_time_us: 14.8,
             exposure_us: 8000.0,
             frames_per_s: 10.0,
+            calibration_error: WaysideError::default(),
             lens_gain: 8.0,
             sensor: SensorSettings::default(),
         }
     }
+}
+
+/// What survey and calibration of a wayside device got wrong: the true value less the calibrated
+/// one. A lidar in the same housing is off by the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct WaysideError {
+    /// Focal length, mm. Default 0.
+    pub focal_length_mm: f64,
+    /// Yaw, deg, left positive. Default 0.
+    pub yaw_deg: f64,
+    /// Pitch, deg, up positive. Default 0.
+    pub pitch_deg: f64,
+    /// Place along the line, m. Default 0.
+    pub chainage_m: f64,
+    /// Place across the line, m to the left. Default 0.
+    pub lateral_m: f64,
+    /// Place in height, m. Default 0.
+    pub height_m: f64,
 }
 
 impl WaysideCameraSettings {
@@ -178,11 +201,47 @@ impl WaysideCameraSettings {
         })
     }
 
+    /// The device as it really hangs and looks, through which the world is drawn.
+    pub fn actual(
+        &self,
+        site: &WaysideSite,
+        tunnel: &Tunnel,
+        with_lidar: bool,
+    ) -> Option<WaysideCalibration> {
+        let error = self.calibration_error;
+        let camera = Self {
+            focal_length_mm: self.focal_length_mm + error.focal_length_mm,
+            ..self.clone()
+        };
+        let site = WaysideSite {
+            chainage_m: site.chainage_m + error.chainage_m,
+            lateral_m: site.lateral_m + error.lateral_m,
+            height_m: site.height_m + error.height_m,
+            yaw_rad: site.yaw_rad + error.yaw_deg.to_radians(),
+            pitch_rad: site.pitch_rad + error.pitch_deg.to_radians(),
+            ..site.clone()
+        };
+        camera.calibration(&site, tunnel, with_lidar)
+    }
+
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "lens_gain", self.lens_gain, "", 8.0);
+        let error = self.calibration_error;
+        let at = format!("{at}.calibration_error");
+        let mut check = Checker::new(&at, problems);
+        let mut within = |key: &str, value: f64, unit: &str, most: f64| {
+            check.within(key, value, -most..=most, unit);
+        };
+        let half_focal = 0.5 * self.focal_length_mm.abs();
+        within("focal_length_mm", error.focal_length_mm, "mm", half_focal);
+        within("yaw_deg", error.yaw_deg, "deg", 45.0);
+        within("pitch_deg", error.pitch_deg, "deg", 45.0);
+        within("chainage_m", error.chainage_m, "m", 1.0);
+        within("lateral_m", error.lateral_m, "m", 0.5);
+        within("height_m", error.height_m, "m", 0.5);
     }
 
     fn optics(&self) -> Optics {
@@ -265,6 +324,29 @@ pub(super) fn positive(
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+
+    /// The error moves the device, camera and lidar alike, and leaves its calibration sheet.
+    #[test]
+    fn calibration_error_moves_the_actual_device_only() {
+        let text = include_str!("../../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let site = &tunnel.wayside[0];
+        let mut camera = WaysideCameraSettings::default();
+        let exact = camera.calibration(site, &tunnel, true).unwrap();
+        assert_eq!(camera.actual(site, &tunnel, true), Some(exact.clone()));
+        camera.calibration_error.pitch_deg = 0.5;
+        camera.calibration_error.height_m = 0.02;
+        assert_eq!(camera.calibration(site, &tunnel, true), Some(exact.clone()));
+        let actual = camera.actual(site, &tunnel, true).unwrap();
+        let turned = |a: &Isometry3<f64>, b: &Isometry3<f64>| a.rotation.angle_to(&b.rotation);
+        let half_deg = 0.5f64.to_radians();
+        let by = turned(&actual.world_from_camera, &exact.world_from_camera);
+        assert!((by - half_deg).abs() < 1e-9, "{by}");
+        let (is, said) = (actual.world_from_lidar, exact.world_from_lidar);
+        assert!((turned(&is.unwrap(), &said.unwrap()) - half_deg).abs() < 1e-9);
+        let up = actual.world_from_camera.translation.z - exact.world_from_camera.translation.z;
+        assert!((up - 0.02).abs() < 1e-9, "{up}");
+    }
 
     /// Camera and lidar of a housing look the same way, which is the site's yaw and pitch.
     #[test]

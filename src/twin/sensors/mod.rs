@@ -6,7 +6,7 @@ mod lidar;
 mod odometer;
 mod rig;
 
-pub use camera::WaysideCameraSettings;
+pub use camera::{WaysideCameraSettings, WaysideError};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
