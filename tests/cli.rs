@@ -220,6 +220,26 @@ fn train_that_begins_outside() {
     refused(&folder, &file, &words);
 }
 
+/// A load put down when its bearer is not there would never appear.
+#[test]
+fn load_put_down_by_nobody() {
+    let folder = folder("nobody");
+    let worker = "exposure_us = 30.0\n\
+        [[workers]]\n\
+        path = [{ time_s = 0.0, chainage_m = 160.0, lateral_m = 0.0 },\n\
+                { time_s = 0.1, chainage_m = 160.1, lateral_m = 0.0 }]\n\
+        puts_down_s = 0.15\n\
+        [workers.carries]\n";
+    let file = scenario(&folder, "exposure_us = 30.0\n", worker);
+    let words = [
+        "wrong.toml:13",
+        "workers[0].puts_down_s",
+        "from 0 to 0.1 s, not at 0.15 s",
+        "give 0 to 0.1 s",
+    ];
+    refused(&folder, &file, &words);
+}
+
 /// The file is right, so the message must not point into it.
 #[test]
 fn wrong_override() {

@@ -1,4 +1,7 @@
 //! The wayside devices of a run: when they look, what they are given, what they send.
+//!
+//! The world is drawn and scanned through each device as it really hangs; the detector is given its
+//! calibration.
 
 use super::cameras::{Clock, wayside_view};
 use super::score::{Presence, WaysideScore};
@@ -9,59 +12,71 @@ use crate::stack::wayside::WaysideDetector;
 use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
+use crate::twin::render::cpu::TunnelCaster;
 use crate::twin::render::{SensorSettings, View};
 use crate::twin::sensors::Lidar;
+use nalgebra::Point3;
+use std::sync::Arc;
 
 /// One device: camera, lidar, and the box that looks at both.
 pub struct Device {
     calibration: WaysideCalibration,
+    outlook: Outlook,
     balise: String,
     sensor: SensorSettings,
     stream: Stream,
     clock: Clock,
-    lidar: Option<Lidar>,
+    lidar: Option<(Lidar, Clock)>,
+    scan: Option<LidarScan>,
     detector: WaysideDetector,
     score: WaysideScore,
 }
 
 /// What a device's frame shows, apart from the image.
 pub struct Look {
-    /// Echoes taken with it.
+    /// The latest scan that was complete when the last row closed.
     pub scan: Option<LidarScan>,
     /// All that was really there.
     pub present: Vec<Presence>,
 }
 
 impl Device {
-    /// All devices of a scenario.
-    pub fn all(scenario: &Scenario) -> Vec<Self> {
-        scenario
-            .wayside
-            .iter()
-            .map(|post| Self::new(scenario, post))
-            .collect()
+    /// All devices of a scenario, with the map that they are given.
+    pub fn all(scenario: &Scenario, map: &Arc<Tunnel>) -> Vec<Self> {
+        let posts = scenario.wayside.iter();
+        posts.map(|post| Self::new(scenario, post, map)).collect()
     }
 
-    fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
+    fn new(scenario: &Scenario, post: &WaysidePost, map: &Arc<Tunnel>) -> Self {
         let name = &post.calibration.name;
         Self {
             calibration: post.calibration.clone(),
+            outlook: Outlook::new(scenario, &post.actual),
             balise: post.balise.clone(),
             sensor: post.camera.sensor_behind_lens(),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
-            lidar: (post.lidar.as_ref().zip(post.calibration.world_from_lidar)).map(
+            lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
                 |(settings, pose)| {
                     let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
-                    Lidar::new(settings, &scenario.tunnel, &pose, stream)
+                    let lidar = Lidar::new(settings, &scenario.tunnel, &pose, stream);
+                    let clock = Clock::new(1.0 / lidar.period_s());
+                    (lidar, clock)
                 },
             ),
+            scan: None,
             detector: WaysideDetector::new(
                 &scenario.stack.wayside,
                 post.calibration.clone(),
-                scenario.tunnel.clone(),
+                map.clone(),
             ),
-            score: WaysideScore::default(),
+            score: WaysideScore::new(
+                scenario.tunnel.alignment.track_from_world(
+                    &post.actual.world_from_camera.translation.vector.into(),
+                    post.actual.chainage_m,
+                ),
+                post.actual.camera.intrinsics.height_px,
+            ),
         }
     }
 
@@ -70,20 +85,33 @@ impl Device {
         let camera = self.calibration.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let (number, start) = self.clock.due(now, span_s)?;
-        let view = wayside_view(&self.calibration, self.sensor, self.stream, number, start);
+        let view = wayside_view(
+            &self.outlook.device,
+            self.sensor,
+            self.stream,
+            number,
+            start,
+        );
         Some((number, start, view))
     }
 
-    /// Echoes and truth of the same moment.
-    pub fn look(&self, world: &World, start: SimTime, number: u32) -> Look {
-        let scan = self.lidar.as_ref().map(|lidar| {
+    /// The lidar's head turns at its own rate: takes the scan that is complete by now, if any.
+    pub fn sweep(&mut self, world: &World) {
+        let Some((lidar, clock)) = &mut self.lidar else {
+            return;
+        };
+        if let Some((number, start)) = clock.due(world.time(), lidar.sweep_s()) {
             let mut bodies = world.bodies();
             bodies.extend(world.train_bodies());
-            lidar.scan(start, number, world.time(), &bodies)
-        });
+            self.scan = Some(lidar.scan(start, number, world.time(), &bodies));
+        }
+    }
+
+    /// What goes with a frame that is complete now.
+    pub fn look(&self, world: &World) -> Look {
         Look {
-            scan,
-            present: present(world),
+            scan: self.scan.clone(),
+            present: self.outlook.present(world),
         }
     }
 
@@ -99,7 +127,8 @@ impl Device {
         let train = comms.train_report(now);
         let detector = &mut self.detector;
         let (report, seconds) = watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));
-        self.score.report(&report, 1e3 * seconds, &look.present);
+        self.score
+            .report(&report, now, 1e3 * seconds, &look.present);
         if let Some(warning) = self.detector.message(&report) {
             comms.send(now, &self.balise, warning);
         }
@@ -117,31 +146,164 @@ impl Device {
     }
 }
 
-/// Everything that a device may rightly report.
-fn present(world: &World) -> Vec<Presence> {
-    let obstacles = world.obstacles().map(|o| Presence {
-        name: o.name.to_owned(),
-        size_m: o.size_m.max(),
-        chainage_m: o.chainage_m,
-        half_length_m: 0.5 * o.size_m.x,
-        at_rest: o.resting,
-        obstacle: true,
-    });
-    let workers = world.workers().map(|w| Presence {
-        name: w.name.to_owned(),
-        size_m: w.stature_m,
-        chainage_m: w.chainage_m,
-        half_length_m: 0.4,
-        at_rest: false,
-        obstacle: false,
-    });
-    let train = (world.head_m().zip(world.train_length_m())).map(|(head_m, length_m)| Presence {
-        name: "train".into(),
-        size_m: length_m,
-        chainage_m: head_m - 0.5 * length_m,
-        half_length_m: 0.5 * length_m,
-        at_rest: false,
-        obstacle: false,
-    });
-    obstacles.chain(workers).chain(train).collect()
+/// What a device can have in view: where it really hangs and looks, and the walls around it.
+struct Outlook {
+    device: WaysideCalibration,
+    reach_m: f64,
+    walls: TunnelCaster,
+    slab: usize,
+}
+
+impl Outlook {
+    fn new(scenario: &Scenario, device: &WaysideCalibration) -> Self {
+        let walls = TunnelCaster::new(&scenario.tunnel);
+        Self {
+            slab: walls.slab_of(&device.world_from_camera.translation.vector.into(), None),
+            device: device.clone(),
+            reach_m: scenario.stack.wayside.reach_m,
+            walls,
+        }
+    }
+
+    /// Whether a place is in the picture, within the detector's reach along the line, and not
+    /// behind a wall. What moves in between does not matter.
+    fn has_in_view(&self, place: &Point3<f64>, chainage_m: f64) -> bool {
+        let camera = &self.device.camera.intrinsics;
+        let pose = &self.device.world_from_camera;
+        let pixel = camera.project(&pose.inverse_transform_point(place));
+        let in_picture = pixel.is_some_and(|p| {
+            (0.0..f64::from(camera.width_px)).contains(&p.x)
+                && (0.0..f64::from(camera.height_px)).contains(&p.y)
+        });
+        let eye = Point3::from(pose.translation.vector);
+        let sight = place - eye;
+        in_picture
+            && (chainage_m - self.device.chainage_m).abs() <= self.reach_m
+            && self.walls.cast(self.slab, &eye, &sight, 1.0).is_none()
+    }
+
+    /// Everything that the device may rightly report.
+    fn present(&self, world: &World) -> Vec<Presence> {
+        let obstacles = world.obstacles().map(|o| Presence {
+            name: o.name.to_owned(),
+            size_m: o.size_m.max(),
+            chainage_m: o.chainage_m,
+            lateral_m: o.lateral_m,
+            half_length_m: o.half_extents_m.x,
+            half_width_m: o.half_extents_m.y,
+            lies_in_view_since: o.resting_since.filter(|_| {
+                self.has_in_view(&o.world_from_body.translation.vector.into(), o.chainage_m)
+            }),
+            obstacle: true,
+        });
+        let workers = world.workers().map(|w| Presence {
+            name: w.name.to_owned(),
+            size_m: w.stature_m,
+            chainage_m: w.chainage_m,
+            lateral_m: w.lateral_m,
+            half_length_m: STRIDE_REACH_M,
+            half_width_m: STRIDE_REACH_M,
+            lies_in_view_since: None,
+            obstacle: false,
+        });
+        let half = world.car_half_extents_m().unwrap_or_default();
+        let train =
+            (world.head_m().zip(world.train_length_m())).map(|(head_m, length_m)| Presence {
+                name: "train".into(),
+                size_m: length_m,
+                chainage_m: head_m - 0.5 * length_m,
+                lateral_m: 0.0,
+                half_length_m: 0.5 * length_m,
+                half_width_m: half.y,
+                lies_in_view_since: None,
+                obstacle: false,
+            });
+        obstacles.chain(workers).chain(train).collect()
+    }
+}
+
+/// How far a walking man's limbs reach from his middle.
+const STRIDE_REACH_M: f64 = 0.4;
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::bus::TrainCommand;
+    use crate::track::read_toml;
+
+    const TUNNEL: &str = include_str!("../../tunnels/chengdu_line1.toml");
+    const SCENARIO: &str = r#"
+        name = "post"
+        tunnel = "given"
+        [[wayside]]
+        device = "W1530"
+        lidar = { rate_hz = 4.0, step_deg = 5.0 }
+        [wayside.camera]
+        frames_per_s = 10.0
+        calibration_error = { yaw_deg = 1.0 }
+        [[obstacles]]
+        name = "seen"
+        chainage_m = 1505.0
+        [[obstacles]]
+        name = "behind the device"
+        chainage_m = 1536.0
+        [[obstacles]]
+        name = "beyond its reach"
+        chainage_m = 1440.0
+    "#;
+
+    fn post() -> (Scenario, World, Device) {
+        let tunnel = Tunnel::from_toml(TUNNEL).unwrap();
+        let scenario = Scenario::new(read_toml(SCENARIO).unwrap(), tunnel).unwrap();
+        let world = World::new(scenario.tunnel.clone(), &scenario.physics, 1, 0).unwrap();
+        let device = Device::all(&scenario, &scenario.map()).pop().unwrap();
+        (scenario, world, device)
+    }
+
+    /// Fails where a scan is made for each frame instead of at the lidar's rate, or before the
+    /// head has come round.
+    #[test]
+    fn the_lidar_turns_at_its_own_rate() {
+        let (_, mut world, mut device) = post();
+        let mut scans = Vec::new();
+        let mut frames = 0;
+        while world.time().secs() < 1.0 {
+            world.step(&TrainCommand::default()).unwrap();
+            device.sweep(&world);
+            if device.due(world.time()).is_some() {
+                frames += 1;
+                let begun = device.look(&world).scan.map(|s| s.time);
+                if begun != scans.last().copied() {
+                    scans.extend(begun);
+                }
+            }
+        }
+        assert_eq!(frames, 10);
+        let begun: Vec<_> = scans.into_iter().map(SimTime::secs).collect();
+        // A sweep of 120 deg at 4 turns a second takes 83 ms: that begun at 0 is not complete when
+        // the first frame closes, that begun at 0.75 s is when the last one does.
+        assert_eq!(begun, [0.0, 0.25, 0.5, 0.75]);
+    }
+
+    /// Fails where a device answers for what it cannot see, or the world is drawn through the
+    /// calibration instead of the device.
+    #[test]
+    fn a_device_answers_for_what_it_has_in_view() {
+        let (_, mut world, device) = post();
+        while world.time().secs() < 2.0 {
+            world.step(&TrainCommand::default()).unwrap();
+        }
+        let lying: Vec<_> = (device.look(&world).present.into_iter())
+            .filter(|p| p.lies_in_view_since.is_some())
+            .collect();
+        assert_eq!(lying.len(), 1, "{lying:?}");
+        assert_eq!(lying[0].name, "seen");
+        // It fell from 0.67 m over the bed, and is still since it came to rest.
+        let since_s = lying[0].lies_in_view_since.unwrap().secs();
+        assert!((0.3..1.7).contains(&since_s), "{since_s}");
+        let (is, said) = (&device.outlook.device, device.calibration());
+        let turned = (is.world_from_camera.rotation).angle_to(&said.world_from_camera.rotation);
+        assert!((turned - 1.0f64.to_radians()).abs() < 1e-9);
+    }
 }

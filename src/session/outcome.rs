@@ -2,7 +2,8 @@
 
 use super::summary::Protection;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
-use crate::twin::physics::{TrainState, World};
+use crate::track::Gauge;
+use crate::twin::physics::{ObstacleTruth, TrainState, World};
 
 /// What a run came to.
 #[derive(Default)]
@@ -11,6 +12,7 @@ pub struct Outcome {
     slowed_by_obstacle: bool,
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
+    stop_margin_m: Option<f64>,
     has_run: bool,
     standing_since: Option<SimTime>,
 }
@@ -26,7 +28,7 @@ impl Outcome {
     }
 
     /// Follows whether the train has run, and since when it stands.
-    pub fn on_motion(&mut self, train: &TrainState) {
+    pub fn on_motion(&mut self, train: &TrainState, world: &World) {
         self.has_run |= !train.standing;
         // A driver who obeys brakes before the equipment has to.
         if self.slowed_by_obstacle && train.brake_mps2 > 0.0 {
@@ -37,8 +39,9 @@ impl Outcome {
             return;
         }
         self.standing_since.get_or_insert(train.time);
-        if self.brake_commanded.is_some() {
-            self.stopped.get_or_insert(train.time);
+        if self.brake_commanded.is_some() && self.stopped.is_none() {
+            self.stopped = Some(train.time);
+            self.stop_margin_m = margin_m(world, train.chainage_m);
         }
     }
 
@@ -50,16 +53,64 @@ impl Outcome {
 
     /// The figures; `None` without a train.
     pub fn protection(&self, world: &World) -> Option<Protection> {
-        let head_m = world.head_m()?;
-        let margins_m = world
-            .obstacles()
-            .map(|o| o.chainage_m - 0.5 * o.size_m.x - head_m)
-            .filter(|margin_m| *margin_m > -1.0);
+        world.head_m()?;
         Some(Protection {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
-            stop_margin_m: self.stopped.and(margins_m.min_by(f64::total_cmp)),
+            stop_margin_m: self.stop_margin_m,
             collision: world.collision().is_some(),
         })
+    }
+}
+
+/// From the head to the nearest obstacle that it would meet. A little behind the head counts too:
+/// that is what a train has hit and not pushed away.
+fn margin_m(world: &World, head_m: f64) -> Option<f64> {
+    (world.obstacles().filter(|o| fouls(world, o)))
+        .map(|o| o.chainage_m - o.half_extents_m.x - head_m)
+        .filter(|margin_m| *margin_m > -1.0)
+        .min_by(f64::total_cmp)
+}
+
+/// Whether any of an obstacle is within the gauge across the track. Under top of rail the train's
+/// own gear hangs, as wide as the gauge's foot.
+fn fouls(world: &World, o: &ObstacleTruth<'_>) -> bool {
+    let curvature = world.tunnel().alignment.at(o.chainage_m).curvature_per_m;
+    let low_m = (o.height_m - o.half_extents_m.z).max(0.0);
+    let half_m = Gauge::b1(curvature).half_width_m(low_m);
+    half_m.is_some_and(|half_m| o.lateral_m.abs() - o.half_extents_m.y < half_m)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::bus::TrainCommand;
+    use crate::track::Tunnel;
+    use crate::twin::physics::{ObstacleSettings, PhysicsSettings};
+    use std::sync::Arc;
+
+    /// Fails where what stands beside the gauge, or lies behind the train, counts as in its way.
+    #[test]
+    fn the_margin_is_to_what_is_in_the_way() {
+        let text = include_str!("../../tunnels/test_bench.toml");
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let lying = |chainage_m, lateral_m| ObstacleSettings {
+            chainage_m,
+            lateral_m,
+            ..ObstacleSettings::default()
+        };
+        let settings = PhysicsSettings {
+            train: None,
+            obstacles: vec![lying(190.0, 2.5), lying(200.0, 0.5), lying(150.0, 0.0)],
+            ..PhysicsSettings::default()
+        };
+        let mut world = World::new(tunnel, &settings, 1, 0).unwrap();
+        while world.time().secs() < 1.5 {
+            world.step(&TrainCommand::default()).unwrap();
+        }
+        let margin = margin_m(&world, 180.0).unwrap();
+        assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");
+        assert_eq!(margin_m(&world, 202.0), None);
     }
 }

@@ -52,8 +52,8 @@ impl<'s> Run<'s> {
     /// At time zero.
     pub fn new(scenario: &'s Scenario, renderer: Box<dyn Renderer>) -> Result<Self, SessionError> {
         let seed = scenario.seed;
-        let map = scenario.tunnel.clone();
-        let world = World::new(map.clone(), &scenario.physics, seed, 0)?;
+        let (tunnel, map) = (&scenario.tunnel, scenario.map());
+        let world = World::new(tunnel.clone(), &scenario.physics, seed, 0)?;
         let imu = Imu::new(&scenario.imu, seed, 0);
         let odometer = Odometer::new(&scenario.odometer, seed, 0);
         let radio = Stream::new(seed, 0, "radio");
@@ -70,8 +70,8 @@ impl<'s> Run<'s> {
             odometer_clock: Clock::new(1.0 / odometer.period_s()),
             odometer,
             eyes,
-            devices: Device::all(scenario),
-            comms: Comms::new(&scenario.radio, &map.base_stations, radio),
+            devices: Device::all(scenario, &map),
+            comms: Comms::new(&scenario.radio, &tunnel.base_stations, radio),
             protection: Protection::new(&scenario.stack.protection, map),
             protection_clock: Clock::new(PROTECTION_HZ),
             command: TrainCommand::default(),
@@ -219,8 +219,9 @@ impl<'s> Run<'s> {
             self.submit(now, views.into(), shot)?;
         }
         for k in 0..self.devices.len() {
+            self.devices[k].sweep(&self.world);
             if let Some((number, start, view)) = self.devices[k].due(now) {
-                let what = What::Wayside(k, self.devices[k].look(&self.world, start, number));
+                let what = What::Wayside(k, self.devices[k].look(&self.world));
                 let shot = Shot {
                     number,
                     start,
@@ -351,7 +352,7 @@ impl<'s> Run<'s> {
         if self.truth_clock.due(now, 0.0).is_some()
             && let Some(train) = self.world.train()
         {
-            self.outcome.on_motion(&train);
+            self.outcome.on_motion(&train, &self.world);
             if let Some(eyes) = &mut self.eyes {
                 eyes.score.head_at(train.chainage_m);
             }

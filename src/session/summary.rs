@@ -189,9 +189,11 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 /// Wayside detection.
 #[derive(Clone, Debug, Serialize)]
 pub struct Wayside {
-    /// Every obstacle that came to lie in view.
+    /// Every obstacle that came to lie in view of a device: in its picture, within the detector's
+    /// reach, not behind a wall.
     pub obstacles: Vec<ObstacleScore>,
-    /// Dangers reported, counted once a frame, where nothing real is.
+    /// Dangers reported, counted once a frame, where nothing real is: not within the error that
+    /// is expected of the device at that distance, along the line and across.
     pub false_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
@@ -204,9 +206,11 @@ pub struct ObstacleScore {
     pub name: String,
     /// Its largest dimension.
     pub size_m: f64,
-    /// When it was first reported.
+    /// When the first report of it was given: `stack.latency_ms` after the last row of the frame.
     pub first_detected_s: Option<f64>,
-    /// From its appearance in the world to its first report.
+    /// From when it lay visible (at rest, in view) to that report. The detector's confirmation over
+    /// several frames is part of it, and so is all the time for which a worker or a train stood
+    /// before it or beside it, where nobody can tell which of the two was seen.
     pub latency_s: Option<f64>,
     /// Reported less true distance along the line, mean over the frames that report it at rest.
     pub distance_error_m: Option<f64>,
@@ -218,9 +222,10 @@ pub struct Protection {
     /// When the train first braked for an obstacle, by the equipment or by a driver who keeps to the
     /// permitted speed.
     pub brake_commanded_s: Option<f64>,
-    /// When the train then stood.
+    /// When the train first stood after that: slower than 0.01 m/s.
     pub stopped_s: Option<f64>,
-    /// From the head of the standing train to the nearest obstacle in its way.
+    /// From the head of the train, at that moment, to the nearest obstacle ahead that is within the
+    /// gauge across the track.
     pub stop_margin_m: Option<f64>,
     /// The train hit something.
     pub collision: bool,

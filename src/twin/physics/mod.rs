@@ -137,10 +137,16 @@ pub struct ObstacleTruth<'a> {
     pub size_m: Vector3<f64>,
     /// Chainage of its centre.
     pub chainage_m: f64,
+    /// Its centre, left of the centreline.
+    pub lateral_m: f64,
+    /// Its centre, above top of rail.
+    pub height_m: f64,
+    /// Half of what it extends along the line, across and up, turned as it is.
+    pub half_extents_m: Vector3<f64>,
     /// Pose of its centre.
     pub world_from_body: Isometry3<f64>,
-    /// It lies still.
-    pub resting: bool,
+    /// Since when it lies still; `None` while it moves.
+    pub resting_since: Option<SimTime>,
 }
 
 /// A train under way.
@@ -391,13 +397,20 @@ impl World {
         self.obstacles.iter().filter_map(|obstacle| {
             let (world_from_body, _) = obstacle.state(&self.rapier)?;
             let centre = world_from_body.translation.vector.into();
-            let near = obstacle.settings.chainage_m;
+            let line = &self.tunnel.alignment;
+            let place = line.track_from_world(&centre, obstacle.settings.chainage_m);
+            let size_m = obstacle.settings.body.size_m();
+            let line_from_world = line.at(place.s_m).world_from_line().rotation.inverse();
+            let turned = (line_from_world * world_from_body.rotation).to_rotation_matrix();
             Some(ObstacleTruth {
                 name: &obstacle.settings.name,
-                size_m: obstacle.settings.body.size_m(),
-                chainage_m: self.tunnel.alignment.track_from_world(&centre, near).s_m,
+                size_m,
+                chainage_m: place.s_m,
+                lateral_m: place.l_m,
+                height_m: place.h_m,
+                half_extents_m: 0.5 * turned.matrix().abs() * size_m,
                 world_from_body,
-                resting: obstacle.resting(),
+                resting_since: (obstacle.resting()).then(|| self.time.plus(-obstacle.still_s())),
             })
         })
     }

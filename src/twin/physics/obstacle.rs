@@ -221,6 +221,11 @@ impl Obstacle {
         self.still_s >= RESTING_S
     }
 
+    /// For how long it has not moved.
+    pub(super) fn still_s(&self) -> f64 {
+        self.still_s
+    }
+
     /// Where it is and how it moves.
     pub(super) fn state(&self, world: &PhysicsWorld) -> Option<(Isometry3<f64>, Vector3<f64>)> {
         let body = world.bodies.get(self.body)?;

@@ -399,7 +399,7 @@ fn obstacles_come_to_rest_on_the_bed() {
     run(&mut world, 6.0, &TrainCommand::default());
     assert_eq!(world.obstacles().count(), 3);
     for (truth, half) in world.obstacles().zip([0.125, 0.15, 0.11]) {
-        assert!(truth.resting, "{} still moves", truth.name);
+        assert!(truth.resting_since.is_some(), "{} still moves", truth.name);
         let height = truth.world_from_body.translation.z - 5.0;
         assert!(
             (height - (crate::track::BED_M + half)).abs() < 5e-3,
@@ -441,7 +441,7 @@ fn worker_leaves_his_toolbox() {
     run(&mut world, 3.0, &TrainCommand::default());
     assert_eq!(world.bodies().len(), 1);
     let left = world.obstacles().next().unwrap();
-    assert!(left.resting && (left.chainage_m - 200.0).abs() < 0.6);
+    assert!(left.resting_since.is_some() && (left.chainage_m - 200.0).abs() < 0.6);
 }
 
 /// A train that hits a box throws it, loses as much momentum as the box gains, and it is recorded.

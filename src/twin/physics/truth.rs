@@ -11,8 +11,10 @@ pub struct WorkerTruth<'a> {
     pub name: &'a str,
     /// Height of the body.
     pub stature_m: f64,
-    /// Where he is.
+    /// Where he is along the line.
     pub chainage_m: f64,
+    /// Left of the centreline.
+    pub lateral_m: f64,
 }
 
 impl World {
@@ -36,10 +38,12 @@ impl World {
     pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
         let now_s = self.time.secs();
         self.settings.workers.iter().filter_map(move |worker| {
+            let (chainage_m, lateral_m) = worker.place_m(now_s)?;
             Some(WorkerTruth {
                 name: &worker.name,
                 stature_m: worker.stature_m,
-                chainage_m: worker.chainage_m(now_s)?,
+                chainage_m,
+                lateral_m,
             })
         })
     }

@@ -35,7 +35,7 @@ pub struct WorkerSettings {
     pub path: Vec<Waypoint>,
     /// What he carries; place, velocity and `appears_s` of it are ignored.
     pub carries: Option<ObstacleSettings>,
-    /// When he puts it down beside him, seconds; never where absent.
+    /// When he puts it down beside him, seconds, while he is there; never where absent.
     pub puts_down_s: Option<f64>,
 }
 
@@ -80,6 +80,17 @@ impl WorkerSettings {
                 ));
             }
         }
+        if let (Some(first), Some(last), Some(at_s)) =
+            (self.path.first(), self.path.last(), self.puts_down_s)
+            && !(first.time_s..=last.time_s).contains(&at_s)
+        {
+            let (from_s, to_s) = (first.time_s, last.time_s);
+            problems.push(Problem::new(
+                join(at, "puts_down_s"),
+                format!("he is on the line from {from_s} to {to_s} s, not at {at_s} s"),
+                format!("give {from_s} to {to_s} s, or let his path last longer"),
+            ));
+        }
         for (k, p) in self.path.iter().enumerate() {
             let at = key_below(at, &format!("path[{k}]"));
             let mut check = Checker::new(&at, problems);
@@ -112,9 +123,9 @@ struct Stance {
 }
 
 impl WorkerSettings {
-    /// Where he is along the line at a time, while he is there.
-    pub(super) fn chainage_m(&self, t_s: f64) -> Option<f64> {
-        self.stance(t_s).map(|stance| stance.s_m)
+    /// Chainage and place left of the centreline at a time, while he is there.
+    pub(super) fn place_m(&self, t_s: f64) -> Option<(f64, f64)> {
+        self.stance(t_s).map(|stance| (stance.s_m, stance.l_m))
     }
 
     /// Where he is at a time; `None` before the first waypoint and after the last.

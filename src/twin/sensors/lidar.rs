@@ -30,7 +30,8 @@ pub struct LidarSettings {
     pub half_sector_deg: f64,
     /// Turn from shot to shot, deg. Default 0.2.
     pub step_deg: f64,
-    /// Turns of the head a second; one scan each. Default 10.
+    /// Turns of the head a second, one scan each; a frame goes with the latest scan that was
+    /// complete when the frame's last row closed. Default 10.
     pub rate_hz: f64,
     /// Standard deviation of a range, m. Default 0.02.
     pub range_noise_m: f64,
@@ -181,6 +182,11 @@ impl Lidar {
     /// From scan to scan.
     pub fn period_s(&self) -> f64 {
         1.0 / self.settings.rate_hz
+    }
+
+    /// From the first shot of a scan to its last.
+    pub fn sweep_s(&self) -> f64 {
+        self.beams.last().map_or(0.0, |beam| beam.after_s)
     }
 
     /// Scan `number`, begun at `time`, among bodies whose poses are those of `bodies_time`.
