@@ -9,6 +9,7 @@ use super::watch::Stopwatch;
 use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
+use crate::track::Tunnel;
 use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;

@@ -2,7 +2,7 @@
 
 use super::summary::Protection;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
-use crate::track::Gauge;
+use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
 
 /// What a run came to.
@@ -28,7 +28,7 @@ impl Outcome {
     }
 
     /// Follows whether the train has run, and since when it stands.
-    pub fn on_motion(&mut self, train: &TrainState, world: &World) {
+    pub fn on_motion(&mut self, train: &TrainState, world: &World, line: &Alignment) {
         self.has_run |= !train.standing;
         // A driver who obeys brakes before the equipment has to.
         if self.slowed_by_obstacle && train.brake_mps2 > 0.0 {
@@ -41,7 +41,7 @@ impl Outcome {
         self.standing_since.get_or_insert(train.time);
         if self.brake_commanded.is_some() && self.stopped.is_none() {
             self.stopped = Some(train.time);
-            self.stop_margin_m = margin_m(world, train.chainage_m);
+            self.stop_margin_m = margin_m(world, line, train.chainage_m);
         }
     }
 
@@ -65,8 +65,8 @@ impl Outcome {
 
 /// From the head to the nearest obstacle that it would meet. A little behind the head counts too:
 /// that is what a train has hit and not pushed away.
-fn margin_m(world: &World, head_m: f64) -> Option<f64> {
-    (world.obstacles().filter(|o| fouls(world, o)))
+fn margin_m(world: &World, line: &Alignment, head_m: f64) -> Option<f64> {
+    (world.obstacles().filter(|o| fouls(line, o)))
         .map(|o| o.chainage_m - o.half_extents_m.x - head_m)
         .filter(|margin_m| *margin_m > -1.0)
         .min_by(f64::total_cmp)
@@ -74,8 +74,8 @@ fn margin_m(world: &World, head_m: f64) -> Option<f64> {
 
 /// Whether any of an obstacle is within the gauge across the track. Under top of rail the train's
 /// own gear hangs, as wide as the gauge's foot.
-fn fouls(world: &World, o: &ObstacleTruth<'_>) -> bool {
-    let curvature = world.tunnel().alignment.at(o.chainage_m).curvature_per_m;
+fn fouls(line: &Alignment, o: &ObstacleTruth<'_>) -> bool {
+    let curvature = line.at(o.chainage_m).curvature_per_m;
     let low_m = (o.height_m - o.half_extents_m.z).max(0.0);
     let half_m = Gauge::b1(curvature).half_width_m(low_m);
     half_m.is_some_and(|half_m| o.lateral_m.abs() - o.half_extents_m.y < half_m)
@@ -105,12 +105,12 @@ mod tests {
             obstacles: vec![lying(190.0, 2.5), lying(200.0, 0.5), lying(150.0, 0.0)],
             ..PhysicsSettings::default()
         };
-        let mut world = World::new(tunnel, &settings, 1, 0).unwrap();
+        let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
         while world.time().secs() < 1.5 {
             world.step(&TrainCommand::default()).unwrap();
         }
-        let margin = margin_m(&world, 180.0).unwrap();
+        let margin = margin_m(&world, &tunnel.alignment, 180.0).unwrap();
         assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");
-        assert_eq!(margin_m(&world, 202.0), None);
+        assert_eq!(margin_m(&world, &tunnel.alignment, 202.0), None);
     }
 }

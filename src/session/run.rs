@@ -352,7 +352,8 @@ impl<'s> Run<'s> {
         if self.truth_clock.due(now, 0.0).is_some()
             && let Some(train) = self.world.train()
         {
-            self.outcome.on_motion(&train, &self.world);
+            let line = &self.scenario.tunnel.alignment;
+            self.outcome.on_motion(&train, &self.world, line);
             if let Some(eyes) = &mut self.eyes {
                 eyes.score.head_at(train.chainage_m);
             }

@@ -86,7 +86,7 @@ impl WorkerSettings {
         {
             let (from_s, to_s) = (first.time_s, last.time_s);
             problems.push(Problem::new(
-                join(at, "puts_down_s"),
+                key_below(at, "puts_down_s"),
                 format!("he is on the line from {from_s} to {to_s} s, not at {at_s} s"),
                 format!("give {from_s} to {to_s} s, or let his path last longer"),
             ));
