@@ -123,7 +123,7 @@ fn renderer(
         Err(RenderError::NoAdapter(why)) if choice == RendererChoice::Auto => {
             tracing::warn!(
                 "no Vulkan, Metal or DirectX 12 adapter ({why}): drawing with the plain CPU \
-                 renderer, right but about ten times slower. On Debian or Ubuntu \
+                 renderer, right but about half as fast as a software driver. On Debian or Ubuntu \
                  `apt-get install mesa-vulkan-drivers` gives a software adapter."
             );
             Ok(Box::new(CpuRenderer::quick(scene)))
