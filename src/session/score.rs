@@ -257,7 +257,8 @@ impl WaysideScore {
     /// Whether what was reported overlaps what is there, in the plane of the track, but for the
     /// error that is expected of a camera `height` over the bed at that distance: e `range` across
     /// the line of sight, and e `range`^2 / `height` along it, with e of [`FOOT_ERROR_RAD`]. What
-    /// the picture's lower border cuts has its foot nearer to the device than the report says.
+    /// the picture's lower border cuts has its foot nearer to the device than the report says, on
+    /// the same line of sight in plan.
     fn may_be(&self, seen: &DetectedObstacle, p: &Presence) -> bool {
         // From the device to the nearest part of it: a train is long.
         let nearest_m = (self.eye.s_m).clamp(
@@ -271,13 +272,14 @@ impl WaysideScore {
         let along_m = across_m * range_m / height_m;
         let (cos, sin) = (ahead_m.abs() / range_m, left_m.abs() / range_m);
         let half_m = 0.5 * (seen.to_chainage_m - seen.from_chainage_m);
-        let cut = seen.blob.bounds.v1 + CUT_ROWS >= self.rows;
-        let nearer = (middle_m(seen) - self.eye.s_m).abs() > ahead_m.abs();
-        let gap_s_m = match cut && nearer {
-            true => 0.0,
-            false => (middle_m(seen) - p.chainage_m).abs() - half_m - p.half_length_m,
-        };
-        let gap_l_m = (seen.lateral_m - p.lateral_m).abs() - 0.5 * seen.width_m - p.half_width_m;
+        let mut gap_s_m = (middle_m(seen) - p.chainage_m).abs() - half_m - p.half_length_m;
+        let mut lateral_m = seen.lateral_m;
+        let share = ahead_m / (middle_m(seen) - self.eye.s_m);
+        if seen.blob.bounds.v1 + CUT_ROWS >= self.rows && (0.0..1.0).contains(&share) {
+            gap_s_m = 0.0;
+            lateral_m = self.eye.l_m + share * (lateral_m - self.eye.l_m);
+        }
+        let gap_l_m = (lateral_m - p.lateral_m).abs() - 0.5 * seen.width_m - p.half_width_m;
         gap_s_m <= along_m * cos + across_m * sin && gap_l_m <= along_m * sin + across_m * cos
     }
 
@@ -416,12 +418,17 @@ mod tests {
     /// one behind what was reported is none.
     #[test]
     fn what_the_border_cuts_is_nearer() {
-        for (chainage_m, v1, false_alarms) in [(122.0, 1078, 0), (122.0, 900, 1), (110.0, 1078, 1)]
-        {
+        // Half way from the report to the eye he is half way to its wall.
+        for (chainage_m, lateral_m, v1, false_alarms) in [
+            (122.0, -1.0, 1078, 0),
+            (122.0, 0.5, 1078, 1),
+            (122.0, -1.0, 900, 1),
+            (110.0, 0.0, 1078, 1),
+        ] {
             let worker = Presence {
                 obstacle: false,
                 lies_in_view_since: None,
-                ..lying("worker", chainage_m, 0.0)
+                ..lying("worker", chainage_m, lateral_m)
             };
             let mut score = score();
             let mut report = alarm(119.0, 0.0);

@@ -193,7 +193,8 @@ pub struct Wayside {
     /// reach, not behind a wall.
     pub obstacles: Vec<ObstacleScore>,
     /// Dangers reported, counted once a frame, where nothing real is: not within the error that
-    /// is expected of the device at that distance, along the line and across.
+    /// is expected of the device at that distance, along the line and across. What is still
+    /// reported after it has gone counts too.
     pub false_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
