@@ -222,6 +222,19 @@ fn train_that_begins_outside() {
 
 /// A load put down when its bearer is not there would never appear.
 #[test]
+fn obstacle_on_the_bench() {
+    let folder = folder("obstacle_on_the_bench");
+    let bench = "[bench]\nfirst_m = 189.75\n[[obstacles]]\nchainage_m = 195.0\n";
+    let train = "[train]\nstart_chainage_m = 150.0\ncruise_speed_kmh = 30.0\n";
+    let file = scenario(&folder, train, bench);
+    refused(
+        &folder,
+        &file,
+        &["obstacles", "bench test", "[[obstacles]]"],
+    );
+}
+
+#[test]
 fn load_put_down_by_nobody() {
     let folder = folder("nobody");
     let worker = "exposure_us = 30.0\n\
@@ -312,37 +325,36 @@ fn unwritable_out_folder() {
 fn a_run_writes_whole_files() {
     let folder = folder("run");
     let out = folder.join("results");
-    let output = metrotwin(&[
-        "run",
-        "scenarios/static_bench.toml",
-        "--out",
-        out.to_str().expect("the path is UTF-8"),
-        "--set",
-        "bench.points=1",
-        "--set",
-        "bench.fixes_per_point=2",
-        "--seed",
-        "7",
-        "--renderer",
-        "cpu",
-        "--json",
-    ]);
-    assert_eq!(output.status.code(), Some(0), "{output:?}");
-    let printed: serde_json::Value =
-        serde_json::from_slice(&output.stdout).expect("standard output is JSON");
-    let kept = fs::read(out.join("summary.json")).expect("there is a summary");
-    let kept: serde_json::Value = serde_json::from_slice(&kept).expect("the summary is JSON");
-    assert_eq!(printed, kept);
+    let run = |more: &[&str]| {
+        let mut args = vec!["run", "scenarios/static_bench.toml", "--json"];
+        args.extend(["--out", out.to_str().expect("the path is UTF-8")]);
+        args.extend(["--set", "bench.points=1"]);
+        args.extend(["--set", "bench.fixes_per_point=2"]);
+        args.extend(["--seed", "7", "--renderer", "cpu"]);
+        args.extend(more);
+        let output = metrotwin(&args);
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        let printed: serde_json::Value =
+            serde_json::from_slice(&output.stdout).expect("standard output is JSON");
+        let kept = fs::read(out.join("summary.json")).expect("there is a summary");
+        let kept: serde_json::Value = serde_json::from_slice(&kept).expect("the summary is JSON");
+        assert_eq!(printed, kept);
+        let mut files: Vec<String> = fs::read_dir(&out)
+            .expect("there is a folder")
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .collect();
+        files.sort();
+        (printed, files)
+    };
+    let (printed, files) = run(&[]);
     assert_eq!(printed["scenario"], "static_bench");
     assert_eq!(printed["seed"], 7);
     assert!(printed["stereo_frames"].as_u64() >= Some(2));
     assert_eq!(printed["renderer"]["backend"], "cpu");
-    let mut files: Vec<String> = fs::read_dir(&out)
-        .expect("there is a folder")
-        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .collect();
-    files.sort();
     assert_eq!(files, ["fixes.csv", "recording.rrd", "summary.json"]);
+    // The recording of the run before does not belong to this one's summary.
+    let (_, files) = run(&["--no-recording"]);
+    assert_eq!(files, ["fixes.csv", "summary.json"]);
 }
 
 /// Every shipped file is right, and the report has the figures that a user plans with.

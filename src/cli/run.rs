@@ -102,6 +102,9 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
 
     stop_on_ctrl_c();
     let summary = observed(args, &scenario, live, &out)?;
+    remove_stale(args, &scenario, &out).map_err(|e| {
+        Failure::run(anyhow::Error::new(e).context("cannot remove results of an earlier run"))
+    })?;
     let text = serde_json::to_string_pretty(&summary).map_err(Failure::run)?;
     write_whole(&out.join("summary.json"), &text)
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write summary.json")))?;
@@ -178,6 +181,22 @@ fn prepare(out: &Path) -> io::Result<()> {
     let probe = out.join(".metrotwin-probe");
     fs::write(&probe, b"")?;
     fs::remove_file(&probe)
+}
+
+/// What this run did not write, but an earlier one into the same folder, would not belong to its
+/// summary.
+fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
+    let stale = [
+        ("recording.rrd", args.no_recording),
+        ("fixes.csv", scenario.rig.is_none()),
+    ];
+    for (name, _) in stale.into_iter().filter(|(_, stale)| *stale) {
+        match fs::remove_file(out.join(name)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Writes under a temporary name and renames, so that a file is whole or not there.

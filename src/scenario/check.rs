@@ -115,6 +115,22 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         )),
         _ => {}
     }
+    if file.bench.is_none() {
+        return;
+    }
+    for (key, count) in [
+        ("wayside", file.wayside.len()),
+        ("obstacles", file.obstacles.len()),
+        ("workers", file.workers.len()),
+    ] {
+        if count > 0 {
+            problems.push(Problem::new(
+                key,
+                "a bench test has the rig and the lamps only: they would not be there",
+                format!("take out [bench] or [[{key}]]"),
+            ));
+        }
+    }
 }
 
 fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {

@@ -9,10 +9,12 @@ use super::watch::{Costs, Watchers};
 use super::{End, Event, Observer, Opening, RunOptions, SessionError, Summary};
 use crate::bus::{Method, SimTime};
 use crate::scenario::{BenchSettings, Scenario};
+use crate::track::Tunnel;
 use crate::twin::physics::TrainState;
 use crate::twin::render::{Job, Renderer};
 use crate::twin::sensors::RigSettings;
 use nalgebra::{Isometry3, Vector3};
+use std::sync::Arc;
 
 /// How long a point is given to yield its fixes.
 const PATIENCE_S: f64 = 5.0;
@@ -22,6 +24,8 @@ pub struct Bench<'s> {
     scenario: &'s Scenario,
     settings: BenchSettings,
     rig: &'s RigSettings,
+    /// As the stack is given it.
+    map: Arc<Tunnel>,
     eyes: Eyes,
     renderer: Box<dyn Renderer>,
     cost: Costs,
@@ -35,11 +39,13 @@ impl<'s> Bench<'s> {
         rig: &'s RigSettings,
         renderer: Box<dyn Renderer>,
     ) -> Self {
+        let map = scenario.map();
         Self {
             scenario,
             settings,
             rig,
-            eyes: Eyes::new(scenario, rig),
+            eyes: Eyes::new(scenario, rig, &map),
+            map,
             renderer,
             cost: Costs::default(),
         }
@@ -77,7 +83,7 @@ impl<'s> Bench<'s> {
     ) -> Result<End, SessionError> {
         for head_m in self.settings.heads_m() {
             let vehicle = self.scenario.tunnel.alignment.at(head_m).world_from_rails();
-            self.eyes.positioner = positioner(self.scenario, self.rig);
+            self.eyes.positioner = positioner(self.scenario, self.rig, &self.map);
             let score = &self.eyes.score;
             let wanted = score.fixes(Method::Paper) + self.settings.fixes_per_point as usize;
             let arrived = self.eyes.clock.next().1;
@@ -123,9 +129,6 @@ impl<'s> Bench<'s> {
         let watch = &mut self.cost.stack;
         let (vehicle_at, head_at) = (|_| Some(*vehicle), |_| Some(head_m));
         let read = (self.eyes).read((number, start), images, watch, vehicle_at, head_at)?;
-        let Some(read) = read else {
-            return Ok(());
-        };
         let train = TrainState {
             time: start,
             chainage_m: head_m,

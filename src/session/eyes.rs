@@ -7,9 +7,11 @@ use super::watch::Stopwatch;
 use crate::bus::{LedReport, Method, SimTime, StereoPair};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
+use crate::track::Tunnel;
 use crate::twin::sensors::RigSettings;
 use image::GrayImage;
 use nalgebra::Isometry3;
+use std::sync::Arc;
 
 /// One rig and what belongs to it.
 pub struct Eyes {
@@ -35,17 +37,16 @@ pub struct Reading {
 
 impl Eyes {
     /// Before the first pair.
-    pub fn new(scenario: &Scenario, rig: &RigSettings) -> Self {
+    pub fn new(scenario: &Scenario, rig: &RigSettings, map: &Arc<Tunnel>) -> Self {
         Self {
             camera: StereoCamera::new(rig, scenario.seed),
             clock: Clock::new(rig.pairs_per_s),
-            positioner: positioner(scenario, rig),
+            positioner: positioner(scenario, rig, map),
             score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
         }
     }
 
-    /// The stack reads a pair and is scored against where vehicle and head really were. `None`
-    /// of anything but two images.
+    /// The stack reads a pair and is scored against where vehicle and head really were.
     pub fn read(
         &mut self,
         (number, start): (u32, SimTime),
@@ -53,10 +54,10 @@ impl Eyes {
         watch: &mut Stopwatch,
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
         head_at: impl Fn(SimTime) -> Option<f64>,
-    ) -> Result<Option<Reading>, SessionError> {
-        let Ok(images) = images.try_into() else {
-            return Ok(None);
-        };
+    ) -> Result<Reading, SessionError> {
+        let images = images
+            .try_into()
+            .map_err(|images: Vec<_>| SessionError::Images(2, images.len()))?;
         let images = pair(number, start, images);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
@@ -71,15 +72,15 @@ impl Eyes {
             self.score.fix(fix, truth_m);
             truths_m.push(truth_m);
         }
-        Ok(Some(Reading {
+        Ok(Reading {
             images,
             report,
             truths_m,
-        }))
+        })
     }
 }
 
 /// The stack as it is switched on, with the rig's calibration sheet and the surveyed map.
-pub fn positioner(scenario: &Scenario, rig: &RigSettings) -> LedPositioner {
-    LedPositioner::new(&scenario.stack.led, rig.calibration(), scenario.map())
+pub fn positioner(scenario: &Scenario, rig: &RigSettings, map: &Arc<Tunnel>) -> LedPositioner {
+    LedPositioner::new(&scenario.stack.led, rig.calibration(), map.clone())
 }

@@ -91,6 +91,9 @@ pub enum SessionError {
         "the pose of the train at {0:.4} s is no longer known: a frame is longer than the world's memory"
     )]
     PoseForgotten(f64),
+    /// The renderer broke its word.
+    #[error("{1} images were drawn in place of {0}")]
+    Images(usize, usize),
 }
 
 /// Runs a scenario to its end. A failure of the world in the middle of the run ends it as

@@ -13,28 +13,31 @@ pub struct Outcome {
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
     stop_margin_m: Option<f64>,
+    standing: bool,
     has_run: bool,
     standing_since: Option<SimTime>,
 }
 
 impl Outcome {
-    /// A cycle of the protection, for a driver who aims at `aim_mps`.
+    /// A cycle of the protection, for a driver who aims at `aim_mps`. A train that stands is not
+    /// braked for an obstacle, but held.
     pub fn on_cycle(&mut self, now: SimTime, report: &ProtectionReport, aim_mps: f64) {
-        self.slowed_by_obstacle =
-            report.authority_end_m.is_some() && report.permitted_mps < aim_mps;
-        if report.command.brake != BrakeDemand::None {
+        let obstacle = report.authority_end_m.is_some();
+        self.slowed_by_obstacle = obstacle && report.permitted_mps < aim_mps;
+        if obstacle && !self.standing && report.command.brake != BrakeDemand::None {
             self.brake_commanded.get_or_insert(now);
         }
     }
 
     /// Follows whether the train has run, and since when it stands.
     pub fn on_motion(&mut self, train: &TrainState, world: &World, line: &Alignment) {
+        self.standing = train.standing;
         self.has_run |= !train.standing;
-        // A driver who obeys brakes before the equipment has to.
-        if self.slowed_by_obstacle && train.brake_mps2 > 0.0 {
-            self.brake_commanded.get_or_insert(train.time);
-        }
         if !train.standing {
+            // A driver who obeys brakes before the equipment has to.
+            if self.slowed_by_obstacle && train.brake_mps2 > 0.0 {
+                self.brake_commanded.get_or_insert(train.time);
+            }
             self.standing_since = None;
             return;
         }
@@ -87,8 +90,49 @@ mod tests {
     use super::*;
     use crate::bus::TrainCommand;
     use crate::track::Tunnel;
-    use crate::twin::physics::{ObstacleSettings, PhysicsSettings};
+    use crate::twin::physics::{ObstacleSettings, PhysicsSettings, TrainSettings};
     use std::sync::Arc;
+
+    /// Fails where a train that is held, or braked for want of a position, braked for an obstacle.
+    #[test]
+    fn only_a_running_train_brakes_for_an_obstacle() {
+        let text = include_str!("../../tunnels/test_bench.toml");
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        for (start_speed_kmh, authority_end_m, braked) in [
+            (40.0, Some(200.0), true),
+            (40.0, None, false),
+            (0.0, Some(200.0), false),
+        ] {
+            let train = TrainSettings {
+                start_speed_kmh,
+                ..TrainSettings::default()
+            };
+            let settings = PhysicsSettings {
+                train: Some(train),
+                ..PhysicsSettings::default()
+            };
+            let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
+            let command = TrainCommand {
+                brake: BrakeDemand::Emergency,
+                ..TrainCommand::default()
+            };
+            let report = ProtectionReport {
+                authority_end_m,
+                command,
+                ..ProtectionReport::default()
+            };
+            let mut outcome = Outcome::default();
+            for _ in 0..100 {
+                world.step(&command).unwrap();
+                let train = world.train().unwrap();
+                outcome.on_motion(&train, &world, &tunnel.alignment);
+                outcome.on_cycle(world.time(), &report, 20.0);
+            }
+            let protection = outcome.protection(&world).unwrap();
+            assert_eq!(protection.brake_commanded_s.is_some(), braked);
+            assert_eq!(protection.stopped_s, None);
+        }
+    }
 
     /// Fails where what stands beside the gauge, or lies behind the train, counts as in its way.
     #[test]

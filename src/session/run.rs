@@ -43,6 +43,7 @@ pub struct Run<'s> {
     command: TrainCommand,
     truth_clock: Clock,
     bodies_clock: Clock,
+    stereo_frames: u32,
     wayside_frames: u32,
     outcome: Outcome,
     cost: Costs,
@@ -60,7 +61,7 @@ impl<'s> Run<'s> {
         let rig = scenario.rig.as_ref();
         let eyes = rig
             .filter(|_| scenario.physics.train.is_some())
-            .map(|rig| Eyes::new(scenario, rig));
+            .map(|rig| Eyes::new(scenario, rig, &map));
         Ok(Self {
             scenario,
             world,
@@ -77,6 +78,7 @@ impl<'s> Run<'s> {
             command: TrainCommand::default(),
             truth_clock: Clock::new(TRUTH_HZ),
             bodies_clock: Clock::new(BODIES_HZ),
+            stereo_frames: 0,
             wayside_frames: 0,
             outcome: Outcome::default(),
             cost: Costs::default(),
@@ -228,7 +230,6 @@ impl<'s> Run<'s> {
                     what,
                 };
                 self.submit(now, vec![view], shot)?;
-                self.wayside_frames += 1;
             }
         }
         Ok(())
@@ -263,17 +264,15 @@ impl<'s> Run<'s> {
         } = shot;
         match what {
             What::Pair => self.judge_pair((number, start), images, watchers),
-            What::Wayside(k, look) => match images.pop() {
-                Some(image) => {
-                    let frame = Frame {
-                        number,
-                        start,
-                        image,
-                    };
-                    self.judge_wayside(now, k, &frame, &look, watchers)
-                }
-                None => Ok(()),
-            },
+            What::Wayside(k, look) => {
+                let image = images.pop().ok_or(SessionError::Images(1, 0))?;
+                let frame = Frame {
+                    number,
+                    start,
+                    image,
+                };
+                self.judge_wayside(now, k, &frame, &look, watchers)
+            }
         }
     }
 
@@ -288,9 +287,8 @@ impl<'s> Run<'s> {
         };
         let watch = &mut self.cost.stack;
         let (vehicle_at, head_at) = (|t| world.vehicle_at(t), |t| world.chainage_at(t));
-        let Some(read) = eyes.read(frame, images, watch, vehicle_at, head_at)? else {
-            return Ok(());
-        };
+        let read = eyes.read(frame, images, watch, vehicle_at, head_at)?;
+        self.stereo_frames += 1;
         for fix in read
             .report
             .fixes
@@ -313,6 +311,7 @@ impl<'s> Run<'s> {
     ) -> Result<(), SessionError> {
         let (comms, watch) = (&mut self.comms, &mut self.cost.stack);
         let report = self.devices[k].judge(frame, look, now, comms, watch);
+        self.wayside_frames += 1;
         watchers.show(&Event::Wayside(k, frame.start, &frame.image, &report))?;
         Ok(())
     }
@@ -386,7 +385,7 @@ impl<'s> Run<'s> {
         let cost = &self.cost;
         let speed = Summary::new(self.scenario, end, simulated_s, backend, cost, watchers);
         Summary {
-            stereo_frames: self.eyes.as_ref().map_or(0, |e| e.clock.next().0),
+            stereo_frames: self.stereo_frames,
             wayside_frames: self.wayside_frames,
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),

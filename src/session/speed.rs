@@ -105,7 +105,7 @@ fn train_seconds(
     rounds: usize,
 ) -> Result<Times, Error> {
     let rig = scenario.rig.as_ref().ok_or("the scene has no rig")?;
-    let mut eyes = Eyes::new(scenario, rig);
+    let mut eyes = Eyes::new(scenario, rig, &scenario.map());
     let mut imu = Imu::new(&scenario.imu, scenario.seed, 0);
     let mut odometer = Odometer::new(&scenario.odometer, scenario.seed, 0);
     let mut imu_clock = Clock::new(1.0 / imu.period_s());
