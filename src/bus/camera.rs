@@ -1,4 +1,7 @@
 //! Cameras as their calibration sheets describe them, and the frames that they deliver.
+//!
+//! Not modelled: distortion of a lens (frames are taken as undistorted and rectified, without
+//! what that leaves), and an error of the eyes' synchronisation (both trigger at the same time).
 
 use super::SimTime;
 use image::GrayImage;
@@ -92,7 +95,8 @@ pub struct CameraModel {
 }
 
 /// The stereo rig on the train head, rectified: both eyes share intrinsics and orientation, and
-/// the right eye sits `baseline_m` along the left eye's x axis.
+/// the right eye sits `baseline_m` along the left eye's x axis. This is the sheet; the rig as it is
+/// built may differ from it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RigCalibration {
     /// Either eye.

@@ -5,7 +5,7 @@ use crate::twin::random::Stream;
 use crate::twin::render::{CameraMotion, NoiseKey, SensorSettings, View};
 use crate::twin::sensors::RigSettings;
 use image::GrayImage;
-use nalgebra::{Isometry3, Translation3};
+use nalgebra::Isometry3;
 
 /// Spacing of the poses handed to the renderer: the step of the physics.
 pub const POSE_STEP_S: f64 = 1e-3;
@@ -54,8 +54,10 @@ fn poses_in(span_s: f64) -> usize {
 /// The stereo camera as it is built: its true mount may differ from the calibration.
 #[derive(Clone, Debug)]
 pub struct StereoCamera {
-    /// Both eyes and their true mount.
+    /// Both eyes and the left one's true mount.
     pub rig: RigCalibration,
+    /// The right eye's true pose in the left one's frame.
+    pub left_from_right: Isometry3<f64>,
     /// From light to grey.
     pub sensor: SensorSettings,
     /// Noise of the left and right eye.
@@ -67,6 +69,7 @@ impl StereoCamera {
     pub fn new(rig: &RigSettings, seed: u64) -> Self {
         Self {
             rig: rig.actual(),
+            left_from_right: rig.left_from_right(),
             sensor: rig.sensor,
             streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
         }
@@ -95,8 +98,10 @@ impl StereoCamera {
             })
             .collect();
         let left = left?;
-        let left_from_right = Translation3::new(self.rig.baseline_m, 0.0, 0.0);
-        let right = left.iter().map(|pose| pose * left_from_right).collect();
+        let right = left
+            .iter()
+            .map(|pose| pose * self.left_from_right)
+            .collect();
         let view = |poses, stream| View {
             camera: self.rig.camera,
             start,
