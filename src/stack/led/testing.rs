@@ -73,6 +73,8 @@ pub struct World {
     pub lamps: Vec<LampSite>,
     /// The rig.
     pub rig: RigCalibration,
+    /// Yaw of the right eye against the left, positive where they converge.
+    pub vergence_rad: f64,
     /// Error of every lamp's clock.
     pub clock_ppm: f64,
     /// Turn of the car off the track's direction, to the left, at a time.
@@ -93,6 +95,7 @@ impl World {
         Self {
             lamps: map.lamps.clone(),
             rig: rig(),
+            vergence_rad: 0.0,
             clock_ppm: 0.0,
             yaw_rad: |_| 0.0,
             start_m,
@@ -111,23 +114,31 @@ impl World {
 
     /// Draws a pair whose rows open from `start_s` on.
     pub fn pair(&self, number: u32, start_s: f64) -> StereoPair {
-        let eye = |x_m: f64, seed: u64| Frame {
+        let left_from_right = Isometry3::from_parts(
+            Translation3::new(self.rig.baseline_m, 0.0, 0.0),
+            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -self.vergence_rad),
+        );
+        let eye = |left_from_eye: Isometry3<f64>, seed: u64| Frame {
             number,
             start: SimTime::from_secs(start_s),
-            image: self.draw(start_s, x_m, &mut Noise::new(2 * u64::from(number) + seed)),
+            image: self.draw(
+                start_s,
+                &left_from_eye,
+                &mut Noise::new(2 * u64::from(number) + seed),
+            ),
         };
         StereoPair {
-            left: eye(0.0, 0),
-            right: eye(self.rig.baseline_m, 1),
+            left: eye(Isometry3::identity(), 0),
+            right: eye(left_from_right, 1),
         }
     }
 
-    fn draw(&self, start_s: f64, x_m: f64, noise: &mut Noise) -> GrayImage {
+    fn draw(&self, start_s: f64, left_from_eye: &Isometry3<f64>, noise: &mut Noise) -> GrayImage {
         let c = self.rig.camera.intrinsics;
         let (w, h) = (c.width_px as usize, c.height_px as usize);
         let mut grey = vec![0.0; w * h];
         for lamp in &self.lamps {
-            self.add_lamp(&mut grey, lamp, start_s, x_m);
+            self.add_lamp(&mut grey, lamp, start_s, left_from_eye);
         }
         // A table of normal numbers, entered anew for every row, keeps the tests fast.
         let table: Vec<f64> = (0..4096).map(|_| noise.normal()).collect();
@@ -148,7 +159,13 @@ impl World {
         image
     }
 
-    fn add_lamp(&self, grey: &mut [f64], lamp: &LampSite, start_s: f64, x_m: f64) {
+    fn add_lamp(
+        &self,
+        grey: &mut [f64],
+        lamp: &LampSite,
+        start_s: f64,
+        left_from_eye: &Isometry3<f64>,
+    ) {
         let (c, s) = (self.rig.camera.intrinsics, self.rig.camera.shutter);
         let wave = Waveform {
             frame: lamp.uid.frame(lamp.code),
@@ -156,8 +173,7 @@ impl World {
             phase_s: 0.000_123 * f64::from(lamp.uid.lamp),
         };
         let seen = |t_s: f64| {
-            let eye = self.world_from_left(t_s) * Translation3::new(x_m, 0.0, 0.0);
-            let to_eye = eye.inverse();
+            let to_eye = (self.world_from_left(t_s) * left_from_eye).inverse();
             (to_eye * lamp.centre, to_eye * lamp.facing.into_inner())
         };
         let shine = |p: &Point3<f64>, n: &Vector3<f64>| {
