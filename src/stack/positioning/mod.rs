@@ -50,6 +50,8 @@
 //!
 //! **What it does not do.** One fix rests on one pair and one lamp: nothing is filtered over time,
 //! as in the paper; earlier fixes serve to expect the next lamp and the track's attitude only.
+//! The eyes are taken as rectified but for a vergence in sigma: distortion, a roll or pitch between
+//! the eyes and an error of their synchronisation are not in it.
 //! It takes the train to run up the line, its rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 

@@ -59,7 +59,7 @@ impl Sighting {
     }
 }
 
-/// How well a lamp was measured in the images alone.
+/// How well a lamp was measured by the rig.
 #[derive(Clone, Copy, Debug)]
 struct Spread {
     /// Standard deviation of its distance, as a share of it.
@@ -112,7 +112,12 @@ impl LedPositioner {
             std::mem::take(&mut self.left),
             std::mem::take(&mut self.right),
         );
-        let smear = Smear::new(&self.rig, &self.map.lamps, self.reckoning.speed_mps(start));
+        let smear = Smear {
+            rig: self.rig,
+            lamps: &self.map.lamps,
+            head_m: self.chainage_m(start),
+            travel_m: self.reckoning.speed_mps(start) * self.rig.camera.shutter.exposure_s,
+        };
         self.finder
             .find(&pair.left.image, |p| smear.along_row_px(p), &mut left);
         self.finder
@@ -294,14 +299,24 @@ impl LedPositioner {
     ) -> Option<PositionFix> {
         let (stereo, r) = (sighting.stereo?, sighting.right?);
         let (l, r) = (&left[sighting.left], &right[r]);
-        let disparity = l.spot.centre.x - r.spot.centre.x;
+        let disparity_px = l.spot.centre.x - r.spot.centre.x;
         let baseline_mm = 1e3 * self.rig.baseline_m;
+        let sigma_px = l.sigma_px.hypot(r.sigma_px);
+        let vergence_px = self.vergence_sigma_px(r.spot.centre.x);
         let spread = Spread {
-            distance: (l.sigma_px.hypot(r.sigma_px) / disparity)
+            distance: (sigma_px.hypot(vergence_px) / disparity_px)
                 .hypot(self.settings.baseline_sigma_mm / baseline_mm),
             image_px: l.sigma_px,
         };
         self.fix(Method::Paper, sighting, stereo, spread)
+    }
+
+    /// What the right eye's yaw against the left makes of its u: u = cx + f tan(angle), so
+    /// du = f (1 + tan^2) d(angle).
+    fn vergence_sigma_px(&self, right_u_px: f64) -> f64 {
+        let c = &self.rig.camera.intrinsics;
+        let tan = (right_u_px - c.cx_px) / c.fx_px;
+        c.fx_px * (1.0 + tan * tan) * self.settings.vergence_sigma_deg.to_radians()
     }
 
     fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
@@ -349,9 +364,10 @@ impl LedPositioner {
         })
     }
 
-    /// One sigma along the track: of what was measured in the images (distance, bearing), of the
-    /// rig's calibration (focal length, attitude of the mount; an error of the first scales depths
-    /// alone, as x = (u - cx) b / d), of the car's attitude, and of the survey.
+    /// One sigma along the track: of distance and bearing (`spread`: what the images scatter by and,
+    /// of the rig's calibration, what enters the disparity), of the rest of the calibration (focal
+    /// length, attitude of the mount; an error of the first scales depths alone, as x = (u - cx) b /
+    /// d), of the car's attitude, and of the survey.
     fn sigma_m(
         &self,
         lamp: &Vector3<f64>,
@@ -389,35 +405,84 @@ fn keep_surer(best: &mut Option<PositionFix>, fix: Option<PositionFix>) {
 /// How far a lamp moves in the image while a row is exposed.
 ///
 /// The paper has V cos(psi) f t / W for a lamp at lateral distance W: the speed across the axis
-/// at depth W. Here the depth is that of the lamps' line along the pixel's own ray, which also
+/// at depth W. Here the depth is that of the lamp's line along the pixel's own ray, which also
 /// holds off the axis: du = V t f (x_x z - x z_x)/z^2 with (x_x, z_x) the running direction in
 /// the camera's frame.
 #[derive(Clone, Copy, Debug)]
-struct Smear {
+struct Smear<'a> {
     rig: RigCalibration,
-    lateral_m: f64,
+    lamps: &'a [LampSite],
+    /// Where the train takes its head to be.
+    head_m: Option<f64>,
     travel_m: f64,
 }
 
-impl Smear {
-    fn new(rig: &RigCalibration, lamps: &[LampSite], speed_mps: f64) -> Self {
-        let lateral_m = lamps.first().map_or(0.0, |l| l.lateral_m);
-        Self {
-            rig: *rig,
-            lateral_m: lateral_m - rig.vehicle_from_left.translation.y,
-            travel_m: speed_mps * rig.camera.shutter.exposure_s,
-        }
-    }
-
+impl Smear<'_> {
     fn along_row_px(&self, p: &Point2<f64>) -> f64 {
         let c = &self.rig.camera.intrinsics;
         let ray = c.ray(p.x, p.y);
         let turn = self.rig.vehicle_from_left.rotation;
-        let z = self.lateral_m / (turn * ray).y;
+        let in_vehicle = turn * ray;
+        let left_m = self.lateral_m(&in_vehicle) - self.rig.vehicle_from_left.translation.y;
+        let z = left_m / in_vehicle.y;
         if !(0.3..60.0).contains(&z) {
             return 0.0;
         }
         let running = turn.inverse() * Vector3::x();
         self.travel_m * c.fx_px * (running.x - ray.x * running.z) / z
+    }
+
+    /// Of the lamp that is expected nearest to a ray from the left eye; of the first lamp while
+    /// the train does not know where it is. The track is taken as straight over the few metres.
+    fn lateral_m(&self, ray: &Vector3<f64>) -> f64 {
+        let eye = self.rig.vehicle_from_left.translation.vector;
+        let off = |lamp: &LampSite, head_m: f64| {
+            let ahead_m = lamp.chainage_m - head_m;
+            ray.angle(&(Vector3::new(ahead_m, lamp.lateral_m, lamp.height_m) - eye))
+        };
+        let nearest = self.head_m.and_then(|head_m| {
+            let near = |lamp: &&LampSite| (lamp.chainage_m - head_m).abs() < LAMPS_WITHIN_M;
+            (self.lamps.iter().filter(near))
+                .min_by(|a, b| off(a, head_m).total_cmp(&off(b, head_m)))
+        });
+        nearest.or(self.lamps.first()).map_or(0.0, |l| l.lateral_m)
+    }
+}
+
+/// Farther off no lamp is large enough in the image to be found.
+const LAMPS_WITHIN_M: f64 = 60.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stack::led::testing::{rig, tunnel};
+
+    /// Lamps on the left wall and on a nearer pillar between them, on the other side of the line
+    /// first: each pixel takes the lamp that is there, and without a position the first.
+    #[test]
+    fn smear_is_of_the_lamp_that_is_looked_at() {
+        let mut lamps = tunnel("manchester").lamps;
+        (lamps[0].lateral_m, lamps[4].lateral_m) = (-2.0, 1.8);
+        let rig = rig();
+        let at_px = |lamp: &LampSite, head_m: f64| {
+            let seen = Point3::new(lamp.chainage_m - head_m, lamp.lateral_m, lamp.height_m);
+            let pixel = (rig.camera.intrinsics).project(&(rig.vehicle_from_left.inverse() * seen));
+            pixel.unwrap_or_else(Point2::origin)
+        };
+        let head_m = lamps[4].chainage_m - 2.0;
+        let smear = |head_m| Smear {
+            rig,
+            lamps: &lamps,
+            head_m,
+            travel_m: 5e-4,
+        };
+        for lamp in &lamps[4..6] {
+            let seen = at_px(lamp, head_m);
+            let moved = at_px(lamp, head_m + 5e-4).x - seen.x;
+            let said = smear(Some(head_m)).along_row_px(&seen);
+            assert!((said + moved).abs() < 0.02 * moved.abs(), "{said} {moved}");
+        }
+        let seen = at_px(&lamps[4], head_m);
+        assert_eq!(smear(None).along_row_px(&seen), 0.0);
     }
 }

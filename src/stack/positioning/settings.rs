@@ -25,8 +25,6 @@ pub struct LedSettings {
     pub agreeing_reads: u32,
     /// A lamp not seen for this many seconds is forgotten, with what was read of its code.
     pub forget_s: f64,
-    /// Odometer error as a share of the distance run (one sigma).
-    pub odometer_sigma_share: f64,
     /// Time constant in seconds with which the gyro's deviation from the track's attitude fades.
     pub imu_fade_s: f64,
     /// Standard deviation of the car's attitude after that, degrees about any axis. 0.03: gyro bias
@@ -37,6 +35,12 @@ pub struct LedSettings {
     pub mount_sigma_deg: f64,
     /// Standard deviation of the calibrated baseline, mm.
     pub baseline_sigma_mm: f64,
+    /// Standard deviation of the yaw of the right eye against the left that calibration left,
+    /// degrees. 0.005, a tenth of a pixel for the reference lens: a target calibration leaves 0.1
+    /// to 0.2 px at a corner, which its many views average out, except what the lens's model
+    /// misses; and a difference of 0.6 K across a bar of aluminium, 120 mm long and 20 mm thick,
+    /// bends it by as much.
+    pub vergence_sigma_deg: f64,
     /// Standard deviation of the calibrated focal length, as a share of it.
     pub focal_sigma_share: f64,
     /// From the train head back to the leading car's front bogie pivot, metres.
@@ -61,11 +65,11 @@ impl Default for LedSettings {
             gate_share: 0.4,
             agreeing_reads: 2,
             forget_s: 0.5,
-            odometer_sigma_share: 0.01,
             imu_fade_s: 10.0,
             attitude_sigma_deg: 0.03,
             mount_sigma_deg: 0.05,
             baseline_sigma_mm: 0.05,
+            vergence_sigma_deg: 0.005,
             focal_sigma_share: 0.001,
             front_pivot_m: 3.5,
             rear_pivot_m: 16.1,
@@ -107,13 +111,6 @@ impl LedSettings {
             20.0,
         );
         range("forget_s", self.forget_s, " s", 0.02, 60.0);
-        range(
-            "odometer_sigma_share",
-            self.odometer_sigma_share,
-            "",
-            0.0,
-            0.5,
-        );
         range("imu_fade_s", self.imu_fade_s, " s", 0.1, 3600.0);
         range(
             "attitude_sigma_deg",
@@ -129,6 +126,13 @@ impl LedSettings {
             " mm",
             0.0,
             50.0,
+        );
+        range(
+            "vergence_sigma_deg",
+            self.vergence_sigma_deg,
+            " deg",
+            0.0,
+            5.0,
         );
         range("focal_sigma_share", self.focal_sigma_share, "", 0.0, 0.5);
         range("front_pivot_m", self.front_pivot_m, " m", 0.0, 30.0);
