@@ -194,8 +194,8 @@ pub struct Wayside {
     pub obstacles: Vec<ObstacleScore>,
     /// Dangers reported, counted once a frame, where nothing real is: not within the error that
     /// is expected of the device at that distance, along the line and across. What is still
-    /// reported after it has gone counts too. A thing in the air is not one, although the device
-    /// takes it to stand on the bed and so puts it too far away.
+    /// reported after it has gone or left the picture counts too. A thing in the air is not one,
+    /// although the device takes it to stand on the bed and so puts it too far away.
     pub false_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
