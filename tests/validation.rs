@@ -1,5 +1,9 @@
 //! The shipped scenarios, run whole and held to the figures that they must reach. Published
 //! figures: Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
+//!
+//! A run takes long, so each is also held to its own past: the bounds in [`regress`] and after the
+//! word "measured" are some 1.5 times what was measured, and far under the published ones. Whoever
+//! makes the world harder and has to raise one says so in the change.
 
 #![cfg(feature = "twin")]
 #![allow(
@@ -10,7 +14,9 @@
 
 use metrotwin::bus::Method;
 use metrotwin::scenario::Scenario;
-use metrotwin::session::{End, Event, Observer, ObserverError, Opening, RunOptions, Summary, run};
+use metrotwin::session::{
+    Distribution, End, Event, Observer, ObserverError, Opening, RunOptions, Summary, run,
+};
 use std::path::Path;
 
 fn scenario(name: &str, overrides: &[&str]) -> Scenario {
@@ -24,6 +30,18 @@ fn figures(scenario: &Scenario, observer: &mut dyn Observer) -> Summary {
     println!("{}", serde_json::to_string_pretty(&summary).unwrap());
     assert_eq!(summary.end, End::Complete);
     summary
+}
+
+/// Holds a method to its own past: no wrong lamp, mean and 95th percentile of the error, and a sigma
+/// that is neither too small nor too large (an honest one has a `nees_mean` of 1).
+fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
+    let figures = &summary.positioning[&method];
+    assert_eq!(figures.wrong_uid, 0, "{method:?}");
+    let Distribution { mean, p95, .. } = figures.error_m.unwrap();
+    assert!(mean < mean_m, "{method:?}: mean {mean} m");
+    assert!(p95 < p95_m, "{method:?}: p95 {p95} m");
+    let nees = figures.nees_mean.unwrap();
+    assert!((0.4..2.5).contains(&nees), "{method:?}: nees_mean {nees}");
 }
 
 /// Error of every fix of the paper's method, with the distance of its lamp.
@@ -55,10 +73,16 @@ impl Observer for ErrorByDistance {
 fn val_static_bench() {
     let mut errors = ErrorByDistance::default();
     let summary = figures(&scenario("static_bench", &[]), &mut errors);
-    let paper = &summary.positioning[&Method::Paper];
-    assert_eq!(paper.fixes, 200);
-    assert_eq!(paper.wrong_uid, 0);
-    assert!(paper.error_m.unwrap().max <= 0.2973);
+    let max_m = |method| summary.positioning[&method].error_m.unwrap().max;
+    for method in [Method::Paper, Method::Mono] {
+        assert_eq!(summary.positioning[&method].fixes, 200);
+    }
+    assert!(max_m(Method::Paper) <= 0.2973);
+    assert!(max_m(Method::Mono) <= 0.356);
+    // Measured: mean 16 and 24 mm, p95 57 and 102 mm, max 162 mm.
+    regress(&summary, Method::Paper, 0.025, 0.09);
+    regress(&summary, Method::Mono, 0.037, 0.15);
+    assert!(max_m(Method::Paper) < 0.25);
     let rms = |near_m: f64, far_m: f64| {
         let inside = errors.0.iter().filter(|e| (near_m..far_m).contains(&e.0));
         let (n, sum) = inside.fold((0, 0.0), |(n, sum), e| (n + 1, sum + e.1 * e.1));
@@ -85,8 +109,14 @@ fn val_line_run_at_60_kmh() {
     let summary = figures(&scenario, &mut ErrorByDistance::default());
     let paper = &summary.positioning[&Method::Paper];
     assert!(paper.uid_decode_rate.unwrap() >= 0.95);
-    assert_eq!(paper.wrong_uid, 0);
     assert!(paper.error_m.unwrap().mean < 0.1533);
+    // Measured with errors of survey and calibration: mean 18 and 27 mm, p95 50 and 78 mm, and 99.8 %
+    // of the pairs. There is room for a rig whose eyes are some 0.004 deg out of parallel.
+    regress(&summary, Method::Paper, 0.06, 0.15);
+    regress(&summary, Method::Mono, 0.045, 0.12);
+    for method in [Method::Paper, Method::Mono] {
+        assert!(summary.positioning[&method].availability.unwrap() > 0.97);
+    }
 }
 
 /// The wayside paper's case, from the worker's first step to the standing train.
@@ -104,7 +134,11 @@ fn val_forgotten_toolbox() {
         .unwrap();
     // The worker stands and walks between camera and toolbox for some seconds.
     assert!(toolbox.latency_s.unwrap() < 6.0);
-    assert!(toolbox.distance_error_m.unwrap().abs() < 1.0);
+    // The camera hangs 0.05 deg off its calibration, which is 0.2 m there. Measured: 0.30 m.
+    assert!(toolbox.distance_error_m.unwrap().abs() < 0.45);
+    // The worker's last image is held for ten frames after he left the picture. Measured: 8.
+    assert!(wayside.false_alarms <= 12, "{}", wayside.false_alarms);
+    assert_eq!(wayside.obstacles.len(), 1);
     let protection = summary.protection.unwrap();
     assert!(!protection.collision);
     assert!(protection.brake_commanded_s.unwrap() > toolbox.first_detected_s.unwrap());

@@ -9,7 +9,7 @@ use super::watch::Stopwatch;
 use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
-use crate::track::Tunnel;
+use crate::track::{BED_M, Tunnel};
 use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -185,6 +185,8 @@ impl Outlook {
 
     /// Everything that the device may rightly report.
     fn present(&self, world: &World) -> Vec<Presence> {
+        let camera = &self.device.camera;
+        let frame_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let obstacles = world.obstacles().map(|o| Presence {
             name: o.name.to_owned(),
             size_m: o.size_m.max(),
@@ -192,6 +194,8 @@ impl Outlook {
             lateral_m: o.lateral_m,
             half_length_m: o.half_extents_m.x,
             half_width_m: o.half_extents_m.y,
+            foot_m: o.height_m - o.half_extents_m.z - BED_M
+                + (-o.velocity_mps.z * frame_s).max(0.0),
             lies_in_view_since: o.resting_since.filter(|_| {
                 self.has_in_view(&o.world_from_body.translation.vector.into(), o.chainage_m)
             }),
@@ -204,6 +208,7 @@ impl Outlook {
             lateral_m: w.lateral_m,
             half_length_m: STRIDE_REACH_M,
             half_width_m: STRIDE_REACH_M,
+            foot_m: 0.0,
             lies_in_view_since: None,
             obstacle: false,
         });
@@ -216,6 +221,7 @@ impl Outlook {
                 lateral_m: 0.0,
                 half_length_m: 0.5 * length_m,
                 half_width_m: half.y,
+                foot_m: 0.0,
                 lies_in_view_since: None,
                 obstacle: false,
             });

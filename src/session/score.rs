@@ -164,6 +164,9 @@ pub struct Presence {
     pub half_length_m: f64,
     /// Half its extent across.
     pub half_width_m: f64,
+    /// Its lowest point over the bed, as high as it was while the frame was taken: what falls was
+    /// higher when its row was read.
+    pub foot_m: f64,
     /// Since when it lies still, on its own, where the device has it in view.
     pub lies_in_view_since: Option<SimTime>,
     /// It is scored as an obstacle (a worker or a train is not).
@@ -177,6 +180,10 @@ const FOOT_ERROR_RAD: f64 = 2e-3 + 1.75e-3;
 /// A region that ends this near to the last row is cut off there; the noise filter takes the rest.
 const CUT_ROWS: u32 = 3;
 
+/// Least height of the eye over a thing's lowest point: of what hangs higher, the camera alone
+/// cannot tell the place.
+const LEAST_HEIGHT_M: f64 = 0.1;
+
 /// Scores wayside detection.
 #[derive(Debug)]
 pub struct WaysideScore {
@@ -189,13 +196,38 @@ pub struct WaysideScore {
     costs_ms: Vec<f64>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Found {
     size_m: f64,
-    lay_visible: SimTime,
-    first: Option<SimTime>,
+    lay_visible: Option<SimTime>,
+    /// When each report of it was given, by one device after the other.
+    reported: Vec<SimTime>,
     error_sum_m: f64,
     errors: u32,
+}
+
+impl Found {
+    fn of(p: &Presence) -> Self {
+        Self {
+            size_m: p.size_m,
+            lay_visible: None,
+            reported: Vec::new(),
+            error_sum_m: 0.0,
+            errors: 0,
+        }
+    }
+
+    /// When it was first reported, moving or at rest.
+    fn first(&self) -> Option<SimTime> {
+        self.reported.iter().min().copied()
+    }
+
+    /// From lying visible to the first report from then on.
+    fn latency_s(&self) -> Option<f64> {
+        let lay = self.lay_visible?;
+        let first = self.reported.iter().filter(|t| **t >= lay).min()?;
+        Some(first.since(lay))
+    }
 }
 
 impl WaysideScore {
@@ -220,14 +252,10 @@ impl WaysideScore {
     ) {
         self.costs_ms.push(cost_ms);
         for p in present.iter().filter(|p| p.obstacle) {
-            if let Some(lay_visible) = p.lies_in_view_since {
-                self.found.entry(p.name.clone()).or_insert(Found {
-                    size_m: p.size_m,
-                    lay_visible,
-                    first: None,
-                    error_sum_m: 0.0,
-                    errors: 0,
-                });
+            if let Some(since) = p.lies_in_view_since {
+                let found = self.found.entry(p.name.clone());
+                let found = found.or_insert_with(|| Found::of(p));
+                found.lay_visible.get_or_insert(since);
             }
         }
         // What the device itself calls clear of the gauge is no alarm.
@@ -247,18 +275,24 @@ impl WaysideScore {
         if fitting().any(|p| !p.obstacle) {
             return;
         }
-        if let Some(found) = self.found.get_mut(&nearest.name) {
-            found.first.get_or_insert(given);
+        let found = self.found.entry(nearest.name.clone());
+        let found = found.or_insert_with(|| Found::of(nearest));
+        found.reported.push(given);
+        if nearest.lies_in_view_since.is_some() {
             found.error_sum_m += middle_m(seen) - nearest.chainage_m;
             found.errors += 1;
         }
     }
 
     /// Whether what was reported overlaps what is there, in the plane of the track, but for the
-    /// error that is expected of a camera `height` over the bed at that distance: e `range` across
-    /// the line of sight, and e `range`^2 / `height` along it, with e of [`FOOT_ERROR_RAD`]. What
-    /// the picture's lower border cuts has its foot nearer to the device than the report says, on
-    /// the same line of sight in plan.
+    /// error that is expected of a camera `height` over the thing's lowest point at that distance:
+    /// e `range` across the line of sight, and e `range`^2 / `height` along it, with e of
+    /// [`FOOT_ERROR_RAD`].
+    ///
+    /// It may be nearer to the device than the report says, on the same line of sight in plan: the
+    /// ray over the lowest point of a thing in the air meets the bed behind it, at
+    /// `range` * (`height` + its foot) / `height`, and of what the picture's lower border cuts, the
+    /// foot may be anywhere before.
     fn may_be(&self, seen: &DetectedObstacle, p: &Presence) -> bool {
         // From the device to the nearest part of it: a train is long.
         let nearest_m = (self.eye.s_m).clamp(
@@ -267,18 +301,21 @@ impl WaysideScore {
         );
         let (ahead_m, left_m) = (nearest_m - self.eye.s_m, p.lateral_m - self.eye.l_m);
         let range_m = ahead_m.hypot(left_m).max(1.0);
-        let height_m = (self.eye.h_m - BED_M).max(1.0);
+        let eye_m = (self.eye.h_m - BED_M).max(1.0);
+        let height_m = (eye_m - p.foot_m.max(0.0)).max(LEAST_HEIGHT_M);
         let across_m = FOOT_ERROR_RAD * range_m;
-        let along_m = across_m * range_m / height_m;
+        let along_m = across_m * range_m / height_m.max(1.0);
         let (cos, sin) = (ahead_m.abs() / range_m, left_m.abs() / range_m);
         let half_m = 0.5 * (seen.to_chainage_m - seen.from_chainage_m);
-        let mut gap_s_m = (middle_m(seen) - p.chainage_m).abs() - half_m - p.half_length_m;
-        let mut lateral_m = seen.lateral_m;
-        let share = ahead_m / (middle_m(seen) - self.eye.s_m);
-        if seen.blob.bounds.v1 + CUT_ROWS >= self.rows && (0.0..1.0).contains(&share) {
-            gap_s_m = 0.0;
-            lateral_m = self.eye.l_m + share * (lateral_m - self.eye.l_m);
-        }
+        // Where on the line of sight it comes nearest to what is there, as a share of the way to
+        // what was reported (0/0 where both are beside the device: no nearer).
+        let cut = seen.blob.bounds.v1 + CUT_ROWS >= self.rows;
+        let least = if cut { 0.0 } else { height_m / eye_m };
+        let seen_ahead_m = middle_m(seen) - self.eye.s_m;
+        let share = (ahead_m / seen_ahead_m).min(1.0).max(least);
+        let middle_m = self.eye.s_m + share * seen_ahead_m;
+        let lateral_m = self.eye.l_m + share * (seen.lateral_m - self.eye.l_m);
+        let gap_s_m = (middle_m - p.chainage_m).abs() - half_m - p.half_length_m;
         let gap_l_m = (lateral_m - p.lateral_m).abs() - 0.5 * seen.width_m - p.half_width_m;
         gap_s_m <= along_m * cos + across_m * sin && gap_l_m <= along_m * sin + across_m * cos
     }
@@ -286,14 +323,15 @@ impl WaysideScore {
     /// Takes in the scores of another device.
     pub fn add(&mut self, other: Self) {
         for (name, theirs) in other.found {
-            let new = !self.found.contains_key(&name);
-            let ours = self.found.entry(name).or_insert(theirs);
-            ours.lay_visible = ours.lay_visible.min(theirs.lay_visible);
-            ours.first = ours.first.into_iter().chain(theirs.first).min();
-            if !new {
-                ours.error_sum_m += theirs.error_sum_m;
-                ours.errors += theirs.errors;
-            }
+            let Some(ours) = self.found.get_mut(&name) else {
+                self.found.insert(name, theirs);
+                continue;
+            };
+            let lay = [ours.lay_visible, theirs.lay_visible];
+            ours.lay_visible = lay.into_iter().flatten().min();
+            ours.reported.extend(theirs.reported);
+            ours.error_sum_m += theirs.error_sum_m;
+            ours.errors += theirs.errors;
         }
         self.false_alarms += other.false_alarms;
         self.costs_ms.extend(other.costs_ms);
@@ -304,8 +342,8 @@ impl WaysideScore {
         let score = |(name, f): (String, Found)| ObstacleScore {
             name,
             size_m: f.size_m,
-            first_detected_s: f.first.map(SimTime::secs),
-            latency_s: f.first.map(|t| t.since(f.lay_visible)),
+            first_detected_s: f.first().map(SimTime::secs),
+            latency_s: f.latency_s(),
             distance_error_m: (f.errors > 0).then(|| f.error_sum_m / f64::from(f.errors)),
         };
         Wayside {
@@ -350,6 +388,7 @@ mod tests {
             lateral_m,
             half_length_m: 0.25,
             half_width_m: 0.15,
+            foot_m: 0.0,
             lies_in_view_since: Some(SimTime::from_secs(3.0)),
             obstacle: true,
         }
@@ -439,6 +478,84 @@ mod tests {
                 false_alarms,
                 "{chainage_m} {v1}"
             );
+        }
+    }
+
+    /// Fails where a thing in the air, whose foot is projected behind it, is a false alarm, or where
+    /// one on the bed may be as far off.
+    #[test]
+    fn what_is_in_the_air_is_matched_along_its_line_of_sight() {
+        // 1.2 m over the bed, seen from 2.7 m: 25 m * 2.7 / 1.5 = 45 m away, and 0 goes to +1.6 m.
+        for (foot_m, chainage_m, lateral_m, false_alarms) in [
+            (1.2, 80.0, 1.6, 0),
+            // A lidar puts it where it is.
+            (1.2, 100.0, 0.0, 0),
+            (1.2, 80.0, 0.0, 1),
+            (1.2, 72.0, 2.24, 1),
+            (1.2, 104.0, -0.32, 1),
+            (0.0, 80.0, 1.6, 1),
+            // As high as the camera, and above it: the line of sight does not come down.
+            (2.7, 50.0, 4.0, 0),
+            (3.5, 50.0, 4.0, 0),
+            (3.5, 50.0, 0.0, 1),
+        ] {
+            let falling = Presence {
+                foot_m,
+                lies_in_view_since: None,
+                ..lying("box", 100.0, 0.0)
+            };
+            let mut score = score();
+            let given = SimTime::from_secs(4.1);
+            score.report(&alarm(chainage_m, lateral_m), given, 1.0, &[falling]);
+            let wayside = score.finish();
+            assert_eq!(wayside.false_alarms, false_alarms, "{foot_m} {chainage_m}");
+            assert_eq!(wayside.obstacles.len(), 1 - false_alarms as usize);
+            if let Some(found) = wayside.obstacles.first() {
+                assert_eq!(found.first_detected_s, Some(given.secs()));
+                assert_eq!(found.latency_s, None, "it never lay");
+                assert_eq!(found.distance_error_m, None);
+            }
+        }
+    }
+
+    /// Fails where the first report of a falling thing is lost, where it counts as latency, where a
+    /// report is lost that was given before it was known to be at rest, and where two devices do
+    /// not come to the same as one.
+    #[test]
+    fn latency_runs_from_lying_to_the_next_report() {
+        let box_in_the_air = Presence {
+            foot_m: 1.2,
+            lies_in_view_since: None,
+            ..lying("box", 100.0, 0.0)
+        };
+        let just_down = Presence {
+            lies_in_view_since: None,
+            ..lying("box", 100.0, 0.0)
+        };
+        let frames = [
+            (2.6, alarm(80.0, 1.6), box_in_the_air),
+            (3.2, alarm(100.0, 0.0), just_down),
+            (3.5, alarm(100.0, 0.0), lying("box", 100.0, 0.0)),
+        ];
+        let together = |split: usize| {
+            let mut scores = [score(), score()];
+            for (k, (given_s, report, box_there)) in frames.iter().enumerate() {
+                let given = SimTime::from_secs(*given_s);
+                let present = std::slice::from_ref(box_there);
+                scores[usize::from(k >= split)].report(report, given, 1.0, present);
+            }
+            let [mut one, other] = scores;
+            one.add(other);
+            one.finish()
+        };
+        for split in 0..=3 {
+            let wayside = together(split);
+            let found = &wayside.obstacles[0];
+            assert_eq!(wayside.false_alarms, 0);
+            let first_s = found.first_detected_s.unwrap();
+            assert!((first_s - 2.6).abs() < 1e-9, "{split}: {first_s}");
+            assert!((found.latency_s.unwrap() - 0.2).abs() < 1e-9, "{split}");
+            assert!(found.distance_error_m.unwrap().abs() < 1e-9, "{split}");
         }
     }
 

@@ -189,12 +189,13 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
 /// Wayside detection.
 #[derive(Clone, Debug, Serialize)]
 pub struct Wayside {
-    /// Every obstacle that came to lie in view of a device: in its picture, within the detector's
-    /// reach, not behind a wall.
+    /// Every obstacle that came to lie in view of a device (in its picture, within the detector's
+    /// reach, not behind a wall), or was reported while it moved.
     pub obstacles: Vec<ObstacleScore>,
     /// Dangers reported, counted once a frame, where nothing real is: not within the error that
     /// is expected of the device at that distance, along the line and across. What is still
-    /// reported after it has gone counts too.
+    /// reported after it has gone or left the picture counts too. A thing in the air is not one,
+    /// although the device takes it to stand on the bed and so puts it too far away.
     pub false_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
@@ -207,11 +208,14 @@ pub struct ObstacleScore {
     pub name: String,
     /// Its largest dimension.
     pub size_m: f64,
-    /// When the first report of it was given: `stack.latency_ms` after the last row of the frame.
+    /// When the first report of it was given, moving or at rest: `stack.latency_ms` after the last
+    /// row of the frame.
     pub first_detected_s: Option<f64>,
-    /// From when it lay visible (at rest, in view) to that report. The detector's confirmation over
-    /// several frames is part of it, and so is all the time for which a worker or a train stood
-    /// before it or beside it, where nobody can tell which of the two was seen.
+    /// From when it lay visible (at rest, in view) to the first report given from then on; of a
+    /// thing reported on its way already, to the next report of it, not below 0. The detector's
+    /// confirmation over several frames is part of it, and so is all the time for which a worker or
+    /// a train stood before it or beside it, where nobody can tell which of the two was seen. `null`
+    /// where it never lay, or was not reported after that.
     pub latency_s: Option<f64>,
     /// Reported less true distance along the line, mean over the frames that report it at rest.
     pub distance_error_m: Option<f64>,

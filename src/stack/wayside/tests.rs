@@ -292,6 +292,35 @@ fn the_train_is_no_obstacle() {
     }
 }
 
+/// The blind zone: what comes to lie within [`GLARE_M`] of a train's head is not found while the
+/// train is there (the price of no false alarm in its headlights), and is when the train is farther
+/// away, or gone. Whoever narrows or widens the zone meets this test.
+#[test]
+fn the_glare_of_a_train_hides_what_falls_before_it() {
+    let scene = Scene::new(640, 360);
+    let item = Crate::on_bed(150.0, 0.0, 0.8);
+    for (head_m, hidden) in [(Some(100.0), true), (Some(20.0), false), (None, false)] {
+        let mut d = taught(&scene, &quiet());
+        let mut look = |n: u32, things: &[(Crate, f64)], head_m: Option<f64>| {
+            let frame = scene.frame(n, STEADY, things);
+            let train = head_m.map(|chainage_m| TrainReport {
+                chainage_m,
+                speed_mps: 0.0,
+                time: frame.start,
+            });
+            d.on_frame(&frame, None, train).obstacles.len()
+        };
+        assert_eq!(look(10, &[], head_m), 0);
+        for n in 11..40 {
+            let expected = usize::from(!hidden && n >= 13);
+            assert_eq!(look(n, &[(item, 20.0)], head_m), expected, "{head_m:?} {n}");
+        }
+        // The train has gone: three frames later it is found at the latest.
+        let seen = [40, 41, 42].map(|n| look(n, &[(item, 20.0)], None));
+        assert_eq!(seen[2], 1, "{seen:?}");
+    }
+}
+
 /// Frames of another size, empty calibrations: no panic, nothing claimed.
 #[test]
 fn odd_input_is_survived() {

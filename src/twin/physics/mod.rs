@@ -145,6 +145,8 @@ pub struct ObstacleTruth<'a> {
     pub half_extents_m: Vector3<f64>,
     /// Pose of its centre.
     pub world_from_body: Isometry3<f64>,
+    /// Velocity of its centre, in the world's axes.
+    pub velocity_mps: Vector3<f64>,
     /// Since when it lies still; `None` while it moves.
     pub resting_since: Option<SimTime>,
 }
@@ -395,7 +397,7 @@ impl World {
     /// Obstacles that are there now.
     pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
         self.obstacles.iter().filter_map(|obstacle| {
-            let (world_from_body, _) = obstacle.state(&self.rapier)?;
+            let (world_from_body, velocity_mps) = obstacle.state(&self.rapier)?;
             let centre = world_from_body.translation.vector.into();
             let line = &self.tunnel.alignment;
             let place = line.track_from_world(&centre, obstacle.settings.chainage_m);
@@ -410,6 +412,7 @@ impl World {
                 height_m: place.h_m,
                 half_extents_m: 0.5 * turned.matrix().abs() * size_m,
                 world_from_body,
+                velocity_mps,
                 resting_since: (obstacle.resting()).then(|| self.time.plus(-obstacle.still_s())),
             })
         })
