@@ -14,6 +14,7 @@
 //! wavelength bounds and nothing outside. The table is periodic in its length, which is over
 //! that of the line.
 
+use super::defect::{DefectSettings, Defects};
 use crate::track::{CANT_BASE_M, Checker, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
@@ -192,9 +193,11 @@ pub(super) struct Deviation {
 const GRID_M: f64 = 0.05;
 
 /// One realisation.
+#[derive(Default)]
 pub(super) struct Irregularity {
     /// Up, left, roll; empty for perfect track, otherwise a power of two long.
     table: Vec<[f64; 3]>,
+    defects: Defects,
 }
 
 impl Irregularity {
@@ -206,7 +209,7 @@ impl Irregularity {
         index: u64,
     ) -> Self {
         let Some(spectra) = settings.class.spectra() else {
-            return Self { table: Vec::new() };
+            return Self::default();
         };
         // At least ten of the longest waves.
         let span_m = length_m.max(10.0 * settings.longest_m);
@@ -219,11 +222,27 @@ impl Irregularity {
         let left = signal(Signal::Lateral, "track lateral");
         let roll = signal(Signal::CrossLevel, "track cross level");
         let table = (0..n).map(|k| [up[k], left[k], roll[k]]).collect();
-        Self { table }
+        Self {
+            table,
+            ..Self::default()
+        }
     }
 
-    /// At any chainage, by cubic (Catmull-Rom) interpolation.
+    /// The same with single defects on top.
+    pub(super) fn with_defects(self, defects: &[DefectSettings]) -> Self {
+        let defects = Defects::new(defects);
+        Self { defects, ..self }
+    }
+
+    /// At any chainage.
     pub(super) fn at(&self, s_m: f64) -> Deviation {
+        let mut deviation = self.random_at(s_m);
+        self.defects.add(s_m, &mut deviation);
+        deviation
+    }
+
+    /// By cubic (Catmull-Rom) interpolation.
+    fn random_at(&self, s_m: f64) -> Deviation {
         if self.table.is_empty() {
             return Deviation::default();
         }

@@ -32,6 +32,7 @@
 
 mod consist;
 mod convert;
+mod defect;
 mod driver;
 mod ground;
 mod history;
@@ -45,6 +46,7 @@ mod truth;
 mod vehicle;
 mod worker;
 
+pub use defect::{DefectSettings, DefectShape, Side};
 pub use history::VehicleMotion;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{ObstacleSettings, ObstacleShape};
@@ -233,7 +235,8 @@ impl World {
             alignment.length_m(),
             seed,
             index,
-        );
+        )
+        .with_defects(&settings.track.defects);
         let mut world = Self {
             put_down: vec![false; settings.workers.len()],
             settings: settings.clone(),

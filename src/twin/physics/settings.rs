@@ -1,5 +1,6 @@
 //! What a scenario may say about train, track, obstacles and workers.
 
+use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
 use super::worker::WorkerSettings;
@@ -47,6 +48,9 @@ impl PhysicsSettings {
         self.track
             .irregularity
             .check(&key_below(at, "track.irregularity"), problems);
+        for (k, defect) in self.track.defects.iter().enumerate() {
+            defect.check(&key_below(at, &format!("track.defects[{k}]")), problems);
+        }
         if let Some(train) = &self.train {
             train.check(&key_below(at, "train"), problems);
         }
@@ -65,6 +69,8 @@ impl PhysicsSettings {
 pub struct TrackSettings {
     /// Random deviation of the rails from their designed place.
     pub irregularity: IrregularitySettings,
+    /// Joints, dipped welds, corrugation and other single defects.
+    pub defects: Vec<DefectSettings>,
 }
 
 /// Whose masses, springs and dampers the cars have.

@@ -46,6 +46,7 @@ fn settings(train: TrainSettings) -> PhysicsSettings {
                 class: IrregularityClass::None,
                 ..IrregularitySettings::default()
             },
+            ..TrackSettings::default()
         },
         train: Some(train),
         ..PhysicsSettings::default()
