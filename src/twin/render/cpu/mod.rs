@@ -2,7 +2,7 @@
 //! of that row's exposure. [`CpuRenderer::oracle`] follows one through every pixel, and is what the
 //! GPU renderer is held against. [`CpuRenderer::quick`] draws on a machine without any graphics
 //! driver: where the tunnel is too dark to tell one grey level from the next, as it is in most of
-//! an exposure of 30 us, it follows one ray in 64 ([`dim`]).
+//! an exposure of 30 us, it follows one ray in 64 (see `dim.rs`).
 //!
 //! ```
 //! use metrotwin::bus::Intrinsics;
