@@ -18,7 +18,7 @@ mod table;
 
 use clap::{ArgAction, Parser, Subcommand};
 use fault::Failure;
-use std::io::Write;
+use std::io::{IsTerminal, Write};
 use std::process::ExitCode;
 use tracing::level_filters::LevelFilter;
 
@@ -81,6 +81,7 @@ fn start_messages(verbose: u8) {
     };
     tracing_subscriber::fmt()
         .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal())
         .with_max_level(level)
         .with_target(verbose > 1)
         .without_time()

@@ -7,6 +7,7 @@ use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::cell::Cell;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -146,7 +147,15 @@ fn observed(
     observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));
 
     let bar = progress_bar(scenario.duration_s);
-    let progress = |now_s: f64| bar.set_position(millis(now_s));
+    let tenths = Cell::new(0);
+    let progress = |now_s: f64| {
+        bar.set_position(millis(now_s));
+        // Where there is no terminal for a bar, a line for every tenth of the run.
+        let reached = (10.0 * now_s / scenario.duration_s).min(10.0) as u32;
+        if bar.is_hidden() && reached > tenths.replace(reached) {
+            eprintln!("{} % of the run", 10 * reached);
+        }
+    };
     let options = RunOptions {
         renderer: args.renderer.into(),
         stop: Some(&STOP),

@@ -125,9 +125,8 @@ fn renderer(
         Ok(renderer) => Ok(Box::new(renderer)),
         Err(RenderError::NoAdapter(why)) if choice == RendererChoice::Auto => {
             tracing::warn!(
-                "no Vulkan, Metal or DirectX 12 adapter ({why}): drawing with the plain CPU \
-                 renderer, right but about half as fast as a software driver. On Debian or Ubuntu \
-                 `apt-get install mesa-vulkan-drivers` gives a software adapter."
+                "no graphics driver: drawing with the plain CPU renderer, right but about half as \
+                 fast as a software driver. {why}"
             );
             Ok(Box::new(CpuRenderer::quick(scene)))
         }

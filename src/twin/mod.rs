@@ -1,4 +1,11 @@
-//! The world: physics, renderer, sensors. Uses the track and the bus, never the stack.
+//! The world: physics, renderer, sensors, radio. Uses the track and the bus, never the stack.
+//!
+//! What is true is known here and in the session only. A step of the world moves the train and all
+//! that lies about ([`physics`]); cameras look along poses that it remembers, row by row
+//! ([`render`]); sensors turn its motion into counts and samples with their errors ([`sensors`]);
+//! messages take their time ([`comms`]); and what the stack believes of the line is not quite the
+//! line ([`survey`]). Everything random comes from counter-based streams ([`random`]), so nothing
+//! depends on order or threads. What is left out is said in each of these.
 
 pub mod comms;
 pub mod physics;
