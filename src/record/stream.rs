@@ -35,8 +35,8 @@ pub(super) enum Target {
     Viewer(String),
 }
 
-/// Simulated time between batches of a file. The file's index takes some kilobytes a batch, in
-/// memory until the end: ten times as many batches and a run of half an hour grows by 300 MB.
+/// Simulated time between batches of a file. The sdk keeps some kilobytes of index a batch in
+/// memory until the file's end: with batches of one second, long runs grow without bound.
 const FILE_BATCH_S: f64 = 10.0;
 /// Simulated time between batches to a viewer, where somebody waits for them.
 const VIEWER_BATCH_S: f64 = 1.0;

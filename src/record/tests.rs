@@ -284,18 +284,3 @@ fn fixes_become_rows() {
         assert!(number(10) > 0.0, "the lamp is in front of the camera");
     }
 }
-
-/// Writes a recording of full size to look at:
-/// `cargo test --release --lib record -- --ignored`, then
-/// `rerun $TMPDIR/metrotwin-trial.rrd`.
-#[test]
-#[ignore = "for the eye: writes 12 s at full resolution into the temporary folder"]
-fn trial_recording() {
-    let size = Size {
-        duration_s: 12.0,
-        shrink: 1,
-        wayside: true,
-        cars: 6,
-    };
-    record(&std::env::temp_dir().join("metrotwin-trial.rrd"), size);
-}

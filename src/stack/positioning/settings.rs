@@ -1,6 +1,6 @@
 //! What a user may set about the positioning.
 
-use crate::track::Problem;
+use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -82,68 +82,54 @@ impl Default for LedSettings {
 impl LedSettings {
     /// Appends what is wrong, with keys under `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
-            if !(low..=high).contains(&value) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("{value}{unit} is outside of what can work"),
-                    format!("use {low} to {high}{unit}"),
-                ));
-            }
-        };
-        range("min_contrast_grey", self.min_contrast_grey, "", 2.0, 250.0);
-        range("min_area_px", self.min_area_px, " px", 9.0, 1e5);
-        range("tilt_over_rows", self.tilt_over_rows, " rows", 0.05, 1e3);
-        range("deblur_over_px", self.deblur_over_px, " px", 0.05, 1e3);
-        range(
+        let mut check = Checker::new(at, problems);
+        check.within("min_contrast_grey", self.min_contrast_grey, 2.0..=250.0, "");
+        check.within("min_area_px", self.min_area_px, 9.0..=1e5, "px");
+        check.within("tilt_over_rows", self.tilt_over_rows, 0.05..=1e3, "rows");
+        check.within("deblur_over_px", self.deblur_over_px, 0.05..=1e3, "px");
+        check.within(
             "wiener_noise_to_signal",
             self.wiener_noise_to_signal,
+            1e-6..=1.0,
             "",
-            1e-6,
-            1.0,
         );
-        range("gate_share", self.gate_share, "", 0.01, 0.49);
-        range(
+        check.within("gate_share", self.gate_share, 0.01..=0.49, "");
+        check.within(
             "agreeing_reads",
             f64::from(self.agreeing_reads),
+            1.0..=20.0,
             "",
-            1.0,
-            20.0,
         );
-        range("forget_s", self.forget_s, " s", 0.02, 60.0);
-        range("imu_fade_s", self.imu_fade_s, " s", 0.1, 3600.0);
-        range(
+        check.within("forget_s", self.forget_s, 0.02..=60.0, "s");
+        check.within("imu_fade_s", self.imu_fade_s, 0.1..=3600.0, "s");
+        check.within(
             "attitude_sigma_deg",
             self.attitude_sigma_deg,
-            " deg",
-            0.0,
-            10.0,
+            0.0..=10.0,
+            "deg",
         );
-        range("mount_sigma_deg", self.mount_sigma_deg, " deg", 0.0, 10.0);
-        range(
+        check.within("mount_sigma_deg", self.mount_sigma_deg, 0.0..=10.0, "deg");
+        check.within(
             "baseline_sigma_mm",
             self.baseline_sigma_mm,
-            " mm",
-            0.0,
-            50.0,
+            0.0..=50.0,
+            "mm",
         );
-        range(
+        check.within(
             "vergence_sigma_deg",
             self.vergence_sigma_deg,
-            " deg",
-            0.0,
-            5.0,
+            0.0..=5.0,
+            "deg",
         );
-        range("focal_sigma_share", self.focal_sigma_share, "", 0.0, 0.5);
-        range("front_pivot_m", self.front_pivot_m, " m", 0.0, 30.0);
-        range("max_sigma_m", self.max_sigma_m, " m", 0.01, 100.0);
-        range("survey_sigma_m", self.survey_sigma_m, " m", 0.0, 5.0);
-        range(
+        check.within("focal_sigma_share", self.focal_sigma_share, 0.0..=0.5, "");
+        check.within("front_pivot_m", self.front_pivot_m, 0.0..=30.0, "m");
+        check.within("max_sigma_m", self.max_sigma_m, 0.01..=100.0, "m");
+        check.within("survey_sigma_m", self.survey_sigma_m, 0.0..=5.0, "m");
+        check.within(
             "rear_pivot_m",
             self.rear_pivot_m,
-            " m",
-            self.front_pivot_m + 1.0,
-            60.0,
+            self.front_pivot_m + 1.0..=60.0,
+            "m",
         );
     }
 }

@@ -1,6 +1,6 @@
 //! What a scenario may say about the protection.
 
-use crate::track::Problem;
+use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -102,77 +102,63 @@ impl Default for ProtectionSettings {
 impl ProtectionSettings {
     /// Appends what is wrong, with keys under `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
-            if !(low..=high).contains(&value) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("is {value}{unit}"),
-                    format!("give {low} to {high}{unit}"),
-                ));
-            }
-        };
-        range("line_speed_kmh", self.line_speed_kmh, " km/h", 5.0, 200.0);
+        let mut check = Checker::new(at, problems);
+        check.within("line_speed_kmh", self.line_speed_kmh, 5.0..=200.0, "km/h");
         if let Some(chainage) = self.initial_chainage_m {
-            range("initial_chainage_m", chainage, " m", -1e5, 1e6);
+            check.within("initial_chainage_m", chainage, -1e5..=1e6, "m");
         }
-        range("initial_sigma_m", self.initial_sigma_m, " m", 0.01, 1e3);
-        range(
+        check.within("initial_sigma_m", self.initial_sigma_m, 0.01..=1e3, "m");
+        check.within(
             "safety_distance_m",
             self.safety_distance_m,
-            " m",
-            self.danger_distance_m.max(0.0),
-            500.0,
+            self.danger_distance_m.max(0.0)..=500.0,
+            "m",
         );
-        range(
+        check.within(
             "danger_distance_m",
             self.danger_distance_m,
-            " m",
-            0.0,
-            500.0,
+            0.0..=500.0,
+            "m",
         );
-        range("restricted_kmh", self.restricted_kmh, " km/h", 1.0, 50.0);
-        range("position_sigmas", self.position_sigmas, "", 0.0, 10.0);
-        range("odometer_drift", self.odometer_drift, "", 0.0, 0.5);
-        range("speed_error_kmh", self.speed_error_kmh, " km/h", 0.0, 20.0);
-        range("sigma_floor_m", self.sigma_floor_m, " m", 0.0, 50.0);
-        range("balise_sigma_m", self.balise_sigma_m, " m", 0.01, 50.0);
-        range("gate_sigmas", self.gate_sigmas, "", 1.0, 100.0);
-        range("reaction_s", self.reaction_s, " s", 0.0, 5.0);
-        range("traction_cut_s", self.traction_cut_s, " s", 0.0, 5.0);
-        range("traction_mps2", self.traction_mps2, " m/s^2", 0.0, 3.0);
-        range("brake_buildup_s", self.brake_buildup_s, " s", 0.0, 10.0);
-        range("emergency_mps2", self.emergency_mps2, " m/s^2", 0.4, 3.0);
-        range(
+        check.within("restricted_kmh", self.restricted_kmh, 1.0..=50.0, "km/h");
+        check.within("position_sigmas", self.position_sigmas, 0.0..=10.0, "");
+        check.within("odometer_drift", self.odometer_drift, 0.0..=0.5, "");
+        check.within("speed_error_kmh", self.speed_error_kmh, 0.0..=20.0, "km/h");
+        check.within("sigma_floor_m", self.sigma_floor_m, 0.0..=50.0, "m");
+        check.within("balise_sigma_m", self.balise_sigma_m, 0.01..=50.0, "m");
+        check.within("gate_sigmas", self.gate_sigmas, 1.0..=100.0, "");
+        check.within("reaction_s", self.reaction_s, 0.0..=5.0, "s");
+        check.within("traction_cut_s", self.traction_cut_s, 0.0..=5.0, "s");
+        check.within("traction_mps2", self.traction_mps2, 0.0..=3.0, "m/s^2");
+        check.within("brake_buildup_s", self.brake_buildup_s, 0.0..=10.0, "s");
+        check.within("emergency_mps2", self.emergency_mps2, 0.4..=3.0, "m/s^2");
+        check.within(
             "service_mps2",
             self.service_mps2,
-            " m/s^2",
-            0.4,
-            self.emergency_mps2.max(0.4),
+            0.4..=self.emergency_mps2.max(0.4),
+            "m/s^2",
         );
-        range("rotating_mass", self.rotating_mass, "", 0.0, 0.5);
-        range("train_length_m", self.train_length_m, " m", 5.0, 500.0);
-        range("driver_time_s", self.driver_time_s, " s", 0.0, 20.0);
-        range(
+        check.within("rotating_mass", self.rotating_mass, 0.0..=0.5, "");
+        check.within("train_length_m", self.train_length_m, 5.0..=500.0, "m");
+        check.within("driver_time_s", self.driver_time_s, 0.0..=20.0, "s");
+        check.within(
             "service_margin_kmh",
             self.service_margin_kmh,
-            " km/h",
-            0.5,
-            self.emergency_margin_kmh.max(0.5),
+            0.5..=self.emergency_margin_kmh.max(0.5),
+            "km/h",
         );
-        range(
+        check.within(
             "emergency_margin_kmh",
             self.emergency_margin_kmh,
-            " km/h",
-            0.5,
-            30.0,
+            0.5..=30.0,
+            "km/h",
         );
-        range(
+        check.within(
             "odometer_timeout_s",
             self.odometer_timeout_s,
-            " s",
-            0.1,
-            30.0,
+            0.1..=30.0,
+            "s",
         );
-        range("radio_timeout_s", self.radio_timeout_s, " s", 0.1, 600.0);
+        check.within("radio_timeout_s", self.radio_timeout_s, 0.1..=600.0, "s");
     }
 }

@@ -1,6 +1,6 @@
 //! What a scenario may say about the detection.
 
-use crate::track::Problem;
+use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -76,55 +76,43 @@ impl Default for WaysideSettings {
 impl WaysideSettings {
     /// Appends what is wrong, with keys under `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut range = |key: &str, value: f64, unit: &str, low: f64, high: f64| {
-            if !(low..=high).contains(&value) {
-                problems.push(Problem::new(
-                    format!("{at}.{key}"),
-                    format!("is {value}{unit}"),
-                    format!("give {low} to {high}{unit}"),
-                ));
-            }
-        };
-        range(
+        let mut check = Checker::new(at, problems);
+        check.within(
             "reference_frames",
             f64::from(self.reference_frames),
+            1.0..=250.0,
             "",
-            1.0,
-            250.0,
         );
-        range("threshold_grey", self.threshold_grey, "", 1.0, 254.0);
-        range("saturated_grey", self.saturated_grey, "", 1.0, 256.0);
-        range("unstable_grey", self.unstable_grey, "", 1.0, 256.0);
-        range("gain_distrust", self.gain_distrust, "", 0.0, 1.0);
-        range("min_area_px", f64::from(self.min_area_px), " px", 1.0, 1e6);
-        range("min_size_m", self.min_size_m, " m", 0.0, 5.0);
-        range("reach_m", self.reach_m, " m", 5.0, 500.0);
-        range("confirm_of", f64::from(self.confirm_of), "", 1.0, 64.0);
-        range("clear_frames", f64::from(self.clear_frames), "", 1.0, 64.0);
-        range(
+        check.within("threshold_grey", self.threshold_grey, 1.0..=254.0, "");
+        check.within("saturated_grey", self.saturated_grey, 1.0..=256.0, "");
+        check.within("unstable_grey", self.unstable_grey, 1.0..=256.0, "");
+        check.within("gain_distrust", self.gain_distrust, 0.0..=1.0, "");
+        check.within("min_area_px", f64::from(self.min_area_px), 1.0..=1e6, "px");
+        check.within("min_size_m", self.min_size_m, 0.0..=5.0, "m");
+        check.within("reach_m", self.reach_m, 5.0..=500.0, "m");
+        check.within("confirm_of", f64::from(self.confirm_of), 1.0..=64.0, "");
+        check.within("clear_frames", f64::from(self.clear_frames), 1.0..=64.0, "");
+        check.within(
             "confirm_frames",
             f64::from(self.confirm_frames),
+            1.0..=f64::from(self.confirm_of.clamp(1, 64)),
             "",
-            1.0,
-            f64::from(self.confirm_of.clamp(1, 64)),
         );
-        range(
+        check.within(
             "gauge_half_width_m",
             self.gauge_half_width_m,
-            " m",
-            0.75,
-            3.0,
+            0.75..=3.0,
+            "m",
         );
-        range("gauge_height_m", self.gauge_height_m, " m", 1.0, 6.0);
-        range("near_gauge_m", self.near_gauge_m, " m", 0.0, 3.0);
-        range(
+        check.within("gauge_height_m", self.gauge_height_m, 1.0..=6.0, "m");
+        check.within("near_gauge_m", self.near_gauge_m, 0.0..=3.0, "m");
+        check.within(
             "dangerous_height_m",
             self.dangerous_height_m,
-            " m",
-            -0.5,
-            1.0,
+            -0.5..=1.0,
+            "m",
         );
-        range("train_length_m", self.train_length_m, " m", 5.0, 500.0);
-        range("refresh_s", self.refresh_s, " s", 0.05, 60.0);
+        check.within("train_length_m", self.train_length_m, 5.0..=500.0, "m");
+        check.within("refresh_s", self.refresh_s, 0.05..=60.0, "s");
     }
 }
