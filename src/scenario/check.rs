@@ -174,7 +174,7 @@ fn check_train(
 ) {
     let end_m = tunnel.alignment.length_m();
     let head_m = train.start_chainage_m;
-    let length_m = f64::from(train.cars) * train.car_length_m;
+    let length_m = train.length_m();
     inside_line(
         "train.start_chainage_m",
         "the train head",

@@ -84,6 +84,7 @@ enum Spectra {
     German {
         vertical: f64,
         lateral: f64,
+        gauge: f64,
     },
     Fra {
         vertical: f64,
@@ -92,12 +93,13 @@ enum Spectra {
     },
 }
 
-/// Which of the three signals.
+/// Which of the four signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Signal {
     Vertical,
     Lateral,
     CrossLevel,
+    Gauge,
 }
 
 /// Corner wave numbers of the German spectra, rad/m.
@@ -112,7 +114,13 @@ const FRA_SCALE: f64 = 0.25;
 
 impl IrregularityClass {
     fn spectra(self) -> Option<Spectra> {
-        let german = |vertical, lateral| Some(Spectra::German { vertical, lateral });
+        let german = |vertical, lateral, gauge| {
+            Some(Spectra::German {
+                vertical,
+                lateral,
+                gauge,
+            })
+        };
         // FRA tables are in cm^2 rad/m.
         let fra = |vertical: f64, lateral: f64, cross_corner| {
             Some(Spectra::Fra {
@@ -123,8 +131,8 @@ impl IrregularityClass {
         };
         match self {
             Self::None => None,
-            Self::GermanLow => german(4.032e-7, 2.119e-7),
-            Self::GermanHigh => german(1.08e-6, 6.125e-7),
+            Self::GermanLow => german(4.032e-7, 2.119e-7, 5.32e-8),
+            Self::GermanHigh => german(1.08e-6, 6.125e-7, 1.032e-7),
             Self::Fra1 => fra(1.2107, 3.3634, 0.6046),
             Self::Fra2 => fra(1.0181, 1.2107, 0.9308),
             Self::Fra3 => fra(0.6816, 0.4128, 0.8520),
@@ -140,16 +148,19 @@ impl Spectra {
     fn density(self, signal: Signal, omega: f64) -> f64 {
         let o2 = omega * omega;
         match self {
-            Self::German { vertical, lateral } => {
+            Self::German {
+                vertical,
+                lateral,
+                gauge,
+            } => {
                 let (c2, r2) = (GERMAN_CORNER.powi(2), GERMAN_LONG.powi(2));
                 let shape = c2 / ((o2 + r2) * (o2 + c2));
+                let short = shape * o2 / (o2 + GERMAN_CROSS.powi(2));
                 match signal {
                     Signal::Vertical => vertical * shape,
                     Signal::Lateral => lateral * shape,
-                    Signal::CrossLevel => {
-                        vertical / GERMAN_HALF_BASE_M.powi(2) * shape * o2
-                            / (o2 + GERMAN_CROSS.powi(2))
-                    }
+                    Signal::CrossLevel => vertical / GERMAN_HALF_BASE_M.powi(2) * short,
+                    Signal::Gauge => gauge * short,
                 }
             }
             Self::Fra {
@@ -159,13 +170,13 @@ impl Spectra {
             } => {
                 let c2 = FRA_CORNER.powi(2);
                 let shape = FRA_SCALE * c2 / (o2 + c2);
+                let short = 4.0 * vertical * shape / (o2 + cross_corner.powi(2));
                 match signal {
                     Signal::Vertical => vertical * shape / o2,
                     Signal::Lateral => lateral * shape / o2,
                     // Given as the height of one rail over the other.
-                    Signal::CrossLevel => {
-                        4.0 * vertical * shape / (o2 + cross_corner.powi(2)) / CANT_BASE_M.powi(2)
-                    }
+                    Signal::CrossLevel => short / CANT_BASE_M.powi(2),
+                    Signal::Gauge => short,
                 }
             }
         }
@@ -181,6 +192,8 @@ pub(super) struct Deviation {
     pub left_m: f64,
     /// Left rail over right, as an angle.
     pub roll_rad: f64,
+    /// Of the rails' distance.
+    pub gauge_m: f64,
     /// Of `up_m`.
     pub up_per_m: f64,
     /// Of `left_m`.
@@ -195,8 +208,8 @@ const GRID_M: f64 = 0.05;
 /// One realisation.
 #[derive(Default)]
 pub(super) struct Irregularity {
-    /// Up, left, roll; empty for perfect track, otherwise a power of two long.
-    table: Vec<[f64; 3]>,
+    /// Up, left, roll, gauge; empty for perfect track, otherwise a power of two long.
+    table: Vec<[f64; 4]>,
     defects: Defects,
 }
 
@@ -221,7 +234,9 @@ impl Irregularity {
         let up = signal(Signal::Vertical, "track vertical");
         let left = signal(Signal::Lateral, "track lateral");
         let roll = signal(Signal::CrossLevel, "track cross level");
-        let table = (0..n).map(|k| [up[k], left[k], roll[k]]).collect();
+        let gauge = signal(Signal::Gauge, "track gauge");
+        let rows = (0..n).map(|k| [up[k], left[k], roll[k], gauge[k]]);
+        let table = rows.collect();
         Self {
             table,
             ..Self::default()
@@ -251,14 +266,15 @@ impl Irregularity {
         // Two's complement makes the table periodic for negative chainage, too.
         let k = (x.floor() as i64) as usize;
         let t = x - x.floor();
-        let p: [&[f64; 3]; 4] =
+        let p: [&[f64; 4]; 4] =
             std::array::from_fn(|j| &self.table[k.wrapping_add(j).wrapping_sub(1) & mask]);
-        let [(up_m, up), (left_m, left), (roll_rad, roll)] =
+        let [(up_m, up), (left_m, left), (roll_rad, roll), (gauge_m, _)] =
             std::array::from_fn(|j| catmull_rom([p[0][j], p[1][j], p[2][j], p[3][j]], t));
         Deviation {
             up_m,
             left_m,
             roll_rad,
+            gauge_m,
             up_per_m: up / GRID_M,
             left_per_m: left / GRID_M,
             roll_rad_per_m: roll / GRID_M,
@@ -409,7 +425,7 @@ mod tests {
             let r = correlation(a.table.iter().zip(&other.table).map(|(x, y)| (x[0], y[0])));
             assert!(r.abs() < 0.3, "{r}");
         }
-        for (i, j) in [(0, 1), (0, 2), (1, 2)] {
+        for (i, j) in [(0, 1), (0, 2), (1, 2), (0, 3), (1, 3), (2, 3)] {
             let r = correlation(a.table.iter().map(|x| (x[i], x[j])));
             assert!(r.abs() < 0.3, "{i} {j}: {r}");
         }

@@ -1,10 +1,10 @@
 //! Rigid bodies: the train on its springs and the uneven track, obstacles, workers. The only place
 //! that knows rapier.
 //!
-//! Car bodies and bogies are rigid bodies with six degrees of freedom each. Primary and secondary
-//! suspension, couplers, traction, brakes and resistance are forces put on them in every step;
-//! wheelsets follow the rails (designed alignment, cant, and a random irregularity with one of the
-//! published spectra). Obstacles fall, bounce and rest by rapier's contacts, and a train that hits
+//! Car bodies, bogies and wheelsets are rigid bodies with six degrees of freedom each. Primary and
+//! secondary suspension, couplers, traction, brakes, resistance and the forces of the rails are put
+//! on them in every step; the rails lie as designed, with cant, and with a random irregularity of
+//! one of the published spectra, and they give. Obstacles fall, bounce and rest by rapier's contacts, and a train that hits
 //! one exchanges momentum with it.
 //!
 //! ```
@@ -22,37 +22,48 @@
 //! # Ok(()) }
 //! ```
 //!
-//! Vehicle parameters: Manchester benchmark vehicle 1 (Iwnicki 1998) and a published metro car.
-//! The step moves positions with the new velocities (symplectic Euler, one solver iteration), so
+//! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
+//! come with the program. The step moves positions with the new velocities (symplectic Euler, one solver iteration), so
 //! springs gain no energy.
 //!
-//! Not modelled: creep and hunting, unsprung masses and the track's own give (wheelsets are held
-//! by rigid rails), bump stops, flexible car bodies, wheel slide, air pressure in the tunnel.
+//! Not modelled: hunting and the steering of bogies (treads centre wheelsets by a spring), the
+//! contact's own stiffness (the rail gives more), flexible car bodies, air springs, pressure waves.
 //! Trains run up the line only, and a worker cannot be run over: he is drawn, not collided with.
 
+mod adhesion;
 mod consist;
 mod convert;
 mod defect;
 mod driver;
+mod energy;
 mod ground;
 mod history;
 mod irregularity;
+mod line;
 mod obstacle;
+mod placement;
 mod settings;
 mod suspension;
 #[cfg(test)]
 mod tests;
 mod truth;
 mod vehicle;
+mod wheelset;
 mod worker;
 
+pub use adhesion::{RailState, RailZone};
 pub use defect::{DefectSettings, DefectShape, Side};
+pub use energy::EnergyBook;
 pub use history::VehicleMotion;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{ObstacleSettings, ObstacleShape};
 
-pub use settings::{PhysicsSettings, TrackSettings, TrainSettings, VehicleSet};
+pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
 pub use truth::WorkerTruth;
+pub use vehicle::{
+    BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
+};
+pub use wheelset::WheelForces;
 pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand};
@@ -63,6 +74,7 @@ use driver::{Driver, Effort, STANDING_MPS};
 use ground::Ground;
 use history::History;
 use irregularity::Irregularity;
+use line::Line;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use obstacle::Obstacle;
 use rapier3d_f64::math::Vector;
@@ -111,6 +123,10 @@ pub struct TrainState {
     pub traction_mps2: f64,
     /// Brake in effect, as deceleration.
     pub brake_mps2: f64,
+    /// Every wheelset and its rails, from the front.
+    pub wheels: Vec<WheelForces>,
+    /// Pull of every coupler, from the front.
+    pub couplers_n: Vec<f64>,
 }
 
 /// The first hit of the train on an obstacle.
@@ -161,6 +177,8 @@ struct Train {
     history: History,
 }
 
+/// So long a train runs, or stands, before its start: springs and dampers come to rest.
+const RUN_IN_S: f64 = 5.0;
 /// A collision is over after this; until then the obstacle's momentum may still grow.
 const COLLISION_S: f64 = 0.05;
 /// Steps between looks at where a moving obstacle is along the line.
@@ -216,13 +234,12 @@ impl World {
         rapier.integration_parameters.dt = step_s;
         // Substeps would move bodies with forces that belong to the step's start.
         rapier.integration_parameters.num_solver_iterations = 1;
-        let alignment = &tunnel.alignment;
         let train = settings.train.as_ref().map(|train| {
-            let consist = Consist::new(&mut rapier, alignment, train);
-            let mut history = History::new((settings.history_s / step_s).ceil() as usize + 1);
-            history.push(consist.motion(SimTime::ZERO));
+            let history = History::new((settings.history_s / step_s).ceil() as usize + 1);
+            // It runs in over the last metres before its starting place.
+            let head_m = train.start_chainage_m - train.start_speed_kmh / 3.6 * RUN_IN_S;
             Train {
-                consist,
+                consist: Consist::new(&mut rapier, &tunnel, train, head_m),
                 driver: Driver::new(train),
                 effort: Effort::default(),
                 history,
@@ -232,7 +249,7 @@ impl World {
         to_come.sort_by(|a, b| b.appears_s.total_cmp(&a.appears_s));
         let irregularity = Irregularity::new(
             &settings.track.irregularity,
-            alignment.length_m(),
+            tunnel.alignment.length_m(),
             seed,
             index,
         )
@@ -253,34 +270,69 @@ impl World {
             step,
             step_s,
         };
+        world.run_in()?;
         world.appear();
         Ok(world)
     }
 
+    /// Brings the train to the state in which it runs, or stands, at its start: leaning in a curve,
+    /// shaken by the track.
+    fn run_in(&mut self) -> Result<(), PhysicsError> {
+        let Some(settings) = &self.settings.train else {
+            return Ok(());
+        };
+        let speed_mps = settings.start_speed_kmh / 3.6;
+        let held_at = (speed_mps > STANDING_MPS).then_some(speed_mps);
+        let effort = Effort {
+            traction_mps2: 0.0,
+            brake_mps2: held_at.map_or(settings.service_brake_mps2, |_| 0.0),
+        };
+        for _ in 0..(RUN_IN_S / self.step_s).round() as usize {
+            self.step_train(effort, held_at)?;
+        }
+        if let Some(train) = &mut self.train {
+            train.consist.open_book();
+            train.history.push(train.consist.motion(self.time));
+        }
+        Ok(())
+    }
+
+    /// Forces on the train, a step of everything, and what the train comes to. A train that is
+    /// `held_at` a speed has not begun its run.
+    fn step_train(&mut self, effort: Effort, held_at: Option<f64>) -> Result<(), PhysicsError> {
+        if let Some(train) = &mut self.train {
+            let (alignment, track) = (&self.tunnel.alignment, &self.settings.track);
+            let line = Line::new(alignment, &self.irregularity, track);
+            let consist = &mut train.consist;
+            consist.apply_forces(&mut self.rapier, &self.tunnel, &line, effort, self.step_s);
+            if let Some(speed_mps) = held_at {
+                consist.hold_speed(&mut self.rapier, speed_mps, self.step_s);
+            }
+        }
+        self.rapier.step();
+        match &mut self.train {
+            Some(train) => train.consist.read(&self.rapier, self.time),
+            None => Ok(()),
+        }
+    }
+
     /// One step on.
     pub fn step(&mut self, command: &TrainCommand) -> Result<(), PhysicsError> {
-        let alignment = &self.tunnel.alignment;
+        let mut effort = Effort::default();
         if let Some(train) = &mut self.train {
-            let instruments = train.consist.instruments(self.time, alignment);
-            train.effort = train.driver.step(&instruments, command, self.step_s);
-            train.consist.apply_forces(
-                &mut self.rapier,
-                alignment,
-                &self.irregularity,
-                train.effort,
-                self.step_s,
-            );
+            let instruments = train.consist.instruments(self.time, &self.tunnel);
+            effort = train.driver.step(&instruments, command, self.step_s);
+            train.effort = effort;
         }
         for obstacle in &mut self.obstacles {
             if let Some((_, velocity)) = obstacle.state(&self.rapier) {
                 obstacle.velocity_before = velocity;
             }
         }
-        self.rapier.step();
         self.steps += 1;
         self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
+        self.step_train(effort, None)?;
         if let Some(train) = &mut self.train {
-            train.consist.read(&self.rapier, self.time)?;
             train.history.push(train.consist.motion(self.time));
         }
         self.watch_obstacles()?;
@@ -299,7 +351,7 @@ impl World {
         let consist = &train.consist;
         let motion = train.history.latest()?;
         let guess = consist
-            .instruments(self.time, &self.tunnel.alignment)
+            .instruments(self.time, &self.tunnel)
             .chainage_m;
         let origin = motion.world_from_vehicle.translation.vector.into();
         let head = self.tunnel.alignment.track_from_world(&origin, guess);
@@ -318,6 +370,8 @@ impl World {
             standing: consist.speed_mps().abs() < STANDING_MPS,
             traction_mps2: train.effort.traction_mps2,
             brake_mps2: train.effort.brake_mps2,
+            wheels: consist.wheel_forces().collect(),
+            couplers_n: consist.couplers_n.clone(),
         })
     }
 
@@ -332,10 +386,15 @@ impl World {
         self.train.as_ref()?.history.latest()
     }
 
-    /// Distance that the leading wheelset has run on the rail since the start; `None` without a
-    /// train.
-    pub fn wheel_run_m(&self) -> Option<f64> {
-        Some(self.train.as_ref()?.consist.run_m)
+    /// Distance that the treads of an axle, counted from 0 at the head, have rolled off since the
+    /// start, slip and slide included; `None` without a train or such an axle.
+    pub fn wheel_run_m(&self, axle: usize) -> Option<f64> {
+        Some(self.train.as_ref()?.consist.wheelsets.get(axle)?.rolled_m)
+    }
+
+    /// The train's energy since the start; `None` without a train.
+    pub fn energy(&self) -> Option<EnergyBook> {
+        Some(self.train.as_ref()?.consist.book())
     }
 
     /// Half extents of a car body's box; `None` without a train.

@@ -1,8 +1,10 @@
 //! What a scenario may say about train, track, obstacles and workers.
 
+use super::adhesion::{RailState, RailZone};
 use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
+use super::vehicle::{Vehicle, VehicleFile};
 use super::worker::WorkerSettings;
 use crate::track::{Checker, Problem, key_below};
 use schemars::JsonSchema;
@@ -45,12 +47,7 @@ impl PhysicsSettings {
         let mut check = Checker::new(at, problems);
         check.within("step_s", self.step_s, 1e-4..=2e-3, "s");
         check.within("history_s", self.history_s, 0.01..=60.0, "s");
-        self.track
-            .irregularity
-            .check(&key_below(at, "track.irregularity"), problems);
-        for (k, defect) in self.track.defects.iter().enumerate() {
-            defect.check(&key_below(at, &format!("track.defects[{k}]")), problems);
-        }
+        self.track.check(&key_below(at, "track"), problems);
         if let Some(train) = &self.train {
             train.check(&key_below(at, "train"), problems);
         }
@@ -63,41 +60,70 @@ impl PhysicsSettings {
     }
 }
 
-/// How even the track is.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+/// A car of a train without a word about it.
+const DEFAULT_VEHICLE: &str = "metro_b1_crush";
+
+/// The track under the train: how even, how stiff, how slippery.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrackSettings {
     /// Random deviation of the rails from their designed place.
     pub irregularity: IrregularitySettings,
     /// Joints, dipped welds, corrugation and other single defects.
     pub defects: Vec<DefectSettings>,
+    /// Force under a wheel over what the rail gives, MN/m. Default 100: a 60 kg rail on fasteners
+    /// of 40 kN/mm every 0.6 m.
+    pub support_mn_m: f64,
+    /// Damping of the same, kN s/m. Default 60: a tenth of critical.
+    pub support_kn_s_m: f64,
+    /// State of the rail heads along the line.
+    pub rail: RailState,
+    /// Stretches where it is another; the last one that covers a place counts.
+    pub rail_zones: Vec<RailZone>,
 }
 
-/// Whose masses, springs and dampers the cars have.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum VehicleSet {
-    /// A metro car of 34.5 t body mass (Shock and Vibration 2019, 2015465).
-    #[default]
-    Metro,
-    /// Vehicle 1 of the Manchester benchmarks (Iwnicki 1998), a main-line coach; for validation.
-    Manchester,
+impl Default for TrackSettings {
+    fn default() -> Self {
+        Self {
+            irregularity: IrregularitySettings::default(),
+            defects: Vec::new(),
+            support_mn_m: 100.0,
+            support_kn_s_m: 60.0,
+            rail: RailState::Dry,
+            rail_zones: Vec::new(),
+        }
+    }
+}
+
+impl TrackSettings {
+    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut check = Checker::new(at, problems);
+        check.within("support_mn_m", self.support_mn_m, 5.0..=500.0, "MN/m");
+        check.within("support_kn_s_m", self.support_kn_s_m, 0.0..=300.0, "kN s/m");
+        self.irregularity
+            .check(&key_below(at, "irregularity"), problems);
+        for (k, defect) in self.defects.iter().enumerate() {
+            defect.check(&key_below(at, &format!("defects[{k}]")), problems);
+        }
+        for (k, zone) in self.rail_zones.iter().enumerate() {
+            zone.check(&key_below(at, &format!("rail_zones[{k}]")), problems);
+        }
+    }
 }
 
 /// The train and how it is driven. The defaults are a B1 train of six cars, 118 m.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TrainSettings {
-    /// Whose masses, springs and dampers the cars have.
-    pub vehicle: VehicleSet,
-    /// Number of cars, 1 to 6.
+    /// Dimensions, masses, springs and dampers of the cars: `metro_b1_empty`, `metro_b1_crush`,
+    /// `manchester`, or the path of a vehicle file, counted from the scenario's folder.
+    pub vehicle: String,
+    /// The vehicle file, once it was read.
+    #[serde(skip)]
+    pub vehicle_file: Option<VehicleFile>,
+    /// Number of cars, 1 to 8.
     pub cars: u32,
-    /// Length of a car over couplers, metres.
-    pub car_length_m: f64,
-    /// Width of a car, metres.
-    pub width_m: f64,
-    /// Height of a car's roof above top of rail, metres.
-    pub height_m: f64,
     /// Chainage of the train head at the start, metres.
     pub start_chainage_m: f64,
     /// Speed at the start, km/h.
@@ -120,14 +146,14 @@ pub struct TrainSettings {
     pub service_build_up_s: f64,
     /// From demand to the full emergency brake, seconds.
     pub emergency_build_up_s: f64,
-    /// Effect of the rotating parts as a share of the train's mass.
-    pub rotating_mass_share: f64,
-    /// Running resistance a + b v + c v^2 over mass: a in m/s^2.
+    /// Running resistance a + b v + c v^2 over mass (rotating parts included): a in m/s^2.
     pub davis_a_mps2: f64,
     /// b in 1/s.
     pub davis_b_per_s: f64,
-    /// c in 1/m.
+    /// c in the open, in 1/m.
     pub davis_c_per_m: f64,
+    /// Times c in a tunnel, by the air that must get past the train.
+    pub tunnel_factor: f64,
     /// Intensity of each of the two headlights along their axis, candela.
     pub headlight_cd: f64,
 }
@@ -135,11 +161,9 @@ pub struct TrainSettings {
 impl Default for TrainSettings {
     fn default() -> Self {
         Self {
-            vehicle: VehicleSet::Metro,
+            vehicle: DEFAULT_VEHICLE.to_owned(),
+            vehicle_file: None,
             cars: 6,
-            car_length_m: 19.67,
-            width_m: 2.8,
-            height_m: 3.8,
             start_chainage_m: 150.0,
             start_speed_kmh: 0.0,
             start_s: 0.0,
@@ -151,24 +175,50 @@ impl Default for TrainSettings {
             jerk_mps3: 0.75,
             service_build_up_s: 1.0,
             emergency_build_up_s: 1.5,
-            rotating_mass_share: 0.08,
             davis_a_mps2: 0.02,
             davis_b_per_s: 0.0,
-            davis_c_per_m: 2.5e-5,
+            davis_c_per_m: 1.25e-5,
+            tunnel_factor: 2.0,
             headlight_cd: 40_000.0,
         }
     }
 }
 
 impl TrainSettings {
+    /// The car that was read, or comes with the program by this name.
+    fn car(&self) -> Option<VehicleFile> {
+        (self.vehicle_file.clone()).or_else(|| VehicleFile::shipped(&self.vehicle))
+    }
+
+    /// The car in SI units.
+    pub(super) fn vehicle(&self) -> Vehicle {
+        let shipped = || VehicleFile::shipped(DEFAULT_VEHICLE);
+        match self.car().or_else(shipped) {
+            Some(file) => Vehicle::new(&file),
+            None => unreachable!("the shipped vehicles are read by a test"),
+        }
+    }
+
+    /// Length of the train over couplers.
+    pub fn length_m(&self) -> f64 {
+        f64::from(self.cars) * self.vehicle().length_m
+    }
+
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        match self.car() {
+            Some(file) => file.check(&key_below(at, "vehicle"), problems),
+            None => problems.push(Problem::new(
+                key_below(at, "vehicle"),
+                format!("there is no vehicle {:?}", self.vehicle),
+                format!(
+                    "give one of {} or the path of a .toml file",
+                    VehicleFile::shipped_names().join(", ")
+                ),
+            )),
+        }
         let mut check = Checker::new(at, problems);
-        check.within("cars", f64::from(self.cars), 1.0..=6.0, "cars");
-        // A car must hold two bogies 17.5 m (or 19 m) apart.
-        check.within("car_length_m", self.car_length_m, 19.2..=30.0, "m");
-        check.within("width_m", self.width_m, 2.0..=3.6, "m");
-        check.within("height_m", self.height_m, 3.0..=5.0, "m");
+        check.within("cars", f64::from(self.cars), 1.0..=8.0, "cars");
         check.within("start_chainage_m", self.start_chainage_m, -1e6..=1e6, "m");
         check.within("start_speed_kmh", self.start_speed_kmh, 0.0..=160.0, "km/h");
         check.within("start_s", self.start_s, 0.0..=1e6, "s");
@@ -207,15 +257,10 @@ impl TrainSettings {
             0.0..=10.0,
             "s",
         );
-        check.within(
-            "rotating_mass_share",
-            self.rotating_mass_share,
-            0.0..=0.3,
-            "",
-        );
         check.within("davis_a_mps2", self.davis_a_mps2, 0.0..=1.0, "m/s^2");
         check.within("davis_b_per_s", self.davis_b_per_s, 0.0..=0.1, "1/s");
         check.within("davis_c_per_m", self.davis_c_per_m, 0.0..=0.01, "1/m");
+        check.within("tunnel_factor", self.tunnel_factor, 1.0..=10.0, "");
         check.within("headlight_cd", self.headlight_cd, 0.0..=1e7, "cd");
     }
 }

@@ -1,16 +1,17 @@
-//! Forces of springs and dampers between car, bogie and wheelset.
+//! Forces of springs and dampers between car, bogie, wheelset and the next car.
 //!
 //! Every force is evaluated from the state at the start of a step and held through it, and the
 //! step moves the bodies with their new velocities (symplectic Euler): stable while the fastest
-//! mode turns by less than 2 rad a step. That is the yaw of a bogie on its axle boxes, 0.2 rad in
-//! 1 ms. Wheelsets are no bodies of their own: the rails guide them, as in the usual models with
-//! rigid track and without creep.
+//! mode turns by less than 2 rad a step. Both bodies get a force at the same point, so that no
+//! angular momentum comes from nowhere. What a damper takes and a spring holds goes into a
+//! [`Ledger`].
 
-use super::vehicle::{Element, Vehicle};
+use super::vehicle::{Coupler, Element, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
+use serde::{Deserialize, Serialize};
 
 /// Pose of a centre of gravity with its velocities, world.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct BodyState {
     pub position: Vector,
     pub rotation: Rotation,
@@ -31,7 +32,7 @@ impl BodyState {
 }
 
 /// What acts on a body, about its centre of gravity.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Wrench {
     pub force: Vector,
     pub torque: Vector,
@@ -42,6 +43,21 @@ impl Wrench {
         self.force += force;
         self.torque += (world - state.position).cross(force);
     }
+}
+
+/// Energy and power of one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct Ledger {
+    /// Held by springs.
+    pub stored_j: f64,
+    /// Taken by dampers.
+    pub lost_w: f64,
+    /// Taken by creep of wheels on rails.
+    pub creep_w: f64,
+    /// Given by traction.
+    pub driven_w: f64,
+    /// Taken by brakes.
+    pub braked_w: f64,
 }
 
 /// Orthonormal directions in the world.
@@ -69,62 +85,58 @@ impl Axes {
         self.x * local.x + self.y * local.y + self.z * local.z
     }
 
-    /// Force of an element stretched by `stretch` that grows by `rate` (world), under a static
-    /// load along z.
-    fn force(self, element: &Element, stretch: Vector, rate: Vector, preload_n: f64) -> Vector {
-        let local =
-            element.stiffness_n_m * self.into(stretch) + element.damping_n_s_m * self.into(rate);
-        self.out(Vector::new(-local.x, -local.y, preload_n - local.z))
+    /// Force of an element stretched by `stretch` that grows by `rate` (world).
+    fn force(self, element: &Element, stretch: Vector, rate: Vector, book: &mut Ledger) -> Vector {
+        let (x, v) = (self.into(stretch), self.into(rate));
+        let spring = element.stiffness_n_m * x;
+        let damper = element.damping_n_s_m * v;
+        book.stored_j += 0.5 * spring.dot(x) - element.preload_n * x.z;
+        book.lost_w += damper.dot(v);
+        self.out(Vector::new(0.0, 0.0, element.preload_n) - spring - damper)
     }
 }
 
-/// A wheelset as the rails hold it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Wheelset {
-    /// Centreline at the top of the rails as they really lie.
-    pub origin: Vector,
-    pub axes: Axes,
-    /// Velocity of the point of contact's frame as it runs along, and its turn rate.
-    pub velocity: Vector,
-    pub angular: Vector,
+/// Force of a spring with free play to either side, and what it holds.
+fn beyond(x: f64, play: f64, stiffness: f64) -> (f64, f64) {
+    let past = x - x.clamp(-play, play);
+    (-stiffness * past, 0.5 * stiffness * past * past)
 }
 
-/// Springs of a bogie's axle boxes on one wheelset, `along_m` ahead of the bogie's centre.
+/// Springs of the axle boxes of a wheelset `along_m` ahead of the bogie's centre.
 pub(super) fn primary(
     vehicle: &Vehicle,
-    wheelset: &Wheelset,
     along_m: f64,
-    bogie: &BodyState,
-    on_bogie: &mut Wrench,
+    (bogie, on_bogie): (&BodyState, &mut Wrench),
+    (wheelset, on_wheelset): (&BodyState, &mut Wrench),
+    book: &mut Ledger,
 ) {
+    let axes = Axes::of(bogie.rotation);
+    let axle = wheelset.rotation * Vector::Y;
     let drop = vehicle.wheel_radius_m - vehicle.bogie_cg_m;
     for side in [-1.0, 1.0] {
-        let lateral = side * vehicle.semi_spring_base_m;
+        let lateral = side * vehicle.half_primary_m;
         let above = bogie.point(Vector::new(along_m, lateral, drop));
-        let arm = wheelset.axes.y * lateral + wheelset.axes.z * vehicle.wheel_radius_m;
-        let below = wheelset.origin + arm;
-        let rate = bogie.velocity_at(above) - wheelset.velocity - wheelset.angular.cross(arm);
-        let force = wheelset.axes.force(
-            &vehicle.primary,
-            above - below,
-            rate,
-            vehicle.primary_preload_n(),
-        );
-        on_bogie.add_at(bogie, force, above);
+        // The box sits on the axle's line: turning, the wheelset does not move it, and takes no
+        // torque about that line from it.
+        let bearing = wheelset.position + axle * lateral;
+        let rate = bogie.velocity_at(bearing) - wheelset.velocity_at(bearing);
+        let force = axes.force(&vehicle.primary, above - bearing, rate, book);
+        on_bogie.add_at(bogie, force, bearing);
+        on_wheelset.add_at(wheelset, -force, bearing);
     }
 }
 
-/// Springs, roll bar and traction rod between a car and a bogie `along_m` ahead of its centre.
-/// Returns how far the springs are compressed, mean of both sides.
+/// Springs, bump stops, roll bar and traction rod between a car and a bogie `along_m` ahead of its
+/// centre. Returns how far the springs are compressed, mean of both sides.
 pub(super) fn secondary(
     vehicle: &Vehicle,
     along_m: f64,
     (car, on_car): (&BodyState, &mut Wrench),
     (bogie, on_bogie): (&BodyState, &mut Wrench),
+    book: &mut Ledger,
 ) -> f64 {
     let axes = Axes::of(car.rotation);
     let mut compression_m = 0.0;
-    // Both bodies get the force at the same point, so that no angular momentum comes from nowhere.
     let mut pair = |force: Vector, world: Vector| {
         on_car.add_at(car, force, world);
         on_bogie.add_at(bogie, -force, world);
@@ -132,45 +144,60 @@ pub(super) fn secondary(
     let ends = |lateral: f64, height: f64| {
         let upper = car.point(Vector::new(along_m, lateral, height - vehicle.car_cg_m));
         let lower = bogie.point(Vector::new(0.0, lateral, height - vehicle.bogie_cg_m));
-        let rate = car.velocity_at(upper) - bogie.velocity_at(lower);
-        (upper - lower, rate, (upper + lower) * 0.5)
+        let middle = (upper + lower) * 0.5;
+        let rate = car.velocity_at(middle) - bogie.velocity_at(middle);
+        (upper - lower, rate, middle)
     };
+    let (play, stop) = vehicle.stop;
     for side in [-1.0, 1.0] {
-        let lateral = side * vehicle.semi_spring_base_m;
-        let (stretch, rate, middle) = ends(lateral, vehicle.secondary_m);
-        compression_m -= 0.5 * axes.z.dot(stretch);
-        let preload = vehicle.secondary_preload_n();
-        pair(
-            axes.force(&vehicle.secondary, stretch, rate, preload),
-            middle,
-        );
+        let (stretch, rate, middle) = ends(side * vehicle.half_secondary_m, vehicle.secondary_m);
+        let up = axes.z.dot(stretch);
+        compression_m -= 0.5 * up;
+        let (push, stored) = beyond(up, play, stop);
+        book.stored_j += stored;
+        let force = axes.force(&vehicle.secondary, stretch, rate, book);
+        pair(force + axes.z * push, middle);
     }
     let (stiffness, damping) = vehicle.traction_rod;
     let (stretch, rate, middle) = ends(0.0, vehicle.bogie_cg_m);
-    let pull = stiffness * axes.x.dot(stretch) + damping * axes.x.dot(rate);
-    pair(axes.x * -pull, middle);
+    let (x, v) = (axes.x.dot(stretch), axes.x.dot(rate));
+    let (push, stored) = beyond(axes.y.dot(stretch), play, stop);
+    book.stored_j += 0.5 * stiffness * x * x + stored;
+    book.lost_w += damping * v * v;
+    pair(
+        axes.x * -(stiffness * x + damping * v) + axes.y * push,
+        middle,
+    );
     let turn = bogie.rotation.inverse() * car.rotation;
     let roll_rad = 2.0 * turn.x * turn.w.signum();
     let torque = axes.x * (-vehicle.roll_bar_n_m_rad * roll_rad);
+    book.stored_j += 0.5 * vehicle.roll_bar_n_m_rad * roll_rad * roll_rad;
     on_car.torque += torque;
     on_bogie.torque -= torque;
     compression_m
 }
 
 /// Coupler between the rear end of one car and the front end of the next: it pulls and buffs
-/// along, and leaves the rest free.
+/// along, with its slack between, and leaves the rest free. Returns its pull.
 pub(super) fn coupler(
-    (stiffness, damping): (f64, f64),
-    rear_end: Vector,
-    front_end: Vector,
+    coupler: &Coupler,
+    (rear_end, front_end): (Vector, Vector),
     (leading, on_leading): (&BodyState, &mut Wrench),
     (following, on_following): (&BodyState, &mut Wrench),
-) {
+    book: &mut Ledger,
+) -> f64 {
     let (a, b) = (leading.point(rear_end), following.point(front_end));
-    let along = (leading.rotation * Vector::X + following.rotation * Vector::X).normalize();
-    let rate = leading.velocity_at(a) - following.velocity_at(b);
-    let pull = along * (stiffness * along.dot(a - b) + damping * along.dot(rate));
     let middle = (a + b) * 0.5;
-    on_leading.add_at(leading, -pull, middle);
-    on_following.add_at(following, pull, middle);
+    let along = (leading.rotation * Vector::X + following.rotation * Vector::X).normalize();
+    let rate = along.dot(leading.velocity_at(middle) - following.velocity_at(middle));
+    let play = 0.5 * coupler.slack_m;
+    let (spring, stored) = beyond(along.dot(a - b), play, coupler.stiffness_n_m);
+    let touching = coupler.slack_m <= 0.0 || spring.abs() > 0.0;
+    let damper = f64::from(u8::from(touching)) * coupler.damping_n_s_m * rate;
+    book.stored_j += stored;
+    book.lost_w += damper * rate;
+    let force = along * (spring - damper);
+    on_leading.add_at(leading, force, middle);
+    on_following.add_at(following, -force, middle);
+    damper - spring
 }

@@ -30,8 +30,7 @@ impl World {
 
     /// Length of the train over couplers; `None` without a train.
     pub fn train_length_m(&self) -> Option<f64> {
-        let settings = &self.train.as_ref()?.consist.settings;
-        Some(f64::from(settings.cars) * settings.car_length_m)
+        Some(self.train.as_ref()?.consist.length_m())
     }
 
     /// Workers who are on the line now.
@@ -53,7 +52,7 @@ impl World {
             .train
             .as_ref()?
             .consist
-            .instruments(self.time, &self.tunnel.alignment);
+            .instruments(self.time, &self.tunnel);
         let origin = world_from_vehicle.translation.vector.into();
         let head = self
             .tunnel

@@ -83,7 +83,7 @@ impl Odometer {
 
     /// A sample now; `None` without a train.
     pub fn sample(&mut self, world: &World) -> Option<OdometerSample> {
-        Some(self.read(world.time(), world.wheel_run_m()?))
+        Some(self.read(world.time(), world.wheel_run_m(0)?))
     }
 
     /// What the box says after `run_m` of rail.

@@ -1,0 +1,53 @@
+//! The energy book of a train: what traction and gravity put in, where it went, what is left.
+
+use super::suspension::Ledger;
+use serde::{Deserialize, Serialize};
+
+/// Energy of the train since the start, J. What was there at the start and came in by traction is
+/// still there, or was lost: [`Self::gap_j`] says by how much this fails. Hits are not in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EnergyBook {
+    /// Put in by traction, at the wheels' treads.
+    pub traction_j: f64,
+    /// Taken by the brakes.
+    pub brake_j: f64,
+    /// Taken by running resistance: air, bearings, curves.
+    pub resistance_j: f64,
+    /// Taken by dampers of suspension, couplers and track.
+    pub dampers_j: f64,
+    /// Taken by creep of wheels on rails.
+    pub creep_j: f64,
+    /// Kinetic energy now.
+    pub kinetic_j: f64,
+    /// Potential energy now, against the start.
+    pub potential_j: f64,
+    /// Kinetic energy at the start.
+    pub start_kinetic_j: f64,
+}
+
+impl EnergyBook {
+    /// Enters a step.
+    pub(super) fn enter(&mut self, now: &Ledger, resistance_w: f64, dt_s: f64) {
+        self.traction_j += now.driven_w * dt_s;
+        self.brake_j += now.braked_w * dt_s;
+        self.resistance_j += resistance_w * dt_s;
+        self.dampers_j += now.lost_w * dt_s;
+        self.creep_j += now.creep_w * dt_s;
+    }
+
+    /// All that was lost.
+    pub fn lost_j(&self) -> f64 {
+        self.brake_j + self.resistance_j + self.dampers_j + self.creep_j
+    }
+
+    /// What came in and is neither there nor known to be lost.
+    pub fn gap_j(&self) -> f64 {
+        let gained = self.kinetic_j - self.start_kinetic_j + self.potential_j;
+        self.traction_j - self.lost_j() - gained
+    }
+
+    /// [`Self::gap_j`] as a share of all that was turned over.
+    pub fn gap_share(&self) -> f64 {
+        self.gap_j().abs() / (self.start_kinetic_j + self.traction_j + self.potential_j.abs()).max(1.0)
+    }
+}

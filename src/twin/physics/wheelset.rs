@@ -1,0 +1,282 @@
+//! A wheelset on its rails: carried by the rail's give, centred by its treads, held by its
+//! flanges, driven and braked by creep.
+//!
+//! ```text
+//! normal   Q = Q0 - k z - c z'   each wheel, never negative   z over the loaded rail
+//! treads   Y = -(2 f22 / L) y - (2 f22 / v) y'               y from the middle of the rails
+//! flanges  Y = -K (|y| - play)                               beyond the play, which the gauge widens
+//! along    F = creep law of the slip v - r w                 w the wheelset's turn rate
+//! ```
+//!
+//! k is that of a beam on elastic support, 2 sqrt(2) (E I)^(1/4) u^(3/4): 100 MN/m for a 60 kg rail
+//! (E I = 6.4 MN m^2) on fasteners of 40 kN/mm every 0.6 m. The wheelset bounces on it at some
+//! 50 Hz: the P2 force of Jenkins et al. (1974). Coned treads steer a wheelset back to the middle
+//! within about a wavelength of Klingel's motion, L = 2 pi sqrt(r b / conicity) = 11 m for a conicity
+//! of 0.1; here that is a spring, so there is no hunting, and the wheelsets of a bogie do not steer.
+//!
+//! Creep forces are stiff: at walking pace a slip dies within microseconds. They are therefore
+//! evaluated with the slip that they leave at the end of the step (linearly implicit: the secant
+//! of the law, the slip's own dynamics), which is stable at any speed and exact where it is steady.
+
+use super::adhesion::{KALKER_ACROSS_N, KALKER_ALONG_N};
+use super::irregularity::Deviation;
+use super::line::Line;
+use super::suspension::{Axes, BodyState, Ledger, Wrench};
+use super::vehicle::{GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
+use rapier3d_f64::math::Vector;
+use rapier3d_f64::prelude::RigidBodyHandle;
+use serde::{Deserialize, Serialize};
+
+/// Way of coned treads back to the middle.
+const CENTRING_M: f64 = 11.0;
+/// Of a flange to its rail, either way, on 1435 mm.
+const FLANGE_PLAY_M: f64 = 0.007;
+/// Sideways, a rail gives more than downwards.
+const FLANGE_STIFFNESS_N_M: f64 = 40e6;
+/// Creepage is slip over speed, and at standstill over this.
+const LEAST_SPEED_MPS: f64 = 0.01;
+/// Discs and pads of one wheelset give by this before they slip, at the wheel's tread.
+const BRAKE_STIFFNESS_N_M: f64 = 2.5e6;
+const BRAKE_DAMPING_N_S_M: f64 = 5e4;
+/// Slide and slip protection lets go where the wheel's speed is off by this share and speed, and
+/// takes and gives back the effort in so many seconds.
+const PROTECTED_SHARE: f64 = 0.15;
+const PROTECTED_MPS: f64 = 0.3;
+const LET_GO_S: f64 = 0.1;
+const GIVE_BACK_S: f64 = 1.0;
+
+/// What a wheelset and its rails do to each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct WheelForces {
+    /// Normal force of the left and right wheel.
+    pub normal_n: [f64; 2],
+    /// Of the rails on the wheelset, to the left.
+    pub lateral_n: f64,
+    /// Of the rails on the wheelset, forward.
+    pub along_n: f64,
+    /// Speed of the axle less that of the treads: positive where the wheel slides.
+    pub slip_mps: f64,
+    /// Share of the effort that slide and slip protection lets through.
+    pub effort_share: f64,
+}
+
+/// A wheelset.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Wheelset {
+    pub body: RigidBodyHandle,
+    pub forces: WheelForces,
+    /// What its treads have rolled off since the start.
+    pub rolled_m: f64,
+    /// Chainage of the axle.
+    pub s_m: f64,
+    /// Roll of the rails by cant, and how it changes.
+    roll_rad: f64,
+    roll_rad_per_m: f64,
+    /// Elastic slip of its brake.
+    brake_slip_m: f64,
+}
+
+/// The rails under a wheelset.
+struct Rails {
+    /// Middle of the rails at their top, as they really lie.
+    origin: Vector,
+    /// Along the designed track, across and up from the real one.
+    axes: Axes,
+    deviation: Deviation,
+    /// Curvature about the designed track's z axis.
+    curvature_per_m: f64,
+    /// Speed of the axle along the track.
+    speed_mps: f64,
+}
+
+/// Forces of one step on a wheelset; both turning ones are at the tread.
+#[derive(Clone, Copy)]
+pub(super) struct Drive {
+    pub traction_n: f64,
+    pub brake_n: f64,
+}
+
+impl Wheelset {
+    pub(super) fn new(body: RigidBodyHandle, s_m: f64, roll_rad: f64) -> Self {
+        Self {
+            body,
+            forces: WheelForces {
+                effort_share: 1.0,
+                ..WheelForces::default()
+            },
+            rolled_m: 0.0,
+            s_m,
+            roll_rad,
+            roll_rad_per_m: 0.0,
+            brake_slip_m: 0.0,
+        }
+    }
+
+    /// Adds what the rails, traction and brake do, to what acts on the wheelset already. Returns
+    /// the torque of traction and brake, whose reaction is on the bogie.
+    pub(super) fn apply(
+        &mut self,
+        vehicle: &Vehicle,
+        line: &Line<'_>,
+        drive: Drive,
+        (state, wrench): (&BodyState, &mut Wrench),
+        book: &mut Ledger,
+        dt_s: f64,
+    ) -> Vector {
+        let rails = self.follow(line, state, dt_s);
+        let contact = self.carry(vehicle, line, &rails, (state, wrench), book);
+        let axle = state.rotation * Vector::Y;
+        let spin = state.angular.dot(axle);
+        let tread_mps = spin * vehicle.wheel_radius_m;
+        self.rolled_m += tread_mps * dt_s;
+        let (traction, brake) = self.effort(drive, tread_mps, rails.speed_mps, dt_s);
+        book.driven_w += traction * tread_mps;
+        book.braked_w -= brake * tread_mps;
+        let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
+        wrench.torque += torque;
+        self.creep(vehicle, line, &rails, contact, (state, wrench), book, dt_s);
+        torque
+    }
+
+    /// The rails under the axle, a step on.
+    fn follow(&mut self, line: &Line<'_>, state: &BodyState, dt_s: f64) -> Rails {
+        // Predicted to some micrometres; the rest is a step along the tangent.
+        let guess = self.s_m + state.velocity.length() * dt_s;
+        let frame = line.alignment.at(guess);
+        let (origin, designed) = super::line::rail_axes(&frame);
+        let along = (state.position - origin).dot(designed.x);
+        let s_m = guess + along / frame.slope.hypot(1.0);
+        let (run_m, turn) = (s_m - self.s_m, frame.roll_rad - self.roll_rad);
+        // The cant is that of the guess, micrometres away; standing, its change stays.
+        if run_m.abs() > 1e-7 {
+            self.roll_rad_per_m = turn / run_m;
+        }
+        (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
+        let d = line.irregularity.at(s_m);
+        // The angle is some mrad at most.
+        let (sin, cos) = d.roll_rad.sin_cos();
+        Rails {
+            origin: origin + designed.x * along + designed.y * d.left_m + designed.z * d.up_m,
+            axes: Axes {
+                x: designed.x,
+                y: designed.y * cos + designed.z * sin,
+                z: designed.z * cos - designed.y * sin,
+            },
+            deviation: d,
+            curvature_per_m: frame.curvature_per_m,
+            speed_mps: state.velocity.dot(designed.x),
+        }
+    }
+
+    /// Normal forces and guidance. Returns the lateral speed over the rails.
+    fn carry(
+        &mut self,
+        vehicle: &Vehicle,
+        line: &Line<'_>,
+        rails: &Rails,
+        (state, wrench): (&BodyState, &mut Wrench),
+        book: &mut Ledger,
+    ) -> f64 {
+        let Axes { x, y, z } = rails.axes;
+        let (d, speed) = (&rails.deviation, rails.speed_mps);
+        let roll_per_m = self.roll_rad_per_m + d.roll_rad_per_m;
+        let axle = state.rotation * Vector::Y;
+        let foot = state.position - z * vehicle.wheel_radius_m;
+        let load_n = vehicle.wheel_load_n();
+        for (k, side) in [HALF_CONTACT_M, -HALF_CONTACT_M].into_iter().enumerate() {
+            let wheel = foot + axle * side;
+            let rise_per_m = d.up_per_m + side * roll_per_m;
+            let over_m = (wheel - rails.origin).dot(z);
+            // Of the wheel's body without its own turning, which is along the rail.
+            let velocity = state.velocity + state.angular.cross(axle * side);
+            let rate = velocity.dot(z) - speed * rise_per_m;
+            let damper = line.support.1 * rate;
+            let normal = (load_n - line.support.0 * over_m - damper).max(0.0);
+            self.forces.normal_n[k] = normal;
+            if normal > 0.0 {
+                book.stored_j += (0.5 * line.support.0 * over_m - load_n) * over_m;
+                book.lost_w += damper * rate;
+            }
+            // At right angles to the way of the contact, so that the rails do no work, and through
+            // the axle.
+            let push = (z - x * rise_per_m) * normal;
+            wrench.add_at(state, push, state.position + axle * side);
+        }
+        let off_m = (foot - rails.origin).dot(y);
+        // The turning about the axle is along the rail, that about the rail moves the foot.
+        let roll_rate = state.angular.dot(x);
+        let rate = state.velocity.dot(y) + roll_rate * vehicle.wheel_radius_m
+            - speed * d.left_per_m;
+        let play = (FLANGE_PLAY_M + 0.5 * d.gauge_m).max(0.0);
+        let past = off_m - off_m.clamp(-play, play);
+        let centring = 2.0 * KALKER_ACROSS_N / CENTRING_M;
+        let lateral = -centring * off_m - FLANGE_STIFFNESS_N_M * past;
+        book.stored_j += 0.5 * (centring * off_m * off_m + FLANGE_STIFFNESS_N_M * past * past);
+        self.forces.lateral_n = lateral;
+        wrench.add_at(state, y * lateral, foot);
+        wrench.force -= x * (d.left_per_m * lateral);
+        rate
+    }
+
+    /// Forces of traction and brake at the tread, through slide and slip protection.
+    fn effort(&mut self, drive: Drive, tread_mps: f64, speed_mps: f64, dt_s: f64) -> (f64, f64) {
+        let slip = (speed_mps - tread_mps).abs();
+        let slips = slip > PROTECTED_SHARE * speed_mps.abs() + PROTECTED_MPS;
+        let share = &mut self.forces.effort_share;
+        let change = if slips { -dt_s / LET_GO_S } else { dt_s / GIVE_BACK_S };
+        *share = (*share + change).clamp(0.0, 1.0);
+        let most_n = *share * drive.brake_n;
+        // Friction with elastic slip (Dahl): the same law brakes a running wheel and holds a
+        // standing one.
+        let most_slip = most_n / BRAKE_STIFFNESS_N_M;
+        self.brake_slip_m = (self.brake_slip_m + tread_mps * dt_s).clamp(-most_slip, most_slip);
+        let brake = BRAKE_STIFFNESS_N_M * self.brake_slip_m + BRAKE_DAMPING_N_S_M * tread_mps;
+        (*share * drive.traction_n, -brake.clamp(-most_n, most_n))
+    }
+
+    /// Creep along, across and in yaw; all that acts else is in the wrench already.
+    #[allow(clippy::too_many_arguments, reason = "the last step of one computation")]
+    fn creep(
+        &mut self,
+        vehicle: &Vehicle,
+        line: &Line<'_>,
+        rails: &Rails,
+        across_mps: f64,
+        (state, wrench): (&BodyState, &mut Wrench),
+        book: &mut Ledger,
+        dt_s: f64,
+    ) {
+        let Axes { x, y, z } = rails.axes;
+        let (mass, r) = (&vehicle.wheelset, vehicle.wheel_radius_m);
+        let axle = state.rotation * Vector::Y;
+        let slip = rails.speed_mps - r * state.angular.dot(axle);
+        let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);
+        let load_n = self.forces.normal_n[0] + self.forces.normal_n[1];
+        let linear = (2.0 * KALKER_ALONG_N * slip).hypot(2.0 * KALKER_ACROSS_N * across_mps);
+        let adhesion = line.adhesion_at(self.s_m);
+        let share = adhesion.share(linear * per_mps, load_n, slip.hypot(across_mps));
+        let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
+        let across_c = 2.0 * KALKER_ACROSS_N * per_mps * share;
+        // Slip' = free - gain * force: of the axle's own mass and of the turning wheels.
+        let free = wrench.force.dot(x) / mass.kg
+            - GRAVITY_MPS2 * x.z
+            - r * wrench.torque.dot(axle) / mass.kg_m2.y;
+        let gain = 1.0 / mass.kg + r * r / mass.kg_m2.y;
+        let along = -along_c * (slip + dt_s * free) / (1.0 + dt_s * along_c * gain);
+        let across = -across_c * across_mps / (1.0 + dt_s * across_c / mass.kg);
+        // The wheels of a turning wheelset slip against each other.
+        let yaw_rate = state.angular.dot(z) - rails.curvature_per_m * rails.speed_mps;
+        let yaw_c = along_c * HALF_CONTACT_M * HALF_CONTACT_M;
+        let yaw = -yaw_c * yaw_rate / (1.0 + dt_s * yaw_c / mass.kg_m2.z);
+        book.creep_w -= along * slip + across * across_mps + yaw * yaw_rate;
+        let foot = state.position - z * r;
+        wrench.add_at(state, x * along + y * across, foot);
+        wrench.torque += z * yaw;
+        // What guides the wheelset along a crooked way is taken from its run.
+        let guided = across * rails.deviation.left_per_m + yaw * rails.curvature_per_m;
+        wrench.force -= x * guided;
+        self.forces.along_n = along;
+        self.forces.lateral_n += across;
+        self.forces.slip_mps = slip;
+    }
+}
