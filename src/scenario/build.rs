@@ -6,7 +6,7 @@ use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
 use crate::track::{FileError, Problem, Tunnel, read_toml};
 use crate::twin::comms::RadioSettings;
-use crate::twin::physics::PhysicsSettings;
+use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
     ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
 };
@@ -126,6 +126,10 @@ impl Scenario {
             file = overridden(path, text, overrides)?;
         }
 
+        if let Some(train) = &mut file.train {
+            load_vehicle(path, train)?;
+        }
+
         let mut problems = Vec::new();
         check::alone(&file, &mut problems);
         let tunnel_path = path.parent().unwrap_or(Path::new("")).join(&file.tunnel);
@@ -197,6 +201,23 @@ impl Scenario {
             record: file.record,
         }
     }
+}
+
+/// Reads the vehicle file that a train names; a name without `.toml` is one of the program's own.
+fn load_vehicle(path: &Path, train: &mut TrainSettings) -> Result<(), ScenarioError> {
+    if Path::new(&train.vehicle).extension().is_none() {
+        return Ok(());
+    }
+    let path = path.parent().unwrap_or(Path::new("")).join(&train.vehicle);
+    let text = read(&path)?;
+    let file = VehicleFile::from_toml(&text).map_err(|source| ScenarioError::File {
+        path,
+        text,
+        overrides: Vec::new(),
+        source,
+    })?;
+    train.vehicle_file = Some(file);
+    Ok(())
 }
 
 /// Reads and checks a tunnel's text; `path` is for the messages.

@@ -107,8 +107,9 @@ impl Adhesion {
         }
         let e = FRAC_PI_4 * linear_n / most_n;
         let adhering = self.in_adhesion * e;
-        let force_n =
-            FRAC_2_PI * most_n * (adhering / (1.0 + adhering * adhering) + (self.in_slip * e).atan());
+        let force_n = FRAC_2_PI
+            * most_n
+            * (adhering / (1.0 + adhering * adhering) + (self.in_slip * e).atan());
         force_n / linear_n
     }
 }

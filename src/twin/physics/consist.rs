@@ -88,7 +88,10 @@ impl Consist {
         };
         for car in &cars {
             consist.insert(world, car);
-            for (state, body) in car[3..].iter().zip(&consist.handles[consist.handles.len() - 4..]) {
+            for (state, body) in car[3..]
+                .iter()
+                .zip(&consist.handles[consist.handles.len() - 4..])
+            {
                 let p = super::convert::point3(state.position);
                 let s_m = alignment.track_from_world(&p, head_m).s_m;
                 let roll_rad = alignment.at(s_m).roll_rad;
@@ -123,7 +126,8 @@ impl Consist {
                 InteractionTestMode::And,
             ));
         let car = self.handles[self.handles.len() - BODIES];
-        self.colliders.push(world.insert_collider(collider, Some(car)));
+        self.colliders
+            .push(world.insert_collider(collider, Some(car)));
     }
 
     /// Of body `k` of a car, or of the train.
@@ -214,7 +218,7 @@ impl Consist {
         let mut resisted_w = 0.0;
         for k in 0..self.colliders.len() {
             self.car_forces(k, line, effort, dt_s);
-            resisted_w += self.resist(k, line, davis_mps2);
+            resisted_w += self.resist(k, davis_mps2);
         }
         self.coupler_forces();
         self.book.enter(&self.ledger, resisted_w, dt_s);
@@ -263,7 +267,7 @@ impl Consist {
     }
 
     /// Running resistance on the bogies of car `k`, at axle height. Returns its power.
-    fn resist(&mut self, k: usize, line: &Line<'_>, davis_mps2: f64) -> f64 {
+    fn resist(&mut self, k: usize, davis_mps2: f64) -> f64 {
         let v = &self.vehicle;
         let mut power_w = 0.0;
         for b in [0, 1] {
@@ -271,9 +275,8 @@ impl Consist {
             let state = &self.states[at];
             let x = state.rotation * Vector::X;
             let speed = state.velocity.dot(x);
-            let wheel = self.wheelsets[4 * k + 2 * b].s_m - v.semi_wheelbase_m;
-            let curve = CURVE_M * line.alignment.at(wheel).curvature_per_m.abs();
-            let curve_n = curve * v.total_kg() * GRAVITY_MPS2;
+            let curvature_per_m = self.wheelsets[4 * k + 2 * b].curvature_per_m.abs();
+            let curve_n = CURVE_M * curvature_per_m * v.total_kg() * GRAVITY_MPS2;
             let force = 0.5 * (davis_mps2 * v.effective_kg() + curve_n);
             let force = -force * (speed / FADE_MPS).clamp(-1.0, 1.0);
             let axle = Vector::new(0.0, 0.0, v.wheel_radius_m - v.bogie_cg_m);

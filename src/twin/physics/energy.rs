@@ -48,6 +48,7 @@ impl EnergyBook {
 
     /// [`Self::gap_j`] as a share of all that was turned over.
     pub fn gap_share(&self) -> f64 {
-        self.gap_j().abs() / (self.start_kinetic_j + self.traction_j + self.potential_j.abs()).max(1.0)
+        self.gap_j().abs()
+            / (self.start_kinetic_j + self.traction_j + self.potential_j.abs()).max(1.0)
     }
 }

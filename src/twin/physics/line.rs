@@ -28,10 +28,7 @@ impl<'a> Line<'a> {
         Self {
             alignment,
             irregularity,
-            support: (
-                1e6 * settings.support_mn_m,
-                1e3 * settings.support_kn_s_m,
-            ),
+            support: (1e6 * settings.support_mn_m, 1e3 * settings.support_kn_s_m),
             adhesion: settings.rail.adhesion(),
             zones: &settings.rail_zones,
         }
@@ -49,7 +46,7 @@ impl<'a> Line<'a> {
 /// and needs no quaternion.
 pub(super) fn rail_axes(frame: &TrackFrame) -> (Vector, Axes) {
     let (sin, cos) = frame.heading_rad.sin_cos();
-    let level = 1.0 / frame.slope.hypot(1.0);
+    let level = 1.0 / (1.0 + frame.slope * frame.slope).sqrt();
     let rise = frame.slope * level;
     let left = Vector::new(-sin, cos, 0.0);
     let up = Vector::new(-cos * rise, -sin * rise, level);

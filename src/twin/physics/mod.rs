@@ -350,9 +350,7 @@ impl World {
         let train = self.train.as_ref()?;
         let consist = &train.consist;
         let motion = train.history.latest()?;
-        let guess = consist
-            .instruments(self.time, &self.tunnel)
-            .chainage_m;
+        let guess = consist.instruments(self.time, &self.tunnel).chainage_m;
         let origin = motion.world_from_vehicle.translation.vector.into();
         let head = self.tunnel.alignment.track_from_world(&origin, guess);
         let frame = self.tunnel.alignment.at(head.s_m);

@@ -43,7 +43,12 @@ pub(super) fn train(
 }
 
 /// A car on the track's designed place, its front bogie at a chainage.
-fn car(vehicle: &Vehicle, alignment: &Alignment, front_m: f64, speed_mps: f64) -> [BodyState; BODIES] {
+fn car(
+    vehicle: &Vehicle,
+    alignment: &Alignment,
+    front_m: f64,
+    speed_mps: f64,
+) -> [BodyState; BODIES] {
     let distance = 2.0 * vehicle.semi_bogie_distance_m;
     let at = |s_m: f64, height_m: f64| on_rails(alignment, s_m, height_m, speed_mps);
     let front = at(front_m, vehicle.bogie_cg_m);

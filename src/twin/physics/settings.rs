@@ -206,16 +206,15 @@ impl TrainSettings {
 
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        match self.car() {
-            Some(file) => file.check(&key_below(at, "vehicle"), problems),
-            None => problems.push(Problem::new(
+        if self.car().is_none() {
+            problems.push(Problem::new(
                 key_below(at, "vehicle"),
                 format!("there is no vehicle {:?}", self.vehicle),
                 format!(
                     "give one of {} or the path of a .toml file",
                     VehicleFile::shipped_names().join(", ")
                 ),
-            )),
+            ));
         }
         let mut check = Checker::new(at, problems);
         check.within("cars", f64::from(self.cars), 1.0..=8.0, "cars");

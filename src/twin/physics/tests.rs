@@ -488,7 +488,9 @@ fn collision_exchanges_momentum() {
     let consist = &world.train.as_ref().unwrap().consist;
     let wheels_kg = 0.25 * (v.effective_kg() - v.car.kg - 2.0 * v.bogie.kg);
     let lost: f64 = consist.states.iter().enumerate().fold(0.0, |sum, (k, s)| {
-        let mass = [v.car.kg, v.bogie.kg, v.bogie.kg, wheels_kg, wheels_kg, wheels_kg, wheels_kg][k];
+        let mass = [
+            v.car.kg, v.bogie.kg, v.bogie.kg, wheels_kg, wheels_kg, wheels_kg, wheels_kg,
+        ][k];
         sum + mass * (10.0 - s.velocity.x * along.x - s.velocity.y * along.y)
     });
     let (_, velocity) = world.obstacles[0].state(&world.rapier).unwrap();

@@ -1,6 +1,6 @@
 //! Masses, springs and dampers of a car: as a file has them, and in SI units for the forces.
 
-use crate::track::{Checker, Problem, key_below};
+use crate::track::{Checker, FileError, Problem, key_below, read_toml};
 use rapier3d_f64::math::Vector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -150,10 +150,21 @@ pub struct CouplerFile {
 }
 
 impl VehicleFile {
+    /// Reads and checks a vehicle file's text.
+    pub fn from_toml(text: &str) -> Result<Self, FileError> {
+        let file: Self = read_toml(text)?;
+        let mut problems = Vec::new();
+        file.check("", &mut problems);
+        match problems.is_empty() {
+            true => Ok(file),
+            false => Err(FileError::Problems(problems)),
+        }
+    }
+
     /// A set that comes with the program.
     pub fn shipped(name: &str) -> Option<Self> {
         let (_, text) = SHIPPED.iter().find(|(n, _)| *n == name)?;
-        crate::track::read_toml(text).ok()
+        Self::from_toml(text).ok()
     }
 
     /// Names of the sets that come with the program.
@@ -162,16 +173,17 @@ impl VehicleFile {
     }
 
     /// Appends what is wrong; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut section = |name: &str, values: &[(&str, &[f64], std::ops::RangeInclusive<f64>, &str)]| {
-            let at = key_below(at, name);
-            let mut check = Checker::new(&at, problems);
-            for (key, numbers, range, unit) in values {
-                for x in *numbers {
-                    check.within(key, *x, range.clone(), unit);
+    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut section =
+            |name: &str, values: &[(&str, &[f64], std::ops::RangeInclusive<f64>, &str)]| {
+                let at = key_below(at, name);
+                let mut check = Checker::new(&at, problems);
+                for (key, numbers, range, unit) in values {
+                    for x in *numbers {
+                        check.within(key, *x, range.clone(), unit);
+                    }
                 }
-            }
-        };
+            };
         let (b, g, w) = (&self.body, &self.bogie, &self.wheelset);
         let (p, s, c) = (&self.primary, &self.secondary, &self.coupler);
         // Both bogies' wheels must be under the body.
@@ -204,7 +216,12 @@ impl VehicleFile {
                 ("mass_kg", &[w.mass_kg], 500.0..=4e3, "kg"),
                 ("inertia_kg_m2", &w.inertia_kg_m2, 20.0..=4e3, "kg m^2"),
                 ("radius_m", &[w.radius_m], 0.25..=0.7, "m"),
-                ("rotating_mass_share", &[w.rotating_mass_share], 0.01..=0.3, ""),
+                (
+                    "rotating_mass_share",
+                    &[w.rotating_mass_share],
+                    0.01..=0.3,
+                    "",
+                ),
             ],
         );
         // With these bounds every mode turns by less than 1 rad in a step of 2 ms.
@@ -223,9 +240,24 @@ impl VehicleFile {
                 ("damping_kn_s_m", &s.damping_kn_s_m, 0.0..=300.0, "kN s/m"),
                 ("base_m", &[s.base_m], 1.0..=2.6, "m"),
                 ("height_m", &[s.height_m], 0.3..=1.5, "m"),
-                ("roll_bar_mn_m_rad", &[s.roll_bar_mn_m_rad], 0.0..=10.0, "MN m/rad"),
-                ("traction_rod_mn_m", &[s.traction_rod_mn_m], 0.5..=20.0, "MN/m"),
-                ("traction_rod_kn_s_m", &[s.traction_rod_kn_s_m], 0.0..=200.0, "kN s/m"),
+                (
+                    "roll_bar_mn_m_rad",
+                    &[s.roll_bar_mn_m_rad],
+                    0.0..=10.0,
+                    "MN m/rad",
+                ),
+                (
+                    "traction_rod_mn_m",
+                    &[s.traction_rod_mn_m],
+                    0.5..=20.0,
+                    "MN/m",
+                ),
+                (
+                    "traction_rod_kn_s_m",
+                    &[s.traction_rod_kn_s_m],
+                    0.0..=200.0,
+                    "kN s/m",
+                ),
                 ("stop_play_m", &[s.stop_play_m], 0.005..=0.2, "m"),
                 ("stop_mn_m", &[s.stop_mn_m], 0.0..=10.0, "MN/m"),
             ],
@@ -365,5 +397,37 @@ impl Vehicle {
     /// Static force of a wheel on its rail.
     pub(super) fn wheel_load_n(&self) -> f64 {
         0.125 * self.total_kg() * GRAVITY_MPS2
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// Fails where a set that comes with the program cannot be read, has another name, or gives
+    /// other figures than its file.
+    #[test]
+    fn shipped_vehicles_are_right() {
+        for name in VehicleFile::shipped_names() {
+            let file = VehicleFile::shipped(name).unwrap();
+            assert_eq!(file.name, name);
+            let car = Vehicle::new(&file);
+            // Class B allows 14 t on an axle.
+            let axle_t = 1e-3 * 0.25 * car.total_kg();
+            assert!((8.0..14.1).contains(&axle_t), "{name}: {axle_t} t");
+            let rotating = car.effective_kg() / car.total_kg() - 1.0;
+            assert!((rotating - file.wheelset.rotating_mass_share).abs() < 1e-12);
+        }
+        assert!(VehicleFile::shipped("tram").is_none());
+    }
+
+    /// Fails where a wrong figure is not named with its key.
+    #[test]
+    fn wrong_figures_are_named() {
+        let (_, text) = SHIPPED[0];
+        let wrong = text.replace("distance_m = 12.6", "distance_m = 19.0");
+        let error = VehicleFile::from_toml(&wrong).unwrap_err().to_string();
+        assert!(error.contains("bogie.distance_m"), "{error}");
     }
 }

@@ -69,6 +69,8 @@ pub(super) struct Wheelset {
     pub rolled_m: f64,
     /// Chainage of the axle.
     pub s_m: f64,
+    /// Curvature of the line there.
+    pub curvature_per_m: f64,
     /// Roll of the rails by cant, and how it changes.
     roll_rad: f64,
     roll_rad_per_m: f64,
@@ -83,8 +85,6 @@ struct Rails {
     /// Along the designed track, across and up from the real one.
     axes: Axes,
     deviation: Deviation,
-    /// Curvature about the designed track's z axis.
-    curvature_per_m: f64,
     /// Speed of the axle along the track.
     speed_mps: f64,
 }
@@ -106,6 +106,7 @@ impl Wheelset {
             },
             rolled_m: 0.0,
             s_m,
+            curvature_per_m: 0.0,
             roll_rad,
             roll_rad_per_m: 0.0,
             brake_slip_m: 0.0,
@@ -145,13 +146,14 @@ impl Wheelset {
         let frame = line.alignment.at(guess);
         let (origin, designed) = super::line::rail_axes(&frame);
         let along = (state.position - origin).dot(designed.x);
-        let s_m = guess + along / frame.slope.hypot(1.0);
+        let s_m = guess + along / (1.0 + frame.slope * frame.slope).sqrt();
         let (run_m, turn) = (s_m - self.s_m, frame.roll_rad - self.roll_rad);
         // The cant is that of the guess, micrometres away; standing, its change stays.
         if run_m.abs() > 1e-7 {
             self.roll_rad_per_m = turn / run_m;
         }
         (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
+        self.curvature_per_m = frame.curvature_per_m;
         let d = line.irregularity.at(s_m);
         // The angle is some mrad at most.
         let (sin, cos) = d.roll_rad.sin_cos();
@@ -163,7 +165,6 @@ impl Wheelset {
                 z: designed.z * cos - designed.y * sin,
             },
             deviation: d,
-            curvature_per_m: frame.curvature_per_m,
             speed_mps: state.velocity.dot(designed.x),
         }
     }
@@ -205,8 +206,8 @@ impl Wheelset {
         let off_m = (foot - rails.origin).dot(y);
         // The turning about the axle is along the rail, that about the rail moves the foot.
         let roll_rate = state.angular.dot(x);
-        let rate = state.velocity.dot(y) + roll_rate * vehicle.wheel_radius_m
-            - speed * d.left_per_m;
+        let rate =
+            state.velocity.dot(y) + roll_rate * vehicle.wheel_radius_m - speed * d.left_per_m;
         let play = (FLANGE_PLAY_M + 0.5 * d.gauge_m).max(0.0);
         let past = off_m - off_m.clamp(-play, play);
         let centring = 2.0 * KALKER_ACROSS_N / CENTRING_M;
@@ -223,7 +224,11 @@ impl Wheelset {
         let slip = (speed_mps - tread_mps).abs();
         let slips = slip > PROTECTED_SHARE * speed_mps.abs() + PROTECTED_MPS;
         let share = &mut self.forces.effort_share;
-        let change = if slips { -dt_s / LET_GO_S } else { dt_s / GIVE_BACK_S };
+        let change = if slips {
+            -dt_s / LET_GO_S
+        } else {
+            dt_s / GIVE_BACK_S
+        };
         *share = (*share + change).clamp(0.0, 1.0);
         let most_n = *share * drive.brake_n;
         // Friction with elastic slip (Dahl): the same law brakes a running wheel and holds a
@@ -235,7 +240,10 @@ impl Wheelset {
     }
 
     /// Creep along, across and in yaw; all that acts else is in the wrench already.
-    #[allow(clippy::too_many_arguments, reason = "the last step of one computation")]
+    #[allow(
+        clippy::too_many_arguments,
+        reason = "the last step of one computation"
+    )]
     fn creep(
         &mut self,
         vehicle: &Vehicle,
@@ -252,9 +260,14 @@ impl Wheelset {
         let slip = rails.speed_mps - r * state.angular.dot(axle);
         let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);
         let load_n = self.forces.normal_n[0] + self.forces.normal_n[1];
-        let linear = (2.0 * KALKER_ALONG_N * slip).hypot(2.0 * KALKER_ACROSS_N * across_mps);
+        let (f_along, f_across) = (
+            2.0 * KALKER_ALONG_N * slip,
+            2.0 * KALKER_ACROSS_N * across_mps,
+        );
+        let linear = (f_along * f_along + f_across * f_across).sqrt();
         let adhesion = line.adhesion_at(self.s_m);
-        let share = adhesion.share(linear * per_mps, load_n, slip.hypot(across_mps));
+        let slip_mps = (slip * slip + across_mps * across_mps).sqrt();
+        let share = adhesion.share(linear * per_mps, load_n, slip_mps);
         let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
         let across_c = 2.0 * KALKER_ACROSS_N * per_mps * share;
         // Slip' = free - gain * force: of the axle's own mass and of the turning wheels.
@@ -265,7 +278,7 @@ impl Wheelset {
         let along = -along_c * (slip + dt_s * free) / (1.0 + dt_s * along_c * gain);
         let across = -across_c * across_mps / (1.0 + dt_s * across_c / mass.kg);
         // The wheels of a turning wheelset slip against each other.
-        let yaw_rate = state.angular.dot(z) - rails.curvature_per_m * rails.speed_mps;
+        let yaw_rate = state.angular.dot(z) - self.curvature_per_m * rails.speed_mps;
         let yaw_c = along_c * HALF_CONTACT_M * HALF_CONTACT_M;
         let yaw = -yaw_c * yaw_rate / (1.0 + dt_s * yaw_c / mass.kg_m2.z);
         book.creep_w -= along * slip + across * across_mps + yaw * yaw_rate;
@@ -273,7 +286,7 @@ impl Wheelset {
         wrench.add_at(state, x * along + y * across, foot);
         wrench.torque += z * yaw;
         // What guides the wheelset along a crooked way is taken from its run.
-        let guided = across * rails.deviation.left_per_m + yaw * rails.curvature_per_m;
+        let guided = across * rails.deviation.left_per_m + yaw * self.curvature_per_m;
         wrench.force -= x * guided;
         self.forces.along_n = along;
         self.forces.lateral_n += across;
