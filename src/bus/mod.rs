@@ -26,7 +26,7 @@ pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, Stereo
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
 pub use message::{Delivery, ObstacleWarning, Via};
-pub use motion::{ImuSample, OdometerSample};
+pub use motion::{DopplerSample, ImuSample, OdometerSample};
 pub use time::SimTime;
 pub use wayside::{
     Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,

@@ -19,8 +19,19 @@ pub struct ImuSample {
 pub struct OdometerSample {
     /// When it was taken.
     pub time: SimTime,
-    /// Distance run since power-on.
+    /// Distance run since power-on; less again when it rolls back.
     pub distance_m: f64,
-    /// Speed over the last interval.
+    /// Speed between the last edges of pulses.
     pub speed_mps: f64,
+}
+
+/// What a Doppler radar says of the speed over ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DopplerSample {
+    /// When it was taken: the end of the time that it is a mean of.
+    pub time: SimTime,
+    /// Speed along the vehicle, mean since the last sample. A radar with one beam does not know
+    /// which way and says how fast; one with two says backwards as negative. `None` where the
+    /// frequency is too low to be measured: slow, or at rest.
+    pub speed_mps: Option<f64>,
 }

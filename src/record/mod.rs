@@ -143,6 +143,7 @@ impl Observer for Recording {
 struct Contents {
     rig: bool,
     train: bool,
+    radar: bool,
     protection: bool,
     /// Names of the wayside devices.
     devices: Vec<String>,
@@ -179,6 +180,7 @@ impl Open {
         let contents = Contents {
             rig: opening.rig.is_some(),
             train: opening.cars > 0,
+            radar: opening.radar,
             protection: opening.protection,
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
@@ -207,6 +209,14 @@ impl Open {
                 let head = train.world_from_vehicle;
                 self.lay_out(Some(&head))?;
                 train.time
+            }
+            Event::Odometer(sample) => {
+                self.plots.odometer(sample);
+                sample.time
+            }
+            Event::Doppler(sample) => {
+                self.plots.doppler(sample);
+                sample.time
             }
             Event::Bodies(time, bodies) => {
                 self.moving.bodies(stream, scene, time, bodies)?;

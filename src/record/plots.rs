@@ -2,7 +2,9 @@
 
 use super::stream::{Stream, failed};
 use super::{Contents, palette, slug};
-use crate::bus::{LedReport, Method, ProtectionReport, SimTime, WaysideReport};
+use crate::bus::{
+    DopplerSample, LedReport, Method, OdometerSample, ProtectionReport, SimTime, WaysideReport,
+};
 use crate::session::ObserverError;
 use crate::twin::physics::TrainState;
 use rerun::external::re_sdk_types::blueprint::components::Corner2D;
@@ -39,6 +41,9 @@ const fn line(path: &'static str, name: &'static str, rgb: (u8, u8, u8), width: 
     }
 }
 
+/// Of the trains that have one.
+const RADAR: &str = "plots/speed/radar";
+
 const SPEED: Group = Group {
     title: "Speed, km/h",
     origin: "plots/speed",
@@ -47,6 +52,8 @@ const SPEED: Group = Group {
         line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5),
         line("plots/speed/service", "service", (255, 170, 60), 1.5),
         line("plots/speed/permitted", "permitted", (235, 225, 100), 1.5),
+        line("plots/speed/odometer", "odometer", (120, 180, 255), 1.0),
+        line(RADAR, "radar", (220, 130, 255), 1.0),
         line("plots/speed/estimated", "estimated", (90, 230, 120), 2.0),
         line("plots/speed/true", "true", (240, 240, 240), 2.0),
     ],
@@ -141,6 +148,7 @@ impl Plots {
             .iter()
             .flatten()
             .flat_map(|group| group.lines)
+            .filter(|line| contents.radar || line.path != RADAR)
         {
             let (r, g, b) = line.rgb;
             style(
@@ -186,6 +194,18 @@ impl Plots {
         self.push("plots/vibration/vertical", t, truth.floor_accel_mps2.z);
         self.push("plots/vibration/lateral", t, truth.floor_accel_mps2.y);
         self.push("plots/suspension/travel", t, truth.secondary_travel_m * MM);
+    }
+
+    /// Speed of the wheels.
+    pub(super) fn odometer(&mut self, sample: &OdometerSample) {
+        let speed_kmh = sample.speed_mps * KMH;
+        self.push("plots/speed/odometer", sample.time, speed_kmh);
+    }
+
+    /// Speed over ground, where it is measured.
+    pub(super) fn doppler(&mut self, sample: &DopplerSample) {
+        let speed_kmh = sample.speed_mps.map(|v| v * KMH);
+        push_or_gap(&mut self.series, RADAR, sample.time, speed_kmh);
     }
 
     /// What the protection holds the speed against.

@@ -9,7 +9,9 @@
 use super::stream::part_name;
 use super::trial::{Size, play};
 use super::{FixTable, Recording};
-use crate::bus::{DangerLevel, Delivery, ObstacleWarning, SimTime, Via};
+use crate::bus::{
+    DangerLevel, Delivery, DopplerSample, ObstacleWarning, OdometerSample, SimTime, Via,
+};
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening};
 use crate::track::Tunnel;
@@ -208,6 +210,7 @@ fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
         wayside: &[],
         car_half_extents_m: nalgebra::Vector3::zeros(),
         cars: 0,
+        radar: false,
         protection: false,
     }
 }
@@ -247,6 +250,51 @@ fn regress_the_log_tells_a_repeated_warning_once() {
         .filter(|c| c.entity_path().to_string() == "/events");
     // What is run, the warning, the all clear.
     assert_eq!(events.map(Chunk::num_rows).sum::<usize>(), 3);
+}
+
+/// Speeds of odometer and radar become series; where the radar says nothing the line breaks, and
+/// a train without one has no entry in the legend.
+#[test]
+fn sensors_of_motion_become_series() {
+    let folder = Folder::new("motion");
+    let tunnel = super::trial::tunnel();
+    for radar in [true, false] {
+        let path = folder.file(if radar { "with.rrd" } else { "without.rrd" });
+        let mut recording = Recording::to_file(&path, &RecordSettings::default());
+        let opening = Opening {
+            cars: 1,
+            radar,
+            ..bare("motion", &tunnel)
+        };
+        recording.open(&opening).unwrap();
+        for k in 0..10 {
+            let time = SimTime::from_secs(0.1 * f64::from(k));
+            let odometer = OdometerSample {
+                time,
+                distance_m: f64::from(k),
+                speed_mps: 10.0,
+            };
+            recording.observe(&Event::Odometer(&odometer)).unwrap();
+            let doppler = DopplerSample {
+                time,
+                speed_mps: (k < 5).then_some(10.0),
+            };
+            if radar {
+                recording.observe(&Event::Doppler(&doppler)).unwrap();
+            }
+        }
+        recording.close().unwrap();
+        let all = chunks(&path, StoreKind::Recording);
+        let rows = |name: &str, still: bool| {
+            let of = all.iter().filter(|c| c.entity_path().to_string() == name);
+            let of = of.filter(|c| c.is_static() == still);
+            of.map(Chunk::num_rows).sum::<usize>()
+        };
+        assert_eq!(rows("/plots/speed/odometer", false), 10);
+        // Five values and one gap.
+        assert_eq!(rows("/plots/speed/radar", false), if radar { 6 } else { 0 });
+        assert_eq!(rows("/plots/speed/radar", true), usize::from(radar));
+    }
 }
 
 /// A folder that cannot be made is an error at once, not a silent loss.

@@ -190,6 +190,7 @@ pub(super) fn play(observer: &mut dyn Observer, size: Size) {
         wayside: &devices,
         car_half_extents_m: Vector3::new(9.5, 1.4, 1.7),
         cars: size.cars,
+        radar: false,
         protection: size.cars > 0,
     };
     observer.open(&opening).unwrap();

@@ -8,7 +8,8 @@ use crate::track::{FileError, Problem, Tunnel, read_toml};
 use crate::twin::comms::RadioSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
-    ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
+    DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
+    WaysideCameraSettings,
 };
 use crate::twin::survey::SurveySettings;
 use std::path::{Path, PathBuf};
@@ -41,6 +42,8 @@ pub struct Scenario {
     pub imu: ImuSettings,
     /// The odometer.
     pub odometer: OdometerSettings,
+    /// The Doppler radar.
+    pub doppler: Option<DopplerSettings>,
     /// Wayside devices in use.
     pub wayside: Vec<WaysidePost>,
     /// The radio.
@@ -195,6 +198,7 @@ impl Scenario {
             rig: file.rig,
             imu: file.imu,
             odometer: file.odometer,
+            doppler: file.doppler,
             wayside,
             radio: file.radio,
             stack: file.stack,

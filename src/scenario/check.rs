@@ -19,6 +19,9 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     file.survey.check("survey", problems);
     file.imu.check("imu", problems);
     file.odometer.check("odometer", problems);
+    if let Some(doppler) = &file.doppler {
+        doppler.check("doppler", problems);
+    }
     file.radio.check("radio", problems);
     file.stack.check("stack", problems);
     file.record.check("record", problems);
@@ -42,6 +45,7 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         }
     }
     check_carrier(file, problems);
+    check_motion(file, problems);
     check_appearances(file, problems);
 }
 
@@ -132,6 +136,31 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         }
     }
 }
+
+/// The sensors of motion need the part of the train that they sit on.
+fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    let Some(train) = &file.train else {
+        if file.doppler.is_some() {
+            problems.push(Problem::new(
+                "doppler",
+                "there is no train that carries it",
+                "add [train], or take this out",
+            ));
+        }
+        return;
+    };
+    let (axle, axles) = (file.odometer.axle, AXLES_PER_CAR * train.cars);
+    if axle > axles {
+        problems.push(Problem::new(
+            "odometer.axle",
+            format!("the train has {axles} wheelsets, not {axle}"),
+            format!("give 1 to {axles}"),
+        ));
+    }
+}
+
+/// Two bogies of two wheelsets.
+const AXLES_PER_CAR: u32 = 4;
 
 fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     let late = |problems: &mut Vec<Problem>, key: String, what: &str, at_s: f64| {
@@ -362,4 +391,28 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
         ),
         remedy,
     )
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::track::read_toml;
+
+    fn keys(rest: &str) -> Vec<String> {
+        let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
+        let mut problems = Vec::new();
+        alone(&read_toml(&text).unwrap(), &mut problems);
+        problems.into_iter().map(|p| p.key).collect()
+    }
+
+    /// A sensor of motion that nothing carries, or on a wheelset that the train has not, would
+    /// be silent all the run.
+    #[test]
+    fn sensors_of_motion_need_their_place() {
+        assert_eq!(keys("[bench]\n[rig]\n[doppler]\n"), ["doppler"]);
+        assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
+        let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";
+        assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
+    }
 }

@@ -10,7 +10,8 @@ use crate::twin::physics::{
     ObstacleSettings, PhysicsSettings, TrackSettings, TrainSettings, WorkerSettings,
 };
 use crate::twin::sensors::{
-    ImuSettings, LidarSettings, OdometerSettings, RigSettings, WaysideCameraSettings,
+    DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
+    WaysideCameraSettings,
 };
 use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
@@ -67,6 +68,9 @@ pub struct ScenarioFile {
     /// The odometer on the train.
     #[serde(default)]
     pub odometer: OdometerSettings,
+    /// A Doppler radar on the train. Default: none.
+    #[serde(default)]
+    pub doppler: Option<DopplerSettings>,
     /// Wayside devices in use, each at a place that the tunnel file names. Default: none.
     #[serde(default)]
     pub wayside: Vec<WaysidePostSettings>,

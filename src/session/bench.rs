@@ -68,6 +68,7 @@ impl<'s> Bench<'s> {
                 wayside: &[],
                 car_half_extents_m: Vector3::zeros(),
                 cars: 0,
+                radar: false,
                 protection: false,
             })
         })?;

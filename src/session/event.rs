@@ -1,8 +1,8 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
 use crate::bus::{
-    Delivery, LedReport, ProtectionReport, RigCalibration, SimTime, StereoPair, WaysideCalibration,
-    WaysideReport,
+    Delivery, DopplerSample, LedReport, OdometerSample, ProtectionReport, RigCalibration, SimTime,
+    StereoPair, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use crate::twin::physics::TrainState;
@@ -27,6 +27,8 @@ pub struct Opening<'a> {
     pub car_half_extents_m: Vector3<f64>,
     /// Cars of the train, 0 where there is none.
     pub cars: usize,
+    /// The train has a Doppler radar.
+    pub radar: bool,
     /// A protection runs: its reports and the driver's display will come.
     pub protection: bool,
 }
@@ -37,6 +39,10 @@ pub enum Event<'a> {
     /// The train as it really is and the pose of its left camera, where it has a rig; 50 times a
     /// second.
     Train(&'a TrainState, Option<&'a Isometry3<f64>>),
+    /// What the odometer says.
+    Odometer(&'a OdometerSample),
+    /// What the Doppler radar says.
+    Doppler(&'a DopplerSample),
     /// Everything solid but the train, 10 times a second.
     Bodies(SimTime, &'a [Body]),
     /// A pair of images, what the stack said of it, and the true chainage at each fix's time.

@@ -22,6 +22,7 @@ mod cameras;
 mod devices;
 mod event;
 mod eyes;
+mod motion;
 mod outcome;
 mod run;
 mod score;

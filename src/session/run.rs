@@ -4,6 +4,7 @@
 use super::cameras::Clock;
 use super::devices::{Device, Look};
 use super::eyes::Eyes;
+use super::motion::MotionSensors;
 use super::outcome::Outcome;
 use super::shots::{Shot, Shots, What};
 use super::watch::{Costs, Watchers};
@@ -15,7 +16,6 @@ use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::{Job, Renderer, View};
-use crate::twin::sensors::{Imu, Odometer};
 use image::GrayImage;
 use nalgebra::Vector3;
 
@@ -31,10 +31,7 @@ pub struct Run<'s> {
     scenario: &'s Scenario,
     world: World,
     shots: Shots,
-    imu: Imu,
-    imu_clock: Clock,
-    odometer: Odometer,
-    odometer_clock: Clock,
+    motion: MotionSensors,
     eyes: Option<Eyes>,
     devices: Vec<Device>,
     comms: Comms,
@@ -55,8 +52,6 @@ impl<'s> Run<'s> {
         let seed = scenario.seed;
         let (tunnel, map) = (&scenario.tunnel, scenario.map());
         let world = World::new(tunnel.clone(), &scenario.physics, seed, 0)?;
-        let imu = Imu::new(&scenario.imu, seed, 0);
-        let odometer = Odometer::new(&scenario.odometer, seed, 0);
         let radio = Stream::new(seed, 0, "radio");
         let rig = scenario.rig.as_ref();
         let eyes = rig
@@ -66,10 +61,7 @@ impl<'s> Run<'s> {
             scenario,
             world,
             shots: Shots::new(renderer, scenario.stack.latency_ms),
-            imu_clock: Clock::new(1.0 / imu.period_s()),
-            imu,
-            odometer_clock: Clock::new(1.0 / odometer.period_s()),
-            odometer,
+            motion: MotionSensors::new(scenario),
             eyes,
             devices: Device::all(scenario, &map),
             comms: Comms::new(&scenario.radio, &tunnel.base_stations, radio),
@@ -115,6 +107,7 @@ impl<'s> Run<'s> {
             wayside: &calibrations,
             car_half_extents_m: self.world.car_half_extents_m().unwrap_or(Vector3::zeros()),
             cars: self.world.train().map_or(0, |t| t.world_from_cars.len()),
+            radar: self.motion.has_radar(),
             protection: self.world.head_m().is_some(),
         };
         watchers.each(|o| o.open(&opening))?;
@@ -148,7 +141,7 @@ impl<'s> Run<'s> {
         let (world, command) = (&mut self.world, &self.command);
         self.cost.physics.time(|| world.step(command)).0?;
         let now = self.world.time();
-        self.sample_motion(now);
+        self.sample_motion(watchers)?;
         self.meet_messages(now, before_m, watchers)?;
         self.trigger(now)?;
         while let Some((shot, images)) = self.shots.due(now, &mut self.cost)? {
@@ -158,23 +151,24 @@ impl<'s> Run<'s> {
         self.show_truth(now, watchers)
     }
 
-    /// Inertial unit and odometer.
-    fn sample_motion(&mut self, now: SimTime) {
+    /// Inertial unit, odometer, radar.
+    fn sample_motion(&mut self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
+        let samples = self.motion.sample(&self.world);
         let mut positioner = self.eyes.as_mut().map(|e| &mut e.positioner);
-        if self.imu_clock.due(now, 0.0).is_some()
-            && let Some(sample) = self.imu.sample(&self.world)
-            && let Some(positioner) = &mut positioner
-        {
-            positioner.on_imu(&sample);
+        if let (Some(sample), Some(positioner)) = (&samples.imu, &mut positioner) {
+            positioner.on_imu(sample);
         }
-        if self.odometer_clock.due(now, 0.0).is_some()
-            && let Some(sample) = self.odometer.sample(&self.world)
-        {
-            self.protection.on_odometer(&sample);
+        if let Some(sample) = &samples.odometer {
+            self.protection.on_odometer(sample);
             if let Some(positioner) = &mut positioner {
-                positioner.on_odometer(&sample);
+                positioner.on_odometer(sample);
             }
+            watchers.show(&Event::Odometer(sample))?;
         }
+        if let Some(sample) = &samples.doppler {
+            watchers.show(&Event::Doppler(sample))?;
+        }
+        Ok(())
     }
 
     /// Balises under the train and messages in the air.

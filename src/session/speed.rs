@@ -4,8 +4,9 @@
 //! 60 km/h on `chengdu_line1`, its stereo pairs (1280 x 720 an eye), and the frames of wayside
 //! device W1530 (1920 x 1080). The tunnel is part of the program, so it works anywhere.
 
-use super::cameras::{Clock, wayside_view};
+use super::cameras::wayside_view;
 use super::eyes::Eyes;
+use super::motion::MotionSensors;
 use super::summary::Cost;
 use super::watch::Stopwatch;
 use super::{RendererChoice, SessionError, renderer};
@@ -16,7 +17,6 @@ use crate::track::{Tunnel, read_toml};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::{Backend, Job, RenderError, Renderer, View, gpu};
-use crate::twin::sensors::{Imu, Odometer};
 use image::GrayImage;
 use serde::Serialize;
 
@@ -106,10 +106,7 @@ fn train_seconds(
 ) -> Result<Times, Error> {
     let rig = scenario.rig.as_ref().ok_or("the scene has no rig")?;
     let mut eyes = Eyes::new(scenario, rig, &scenario.map());
-    let mut imu = Imu::new(&scenario.imu, scenario.seed, 0);
-    let mut odometer = Odometer::new(&scenario.odometer, scenario.seed, 0);
-    let mut imu_clock = Clock::new(1.0 / imu.period_s());
-    let mut odometer_clock = Clock::new(1.0 / odometer.period_s());
+    let mut motion = MotionSensors::new(scenario);
     let command = TrainCommand {
         permitted_speed_mps: 80.0 / 3.6,
         ..TrainCommand::default()
@@ -125,14 +122,10 @@ fn train_seconds(
             steps = Stopwatch::default();
         }
         let now = world.time();
-        if imu_clock.due(now, 0.0).is_some() {
-            let sample = imu.sample(world);
-            sample.iter().for_each(|s| eyes.positioner.on_imu(s));
-        }
-        if odometer_clock.due(now, 0.0).is_some() {
-            let sample = odometer.sample(world);
-            sample.iter().for_each(|s| eyes.positioner.on_odometer(s));
-        }
+        let samples = motion.sample(world);
+        samples.imu.iter().for_each(|s| eyes.positioner.on_imu(s));
+        let odometer = samples.odometer.iter();
+        odometer.for_each(|s| eyes.positioner.on_odometer(s));
         let Some((number, start)) = eyes.clock.due(now, eyes.camera.delay_s()) else {
             continue;
         };

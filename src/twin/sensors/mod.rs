@@ -1,12 +1,14 @@
 //! Sensors: each turns the world's state at its own mount into raw output.
 
 mod camera;
+mod doppler;
 mod imu;
 mod lidar;
 mod odometer;
 mod rig;
 
 pub use camera::{WaysideCameraSettings, WaysideError};
+pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
