@@ -149,7 +149,9 @@ fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         }
         return;
     };
-    let (axle, axles) = (file.odometer.axle, AXLES_PER_CAR * train.cars);
+    // A train without cars is a problem of its own.
+    let axles = AXLES_PER_CAR.saturating_mul(train.cars.max(1));
+    let axle = file.odometer.axle;
     if axle > axles {
         problems.push(Problem::new(
             "odometer.axle",

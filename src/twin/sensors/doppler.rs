@@ -303,9 +303,9 @@ mod tests {
                 square += wrong * wrong;
             }
             let sigma = (square / f64::from(n)).sqrt();
-            let wave_m = 0.012_426_6;
-            let band_hz = 2.0 * speed / wave_m * 0.707_11 * (10f64.to_radians() * 0.300_28);
-            let beam_mps = (band_hz / (7.0898 * 0.05)).sqrt() * wave_m / (2.0 * 0.707_11);
+            let (wave_m, sine) = (0.012_426_6, 0.5f64.sqrt());
+            let band_hz = 2.0 * speed / wave_m * sine * (10f64.to_radians() * 0.300_28);
+            let beam_mps = (band_hz / (7.0898 * 0.05)).sqrt() * wave_m / (2.0 * sine);
             let wanted = if janus {
                 beam_mps / 2f64.sqrt()
             } else {

@@ -135,7 +135,7 @@ fn val_allan_deviation_of_the_imu() {
     let force = Vector3::new(0.0, 0.0, G_MPS2);
     for index in 0..UNITS {
         let mut imu = Imu::new(&settings, 11, index);
-        let mut records = vec![Vec::with_capacity(STILL_S * RATE_HZ); 6];
+        let mut records = vec![Vec::new(); 6];
         for _ in 0..STILL_S * RATE_HZ {
             let (gyro, accel) = imu.measure(&Vector3::zeros(), &force, 1.0 / RATE_HZ as f64);
             for (record, x) in records.iter_mut().zip(gyro.iter().chain(&accel)) {

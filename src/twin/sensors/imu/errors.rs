@@ -6,10 +6,10 @@
 //!
 //! **Drift.** The data sheet's in-run bias stability is the floor of the Allan deviation, which is
 //! what flicker noise makes. IEEE Std 952, annex C, writes its two-sided spectrum as (B²/2π)/f and
-//! its Allan deviation as B √(2 ln 2/π) = 0.664 B, at every averaging time. One first-order Gauss-Markov process has no such floor, only a hump. But of
-//! processes with one variance v and time constants T that grow by the ratio r, each of two-sided
-//! spectrum 2vT/(1 + (2πfT)²), the sum is, as an integral over ln T,
-//! (v/ln r) ∫ 2/(1 + (2πfT)²) dT = (v/ln r)/(2f), flicker with
+//! its Allan deviation as B √(2 ln 2/π) = 0.664 B, at every averaging time. One first-order
+//! Gauss-Markov process has no such floor, only a hump. But of processes with one variance v and
+//! time constants T that grow by the ratio r, each of two-sided spectrum 2vT/(1 + (2πfT)²), the sum
+//! is, as an integral over ln T, (v/ln r) ∫ 2/(1 + (2πfT)²) dT = (v/ln r)/(2f), flicker with
 //!
 //! > v = B² ln r / π.
 //!

@@ -61,7 +61,8 @@ pub struct ImuSettings {
     /// How long the gyroscopes were averaged at standstill before the run to take their bias out,
     /// seconds; 0 for not at all.
     pub gyro_null_s: f64,
-    /// In-run bias stability of the gyroscopes: the floor of their Allan deviation, degrees an hour.
+    /// In-run bias stability of the gyroscopes: the floor of their Allan deviation, degrees an
+    /// hour.
     pub gyro_bias_deg_h: f64,
     /// Angle random walk, degrees a square root of an hour.
     pub angle_random_walk_deg_sqrt_h: f64,
@@ -75,7 +76,8 @@ pub struct ImuSettings {
     pub gyro_range_deg_s: f64,
     /// Sigma of the accelerometers' bias at turn-on, thousandths of g.
     pub accel_turn_on_mg: f64,
-    /// In-run bias stability of the accelerometers: the floor of their Allan deviation, thousandths of g.
+    /// In-run bias stability of the accelerometers: the floor of their Allan deviation,
+    /// thousandths of g.
     pub accel_bias_mg: f64,
     /// Velocity random walk, m/s a square root of an hour.
     pub velocity_random_walk_mps_sqrt_h: f64,
