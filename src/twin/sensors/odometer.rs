@@ -123,9 +123,10 @@ impl Odometer {
         1.0 / self.settings.rate_hz
     }
 
-    /// A sample now; `None` without a train.
+    /// A sample now; `None` without a train, or without that wheelset.
     pub fn sample(&mut self, world: &World) -> Option<OdometerSample> {
-        Some(self.read(world.time(), world.wheel_run_m(0)?))
+        let axle = (self.settings.axle as usize).saturating_sub(1);
+        Some(self.read(world.time(), world.wheel_run_m(axle)?))
     }
 
     /// What the box says when its wheelset's tread has rolled `run_m` since the start.
