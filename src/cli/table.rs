@@ -30,7 +30,27 @@ fn write_all(text: &mut String, s: &Summary, out: &Path) -> std::fmt::Result {
     positioning(text, s)?;
     wayside(text, s)?;
     protection(text, s)?;
+    train(text, s)?;
     writeln!(text, "\nresults in {}", out.display())
+}
+
+fn train(text: &mut String, s: &Summary) -> std::fmt::Result {
+    let Some(t) = &s.train else {
+        return Ok(());
+    };
+    let [_, lateral, vertical] = t.floor_accel_rms_mps2;
+    write!(
+        text,
+        "train ran {:.1} m; floor {vertical:.3} m/s^2 vertical, {lateral:.3} lateral (RMS); \
+         wheel load down to {:.0} %; slip up to {:.2} m/s",
+        t.run_m,
+        100.0 * t.least_wheel_load_share,
+        t.most_slip_mps,
+    )?;
+    if let Some(error_m) = t.stop_error_m {
+        write!(text, "; stopped {:.2} m off the mark", error_m.abs())?;
+    }
+    writeln!(text)
 }
 
 fn positioning(text: &mut String, s: &Summary) -> std::fmt::Result {

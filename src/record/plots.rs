@@ -13,6 +13,7 @@ use std::collections::BTreeMap;
 
 const KMH: f64 = 3.6;
 const MM: f64 = 1000.0;
+const KN: f64 = 1000.0;
 
 /// Series that share a pane.
 pub(super) struct Group {
@@ -73,12 +74,52 @@ const SUSPENSION: Group = Group {
     title: "Suspension travel, mm",
     origin: "plots/suspension",
     legend: Corner2D::RightTop,
-    lines: &[line(
-        "plots/suspension/travel",
-        "secondary, front bogie",
-        (170, 220, 130),
-        1.5,
-    )],
+    lines: &[
+        line(
+            "plots/suspension/primary",
+            "primary, first axle",
+            (90, 200, 255),
+            1.0,
+        ),
+        line(
+            "plots/suspension/secondary",
+            "secondary over it",
+            (170, 220, 130),
+            1.5,
+        ),
+    ],
+};
+
+const WHEELS: Group = Group {
+    title: "Wheel forces, first axle, kN",
+    origin: "plots/wheels",
+    legend: Corner2D::RightTop,
+    lines: &[
+        line("plots/wheels/left", "normal, left", (120, 180, 255), 1.0),
+        line("plots/wheels/right", "normal, right", (255, 170, 60), 1.0),
+        line("plots/wheels/lateral", "lateral", (170, 220, 130), 1.0),
+        line("plots/wheels/along", "along", (240, 240, 240), 1.0),
+    ],
+};
+
+const SLIP: Group = Group {
+    title: "Slip of the wheels, m/s",
+    origin: "plots/slip",
+    legend: Corner2D::RightTop,
+    lines: &[
+        line("plots/slip/most", "most of all axles", (255, 170, 60), 1.0),
+        line("plots/slip/first", "first axle", (120, 180, 255), 1.0),
+    ],
+};
+
+const COUPLERS: Group = Group {
+    title: "Pull of the couplers, kN",
+    origin: "plots/couplers",
+    legend: Corner2D::RightTop,
+    lines: &[
+        line("plots/couplers/first", "first", (120, 180, 255), 1.0),
+        line("plots/couplers/last", "last", (255, 170, 60), 1.0),
+    ],
 };
 
 const DISTANCE: Group = Group {
@@ -121,7 +162,7 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
         panes.push(vec![DISTANCE]);
     }
     if contents.train {
-        panes.push(vec![VIBRATION, SUSPENSION]);
+        panes.push(vec![VIBRATION, SUSPENSION, WHEELS, SLIP, COUPLERS]);
     }
     panes
 }
@@ -193,7 +234,38 @@ impl Plots {
         self.push("plots/speed/true", t, truth.speed_mps * KMH);
         self.push("plots/vibration/vertical", t, truth.floor_accel_mps2.z);
         self.push("plots/vibration/lateral", t, truth.floor_accel_mps2.y);
-        self.push("plots/suspension/travel", t, truth.secondary_travel_m * MM);
+        self.push("plots/suspension/primary", t, truth.primary_travel_m * MM);
+        self.push(
+            "plots/suspension/secondary",
+            t,
+            truth.secondary_travel_m * MM,
+        );
+        self.wheels(truth);
+        for (path, pull) in [
+            ("plots/couplers/first", truth.couplers_n.first()),
+            ("plots/couplers/last", truth.couplers_n.last()),
+        ] {
+            if let Some(pull_n) = pull {
+                self.push(path, t, pull_n / KN);
+            }
+        }
+    }
+
+    /// What the rails do to the first axle, and how the wheels slip.
+    fn wheels(&mut self, truth: &TrainState) {
+        let Some(first) = truth.wheels.first() else {
+            return;
+        };
+        let t = truth.time;
+        let slips = truth.wheels.iter().map(|w| w.slip_mps);
+        let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+        let [left_n, right_n] = first.normal_n;
+        self.push("plots/wheels/left", t, left_n / KN);
+        self.push("plots/wheels/right", t, right_n / KN);
+        self.push("plots/wheels/lateral", t, first.lateral_n / KN);
+        self.push("plots/wheels/along", t, first.along_n / KN);
+        self.push("plots/slip/first", t, first.slip_mps);
+        self.push("plots/slip/most", t, most);
     }
 
     /// Speed of the wheels.

@@ -11,7 +11,7 @@ use crate::bus::*;
 use crate::session::{Event, Observer, Opening};
 use crate::track::uid::Uid;
 use crate::track::*;
-use crate::twin::physics::TrainState;
+use crate::twin::physics::{TrainState, WheelForces};
 use crate::twin::random::Stream as Random;
 use crate::twin::render::{Body, Shape};
 use image::{GrayImage, Luma};
@@ -255,6 +255,13 @@ impl Session<'_> {
             self.tunnel.alignment.at(middle).world_from_line()
                 * Isometry3::translation(0.0, 0.0, 2.1)
         };
+        let wheel = WheelForces {
+            normal_n: [68e3 + 4e3 * (t_s * 60.0).sin(), 69e3],
+            lateral_n: 3e3 * (t_s * 9.0).sin(),
+            along_n: -2e3,
+            slip_mps: 0.01,
+            effort_share: 1.0,
+        };
         let truth = TrainState {
             time: SimTime::from_secs(t_s),
             chainage_m,
@@ -266,7 +273,10 @@ impl Session<'_> {
                 0.2 * (t_s * 11.0).sin(),
                 0.5 * (t_s * 23.0).sin() * (t_s * 3.0).cos(),
             ),
+            primary_travel_m: 0.003 * (t_s * 31.0).sin(),
             secondary_travel_m: 0.012 * (t_s * 7.0).sin(),
+            wheels: vec![wheel; 4 * self.cars],
+            couplers_n: vec![-2e4; self.cars - 1],
             ..TrainState::default()
         };
         let left = truth.world_from_vehicle * self.rig.vehicle_from_left;

@@ -24,6 +24,7 @@ mod event;
 mod eyes;
 mod motion;
 mod outcome;
+mod ride;
 mod run;
 mod score;
 mod shots;
@@ -34,8 +35,8 @@ mod watch;
 pub use event::{Event, Observer, ObserverError, Opening};
 pub use speed::{Speeds, measure};
 pub use summary::{
-    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary, WallShares,
-    Wayside,
+    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary,
+    TrainFigures, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

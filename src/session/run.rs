@@ -6,6 +6,7 @@ use super::devices::{Device, Look};
 use super::eyes::Eyes;
 use super::motion::MotionSensors;
 use super::outcome::Outcome;
+use super::ride::Ride;
 use super::shots::{Shot, Shots, What};
 use super::watch::{Costs, Watchers};
 use super::{End, Event, Observer, Opening, RunOptions, SessionError, Summary};
@@ -43,6 +44,7 @@ pub struct Run<'s> {
     stereo_frames: u32,
     wayside_frames: u32,
     outcome: Outcome,
+    ride: Ride,
     cost: Costs,
 }
 
@@ -73,6 +75,7 @@ impl<'s> Run<'s> {
             stereo_frames: 0,
             wayside_frames: 0,
             outcome: Outcome::default(),
+            ride: Ride::default(),
             cost: Costs::default(),
         })
     }
@@ -347,6 +350,7 @@ impl<'s> Run<'s> {
         {
             let line = &self.scenario.tunnel.alignment;
             self.outcome.on_motion(&train, &self.world, line);
+            self.ride.on_motion(&train);
             if let Some(eyes) = &mut self.eyes {
                 eyes.score.head_at(train.chainage_m);
             }
@@ -374,6 +378,8 @@ impl<'s> Run<'s> {
             a.add(b);
             a
         });
+        let train = self.scenario.physics.train.as_ref();
+        let stop_at_m = train.and_then(|t| t.stop_at_m);
         let simulated_s = self.world.time().secs();
         let backend = self.shots.backend();
         let cost = &self.cost;
@@ -384,6 +390,7 @@ impl<'s> Run<'s> {
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),
             protection: self.outcome.protection(&self.world),
+            train: self.ride.finish(&self.world, stop_at_m),
             ..speed
         }
     }

@@ -3,6 +3,7 @@
 use super::watch::{Costs, Watchers};
 use crate::bus::Method;
 use crate::scenario::Scenario;
+use crate::twin::physics::EnergyBook;
 use crate::twin::render::Backend;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -38,6 +39,8 @@ pub struct Summary {
     pub wayside: Option<Wayside>,
     /// Train protection.
     pub protection: Option<Protection>,
+    /// How the train ran.
+    pub train: Option<TrainFigures>,
 }
 
 impl Summary {
@@ -74,6 +77,7 @@ impl Summary {
             positioning: BTreeMap::new(),
             wayside: None,
             protection: None,
+            train: None,
         }
     }
 }
@@ -219,6 +223,25 @@ pub struct ObstacleScore {
     pub latency_s: Option<f64>,
     /// Reported less true distance along the line, mean over the frames that report it at rest.
     pub distance_error_m: Option<f64>,
+}
+
+/// How the train ran: figures of the truth, 50 times a second.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct TrainFigures {
+    /// Distance of its head, along the line.
+    pub run_m: f64,
+    /// Where its head stood at the end less the stop mark; `null` where there is none, or it runs.
+    pub stop_error_m: Option<f64>,
+    /// RMS of the acceleration of the leading car's floor over its first bogie: forward, left, up.
+    pub floor_accel_rms_mps2: [f64; 3],
+    /// Least normal force of any wheel over its load at rest.
+    pub least_wheel_load_share: f64,
+    /// Most that any wheel slipped or slid.
+    pub most_slip_mps: f64,
+    /// Where the energy went.
+    pub energy: EnergyBook,
+    /// Energy that the book cannot place, over what was turned over.
+    pub energy_gap_share: f64,
 }
 
 /// Train protection.

@@ -42,8 +42,9 @@ pub(super) struct Consist {
     pub wheelsets: Vec<Wheelset>,
     /// Of every car in turn: itself, its bogies, its wheelsets, at the start of the step.
     pub states: Vec<BodyState>,
-    /// Mean compression of the leading car's front secondary springs.
-    pub secondary_travel_m: f64,
+    /// Mean compression of the leading axle's primary springs, and of the secondary springs over
+    /// it.
+    pub travel_m: [f64; 2],
     /// Pull of every coupler.
     pub couplers_n: Vec<f64>,
     pub handles: Vec<RigidBodyHandle>,
@@ -76,7 +77,7 @@ impl Consist {
             settings: settings.clone(),
             wheelsets: Vec::new(),
             states: cars.concat(),
-            secondary_travel_m: 0.0,
+            travel_m: [0.0; 2],
             couplers_n: vec![0.0; cars.len() - 1],
             handles: Vec::new(),
             colliders: Vec::new(),
@@ -252,13 +253,16 @@ impl Consist {
             let at_m = end * v.semi_bogie_distance_m;
             let travel_m = secondary(v, at_m, (&states[0], car), bogie, book);
             if k == 0 && b == 0 {
-                self.secondary_travel_m = travel_m;
+                self.travel_m[1] = travel_m;
             }
             for (w, end) in [(2 * b, 1.0), (2 * b + 1, -1.0)] {
                 let (state, wrench) = (&states[3 + w], &mut wheels[w]);
                 let at_m = end * v.semi_wheelbase_m;
                 let bogie = (&states[1 + b], &mut bogies[b]);
-                primary(v, at_m, bogie, (state, wrench), book);
+                let travel_m = primary(v, at_m, bogie, (state, wrench), book);
+                if k == 0 && w == 0 {
+                    self.travel_m[0] = travel_m;
+                }
                 let wheelset = &mut self.wheelsets[4 * k + w];
                 let torque = wheelset.apply(v, line, drive, (state, wrench), book, dt_s);
                 bogies[b].torque -= torque;

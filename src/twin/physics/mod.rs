@@ -114,8 +114,10 @@ pub struct TrainState {
     pub world_from_cars: Vec<Isometry3<f64>>,
     /// Acceleration of the leading car's floor over its first bogie, vehicle axes, without gravity.
     pub floor_accel_mps2: Vector3<f64>,
-    /// Vertical travel of the leading car's front secondary suspension from its place at rest,
+    /// Vertical travel of the primary suspension of the leading axle from its place at rest,
     /// positive where it is compressed.
+    pub primary_travel_m: f64,
+    /// And of the secondary suspension over it.
     pub secondary_travel_m: f64,
     /// The train stands.
     pub standing: bool,
@@ -364,7 +366,8 @@ impl World {
             world_from_vehicle: motion.world_from_vehicle,
             world_from_cars: consist.boxes().collect(),
             floor_accel_mps2: consist.floor_accel_mps2(self.step_s),
-            secondary_travel_m: consist.secondary_travel_m,
+            primary_travel_m: consist.travel_m[0],
+            secondary_travel_m: consist.travel_m[1],
             standing: consist.speed_mps().abs() < STANDING_MPS,
             traction_mps2: train.effort.traction_mps2,
             brake_mps2: train.effort.brake_mps2,

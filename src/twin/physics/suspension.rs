@@ -102,15 +102,17 @@ fn beyond(x: f64, play: f64, stiffness: f64) -> (f64, f64) {
     (-stiffness * past, 0.5 * stiffness * past * past)
 }
 
-/// Springs of the axle boxes of a wheelset `along_m` ahead of the bogie's centre.
+/// Springs of the axle boxes of a wheelset `along_m` ahead of the bogie's centre. Returns how far
+/// they are compressed, mean of both.
 pub(super) fn primary(
     vehicle: &Vehicle,
     along_m: f64,
     (bogie, on_bogie): (&BodyState, &mut Wrench),
     (wheelset, on_wheelset): (&BodyState, &mut Wrench),
     book: &mut Ledger,
-) {
+) -> f64 {
     let axes = Axes::of(bogie.rotation);
+    let mut compression_m = 0.0;
     let axle = wheelset.rotation * Vector::Y;
     let drop = vehicle.wheel_radius_m - vehicle.bogie_cg_m;
     for side in [-1.0, 1.0] {
@@ -120,10 +122,13 @@ pub(super) fn primary(
         // torque about that line from it.
         let bearing = wheelset.position + axle * lateral;
         let rate = bogie.velocity_at(bearing) - wheelset.velocity_at(bearing);
-        let force = axes.force(&vehicle.primary, above - bearing, rate, book);
+        let stretch = above - bearing;
+        compression_m -= 0.5 * axes.z.dot(stretch);
+        let force = axes.force(&vehicle.primary, stretch, rate, book);
         on_bogie.add_at(bogie, force, bearing);
         on_wheelset.add_at(wheelset, -force, bearing);
     }
+    compression_m
 }
 
 /// Springs, bump stops, roll bar and traction rod between a car and a bogie `along_m` ahead of its

@@ -33,6 +33,11 @@ impl World {
         Some(self.train.as_ref()?.consist.length_m())
     }
 
+    /// Normal force of a wheel at rest; `None` without a train.
+    pub fn wheel_load_n(&self) -> Option<f64> {
+        Some(self.train.as_ref()?.consist.vehicle.wheel_load_n())
+    }
+
     /// Workers who are on the line now.
     pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
         let now_s = self.time.secs();
