@@ -27,8 +27,6 @@ pub(super) const TRAIN_GROUP: Group = Group::GROUP_1;
 pub(super) const OBSTACLE_GROUP: Group = Group::GROUP_2;
 /// Lowest parts of a car over top of rail: guard irons hang 60 mm over the rails.
 const UNDERSIDE_M: f64 = 0.06;
-/// Resistance of a curve, 600/R N/kN (the rule of Chinese traction calculations), over weight.
-const CURVE_M: f64 = 0.6;
 /// Slower than this, resistance fades, so that it does not push a standing train.
 const FADE_MPS: f64 = 0.1;
 /// How quickly a train that is brought to its starting state is held to its speed.
@@ -192,7 +190,8 @@ impl Consist {
         state.velocity.dot(state.rotation * Vector::X)
     }
 
-    /// Running resistance as a deceleration, without curves and gradients.
+    /// Running resistance as a deceleration, without gradients and curves: those take theirs by
+    /// weight and by creep.
     fn davis_mps2(&self, tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> f64 {
         let (s, v) = (&self.settings, speed_mps.abs());
         let confined = match tunnel.section_at(s_m) {
@@ -279,10 +278,8 @@ impl Consist {
             let state = &self.states[at];
             let x = state.rotation * Vector::X;
             let speed = state.velocity.dot(x);
-            let curvature_per_m = self.wheelsets[4 * k + 2 * b].curvature_per_m.abs();
-            let curve_n = CURVE_M * curvature_per_m * v.total_kg() * GRAVITY_MPS2;
-            let force = 0.5 * (davis_mps2 * v.effective_kg() + curve_n);
-            let force = -force * (speed / FADE_MPS).clamp(-1.0, 1.0);
+            let fade = (speed / FADE_MPS).clamp(-1.0, 1.0);
+            let force = -0.5 * davis_mps2 * v.effective_kg() * fade;
             let axle = Vector::new(0.0, 0.0, v.wheel_radius_m - v.bogie_cg_m);
             self.wrenches[at].add_at(state, x * force, state.point(axle));
             power_w -= force * speed;

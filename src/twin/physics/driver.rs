@@ -115,8 +115,10 @@ impl Driver {
             let planned = PLANNED_SHARE * s.service_brake_mps2;
             let needed = now.speed_mps.powi(2) / (2.0 * left_m.max(AT_MARK_M));
             if left_m < AT_MARK_M {
-                target = 0.0;
-            } else if needed > 0.9 * planned {
+                // At the mark, or past it on slippery rails.
+                return -s.service_brake_mps2;
+            }
+            if needed > 0.9 * planned {
                 wanted = wanted.min(now.resistance_mps2 - needed);
             }
         }

@@ -11,11 +11,11 @@ pub struct EnergyBook {
     pub traction_j: f64,
     /// Taken by the brakes.
     pub brake_j: f64,
-    /// Taken by running resistance: air, bearings, curves.
+    /// Taken by running resistance: air and bearings.
     pub resistance_j: f64,
     /// Taken by dampers of suspension, couplers and track.
     pub dampers_j: f64,
-    /// Taken by creep of wheels on rails.
+    /// Taken by creep of wheels on rails: in curves, and where they slip or slide.
     pub creep_j: f64,
     /// Kinetic energy now.
     pub kinetic_j: f64,

@@ -26,8 +26,8 @@
 //! come with the program. The step moves positions with the new velocities (symplectic Euler, one solver iteration), so
 //! springs gain no energy.
 //!
-//! Not modelled: hunting and the steering of bogies (treads centre wheelsets by a spring), the
-//! contact's own stiffness (the rail gives more), flexible car bodies, air springs, pressure waves.
+//! Not modelled: real wheel profiles (treads are cones), the contact's own stiffness (the rail gives
+//! more), flexible car bodies, air springs, pressure waves.
 //! Trains run up the line only, and a worker cannot be run over: he is drawn, not collided with.
 
 mod adhesion;

@@ -298,7 +298,7 @@ fn curve_quasi_static() {
     };
     let mut world = World::new(line.clone(), &settings(train), 1, 0).unwrap();
     run(&mut world, 30.0, &command(BrakeDemand::None, GO));
-    let mut imu = Imu::new(&ImuSettings::default(), 1, 0);
+    let mut imu = Imu::new(&ImuSettings::ideal(), 1, 0);
     let mut lateral = 0.0;
     let mut yaw = 0.0;
     for k in 0..=200 {
@@ -637,4 +637,175 @@ fn check_names_the_keys() {
     let keys: Vec<&str> = problems.iter().map(|p| p.key.as_str()).collect();
     assert_eq!(keys, ["x.step_s", "x.train.cars", "x.obstacles[0].mass_kg"]);
     assert!(World::new(straight(), &wrong, 1, 0).is_err());
+}
+
+/// What traction puts in is kinetic, potential or known to be lost, whatever the train does: a force
+/// that does work on the train and is in no account, or a force whose two ends do not meet, shows.
+#[test]
+fn val_energy_closes() {
+    use IrregularityClass::{GermanHigh, None as Even};
+    let straight = PlanElement::straight(3000.0);
+    let curve = PlanElement::arc(3000.0, 1.0 / 300.0, 0.06);
+    for (name, from_kmh, to_kmh, brake, class, slope, element, rail) in [
+        (
+            "coasting",
+            60.0,
+            0.0,
+            BrakeDemand::None,
+            Even,
+            0.0,
+            straight,
+            RailState::Dry,
+        ),
+        (
+            "starting",
+            0.0,
+            70.0,
+            BrakeDemand::None,
+            Even,
+            0.0,
+            straight,
+            RailState::Dry,
+        ),
+        (
+            "braking",
+            70.0,
+            70.0,
+            BrakeDemand::Service,
+            Even,
+            0.0,
+            straight,
+            RailState::Dry,
+        ),
+        (
+            "sliding",
+            70.0,
+            70.0,
+            BrakeDemand::Service,
+            Even,
+            0.0,
+            straight,
+            RailState::LeafFilm,
+        ),
+        (
+            "shaken",
+            60.0,
+            60.0,
+            BrakeDemand::None,
+            GermanHigh,
+            0.0,
+            straight,
+            RailState::Dry,
+        ),
+        (
+            "climbing",
+            60.0,
+            60.0,
+            BrakeDemand::None,
+            Even,
+            0.02,
+            straight,
+            RailState::Dry,
+        ),
+        (
+            "curving",
+            60.0,
+            60.0,
+            BrakeDemand::None,
+            Even,
+            0.0,
+            curve,
+            RailState::Dry,
+        ),
+    ] {
+        let train = TrainSettings {
+            start_speed_kmh: from_kmh,
+            cruise_speed_kmh: to_kmh,
+            cars: 2,
+            ..TrainSettings::default()
+        };
+        let mut settings = settings(train);
+        settings.track.irregularity.class = class;
+        settings.track.rail = rail;
+        let mut world = World::new(tunnel(&[element], slope), &settings, 1, 0).unwrap();
+        run(&mut world, 15.0, &command(brake, GO));
+        let book = world.energy().unwrap();
+        eprintln!("{name}: gap {:.5} %, {book:?}", 100.0 * book.gap_share());
+        assert!(book.gap_share() < 5e-4, "{name}: {book:?}");
+        // And the account that the case is about is not empty.
+        let moved_j = match name {
+            "coasting" => book.resistance_j,
+            "starting" => book.traction_j,
+            "braking" => book.brake_j,
+            "shaken" => 100.0 * book.dampers_j,
+            "climbing" => book.potential_j,
+            _ => book.creep_j,
+        };
+        assert!(moved_j > 1e5, "{name}: {moved_j}");
+    }
+}
+
+/// What a curve takes from the run, by creep and flanges, against the rule of Chinese traction
+/// calculations (TB/T 1407), 600/R N/kN. Wheelsets that did not run against the outer rail, or
+/// creep forces of the wrong sign or size, are off by more than the rule is rough: it is an average
+/// over worn and new profiles, dry and greased rails.
+#[test]
+fn val_curve_resistance() {
+    for (radius_m, kmh) in [(250.0, 45.0), (300.0, 50.0), (400.0, 60.0), (600.0, 60.0)] {
+        let line = tunnel(&[PlanElement::arc(3000.0, 1.0 / radius_m, 0.06)], 0.0);
+        let train = TrainSettings {
+            start_speed_kmh: kmh,
+            cruise_speed_kmh: kmh,
+            cars: 1,
+            ..TrainSettings::default()
+        };
+        let mut world = World::new(line, &settings(train), 1, 0).unwrap();
+        run(&mut world, 10.0, &command(BrakeDemand::None, GO));
+        let weight_kn = 1e-3 * GRAVITY_MPS2 * car("metro_b1_crush").total_kg();
+        let run_m = world.train().unwrap().chainage_m - 150.0;
+        let got = world.energy().unwrap().creep_j / run_m / weight_kn;
+        let rule = 600.0 / radius_m;
+        eprintln!("R {radius_m} m: {got:.2} N/kN, by the rule {rule:.2}");
+        assert!((0.3..1.5).contains(&(got / rule)), "{got} against {rule}");
+    }
+}
+
+/// A wheelset that is knocked aside comes back to the middle, at the top speed of the line and over
+/// it: a train that hunts does not.
+#[test]
+fn runs_steadily_at_design_speed() {
+    for name in ["metro_b1_empty", "metro_b1_crush", "manchester"] {
+        let train = TrainSettings {
+            vehicle: name.to_owned(),
+            start_speed_kmh: 120.0,
+            cruise_speed_kmh: 120.0,
+            cars: 1,
+            ..TrainSettings::default()
+        };
+        let mut world = World::new(straight(), &settings(train), 1, 0).unwrap();
+        let across = world.tunnel.alignment.at(0.0).left();
+        let across = Vector::new(across.x, across.y, across.z);
+        for handle in world.train.as_ref().unwrap().consist.handles.clone() {
+            let body = &mut world.rapier.bodies[handle];
+            body.set_linvel(body.linvel() + across * 0.05, true);
+        }
+        let mut swing = |seconds: f64| {
+            let mut most_m = 0.0f64;
+            for _ in 0..(1000.0 * seconds) as usize {
+                world.step(&command(BrakeDemand::None, GO)).unwrap();
+                let axle = world.train.as_ref().unwrap().consist.states[3].position;
+                let line = &world.tunnel.alignment;
+                let place = line.track_from_world(&convert::point3(axle), 300.0);
+                most_m = most_m.max(place.l_m.abs());
+            }
+            most_m
+        };
+        let (first_m, _, last_m) = (swing(2.0), swing(8.0), swing(2.0));
+        eprintln!(
+            "{name}: {:.2} mm, after 10 s {:.3} mm",
+            1e3 * first_m,
+            1e3 * last_m
+        );
+        assert!(first_m > 5e-4 && last_m < 0.1 * first_m, "{name} hunts");
+    }
 }

@@ -2,17 +2,23 @@
 //! flanges, driven and braked by creep.
 //!
 //! ```text
-//! normal   Q = Q0 - k z - c z'   each wheel, never negative   z over the loaded rail
-//! treads   Y = -(2 f22 / L) y - (2 f22 / v) y'               y from the middle of the rails
-//! flanges  Y = -K (|y| - play)                               beyond the play, which the gauge widens
-//! along    F = creep law of the slip v - r w                 w the wheelset's turn rate
+//! normal   Q = Q0 - k z - c z'       each wheel, never negative   z over the loaded rail
+//! flanges  Y = -K (|y| - play)       y from the middle of the rails, beyond the play, which the
+//!                                    gauge widens
+//! creep    (Fx, Fy) = law of the slip of the treads over the rails, by Polach
+//! yaw      M = -2 f11 b^2 / v (w_z + conicity y w / b)            b half the contacts' distance
 //! ```
 //!
 //! k is that of a beam on elastic support, 2 sqrt(2) (E I)^(1/4) u^(3/4): 100 MN/m for a 60 kg rail
 //! (E I = 6.4 MN m^2) on fasteners of 40 kN/mm every 0.6 m. The wheelset bounces on it at some
-//! 50 Hz: the P2 force of Jenkins et al. (1974). Coned treads steer a wheelset back to the middle
-//! within about a wavelength of Klingel's motion, L = 2 pi sqrt(r b / conicity) = 11 m for a conicity
-//! of 0.1; here that is a spring, so there is no hunting, and the wheelsets of a bogie do not steer.
+//! 50 Hz: the P2 force of Jenkins et al. (1974).
+//!
+//! Off the middle, coned treads roll on different radii: the wheels slip against each other until
+//! the wheelset has turned towards the middle. With the lateral slip of a wheelset that is not at
+//! right angles to the rails this gives steering in curves, Klingel's motion with its wavelength
+//! 2 pi sqrt(r b / conicity), and hunting (Wickens, "Fundamentals of Rail Vehicle Dynamics", 2003,
+//! chapters 2 and 3; no spin creep and no gravitational stiffness). What curves take from the run is
+//! the work of this slip.
 //!
 //! Creep forces are stiff: at walking pace a slip dies within microseconds. They are therefore
 //! evaluated with the slip that they leave at the end of the step (linearly implicit: the secant
@@ -27,8 +33,8 @@ use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::RigidBodyHandle;
 use serde::{Deserialize, Serialize};
 
-/// Way of coned treads back to the middle.
-const CENTRING_M: f64 = 11.0;
+/// Equivalent conicity of moderately worn treads, by UIC 519.
+const CONICITY: f64 = 0.1;
 /// Of a flange to its rail, either way, on 1435 mm.
 const FLANGE_PLAY_M: f64 = 0.007;
 /// Sideways, a rail gives more than downwards.
@@ -69,8 +75,6 @@ pub(super) struct Wheelset {
     pub rolled_m: f64,
     /// Chainage of the axle.
     pub s_m: f64,
-    /// Curvature of the line there.
-    pub curvature_per_m: f64,
     /// Roll of the rails by cant, and how it changes.
     roll_rad: f64,
     roll_rad_per_m: f64,
@@ -106,7 +110,6 @@ impl Wheelset {
             },
             rolled_m: 0.0,
             s_m,
-            curvature_per_m: 0.0,
             roll_rad,
             roll_rad_per_m: 0.0,
             brake_slip_m: 0.0,
@@ -125,7 +128,7 @@ impl Wheelset {
         dt_s: f64,
     ) -> Vector {
         let rails = self.follow(line, state, dt_s);
-        let contact = self.carry(vehicle, line, &rails, (state, wrench), book);
+        let off_m = self.carry(vehicle, line, &rails, (state, wrench), book);
         let axle = state.rotation * Vector::Y;
         let spin = state.angular.dot(axle);
         let tread_mps = spin * vehicle.wheel_radius_m;
@@ -135,7 +138,7 @@ impl Wheelset {
         book.braked_w -= brake * tread_mps;
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
         wrench.torque += torque;
-        self.creep(vehicle, line, &rails, contact, (state, wrench), book, dt_s);
+        self.creep(vehicle, line, &rails, off_m, (state, wrench), book, dt_s);
         torque
     }
 
@@ -153,7 +156,6 @@ impl Wheelset {
             self.roll_rad_per_m = turn / run_m;
         }
         (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
-        self.curvature_per_m = frame.curvature_per_m;
         let d = line.irregularity.at(s_m);
         // The angle is some mrad at most.
         let (sin, cos) = d.roll_rad.sin_cos();
@@ -169,7 +171,7 @@ impl Wheelset {
         }
     }
 
-    /// Normal forces and guidance. Returns the lateral speed over the rails.
+    /// Normal forces, and those of the flanges. Returns how far left of the rails' middle it is.
     fn carry(
         &mut self,
         vehicle: &Vehicle,
@@ -204,19 +206,16 @@ impl Wheelset {
             wrench.add_at(state, push, state.position + axle * side);
         }
         let off_m = (foot - rails.origin).dot(y);
-        // The turning about the axle is along the rail, that about the rail moves the foot.
-        let roll_rate = state.angular.dot(x);
-        let rate =
-            state.velocity.dot(y) + roll_rate * vehicle.wheel_radius_m - speed * d.left_per_m;
         let play = (FLANGE_PLAY_M + 0.5 * d.gauge_m).max(0.0);
         let past = off_m - off_m.clamp(-play, play);
-        let centring = 2.0 * KALKER_ACROSS_N / CENTRING_M;
-        let lateral = -centring * off_m - FLANGE_STIFFNESS_N_M * past;
-        book.stored_j += 0.5 * (centring * off_m * off_m + FLANGE_STIFFNESS_N_M * past * past);
+        let lateral = -FLANGE_STIFFNESS_N_M * past;
+        book.stored_j += 0.5 * FLANGE_STIFFNESS_N_M * past * past;
         self.forces.lateral_n = lateral;
-        wrench.add_at(state, y * lateral, foot);
-        wrench.force -= x * (d.left_per_m * lateral);
-        rate
+        // At rail level, but no torque about the axle: a flange does not drive the wheel.
+        let tilt = x - axle * axle.dot(x);
+        wrench.force += (y - x * d.left_per_m) * lateral;
+        wrench.torque += tilt * (vehicle.wheel_radius_m * lateral);
+        off_m
     }
 
     /// Forces of traction and brake at the tread, through slide and slip protection.
@@ -249,47 +248,78 @@ impl Wheelset {
         vehicle: &Vehicle,
         line: &Line<'_>,
         rails: &Rails,
-        across_mps: f64,
+        off_m: f64,
         (state, wrench): (&BodyState, &mut Wrench),
         book: &mut Ledger,
         dt_s: f64,
     ) {
         let Axes { x, y, z } = rails.axes;
         let (mass, r) = (&vehicle.wheelset, vehicle.wheel_radius_m);
-        let axle = state.rotation * Vector::Y;
-        let slip = rails.speed_mps - r * state.angular.dot(axle);
+        let foot = state.position - z * r;
+        let slips = state.velocity_at(foot);
+        let (slip, across_mps) = (slips.dot(x), slips.dot(y));
+        // The wheels of a wheelset that turns, or runs on different radii, slip against each other.
+        let cone = CONICITY * off_m / HALF_CONTACT_M;
+        let yaw_rate = state.angular.dot(z) + cone * state.angular.dot(y);
+
         let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);
         let load_n = self.forces.normal_n[0] + self.forces.normal_n[1];
-        let (f_along, f_across) = (
-            2.0 * KALKER_ALONG_N * slip,
-            2.0 * KALKER_ACROSS_N * across_mps,
-        );
-        let linear = (f_along * f_along + f_across * f_across).sqrt();
-        let adhesion = line.adhesion_at(self.s_m);
+        let (f_along, f_across) = (KALKER_ALONG_N * slip, KALKER_ACROSS_N * across_mps);
+        let linear = 2.0 * per_mps * (f_along * f_along + f_across * f_across).sqrt();
         let slip_mps = (slip * slip + across_mps * across_mps).sqrt();
-        let share = adhesion.share(linear * per_mps, load_n, slip_mps);
+        let share = line.adhesion_at(self.s_m).share(linear, load_n, slip_mps);
         let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
         let across_c = 2.0 * KALKER_ACROSS_N * per_mps * share;
-        // Slip' = free - gain * force: of the axle's own mass and of the turning wheels.
-        let free = wrench.force.dot(x) / mass.kg
-            - GRAVITY_MPS2 * x.z
-            - r * wrench.torque.dot(axle) / mass.kg_m2.y;
-        let gain = 1.0 / mass.kg + r * r / mass.kg_m2.y;
-        let along = -along_c * (slip + dt_s * free) / (1.0 + dt_s * along_c * gain);
-        let across = -across_c * across_mps / (1.0 + dt_s * across_c / mass.kg);
-        // The wheels of a turning wheelset slip against each other.
-        let yaw_rate = state.angular.dot(z) - self.curvature_per_m * rails.speed_mps;
         let yaw_c = along_c * HALF_CONTACT_M * HALF_CONTACT_M;
-        let yaw = -yaw_c * yaw_rate / (1.0 + dt_s * yaw_c / mass.kg_m2.z);
-        book.creep_w -= along * slip + across * across_mps + yaw * yaw_rate;
-        let foot = state.position - z * r;
-        wrench.add_at(state, x * along + y * across, foot);
-        wrench.torque += z * yaw;
-        // What guides the wheelset along a crooked way is taken from its run.
-        let guided = across * rails.deviation.left_per_m + yaw * self.curvature_per_m;
-        wrench.force -= x * guided;
-        self.forces.along_n = along;
-        self.forces.lateral_n += across;
+
+        // slip' = free + gain F, by all that acts else, the axle's mass and its inertia.
+        let pull = wrench.force / mass.kg - Vector::Z * GRAVITY_MPS2;
+        let inverse = |inertia_kg_m2: f64| 1.0 / mass.kg + r * r / inertia_kg_m2;
+        let along = Slip {
+            now: slip,
+            free: pull.dot(x) - r * wrench.torque.dot(y) / mass.kg_m2.y,
+            gain: inverse(mass.kg_m2.y),
+        };
+        let across = Slip {
+            now: across_mps,
+            free: pull.dot(y) + r * wrench.torque.dot(x) / mass.kg_m2.x,
+            gain: inverse(mass.kg_m2.x),
+        };
+        let yaw = Slip {
+            now: yaw_rate,
+            free: wrench.torque.dot(z) / mass.kg_m2.z,
+            gain: 1.0 / mass.kg_m2.z,
+        };
+        let forces = [(along, along_c), (across, across_c), (yaw, yaw_c)].map(|(slip, c)| {
+            let force = slip.force(c, dt_s);
+            book.creep_w -= force * slip.middle(force, dt_s);
+            force
+        });
+        let [along_n, across_n, yaw_n_m] = forces;
+        wrench.add_at(state, x * along_n + y * across_n, foot);
+        wrench.torque += (z + y * cone) * yaw_n_m;
+        self.forces.along_n = along_n;
+        self.forces.lateral_n += across_n;
         self.forces.slip_mps = slip;
+    }
+}
+
+/// A slip now, how it changes by itself, and by a unit of force.
+#[derive(Clone, Copy)]
+struct Slip {
+    now: f64,
+    free: f64,
+    gain: f64,
+}
+
+impl Slip {
+    /// Force of the damping `c` for the slip that it leaves at the end of the step.
+    fn force(self, c: f64, dt_s: f64) -> f64 {
+        -c * (self.now + dt_s * self.free) / (1.0 + dt_s * c * self.gain)
+    }
+
+    /// The slip in the middle of the step.
+    fn middle(self, force: f64, dt_s: f64) -> f64 {
+        self.now + 0.5 * dt_s * (self.free + self.gain * force)
     }
 }
