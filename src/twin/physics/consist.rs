@@ -9,7 +9,7 @@ use super::history::VehicleMotion;
 use super::line::Line;
 use super::placement::{self, BODIES};
 use super::settings::TrainSettings;
-use super::suspension::{BodyState, Ledger, Wrench, coupler, primary, secondary};
+use super::suspension::{Axes, BodyState, Ledger, Wrench, coupler, primary, secondary};
 use super::vehicle::{GRAVITY_MPS2, Mass, Vehicle};
 use super::wheelset::{Drive, WheelForces, Wheelset};
 use crate::bus::SimTime;
@@ -254,10 +254,11 @@ impl Consist {
             if k == 0 && b == 0 {
                 self.travel_m[1] = travel_m;
             }
+            let axes = Axes::of(states[1 + b].rotation);
             for (w, end) in [(2 * b, 1.0), (2 * b + 1, -1.0)] {
                 let (state, wrench) = (&states[3 + w], &mut wheels[w]);
                 let at_m = end * v.semi_wheelbase_m;
-                let bogie = (&states[1 + b], &mut bogies[b]);
+                let bogie = (&states[1 + b], &axes, &mut bogies[b]);
                 let travel_m = primary(v, at_m, bogie, (state, wrench), book);
                 if k == 0 && w == 0 {
                     self.travel_m[0] = travel_m;

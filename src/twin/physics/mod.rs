@@ -311,6 +311,9 @@ impl World {
                 consist.hold_speed(&mut self.rapier, speed_mps, self.step_s);
             }
         }
+        // What lies or is not there needs no search for what it flies through.
+        let flying = self.obstacles.iter().any(|o| !o.resting());
+        self.rapier.integration_parameters.max_ccd_substeps = usize::from(flying);
         self.rapier.step();
         match &mut self.train {
             Some(train) => train.consist.read(&self.rapier, self.time),

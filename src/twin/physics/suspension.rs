@@ -107,17 +107,17 @@ fn beyond(x: f64, play: f64, stiffness: f64) -> (f64, f64) {
 pub(super) fn primary(
     vehicle: &Vehicle,
     along_m: f64,
-    (bogie, on_bogie): (&BodyState, &mut Wrench),
+    (bogie, axes, on_bogie): (&BodyState, &Axes, &mut Wrench),
     (wheelset, on_wheelset): (&BodyState, &mut Wrench),
     book: &mut Ledger,
 ) -> f64 {
-    let axes = Axes::of(bogie.rotation);
     let mut compression_m = 0.0;
     let axle = wheelset.rotation * Vector::Y;
     let drop = vehicle.wheel_radius_m - vehicle.bogie_cg_m;
+    let over_axle = bogie.position + axes.x * along_m + axes.z * drop;
     for side in [-1.0, 1.0] {
         let lateral = side * vehicle.half_primary_m;
-        let above = bogie.point(Vector::new(along_m, lateral, drop));
+        let above = over_axle + axes.y * lateral;
         // The box sits on the axle's line: turning, the wheelset does not move it, and takes no
         // torque about that line from it.
         let bearing = wheelset.position + axle * lateral;

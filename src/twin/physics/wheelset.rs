@@ -157,8 +157,9 @@ impl Wheelset {
         }
         (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
         let d = line.irregularity.at(s_m);
-        // The angle is some mrad at most.
-        let (sin, cos) = d.roll_rad.sin_cos();
+        // The angle is some mrad at most: to 1e-12.
+        let half = 0.5 * d.roll_rad * d.roll_rad;
+        let (sin, cos) = (d.roll_rad * (1.0 - half / 3.0), 1.0 - half);
         Rails {
             origin: origin + designed.x * along + designed.y * d.left_m + designed.z * d.up_m,
             axes: Axes {
