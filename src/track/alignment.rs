@@ -151,7 +151,12 @@ struct Piece {
     /// Position as polynomials of the distance from `s0`, lowest power first.
     x: [f64; TERMS],
     y: [f64; TERMS],
+    /// How many of the terms matter within the piece: 2 where it is straight.
+    terms: usize,
 }
+
+/// What a term must add, somewhere within a piece, to matter.
+const MATTERS_M: f64 = 1e-15;
 
 impl Piece {
     fn new(s0: f64, start: (f64, f64), heading0: f64, curvature: Linear, cant: Linear) -> Self {
@@ -168,6 +173,11 @@ impl Piece {
             before = w;
             w = (-im / n as f64, re / n as f64);
         }
+        let matters = |n: &usize| {
+            let most_m = PIECE_M.powi(*n as i32);
+            x[*n].abs().max(y[*n].abs()) * most_m > MATTERS_M
+        };
+        let terms = (2..TERMS).rev().find(matters).map_or(2, |n| n + 1);
         Self {
             s0,
             heading0,
@@ -177,6 +187,7 @@ impl Piece {
             cant_rate: cant.rate,
             x,
             y,
+            terms,
         }
     }
 
@@ -193,7 +204,8 @@ impl Piece {
     }
 
     fn position(&self, ds: f64) -> (f64, f64) {
-        let terms = self.x.iter().zip(&self.y).rev();
+        let terms = self.x[..self.terms].iter().zip(&self.y[..self.terms]);
+        let terms = terms.rev();
         terms.fold((0.0, 0.0), |(x, y), (cx, cy)| (x * ds + cx, y * ds + cy))
     }
 
