@@ -162,7 +162,16 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
         panes.push(vec![DISTANCE]);
     }
     if contents.train {
-        panes.push(vec![VIBRATION, SUSPENSION, WHEELS, SLIP, COUPLERS]);
+        let cameras = contents.rig || !contents.devices.is_empty();
+        match cameras {
+            true => panes.push(vec![VIBRATION, SUSPENSION, WHEELS, SLIP, COUPLERS]),
+            // There is room.
+            false => panes.extend([
+                vec![VIBRATION, SUSPENSION],
+                vec![WHEELS],
+                vec![SLIP, COUPLERS],
+            ]),
+        }
     }
     panes
 }
