@@ -31,7 +31,7 @@ use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Body, CameraMotion, Headlight, Job, LampLight, Renderer, Scene, Shape, View, sample,
+    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
 };
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -131,11 +131,33 @@ fn headlight(tunnel: &Tunnel, s_m: f64) -> Headlight {
     }
 }
 
-/// The wayside camera over a worker and a box, and a train that comes with its headlights on.
+/// A lopsided body with flat faces, some as large as a light cell.
+fn boulder() -> Shape {
+    let corners = [
+        [0.9, 0.7, -0.5],
+        [1.0, -0.6, -0.5],
+        [-0.8, -0.8, -0.4],
+        [-0.9, 0.6, -0.5],
+        [0.4, 0.2, 0.8],
+        [-0.5, 0.3, 0.6],
+        [0.1, -0.7, 0.4],
+    ];
+    Shape::Hull(Hull::around(&corners.map(Point3::from)).unwrap().into())
+}
+
+/// The wayside camera over a worker, a box and a boulder, and a train that comes with its
+/// headlights on.
 fn wayside_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
     let mut job = sample::wayside_job(tunnel, s_m);
     scaled(&mut job.views[0], gain, 2);
     job.headlights.push(headlight(tunnel, s_m - 30.0));
+    job.bodies.push(Body {
+        shape: boulder(),
+        world_from_body: sample::on_bed(tunnel, s_m + 12.0, -0.6, 0.6),
+        velocity_mps: Vector3::zeros(),
+        albedo: 0.35,
+        luminance_cd_m2: 0.0,
+    });
     job.bodies.push(Body {
         shape: Shape::Box(Vector3::new(10.0, 1.4, 1.8)),
         world_from_body: sample::on_bed(tunnel, s_m + 60.0, 0.0, 2.0),

@@ -123,12 +123,12 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         };
         lines.push(format!("{name}: about {count:.0} images{lidar}"));
     }
-    let (obstacles, workers) = (&scenario.physics.obstacles, &scenario.physics.workers);
-    if !(obstacles.is_empty() && workers.is_empty()) {
+    let world = &scenario.physics;
+    let obstacles: u32 = world.obstacles.iter().map(|o| o.count).sum();
+    let (cables, workers) = (world.cables.len(), world.workers.len());
+    if obstacles > 0 || cables > 0 || workers > 0 {
         lines.push(format!(
-            "obstacles: {}, workers: {}",
-            obstacles.len(),
-            workers.len()
+            "obstacles: {obstacles}, cables: {cables}, workers: {workers}"
         ));
     }
     indented(&lines)

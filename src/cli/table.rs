@@ -143,5 +143,25 @@ fn protection(text: &mut String, s: &Summary) -> std::fmt::Result {
         } else {
             "; no collision"
         }
-    )
+    )?;
+    for hit in p.impacts.iter().take(IMPACTS) {
+        writeln!(
+            text,
+            "  hit {} at {:.2} s with {:.1} km/h: {:.0} N s, {:.2} kJ of {:.2} kJ lost, {} damage",
+            hit.with,
+            hit.time_s,
+            3.6 * hit.speed_mps,
+            hit.momentum_n_s,
+            1e-3 * hit.energy_lost_j,
+            1e-3 * hit.energy_j,
+            hit.damage.name().replace('_', " "),
+        )?;
+    }
+    match p.impacts.len().saturating_sub(IMPACTS) {
+        0 => Ok(()),
+        more => writeln!(text, "  and {more} more hits: see summary.json"),
+    }
 }
+
+/// Hits that the table lists.
+const IMPACTS: usize = 10;

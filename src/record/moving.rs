@@ -8,12 +8,12 @@ use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
 use crate::session::{ObserverError, Opening};
 use crate::track::TrackPoint;
 use crate::twin::physics::TrainState;
-use crate::twin::render::{Body, Shape};
+use crate::twin::render::{Body, Hull, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::RotationQuat;
 use rerun::{
     AsComponents, Boxes3D, Capsules3D, Color, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D,
-    Points3D, Transform3D,
+    Mesh3D, Points3D, Transform3D,
 };
 
 const SIGHT: &str = "world/estimate/sight";
@@ -66,6 +66,7 @@ pub(super) struct Moving {
     left: Option<Isometry3<f64>>,
     /// Which kinds of bodies are on show: boxes, cylinders, spheres, capsules.
     shown: [bool; 4],
+    hulls_shown: bool,
     sight_shown: bool,
     methods: Vec<Method>,
     obstacles_shown: Vec<bool>,
@@ -102,6 +103,7 @@ impl Moving {
             train,
             left: None,
             shown: [false; 4],
+            hulls_shown: false,
             sight_shown: false,
             methods: Vec::new(),
             obstacles_shown: vec![false; opening.wayside.len()],
@@ -148,8 +150,17 @@ impl Moving {
     ) -> Result<(), ObserverError> {
         stream.at(time);
         let mut groups: [Solids; 4] = Default::default();
+        let mut hulls = Hulls::default();
         for body in bodies {
-            groups[kind(&body.shape)].push(scene, body);
+            match &body.shape {
+                Shape::Hull(hull) => hulls.push(scene, body, hull),
+                shape => groups[kind(shape)].push(scene, body),
+            }
+        }
+        // An empty mesh once, where there were hulls before.
+        let any = !hulls.triangles.is_empty();
+        if std::mem::replace(&mut self.hulls_shown, any) || any {
+            hulls.log(stream)?;
         }
         for (kind, group) in groups.into_iter().enumerate() {
             let any = !group.sizes.is_empty();
@@ -275,19 +286,53 @@ struct Solids {
     colours: Vec<Color>,
 }
 
+/// Which group a shape is drawn with.
 fn kind(shape: &Shape) -> usize {
     match shape {
-        Shape::Box(_) => 0,
+        Shape::Box(_) | Shape::Hull(_) => 0,
         Shape::Cylinder(..) => 1,
         Shape::Sphere(_) => 2,
         Shape::Capsule(..) => 3,
     }
 }
 
+/// All bodies with corners, as one mesh of flat triangles.
+#[derive(Default)]
+struct Hulls {
+    corners: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Hulls {
+    fn push(&mut self, scene: &Scene, body: &Body, hull: &Hull) {
+        for face in hull.faces() {
+            let first = self.corners.len() as u32;
+            let normal = body.world_from_body * face.normal;
+            for k in &face.corners {
+                let corner = body.world_from_body * hull.corners()[*k];
+                self.corners.push(scene.local(&corner));
+                self.normals.push(normal.map(|x| x as f32).into());
+            }
+            let fan = 2..face.corners.len() as u32;
+            self.triangles
+                .extend(fan.map(|k| [first, first + k - 1, first + k]));
+        }
+    }
+
+    fn log(self, stream: &Stream) -> Result<(), ObserverError> {
+        let mesh = Mesh3D::new(self.corners)
+            .with_vertex_normals(self.normals)
+            .with_triangle_indices(self.triangles)
+            .with_albedo_factor(palette::BODY.0);
+        stream.log("world/bodies/hulls", &mesh)
+    }
+}
+
 impl Solids {
     fn push(&mut self, scene: &Scene, body: &Body) {
         let (size, shift_m) = match body.shape {
-            Shape::Box(half) => (half, 0.0),
+            Shape::Box(_) | Shape::Hull(_) => (body.shape.half_extents_m(), 0.0),
             Shape::Cylinder(radius, half) => (Vector3::new(radius, 2.0 * half, 0.0), 0.0),
             Shape::Sphere(radius) => (Vector3::repeat(radius), 0.0),
             // rerun's capsule starts at its origin, ours is centred on it.

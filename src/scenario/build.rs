@@ -2,6 +2,7 @@
 
 use super::RecordSettings;
 use super::file::{BenchSettings, ScenarioFile, StackSettings};
+use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
 use crate::track::{FileError, Problem, Tunnel, read_toml};
@@ -134,8 +135,13 @@ impl Scenario {
         }
 
         let mut problems = Vec::new();
-        check::alone(&file, &mut problems);
-        let tunnel_path = path.parent().unwrap_or(Path::new("")).join(&file.tunnel);
+        let folder = path.parent().unwrap_or(Path::new(""));
+        read_meshes(&mut file, folder, &mut problems);
+        // A mesh that could not be read would be missed once more.
+        if problems.is_empty() {
+            check::alone(&file, &mut problems);
+        }
+        let tunnel_path = folder.join(&file.tunnel);
         let tunnel = match std::fs::read_to_string(&tunnel_path) {
             Ok(text) => Some(parse_tunnel(&tunnel_path, &text)),
             Err(error) => {

@@ -73,6 +73,7 @@ pub(super) fn in_tunnel(
         }
     }
     check_obstacles(file, tunnel, problems);
+    check_cables(file, tunnel, problems);
     check_workers(file, tunnel, problems);
     if let Some(rig) = &file.rig {
         check_view(rig, tunnel, problems);
@@ -125,6 +126,7 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     for (key, count) in [
         ("wayside", file.wayside.len()),
         ("obstacles", file.obstacles.len()),
+        ("cables", file.cables.len()),
         ("workers", file.workers.len()),
     ] {
         if count > 0 {
@@ -180,6 +182,16 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     for (k, obstacle) in file.obstacles.iter().enumerate() {
         let key = format!("obstacles[{k}].appears_s");
         late(problems, key, "it appears", obstacle.appears_s);
+        if let Some(at_s) = obstacle.held_until_s {
+            let key = format!("obstacles[{k}].held_until_s");
+            late(problems, key, "it comes loose", at_s);
+        }
+    }
+    for (k, cable) in file.cables.iter().enumerate() {
+        for (end, at_s) in [("from", cable.from.lets_go_s), ("to", cable.to.lets_go_s)] {
+            let key = format!("cables[{k}].{end}.lets_go_s");
+            late(problems, key, "it lets go", at_s.unwrap_or_default());
+        }
     }
     for (k, worker) in file.workers.iter().enumerate() {
         let Some(at_s) = worker.puts_down_s else {
@@ -194,6 +206,10 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
             ));
         }
         late(problems, key, "he puts it down", at_s);
+        if let Some(at_s) = worker.picks_up_s {
+            let key = format!("workers[{k}].picks_up_s");
+            late(problems, key, "he picks it up", at_s);
+        }
     }
 }
 
@@ -254,12 +270,48 @@ fn farthest_run_m(train: &TrainSettings, duration_s: f64) -> f64 {
 }
 
 fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
-    for (k, o) in file.obstacles.iter().enumerate() {
+    'obstacles: for (k, o) in file.obstacles.iter().enumerate() {
         let key = format!("obstacles[{k}].chainage_m");
-        if inside_line(&key, "it", o.chainage_m, tunnel, problems) {
-            let middle_m = o.height_m + 0.5 * o.body.size_m().z;
+        let Some(middle_m) = o.middle_m() else {
+            continue;
+        };
+        let spread = if o.count > 1 { o.spread_m } else { [0.0; 3] };
+        for side in [-1.0, 1.0] {
+            let s_m = o.chainage_m + side * spread[0];
+            if !inside_line(&key, "it", s_m, tunnel, problems) {
+                break;
+            }
             let at = format!("obstacles[{k}].lateral_m");
-            in_the_open(&at, o.chainage_m, o.lateral_m, middle_m, tunnel, problems);
+            for (across, up) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
+                let l_m = o.lateral_m + across * spread[1];
+                let h_m = middle_m + up * spread[2];
+                if !in_the_open(&at, s_m, l_m, h_m, tunnel, problems) {
+                    continue 'obstacles;
+                }
+            }
+        }
+    }
+}
+
+fn check_cables(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    for (k, cable) in file.cables.iter().enumerate() {
+        let at = format!("cables[{k}]");
+        let mut inside = true;
+        for (key, end) in [("from", &cable.from), ("to", &cable.to)] {
+            let (s_m, l_m) = (end.chainage_m, end.lateral_m);
+            let at = format!("{at}.{key}");
+            inside &= inside_line(&format!("{at}.chainage_m"), "it", s_m, tunnel, problems)
+                && in_the_open(
+                    &format!("{at}.lateral_m"),
+                    s_m,
+                    l_m,
+                    end.height_m,
+                    tunnel,
+                    problems,
+                );
+        }
+        if inside {
+            cable.check_reach(&at, &tunnel.alignment, problems);
         }
     }
 }
@@ -304,9 +356,10 @@ fn in_the_open(
     height_m: f64,
     tunnel: &Tunnel,
     problems: &mut Vec<Problem>,
-) {
+) -> bool {
     let section = tunnel.section_at(chainage_m);
-    if section.is_some_and(|section| !section.contains(lateral_m, height_m)) {
+    let open = section.is_none_or(|section| section.contains(lateral_m, height_m));
+    if !open {
         problems.push(Problem::new(
             key,
             format!(
@@ -316,6 +369,7 @@ fn in_the_open(
             "bring it nearer to the centreline (0 m), or check its height",
         ));
     }
+    open
 }
 
 fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {

@@ -7,7 +7,7 @@ use crate::stack::wayside::WaysideSettings;
 use crate::track::Problem;
 use crate::twin::comms::RadioSettings;
 use crate::twin::physics::{
-    ObstacleSettings, PhysicsSettings, TrackSettings, TrainSettings, WorkerSettings,
+    CableSettings, ObstacleSettings, PhysicsSettings, TrackSettings, TrainSettings, WorkerSettings,
 };
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -56,6 +56,9 @@ pub struct ScenarioFile {
     /// Things that lie or fall on the line. Default: none.
     #[serde(default)]
     pub obstacles: Vec<ObstacleSettings>,
+    /// Cables that hang on the wall. Default: none.
+    #[serde(default)]
+    pub cables: Vec<CableSettings>,
     /// People on the line. Default: none.
     #[serde(default)]
     pub workers: Vec<WorkerSettings>,
@@ -218,6 +221,7 @@ impl ScenarioFile {
             track: self.track.clone(),
             train: self.train.clone(),
             obstacles: self.obstacles.clone(),
+            cables: self.cables.clone(),
             workers: self.workers.clone(),
             ..PhysicsSettings::default()
         }

@@ -35,6 +35,7 @@
 mod build;
 mod check;
 mod file;
+mod meshes;
 mod overrides;
 mod recording;
 pub mod schema;

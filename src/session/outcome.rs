@@ -1,6 +1,6 @@
 //! How the train fared: whether it ran, braked for an obstacle, stood, hit something.
 
-use super::summary::Protection;
+use super::summary::{ImpactScore, Protection};
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
 use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
@@ -61,7 +61,8 @@ impl Outcome {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.stop_margin_m,
-            collision: world.collision().is_some(),
+            collision: !world.impacts().is_empty(),
+            impacts: world.impacts().iter().map(ImpactScore::of).collect(),
         })
     }
 }

@@ -416,16 +416,6 @@ impl Consist {
         self.wheelsets.iter().map(|w| w.forces)
     }
 
-    /// Whether one of two colliders belongs to the train.
-    pub(super) fn is_part(&self, a: ColliderHandle, b: ColliderHandle) -> bool {
-        self.colliders.contains(&a) || self.colliders.contains(&b)
-    }
-
-    /// Velocity of the leading car before the last step.
-    pub(super) fn velocity_before_mps(&self) -> Vector3<f64> {
-        vector3(self.previous.velocity)
-    }
-
     /// Acceleration over the last step of the leading car's centre of gravity along a direction.
     pub(super) fn accel_mps2(&self, along: Vector3<f64>, dt_s: f64) -> f64 {
         (self.states[0].velocity - self.previous.velocity).dot(vector(along)) / dt_s

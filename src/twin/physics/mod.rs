@@ -4,8 +4,9 @@
 //! Car bodies, bogies and wheelsets are rigid bodies with six degrees of freedom each. Primary and
 //! secondary suspension, couplers, traction, brakes, resistance and the forces of the rails are put
 //! on them in every step; the rails lie as designed, with cant, and with a random irregularity of
-//! one of the published spectra, and they give. Obstacles fall, bounce and rest by rapier's contacts, and a train that hits
-//! one exchanges momentum with it.
+//! one of the published spectra, and they give. Obstacles fall, bounce, roll and rest by rapier's
+//! contacts, panels come off the wall, cables sag, workers walk; a train that hits one of them
+//! exchanges momentum with it, and [`Impact`] says what that costs.
 //!
 //! ```
 //! use metrotwin::bus::TrainCommand;
@@ -27,10 +28,12 @@
 //! springs gain no energy.
 //!
 //! Not modelled: real wheel profiles (treads are cones), the contact's own stiffness (the rail gives
-//! more), flexible car bodies, air springs, pressure waves.
-//! Trains run up the line only, and a worker cannot be run over: he is drawn, not collided with.
+//! more), flexible car bodies, air springs, pressure waves. Trains run up the line only. A thing that
+//! slides fast may stumble at a seam of the ground, every 2 m.
 
 mod adhesion;
+mod cable;
+mod catenary;
 mod consist;
 mod convert;
 mod defect;
@@ -38,28 +41,38 @@ mod driver;
 mod energy;
 mod ground;
 mod history;
+mod impact;
 mod irregularity;
 mod line;
 mod obstacle;
 mod placement;
 mod settings;
+mod shape;
 mod suspension;
 #[cfg(test)]
 mod tests;
+mod thing;
+mod things;
+#[cfg(test)]
+mod things_tests;
 mod truth;
 mod vehicle;
+mod walker;
 mod wheelset;
 mod worker;
 
 pub use adhesion::{RailState, RailZone};
+pub use cable::{CableEnd, CableSettings};
 pub use defect::{DefectSettings, DefectShape, Side};
 pub use energy::EnergyBook;
 pub use history::VehicleMotion;
+pub use impact::{Damage, DamageBounds, Impact};
 pub use irregularity::{IrregularityClass, IrregularitySettings};
-pub use obstacle::{ObstacleSettings, ObstacleShape};
+pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
+pub use shape::ObstacleShape;
 
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
-pub use truth::WorkerTruth;
+pub use things::{ObstacleTruth, WorkerTruth};
 pub use vehicle::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
 };
@@ -71,15 +84,14 @@ use crate::track::{Problem, Tunnel};
 use crate::twin::render::{Body, Headlight, Shape};
 use consist::Consist;
 use driver::{Driver, Effort, STANDING_MPS};
-use ground::Ground;
 use history::History;
 use irregularity::Irregularity;
 use line::Line;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
-use obstacle::Obstacle;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
 use std::sync::Arc;
+use things::Things;
 
 /// Why the world could not be made, or could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -131,46 +143,6 @@ pub struct TrainState {
     pub couplers_n: Vec<f64>,
 }
 
-/// The first hit of the train on an obstacle.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Collision {
-    /// When.
-    pub time: SimTime,
-    /// Name of the obstacle.
-    pub obstacle: String,
-    /// Speed of the train relative to the obstacle just before.
-    pub speed_mps: f64,
-    /// Velocity of the obstacle just before, world.
-    pub velocity_before_mps: Vector3<f64>,
-    /// Momentum that the obstacle took.
-    pub momentum_n_s: f64,
-    /// Kinetic energy of the obstacle relative to the train just before.
-    pub energy_j: f64,
-}
-
-/// One obstacle as it really is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObstacleTruth<'a> {
-    /// Name.
-    pub name: &'a str,
-    /// Length, width and height of its own box.
-    pub size_m: Vector3<f64>,
-    /// Chainage of its centre.
-    pub chainage_m: f64,
-    /// Its centre, left of the centreline.
-    pub lateral_m: f64,
-    /// Its centre, above top of rail.
-    pub height_m: f64,
-    /// Half of what it extends along the line, across and up, turned as it is.
-    pub half_extents_m: Vector3<f64>,
-    /// Pose of its centre.
-    pub world_from_body: Isometry3<f64>,
-    /// Velocity of its centre, in the world's axes.
-    pub velocity_mps: Vector3<f64>,
-    /// Since when it lies still; `None` while it moves.
-    pub resting_since: Option<SimTime>,
-}
-
 /// A train under way.
 struct Train {
     consist: Consist,
@@ -181,10 +153,6 @@ struct Train {
 
 /// So long a train runs, or stands, before its start: springs and dampers come to rest.
 const RUN_IN_S: f64 = 5.0;
-/// A collision is over after this; until then the obstacle's momentum may still grow.
-const COLLISION_S: f64 = 0.05;
-/// Steps between looks at where a moving obstacle is along the line.
-const LOOK_STEPS: u64 = 50;
 /// A headlight's lens.
 const LENS_RADIUS_M: f64 = 0.09;
 /// Headlights: beside the centreline, over top of rail, looking down to the track ahead.
@@ -202,16 +170,9 @@ pub struct World {
     settings: PhysicsSettings,
     rapier: PhysicsWorld,
     irregularity: Irregularity,
-    ground: Ground,
     train: Option<Train>,
-    obstacles: Vec<Obstacle>,
-    /// Obstacles still to come, the next one last.
-    to_come: Vec<ObstacleSettings>,
-    /// Which workers' loads are down.
-    put_down: Vec<bool>,
-    collision: Option<Collision>,
+    things: Things,
     time: SimTime,
-    steps: u64,
     step: SimTime,
     step_s: f64,
 }
@@ -247,8 +208,10 @@ impl World {
                 history,
             }
         });
-        let mut to_come = settings.obstacles.clone();
-        to_come.sort_by(|a, b| b.appears_s.total_cmp(&a.appears_s));
+        let train_mass_kg = train.as_ref().map(|train| {
+            let consist = &train.consist;
+            consist.vehicle.total_kg() * f64::from(consist.settings.cars)
+        });
         let irregularity = Irregularity::new(
             &settings.track.irregularity,
             tunnel.alignment.length_m(),
@@ -257,23 +220,25 @@ impl World {
         )
         .with_defects(&settings.track.defects);
         let mut world = Self {
-            put_down: vec![false; settings.workers.len()],
             settings: settings.clone(),
             tunnel,
             rapier,
             irregularity,
-            ground: Ground::default(),
             train,
-            obstacles: Vec::new(),
-            to_come,
-            collision: None,
+            things: Things::default(),
             time: SimTime::ZERO,
-            steps: 0,
             step,
             step_s,
         };
         world.run_in()?;
-        world.appear();
+        let run = [seed, index];
+        world.things = Things::new(
+            &mut world.rapier,
+            &world.tunnel,
+            settings,
+            run,
+            train_mass_kg,
+        );
         Ok(world)
     }
 
@@ -329,20 +294,14 @@ impl World {
             effort = train.driver.step(&instruments, command, self.step_s);
             train.effort = effort;
         }
-        for obstacle in &mut self.obstacles {
-            if let Some((_, velocity)) = obstacle.state(&self.rapier) {
-                obstacle.velocity_before = velocity;
-            }
-        }
-        self.steps += 1;
+        self.things.before_step(&mut self.rapier);
         self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
         self.step_train(effort, None)?;
         if let Some(train) = &mut self.train {
             train.history.push(train.consist.motion(self.time));
         }
-        self.watch_obstacles()?;
-        self.appear();
-        Ok(())
+        self.things
+            .after_step(&mut self.rapier, &self.tunnel, self.time)
     }
 
     /// Now.
@@ -406,14 +365,10 @@ impl World {
         Some(self.train.as_ref()?.consist.half_extents_m())
     }
 
-    /// Obstacles and workers that are there now, to draw.
+    /// Obstacles, cables and workers that are there now, to draw.
     pub fn bodies(&self) -> Vec<Body> {
-        let drawn = self.obstacles.iter().filter_map(|o| o.draw(&self.rapier));
-        let mut bodies: Vec<Body> = drawn.collect();
-        for worker in &self.settings.workers {
-            worker.draw(&self.tunnel.alignment, self.time.secs(), &mut bodies);
-        }
-        bodies
+        let line = &self.tunnel.alignment;
+        self.things.draw(&self.rapier, line, self.time.secs())
     }
 
     /// The train as boxes with the lenses of its headlights, for cameras that stand outside.
@@ -460,117 +415,21 @@ impl World {
         lights.to_vec()
     }
 
-    /// Obstacles that are there now.
+    /// Obstacles that are there now: what lies, falls or swings. What is still fixed to the lining
+    /// is none.
     pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
-        self.obstacles.iter().filter_map(|obstacle| {
-            let (world_from_body, velocity_mps) = obstacle.state(&self.rapier)?;
-            let centre = world_from_body.translation.vector.into();
-            let line = &self.tunnel.alignment;
-            let place = line.track_from_world(&centre, obstacle.settings.chainage_m);
-            let size_m = obstacle.settings.body.size_m();
-            let line_from_world = line.at(place.s_m).world_from_line().rotation.inverse();
-            let turned = (line_from_world * world_from_body.rotation).to_rotation_matrix();
-            Some(ObstacleTruth {
-                name: &obstacle.settings.name,
-                size_m,
-                chainage_m: place.s_m,
-                lateral_m: place.l_m,
-                height_m: place.h_m,
-                half_extents_m: 0.5 * turned.matrix().abs() * size_m,
-                world_from_body,
-                velocity_mps,
-                resting_since: (obstacle.resting()).then(|| self.time.plus(-obstacle.still_s())),
-            })
-        })
+        let line = &self.tunnel.alignment;
+        self.things.obstacles(&self.rapier, line, self.time)
     }
 
-    /// The first hit of the train on an obstacle.
-    pub fn collision(&self) -> Option<&Collision> {
-        self.collision.as_ref()
+    /// Workers who are on the line now.
+    pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
+        let line = &self.tunnel.alignment;
+        self.things.workers(&self.rapier, line, self.time.secs())
     }
 
-    /// Lets appear what is due.
-    fn appear(&mut self) {
-        let now = self.time.secs();
-        while let Some(next) = self.to_come.pop_if(|next| next.appears_s <= now) {
-            self.insert(&next);
-        }
-        for k in 0..self.put_down.len() {
-            if !self.put_down[k]
-                && let Some(load) = self.settings.workers[k].put_down(now)
-            {
-                self.put_down[k] = true;
-                self.insert(&load);
-            }
-        }
-    }
-
-    fn insert(&mut self, settings: &ObstacleSettings) {
-        self.ground
-            .lay(&mut self.rapier, &self.tunnel, settings.chainage_m);
-        let alignment = &self.tunnel.alignment;
-        let obstacle = Obstacle::insert(&mut self.rapier, alignment, settings);
-        self.obstacles.push(obstacle);
-    }
-
-    /// After a step: finite states, rest, ground under what flies on, collisions.
-    fn watch_obstacles(&mut self) -> Result<(), PhysicsError> {
-        for k in 0..self.obstacles.len() {
-            let obstacle = &mut self.obstacles[k];
-            if !obstacle.observe(&self.rapier, self.step_s) {
-                return Err(PhysicsError::NonFinite {
-                    body: format!("obstacle {}", obstacle.settings.name),
-                    time: self.time,
-                });
-            }
-            if !obstacle.resting() && self.steps.is_multiple_of(LOOK_STEPS) {
-                let place = obstacle.state(&self.rapier);
-                let centre = place.map(|(pose, _)| pose.translation.vector.into());
-                if let Some(centre) = centre {
-                    let near = obstacle.settings.chainage_m;
-                    let s_m = self.tunnel.alignment.track_from_world(&centre, near).s_m;
-                    obstacle.settings.chainage_m = s_m;
-                    self.ground.lay(&mut self.rapier, &self.tunnel, s_m);
-                }
-            }
-            self.watch_collision(k);
-        }
-        Ok(())
-    }
-
-    /// Records the first contact of the train with obstacle `k`, and what it does to it.
-    fn watch_collision(&mut self, k: usize) {
-        let obstacle = &self.obstacles[k];
-        let (Some(train), Some((_, velocity))) = (&self.train, obstacle.state(&self.rapier)) else {
-            return;
-        };
-        let mass = obstacle.settings.mass_kg;
-        if let Some(collision) = &mut self.collision {
-            let lasts = self.time.since(collision.time) < COLLISION_S;
-            if lasts && collision.obstacle == obstacle.settings.name {
-                let taken = mass * (velocity - collision.velocity_before_mps).norm();
-                collision.momentum_n_s = collision.momentum_n_s.max(taken);
-            }
-            return;
-        }
-        let mut pairs = self
-            .rapier
-            .narrow_phase
-            .contact_pairs_with(obstacle.collider);
-        let hit = pairs.any(|pair| {
-            pair.has_any_active_contact() && train.consist.is_part(pair.collider1, pair.collider2)
-        });
-        if hit {
-            let before = obstacle.velocity_before;
-            let closing = (train.consist.velocity_before_mps() - before).norm();
-            self.collision = Some(Collision {
-                time: self.time,
-                obstacle: obstacle.settings.name.clone(),
-                speed_mps: closing,
-                velocity_before_mps: before,
-                momentum_n_s: mass * (velocity - before).norm(),
-                energy_j: 0.5 * mass * closing * closing,
-            });
-        }
+    /// Hits of the train on obstacles, cables and workers, in order of time; the first thousand.
+    pub fn impacts(&self) -> &[Impact] {
+        self.things.impacts()
     }
 }

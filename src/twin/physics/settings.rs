@@ -1,6 +1,7 @@
 //! What a scenario may say about train, track, obstacles and workers.
 
 use super::adhesion::{RailState, RailZone};
+use super::cable::CableSettings;
 use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
@@ -24,6 +25,8 @@ pub struct PhysicsSettings {
     pub train: Option<TrainSettings>,
     /// Things that lie or fall on the line.
     pub obstacles: Vec<ObstacleSettings>,
+    /// Cables that hang on the wall.
+    pub cables: Vec<CableSettings>,
     /// People on the line.
     pub workers: Vec<WorkerSettings>,
 }
@@ -36,6 +39,7 @@ impl Default for PhysicsSettings {
             track: TrackSettings::default(),
             train: Some(TrainSettings::default()),
             obstacles: Vec::new(),
+            cables: Vec::new(),
             workers: Vec::new(),
         }
     }
@@ -53,6 +57,9 @@ impl PhysicsSettings {
         }
         for (k, obstacle) in self.obstacles.iter().enumerate() {
             obstacle.check(&key_below(at, &format!("obstacles[{k}]")), problems);
+        }
+        for (k, cable) in self.cables.iter().enumerate() {
+            cable.check(&key_below(at, &format!("cables[{k}]")), problems);
         }
         for (k, worker) in self.workers.iter().enumerate() {
             worker.check(&key_below(at, &format!("workers[{k}]")), problems);

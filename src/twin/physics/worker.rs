@@ -1,6 +1,7 @@
-//! People on the line: they walk where their path says, and may leave something behind.
+//! People on the line: they walk where their path says, carry something, put it down and pick it up
+//! again.
 
-use super::obstacle::ObstacleSettings;
+use super::obstacle::{ObstacleSettings, Single};
 use crate::track::{Alignment, BED_M, Checker, Problem, TrackPoint, key_below};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -27,16 +28,21 @@ pub struct WorkerSettings {
     pub name: String,
     /// Height of the body, metres.
     pub stature_m: f64,
+    /// Mass, kilograms.
+    pub mass_kg: f64,
     /// Height of the ground he walks on above top of rail, metres: the track bed's where absent.
     pub ground_m: f64,
     /// Share of light that his clothes reflect, 0 to 1.
     pub albedo: f64,
     /// Where he is when.
     pub path: Vec<Waypoint>,
-    /// What he carries; place, velocity and `appears_s` of it are ignored.
+    /// What he carries, a single thing; place, motion, hold and `appears_s` of it are ignored.
     pub carries: Option<ObstacleSettings>,
     /// When he puts it down beside him, seconds, while he is there; never where absent.
     pub puts_down_s: Option<f64>,
+    /// When he picks it up again, seconds, while he is there and it lies within 1.5 m of him;
+    /// never where absent.
+    pub picks_up_s: Option<f64>,
 }
 
 impl Default for WorkerSettings {
@@ -44,11 +50,13 @@ impl Default for WorkerSettings {
         Self {
             name: "worker".to_owned(),
             stature_m: 1.75,
+            mass_kg: 80.0,
             ground_m: BED_M,
             albedo: 0.4,
             path: Vec::new(),
             carries: None,
             puts_down_s: None,
+            picks_up_s: None,
         }
     }
 }
@@ -58,6 +66,7 @@ impl WorkerSettings {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         let mut check = Checker::new(at, problems);
         check.within("stature_m", self.stature_m, 1.0..=2.3, "m");
+        check.within("mass_kg", self.mass_kg, 30.0..=200.0, "kg");
         check.within("ground_m", self.ground_m, -2.0..=2.0, "m");
         check.within("albedo", self.albedo, 0.0..=1.0, "");
         if let Some(carried) = &self.carries {
@@ -80,15 +89,29 @@ impl WorkerSettings {
                 ));
             }
         }
-        if let (Some(first), Some(last), Some(at_s)) =
-            (self.path.first(), self.path.last(), self.puts_down_s)
-            && !(first.time_s..=last.time_s).contains(&at_s)
+        for (key, when) in [
+            ("puts_down_s", self.puts_down_s),
+            ("picks_up_s", self.picks_up_s),
+        ] {
+            if let (Some(first), Some(last), Some(at_s)) =
+                (self.path.first(), self.path.last(), when)
+                && !(first.time_s..=last.time_s).contains(&at_s)
+            {
+                let (from_s, to_s) = (first.time_s, last.time_s);
+                problems.push(Problem::new(
+                    key_below(at, key),
+                    format!("he is on the line from {from_s} to {to_s} s, not at {at_s} s"),
+                    format!("give {from_s} to {to_s} s, or let his path last longer"),
+                ));
+            }
+        }
+        if let Some(up_s) = self.picks_up_s
+            && !self.puts_down_s.is_some_and(|down_s| down_s < up_s)
         {
-            let (from_s, to_s) = (first.time_s, last.time_s);
             problems.push(Problem::new(
-                key_below(at, "puts_down_s"),
-                format!("he is on the line from {from_s} to {to_s} s, not at {at_s} s"),
-                format!("give {from_s} to {to_s} s, or let his path last longer"),
+                key_below(at, "picks_up_s"),
+                "he has put nothing down by then",
+                "give an earlier puts_down_s, or take this out",
             ));
         }
         for (k, p) in self.path.iter().enumerate() {
@@ -110,26 +133,24 @@ const HAND_M: f64 = 0.38;
 /// What is put down is let go this high over the ground.
 const LET_GO_M: f64 = 0.03;
 
+/// Pose of a worker's feet (x ahead of him) and his velocity, world.
+pub(super) type Feet = (Isometry3<f64>, Vector3<f64>);
+
 /// A worker at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Stance {
-    s_m: f64,
-    l_m: f64,
+pub(super) struct Stance {
+    pub s_m: f64,
+    pub l_m: f64,
     /// Along the line and to the left.
-    velocity_mps: [f64; 2],
+    pub velocity_mps: [f64; 2],
     /// From the line's direction, to the left.
     facing_rad: f64,
     walked_m: f64,
 }
 
 impl WorkerSettings {
-    /// Chainage and place left of the centreline at a time, while he is there.
-    pub(super) fn place_m(&self, t_s: f64) -> Option<(f64, f64)> {
-        self.stance(t_s).map(|stance| (stance.s_m, stance.l_m))
-    }
-
     /// Where he is at a time; `None` before the first waypoint and after the last.
-    fn stance(&self, t_s: f64) -> Option<Stance> {
+    pub(super) fn stance(&self, t_s: f64) -> Option<Stance> {
         let first = self.path.first()?;
         if !(first.time_s..=self.path.last()?.time_s).contains(&t_s) {
             return None;
@@ -161,31 +182,30 @@ impl WorkerSettings {
         Some(stance)
     }
 
-    /// What he has put down by now, to be dropped beside him.
-    pub(super) fn put_down(&self, t_s: f64) -> Option<ObstacleSettings> {
-        let (carried, when) = (self.carries.as_ref()?, self.puts_down_s?);
-        if t_s < when {
-            return None;
-        }
-        let stance = self.stance(when)?;
+    /// What he carries, to be put down beside him where he stands.
+    pub(super) fn put_down(&self, stance: &Stance, load: &Single) -> Single {
         let (sin, cos) = stance.facing_rad.sin_cos();
         // His right hand.
         let (s_m, l_m) = (stance.s_m + HAND_M * sin, stance.l_m - HAND_M * cos);
-        Some(ObstacleSettings {
+        let settings = ObstacleSettings {
             chainage_m: s_m,
             lateral_m: l_m,
             height_m: self.ground_m + LET_GO_M,
             yaw_deg: stance.facing_rad.to_degrees(),
             velocity_mps: [0.0; 3],
-            ..carried.clone()
-        })
+            spin_rad_s: [0.0; 3],
+            held_until_s: None,
+            hinge: None,
+            ..load.settings.clone()
+        };
+        Single {
+            settings,
+            body: load.body.clone(),
+        }
     }
 
-    /// Appends his limbs, and what he still carries.
-    pub(super) fn draw(&self, alignment: &Alignment, t_s: f64, bodies: &mut Vec<Body>) {
-        let Some(stance) = self.stance(t_s) else {
-            return;
-        };
+    /// Pose of his feet (x ahead of him) and his velocity, world.
+    pub(super) fn feet(&self, alignment: &Alignment, stance: &Stance) -> Feet {
         let frame = alignment.at(stance.s_m);
         let feet = alignment.world_from_track(TrackPoint {
             s_m: stance.s_m,
@@ -193,12 +213,23 @@ impl WorkerSettings {
             h_m: self.ground_m,
         });
         let turned = |angle| UnitQuaternion::from_axis_angle(&Vector3::z_axis(), angle);
-        let world_from_feet = Isometry3::from_parts(
-            Translation3::from(feet),
-            turned(frame.heading_rad + stance.facing_rad),
-        );
+        let facing = turned(frame.heading_rad + stance.facing_rad);
         let [along, left] = stance.velocity_mps;
         let velocity = turned(frame.heading_rad) * Vector3::new(along, left, 0.0);
+        (
+            Isometry3::from_parts(Translation3::from(feet), facing),
+            velocity,
+        )
+    }
+
+    /// Appends his limbs, and what he carries.
+    pub(super) fn draw(
+        &self,
+        stance: &Stance,
+        (world_from_feet, velocity): Feet,
+        load: Option<&Single>,
+        bodies: &mut Vec<Body>,
+    ) {
         let mut put = |shape, feet_from_part: Isometry3<f64>, albedo| {
             bodies.push(Body {
                 shape,
@@ -217,6 +248,7 @@ impl WorkerSettings {
             self.albedo,
         );
         put(Shape::Sphere(0.11), at(0.0, 0.0, tall - 0.11), self.albedo);
+        let [along, left] = stance.velocity_mps;
         let pace = (along.hypot(left) / 1.4).min(1.2);
         let phase = std::f64::consts::TAU * stance.walked_m / STRIDE_M;
         for (side, sign) in [(0.09, 1.0), (-0.09, -1.0)] {
@@ -227,15 +259,11 @@ impl WorkerSettings {
                 * at(0.0, 0.0, -hip / 2.0);
             put(Shape::Capsule(0.08, hip / 2.0 - 0.08), leg, self.albedo);
         }
-        let carries = self.puts_down_s.is_none_or(|when| t_s < when);
-        if let Some(carried) = self.carries.as_ref().filter(|_| carries) {
-            let top = 0.42 * tall;
-            let centre = (top - carried.body.size_m().z / 2.0).max(carried.body.size_m().z / 2.0);
-            put(
-                carried.body.render_shape(),
-                at(0.0, -HAND_M, centre),
-                carried.albedo,
-            );
+        if let Some(load) = load {
+            let half = load.body.half_extents_m().z;
+            let centre = (0.42 * tall - half).max(half);
+            let albedo = load.settings.albedo;
+            put(load.body.clone(), at(0.0, -HAND_M, centre), albedo);
         }
     }
 }

@@ -3,11 +3,13 @@
 
 pub mod cpu;
 pub mod gpu;
+mod hull;
 pub mod light;
 pub mod sample;
 mod scene;
 pub mod surface;
 
+pub use hull::{Face, Hull};
 pub use scene::{
     Body, CameraMotion, Headlight, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View,
 };

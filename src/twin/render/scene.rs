@@ -1,5 +1,6 @@
 //! What there is to see, and through which camera.
 
+use super::hull::Hull;
 use crate::bus::{CameraModel, SimTime};
 use crate::track::uid::Waveform;
 use crate::track::{Checker, Problem, Tunnel};
@@ -47,6 +48,33 @@ pub enum Shape {
     Sphere(f64),
     /// Radius and half length of the straight part, along z.
     Capsule(f64, f64),
+    /// Corners and flat faces.
+    Hull(Arc<Hull>),
+}
+
+impl Shape {
+    /// How far it extends from its origin in a direction of length 1 (its support function).
+    pub fn reach_m(&self, direction: &Vector3<f64>) -> f64 {
+        let (level, up) = (direction.xy().norm(), direction.z.abs());
+        match self {
+            Self::Box(half) => half.dot(&direction.abs()),
+            Self::Cylinder(radius, half) => radius * level + half * up,
+            Self::Sphere(radius) => *radius,
+            Self::Capsule(radius, half) => radius + half * up,
+            Self::Hull(hull) => hull.reach_m(direction),
+        }
+    }
+
+    /// Half extents along its axes; of a hull, which may be lopsided, those of its farther side.
+    pub fn half_extents_m(&self) -> Vector3<f64> {
+        match self {
+            Self::Box(half) => *half,
+            Self::Cylinder(r, h) => Vector3::new(*r, *r, *h),
+            Self::Sphere(r) => Vector3::repeat(*r),
+            Self::Capsule(r, h) => Vector3::new(*r, *r, h + r),
+            Self::Hull(hull) => hull.half_extents_m(),
+        }
+    }
 }
 
 /// Something that may move: obstacle, limb of a worker, part of a train.

@@ -32,6 +32,7 @@ impl<'a> Solid<'a> {
         let o = self.world_from_body.inverse_transform_point(o).coords;
         let d = self.world_from_body.inverse_transform_vector(d);
         let (t, n) = match self.body.shape {
+            Shape::Hull(ref hull) => hull.cast(&o, &d),
             Shape::Box(half) => cast_box(&o, &d, &half),
             Shape::Sphere(radius) => cast_sphere(&o, &d, radius),
             Shape::Cylinder(radius, half) => first(
@@ -55,12 +56,7 @@ impl<'a> Solid<'a> {
 
     /// Corners of a box around it, in the world.
     pub fn corners(&self) -> [Point3<f64>; 8] {
-        let half = match self.body.shape {
-            Shape::Box(half) => half,
-            Shape::Cylinder(r, h) => Vector3::new(r, r, h),
-            Shape::Sphere(r) => Vector3::repeat(r),
-            Shape::Capsule(r, h) => Vector3::new(r, r, h + r),
-        };
+        let half = self.body.shape.half_extents_m();
         std::array::from_fn(|k| {
             let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
             let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
@@ -141,10 +137,12 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
     use super::*;
     use crate::twin::random::Stream;
+    use crate::twin::render::Hull;
     use nalgebra::{Translation3, UnitQuaternion};
     use parry3d_f64::math::Vector as DVec3;
     use parry3d_f64::query::{Ray, RayCast};
-    use parry3d_f64::shape::{Ball, Capsule, Cuboid, Cylinder};
+    use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, Cylinder};
+    use std::sync::Arc;
 
     fn parry(shape: &Shape) -> Box<dyn RayCast> {
         // parry's cylinder stands along y: rays for it are turned below.
@@ -153,6 +151,11 @@ mod tests {
             Shape::Cylinder(r, h) => Box::new(Cylinder::new(h, r)),
             Shape::Sphere(r) => Box::new(Ball::new(r)),
             Shape::Capsule(r, h) => Box::new(Capsule::new_y(h, r)),
+            Shape::Hull(ref hull) => {
+                let corners = hull.corners().iter();
+                let corners: Vec<_> = corners.map(|p| DVec3::new(p.x, p.z, p.y)).collect();
+                Box::new(ConvexPolyhedron::from_convex_hull(&corners).unwrap())
+            }
         }
     }
 
@@ -164,6 +167,7 @@ mod tests {
             Shape::Cylinder(0.4, 0.9),
             Shape::Sphere(0.8),
             Shape::Capsule(0.35, 0.6),
+            Shape::Hull(Arc::new(wedge())),
         ];
         let random = Stream::new(7, 0, "rays");
         for (index, shape) in shapes.into_iter().enumerate() {
@@ -206,7 +210,10 @@ mod tests {
                         let n = moved.inverse_transform_vector(&n);
                         let at = o + d * t;
                         // On an edge either face may be named.
-                        let flat = matches!(body.shape, Shape::Box(_) | Shape::Cylinder(..));
+                        let flat = matches!(
+                            body.shape,
+                            Shape::Box(_) | Shape::Cylinder(..) | Shape::Hull(_)
+                        );
                         let cos = n.dot(&Vector3::new(hit.normal.x, hit.normal.z, hit.normal.y));
                         assert!(flat || cos > 1.0 - 1e-4, "shape {index} at {at}: {cos}");
                         assert!(n.dot(&d) <= 0.0 && (n.norm() - 1.0).abs() < 1e-9);
@@ -226,6 +233,20 @@ mod tests {
         }
     }
 
+    /// A lopsided hull of seven corners.
+    fn wedge() -> Hull {
+        let corners = [
+            [1.0, 0.8, -0.6],
+            [1.1, -0.7, -0.6],
+            [-0.9, -0.9, -0.5],
+            [-1.0, 0.7, -0.6],
+            [0.4, 0.2, 0.9],
+            [-0.5, 0.3, 0.7],
+            [0.1, -0.8, 0.5],
+        ];
+        Hull::around(&corners.map(Point3::from)).unwrap()
+    }
+
     /// Whether the ray is within 1e-3 of the shape's silhouette at this point: it leaves the
     /// shape again within that depth.
     fn grazes(shape: &Shape, p: &Point3<f64>, d: &Vector3<f64>) -> bool {
@@ -241,6 +262,8 @@ mod tests {
                 let z = (inward.z.abs() - h).max(0.0);
                 (r.hypot(z) - radius).abs() < 4e-3
             }
+            Shape::Hull(ref hull) => (hull.faces().iter())
+                .any(|f| (f.normal.dot(&inward.coords) - f.offset_m).abs() < 4e-3),
         }
     }
 

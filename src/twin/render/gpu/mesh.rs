@@ -1,6 +1,7 @@
 //! Triangles, and the triangles of the bodies' shapes.
 
 use super::layout::Vertex;
+use crate::twin::render::hull::Hull;
 use crate::twin::render::light::LampField;
 use crate::twin::render::scene::{Body, Shape};
 use nalgebra::{Point3, Vector3};
@@ -73,6 +74,7 @@ impl Mesh {
 
     /// Appends a body, lit where it stands.
     pub fn add_body(&mut self, body: &Body, lamps: &LampField, ambient_lx: f64) {
+        let from = self.vertices.len() as u32;
         let mut corner = |p: Vector3<f64>, n: Vector3<f64>| {
             let at = body.world_from_body * Point3::from(p);
             let normal = body.world_from_body * n;
@@ -91,6 +93,11 @@ impl Mesh {
             Shape::Cylinder(r, h) => turned(&cylinder_profile(*r, *h), &mut corner),
             Shape::Sphere(r) => turned(&capsule_profile(*r, 0.0), &mut corner),
             Shape::Capsule(r, h) => turned(&capsule_profile(*r, *h), &mut corner),
+            Shape::Hull(hull) => {
+                let corners = hull_triangles(hull, &mut corner);
+                self.indices.extend(corners.iter().map(|k| from + k));
+                return;
+            }
         };
         let total: usize = grids.iter().map(|(rows, columns)| rows * columns).sum();
         let mut first = self.vertices.len() - total;
@@ -131,6 +138,40 @@ fn box_grids(
         }
     }
     grids
+}
+
+/// Faces as fans of triangles, cut into equal smaller ones; yields their corners.
+fn hull_triangles(hull: &Hull, corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>)) -> Vec<u32> {
+    let mut indices = Vec::new();
+    let mut first = 0;
+    for face in hull.faces() {
+        let ring: Vec<_> = face
+            .corners
+            .iter()
+            .map(|k| hull.corners()[*k].coords)
+            .collect();
+        for k in 2..ring.len() {
+            let [a, b, c] = [ring[0], ring[k - 1], ring[k]];
+            let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
+            let n = cells(longest) as u32;
+            // Row r from the corner a on has r + 1 vertices.
+            let row = |r: u32| first + r * (r + 1) / 2;
+            for r in 0..=n {
+                for j in 0..=r {
+                    let (u, v) = (f64::from(r - j) / f64::from(n), f64::from(j) / f64::from(n));
+                    corner(a + (b - a) * u + (c - a) * v, face.normal);
+                }
+                for j in 0..r {
+                    indices.extend([row(r - 1) + j, row(r) + j, row(r) + j + 1]);
+                    if j > 0 {
+                        indices.extend([row(r - 1) + j - 1, row(r) + j, row(r - 1) + j]);
+                    }
+                }
+            }
+            first = row(n + 1);
+        }
+    }
+    indices
 }
 
 /// A point of the outline of a body of revolution: radius, height, and its normal in that plane.
@@ -203,6 +244,7 @@ fn turned(
 mod tests {
     use super::*;
     use nalgebra::Isometry3;
+    use std::sync::Arc;
 
     fn mesh(shape: Shape) -> Mesh {
         let body = Body {
@@ -249,7 +291,11 @@ mod tests {
                 0.02,
             ),
         ];
-        for (shape, exact, tolerance) in cases {
+        let corners = [[3.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0], [0.0; 3]];
+        let tetrahedron = Hull::around(&corners.map(Point3::from)).map(Arc::new);
+        let hull = tetrahedron.map(|hull| (Shape::Hull(hull), 1.0, 1e-6));
+        assert!(hull.is_some());
+        for (shape, exact, tolerance) in cases.into_iter().chain(hull) {
             let v = volume(&mesh(shape.clone()));
             assert!(
                 (v / exact - 1.0).abs() < tolerance,

@@ -1,0 +1,415 @@
+//! Cables on the wall: chains of stiff links that hang between two fixed ends, until one lets go.
+//!
+//! Links are capsules joined by balls and sockets (rapier's impulse joints). At the start they hang
+//! along the catenary, which is where they would come to rest. Bending stiffness is left out: under
+//! its own weight a 25 mm cable of some metres is shaped by gravity. What a real cable loses
+//! to the air and between its strands, the links lose to a drag in proportion to their speed: a
+//! swing dies out within some ten seconds, a falling end loses less than a tenth of its speed.
+
+use super::catenary::Catenary;
+use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
+use super::convert::{isometry, point3, pose, vector3};
+use super::ground::GROUND_GROUP;
+use super::thing::{RESTING_MPS, SOLID_GROUP, groups};
+use super::vehicle::GRAVITY_MPS2;
+use crate::bus::SimTime;
+use crate::track::{Alignment, Checker, Problem, TrackPoint, key_below};
+use crate::twin::render::{Body, Shape};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rapier3d_f64::math::Vector;
+use rapier3d_f64::prelude::{
+    ColliderBuilder, ImpulseJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    SphericalJointBuilder,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A cable that hangs between two points of the lining.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CableSettings {
+    /// Name, for the summary.
+    pub name: String,
+    /// Its first end.
+    pub from: CableEnd,
+    /// Its other end.
+    pub to: CableEnd,
+    /// Its length, metres: at least what the ends are apart.
+    pub length_m: f64,
+    /// Diameter, metres.
+    pub diameter_m: f64,
+    /// Mass of a metre, kilograms.
+    pub mass_kg_per_m: f64,
+    /// It tears where it is pulled harder than this, newtons. Default: a copper cable of 120 mm^2
+    /// (200 N/mm^2).
+    pub breaking_n: f64,
+    /// Coulomb friction.
+    pub friction: f64,
+    /// Share of light reflected, 0 to 1.
+    pub albedo: f64,
+    /// Temperature of its surface, degrees Celsius.
+    pub temperature_c: f64,
+}
+
+/// Where a cable is fixed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct CableEnd {
+    /// Chainage, metres.
+    pub chainage_m: f64,
+    /// Left of the centreline, metres.
+    pub lateral_m: f64,
+    /// Above top of rail, metres.
+    pub height_m: f64,
+    /// When this end lets go, seconds. Default: never.
+    pub lets_go_s: Option<f64>,
+}
+
+impl Default for CableSettings {
+    fn default() -> Self {
+        let end = |chainage_m| CableEnd {
+            chainage_m,
+            lateral_m: 2.0,
+            height_m: 3.0,
+            lets_go_s: None,
+        };
+        Self {
+            name: "cable".to_owned(),
+            from: end(0.0),
+            to: end(6.0),
+            length_m: 6.3,
+            diameter_m: 0.025,
+            mass_kg_per_m: 1.2,
+            breaking_n: 24_000.0,
+            friction: 0.5,
+            albedo: 0.1,
+            temperature_c: 25.0,
+        }
+    }
+}
+
+impl CableEnd {
+    fn place(&self) -> TrackPoint {
+        TrackPoint {
+            s_m: self.chainage_m,
+            l_m: self.lateral_m,
+            h_m: self.height_m,
+        }
+    }
+}
+
+impl CableSettings {
+    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut check = Checker::new(at, problems);
+        check.within("length_m", self.length_m, 0.5..=50.0, "m");
+        check.within("diameter_m", self.diameter_m, 0.005..=0.2, "m");
+        check.within("mass_kg_per_m", self.mass_kg_per_m, 0.05..=100.0, "kg/m");
+        check.within("breaking_n", self.breaking_n, 10.0..=1e7, "N");
+        check.within("friction", self.friction, 0.0..=2.0, "");
+        check.within("albedo", self.albedo, 0.0..=1.0, "");
+        check.within("temperature_c", self.temperature_c, -50.0..=1500.0, "deg C");
+        for (key, end) in [("from", &self.from), ("to", &self.to)] {
+            let at = key_below(at, key);
+            let mut check = Checker::new(&at, problems);
+            check.within("chainage_m", end.chainage_m, -1e6..=1e6, "m");
+            check.within("lateral_m", end.lateral_m, -10.0..=10.0, "m");
+            check.within("height_m", end.height_m, -1.0..=10.0, "m");
+            if let Some(at_s) = end.lets_go_s {
+                check.within("lets_go_s", at_s, 0.0..=1e6, "s");
+            }
+        }
+    }
+
+    /// Appends what is wrong with it on a line: it must reach from end to end.
+    pub fn check_reach(&self, at: &str, alignment: &Alignment, problems: &mut Vec<Problem>) {
+        let [a, b] = [&self.from, &self.to].map(|end| alignment.world_from_track(end.place()));
+        let apart_m = (b - a).norm();
+        if self.length_m < apart_m {
+            problems.push(Problem::new(
+                key_below(at, "length_m"),
+                format!(
+                    "{} m do not reach: its ends are {apart_m:.2} m apart",
+                    self.length_m
+                ),
+                format!("give more than {apart_m:.2} m: it sags by what it is longer"),
+            ));
+        }
+    }
+}
+
+/// Length of a link.
+const LINK_M: f64 = 0.25;
+const LINKS: (usize, usize) = (8, 64);
+/// Solver passes for a chain of links under tension.
+const CHAIN_PASSES: usize = 7;
+/// Damping ratio of the swing of a cable that hangs from one end.
+const SWING_DAMPING: f64 = 0.05;
+/// Drag on the turning of a link, which nothing else keeps from spinning about its own axis.
+const TWIST_PER_S: f64 = 2.0;
+/// Pull is averaged over this: blows of the solver's single steps do not tear a cable.
+const PULL_S: f64 = 0.01;
+
+impl CableSettings {
+    /// Drag over momentum: 2 zeta w of the rod that the cable hangs as, w^2 = 3 g / 2 L.
+    fn drag_per_s(&self) -> f64 {
+        2.0 * SWING_DAMPING * (1.5 * GRAVITY_MPS2 / self.length_m).sqrt()
+    }
+}
+
+/// A cable in the world.
+pub(super) struct Cable {
+    pub settings: CableSettings,
+    pub links: Vec<Link>,
+    /// Joints in order: at the first end, between links, at the other end.
+    joints: Vec<Option<ImpulseJointHandle>>,
+    /// Pull between its links, averaged over a short time.
+    pulls_n: Vec<f64>,
+    still_since: Option<SimTime>,
+    loose: bool,
+}
+
+/// A stiff piece of a cable.
+pub(super) struct Link {
+    pub body: RigidBodyHandle,
+    half_m: f64,
+}
+
+impl Cable {
+    /// Hangs a cable up.
+    pub(super) fn insert(
+        world: &mut PhysicsWorld,
+        alignment: &Alignment,
+        settings: &CableSettings,
+        id: u128,
+    ) -> Self {
+        let [from, to] =
+            [&settings.from, &settings.to].map(|end| alignment.world_from_track(end.place()));
+        let count = (settings.length_m / LINK_M).round() as usize;
+        let count = count.clamp(LINKS.0, LINKS.1);
+        let curve: Vec<Point3<f64>> = Catenary::new(from, to, settings.length_m)
+            .points(count)
+            .collect();
+        Self::along(world, settings, &curve, id)
+    }
+
+    /// A cable whose joints are at the points of a curve.
+    pub(super) fn along(
+        world: &mut PhysicsWorld,
+        settings: &CableSettings,
+        curve: &[Point3<f64>],
+        id: u128,
+    ) -> Self {
+        let count = curve.len() - 1;
+        let links: Vec<Link> = (curve.windows(2).enumerate())
+            .map(|(k, ends)| {
+                let end = k == 0 || k + 1 == count;
+                insert_link(world, settings, [ends[0], ends[1]], end, id)
+            })
+            .collect();
+        let joints = (0..=count).map(|k| {
+            let anchor = |world: &mut PhysicsWorld| {
+                let at = Isometry3::from(Translation3::from(curve[k]));
+                (
+                    world.insert_body(RigidBodyBuilder::fixed().pose(pose(&at))),
+                    Vector::ZERO,
+                )
+            };
+            let (before, its) = match k.checked_sub(1) {
+                Some(k) => (links[k].body, Vector::Z * links[k].half_m),
+                None => anchor(world),
+            };
+            let (after, own) = match links.get(k) {
+                Some(link) => (link.body, Vector::Z * -link.half_m),
+                None => anchor(world),
+            };
+            let joint = SphericalJointBuilder::new()
+                .local_anchor1(its)
+                .local_anchor2(own)
+                .contacts_enabled(false);
+            Some(world.insert_impulse_joint(before, after, joint))
+        });
+        let joints = joints.collect();
+        Self {
+            settings: settings.clone(),
+            links,
+            joints,
+            pulls_n: vec![0.0; count - 1],
+            still_since: None,
+            loose: false,
+        }
+    }
+
+    /// An end has let go, or it has torn: it is no part of the lining any more.
+    pub(super) fn loose(&self) -> bool {
+        self.loose
+    }
+
+    /// Lets go the ends that are due.
+    pub(super) fn release(&mut self, world: &mut PhysicsWorld, now_s: f64) {
+        let last = self.joints.len() - 1;
+        for (k, end) in [(0, self.settings.from), (last, self.settings.to)] {
+            if end.lets_go_s.is_some_and(|at_s| at_s <= now_s) {
+                self.part(world, k);
+            }
+        }
+    }
+
+    /// Tears where it is pulled too hard. To be called after each step while it is awake.
+    pub(super) fn tear(&mut self, world: &mut PhysicsWorld) {
+        let share = (world.integration_parameters.dt / PULL_S).min(1.0);
+        let mut hardest = (0.0, 0);
+        for k in 0..self.pulls_n.len() {
+            let pull_n = self.tension_n(world, k + 1);
+            self.pulls_n[k] += share * (pull_n - self.pulls_n[k]);
+            if self.pulls_n[k] > hardest.0 {
+                hardest = (self.pulls_n[k], k);
+            }
+        }
+        let (pull_n, k) = hardest;
+        if pull_n > self.settings.breaking_n {
+            self.part(world, k + 1);
+            self.pulls_n.fill(0.0);
+        }
+    }
+
+    /// Force in a joint between links over the last step. The solver makes the rows of a joint
+    /// independent of each other, so its figures are forces along axes only where these are the
+    /// links' own: not at a wall.
+    pub(super) fn tension_n(&self, world: &PhysicsWorld, joint: usize) -> f64 {
+        let handle = self.joints.get(joint).copied().flatten();
+        let joint = handle.and_then(|handle| world.impulse_joints.get(handle));
+        let solver = &world.integration_parameters;
+        let passes = (solver.num_solver_iterations + CHAIN_PASSES) as f64;
+        joint.map_or(0.0, |joint| {
+            let impulse = Vector3::from([0, 1, 2].map(|k| joint.impulses[k]));
+            impulse.norm() * passes / solver.dt
+        })
+    }
+
+    fn part(&mut self, world: &mut PhysicsWorld, joint: usize) {
+        let Some(handle) = self.joints[joint].take() else {
+            return;
+        };
+        world.remove_impulse_joint(handle);
+        self.loose = true;
+        self.still_since = None;
+        // The piece at the wall did not touch it while it hung there.
+        let ends = [self.links.first(), self.links.last()];
+        for link in ends.into_iter().flatten() {
+            world.wake_up(link.body, true);
+            let Some(body) = world.bodies.get(link.body) else {
+                continue;
+            };
+            for collider in body.colliders() {
+                if let Some(collider) = world.colliders.get_mut(*collider) {
+                    collider.set_collision_groups(touching(false));
+                }
+            }
+        }
+    }
+
+    /// Notes whether it moves, when a link is awake.
+    pub(super) fn observe(&mut self, world: &PhysicsWorld, now: SimTime) {
+        let still = self.links.iter().all(|link| {
+            (world.bodies.get(link.body))
+                .is_some_and(|body| body.is_sleeping() || body.linvel().length() < RESTING_MPS)
+        });
+        self.still_since = still.then(|| self.still_since.unwrap_or(now));
+    }
+
+    /// Since when it has not moved.
+    pub(super) fn still_since(&self) -> Option<SimTime> {
+        self.still_since
+    }
+
+    /// Both ends of each link.
+    pub(super) fn ends(&self, world: &PhysicsWorld) -> impl Iterator<Item = [Point3<f64>; 2]> {
+        self.links.iter().filter_map(move |link| {
+            let body = world.bodies.get(link.body)?;
+            let half = *body.rotation() * (Vector::Z * link.half_m);
+            let centre = body.translation();
+            Some([centre - half, centre + half].map(point3))
+        })
+    }
+
+    /// Its mean velocity.
+    pub(super) fn velocity_mps(&self, world: &PhysicsWorld) -> Vector3<f64> {
+        let bodies = self.links.iter().filter_map(|l| world.bodies.get(l.body));
+        let sum = bodies.fold(Vector::ZERO, |sum, body| sum + body.linvel());
+        vector3(sum) / self.links.len() as f64
+    }
+
+    /// Appends it as the renderer draws it.
+    pub(super) fn draw(&self, world: &PhysicsWorld, bodies: &mut Vec<Body>) {
+        for link in &self.links {
+            let Some(body) = world.bodies.get(link.body) else {
+                continue;
+            };
+            bodies.push(Body {
+                shape: Shape::Capsule(0.5 * self.settings.diameter_m, link.half_m),
+                world_from_body: isometry(body.translation(), *body.rotation()),
+                velocity_mps: vector3(body.linvel()),
+                albedo: self.settings.albedo,
+                luminance_cd_m2: 0.0,
+            });
+        }
+    }
+}
+
+/// What a link touches; the pieces at its ends do not touch the wall that they are fixed to.
+fn touching(at_wall: bool) -> rapier3d_f64::prelude::InteractionGroups {
+    let others = TRAIN_GROUP | SOLID_GROUP;
+    let of = if at_wall {
+        others
+    } else {
+        others | GROUND_GROUP
+    };
+    groups(OBSTACLE_GROUP, of)
+}
+
+fn insert_link(
+    world: &mut PhysicsWorld,
+    settings: &CableSettings,
+    ends: [Point3<f64>; 2],
+    at_wall: bool,
+    id: u128,
+) -> Link {
+    let along = ends[1] - ends[0];
+    let half_m = 0.5 * along.norm();
+    let turn = UnitQuaternion::rotation_between(&Vector3::z(), &along).unwrap_or_else(|| {
+        UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI)
+    });
+    let place = Isometry3::from_parts(Translation3::from(ends[0] + 0.5 * along), turn);
+    let body = world.insert_body(
+        RigidBodyBuilder::dynamic()
+            .pose(pose(&place))
+            .linear_damping(settings.drag_per_s())
+            .angular_damping(TWIST_PER_S)
+            .user_data(id)
+            .additional_solver_iterations(CHAIN_PASSES),
+    );
+    if let Some(body) = world.bodies.get_mut(body) {
+        // A slow swing is slowest where it turns: it is no rest.
+        body.activation_mut().normalized_linear_threshold = RESTING_MPS;
+    }
+    let collider = ColliderBuilder::capsule_z(half_m, 0.5 * settings.diameter_m)
+        .mass(2.0 * half_m * settings.mass_kg_per_m)
+        .friction(settings.friction)
+        .restitution(0.0)
+        .user_data(id)
+        .collision_groups(touching(at_wall));
+    world.insert_collider(collider, Some(body));
+    Link { body, half_m }
+}
+
+/// Corners of the box around points, in a frame.
+pub(super) fn bounds(
+    points: impl Iterator<Item = Point3<f64>>,
+    frame_from_world: &Isometry3<f64>,
+) -> Option<[Vector3<f64>; 2]> {
+    points
+        .map(|p| (frame_from_world * p).coords)
+        .map(|p| [p, p])
+        .reduce(|[low, high], [p, _]| [low.inf(&p), high.sup(&p)])
+}

@@ -1,0 +1,283 @@
+//! A thing in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
+
+use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
+use super::convert::{isometry, pose, vector, vector3};
+use super::ground::GROUND_GROUP;
+use super::impact::Motion;
+use super::obstacle::{HingeEdge, HingeSettings, Single};
+use crate::bus::SimTime;
+use crate::track::{Alignment, TrackPoint};
+use crate::twin::render::{Body, Shape};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use rapier3d_f64::math::Vector;
+use rapier3d_f64::prelude::{
+    ColliderBuilder, ColliderHandle, Group, ImpulseJointHandle, InteractionGroups,
+    InteractionTestMode, PhysicsWorld, RevoluteJointBuilder, RigidBodyBuilder, RigidBodyHandle,
+    RigidBodyType,
+};
+
+/// What cables lie on: they do not touch each other.
+pub(super) const SOLID_GROUP: Group = Group::GROUP_4;
+/// Slower than this, a body lies still.
+pub(super) const RESTING_MPS: f64 = 0.02;
+pub(super) const RESTING_RAD_S: f64 = 0.1;
+/// Extra solver passes for contacts of light bodies with a train.
+pub(super) const EXTRA_PASSES: usize = 8;
+
+/// Who may touch whom: by groups that contain each other.
+pub(super) fn groups(member: Group, of: Group) -> InteractionGroups {
+    InteractionGroups::new(member, of, InteractionTestMode::And)
+}
+
+fn loose() -> InteractionGroups {
+    let all = OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP;
+    groups(OBSTACLE_GROUP | SOLID_GROUP, all)
+}
+
+/// What is fixed would stop the train dead: the train meets it without force, which tears it off.
+fn fixed() -> InteractionGroups {
+    groups(OBSTACLE_GROUP | SOLID_GROUP, OBSTACLE_GROUP | GROUND_GROUP)
+}
+
+/// What still holds a thing.
+enum Hold {
+    Nothing,
+    Fixed {
+        until_s: f64,
+    },
+    Hinge {
+        until_s: f64,
+        joint: ImpulseJointHandle,
+    },
+}
+
+/// A thing.
+pub(super) struct Thing {
+    pub single: Single,
+    pub body: RigidBodyHandle,
+    pub collider: ColliderHandle,
+    hold: Hold,
+    still_since: Option<SimTime>,
+}
+
+impl Thing {
+    /// Puts a thing where its settings say: its lowest point at their height.
+    pub(super) fn insert(
+        world: &mut PhysicsWorld,
+        alignment: &Alignment,
+        single: &Single,
+        id: u128,
+    ) -> Self {
+        let settings = &single.settings;
+        let frame = alignment.at(settings.chainage_m);
+        let centre = alignment.world_from_track(TrackPoint {
+            s_m: settings.chainage_m,
+            l_m: settings.lateral_m,
+            h_m: settings.centre_height_m(&single.body),
+        });
+        let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), frame.heading_rad);
+        let place =
+            Isometry3::from_parts(Translation3::from(centre), heading * settings.attitude());
+        let builder = match settings.held_until_s {
+            Some(_) => RigidBodyBuilder::fixed(),
+            None => RigidBodyBuilder::dynamic()
+                .linvel(vector(heading * Vector3::from(settings.velocity_mps)))
+                .angvel(vector(heading * Vector3::from(settings.spin_rad_s))),
+        };
+        let body = world.insert_body(
+            builder
+                .pose(pose(&place))
+                .ccd_enabled(true)
+                .user_data(id)
+                .additional_solver_iterations(EXTRA_PASSES),
+        );
+        let (hold, solver) = match settings.held_until_s {
+            Some(until_s) => (Hold::Fixed { until_s }, fixed()),
+            None => (Hold::Nothing, loose()),
+        };
+        let collider = collider_of(&single.body)
+            .mass(settings.mass_kg)
+            .friction(settings.friction)
+            .restitution(settings.restitution)
+            .user_data(id)
+            .collision_groups(loose())
+            .solver_groups(solver);
+        Self {
+            body,
+            collider: world.insert_collider(collider, Some(body)),
+            single: single.clone(),
+            hold,
+            still_since: None,
+        }
+    }
+
+    /// It is fixed to the lining, as a part of it.
+    pub(super) fn fixed(&self) -> bool {
+        matches!(self.hold, Hold::Fixed { .. })
+    }
+
+    /// The train has touched it where it was held.
+    pub(super) fn tear_off(&mut self, world: &mut PhysicsWorld) {
+        match self.hold {
+            Hold::Nothing => {}
+            Hold::Fixed { .. } => self.let_go(world),
+            Hold::Hinge { joint, .. } => {
+                world.remove_impulse_joint(joint);
+                self.let_go(world);
+            }
+        }
+    }
+
+    /// Lets go what is due.
+    pub(super) fn release(&mut self, world: &mut PhysicsWorld, now_s: f64) {
+        match self.hold {
+            Hold::Fixed { until_s } if until_s <= now_s => match self.single.settings.hinge {
+                Some(hinge) => self.swing(world, &hinge),
+                None => self.let_go(world),
+            },
+            Hold::Hinge { until_s, joint } if until_s <= now_s => {
+                world.remove_impulse_joint(joint);
+                self.let_go(world);
+            }
+            _ => {}
+        }
+    }
+
+    fn set_free(&mut self, world: &mut PhysicsWorld) {
+        if let Some(body) = world.bodies.get_mut(self.body) {
+            body.set_body_type(RigidBodyType::Dynamic, true);
+        }
+        self.still_since = None;
+    }
+
+    fn let_go(&mut self, world: &mut PhysicsWorld) {
+        self.set_free(world);
+        if let Some(collider) = world.colliders.get_mut(self.collider) {
+            collider.set_solver_groups(loose());
+        }
+        self.hold = Hold::Nothing;
+    }
+
+    fn swing(&mut self, world: &mut PhysicsWorld, hinge: &HingeSettings) {
+        let Some((place, _)) = self.state(world) else {
+            return;
+        };
+        self.set_free(world);
+        let half = self.single.body.half_extents_m();
+        let (edge, axis) = match hinge.edge {
+            HingeEdge::Top => (Vector3::z() * half.z, Vector::X),
+            HingeEdge::Bottom => (Vector3::z() * -half.z, Vector::X),
+            HingeEdge::Front => (Vector3::x() * half.x, Vector::Z),
+            HingeEdge::Back => (Vector3::x() * -half.x, Vector::Z),
+        };
+        let at = place * Isometry3::translation(edge.x, edge.y, edge.z);
+        let wall = world.insert_body(RigidBodyBuilder::fixed().pose(pose(&at)));
+        let joint = RevoluteJointBuilder::new(axis)
+            .local_anchor1(Vector::ZERO)
+            .local_anchor2(vector(edge));
+        self.hold = Hold::Hinge {
+            until_s: hinge.until_s.unwrap_or(f64::INFINITY),
+            joint: world.insert_impulse_joint(wall, self.body, joint),
+        };
+    }
+
+    /// Notes whether it moves, when awake.
+    pub(super) fn observe(&mut self, world: &PhysicsWorld, now: SimTime) {
+        let still = world.bodies.get(self.body).is_some_and(|body| {
+            body.is_sleeping()
+                || body.linvel().length() < RESTING_MPS && body.angvel().length() < RESTING_RAD_S
+        });
+        self.still_since = still.then(|| self.still_since.unwrap_or(now));
+    }
+
+    /// Since when it has not moved.
+    pub(super) fn still_since(&self) -> Option<SimTime> {
+        self.still_since
+    }
+
+    /// Where it is and how it moves.
+    pub(super) fn state(&self, world: &PhysicsWorld) -> Option<(Isometry3<f64>, Vector3<f64>)> {
+        let body = world.bodies.get(self.body)?;
+        Some((
+            isometry(body.translation(), *body.rotation()),
+            vector3(body.linvel()),
+        ))
+    }
+
+    /// As the renderer draws it.
+    pub(super) fn draw(&self, world: &PhysicsWorld) -> Option<Body> {
+        let (world_from_body, velocity_mps) = self.state(world)?;
+        Some(Body {
+            shape: self.single.body.clone(),
+            world_from_body,
+            velocity_mps,
+            albedo: self.single.settings.albedo,
+            luminance_cd_m2: 0.0,
+        })
+    }
+
+    /// Rolling resistance. A wheel under the load N that rolls evenly has to be pulled with
+    /// c N, because the ground's reaction is ahead of its centre by c r: a moment c N r against
+    /// its turning, about an axis in the contact's plane. Rapier knows point contacts only, so the
+    /// moment is put on the body here, no greater than what stops it. The load is what changed its
+    /// momentum over the last step, besides its weight.
+    ///
+    /// Forces along the normals never turn a body of revolution about its axis. Rapier keeps the
+    /// contact points of a cylinder while it rolls by up to a degree, and these lag behind, which
+    /// drives it on; that moment is taken off again.
+    pub(super) fn resist_rolling(&self, world: &mut PhysicsWorld, before: &Motion) {
+        let (mut normal, mut arm_m, mut turning) = (Vector::ZERO, 0.0f64, Vector::ZERO);
+        for pair in world.narrow_phase.contact_pairs_with(self.collider) {
+            let second = pair.collider2 == self.collider;
+            for manifold in pair.solver_manifolds() {
+                let own = if second { 1.0 } else { -1.0 };
+                for point in manifold.points.iter().filter(|p| p.data.impulse > 0.0) {
+                    let arms = [point.data.solver_dp1, point.data.solver_dp2];
+                    let (push, arm) = (manifold.data.normal * own, arms[usize::from(second)]);
+                    normal += push * point.data.impulse;
+                    turning += arm.cross(push) * point.data.impulse;
+                    arm_m = arm_m.max(-push.dot(arm));
+                }
+            }
+        }
+        let (gravity, dt_s) = (world.gravity, world.integration_parameters.dt);
+        let Some(body) = world.bodies.get_mut(self.body).filter(|_| arm_m > 0.0) else {
+            return;
+        };
+        if let Shape::Cylinder(..) = self.single.body {
+            let axis = *body.rotation() * Vector::Z;
+            body.apply_torque_impulse(axis * -axis.dot(turning), false);
+        }
+        let normal = normal.normalize_or_zero();
+        let load_n_s = (body.linvel() - before.linear - gravity * dt_s).dot(normal) * body.mass();
+        let moment = self.single.settings.rolling_resistance * load_n_s.max(0.0) * arm_m;
+        let spin = body.angvel() - normal * normal.dot(body.angvel());
+        let rate = spin.length();
+        if rate > 1e-9 {
+            let axis = spin / rate;
+            let turned = body.mass_properties().effective_world_inv_inertia * axis;
+            let stops = rate / axis.dot(turned);
+            body.apply_torque_impulse(axis * -moment.min(stops), false);
+        }
+    }
+}
+
+fn collider_of(body: &Shape) -> ColliderBuilder {
+    // Rapier's cylinders stand along y, ours along z.
+    let upright = Vector::X * std::f64::consts::FRAC_PI_2;
+    match body {
+        Shape::Box(half) => ColliderBuilder::cuboid(half.x, half.y, half.z),
+        Shape::Sphere(radius) => ColliderBuilder::ball(*radius),
+        Shape::Cylinder(radius, half) => {
+            ColliderBuilder::cylinder(*half, *radius).rotation(upright)
+        }
+        Shape::Capsule(radius, half) => ColliderBuilder::capsule_z(*half, *radius),
+        Shape::Hull(hull) => {
+            let corners = hull.corners().iter();
+            let corners: Vec<Vector> = corners.map(|c| super::convert::point(*c)).collect();
+            // It is a hull already; a ball in its place would only stand for a broken library.
+            ColliderBuilder::convex_hull(&corners)
+                .unwrap_or_else(|| ColliderBuilder::ball(hull.half_extents_m().min()))
+        }
+    }
+}
