@@ -277,7 +277,7 @@ impl World {
             }
         }
         // What lies or is not there needs no search for what it flies through.
-        let flying = self.obstacles.iter().any(|o| !o.resting());
+        let flying = self.things.moving();
         self.rapier.integration_parameters.max_ccd_substeps = usize::from(flying);
         self.rapier.step();
         match &mut self.train {

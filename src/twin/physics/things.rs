@@ -176,6 +176,11 @@ impl Things {
         }));
     }
 
+    /// Something moves, or did before the last step.
+    pub(super) fn moving(&self) -> bool {
+        !self.awake.is_empty()
+    }
+
     /// To be called after a step.
     pub(super) fn after_step(
         &mut self,
