@@ -130,7 +130,7 @@ impl Scenario {
             file = overridden(path, text, overrides)?;
         }
 
-        if let Some(train) = &mut file.train {
+        for train in file.train.iter_mut().chain(&mut file.other_trains) {
             load_vehicle(path, train)?;
         }
 

@@ -50,6 +50,10 @@ pub struct ScenarioFile {
     /// The train and how it is driven. Default: no train.
     #[serde(default)]
     pub train: Option<TrainSettings>,
+    /// Other trains on the line, up to three: each with a driver of its own, whom nothing supervises.
+    /// Default: none.
+    #[serde(default)]
+    pub other_trains: Vec<TrainSettings>,
     /// A still rig moved from point to point, in place of a train. Default: none.
     #[serde(default)]
     pub bench: Option<BenchSettings>,
@@ -220,6 +224,7 @@ impl ScenarioFile {
             step_s: self.step_s,
             track: self.track.clone(),
             train: self.train.clone(),
+            other_trains: self.other_trains.clone(),
             obstacles: self.obstacles.clone(),
             cables: self.cables.clone(),
             workers: self.workers.clone(),

@@ -213,19 +213,20 @@ impl Outlook {
             obstacle: false,
         });
         let half = world.car_half_extents_m().unwrap_or_default();
-        let train =
-            (world.head_m().zip(world.train_length_m())).map(|(head_m, length_m)| Presence {
-                name: "train".into(),
-                size_m: length_m,
-                chainage_m: head_m - 0.5 * length_m,
-                lateral_m: 0.0,
-                half_length_m: 0.5 * length_m,
-                half_width_m: half.y,
-                foot_m: 0.0,
-                lies_in_view_since: None,
-                obstacle: false,
-            });
-        obstacles.chain(workers).chain(train).collect()
+        let own = world.head_m().zip(world.train_length_m());
+        let trains = own.into_iter().chain(world.other_trains_m());
+        let trains = trains.map(|(head_m, length_m)| Presence {
+            name: "train".into(),
+            size_m: length_m,
+            chainage_m: head_m - 0.5 * length_m,
+            lateral_m: 0.0,
+            half_length_m: 0.5 * length_m,
+            half_width_m: half.y,
+            foot_m: 0.0,
+            lies_in_view_since: None,
+            obstacle: false,
+        });
+        obstacles.chain(workers).chain(trains).collect()
     }
 }
 

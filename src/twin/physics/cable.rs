@@ -158,6 +158,7 @@ impl CableSettings {
 }
 
 /// A cable in the world.
+#[derive(Clone)]
 pub(super) struct Cable {
     pub settings: CableSettings,
     pub links: Vec<Link>,
@@ -170,6 +171,7 @@ pub(super) struct Cable {
 }
 
 /// A stiff piece of a cable.
+#[derive(Clone)]
 pub(super) struct Link {
     pub body: RigidBodyHandle,
     half_m: f64,

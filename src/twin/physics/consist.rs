@@ -11,7 +11,7 @@ use super::placement::{self, BODIES};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Ledger, Wrench, coupler, primary, secondary};
 use super::vehicle::{GRAVITY_MPS2, Mass, Vehicle};
-use super::wheelset::{Drive, WheelForces, Wheelset};
+use super::wheelset::{Drive, Wheelset};
 use crate::bus::SimTime;
 use crate::track::Tunnel;
 use nalgebra::{Isometry3, Vector3};
@@ -20,11 +20,11 @@ use rapier3d_f64::prelude::{
     ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, MassProperties,
     PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
 };
-use serde::{Deserialize, Serialize};
 
-/// What trains hit and are hit by: obstacles only.
+/// The train that a scenario is about hits obstacles and other trains.
 pub(super) const TRAIN_GROUP: Group = Group::GROUP_1;
 pub(super) const OBSTACLE_GROUP: Group = Group::GROUP_2;
+const OTHER_TRAIN_GROUP: Group = Group::GROUP_5;
 /// Lowest parts of a car over top of rail: guard irons hang 60 mm over the rails.
 const UNDERSIDE_M: f64 = 0.06;
 /// Slower than this, resistance fades, so that it does not push a standing train.
@@ -32,8 +32,17 @@ const FADE_MPS: f64 = 0.1;
 /// How quickly a train that is brought to its starting state is held to its speed.
 const HOLD_PER_S: f64 = 50.0;
 
+/// Whose train it is.
+#[derive(Clone, Copy)]
+pub(super) enum Crowd {
+    /// The one that a scenario is about.
+    Own,
+    /// Another one, whose bodies say so by this number.
+    Other(u128),
+}
+
 /// The train.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone)]
 pub(super) struct Consist {
     pub vehicle: Vehicle,
     pub settings: TrainSettings,
@@ -62,6 +71,7 @@ impl Consist {
         tunnel: &Tunnel,
         settings: &TrainSettings,
         head_m: f64,
+        crowd: Crowd,
     ) -> Self {
         let vehicle = settings.vehicle();
         let alignment = &tunnel.alignment;
@@ -86,22 +96,23 @@ impl Consist {
             start_potential_j: 0.0,
         };
         for car in &cars {
-            consist.insert(world, car);
-            for (state, body) in car[3..]
-                .iter()
-                .zip(&consist.handles[consist.handles.len() - 4..])
-            {
+            consist.insert(world, car, crowd);
+            for state in &car[3..] {
                 let p = super::convert::point3(state.position);
                 let s_m = alignment.track_from_world(&p, head_m).s_m;
                 let roll_rad = alignment.at(s_m).roll_rad;
-                consist.wheelsets.push(Wheelset::new(*body, s_m, roll_rad));
+                consist.wheelsets.push(Wheelset::new(s_m, roll_rad));
             }
         }
         consist
     }
 
     /// The bodies of a car, and the box that hits things.
-    fn insert(&mut self, world: &mut PhysicsWorld, states: &[BodyState; BODIES]) {
+    fn insert(&mut self, world: &mut PhysicsWorld, states: &[BodyState; BODIES], crowd: Crowd) {
+        let (groups, id) = match crowd {
+            Crowd::Own => ((TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP), 0),
+            Crowd::Other(id) => ((OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP), id),
+        };
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
             let body = RigidBodyBuilder::dynamic()
@@ -120,10 +131,11 @@ impl Consist {
             .friction(0.3)
             .restitution(0.1)
             .collision_groups(InteractionGroups::new(
-                TRAIN_GROUP,
-                OBSTACLE_GROUP,
+                groups.0,
+                groups.1,
                 InteractionTestMode::And,
-            ));
+            ))
+            .user_data(id);
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders
             .push(world.insert_collider(collider, Some(car)));
@@ -164,6 +176,11 @@ impl Consist {
     /// Length over couplers.
     pub(super) fn length_m(&self) -> f64 {
         self.vehicle.length_m * f64::from(self.settings.cars)
+    }
+
+    /// Mass of the train, without what rotating parts add.
+    pub(super) fn mass_kg(&self) -> f64 {
+        self.vehicle.total_kg() * f64::from(self.settings.cars)
     }
 
     /// What the driver goes by.
@@ -409,11 +426,6 @@ impl Consist {
     /// Velocities of the car bodies.
     pub(super) fn velocities_mps(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
         self.cars().map(|car| vector3(car.velocity))
-    }
-
-    /// What every wheelset and its rails do to each other.
-    pub(super) fn wheel_forces(&self) -> impl Iterator<Item = WheelForces> + '_ {
-        self.wheelsets.iter().map(|w| w.forces)
     }
 
     /// Acceleration over the last step of the leading car's centre of gravity along a direction.

@@ -1,11 +1,11 @@
 //! The energy book of a train: what traction and gravity put in, where it went, what is left.
 
 use super::suspension::Ledger;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 /// Energy of the train since the start, J. What was there at the start and came in by traction is
 /// still there, or was lost: [`Self::gap_j`] says by how much this fails. Hits are not in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EnergyBook {
     /// Put in by traction, at the wheels' treads.
     pub traction_j: f64,

@@ -24,7 +24,7 @@ const BEHIND_M: f64 = 12.0;
 const AHEAD_M: f64 = 60.0;
 
 /// The slabs laid so far.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Ground {
     laid: BTreeSet<i64>,
 }

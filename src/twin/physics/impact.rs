@@ -149,6 +149,7 @@ impl Motion {
 }
 
 /// A part of the train that things can hit.
+#[derive(Clone)]
 struct Part {
     collider: ColliderHandle,
     body: RigidBodyHandle,
@@ -156,6 +157,7 @@ struct Part {
 }
 
 /// A thing in touch with the train.
+#[derive(Clone)]
 struct Touch {
     id: u128,
     /// Which hit, unless that was too slow or too late to be kept.
@@ -186,7 +188,7 @@ struct Push {
 }
 
 /// All hits so far.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Impacts {
     parts: Vec<Part>,
     bounds: DamageBounds,

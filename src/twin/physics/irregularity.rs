@@ -206,7 +206,7 @@ pub(super) struct Deviation {
 const GRID_M: f64 = 0.05;
 
 /// One realisation.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Irregularity {
     /// Up, left, roll, gauge; empty for perfect track, otherwise a power of two long.
     table: Vec<[f64; 4]>,

@@ -6,7 +6,7 @@ use super::convert::point;
 use super::irregularity::Irregularity;
 use super::settings::TrackSettings;
 use super::suspension::Axes;
-use crate::track::{Alignment, TrackFrame};
+use crate::track::{Alignment, TrackFrame, Tunnel};
 use rapier3d_f64::math::Vector;
 
 /// The track for one step.
@@ -21,12 +21,12 @@ pub(super) struct Line<'a> {
 
 impl<'a> Line<'a> {
     pub(super) fn new(
-        alignment: &'a Alignment,
+        tunnel: &'a Tunnel,
         irregularity: &'a Irregularity,
         settings: &'a TrackSettings,
     ) -> Self {
         Self {
-            alignment,
+            alignment: &tunnel.alignment,
             irregularity,
             support: (1e6 * settings.support_mn_m, 1e3 * settings.support_kn_s_m),
             adhesion: settings.rail.adhesion(),

@@ -46,6 +46,7 @@ mod irregularity;
 mod line;
 mod obstacle;
 mod placement;
+mod saved;
 mod settings;
 mod shape;
 mod suspension;
@@ -55,6 +56,7 @@ mod thing;
 mod things;
 #[cfg(test)]
 mod things_tests;
+mod train;
 mod truth;
 mod vehicle;
 mod walker;
@@ -79,19 +81,18 @@ pub use vehicle::{
 pub use wheelset::WheelForces;
 pub use worker::{Waypoint, WorkerSettings};
 
-use crate::bus::{SimTime, TrainCommand};
+use crate::bus::{BrakeDemand, SimTime, TrainCommand};
 use crate::track::{Problem, Tunnel};
-use crate::twin::render::{Body, Headlight, Shape};
-use consist::Consist;
-use driver::{Driver, Effort, STANDING_MPS};
-use history::History;
+use crate::twin::render::{Body, Headlight};
+use consist::Crowd;
 use irregularity::Irregularity;
 use line::Line;
-use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
 use std::sync::Arc;
 use things::Things;
+use train::{RUN_IN_S, Train};
 
 /// Why the world could not be made, or could not go on.
 #[derive(Debug, thiserror::Error)]
@@ -143,26 +144,11 @@ pub struct TrainState {
     pub couplers_n: Vec<f64>,
 }
 
-/// A train under way.
-struct Train {
-    consist: Consist,
-    driver: Driver,
-    effort: Effort,
-    history: History,
-}
-
-/// So long a train runs, or stands, before its start: springs and dampers come to rest.
-const RUN_IN_S: f64 = 5.0;
-/// A headlight's lens.
-const LENS_RADIUS_M: f64 = 0.09;
-/// Headlights: beside the centreline, over top of rail, looking down to the track ahead.
-const HEADLIGHT_LATERAL_M: f64 = 0.9;
-const HEADLIGHT_HEIGHT_M: f64 = 1.0;
-const HEADLIGHT_DOWN_RAD: f64 = 0.02;
-/// Narrow beam: half its intensity at 9 degrees from the axis.
-const HEADLIGHT_EXPONENT: f64 = 56.0;
-/// Painted steel.
-const CAR_ALBEDO: f64 = 0.5;
+/// What other trains are told: nothing.
+const UNSUPERVISED: TrainCommand = TrainCommand {
+    brake: BrakeDemand::None,
+    permitted_speed_mps: f64::INFINITY,
+};
 
 /// Everything that moves.
 pub struct World {
@@ -171,6 +157,8 @@ pub struct World {
     rapier: PhysicsWorld,
     irregularity: Irregularity,
     train: Option<Train>,
+    /// Trains that nobody but their drivers drives.
+    others: Vec<Train>,
     things: Things,
     time: SimTime,
     step: SimTime,
@@ -197,21 +185,14 @@ impl World {
         rapier.integration_parameters.dt = step_s;
         // Substeps would move bodies with forces that belong to the step's start.
         rapier.integration_parameters.num_solver_iterations = 1;
-        let train = settings.train.as_ref().map(|train| {
-            let history = History::new((settings.history_s / step_s).ceil() as usize + 1);
-            // It runs in over the last metres before its starting place.
-            let head_m = train.start_chainage_m - train.start_speed_kmh / 3.6 * RUN_IN_S;
-            Train {
-                consist: Consist::new(&mut rapier, &tunnel, train, head_m),
-                driver: Driver::new(train),
-                effort: Effort::default(),
-                history,
-            }
-        });
-        let train_mass_kg = train.as_ref().map(|train| {
-            let consist = &train.consist;
-            consist.vehicle.total_kg() * f64::from(consist.settings.cars)
-        });
+        let history = (settings.history_s / step_s).ceil() as usize + 1;
+        let mut train = |train, crowd, steps| Train::new(&mut rapier, &tunnel, train, crowd, steps);
+        let own = settings.train.as_ref();
+        let own = own.map(|own| train(own, Crowd::Own, history));
+        let others = settings.other_trains.iter().enumerate();
+        let others = others.map(|(k, other)| train(other, Crowd::Other(things::train_id(k)), 2));
+        let others = others.collect();
+        let train_mass_kg = own.as_ref().map(|train| train.consist.mass_kg());
         let irregularity = Irregularity::new(
             &settings.track.irregularity,
             tunnel.alignment.length_m(),
@@ -224,7 +205,8 @@ impl World {
             tunnel,
             rapier,
             irregularity,
-            train,
+            train: own,
+            others,
             things: Things::default(),
             time: SimTime::ZERO,
             step,
@@ -242,63 +224,49 @@ impl World {
         Ok(world)
     }
 
-    /// Brings the train to the state in which it runs, or stands, at its start: leaning in a curve,
-    /// shaken by the track.
+    /// Brings the trains to the state in which they run, or stand, at their start: leaning in a
+    /// curve, shaken by the track.
     fn run_in(&mut self) -> Result<(), PhysicsError> {
-        let Some(settings) = &self.settings.train else {
-            return Ok(());
-        };
-        let speed_mps = settings.start_speed_kmh / 3.6;
-        let held_at = (speed_mps > STANDING_MPS).then_some(speed_mps);
-        let effort = Effort {
-            traction_mps2: 0.0,
-            brake_mps2: held_at.map_or(settings.service_brake_mps2, |_| 0.0),
-        };
         for _ in 0..(RUN_IN_S / self.step_s).round() as usize {
-            self.step_train(effort, held_at)?;
+            let line = Line::new(&self.tunnel, &self.irregularity, &self.settings.track);
+            for train in self.train.iter_mut().chain(&mut self.others) {
+                train.run_in(&mut self.rapier, &self.tunnel, &line, self.step_s);
+            }
+            self.rapier.step();
+            for train in self.train.iter_mut().chain(&mut self.others) {
+                train.consist.read(&self.rapier, self.time)?;
+            }
         }
-        if let Some(train) = &mut self.train {
-            train.consist.open_book();
-            train.history.push(train.consist.motion(self.time));
+        for train in self.train.iter_mut().chain(&mut self.others) {
+            train.begin();
         }
         Ok(())
     }
 
-    /// Forces on the train, a step of everything, and what the train comes to. A train that is
-    /// `held_at` a speed has not begun its run.
-    fn step_train(&mut self, effort: Effort, held_at: Option<f64>) -> Result<(), PhysicsError> {
-        if let Some(train) = &mut self.train {
-            let (alignment, track) = (&self.tunnel.alignment, &self.settings.track);
-            let line = Line::new(alignment, &self.irregularity, track);
-            let consist = &mut train.consist;
-            consist.apply_forces(&mut self.rapier, &self.tunnel, &line, effort, self.step_s);
-            if let Some(speed_mps) = held_at {
-                consist.hold_speed(&mut self.rapier, speed_mps, self.step_s);
-            }
-        }
-        // What lies or is not there needs no search for what it flies through.
-        let flying = self.things.moving();
-        self.rapier.integration_parameters.max_ccd_substeps = usize::from(flying);
-        self.rapier.step();
-        match &mut self.train {
-            Some(train) => train.consist.read(&self.rapier, self.time),
-            None => Ok(()),
-        }
-    }
-
     /// One step on.
     pub fn step(&mut self, command: &TrainCommand) -> Result<(), PhysicsError> {
-        let mut effort = Effort::default();
+        let (rapier, tunnel) = (&mut self.rapier, &self.tunnel);
+        let line = Line::new(tunnel, &self.irregularity, &self.settings.track);
+        let now = (self.time, self.step_s);
         if let Some(train) = &mut self.train {
-            let instruments = train.consist.instruments(self.time, &self.tunnel);
-            effort = train.driver.step(&instruments, command, self.step_s);
-            train.effort = effort;
+            train.drive(rapier, tunnel, &line, command, now);
         }
+        for other in &mut self.others {
+            other.drive(rapier, tunnel, &line, &UNSUPERVISED, now);
+        }
+        self.go()
+    }
+
+    /// A step of everything under the forces that act, and what comes of it.
+    fn go(&mut self) -> Result<(), PhysicsError> {
         self.things.before_step(&mut self.rapier);
         self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
-        self.step_train(effort, None)?;
-        if let Some(train) = &mut self.train {
-            train.history.push(train.consist.motion(self.time));
+        // What lies or is not there needs no search for what it flies through.
+        let substeps = usize::from(self.things.moving());
+        self.rapier.integration_parameters.max_ccd_substeps = substeps;
+        self.rapier.step();
+        for train in self.train.iter_mut().chain(&mut self.others) {
+            train.read(&self.rapier, self.time)?;
         }
         self.things
             .after_step(&mut self.rapier, &self.tunnel, self.time)
@@ -311,31 +279,13 @@ impl World {
 
     /// The train now; `None` where there is none.
     pub fn train(&self) -> Option<TrainState> {
-        let train = self.train.as_ref()?;
-        let consist = &train.consist;
-        let motion = train.history.latest()?;
-        let guess = consist.instruments(self.time, &self.tunnel).chainage_m;
-        let origin = motion.world_from_vehicle.translation.vector.into();
-        let head = self.tunnel.alignment.track_from_world(&origin, guess);
-        let frame = self.tunnel.alignment.at(head.s_m);
-        let along = frame.world_from_line().rotation * Vector3::x();
-        let speed_mps = motion.velocity_mps.dot(&along);
-        Some(TrainState {
-            time: self.time,
-            chainage_m: head.s_m,
-            speed_mps,
-            accel_mps2: consist.accel_mps2(along, self.step_s),
-            world_from_vehicle: motion.world_from_vehicle,
-            world_from_cars: consist.boxes().collect(),
-            floor_accel_mps2: consist.floor_accel_mps2(self.step_s),
-            primary_travel_m: consist.travel_m[0],
-            secondary_travel_m: consist.travel_m[1],
-            standing: consist.speed_mps().abs() < STANDING_MPS,
-            traction_mps2: train.effort.traction_mps2,
-            brake_mps2: train.effort.brake_mps2,
-            wheels: consist.wheel_forces().collect(),
-            couplers_n: consist.couplers_n.clone(),
-        })
+        self.train.as_ref()?.state(&self.tunnel, self.step_s)
+    }
+
+    /// Other trains on the line.
+    pub fn other_trains(&self) -> impl Iterator<Item = TrainState> + '_ {
+        let others = self.others.iter();
+        others.filter_map(|train| train.state(&self.tunnel, self.step_s))
     }
 
     /// Pose of the vehicle frame at a time of the recent past; `None` without a train, after now,
@@ -346,7 +296,7 @@ impl World {
 
     /// Motion of the vehicle frame now; `None` without a train.
     pub fn vehicle_motion(&self) -> Option<&VehicleMotion> {
-        self.train.as_ref()?.history.latest()
+        self.train.as_ref()?.motion()
     }
 
     /// Distance that the treads of an axle, counted from 0 at the head, have rolled off since the
@@ -365,54 +315,23 @@ impl World {
         Some(self.train.as_ref()?.consist.half_extents_m())
     }
 
-    /// Obstacles, cables and workers that are there now, to draw.
+    /// Obstacles, cables, workers and other trains that are there now, to draw.
     pub fn bodies(&self) -> Vec<Body> {
         let line = &self.tunnel.alignment;
-        self.things.draw(&self.rapier, line, self.time.secs())
+        let mut bodies = self.things.draw(&self.rapier, line, self.time.secs());
+        bodies.extend(self.others.iter().flat_map(Train::bodies));
+        bodies
     }
 
     /// The train as boxes with the lenses of its headlights, for cameras that stand outside.
     pub fn train_bodies(&self) -> Vec<Body> {
-        let Some(train) = &self.train else {
-            return Vec::new();
-        };
-        let half = train.consist.half_extents_m();
-        let cars = train.consist.boxes().zip(train.consist.velocities_mps());
-        let mut bodies: Vec<Body> = cars
-            .map(|(world_from_body, velocity_mps)| Body {
-                shape: Shape::Box(half),
-                world_from_body,
-                velocity_mps,
-                albedo: CAR_ALBEDO,
-                luminance_cd_m2: 0.0,
-            })
-            .collect();
-        let velocity_mps = bodies.first().map_or(Vector3::zeros(), |b| b.velocity_mps);
-        let lens_m2 = std::f64::consts::PI * LENS_RADIUS_M.powi(2);
-        bodies.extend(self.headlights().into_iter().map(|light| Body {
-            shape: Shape::Sphere(LENS_RADIUS_M),
-            world_from_body: light.world_from_light,
-            velocity_mps,
-            albedo: CAR_ALBEDO,
-            luminance_cd_m2: light.intensity_cd / lens_m2,
-        }));
-        bodies
+        self.train.as_ref().map_or_else(Vec::new, Train::bodies)
     }
 
-    /// The train's headlights.
+    /// The headlights of all trains.
     pub fn headlights(&self) -> Vec<Headlight> {
-        let (Some(train), Some(motion)) = (&self.train, self.vehicle_motion()) else {
-            return Vec::new();
-        };
-        let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), HEADLIGHT_DOWN_RAD);
-        let lights = [HEADLIGHT_LATERAL_M, -HEADLIGHT_LATERAL_M].map(|lateral| Headlight {
-            world_from_light: motion.world_from_vehicle
-                * Isometry3::translation(0.0, lateral, HEADLIGHT_HEIGHT_M)
-                * down,
-            intensity_cd: train.consist.settings.headlight_cd,
-            exponent: HEADLIGHT_EXPONENT,
-        });
-        lights.to_vec()
+        let trains = self.train.iter().chain(&self.others);
+        trains.filter_map(Train::headlights).flatten().collect()
     }
 
     /// Obstacles that are there now: what lies, falls or swings. What is still fixed to the lining
@@ -428,7 +347,8 @@ impl World {
         self.things.workers(&self.rapier, line, self.time.secs())
     }
 
-    /// Hits of the train on obstacles, cables and workers, in order of time; the first thousand.
+    /// Hits of the train on obstacles, cables, workers and other trains, in order of time; the first
+    /// thousand.
     pub fn impacts(&self) -> &[Impact] {
         self.things.impacts()
     }

@@ -23,6 +23,8 @@ pub struct PhysicsSettings {
     pub track: TrackSettings,
     /// The train, if there is one.
     pub train: Option<TrainSettings>,
+    /// Other trains, up to three, with drivers of their own that nothing supervises.
+    pub other_trains: Vec<TrainSettings>,
     /// Things that lie or fall on the line.
     pub obstacles: Vec<ObstacleSettings>,
     /// Cables that hang on the wall.
@@ -38,6 +40,7 @@ impl Default for PhysicsSettings {
             history_s: 0.5,
             track: TrackSettings::default(),
             train: Some(TrainSettings::default()),
+            other_trains: Vec::new(),
             obstacles: Vec::new(),
             cables: Vec::new(),
             workers: Vec::new(),
@@ -54,6 +57,11 @@ impl PhysicsSettings {
         self.track.check(&key_below(at, "track"), problems);
         if let Some(train) = &self.train {
             train.check(&key_below(at, "train"), problems);
+        }
+        let others = self.other_trains.len() as f64;
+        Checker::new(at, problems).within("other_trains", others, 0.0..=3.0, "trains");
+        for (k, train) in self.other_trains.iter().enumerate() {
+            train.check(&key_below(at, &format!("other_trains[{k}]")), problems);
         }
         for (k, obstacle) in self.obstacles.iter().enumerate() {
             obstacle.check(&key_below(at, &format!("obstacles[{k}]")), problems);

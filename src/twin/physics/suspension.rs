@@ -8,10 +8,9 @@
 
 use super::vehicle::{Coupler, Element, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
-use serde::{Deserialize, Serialize};
 
 /// Pose of a centre of gravity with its velocities, world.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BodyState {
     pub position: Vector,
     pub rotation: Rotation,
@@ -32,7 +31,7 @@ impl BodyState {
 }
 
 /// What acts on a body, about its centre of gravity.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Wrench {
     pub force: Vector,
     pub torque: Vector,
@@ -46,7 +45,7 @@ impl Wrench {
 }
 
 /// Energy and power of one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Ledger {
     /// Held by springs.
     pub stored_j: f64,

@@ -7,6 +7,8 @@
     reason = "tests may panic, compare bytes, and say what they measured"
 )]
 
+use super::driver::Effort;
+use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::{Alignment, Grade, PlanElement};
@@ -183,10 +185,11 @@ fn coasts_down_as_the_equation_of_motion() {
 
 /// A step without traction and brake.
 fn coast(world: &mut World) {
-    world.time = world.time.plus(world.step_s);
-    world.step_train(Effort::default(), None).unwrap();
-    let train = world.train.as_mut().unwrap();
-    train.history.push(train.consist.motion(world.time));
+    let (tunnel, dt_s) = (&world.tunnel, world.step_s);
+    let line = Line::new(tunnel, &world.irregularity, &world.settings.track);
+    let consist = &mut world.train.as_mut().unwrap().consist;
+    consist.apply_forces(&mut world.rapier, tunnel, &line, Effort::default(), dt_s);
+    world.go().unwrap();
 }
 
 /// On a gradient a train without resistance gains g sin over 1 + rotating share.
@@ -437,6 +440,86 @@ fn val_vertical_ride() {
     assert!((0.03..0.13).contains(&centre));
     assert!((0.045..0.18).contains(&floor));
     assert!((0.9..3.5).contains(&(1e3 * bounce)));
+}
+
+/// A world that was saved in the middle of a fall and a shake goes on in every byte as the one that
+/// ran through: state that a copy forgets (contacts, sleep, springs, a driver's lever) shows.
+#[test]
+fn a_saved_world_goes_on_exactly() {
+    let train = TrainSettings {
+        start_speed_kmh: 60.0,
+        cars: 2,
+        ..TrainSettings::default()
+    };
+    let falling = |chainage_m, body| ObstacleSettings {
+        body,
+        chainage_m,
+        height_m: 0.6,
+        ..ObstacleSettings::default()
+    };
+    let ball = ObstacleShape::Sphere { diameter_m: 0.2 };
+    let settings = PhysicsSettings {
+        train: Some(train.clone()),
+        other_trains: vec![TrainSettings {
+            start_chainage_m: 600.0,
+            start_speed_kmh: 0.0,
+            ..train
+        }],
+        // The first is hit by the train, the others fall meanwhile.
+        obstacles: vec![
+            falling(175.0, ObstacleSettings::default().body),
+            falling(300.0, ball),
+            falling(310.0, ObstacleShape::Rock { diameter_m: 0.4 }),
+        ],
+        ..PhysicsSettings::default()
+    };
+    let go = command(BrakeDemand::None, 50.0);
+    let mut through = World::new(straight(), &settings, 1, 0).unwrap();
+    let truth = |world: &World| (world.train(), world.bodies(), world.impacts().to_vec());
+    for _ in 0..4 {
+        let mut saved = through.clone();
+        run(&mut through, 0.6, &go);
+        assert_ne!(truth(&saved).0, truth(&through).0);
+        run(&mut saved, 0.6, &go);
+        assert_eq!(truth(&saved), truth(&through));
+    }
+    assert!(!through.impacts().is_empty());
+}
+
+/// A train that runs into another one that stands takes the momentum of a plastic hit, and it is
+/// told as one; its driver is not warned.
+#[test]
+fn trains_collide() {
+    let train = TrainSettings {
+        start_speed_kmh: 20.0,
+        cruise_speed_kmh: 20.0,
+        cars: 2,
+        ..TrainSettings::default()
+    };
+    let settings = PhysicsSettings {
+        other_trains: vec![TrainSettings {
+            start_chainage_m: 220.0,
+            start_speed_kmh: 0.0,
+            cruise_speed_kmh: 0.0,
+            ..train.clone()
+        }],
+        ..settings(train)
+    };
+    let mut world = World::new(straight(), &settings, 1, 0).unwrap();
+    let (head_m, length_m) = world.other_trains_m().next().unwrap();
+    assert!((head_m - 220.0).abs() < 1e-3 && (length_m - 39.34).abs() < 1e-9);
+    run(&mut world, 8.0, &command(BrakeDemand::None, GO));
+    let hit = &world.impacts()[0];
+    eprintln!("{hit:?}");
+    assert_eq!(hit.with, "other train 1");
+    // 30.66 m at 20 km/h.
+    assert!((hit.time.secs() - 30.66 / (20.0 / 3.6)).abs() < 0.05);
+    assert!((hit.speed_mps - 20.0 / 3.6).abs() < 0.05);
+    // Within the hit the leading car of one meets the last car of the other.
+    let v = car("metro_b1_crush");
+    let most = 1.2 * v.total_kg() * 20.0 / 3.6;
+    assert!((0.4 * most..most).contains(&hit.momentum_n_s));
+    assert!(world.other_trains().next().unwrap().chainage_m > 220.0);
 }
 
 /// A state that is no number ends the run with the body's name.

@@ -40,6 +40,7 @@ fn fixed() -> InteractionGroups {
 }
 
 /// What still holds a thing.
+#[derive(Clone, Copy)]
 enum Hold {
     Nothing,
     Fixed {
@@ -52,6 +53,7 @@ enum Hold {
 }
 
 /// A thing.
+#[derive(Clone)]
 pub(super) struct Thing {
     pub single: Single,
     pub body: RigidBodyHandle,

@@ -67,6 +67,12 @@ enum Owner {
     Thing(usize),
     Cable(usize),
     Worker(usize),
+    Train(usize),
+}
+
+/// How the bodies of the other train `k` say whose they are.
+pub(super) fn train_id(k: usize) -> u128 {
+    Owner::Train(k).id()
 }
 
 impl Owner {
@@ -75,6 +81,7 @@ impl Owner {
             Self::Thing(k) => (1, k),
             Self::Cable(k) => (2, k),
             Self::Worker(k) => (3, k),
+            Self::Train(k) => (4, k),
         };
         (kind << 64) | k as u128
     }
@@ -85,12 +92,14 @@ impl Owner {
             1 => Some(Self::Thing(k)),
             2 => Some(Self::Cable(k)),
             3 => Some(Self::Worker(k)),
+            4 => Some(Self::Train(k)),
             _ => None,
         }
     }
 }
 
 /// A body that was awake before the step.
+#[derive(Clone)]
 struct Awake {
     body: RigidBodyHandle,
     id: u128,
@@ -98,12 +107,14 @@ struct Awake {
 }
 
 /// Everything that the train may hit.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(super) struct Things {
     /// `None` for what was taken away again.
     pub things: Vec<Option<Thing>>,
     pub cables: Vec<Cable>,
     walkers: Vec<Walker>,
+    /// Names of other trains.
+    trains: Vec<String>,
     ground: Ground,
     /// Still to come, the next one last.
     to_come: Vec<Single>,
@@ -142,6 +153,9 @@ impl Things {
         });
         let mut things = Self {
             walkers: walkers.collect(),
+            trains: (1..=settings.other_trains.len())
+                .map(|number| format!("other train {number}"))
+                .collect(),
             things: Vec::new(),
             cables: Vec::new(),
             ground: Ground::default(),
@@ -255,7 +269,7 @@ impl Things {
                 let path = self.walkers.get(k).map(|w| &w.settings.path);
                 path.and_then(|path| path.first()).map(|p| p.chainage_m)
             }
-            None => None,
+            Some(Owner::Train(_)) | None => None,
         };
         let Some(near_m) = near_m else {
             return;
@@ -363,6 +377,7 @@ impl Things {
             }
             Some(Owner::Cable(k)) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
             Some(Owner::Worker(k)) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
+            Some(Owner::Train(k)) => self.trains.get(k).map_or("train", String::as_str),
             None => "a body",
         }
     }

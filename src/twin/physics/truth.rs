@@ -20,22 +20,22 @@ impl World {
         Some(self.train.as_ref()?.consist.length_m())
     }
 
+    /// Chainage of the head and length of every other train.
+    pub fn other_trains_m(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        self.others.iter().filter_map(|train| {
+            let pose = train.motion()?.world_from_vehicle;
+            let head_m = train.chainage_m(&self.tunnel, &pose);
+            Some((head_m, train.consist.length_m()))
+        })
+    }
+
     /// Normal force of a wheel at rest; `None` without a train.
     pub fn wheel_load_n(&self) -> Option<f64> {
         Some(self.train.as_ref()?.consist.vehicle.wheel_load_n())
     }
 
     fn chainage_of(&self, world_from_vehicle: &Isometry3<f64>) -> Option<f64> {
-        let near = self
-            .train
-            .as_ref()?
-            .consist
-            .instruments(self.time, &self.tunnel);
-        let origin = world_from_vehicle.translation.vector.into();
-        let head = self
-            .tunnel
-            .alignment
-            .track_from_world(&origin, near.chainage_m);
-        Some(head.s_m)
+        let train = self.train.as_ref()?;
+        Some(train.chainage_m(&self.tunnel, world_from_vehicle))
     }
 }

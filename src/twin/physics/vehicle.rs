@@ -275,7 +275,7 @@ impl VehicleFile {
 }
 
 /// Springs and dampers of one element along its x, y and z, under a static load along z.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Element {
     pub stiffness_n_m: Vector,
     pub damping_n_s_m: Vector,
@@ -283,7 +283,7 @@ pub(super) struct Element {
 }
 
 /// Mass and moments of inertia of a body.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Mass {
     pub kg: f64,
     /// Roll, pitch, yaw.
@@ -291,7 +291,7 @@ pub(super) struct Mass {
 }
 
 /// A car in SI units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Vehicle {
     pub length_m: f64,
     pub width_m: f64,
@@ -324,7 +324,7 @@ pub(super) struct Vehicle {
 }
 
 /// A coupler in SI units.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Coupler {
     pub height_m: f64,
     pub stiffness_n_m: f64,

@@ -21,6 +21,7 @@ const RADIUS_M: f64 = 0.2;
 const REACH_M: f64 = 1.5;
 
 /// A worker in the world.
+#[derive(Clone)]
 pub(super) struct Walker {
     pub settings: WorkerSettings,
     /// What he carries, or has put down.

@@ -30,8 +30,6 @@ use super::line::Line;
 use super::suspension::{Axes, BodyState, Ledger, Wrench};
 use super::vehicle::{GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
 use rapier3d_f64::math::Vector;
-use rapier3d_f64::prelude::RigidBodyHandle;
-use serde::{Deserialize, Serialize};
 
 /// Equivalent conicity of moderately worn treads, by UIC 519.
 const CONICITY: f64 = 0.1;
@@ -52,7 +50,7 @@ const LET_GO_S: f64 = 0.1;
 const GIVE_BACK_S: f64 = 1.0;
 
 /// What a wheelset and its rails do to each other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WheelForces {
     /// Normal force of the left and right wheel.
     pub normal_n: [f64; 2],
@@ -67,9 +65,8 @@ pub struct WheelForces {
 }
 
 /// A wheelset.
-#[derive(Serialize, Deserialize)]
+#[derive(Clone)]
 pub(super) struct Wheelset {
-    pub body: RigidBodyHandle,
     pub forces: WheelForces,
     /// What its treads have rolled off since the start.
     pub rolled_m: f64,
@@ -101,9 +98,8 @@ pub(super) struct Drive {
 }
 
 impl Wheelset {
-    pub(super) fn new(body: RigidBodyHandle, s_m: f64, roll_rad: f64) -> Self {
+    pub(super) fn new(s_m: f64, roll_rad: f64) -> Self {
         Self {
-            body,
             forces: WheelForces {
                 effort_share: 1.0,
                 ..WheelForces::default()

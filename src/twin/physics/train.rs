@@ -1,0 +1,188 @@
+//! A train under way: its bodies, its driver, its recent past, and what it looks like.
+
+use super::consist::{Consist, Crowd};
+use super::driver::{Driver, Effort, STANDING_MPS};
+use super::history::{History, VehicleMotion};
+use super::line::Line;
+use super::settings::TrainSettings;
+use super::wheelset::WheelForces;
+use super::{PhysicsError, TrainState};
+use crate::bus::{SimTime, TrainCommand};
+use crate::track::Tunnel;
+use crate::twin::render::{Body, Headlight, Shape};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
+use rapier3d_f64::prelude::PhysicsWorld;
+
+/// So long a train runs, or stands, before its start: springs and dampers come to rest.
+pub(super) const RUN_IN_S: f64 = 5.0;
+/// A headlight's lens.
+const LENS_RADIUS_M: f64 = 0.09;
+/// Headlights: beside the centreline, over top of rail, looking down to the track ahead.
+const HEADLIGHT_LATERAL_M: f64 = 0.9;
+const HEADLIGHT_HEIGHT_M: f64 = 1.0;
+const HEADLIGHT_DOWN_RAD: f64 = 0.02;
+/// Narrow beam: half its intensity at 9 degrees from the axis.
+const HEADLIGHT_EXPONENT: f64 = 56.0;
+/// Painted steel.
+const CAR_ALBEDO: f64 = 0.5;
+
+/// A train under way.
+#[derive(Clone)]
+pub(super) struct Train {
+    pub consist: Consist,
+    pub history: History,
+    driver: Driver,
+    pub effort: Effort,
+}
+
+impl Train {
+    /// A train that has yet to run in over the last metres before its starting place.
+    pub(super) fn new(
+        world: &mut PhysicsWorld,
+        tunnel: &Tunnel,
+        settings: &TrainSettings,
+        crowd: Crowd,
+        history_steps: usize,
+    ) -> Self {
+        let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
+        Self {
+            consist: Consist::new(world, tunnel, settings, head_m, crowd),
+            history: History::new(history_steps),
+            driver: Driver::new(settings),
+            effort: Effort::default(),
+        }
+    }
+
+    /// Forces of a step of the run-in: held at the starting speed, or braked at standstill.
+    pub(super) fn run_in(
+        &mut self,
+        world: &mut PhysicsWorld,
+        tunnel: &Tunnel,
+        line: &Line<'_>,
+        dt_s: f64,
+    ) {
+        let settings = &self.consist.settings;
+        let speed_mps = settings.start_speed_kmh / 3.6;
+        let runs = speed_mps > STANDING_MPS;
+        let effort = Effort {
+            traction_mps2: 0.0,
+            brake_mps2: if runs {
+                0.0
+            } else {
+                settings.service_brake_mps2
+            },
+        };
+        self.consist.apply_forces(world, tunnel, line, effort, dt_s);
+        if runs {
+            self.consist.hold_speed(world, speed_mps, dt_s);
+        }
+    }
+
+    /// The run begins.
+    pub(super) fn begin(&mut self) {
+        self.consist.open_book();
+        self.history.push(self.consist.motion(SimTime::ZERO));
+    }
+
+    /// The driver's decision, and the forces of a step.
+    pub(super) fn drive(
+        &mut self,
+        world: &mut PhysicsWorld,
+        tunnel: &Tunnel,
+        line: &Line<'_>,
+        command: &TrainCommand,
+        (now, dt_s): (SimTime, f64),
+    ) {
+        let instruments = self.consist.instruments(now, tunnel);
+        self.effort = self.driver.step(&instruments, command, dt_s);
+        self.consist
+            .apply_forces(world, tunnel, line, self.effort, dt_s);
+    }
+
+    /// What a step came to.
+    pub(super) fn read(&mut self, world: &PhysicsWorld, now: SimTime) -> Result<(), PhysicsError> {
+        self.consist.read(world, now)?;
+        self.history.push(self.consist.motion(now));
+        Ok(())
+    }
+
+    /// Motion of its vehicle frame now.
+    pub(super) fn motion(&self) -> Option<&VehicleMotion> {
+        self.history.latest()
+    }
+
+    /// Chainage of the origin of its vehicle frame at a pose.
+    pub(super) fn chainage_m(&self, tunnel: &Tunnel, world_from_vehicle: &Isometry3<f64>) -> f64 {
+        let near_m = self.consist.instruments(SimTime::ZERO, tunnel).chainage_m;
+        let origin = world_from_vehicle.translation.vector.into();
+        tunnel.alignment.track_from_world(&origin, near_m).s_m
+    }
+
+    /// As it really is.
+    pub(super) fn state(&self, tunnel: &Tunnel, dt_s: f64) -> Option<TrainState> {
+        let (consist, motion) = (&self.consist, self.motion()?);
+        let chainage_m = self.chainage_m(tunnel, &motion.world_from_vehicle);
+        let frame = tunnel.alignment.at(chainage_m);
+        let along = frame.world_from_line().rotation * Vector3::x();
+        Some(TrainState {
+            time: motion.time,
+            chainage_m,
+            speed_mps: motion.velocity_mps.dot(&along),
+            accel_mps2: consist.accel_mps2(along, dt_s),
+            world_from_vehicle: motion.world_from_vehicle,
+            world_from_cars: consist.boxes().collect(),
+            floor_accel_mps2: consist.floor_accel_mps2(dt_s),
+            primary_travel_m: consist.travel_m[0],
+            secondary_travel_m: consist.travel_m[1],
+            standing: consist.speed_mps().abs() < STANDING_MPS,
+            traction_mps2: self.effort.traction_mps2,
+            brake_mps2: self.effort.brake_mps2,
+            wheels: self.wheel_forces().collect(),
+            couplers_n: consist.couplers_n.clone(),
+        })
+    }
+
+    fn wheel_forces(&self) -> impl Iterator<Item = WheelForces> + '_ {
+        self.consist.wheelsets.iter().map(|w| w.forces)
+    }
+
+    /// Boxes with the lenses of its headlights.
+    pub(super) fn bodies(&self) -> Vec<Body> {
+        let half = self.consist.half_extents_m();
+        let cars = self.consist.boxes().zip(self.consist.velocities_mps());
+        let mut bodies: Vec<Body> = cars
+            .map(|(world_from_body, velocity_mps)| Body {
+                shape: Shape::Box(half),
+                world_from_body,
+                velocity_mps,
+                albedo: CAR_ALBEDO,
+                luminance_cd_m2: 0.0,
+            })
+            .collect();
+        let velocity_mps = bodies.first().map_or(Vector3::zeros(), |b| b.velocity_mps);
+        let lens_m2 = std::f64::consts::PI * LENS_RADIUS_M.powi(2);
+        bodies.extend(self.headlights().into_iter().flatten().map(|light| Body {
+            shape: Shape::Sphere(LENS_RADIUS_M),
+            world_from_body: light.world_from_light,
+            velocity_mps,
+            albedo: CAR_ALBEDO,
+            luminance_cd_m2: light.intensity_cd / lens_m2,
+        }));
+        bodies
+    }
+
+    /// The two headlights.
+    pub(super) fn headlights(&self) -> Option<[Headlight; 2]> {
+        let motion = self.motion()?;
+        let down = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), HEADLIGHT_DOWN_RAD);
+        Some(
+            [HEADLIGHT_LATERAL_M, -HEADLIGHT_LATERAL_M].map(|lateral| Headlight {
+                world_from_light: motion.world_from_vehicle
+                    * Isometry3::translation(0.0, lateral, HEADLIGHT_HEIGHT_M)
+                    * down,
+                intensity_cd: self.consist.settings.headlight_cd,
+                exponent: HEADLIGHT_EXPONENT,
+            }),
+        )
+    }
+}
