@@ -56,6 +56,8 @@ mod things;
 #[cfg(test)]
 mod things_tests;
 mod truth;
+#[cfg(test)]
+mod validation;
 mod vehicle;
 mod walker;
 mod wheelset;
