@@ -276,7 +276,7 @@ impl Session<'_> {
             primary_travel_m: 0.003 * (t_s * 31.0).sin(),
             secondary_travel_m: 0.012 * (t_s * 7.0).sin(),
             wheels: vec![wheel; 4 * self.cars],
-            couplers_n: vec![-2e4; self.cars - 1],
+            couplers_n: vec![-2e4; self.cars.saturating_sub(1)],
             ..TrainState::default()
         };
         let left = truth.world_from_vehicle * self.rig.vehicle_from_left;
