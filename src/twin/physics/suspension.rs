@@ -139,7 +139,8 @@ pub(super) fn secondary(
     (bogie, on_bogie): (&BodyState, &mut Wrench),
     book: &mut Ledger,
 ) -> f64 {
-    let axes = Axes::of(car.rotation);
+    // Halfway between both bodies, as the points where the forces act: so they have a potential.
+    let axes = Axes::of(car.rotation.lerp(bogie.rotation, 0.5));
     let mut compression_m = 0.0;
     let mut pair = |force: Vector, world: Vector| {
         on_car.add_at(car, force, world);
