@@ -128,7 +128,7 @@ mod tests {
             let slope = 0.5 * (law.in_adhesion + law.in_slip);
             assert!((law.share(1e-3, load_n, 0.0) / slope - 1.0).abs() < 1e-6);
             assert!((law.share(0.0, load_n, 0.0) - slope).abs() < 1e-12);
-            assert_eq!(law.share(1e3, 0.0, 0.0), 0.0);
+            assert!(law.share(1e3, 0.0, 0.0).abs() < 1e-300);
             let speed_mps = 10.0;
             let force = |creepage: f64| {
                 let linear_n = KALKER_ALONG_N * creepage;

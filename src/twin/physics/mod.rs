@@ -58,6 +58,8 @@ mod things;
 mod things_tests;
 mod train;
 mod truth;
+#[cfg(test)]
+mod validation;
 mod vehicle;
 mod walker;
 mod wheelset;

@@ -7,13 +7,11 @@
     reason = "tests may panic, compare bytes, and say what they measured"
 )]
 
-use super::driver::Effort;
 use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::{Alignment, Grade, PlanElement};
-use crate::twin::sensors::{Imu, ImuSettings};
-use nalgebra::{Matrix4, Point3};
+use nalgebra::Point3;
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 fn car(name: &str) -> Vehicle {
@@ -90,161 +88,6 @@ fn stands_in_equilibrium() {
     assert_eq!(train.world_from_cars.len(), 6);
 }
 
-/// Bounce of a car on two springs in series with bogie masses between, by the eigenvalues of the
-/// symmetric two-mass model, for both vehicles.
-#[test]
-fn val_bounce_frequency() {
-    for set in ["manchester", "metro_b1_empty", "metro_b1_crush"] {
-        let v = car(set);
-        let (ks, cs) = (
-            4.0 * v.secondary.stiffness_n_m.z,
-            4.0 * v.secondary.damping_n_s_m.z,
-        );
-        let (kp, cp) = (
-            8.0 * v.primary.stiffness_n_m.z,
-            8.0 * v.primary.damping_n_s_m.z,
-        );
-        let (mc, mb) = (v.car.kg, 2.0 * v.bogie.kg);
-        #[rustfmt::skip]
-        let a = Matrix4::new(
-            0.0, 0.0, 1.0, 0.0,
-            0.0, 0.0, 0.0, 1.0,
-            -ks / mc, ks / mc, -cs / mc, cs / mc,
-            ks / mb, -(ks + kp) / mb, cs / mb, -(cs + cp) / mb,
-        );
-        let modes = a.complex_eigenvalues();
-        let wanted = modes
-            .iter()
-            .filter(|m| m.im > 0.0)
-            .map(|m| m.im)
-            .fold(f64::MAX, f64::min);
-        let mut world = World::new(
-            straight(),
-            &settings(TrainSettings {
-                vehicle: set.to_owned(),
-                cars: 1,
-                ..TrainSettings::default()
-            }),
-            1,
-            0,
-        )
-        .unwrap();
-        let body = world.train.as_ref().unwrap().consist.handles[0];
-        let rest = world.rapier.bodies[body].translation();
-        world.rapier.bodies[body].set_translation(rest + Vector::Z * 0.005, true);
-        // The car's state is read from the bodies after each step: once before the first.
-        let now = world.time;
-        world
-            .train
-            .as_mut()
-            .unwrap()
-            .consist
-            .read(&world.rapier, now)
-            .unwrap();
-        let mut crossings = Vec::new();
-        let mut before = 0.005;
-        for k in 0..6000 {
-            world.step(&command(BrakeDemand::None, 0.0)).unwrap();
-            let z = world.rapier.bodies[body].translation().z - rest.z;
-            if before < 0.0 && z >= 0.0 {
-                crossings.push(f64::from(k) * 0.001 + 0.001 * -before / (z - before));
-            }
-            before = z;
-        }
-        let periods = crossings.len() - 1;
-        let span = crossings[periods] - crossings[0];
-        let got = std::f64::consts::TAU * periods as f64 / span;
-        eprintln!(
-            "{set}: bounce {:.4} Hz, closed form {:.4} Hz",
-            got / std::f64::consts::TAU,
-            wanted / std::f64::consts::TAU
-        );
-        assert!(periods >= 3 && (got / wanted - 1.0).abs() < 0.02);
-    }
-}
-
-/// Resistance on the wrong mass, or rotating parts forgotten, change the speed after a minute.
-#[test]
-fn coasts_down_as_the_equation_of_motion() {
-    let train = TrainSettings {
-        start_speed_kmh: 60.0,
-        cars: 2,
-        jerk_mps3: 10.0,
-        ..TrainSettings::default()
-    };
-    let mut world = World::new(straight(), &settings(train.clone()), 1, 0).unwrap();
-    // Coasting: the driver's lever is taken out of his hand.
-    let (mut v, dt) = (60.0 / 3.6, 1e-3);
-    for _ in 0..20_000 {
-        coast(&mut world);
-        v -= dt * (train.davis_a_mps2 + train.davis_c_per_m * v * v);
-    }
-    let got = world.train().unwrap().speed_mps;
-    assert!((got - v).abs() < 1e-3 * v, "{got} against {v} m/s");
-}
-
-/// A step without traction and brake.
-fn coast(world: &mut World) {
-    let (tunnel, dt_s) = (&world.tunnel, world.step_s);
-    let line = Line::new(tunnel, &world.irregularity, &world.settings.track);
-    let consist = &mut world.train.as_mut().unwrap().consist;
-    consist.apply_forces(&mut world.rapier, tunnel, &line, Effort::default(), dt_s);
-    world.go().unwrap();
-}
-
-/// On a gradient a train without resistance gains g sin over 1 + rotating share.
-#[test]
-fn rolls_down_a_gradient() {
-    let train = TrainSettings {
-        cars: 2,
-        davis_a_mps2: 0.0,
-        davis_c_per_m: 0.0,
-        ..TrainSettings::default()
-    };
-    let line = tunnel(&[PlanElement::straight(3000.0)], -0.03);
-    let mut world = World::new(line, &settings(train), 1, 0).unwrap();
-    for _ in 0..10_000 {
-        coast(&mut world);
-    }
-    let v = car("metro_b1_crush");
-    let share = v.total_kg() / v.effective_kg();
-    let want = GRAVITY_MPS2 * f64::sin(f64::atan(0.03)) * share * 10.0;
-    let got = world.train().unwrap().speed_mps;
-    assert!((got / want - 1.0).abs() < 2e-3, "{got} against {want} m/s");
-}
-
-/// Emergency brake from 80 km/h: build-up, then constant deceleration, then it stands.
-#[test]
-fn val_emergency_braking_distance() {
-    let train = TrainSettings {
-        cars: 2,
-        start_chainage_m: 300.0,
-        start_speed_kmh: 80.0,
-        cruise_speed_kmh: 80.0,
-        davis_a_mps2: 0.0,
-        davis_c_per_m: 0.0,
-        ..TrainSettings::default()
-    };
-    let mut world = World::new(straight(), &settings(train), 1, 0).unwrap();
-    run(&mut world, 30.0, &command(BrakeDemand::Emergency, GO));
-    let (v, a, t) = (80.0 / 3.6, 1.3, 1.5);
-    let after = v - a * t / 2.0;
-    let want = v * t - a * t * t / 6.0 + after * after / (2.0 * a);
-    let state = world.train().unwrap();
-    let got = state.chainage_m - 300.0;
-    eprintln!("braking distance {got:.2} m, closed form {want:.2} m");
-    assert!((got / want - 1.0).abs() < 0.01);
-    assert!(state.standing);
-    // It stays while the demand holds, whatever the driver would like.
-    run(&mut world, 5.0, &command(BrakeDemand::Emergency, GO));
-    assert!((world.train().unwrap().chainage_m - 300.0 - got).abs() < 1e-3);
-    run(&mut world, 10.0, &command(BrakeDemand::None, GO));
-    assert!(
-        world.train().unwrap().speed_mps > 1.0,
-        "does not start again"
-    );
-}
-
 /// A standing train does not creep down a gradient.
 #[test]
 fn holds_on_a_gradient() {
@@ -285,51 +128,6 @@ fn driver_keeps_limits_and_stops_at_the_mark() {
     assert!(fastest < 50.0 / 3.6 && fastest > 46.0 / 3.6);
     assert!(hardest < 0.7501, "{hardest} m/s^3");
     assert!(state.standing && (state.chainage_m - 900.0).abs() < 0.3);
-}
-
-/// Steady curve: the inertial unit's lateral specific force is that of the curve less cant, times
-/// 1 + s because the car leans out on its springs. UIC 505-1 allows a flexibility coefficient s of
-/// 0.4; a car without roll bars has no less than 0.1.
-#[test]
-fn curve_quasi_static() {
-    let (radius, cant, speed) = (400.0, 0.06, 60.0 / 3.6);
-    let line = tunnel(&[PlanElement::arc(1800.0, 1.0 / radius, cant)], 0.0);
-    let train = TrainSettings {
-        start_speed_kmh: 60.0,
-        cars: 2,
-        ..TrainSettings::default()
-    };
-    let mut world = World::new(line.clone(), &settings(train), 1, 0).unwrap();
-    run(&mut world, 30.0, &command(BrakeDemand::None, GO));
-    let mut imu = Imu::new(&ImuSettings::ideal(), 1, 0);
-    let mut lateral = 0.0;
-    let mut yaw = 0.0;
-    for k in 0..=200 {
-        run(&mut world, 0.005, &command(BrakeDemand::None, GO));
-        if let Some(sample) = imu.sample(&world) {
-            assert!(k > 0);
-            lateral += sample.accel_m_s2.y / 200.0;
-            yaw += sample.gyro_rad_s.z / 200.0;
-        }
-    }
-    let state = world.train().unwrap();
-    let frame = line.alignment.at(state.chainage_m);
-    let v = state.speed_mps;
-    assert!((v - speed).abs() < 0.1);
-    let y = frame.world_from_rails().rotation * Vector3::y();
-    let wanted = v * v / radius * y.dot(&frame.left()) + GRAVITY_MPS2 * y.z;
-    eprintln!("lateral {lateral:.4} m/s^2, in the rails' plane {wanted:.4}; yaw {yaw:.5} rad/s");
-    assert!((1.1..1.4).contains(&(lateral / wanted)));
-    assert!((yaw * radius / v - 1.0).abs() < 0.01);
-    // Every car follows the curve: its ends are inside by the versine, no more.
-    for car in &state.world_from_cars {
-        let centre = car.translation.vector.into();
-        let l = line
-            .alignment
-            .track_from_world(&centre, state.chainage_m)
-            .l_m;
-        assert!(l.abs() < 0.25, "{l} m off the centreline");
-    }
 }
 
 /// Same seed, same bytes; another seed or run, another shake.
@@ -398,48 +196,6 @@ fn pose_history_of_a_shaken_train() {
     assert!(worst_m < 1e-4 && worst_rad < 5e-6);
     assert!(world.vehicle_at(world.time().plus(-0.3)).is_some());
     assert!(world.vehicle_at(world.time().plus(0.001)).is_none());
-}
-
-/// Ride of the Manchester car at 60 km/h on German low disturbance, beside a linear six-degree
-/// vertical model (0.063 m/s^2 at the car's centre, 0.090 over the bogie, 0.3 to 30 Hz): here
-/// without the band limits and with all degrees of freedom, so within a factor of two.
-#[test]
-fn val_vertical_ride() {
-    let train = TrainSettings {
-        vehicle: "manchester".to_owned(),
-        start_speed_kmh: 60.0,
-        cars: 1,
-        davis_a_mps2: 0.0,
-        davis_c_per_m: 0.0,
-        ..TrainSettings::default()
-    };
-    let shaken = PhysicsSettings {
-        train: Some(train),
-        ..PhysicsSettings::default()
-    };
-    let mut world = World::new(straight(), &shaken, 4, 0).unwrap();
-    let (mut centre, mut floor, mut bounce, mut n) = (0.0, 0.0, 0.0, 0.0);
-    let mut before = 0.0;
-    for k in 0..60_000 {
-        coast(&mut world);
-        let consist = &world.train.as_ref().unwrap().consist;
-        let vz = consist.states[0].velocity.z;
-        if k > 5000 {
-            centre += ((vz - before) / 0.001).powi(2);
-            floor += consist.floor_accel_mps2(0.001).z.powi(2);
-            bounce += (consist.states[0].position.z - 6.8).powi(2);
-            n += 1.0;
-        }
-        before = vz;
-    }
-    let [centre, floor, bounce] = [centre, floor, bounce].map(|x: f64| (x / n).sqrt());
-    eprintln!(
-        "60 km/h: centre {centre:.3} m/s^2, over bogie {floor:.3}, bounce {:.2} mm",
-        1e3 * bounce
-    );
-    assert!((0.03..0.13).contains(&centre));
-    assert!((0.045..0.18).contains(&floor));
-    assert!((0.9..3.5).contains(&(1e3 * bounce)));
 }
 
 /// A world that was saved in the middle of a fall and a shake goes on in every byte as the one that
