@@ -355,7 +355,12 @@ fn val_braking_on_slippery_rails() {
         for _ in 0..1500 {
             run(&mut world, 0.1, &command(BrakeDemand::Emergency, 200.0));
             let v = consist(&world).speed_mps();
-            for wheel in consist(&world).wheel_forces().filter(|_| v > 3.0) {
+            for wheel in consist(&world)
+                .wheelsets
+                .iter()
+                .map(|w| w.forces)
+                .filter(|_| v > 3.0)
+            {
                 looks += 1.0;
                 sliding += f64::from(u8::from(wheel.slip_mps > 0.02 * v));
                 deepest = deepest.max(wheel.slip_mps / v);
@@ -401,7 +406,11 @@ fn val_starting_on_leaves() {
     let mut slips = 0.0f64;
     for _ in 0..200 {
         run(&mut world, 0.1, &go());
-        let least = consist(&world).wheel_forces().map(|w| w.slip_mps);
+        let least = consist(&world)
+            .wheelsets
+            .iter()
+            .map(|w| w.forces)
+            .map(|w| w.slip_mps);
         slips = slips.min(least.fold(0.0, f64::min));
     }
     let v = world.train().unwrap().speed_mps;
