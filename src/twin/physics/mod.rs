@@ -23,13 +23,22 @@
 //! # Ok(()) }
 //! ```
 //!
+//! | | |
+//! |---|---|
+//! | track | `irregularity` and `defect` (where the rails lie), `adhesion` (how slippery they are), `line` (all of it, as a wheelset asks) |
+//! | train | `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train` |
+//! | things | `obstacle`, `shape`, `thing`, `cable` and `catenary`, `worker` and `walker`, `ground`, `impact`, `things` |
+//! | world | `settings`, `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
+//!
 //! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
-//! come with the program. The step moves positions with the new velocities (symplectic Euler, one solver iteration), so
-//! springs gain no energy.
+//! come with the program. All bodies and their integration are rapier's: forces are put on them by
+//! hand, and the step moves positions with the new velocities (symplectic Euler, one solver
+//! iteration), so that springs gain no energy. A train runs in for five seconds before its start,
+//! so that it begins leaning in its curve and shaken by its track.
 //!
 //! Not modelled: real wheel profiles (treads are cones), the contact's own stiffness (the rail gives
-//! more), flexible car bodies, air springs, pressure waves. Trains run up the line only. A thing that
-//! slides fast may stumble at a seam of the ground, every 2 m.
+//! more), flexible car bodies, air springs, pressure waves, ringing of the track. Trains run up the
+//! line only. A thing that slides fast may stumble at a seam of the ground, every 2 m.
 
 mod adhesion;
 mod cable;
