@@ -55,9 +55,7 @@ pub(super) fn in_tunnel(
     tunnel: &Tunnel,
     problems: &mut Vec<Problem>,
 ) -> Vec<WaysidePost> {
-    if let Some(train) = &file.train {
-        check_train(train, file.duration_s, tunnel, problems);
-    }
+    check_trains(file, tunnel, problems);
     if let Some(bench) = &file.bench {
         let heads: Vec<f64> = bench.heads_m().collect();
         for (key, head) in [("first_m", heads.first()), ("points", heads.last())] {
@@ -213,42 +211,60 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     }
 }
 
+/// Each on the line, and no two in the same place.
+fn check_trains(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+    let own = file.train.iter().map(|train| ("train".to_owned(), train));
+    let others = file.other_trains.iter().enumerate();
+    let others = others.map(|(k, train)| (format!("other_trains[{k}]"), train));
+    let trains: Vec<_> = own.chain(others).collect();
+    for (k, (at, train)) in trains.iter().enumerate() {
+        check_train(at, train, file.duration_s, tunnel, problems);
+        let taken = |train: &TrainSettings| {
+            let head_m = train.start_chainage_m;
+            (head_m - train.length_m(), head_m)
+        };
+        let (tail_m, head_m) = taken(train);
+        let before = trains[..k].iter().find(|(_, other)| {
+            let (other_tail_m, other_head_m) = taken(other);
+            tail_m < other_head_m && other_tail_m < head_m
+        });
+        if let Some((other, _)) = before {
+            problems.push(Problem::new(
+                format!("{at}.start_chainage_m"),
+                format!("it stands from {tail_m:.1} to {head_m:.1} m, where `{other}` stands too"),
+                "start them clear of each other",
+            ));
+        }
+    }
+}
+
 fn check_train(
+    at: &str,
     train: &TrainSettings,
     duration_s: f64,
     tunnel: &Tunnel,
     problems: &mut Vec<Problem>,
 ) {
+    let start_key = format!("{at}.start_chainage_m");
+    let stop_key = format!("{at}.stop_at_m");
     let end_m = tunnel.alignment.length_m();
     let head_m = train.start_chainage_m;
     let length_m = train.length_m();
-    inside_line(
-        "train.start_chainage_m",
-        "the train head",
-        head_m,
-        tunnel,
-        problems,
-    );
+    inside_line(&start_key, "the train head", head_m, tunnel, problems);
     if head_m < length_m {
         problems.push(Problem::new(
-            "train.start_chainage_m",
+            start_key,
             format!("with its head at {head_m} m a train of {length_m:.1} m begins outside"),
             format!("start at {length_m:.1} m or further up the line"),
         ));
     }
     if let Some(stop_m) = train.stop_at_m {
-        inside_line(
-            "train.stop_at_m",
-            "the train head",
-            stop_m,
-            tunnel,
-            problems,
-        );
+        inside_line(&stop_key, "the train head", stop_m, tunnel, problems);
     } else {
         let reach_m = head_m + farthest_run_m(train, duration_s);
         if reach_m > end_m {
             problems.push(Problem::new(
-                "train.stop_at_m",
+                stop_key,
                 format!(
                     "it is not given, and in {duration_s} s the train can get to {reach_m:.0} m, \
                      past the end of the tunnel at {end_m:.0} m"
@@ -470,5 +486,24 @@ mod tests {
         assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
         let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";
         assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
+    }
+
+    /// Two trains in one place would burst apart.
+    #[test]
+    fn trains_stand_clear_of_each_other() {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let keys = |other_m: f64| {
+            let text = format!(
+                "name = \"test\"\ntunnel = \"given\"\n[train]\nstart_chainage_m = 300.0\n\
+                 stop_at_m = 2000.0\n[[other_trains]]\nstart_chainage_m = {other_m}\n\
+                 stop_at_m = 2500.0\n"
+            );
+            let mut problems = Vec::new();
+            in_tunnel(&read_toml(&text).unwrap(), &tunnel, &mut problems);
+            problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+        };
+        assert_eq!(keys(420.0), [""; 0]);
+        assert_eq!(keys(417.0), ["other_trains[0].start_chainage_m"]);
     }
 }
