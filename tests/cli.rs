@@ -264,7 +264,7 @@ fn wrong_override() {
     for (change, words) in [
         (
             "train.cars=0",
-            ["train.cars: 0 cars", "(--set train.cars=0)", "give 1 to 6"],
+            ["train.cars: 0 cars", "(--set train.cars=0)", "give 1 to 8"],
         ),
         (
             "train.crs=9",

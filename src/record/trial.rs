@@ -260,7 +260,6 @@ impl Session<'_> {
             lateral_n: 3e3 * (t_s * 9.0).sin(),
             along_n: -2e3,
             slip_mps: 0.01,
-            effort_share: 1.0,
         };
         let truth = TrainState {
             time: SimTime::from_secs(t_s),

@@ -123,6 +123,7 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     }
     for (key, count) in [
         ("wayside", file.wayside.len()),
+        ("other_trains", file.other_trains.len()),
         ("obstacles", file.obstacles.len()),
         ("cables", file.cables.len()),
         ("workers", file.workers.len()),
@@ -150,7 +151,7 @@ fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         return;
     };
     // A train without cars is a problem of its own.
-    let axles = AXLES_PER_CAR.saturating_mul(train.cars.max(1));
+    let axles = train.axles().max(1);
     let axle = file.odometer.axle;
     if axle > axles {
         problems.push(Problem::new(
@@ -160,9 +161,6 @@ fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         ));
     }
 }
-
-/// Two bogies of two wheelsets.
-const AXLES_PER_CAR: u32 = 4;
 
 fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     let late = |problems: &mut Vec<Problem>, key: String, what: &str, at_s: f64| {

@@ -4,12 +4,12 @@
 use super::PhysicsError;
 use super::convert::{isometry, vector, vector3};
 use super::driver::{Effort, Instruments};
-use super::energy::EnergyBook;
+use super::energy::{EnergyBook, Ledger};
 use super::history::VehicleMotion;
 use super::line::Line;
-use super::placement::{self, BODIES};
+use super::placement::{self, AXLES, BODIES, Part};
 use super::settings::TrainSettings;
-use super::suspension::{Axes, BodyState, Ledger, Wrench, coupler, primary, secondary};
+use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
 use super::vehicle::{GRAVITY_MPS2, Mass, Vehicle};
 use super::wheelset::{Drive, Wheelset};
 use crate::bus::SimTime;
@@ -49,9 +49,10 @@ pub(super) struct Consist {
     pub wheelsets: Vec<Wheelset>,
     /// Of every car in turn: itself, its bogies, its wheelsets, at the start of the step.
     pub states: Vec<BodyState>,
-    /// Mean compression of the leading axle's primary springs, and of the secondary springs over
-    /// it.
-    pub travel_m: [f64; 2],
+    /// Mean compression of the leading axle's primary springs.
+    pub primary_travel_m: f64,
+    /// And of the secondary springs over it.
+    pub secondary_travel_m: f64,
     /// Pull of every coupler.
     pub couplers_n: Vec<f64>,
     pub handles: Vec<RigidBodyHandle>,
@@ -85,7 +86,8 @@ impl Consist {
             settings: settings.clone(),
             wheelsets: Vec::new(),
             states: cars.concat(),
-            travel_m: [0.0; 2],
+            primary_travel_m: 0.0,
+            secondary_travel_m: 0.0,
             couplers_n: vec![0.0; cars.len() - 1],
             handles: Vec::new(),
             colliders: Vec::new(),
@@ -120,7 +122,7 @@ impl Consist {
                 .linvel(state.velocity)
                 .angvel(state.angular)
                 .additional_mass_properties(MassProperties::new(Vector::ZERO, kg, kg_m2))
-                .gyroscopic_forces_enabled(k >= 3)
+                .gyroscopic_forces_enabled(matches!(Part::of(k), Part::Wheelset))
                 .can_sleep(false);
             self.handles.push(world.insert_body(body));
         }
@@ -141,12 +143,12 @@ impl Consist {
             .push(world.insert_collider(collider, Some(car)));
     }
 
-    /// Of body `k` of a car, or of the train.
+    /// Of body `k`.
     fn mass(&self, k: usize) -> Mass {
-        match k % BODIES {
-            0 => self.vehicle.car,
-            1 | 2 => self.vehicle.bogie,
-            _ => self.vehicle.wheelset,
+        match Part::of(k) {
+            Part::Body => self.vehicle.car,
+            Part::Bogie => self.vehicle.bogie,
+            Part::Wheelset => self.vehicle.wheelset,
         }
     }
 
@@ -160,12 +162,6 @@ impl Consist {
     fn box_centre_m(&self) -> Vector3<f64> {
         let middle = 0.5 * (self.vehicle.height_m + UNDERSIDE_M);
         Vector3::new(0.0, 0.0, middle - self.vehicle.car_cg_m)
-    }
-
-    fn coupler_m(&self, end: f64) -> Vector {
-        let v = &self.vehicle;
-        let height_m = v.coupler.height_m - v.car_cg_m;
-        Vector::new(end * 0.5 * v.length_m, 0.0, height_m)
     }
 
     /// Origin of the vehicle frame in the leading car's body.
@@ -183,21 +179,28 @@ impl Consist {
         self.vehicle.total_kg() * f64::from(self.settings.cars)
     }
 
+    /// Chainage of the train head, by its leading wheelset.
+    pub(super) fn head_chainage_m(&self) -> f64 {
+        let v = &self.vehicle;
+        let overhang_m = 0.5 * v.length_m - v.semi_bogie_distance_m - v.semi_wheelbase_m;
+        self.wheelsets[0].s_m + overhang_m
+    }
+
+    /// Chainage of the train's middle.
+    fn middle_m(&self) -> f64 {
+        self.head_chainage_m() - 0.5 * self.length_m()
+    }
+
     /// What the driver goes by.
     pub(super) fn instruments(&self, time: SimTime, tunnel: &Tunnel) -> Instruments {
         let v = &self.vehicle;
-        let overhang_m = 0.5 * v.length_m - v.semi_bogie_distance_m - v.semi_wheelbase_m;
-        let chainage_m = self.wheelsets[0].s_m + overhang_m;
-        let speed_mps = self.speed_mps();
-        let middle_m = chainage_m - 0.5 * self.length_m();
-        let slope = tunnel.alignment.at(middle_m).slope;
+        let slope = tunnel.alignment.at(self.middle_m()).slope;
         let share = v.total_kg() / v.effective_kg();
         Instruments {
             time_s: time.secs(),
-            chainage_m,
-            speed_mps,
-            resistance_mps2: self.davis_mps2(tunnel, middle_m, speed_mps)
-                + GRAVITY_MPS2 * slope * share,
+            chainage_m: self.head_chainage_m(),
+            speed_mps: self.speed_mps(),
+            resistance_mps2: self.davis_mps2(tunnel) + GRAVITY_MPS2 * slope * share,
         }
     }
 
@@ -209,9 +212,9 @@ impl Consist {
 
     /// Running resistance as a deceleration, without gradients and curves: those take theirs by
     /// weight and by creep.
-    fn davis_mps2(&self, tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> f64 {
-        let (s, v) = (&self.settings, speed_mps.abs());
-        let confined = match tunnel.section_at(s_m) {
+    fn davis_mps2(&self, tunnel: &Tunnel) -> f64 {
+        let (s, v) = (&self.settings, self.speed_mps().abs());
+        let confined = match tunnel.section_at(self.middle_m()) {
             Some(_) => s.tunnel_factor,
             None => 1.0,
         };
@@ -230,15 +233,13 @@ impl Consist {
         self.previous = self.states[0];
         self.wrenches.fill(Wrench::default());
         self.ledger = Ledger::default();
-        let head_m = self.wheelsets[0].s_m;
-        let davis_mps2 = self.davis_mps2(tunnel, head_m, self.speed_mps());
-        let mut resisted_w = 0.0;
-        for k in 0..self.colliders.len() {
+        let davis_mps2 = self.davis_mps2(tunnel);
+        for k in 0..self.settings.cars as usize {
             self.car_forces(k, line, effort, dt_s);
-            resisted_w += self.resist(k, davis_mps2);
+            self.resist(k, davis_mps2);
         }
         self.coupler_forces();
-        self.book.enter(&self.ledger, resisted_w, dt_s);
+        self.book.enter(&self.ledger, dt_s);
         for (handle, wrench) in self.handles.iter().zip(&self.wrenches) {
             if let Some(body) = world.bodies.get_mut(*handle) {
                 body.reset_forces(false);
@@ -257,7 +258,7 @@ impl Consist {
             traction_n: effort.traction_mps2 * share_kg,
             brake_n: effort.brake_mps2 * share_kg,
         };
-        let book = &mut self.ledger;
+        let ledger = &mut self.ledger;
         let bodies = BODIES * k..BODIES * (k + 1);
         let states = &self.states[bodies.clone()];
         let [car, rest @ ..] = &mut self.wrenches[bodies] else {
@@ -267,32 +268,30 @@ impl Consist {
         for (b, end) in [1.0, -1.0].into_iter().enumerate() {
             let bogie = (&states[1 + b], &mut bogies[b]);
             let at_m = end * v.semi_bogie_distance_m;
-            let travel_m = secondary(v, at_m, (&states[0], car), bogie, book);
+            let travel_m = secondary(v, at_m, (&states[0], car), bogie, ledger);
             if k == 0 && b == 0 {
-                self.travel_m[1] = travel_m;
+                self.secondary_travel_m = travel_m;
             }
             let axes = Axes::of(states[1 + b].rotation);
             for (w, end) in [(2 * b, 1.0), (2 * b + 1, -1.0)] {
                 let (state, wrench) = (&states[3 + w], &mut wheels[w]);
                 let at_m = end * v.semi_wheelbase_m;
                 let bogie = (&states[1 + b], &axes, &mut bogies[b]);
-                let travel_m = primary(v, at_m, bogie, (state, wrench), book);
+                let travel_m = primary(v, at_m, bogie, (state, wrench), ledger);
                 if k == 0 && w == 0 {
-                    self.travel_m[0] = travel_m;
+                    self.primary_travel_m = travel_m;
                 }
-                let wheelset = &mut self.wheelsets[4 * k + w];
-                let torque = wheelset.apply(v, line, drive, (state, wrench), book, dt_s);
+                let wheelset = &mut self.wheelsets[AXLES * k + w];
+                let torque = wheelset.apply(v, line, drive, (state, wrench), ledger, dt_s);
                 bogies[b].torque -= torque;
             }
         }
     }
 
-    /// Running resistance on the bogies of car `k`, at axle height. Returns its power.
-    fn resist(&mut self, k: usize, davis_mps2: f64) -> f64 {
+    /// Running resistance on the bogies of car `k`, at axle height.
+    fn resist(&mut self, k: usize, davis_mps2: f64) {
         let v = &self.vehicle;
-        let mut power_w = 0.0;
-        for b in [0, 1] {
-            let at = BODIES * k + 1 + b;
+        for at in [BODIES * k + 1, BODIES * k + 2] {
             let state = &self.states[at];
             let x = state.rotation * Vector::X;
             let speed = state.velocity.dot(x);
@@ -300,13 +299,12 @@ impl Consist {
             let force = -0.5 * davis_mps2 * v.effective_kg() * fade;
             let axle = Vector::new(0.0, 0.0, v.wheel_radius_m - v.bogie_cg_m);
             self.wrenches[at].add_at(state, x * force, state.point(axle));
-            power_w -= force * speed;
+            self.ledger.resistance_w -= force * speed;
         }
-        power_w
     }
 
     fn coupler_forces(&mut self) {
-        let ends = (self.coupler_m(-1.0), self.coupler_m(1.0));
+        let ends = (self.vehicle.coupler_m(-1.0), self.vehicle.coupler_m(1.0));
         for (k, pull) in self.couplers_n.iter_mut().enumerate() {
             let (leading, following) = (BODIES * k, BODIES * (k + 1));
             let (before, after) = self.wrenches.split_at_mut(following);
@@ -324,16 +322,8 @@ impl Consist {
     pub(super) fn read(&mut self, world: &PhysicsWorld, time: SimTime) -> Result<(), PhysicsError> {
         for (k, (handle, state)) in self.handles.iter().zip(&mut self.states).enumerate() {
             let Some(body) = world.bodies.get(*handle).filter(|b| b.is_enabled()) else {
-                let part = match k % BODIES {
-                    0 => "body".to_owned(),
-                    1 => "front bogie".to_owned(),
-                    2 => "rear bogie".to_owned(),
-                    w => format!("wheelset {}", w - 2),
-                };
-                return Err(PhysicsError::NonFinite {
-                    body: format!("{part} of car {}", k / BODIES + 1),
-                    time,
-                });
+                let body = placement::name(k);
+                return Err(PhysicsError::NonFinite { body, time });
             };
             *state = BodyState {
                 position: body.translation(),
@@ -350,9 +340,9 @@ impl Consist {
     pub(super) fn hold_speed(&mut self, world: &mut PhysicsWorld, speed_mps: f64, dt_s: f64) {
         for (k, handle) in self.handles.iter().enumerate() {
             let state = &self.states[k];
-            let along = match k % BODIES {
-                0..3 => state.rotation * Vector::X,
-                _ => state.velocity.normalize_or_zero(),
+            let along = match Part::of(k) {
+                Part::Wheelset => state.velocity.normalize_or_zero(),
+                _ => state.rotation * Vector::X,
             };
             let off = speed_mps - state.velocity.dot(along);
             let pull = off * (HOLD_PER_S * dt_s).min(1.0) / dt_s + GRAVITY_MPS2 * along.z;
@@ -396,7 +386,7 @@ impl Consist {
         let weights: f64 = bodies
             .map(|(k, s)| self.mass(k).kg * GRAVITY_MPS2 * s.position.z)
             .sum();
-        weights + self.ledger.stored_j
+        weights + self.ledger.springs_j
     }
 
     /// Motion of the vehicle frame.

@@ -1,7 +1,23 @@
 //! The energy book of a train: what traction and gravity put in, where it went, what is left.
 
-use super::suspension::Ledger;
 use serde::Serialize;
+
+/// Energy and power of one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Ledger {
+    /// Held by springs.
+    pub springs_j: f64,
+    /// Taken by dampers.
+    pub dampers_w: f64,
+    /// Taken by creep of wheels on rails.
+    pub creep_w: f64,
+    /// Given by traction.
+    pub traction_w: f64,
+    /// Taken by brakes.
+    pub brake_w: f64,
+    /// Taken by running resistance.
+    pub resistance_w: f64,
+}
 
 /// Energy of the train since the start, J. What was there at the start and came in by traction is
 /// still there, or was lost: [`Self::gap_j`] says by how much this fails. Hits are not in it.
@@ -27,11 +43,11 @@ pub struct EnergyBook {
 
 impl EnergyBook {
     /// Enters a step.
-    pub(super) fn enter(&mut self, now: &Ledger, resistance_w: f64, dt_s: f64) {
-        self.traction_j += now.driven_w * dt_s;
-        self.brake_j += now.braked_w * dt_s;
-        self.resistance_j += resistance_w * dt_s;
-        self.dampers_j += now.lost_w * dt_s;
+    pub(super) fn enter(&mut self, now: &Ledger, dt_s: f64) {
+        self.traction_j += now.traction_w * dt_s;
+        self.brake_j += now.brake_w * dt_s;
+        self.resistance_j += now.resistance_w * dt_s;
+        self.dampers_j += now.dampers_w * dt_s;
         self.creep_j += now.creep_w * dt_s;
     }
 

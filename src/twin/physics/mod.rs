@@ -26,7 +26,7 @@
 //! | | |
 //! |---|---|
 //! | track | `irregularity` and `defect` (where the rails lie), `adhesion` (how slippery they are), `line` (all of it, as a wheelset asks) |
-//! | train | `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train` |
+//! | train | `vehicle_file` and `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train` |
 //! | things | `obstacle`, `shape`, `thing`, `cable` and `catenary`, `worker` and `walker`, `ground`, `impact`, `things` |
 //! | world | `settings`, `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
 //!
@@ -70,6 +70,7 @@ mod truth;
 #[cfg(test)]
 mod validation;
 mod vehicle;
+mod vehicle_file;
 mod walker;
 mod wheelset;
 mod worker;
@@ -86,7 +87,7 @@ pub use shape::ObstacleShape;
 
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
 pub use things::{ObstacleTruth, WorkerTruth};
-pub use vehicle::{
+pub use vehicle_file::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
 };
 pub use wheelset::WheelForces;

@@ -9,6 +9,38 @@ use rapier3d_f64::math::{Rotation, Vector};
 
 /// Bodies of a car: itself, front and rear bogie, four wheelsets from the front.
 pub(super) const BODIES: usize = 7;
+/// Wheelsets of a car.
+pub(super) const AXLES: usize = 4;
+
+/// Which of a car's bodies.
+#[derive(Clone, Copy)]
+pub(super) enum Part {
+    Body,
+    Bogie,
+    Wheelset,
+}
+
+impl Part {
+    /// Body `k` of a train.
+    pub(super) fn of(k: usize) -> Self {
+        match k % BODIES {
+            0 => Self::Body,
+            1 | 2 => Self::Bogie,
+            _ => Self::Wheelset,
+        }
+    }
+}
+
+/// Body `k` of a train, for messages.
+pub(super) fn name(k: usize) -> String {
+    let part = match k % BODIES {
+        0 => "body".to_owned(),
+        1 => "front bogie".to_owned(),
+        2 => "rear bogie".to_owned(),
+        w => format!("wheelset {}", w - 2),
+    };
+    format!("{part} of car {}", k / BODIES + 1)
+}
 
 /// One car after the other, the head of the train at a chainage, running.
 pub(super) fn train(
@@ -20,22 +52,18 @@ pub(super) fn train(
 ) -> Vec<[BodyState; BODIES]> {
     let mut front_end: Option<Vector> = None;
     let mut front_m = head_m - (0.5 * vehicle.length_m - vehicle.semi_bogie_distance_m);
-    let end = |forward: f64| {
-        let height = vehicle.coupler.height_m - vehicle.car_cg_m;
-        Vector::new(forward * 0.5 * vehicle.length_m, 0.0, height)
-    };
     let mut placed = Vec::new();
     for _ in 0..cars {
         let mut states = car(vehicle, alignment, front_m, speed_mps);
         // Where the track bends, cars are chords: their couplers shall meet all the same.
         if let Some(meet) = front_end {
             for _ in 0..6 {
-                let gap = meet - states[0].point(end(1.0));
+                let gap = meet - states[0].point(vehicle.coupler_m(1.0));
                 front_m += gap.dot(states[0].rotation * Vector::X);
                 states = car(vehicle, alignment, front_m, speed_mps);
             }
         }
-        front_end = Some(states[0].point(end(-1.0)));
+        front_end = Some(states[0].point(vehicle.coupler_m(-1.0)));
         front_m -= vehicle.length_m;
         placed.push(states);
     }

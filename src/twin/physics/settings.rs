@@ -5,7 +5,9 @@ use super::cable::CableSettings;
 use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
-use super::vehicle::{Vehicle, VehicleFile};
+use super::placement::AXLES;
+use super::vehicle::Vehicle;
+use super::vehicle_file::VehicleFile;
 use super::worker::WorkerSettings;
 use crate::track::{Checker, Problem, key_below};
 use schemars::JsonSchema;
@@ -201,17 +203,22 @@ impl Default for TrainSettings {
 
 impl TrainSettings {
     /// The car that was read, or comes with the program by this name.
-    fn car(&self) -> Option<VehicleFile> {
-        (self.vehicle_file.clone()).or_else(|| VehicleFile::shipped(&self.vehicle))
+    fn car(&self) -> Option<&VehicleFile> {
+        (self.vehicle_file.as_ref()).or_else(|| VehicleFile::shipped(&self.vehicle))
     }
 
-    /// The car in SI units.
+    /// The car in SI units. [`Self::check`] says where there is none; only until then it is the
+    /// default one.
     pub(super) fn vehicle(&self) -> Vehicle {
-        let shipped = || VehicleFile::shipped(DEFAULT_VEHICLE);
-        match self.car().or_else(shipped) {
-            Some(file) => Vehicle::new(&file),
-            None => unreachable!("the shipped vehicles are read by a test"),
+        match self.car().or_else(|| VehicleFile::shipped(DEFAULT_VEHICLE)) {
+            Some(file) => Vehicle::new(file),
+            None => unreachable!("a test reads the vehicles that come with the program"),
         }
+    }
+
+    /// Wheelsets of the train.
+    pub fn axles(&self) -> u32 {
+        self.cars.saturating_mul(AXLES as u32)
     }
 
     /// Length of the train over couplers.

@@ -6,6 +6,7 @@
 //! angular momentum comes from nowhere. What a damper takes and a spring holds goes into a
 //! [`Ledger`].
 
+use super::energy::Ledger;
 use super::vehicle::{Coupler, Element, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
 
@@ -44,21 +45,6 @@ impl Wrench {
     }
 }
 
-/// Energy and power of one moment.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Ledger {
-    /// Held by springs.
-    pub stored_j: f64,
-    /// Taken by dampers.
-    pub lost_w: f64,
-    /// Taken by creep of wheels on rails.
-    pub creep_w: f64,
-    /// Given by traction.
-    pub driven_w: f64,
-    /// Taken by brakes.
-    pub braked_w: f64,
-}
-
 /// Orthonormal directions in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Axes {
@@ -85,12 +71,18 @@ impl Axes {
     }
 
     /// Force of an element stretched by `stretch` that grows by `rate` (world).
-    fn force(self, element: &Element, stretch: Vector, rate: Vector, book: &mut Ledger) -> Vector {
+    fn force(
+        self,
+        element: &Element,
+        stretch: Vector,
+        rate: Vector,
+        ledger: &mut Ledger,
+    ) -> Vector {
         let (x, v) = (self.into(stretch), self.into(rate));
         let spring = element.stiffness_n_m * x;
         let damper = element.damping_n_s_m * v;
-        book.stored_j += 0.5 * spring.dot(x) - element.preload_n * x.z;
-        book.lost_w += damper.dot(v);
+        ledger.springs_j += 0.5 * spring.dot(x) - element.preload_n * x.z;
+        ledger.dampers_w += damper.dot(v);
         self.out(Vector::new(0.0, 0.0, element.preload_n) - spring - damper)
     }
 }
@@ -108,7 +100,7 @@ pub(super) fn primary(
     along_m: f64,
     (bogie, axes, on_bogie): (&BodyState, &Axes, &mut Wrench),
     (wheelset, on_wheelset): (&BodyState, &mut Wrench),
-    book: &mut Ledger,
+    ledger: &mut Ledger,
 ) -> f64 {
     let mut compression_m = 0.0;
     let axle = wheelset.rotation * Vector::Y;
@@ -123,7 +115,7 @@ pub(super) fn primary(
         let rate = bogie.velocity_at(bearing) - wheelset.velocity_at(bearing);
         let stretch = above - bearing;
         compression_m -= 0.5 * axes.z.dot(stretch);
-        let force = axes.force(&vehicle.primary, stretch, rate, book);
+        let force = axes.force(&vehicle.primary, stretch, rate, ledger);
         on_bogie.add_at(bogie, force, bearing);
         on_wheelset.add_at(wheelset, -force, bearing);
     }
@@ -137,7 +129,7 @@ pub(super) fn secondary(
     along_m: f64,
     (car, on_car): (&BodyState, &mut Wrench),
     (bogie, on_bogie): (&BodyState, &mut Wrench),
-    book: &mut Ledger,
+    ledger: &mut Ledger,
 ) -> f64 {
     // Halfway between both bodies, as the points where the forces act: so they have a potential.
     let axes = Axes::of(car.rotation.lerp(bogie.rotation, 0.5));
@@ -159,16 +151,16 @@ pub(super) fn secondary(
         let up = axes.z.dot(stretch);
         compression_m -= 0.5 * up;
         let (push, stored) = beyond(up, play, stop);
-        book.stored_j += stored;
-        let force = axes.force(&vehicle.secondary, stretch, rate, book);
+        ledger.springs_j += stored;
+        let force = axes.force(&vehicle.secondary, stretch, rate, ledger);
         pair(force + axes.z * push, middle);
     }
     let (stiffness, damping) = vehicle.traction_rod;
     let (stretch, rate, middle) = ends(0.0, vehicle.bogie_cg_m);
     let (x, v) = (axes.x.dot(stretch), axes.x.dot(rate));
     let (push, stored) = beyond(axes.y.dot(stretch), play, stop);
-    book.stored_j += 0.5 * stiffness * x * x + stored;
-    book.lost_w += damping * v * v;
+    ledger.springs_j += 0.5 * stiffness * x * x + stored;
+    ledger.dampers_w += damping * v * v;
     pair(
         axes.x * -(stiffness * x + damping * v) + axes.y * push,
         middle,
@@ -176,7 +168,7 @@ pub(super) fn secondary(
     let turn = bogie.rotation.inverse() * car.rotation;
     let roll_rad = 2.0 * turn.x * turn.w.signum();
     let torque = axes.x * (-vehicle.roll_bar_n_m_rad * roll_rad);
-    book.stored_j += 0.5 * vehicle.roll_bar_n_m_rad * roll_rad * roll_rad;
+    ledger.springs_j += 0.5 * vehicle.roll_bar_n_m_rad * roll_rad * roll_rad;
     on_car.torque += torque;
     on_bogie.torque -= torque;
     compression_m
@@ -189,7 +181,7 @@ pub(super) fn coupler(
     (rear_end, front_end): (Vector, Vector),
     (leading, on_leading): (&BodyState, &mut Wrench),
     (following, on_following): (&BodyState, &mut Wrench),
-    book: &mut Ledger,
+    ledger: &mut Ledger,
 ) -> f64 {
     let (a, b) = (leading.point(rear_end), following.point(front_end));
     let middle = (a + b) * 0.5;
@@ -199,8 +191,8 @@ pub(super) fn coupler(
     let (spring, stored) = beyond(along.dot(a - b), play, coupler.stiffness_n_m);
     let touching = coupler.slack_m <= 0.0 || spring.abs() > 0.0;
     let damper = f64::from(u8::from(touching)) * coupler.damping_n_s_m * rate;
-    book.stored_j += stored;
-    book.lost_w += damper * rate;
+    ledger.springs_j += stored;
+    ledger.dampers_w += damper * rate;
     let force = along * (spring - damper);
     on_leading.add_at(leading, force, middle);
     on_following.add_at(following, -force, middle);

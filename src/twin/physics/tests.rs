@@ -15,7 +15,7 @@ use nalgebra::Point3;
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 fn car(name: &str) -> Vehicle {
-    Vehicle::new(&VehicleFile::shipped(name).unwrap())
+    Vehicle::new(VehicleFile::shipped(name).unwrap())
 }
 
 fn tunnel(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {

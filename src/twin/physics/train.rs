@@ -113,7 +113,7 @@ impl Train {
 
     /// Chainage of the origin of its vehicle frame at a pose.
     pub(super) fn chainage_m(&self, tunnel: &Tunnel, world_from_vehicle: &Isometry3<f64>) -> f64 {
-        let near_m = self.consist.instruments(SimTime::ZERO, tunnel).chainage_m;
+        let near_m = self.consist.head_chainage_m();
         let origin = world_from_vehicle.translation.vector.into();
         tunnel.alignment.track_from_world(&origin, near_m).s_m
     }
@@ -132,8 +132,8 @@ impl Train {
             world_from_vehicle: motion.world_from_vehicle,
             world_from_cars: consist.boxes().collect(),
             floor_accel_mps2: consist.floor_accel_mps2(dt_s),
-            primary_travel_m: consist.travel_m[0],
-            secondary_travel_m: consist.travel_m[1],
+            primary_travel_m: consist.primary_travel_m,
+            secondary_travel_m: consist.secondary_travel_m,
             standing: consist.speed_mps().abs() < STANDING_MPS,
             traction_mps2: self.effort.traction_mps2,
             brake_mps2: self.effort.brake_mps2,

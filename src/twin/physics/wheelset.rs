@@ -6,7 +6,8 @@
 //! flanges  Y = -K (|y| - play)       y from the middle of the rails, beyond the play, which the
 //!                                    gauge widens
 //! creep    (Fx, Fy) = law of the slip of the treads over the rails, by Polach
-//! yaw      M = -2 f11 b^2 / v (w_z + conicity y w / b)            b half the contacts' distance
+//! yaw      M = -2 f11 b^2 / v (w_z + conicity y w / b)            b half the contacts' distance,
+//!                                    f11 less by the share that Polach's law leaves of it
 //! ```
 //!
 //! k is that of a beam on elastic support, 2 sqrt(2) (E I)^(1/4) u^(3/4): 100 MN/m for a 60 kg rail
@@ -25,9 +26,10 @@
 //! of the law, the slip's own dynamics), which is stable at any speed and exact where it is steady.
 
 use super::adhesion::{KALKER_ACROSS_N, KALKER_ALONG_N};
+use super::energy::Ledger;
 use super::irregularity::Deviation;
 use super::line::Line;
-use super::suspension::{Axes, BodyState, Ledger, Wrench};
+use super::suspension::{Axes, BodyState, Wrench};
 use super::vehicle::{GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
 use rapier3d_f64::math::Vector;
 
@@ -60,8 +62,6 @@ pub struct WheelForces {
     pub along_n: f64,
     /// Speed of the axle less that of the treads: positive where the wheel slides.
     pub slip_mps: f64,
-    /// Share of the effort that slide and slip protection lets through.
-    pub effort_share: f64,
 }
 
 /// A wheelset.
@@ -77,6 +77,8 @@ pub(super) struct Wheelset {
     roll_rad_per_m: f64,
     /// Elastic slip of its brake.
     brake_slip_m: f64,
+    /// Share of the effort that slide and slip protection lets through.
+    effort_share: f64,
 }
 
 /// The rails under a wheelset.
@@ -90,7 +92,7 @@ struct Rails {
     speed_mps: f64,
 }
 
-/// Forces of one step on a wheelset; both turning ones are at the tread.
+/// Traction and brake demanded of a wheelset, at the tread.
 #[derive(Clone, Copy)]
 pub(super) struct Drive {
     pub traction_n: f64,
@@ -100,10 +102,8 @@ pub(super) struct Drive {
 impl Wheelset {
     pub(super) fn new(s_m: f64, roll_rad: f64) -> Self {
         Self {
-            forces: WheelForces {
-                effort_share: 1.0,
-                ..WheelForces::default()
-            },
+            forces: WheelForces::default(),
+            effort_share: 1.0,
             rolled_m: 0.0,
             s_m,
             roll_rad,
@@ -120,21 +120,21 @@ impl Wheelset {
         line: &Line<'_>,
         drive: Drive,
         (state, wrench): (&BodyState, &mut Wrench),
-        book: &mut Ledger,
+        ledger: &mut Ledger,
         dt_s: f64,
     ) -> Vector {
         let rails = self.follow(line, state, dt_s);
-        let off_m = self.carry(vehicle, line, &rails, (state, wrench), book);
+        let off_m = self.carry(vehicle, line, &rails, (state, wrench), ledger);
         let axle = state.rotation * Vector::Y;
         let spin = state.angular.dot(axle);
         let tread_mps = spin * vehicle.wheel_radius_m;
         self.rolled_m += tread_mps * dt_s;
         let (traction, brake) = self.effort(drive, tread_mps, rails.speed_mps, dt_s);
-        book.driven_w += traction * tread_mps;
-        book.braked_w -= brake * tread_mps;
+        ledger.traction_w += traction * tread_mps;
+        ledger.brake_w -= brake * tread_mps;
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
         wrench.torque += torque;
-        self.creep(vehicle, line, &rails, off_m, (state, wrench), book, dt_s);
+        self.creep(vehicle, line, &rails, off_m, (state, wrench), ledger, dt_s);
         torque
     }
 
@@ -175,7 +175,7 @@ impl Wheelset {
         line: &Line<'_>,
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
-        book: &mut Ledger,
+        ledger: &mut Ledger,
     ) -> f64 {
         let Axes { x, y, z } = rails.axes;
         let (d, speed) = (&rails.deviation, rails.speed_mps);
@@ -194,8 +194,8 @@ impl Wheelset {
             let normal = (load_n - line.support.0 * over_m - damper).max(0.0);
             self.forces.normal_n[k] = normal;
             if normal > 0.0 {
-                book.stored_j += (0.5 * line.support.0 * over_m - load_n) * over_m;
-                book.lost_w += damper * rate;
+                ledger.springs_j += (0.5 * line.support.0 * over_m - load_n) * over_m;
+                ledger.dampers_w += damper * rate;
             }
             // At right angles to the way of the contact, so that the rails do no work, and through
             // the axle.
@@ -206,7 +206,7 @@ impl Wheelset {
         let play = (FLANGE_PLAY_M + 0.5 * d.gauge_m).max(0.0);
         let past = off_m - off_m.clamp(-play, play);
         let lateral = -FLANGE_STIFFNESS_N_M * past;
-        book.stored_j += 0.5 * FLANGE_STIFFNESS_N_M * past * past;
+        ledger.springs_j += 0.5 * FLANGE_STIFFNESS_N_M * past * past;
         self.forces.lateral_n = lateral;
         // At rail level, but no torque about the axle: a flange does not drive the wheel.
         let tilt = x - axle * axle.dot(x);
@@ -219,7 +219,7 @@ impl Wheelset {
     fn effort(&mut self, drive: Drive, tread_mps: f64, speed_mps: f64, dt_s: f64) -> (f64, f64) {
         let slip = (speed_mps - tread_mps).abs();
         let slips = slip > PROTECTED_SHARE * speed_mps.abs() + PROTECTED_MPS;
-        let share = &mut self.forces.effort_share;
+        let share = &mut self.effort_share;
         let change = if slips {
             -dt_s / LET_GO_S
         } else {
@@ -247,49 +247,49 @@ impl Wheelset {
         rails: &Rails,
         off_m: f64,
         (state, wrench): (&BodyState, &mut Wrench),
-        book: &mut Ledger,
+        ledger: &mut Ledger,
         dt_s: f64,
     ) {
         let Axes { x, y, z } = rails.axes;
         let (mass, r) = (&vehicle.wheelset, vehicle.wheel_radius_m);
         let foot = state.position - z * r;
-        let slips = state.velocity_at(foot);
-        let (slip, across_mps) = (slips.dot(x), slips.dot(y));
+        let creep_mps = state.velocity_at(foot);
+        let (along_mps, across_mps) = (creep_mps.dot(x), creep_mps.dot(y));
         // The wheels of a wheelset that turns, or runs on different radii, slip against each other.
         let cone = CONICITY * off_m / HALF_CONTACT_M;
         let yaw_rate = state.angular.dot(z) + cone * state.angular.dot(y);
 
         let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);
         let load_n = self.forces.normal_n[0] + self.forces.normal_n[1];
-        let (f_along, f_across) = (KALKER_ALONG_N * slip, KALKER_ACROSS_N * across_mps);
+        let (f_along, f_across) = (KALKER_ALONG_N * along_mps, KALKER_ACROSS_N * across_mps);
         let linear = 2.0 * per_mps * (f_along * f_along + f_across * f_across).sqrt();
-        let slip_mps = (slip * slip + across_mps * across_mps).sqrt();
-        let share = line.adhesion_at(self.s_m).share(linear, load_n, slip_mps);
+        let total_mps = (along_mps * along_mps + across_mps * across_mps).sqrt();
+        let share = line.adhesion_at(self.s_m).share(linear, load_n, total_mps);
         let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
         let across_c = 2.0 * KALKER_ACROSS_N * per_mps * share;
         let yaw_c = along_c * HALF_CONTACT_M * HALF_CONTACT_M;
 
-        // slip' = free + gain F, by all that acts else, the axle's mass and its inertia.
+        // creep' = free + gain F, by all that acts else, the axle's mass and its inertia.
         let pull = wrench.force / mass.kg - Vector::Z * GRAVITY_MPS2;
         let inverse = |inertia_kg_m2: f64| 1.0 / mass.kg + r * r / inertia_kg_m2;
-        let along = Slip {
-            now: slip,
+        let along = Creepage {
+            now: along_mps,
             free: pull.dot(x) - r * wrench.torque.dot(y) / mass.kg_m2.y,
             gain: inverse(mass.kg_m2.y),
         };
-        let across = Slip {
+        let across = Creepage {
             now: across_mps,
             free: pull.dot(y) + r * wrench.torque.dot(x) / mass.kg_m2.x,
             gain: inverse(mass.kg_m2.x),
         };
-        let yaw = Slip {
+        let yaw = Creepage {
             now: yaw_rate,
             free: wrench.torque.dot(z) / mass.kg_m2.z,
             gain: 1.0 / mass.kg_m2.z,
         };
-        let forces = [(along, along_c), (across, across_c), (yaw, yaw_c)].map(|(slip, c)| {
-            let force = slip.force(c, dt_s);
-            book.creep_w -= force * slip.middle(force, dt_s);
+        let forces = [(along, along_c), (across, across_c), (yaw, yaw_c)].map(|(creep, c)| {
+            let force = creep.force(c, dt_s);
+            ledger.creep_w -= force * creep.middle(force, dt_s);
             force
         });
         let [along_n, across_n, yaw_n_m] = forces;
@@ -297,25 +297,25 @@ impl Wheelset {
         wrench.torque += (z + y * cone) * yaw_n_m;
         self.forces.along_n = along_n;
         self.forces.lateral_n += across_n;
-        self.forces.slip_mps = slip;
+        self.forces.slip_mps = along_mps;
     }
 }
 
-/// A slip now, how it changes by itself, and by a unit of force.
+/// A speed of creep now, how it changes by itself, and by a unit of force.
 #[derive(Clone, Copy)]
-struct Slip {
+struct Creepage {
     now: f64,
     free: f64,
     gain: f64,
 }
 
-impl Slip {
-    /// Force of the damping `c` for the slip that it leaves at the end of the step.
+impl Creepage {
+    /// Force of the damping `c` for the creep that it leaves at the end of the step.
     fn force(self, c: f64, dt_s: f64) -> f64 {
         -c * (self.now + dt_s * self.free) / (1.0 + dt_s * c * self.gain)
     }
 
-    /// The slip in the middle of the step.
+    /// The creep in the middle of the step.
     fn middle(self, force: f64, dt_s: f64) -> f64 {
         self.now + 0.5 * dt_s * (self.free + self.gain * force)
     }

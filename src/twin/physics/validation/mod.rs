@@ -40,7 +40,7 @@ fn free_car(file: VehicleFile, speed_kmh: f64) -> TrainSettings {
 }
 
 fn shipped(name: &str) -> VehicleFile {
-    VehicleFile::shipped(name).unwrap()
+    VehicleFile::shipped(name).unwrap().clone()
 }
 
 /// A line without tunnel walls.
