@@ -12,8 +12,6 @@ pub struct Ride {
     standing: bool,
     samples: u32,
     squares: Vector3<f64>,
-    least_load_n: f64,
-    most_slip_mps: f64,
 }
 
 impl Ride {
@@ -24,14 +22,6 @@ impl Ride {
         self.standing = train.standing;
         let accel = train.floor_accel_mps2;
         self.squares += accel.component_mul(&accel);
-        let loads = train.wheels.iter().flat_map(|w| w.normal_n);
-        let least_n = loads.fold(f64::INFINITY, f64::min);
-        self.least_load_n = match self.samples {
-            0 => least_n,
-            _ => self.least_load_n.min(least_n),
-        };
-        let slips = train.wheels.iter().map(|w| w.slip_mps.abs());
-        self.most_slip_mps = slips.fold(self.most_slip_mps, f64::max);
         self.samples += 1;
     }
 
@@ -39,12 +29,13 @@ impl Ride {
     pub fn finish(&self, world: &World, stop_at_m: Option<f64>) -> Option<TrainFigures> {
         let (energy, first_m) = (world.energy()?, self.first_m?);
         let rms = (self.squares / f64::from(self.samples)).map(f64::sqrt);
+        let worst = world.wheel_extremes()?;
         Some(TrainFigures {
             run_m: self.last_m - first_m,
             stop_error_m: stop_at_m.filter(|_| self.standing).map(|s| self.last_m - s),
             floor_accel_rms_mps2: rms.into(),
-            least_wheel_load_share: self.least_load_n / world.wheel_load_n()?,
-            most_slip_mps: self.most_slip_mps,
+            least_wheel_load_share: worst.least_normal_n / world.wheel_load_n()?,
+            most_slip_mps: worst.most_slip_mps,
             energy,
             energy_gap_share: energy.gap_share(),
         })

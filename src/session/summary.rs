@@ -225,18 +225,19 @@ pub struct ObstacleScore {
     pub distance_error_m: Option<f64>,
 }
 
-/// How the train ran: figures of the truth, 50 times a second.
+/// How the train ran: figures of the truth.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TrainFigures {
     /// Distance of its head, along the line.
     pub run_m: f64,
     /// Where its head stood at the end less the stop mark; `null` where there is none, or it runs.
     pub stop_error_m: Option<f64>,
-    /// RMS of the acceleration of the leading car's floor over its first bogie: forward, left, up.
+    /// RMS of the acceleration of the leading car's floor over its first bogie: forward, left, up; 50
+    /// samples a second.
     pub floor_accel_rms_mps2: [f64; 3],
-    /// Least normal force of any wheel over its load at rest.
+    /// Least normal force of any wheel in any step, over its load at rest.
     pub least_wheel_load_share: f64,
-    /// Most that any wheel slipped or slid.
+    /// Most that any wheel slipped or slid in any step.
     pub most_slip_mps: f64,
     /// Where the energy went.
     pub energy: EnergyBook,

@@ -11,7 +11,7 @@ use super::placement::{self, AXLES, BODIES, Part};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
 use super::vehicle::{GRAVITY_MPS2, Mass, Vehicle};
-use super::wheelset::{Drive, Wheelset};
+use super::wheelset::{Drive, WheelExtremes, Wheelset};
 use crate::bus::SimTime;
 use crate::track::Tunnel;
 use nalgebra::{Isometry3, Vector3};
@@ -332,7 +332,11 @@ impl Consist {
                 angular: body.angvel(),
             };
         }
-        Ok(())
+        let off = self.wheelsets.iter().position(Wheelset::derailed);
+        off.map_or(Ok(()), |axle| {
+            let body = placement::name(placement::wheelset(axle));
+            Err(PhysicsError::Derailed { body, time })
+        })
     }
 
     /// Pulls every body towards a speed along the track, against its weight's share along it: a
@@ -359,6 +363,7 @@ impl Consist {
         self.book.start_kinetic_j = self.kinetic_j();
         for wheelset in &mut self.wheelsets {
             wheelset.rolled_m = 0.0;
+            wheelset.extremes = WheelExtremes::default();
         }
     }
 

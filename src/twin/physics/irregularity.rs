@@ -200,6 +200,8 @@ pub(super) struct Deviation {
     pub left_per_m: f64,
     /// Of `roll_rad`.
     pub roll_rad_per_m: f64,
+    /// Of `gauge_m`.
+    pub gauge_per_m: f64,
 }
 
 /// Grid of the table: ten points in the shortest wavelength that the settings allow.
@@ -268,8 +270,12 @@ impl Irregularity {
         let t = x - x.floor();
         let p: [&[f64; 4]; 4] =
             std::array::from_fn(|j| &self.table[k.wrapping_add(j).wrapping_sub(1) & mask]);
-        let [(up_m, up), (left_m, left), (roll_rad, roll), (gauge_m, _)] =
-            std::array::from_fn(|j| catmull_rom([p[0][j], p[1][j], p[2][j], p[3][j]], t));
+        let [
+            (up_m, up),
+            (left_m, left),
+            (roll_rad, roll),
+            (gauge_m, gauge),
+        ] = std::array::from_fn(|j| catmull_rom([p[0][j], p[1][j], p[2][j], p[3][j]], t));
         Deviation {
             up_m,
             left_m,
@@ -278,6 +284,7 @@ impl Irregularity {
             up_per_m: up / GRID_M,
             left_per_m: left / GRID_M,
             roll_rad_per_m: roll / GRID_M,
+            gauge_per_m: gauge / GRID_M,
         }
     }
 }

@@ -28,7 +28,7 @@ impl<'a> Line<'a> {
         Self {
             alignment: &tunnel.alignment,
             irregularity,
-            support: (1e6 * settings.support_mn_m, 1e3 * settings.support_kn_s_m),
+            support: settings.support(),
             adhesion: settings.rail.adhesion(),
             zones: &settings.rail_zones,
         }

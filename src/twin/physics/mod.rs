@@ -37,7 +37,8 @@
 //! so that it begins leaning in its curve and shaken by its track.
 //!
 //! Not modelled: real wheel profiles (treads are cones), the contact's own stiffness (the rail gives
-//! more), flexible car bodies, air springs, pressure waves, ringing of the track. Trains run up the
+//! more), the run of a derailed train (a run ends there), flexible car bodies, air springs, pressure
+//! waves, ringing of the track. Motors turn with their wheelset, gear ratio and all. Trains run up the
 //! line only. A thing that slides fast may stumble at a seam of the ground, every 2 m.
 
 mod adhesion;
@@ -58,6 +59,7 @@ mod placement;
 mod saved;
 mod settings;
 mod shape;
+mod stability;
 mod suspension;
 #[cfg(test)]
 mod tests;
@@ -90,7 +92,7 @@ pub use things::{ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
 };
-pub use wheelset::WheelForces;
+pub use wheelset::{WheelExtremes, WheelForces};
 pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{BrakeDemand, SimTime, TrainCommand};
@@ -112,6 +114,14 @@ pub enum PhysicsError {
     /// Settings that no world can be made from.
     #[error("the physics settings are wrong: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Settings(Vec<Problem>),
+    /// A wheelset has left the rails.
+    #[error("{body} left the rails at {time}")]
+    Derailed {
+        /// Which wheelset.
+        body: String,
+        /// When.
+        time: SimTime,
+    },
     /// A body's state is no longer a number.
     #[error("the state of {body} became non-finite at {time}")]
     NonFinite {

@@ -31,6 +31,11 @@ impl Part {
     }
 }
 
+/// The body of an axle, counted from the front of the train.
+pub(super) fn wheelset(axle: usize) -> usize {
+    BODIES * (axle / AXLES) + 3 + axle % AXLES
+}
+
 /// Body `k` of a train, for messages.
 pub(super) fn name(k: usize) -> String {
     let part = match k % BODIES {

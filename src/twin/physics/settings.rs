@@ -6,6 +6,7 @@ use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
 use super::placement::AXLES;
+use super::stability::longest_step_s;
 use super::vehicle::Vehicle;
 use super::vehicle_file::VehicleFile;
 use super::worker::WorkerSettings;
@@ -17,7 +18,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PhysicsSettings {
-    /// Time step in seconds, a whole number of nanoseconds. The suspension is stable up to 2 ms.
+    /// Time step in seconds, a whole number of nanoseconds. Up to 2 ms, and as far
+    /// as the train's springs and the rails bear it.
     pub step_s: f64,
     /// How far back poses can be asked for, in seconds; at least the longest frame of any camera.
     pub history_s: f64,
@@ -65,6 +67,7 @@ impl PhysicsSettings {
         for (k, train) in self.other_trains.iter().enumerate() {
             train.check(&key_below(at, &format!("other_trains[{k}]")), problems);
         }
+        self.check_step(at, problems);
         for (k, obstacle) in self.obstacles.iter().enumerate() {
             obstacle.check(&key_below(at, &format!("obstacles[{k}]")), problems);
         }
@@ -73,6 +76,29 @@ impl PhysicsSettings {
         }
         for (k, worker) in self.workers.iter().enumerate() {
             worker.check(&key_below(at, &format!("workers[{k}]")), problems);
+        }
+    }
+
+    /// Whether the trains' springs, and the rails, bear the step.
+    fn check_step(&self, at: &str, problems: &mut Vec<Problem>) {
+        let support = self.track.support();
+        for train in self.train.iter().chain(&self.other_trains) {
+            let (longest_s, what) = longest_step_s(&train.vehicle(), support);
+            if self.step_s > longest_s {
+                problems.push(Problem::new(
+                    key_below(at, "step_s"),
+                    format!(
+                        "{what} of `{}` on rails of {} MN/m and {} kN s/m swings too fast for steps \
+                         of {} ms",
+                        train.vehicle,
+                        self.track.support_mn_m,
+                        self.track.support_kn_s_m,
+                        1e3 * self.step_s
+                    ),
+                    format!("give at most {:.2} ms, or softer springs and rails", 1e3 * longest_s),
+                ));
+                return;
+            }
         }
     }
 }
@@ -113,6 +139,11 @@ impl Default for TrackSettings {
 }
 
 impl TrackSettings {
+    /// Stiffness (N/m) and damping (N s/m) of a rail under a wheel.
+    pub(super) fn support(&self) -> (f64, f64) {
+        (1e6 * self.support_mn_m, 1e3 * self.support_kn_s_m)
+    }
+
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         let mut check = Checker::new(at, problems);

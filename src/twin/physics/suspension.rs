@@ -189,12 +189,117 @@ pub(super) fn coupler(
     let rate = along.dot(leading.velocity_at(middle) - following.velocity_at(middle));
     let play = 0.5 * coupler.slack_m;
     let (spring, stored) = beyond(along.dot(a - b), play, coupler.stiffness_n_m);
-    let touching = coupler.slack_m <= 0.0 || spring.abs() > 0.0;
-    let damper = f64::from(u8::from(touching)) * coupler.damping_n_s_m * rate;
+    let damper = coupler.damping_n_s_m * rate;
+    // With slack, what buffs does not pull, and what pulls does not buff.
+    let damper = match (coupler.slack_m > 0.0, spring > 0.0) {
+        (false, _) => damper,
+        (true, true) => damper.min(spring),
+        (true, false) => damper.max(spring),
+    };
     ledger.springs_j += stored;
     ledger.dampers_w += damper * rate;
     let force = along * (spring - damper);
     on_leading.add_at(leading, force, middle);
     on_following.add_at(following, -force, middle);
     damper - spring
+}
+
+#[cfg(test)]
+#[allow(clippy::float_cmp, reason = "nothing is exactly nothing")]
+mod tests {
+    use super::*;
+    use crate::twin::physics::vehicle_file::VehicleFile;
+
+    fn vehicle() -> Vehicle {
+        match VehicleFile::shipped("metro_b1_empty") {
+            Some(file) => Vehicle::new(file),
+            None => unreachable!("it comes with the program"),
+        }
+    }
+
+    fn at(position: Vector, velocity: Vector) -> BodyState {
+        BodyState {
+            position,
+            rotation: Rotation::IDENTITY,
+            velocity,
+            angular: Vector::ZERO,
+        }
+    }
+
+    /// Fails where a coupler pulls or buffs within its slack, by another stiffness beyond it, where it
+    /// sticks as its ends part, or where its account is not force times way.
+    #[test]
+    fn a_coupler_takes_up_its_slack_first() {
+        let v = vehicle();
+        let gear = Coupler {
+            slack_m: 0.02,
+            ..v.coupler
+        };
+        let pull = |apart_m: f64, parting_mps: f64| {
+            let ahead = at(Vector::X * apart_m, Vector::X * parting_mps);
+            let behind = at(-Vector::X * v.length_m, Vector::ZERO);
+            let ends = (v.coupler_m(-1.0), v.coupler_m(1.0));
+            let (mut a, mut b, mut ledger) = Default::default();
+            let pull_n = coupler(
+                &gear,
+                ends,
+                (&ahead, &mut a),
+                (&behind, &mut b),
+                &mut ledger,
+            );
+            assert_eq!(a.force, -b.force);
+            assert!((a.force.x + pull_n).abs() < 1e-9);
+            (pull_n, ledger)
+        };
+        for (apart_m, want_n) in [
+            (0.0, 0.0),
+            (0.0099, 0.0),
+            (-0.0099, 0.0),
+            (0.015, 0.005 * gear.stiffness_n_m),
+            (-0.015, -0.005 * gear.stiffness_n_m),
+        ] {
+            let (got_n, ledger) = pull(apart_m, 0.0);
+            assert!((got_n - want_n).abs() < 1e-3, "{apart_m}: {got_n}");
+            let stored_j = 0.5 * want_n * want_n / gear.stiffness_n_m;
+            assert!((ledger.springs_j - stored_j).abs() < 1e-6);
+        }
+        // Within the slack nothing damps; parting fast out of a buff does not pull.
+        assert_eq!(pull(0.0, 1.0).0, 0.0);
+        let (got_n, ledger) = pull(-0.011, 1.0);
+        assert_eq!(got_n, 0.0);
+        assert!((ledger.dampers_w - 0.001 * gear.stiffness_n_m).abs() < 1e-6);
+    }
+
+    /// Fails where a bump stop is met early, late, on one side only, or not at all.
+    #[test]
+    fn bump_stops_are_met_after_their_play() {
+        let v = vehicle();
+        let (play, stop) = v.stop;
+        let force = |aside: Vector| {
+            let car = at(Vector::Z * v.car_cg_m + aside, Vector::ZERO);
+            let bogie = at(Vector::Z * v.bogie_cg_m, Vector::ZERO);
+            let (mut on_car, mut on_bogie, mut ledger) = Default::default();
+            secondary(
+                &v,
+                0.0,
+                (&car, &mut on_car),
+                (&bogie, &mut on_bogie),
+                &mut ledger,
+            );
+            on_car.force
+        };
+        let spring = v.secondary.stiffness_n_m;
+        for sign in [-1.0, 1.0] {
+            for past_m in [-0.02, 0.0, 0.01] {
+                let x = play + past_m;
+                let stops_n = stop * past_m.max(0.0);
+                let across = -sign * (2.0 * spring.y * x + stops_n);
+                let got = force(Vector::Y * (sign * x)).y;
+                assert!((got - across).abs() < 1e-6 * across.abs(), "{got} {across}");
+                let up = 2.0 * (v.secondary.preload_n - sign * (spring.z * x + stops_n));
+                let got = force(Vector::Z * (sign * x)).z;
+                assert!((got - up).abs() < 1e-6 * up.abs().max(1e3), "{got} {up}");
+            }
+        }
+    }
 }

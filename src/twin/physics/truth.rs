@@ -1,6 +1,6 @@
 //! What sessions ask of the world to score by.
 
-use super::World;
+use super::{WheelExtremes, World};
 use crate::bus::SimTime;
 use nalgebra::Isometry3;
 
@@ -27,6 +27,12 @@ impl World {
             let head_m = train.chainage_m(&self.tunnel, &pose);
             Some((head_m, train.consist.length_m()))
         })
+    }
+
+    /// What the worst of the train's wheels has been through; `None` without a train.
+    pub fn wheel_extremes(&self) -> Option<WheelExtremes> {
+        let wheelsets = self.train.as_ref()?.consist.wheelsets.iter();
+        wheelsets.map(|w| w.extremes).reduce(WheelExtremes::and)
     }
 
     /// Normal force of a wheel at rest; `None` without a train.

@@ -181,7 +181,6 @@ impl VehicleFile {
         self.bogie
             .check(&mut Checker::new("bogie", problems), longest_m);
         self.wheelset.check(&mut Checker::new("wheelset", problems));
-        // With these bounds every mode turns by less than 1 rad in a step of 2 ms.
         self.primary.check(&mut Checker::new("primary", problems));
         self.secondary
             .check(&mut Checker::new("secondary", problems));

@@ -37,8 +37,11 @@ use rapier3d_f64::math::Vector;
 const CONICITY: f64 = 0.1;
 /// Of a flange to its rail, either way, on 1435 mm.
 const FLANGE_PLAY_M: f64 = 0.007;
+/// Of a rail's head (60 kg), and of a flange.
+const RAIL_HEAD_M: f64 = 0.073;
+const FLANGE_HEIGHT_M: f64 = 0.028;
 /// Sideways, a rail gives more than downwards.
-const FLANGE_STIFFNESS_N_M: f64 = 40e6;
+pub(super) const FLANGE_STIFFNESS_N_M: f64 = 40e6;
 /// Creepage is slip over speed, and at standstill over this.
 const LEAST_SPEED_MPS: f64 = 0.01;
 /// Discs and pads of one wheelset give by this before they slip, at the wheel's tread.
@@ -79,6 +82,38 @@ pub(super) struct Wheelset {
     brake_slip_m: f64,
     /// Share of the effort that slide and slip protection lets through.
     effort_share: f64,
+    /// How far its middle is left of the rails' middle, and its lower wheel over its rail.
+    off_m: f64,
+    over_m: f64,
+    pub extremes: WheelExtremes,
+}
+
+/// What a wheelset has been through since the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WheelExtremes {
+    /// Least normal force of a wheel.
+    pub least_normal_n: f64,
+    /// Most that it slipped or slid.
+    pub most_slip_mps: f64,
+}
+
+impl Default for WheelExtremes {
+    fn default() -> Self {
+        Self {
+            least_normal_n: f64::INFINITY,
+            most_slip_mps: 0.0,
+        }
+    }
+}
+
+impl WheelExtremes {
+    /// Of both.
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            least_normal_n: self.least_normal_n.min(other.least_normal_n),
+            most_slip_mps: self.most_slip_mps.max(other.most_slip_mps),
+        }
+    }
 }
 
 /// The rails under a wheelset.
@@ -104,6 +139,9 @@ impl Wheelset {
         Self {
             forces: WheelForces::default(),
             effort_share: 1.0,
+            off_m: 0.0,
+            over_m: 0.0,
+            extremes: WheelExtremes::default(),
             rolled_m: 0.0,
             s_m,
             roll_rad,
@@ -135,7 +173,16 @@ impl Wheelset {
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
         wrench.torque += torque;
         self.creep(vehicle, line, &rails, off_m, (state, wrench), ledger, dt_s);
+        self.extremes = self.extremes.and(WheelExtremes {
+            least_normal_n: self.forces.normal_n[0].min(self.forces.normal_n[1]),
+            most_slip_mps: self.forces.slip_mps.abs(),
+        });
         torque
+    }
+
+    /// It is where the rails no longer hold it: beside them, or both flanges over them.
+    pub(super) fn derailed(&self) -> bool {
+        self.off_m.abs() > RAIL_HEAD_M || self.over_m > FLANGE_HEIGHT_M
     }
 
     /// The rails under the axle, a step on.
@@ -185,14 +232,19 @@ impl Wheelset {
         let load_n = vehicle.wheel_load_n();
         for (k, side) in [HALF_CONTACT_M, -HALF_CONTACT_M].into_iter().enumerate() {
             let wheel = foot + axle * side;
-            let rise_per_m = d.up_per_m + side * roll_per_m;
             let over_m = (wheel - rails.origin).dot(z);
+            let rise_per_m = d.up_per_m + (wheel - rails.origin).dot(y) * roll_per_m;
             // Of the wheel's body without its own turning, which is along the rail.
             let velocity = state.velocity + state.angular.cross(axle * side);
             let rate = velocity.dot(z) - speed * rise_per_m;
             let damper = line.support.1 * rate;
             let normal = (load_n - line.support.0 * over_m - damper).max(0.0);
             self.forces.normal_n[k] = normal;
+            self.over_m = if k == 0 {
+                over_m
+            } else {
+                self.over_m.min(over_m)
+            };
             if normal > 0.0 {
                 ledger.springs_j += (0.5 * line.support.0 * over_m - load_n) * over_m;
                 ledger.dampers_w += damper * rate;
@@ -208,9 +260,12 @@ impl Wheelset {
         let lateral = -FLANGE_STIFFNESS_N_M * past;
         ledger.springs_j += 0.5 * FLANGE_STIFFNESS_N_M * past * past;
         self.forces.lateral_n = lateral;
+        self.off_m = off_m;
         // At rail level, but no torque about the axle: a flange does not drive the wheel.
         let tilt = x - axle * axle.dot(x);
-        wrench.force += (y - x * d.left_per_m) * lateral;
+        // The rail that is touched runs aside as the track does, and as the gauge widens.
+        let aside_per_m = d.left_per_m + 0.5 * d.gauge_per_m * past.signum();
+        wrench.force += (y - x * aside_per_m) * lateral;
         wrench.torque += tilt * (vehicle.wheel_radius_m * lateral);
         off_m
     }
@@ -262,7 +317,9 @@ impl Wheelset {
         let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);
         let load_n = self.forces.normal_n[0] + self.forces.normal_n[1];
         let (f_along, f_across) = (KALKER_ALONG_N * along_mps, KALKER_ACROSS_N * across_mps);
-        let linear = 2.0 * per_mps * (f_along * f_along + f_across * f_across).sqrt();
+        let f_yaw = KALKER_ALONG_N * HALF_CONTACT_M * yaw_rate;
+        let linear = f_along * f_along + f_across * f_across + f_yaw * f_yaw;
+        let linear = 2.0 * per_mps * linear.sqrt();
         let total_mps = (along_mps * along_mps + across_mps * across_mps).sqrt();
         let share = line.adhesion_at(self.s_m).share(linear, load_n, total_mps);
         let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
