@@ -10,6 +10,7 @@ use super::catenary::Catenary;
 use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, point3, pose, vector3};
 use super::ground::GROUND_GROUP;
+use super::owner::Owner;
 use super::thing::{RESTING_MPS, SOLID_GROUP, groups};
 use super::vehicle::GRAVITY_MPS2;
 use crate::bus::SimTime;
@@ -183,7 +184,7 @@ impl Cable {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         settings: &CableSettings,
-        id: u128,
+        owner: Owner,
     ) -> Self {
         let [from, to] =
             [&settings.from, &settings.to].map(|end| alignment.world_from_track(end.place()));
@@ -192,7 +193,7 @@ impl Cable {
         let curve: Vec<Point3<f64>> = Catenary::new(from, to, settings.length_m)
             .points(count)
             .collect();
-        Self::along(world, settings, &curve, id)
+        Self::along(world, settings, &curve, owner)
     }
 
     /// A cable whose joints are at the points of a curve.
@@ -200,13 +201,13 @@ impl Cable {
         world: &mut PhysicsWorld,
         settings: &CableSettings,
         curve: &[Point3<f64>],
-        id: u128,
+        owner: Owner,
     ) -> Self {
         let count = curve.len() - 1;
         let links: Vec<Link> = (curve.windows(2).enumerate())
             .map(|(k, ends)| {
                 let end = k == 0 || k + 1 == count;
-                insert_link(world, settings, [ends[0], ends[1]], end, id)
+                insert_link(world, settings, [ends[0], ends[1]], end, owner)
             })
             .collect();
         let joints = (0..=count).map(|k| {
@@ -375,7 +376,7 @@ fn insert_link(
     settings: &CableSettings,
     ends: [Point3<f64>; 2],
     at_wall: bool,
-    id: u128,
+    owner: Owner,
 ) -> Link {
     let along = ends[1] - ends[0];
     let half_m = 0.5 * along.norm();
@@ -388,7 +389,7 @@ fn insert_link(
             .pose(pose(&place))
             .linear_damping(settings.drag_per_s())
             .angular_damping(TWIST_PER_S)
-            .user_data(id)
+            .user_data(owner.id())
             .additional_solver_iterations(CHAIN_PASSES),
     );
     if let Some(body) = world.bodies.get_mut(body) {
@@ -399,7 +400,7 @@ fn insert_link(
         .mass(2.0 * half_m * settings.mass_kg_per_m)
         .friction(settings.friction)
         .restitution(0.0)
-        .user_data(id)
+        .user_data(owner.id())
         .collision_groups(touching(at_wall));
     world.insert_collider(collider, Some(body));
     Link { body, half_m }

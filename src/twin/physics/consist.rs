@@ -7,6 +7,7 @@ use super::driver::{Effort, Instruments};
 use super::energy::EnergyBook;
 use super::history::VehicleMotion;
 use super::line::Line;
+use super::owner::Owner;
 use super::placement::{self, BODIES};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Ledger, Wrench, coupler, primary, secondary};
@@ -32,14 +33,8 @@ const FADE_MPS: f64 = 0.1;
 /// How quickly a train that is brought to its starting state is held to its speed.
 const HOLD_PER_S: f64 = 50.0;
 
-/// Whose train it is.
-#[derive(Clone, Copy)]
-pub(super) enum Crowd {
-    /// The one that a scenario is about.
-    Own,
-    /// Another one, whose bodies say so by this number.
-    Other(u128),
-}
+/// Whose train it is; `None` is the one that a scenario is about.
+pub(super) type Crowd = Option<Owner>;
 
 /// The train.
 #[derive(Clone)]
@@ -71,7 +66,7 @@ impl Consist {
         tunnel: &Tunnel,
         settings: &TrainSettings,
         head_m: f64,
-        crowd: Crowd,
+        owner: Option<Owner>,
     ) -> Self {
         let vehicle = settings.vehicle();
         let alignment = &tunnel.alignment;
@@ -96,7 +91,7 @@ impl Consist {
             start_potential_j: 0.0,
         };
         for car in &cars {
-            consist.insert(world, car, crowd);
+            consist.insert(world, car, owner);
             for state in &car[3..] {
                 let p = super::convert::point3(state.position);
                 let s_m = alignment.track_from_world(&p, head_m).s_m;
@@ -108,10 +103,15 @@ impl Consist {
     }
 
     /// The bodies of a car, and the box that hits things.
-    fn insert(&mut self, world: &mut PhysicsWorld, states: &[BodyState; BODIES], crowd: Crowd) {
-        let (groups, id) = match crowd {
-            Crowd::Own => ((TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP), 0),
-            Crowd::Other(id) => ((OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP), id),
+    fn insert(
+        &mut self,
+        world: &mut PhysicsWorld,
+        states: &[BodyState; BODIES],
+        owner: Option<Owner>,
+    ) {
+        let groups = match owner {
+            None => (TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
+            Some(_) => (OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
         };
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
@@ -135,7 +135,7 @@ impl Consist {
                 groups.1,
                 InteractionTestMode::And,
             ))
-            .user_data(id);
+            .user_data(owner.map_or(0, Owner::id));
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders
             .push(world.insert_collider(collider, Some(car)));

@@ -21,6 +21,7 @@
 //! harm at less.
 
 use super::consist::TRAIN_GROUP;
+use super::owner::Owner;
 use super::thing::groups;
 use crate::bus::SimTime;
 use rapier3d_f64::geometry::ContactPair;
@@ -159,7 +160,7 @@ struct Part {
 /// A thing in touch with the train.
 #[derive(Clone)]
 struct Touch {
-    id: u128,
+    owner: Owner,
     /// Which hit, unless that was too slow or too late to be kept.
     impact: Option<usize>,
     since: SimTime,
@@ -172,7 +173,7 @@ struct Touch {
 /// One contact of the train in one step.
 pub(super) struct Hit {
     /// Who was hit.
-    pub id: u128,
+    pub owner: Owner,
     /// With force, not by its touch alone.
     pub force: bool,
     body: RigidBodyHandle,
@@ -254,7 +255,7 @@ impl Impacts {
         let closing = |push: &Push| was.at(push.arm) - train_was.at(push.train_arm);
         let fastest = hit.pair.iter().map(|push| closing(push).length());
         let speed_mps = fastest.fold(0.0, f64::max);
-        let k = self.touch(hit.id, name, speed_mps, now);
+        let k = self.touch(hit.owner, name, speed_mps, now);
         let touch = &mut self.touches[k];
         touch.last = now;
         let blow = now.since(touch.since) <= BLOW_S;
@@ -282,8 +283,8 @@ impl Impacts {
     }
 
     /// The touch that goes on, or a new one, with a hit of its own where it is one.
-    fn touch(&mut self, id: u128, name: &str, speed_mps: f64, now: SimTime) -> usize {
-        let known = self.touches.iter().position(|touch| touch.id == id);
+    fn touch(&mut self, owner: Owner, name: &str, speed_mps: f64, now: SimTime) -> usize {
+        let known = self.touches.iter().position(|touch| touch.owner == owner);
         if let Some(k) = known
             && now.since(self.touches[k].last) <= GAP_S
         {
@@ -291,7 +292,7 @@ impl Impacts {
         }
         let hit = (known.is_none() || speed_mps >= AGAIN_MPS) && self.list.len() < MOST;
         let touch = Touch {
-            id,
+            owner,
             impact: hit.then_some(self.list.len()),
             since: now,
             last: now,
@@ -349,7 +350,7 @@ fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Optio
         points.into_iter().any(|point| point.dist <= 0.0)
     };
     (!pushes.is_empty() || touching()).then_some(Hit {
-        id: other.user_data,
+        owner: Owner::of(other.user_data)?,
         force: !pushes.is_empty(),
         body: other.parent()?,
         part: k,

@@ -5,6 +5,7 @@ use super::convert::{isometry, pose, vector, vector3};
 use super::ground::GROUND_GROUP;
 use super::impact::Motion;
 use super::obstacle::{HingeEdge, HingeSettings, Single};
+use super::owner::Owner;
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
 use crate::twin::render::{Body, Shape};
@@ -68,7 +69,7 @@ impl Thing {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         single: &Single,
-        id: u128,
+        owner: Owner,
     ) -> Self {
         let settings = &single.settings;
         let frame = alignment.at(settings.chainage_m);
@@ -90,7 +91,7 @@ impl Thing {
             builder
                 .pose(pose(&place))
                 .ccd_enabled(true)
-                .user_data(id)
+                .user_data(owner.id())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let (hold, solver) = match settings.held_until_s {
@@ -101,7 +102,7 @@ impl Thing {
             .mass(settings.mass_kg)
             .friction(settings.friction)
             .restitution(settings.restitution)
-            .user_data(id)
+            .user_data(owner.id())
             .collision_groups(loose())
             .solver_groups(solver);
         Self {

@@ -8,6 +8,7 @@ use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
 use super::ground::GROUND_GROUP;
 use super::obstacle::Single;
+use super::owner::Owner;
 use super::thing::{EXTRA_PASSES, SOLID_GROUP, groups};
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
@@ -77,7 +78,7 @@ impl Walker {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         now_s: f64,
-        id: u128,
+        owner: Owner,
     ) {
         if self.hit.is_some() {
             return;
@@ -92,7 +93,7 @@ impl Walker {
         let centre = feet * Isometry3::translation(0.0, 0.0, self.half_m());
         let body = match self.body {
             Some(body) => body,
-            None => *self.body.insert(self.insert(world, &centre, id)),
+            None => *self.body.insert(self.insert(world, &centre, owner)),
         };
         if let Some(body) = world.bodies.get_mut(body) {
             body.set_position(pose(&centre), true);
@@ -101,19 +102,24 @@ impl Walker {
         }
     }
 
-    fn insert(&self, world: &mut PhysicsWorld, at: &Isometry3<f64>, id: u128) -> RigidBodyHandle {
+    fn insert(
+        &self,
+        world: &mut PhysicsWorld,
+        at: &Isometry3<f64>,
+        owner: Owner,
+    ) -> RigidBodyHandle {
         let body = world.insert_body(
             RigidBodyBuilder::dynamic()
                 .pose(pose(at))
                 .gravity_scale(0.0)
-                .user_data(id)
+                .user_data(owner.id())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let collider = ColliderBuilder::capsule_z(self.half_m() - RADIUS_M, RADIUS_M)
             .mass(self.settings.mass_kg)
             .friction(0.6)
             .restitution(0.0)
-            .user_data(id)
+            .user_data(owner.id())
             .collision_groups(groups(OBSTACLE_GROUP, TRAIN_GROUP));
         world.insert_collider(collider, Some(body));
         body
