@@ -167,6 +167,8 @@ pub(super) struct Cable {
     joints: Vec<Option<ImpulseJointHandle>>,
     /// Pull between its links, averaged over a short time.
     pulls_n: Vec<f64>,
+    /// Where it was last along the line.
+    pub near_m: f64,
     still_since: Option<SimTime>,
     loose: bool,
 }
@@ -238,6 +240,7 @@ impl Cable {
             links,
             joints,
             pulls_n: vec![0.0; count - 1],
+            near_m: settings.from.chainage_m,
             still_since: None,
             loose: false,
         }

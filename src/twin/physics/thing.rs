@@ -4,7 +4,7 @@ use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
 use super::ground::GROUND_GROUP;
 use super::impact::Motion;
-use super::obstacle::{HingeEdge, HingeSettings, Single};
+use super::obstacle::{HingeEdge, HingeSettings, Piece};
 use super::owner::Owner;
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
@@ -56,10 +56,12 @@ enum Hold {
 /// A thing.
 #[derive(Clone)]
 pub(super) struct Thing {
-    pub single: Single,
+    pub piece: Piece,
     pub body: RigidBodyHandle,
     pub collider: ColliderHandle,
     hold: Hold,
+    /// Where it was last along the line.
+    pub near_m: f64,
     still_since: Option<SimTime>,
 }
 
@@ -68,15 +70,15 @@ impl Thing {
     pub(super) fn insert(
         world: &mut PhysicsWorld,
         alignment: &Alignment,
-        single: &Single,
+        piece: &Piece,
         owner: Owner,
     ) -> Self {
-        let settings = &single.settings;
+        let settings = &piece.settings;
         let frame = alignment.at(settings.chainage_m);
         let centre = alignment.world_from_track(TrackPoint {
             s_m: settings.chainage_m,
             l_m: settings.lateral_m,
-            h_m: settings.centre_height_m(&single.body),
+            h_m: settings.centre_height_m(&piece.body),
         });
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), frame.heading_rad);
         let place =
@@ -98,7 +100,7 @@ impl Thing {
             Some(until_s) => (Hold::Fixed { until_s }, fixed()),
             None => (Hold::Nothing, loose()),
         };
-        let collider = collider_of(&single.body)
+        let collider = collider_of(&piece.body)
             .mass(settings.mass_kg)
             .friction(settings.friction)
             .restitution(settings.restitution)
@@ -108,8 +110,9 @@ impl Thing {
         Self {
             body,
             collider: world.insert_collider(collider, Some(body)),
-            single: single.clone(),
+            piece: piece.clone(),
             hold,
+            near_m: settings.chainage_m,
             still_since: None,
         }
     }
@@ -134,7 +137,7 @@ impl Thing {
     /// Lets go what is due.
     pub(super) fn release(&mut self, world: &mut PhysicsWorld, now_s: f64) {
         match self.hold {
-            Hold::Fixed { until_s } if until_s <= now_s => match self.single.settings.hinge {
+            Hold::Fixed { until_s } if until_s <= now_s => match self.piece.settings.hinge {
                 Some(hinge) => self.swing(world, &hinge),
                 None => self.let_go(world),
             },
@@ -166,7 +169,7 @@ impl Thing {
             return;
         };
         self.set_free(world);
-        let half = self.single.body.half_extents_m();
+        let half = self.piece.body.half_extents_m();
         let (edge, axis) = match hinge.edge {
             HingeEdge::Top => (Vector3::z() * half.z, Vector::X),
             HingeEdge::Bottom => (Vector3::z() * -half.z, Vector::X),
@@ -211,10 +214,10 @@ impl Thing {
     pub(super) fn draw(&self, world: &PhysicsWorld) -> Option<Body> {
         let (world_from_body, velocity_mps) = self.state(world)?;
         Some(Body {
-            shape: self.single.body.clone(),
+            shape: self.piece.body.clone(),
             world_from_body,
             velocity_mps,
-            albedo: self.single.settings.albedo,
+            albedo: self.piece.settings.albedo,
             luminance_cd_m2: 0.0,
         })
     }
@@ -247,13 +250,13 @@ impl Thing {
         let Some(body) = world.bodies.get_mut(self.body).filter(|_| arm_m > 0.0) else {
             return;
         };
-        if let Shape::Cylinder(..) = self.single.body {
+        if let Shape::Cylinder(..) = self.piece.body {
             let axis = *body.rotation() * Vector::Z;
             body.apply_torque_impulse(axis * -axis.dot(turning), false);
         }
         let normal = normal.normalize_or_zero();
         let load_n_s = (body.linvel() - before.linear - gravity * dt_s).dot(normal) * body.mass();
-        let moment = self.single.settings.rolling_resistance * load_n_s.max(0.0) * arm_m;
+        let moment = self.piece.settings.rolling_resistance * load_n_s.max(0.0) * arm_m;
         let spin = body.angvel() - normal * normal.dot(body.angvel());
         let rate = spin.length();
         if rate > 1e-9 {

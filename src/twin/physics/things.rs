@@ -6,9 +6,10 @@
 
 use super::PhysicsError;
 use super::cable::Cable;
+use super::convert::point3;
 use super::ground::Ground;
 use super::impact::{Impact, Impacts, Motion};
-use super::obstacle::Single;
+use super::obstacle::Piece;
 use super::owner::Owner;
 use super::settings::PhysicsSettings;
 use super::thing::Thing;
@@ -40,7 +41,7 @@ pub(super) struct Things {
     trains: Vec<String>,
     ground: Ground,
     /// Still to come, the next one last.
-    to_come: Vec<Single>,
+    to_come: Vec<Piece>,
     /// Times when something fixed lets go, the next one last.
     releases_s: Vec<f64>,
     impacts: Impacts,
@@ -64,15 +65,15 @@ impl Things {
         // Contacts that are kept while a body turns by some degrees make a wheel a polygon.
         solver.contact_recycling = false;
         let entries = settings.obstacles.iter().enumerate();
-        let mut to_come: Vec<Single> = entries
-            .flat_map(|(k, entry)| entry.single(&format!("obstacle {k}"), seed, index))
+        let mut to_come: Vec<Piece> = entries
+            .flat_map(|(k, entry)| entry.pieces(&format!("obstacle {k}"), seed, index))
             .collect();
         to_come.sort_by(|a, b| a.settings.appears_s.total_cmp(&b.settings.appears_s));
         to_come.reverse();
         let walkers = settings.workers.iter().enumerate().map(|(k, worker)| {
             let load = worker.carries.as_ref();
-            let load = load.map(|load| load.single(&format!("load {k}"), seed, index));
-            Walker::new(worker, load.and_then(|single| single.into_iter().next()))
+            let load = load.map(|load| load.pieces(&format!("load {k}"), seed, index));
+            Walker::new(worker, load.and_then(|pieces| pieces.into_iter().next()))
         });
         let mut things = Self {
             walkers: walkers.collect(),
@@ -187,28 +188,17 @@ impl Things {
             return;
         };
         let near_m = match owner {
-            Owner::Thing(k) => {
-                let thing = self.things.get(k).and_then(Option::as_ref);
-                thing.map(|thing| thing.single.settings.chainage_m)
-            }
-            Owner::Cable(k) => self.cables.get(k).map(|c| c.settings.from.chainage_m),
-            Owner::Worker(k) => {
-                let path = self.walkers.get(k).map(|w| &w.settings.path);
-                path.and_then(|path| path.first()).map(|p| p.chainage_m)
-            }
+            Owner::Thing(k) => self.things[k].as_mut().map(|thing| &mut thing.near_m),
+            Owner::Cable(k) => Some(&mut self.cables[k].near_m),
+            Owner::Worker(k) => Some(&mut self.walkers[k].near_m),
             Owner::Train(_) => None,
         };
         let Some(near_m) = near_m else {
             return;
         };
-        let centre = super::convert::point3(at);
-        let s_m = tunnel.alignment.track_from_world(&centre, near_m).s_m;
-        if let Owner::Thing(k) = owner
-            && let Some(thing) = &mut self.things[k]
-        {
-            thing.single.settings.chainage_m = s_m;
-        }
-        self.ground.lay(world, tunnel, s_m);
+        let centre = point3(at);
+        *near_m = tunnel.alignment.track_from_world(&centre, *near_m).s_m;
+        self.ground.lay(world, tunnel, *near_m);
     }
 
     /// Hits of the train, and what they tear off and knock down.
@@ -265,11 +255,11 @@ impl Things {
         }
     }
 
-    fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, single: &Single) -> usize {
+    fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, piece: &Piece) -> usize {
         let number = self.things.len();
-        self.ground.lay(world, tunnel, single.settings.chainage_m);
+        self.ground.lay(world, tunnel, piece.settings.chainage_m);
         let owner = Owner::Thing(number);
-        let thing = Thing::insert(world, &tunnel.alignment, single, owner);
+        let thing = Thing::insert(world, &tunnel.alignment, piece, owner);
         self.things.push(Some(thing));
         number
     }
@@ -299,7 +289,7 @@ impl Things {
         match owner {
             Owner::Thing(k) => {
                 let thing = self.things.get(k).and_then(Option::as_ref);
-                thing.map_or("obstacle", |thing| &thing.single.settings.name)
+                thing.map_or("obstacle", |thing| &thing.piece.settings.name)
             }
             Owner::Cable(k) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
             Owner::Worker(k) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),

@@ -2,7 +2,7 @@
 
 use super::World;
 use super::cable::{Cable, bounds};
-use super::obstacle::Single;
+use super::obstacle::Piece;
 use super::thing::Thing;
 use crate::bus::SimTime;
 use crate::track::Alignment;
@@ -98,9 +98,9 @@ pub(super) fn thing_truth<'a>(
     now: SimTime,
 ) -> Option<ObstacleTruth<'a>> {
     let (world_from_body, velocity_mps) = thing.state(world)?;
-    let Single { settings, body } = &thing.single;
+    let Piece { settings, body } = &thing.piece;
     let centre = world_from_body.translation.vector.into();
-    let place = line.track_from_world(&centre, settings.chainage_m);
+    let place = line.track_from_world(&centre, thing.near_m);
     let world_from_line = line.at(place.s_m).world_from_line().rotation;
     let body_from_line = world_from_body.rotation.inverse() * world_from_line;
     let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
@@ -131,8 +131,9 @@ pub(super) fn cable_truth<'a>(
     let settings = &cable.settings;
     let middle = cable.ends(world).flatten().map(|p| p.coords);
     let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
-    let near_m = settings.from.chainage_m;
-    let s_m = line.track_from_world(&Point3::from(middle), near_m).s_m;
+    let s_m = line
+        .track_from_world(&Point3::from(middle), cable.near_m)
+        .s_m;
     let frame = line.at(s_m).world_from_line();
     let [low, high] = bounds(cable.ends(world).flatten(), &frame.inverse())?;
     let half_extents_m = 0.5 * (high - low).add_scalar(settings.diameter_m);

@@ -7,7 +7,7 @@
 use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
 use super::ground::GROUND_GROUP;
-use super::obstacle::Single;
+use super::obstacle::Piece;
 use super::owner::Owner;
 use super::thing::{EXTRA_PASSES, SOLID_GROUP, groups};
 use super::worker::{Feet, Stance, WorkerSettings};
@@ -26,10 +26,12 @@ const REACH_M: f64 = 1.5;
 pub(super) struct Walker {
     pub settings: WorkerSettings,
     /// What he carries, or has put down.
-    load: Option<Single>,
+    load: Option<Piece>,
     load_is: Load,
     /// While he is on the line.
     pub body: Option<RigidBodyHandle>,
+    /// Where he was last along the line.
+    pub near_m: f64,
     /// How he stood when the train hit him.
     hit: Option<Stance>,
 }
@@ -45,7 +47,7 @@ enum Load {
 
 /// What a worker does with his load now.
 pub(super) enum Act {
-    PutDown(Box<Single>),
+    PutDown(Box<Piece>),
     /// Wants to pick up what lies under this number, if it is within his reach of a place (chainage,
     /// left of the centreline).
     PickUp(usize, [f64; 2]),
@@ -53,12 +55,13 @@ pub(super) enum Act {
 
 impl Walker {
     /// A worker, with what he carries.
-    pub(super) fn new(settings: &WorkerSettings, load: Option<Single>) -> Self {
+    pub(super) fn new(settings: &WorkerSettings, load: Option<Piece>) -> Self {
         Self {
             settings: settings.clone(),
             load,
             load_is: Load::InHand,
             body: None,
+            near_m: settings.path.first().map_or(0.0, |p| p.chainage_m),
             hit: None,
         }
     }
