@@ -7,11 +7,10 @@
 //! swing dies out within some ten seconds, a falling end loses less than a tenth of its speed.
 
 use super::catenary::Catenary;
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, point3, pose, vector3};
-use super::ground::GROUND_GROUP;
+use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUP, groups};
 use super::owner::Owner;
-use super::thing::{RESTING_MPS, SOLID_GROUP, groups};
+use super::thing::RESTING_MPS;
 use super::vehicle::GRAVITY_MPS2;
 use crate::bus::SimTime;
 use crate::track::{Alignment, Checker, Problem, TrackPoint, key_below};
@@ -19,8 +18,8 @@ use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ImpulseJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
-    SphericalJointBuilder,
+    ColliderBuilder, ImpulseJointHandle, InteractionGroups, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle, SphericalJointBuilder,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -364,7 +363,7 @@ impl Cable {
 }
 
 /// What a link touches; the pieces at its ends do not touch the wall that they are fixed to.
-fn touching(at_wall: bool) -> rapier3d_f64::prelude::InteractionGroups {
+fn touching(at_wall: bool) -> InteractionGroups {
     let others = TRAIN_GROUP | SOLID_GROUP;
     let of = if at_wall {
         others

@@ -5,6 +5,7 @@ use super::PhysicsError;
 use super::convert::{isometry, vector, vector3};
 use super::driver::{Effort, Instruments};
 use super::energy::EnergyBook;
+use super::groups::{OBSTACLE_GROUP, OTHER_TRAIN_GROUP, TRAIN_GROUP, groups};
 use super::history::VehicleMotion;
 use super::line::Line;
 use super::owner::Owner;
@@ -18,14 +19,10 @@ use crate::track::Tunnel;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, MassProperties,
-    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    ColliderBuilder, ColliderHandle, MassProperties, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle,
 };
 
-/// The train that a scenario is about hits obstacles and other trains.
-pub(super) const TRAIN_GROUP: Group = Group::GROUP_1;
-pub(super) const OBSTACLE_GROUP: Group = Group::GROUP_2;
-const OTHER_TRAIN_GROUP: Group = Group::GROUP_5;
 /// Lowest parts of a car over top of rail: guard irons hang 60 mm over the rails.
 const UNDERSIDE_M: f64 = 0.06;
 /// Slower than this, resistance fades, so that it does not push a standing train.
@@ -109,9 +106,9 @@ impl Consist {
         states: &[BodyState; BODIES],
         owner: Option<Owner>,
     ) {
-        let groups = match owner {
-            None => (TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
-            Some(_) => (OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
+        let touching = match owner {
+            None => groups(TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
+            Some(_) => groups(OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
         };
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
@@ -130,11 +127,7 @@ impl Consist {
             .density(0.0)
             .friction(0.3)
             .restitution(0.1)
-            .collision_groups(InteractionGroups::new(
-                groups.0,
-                groups.1,
-                InteractionTestMode::And,
-            ))
+            .collision_groups(touching)
             .user_data(owner.map_or(0, Owner::id));
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders

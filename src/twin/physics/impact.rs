@@ -20,9 +20,8 @@
 //! The bounds hold for hits where these parts are. A thing that hits equipment below the floor does
 //! harm at less.
 
-use super::consist::TRAIN_GROUP;
+use super::groups::{TRAIN_GROUP, groups};
 use super::owner::Owner;
-use super::thing::groups;
 use crate::bus::SimTime;
 use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;

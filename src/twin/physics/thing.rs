@@ -1,8 +1,7 @@
 //! A thing in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
 
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
-use super::ground::GROUND_GROUP;
+use super::groups::{fixed, loose};
 use super::impact::Motion;
 use super::obstacle::{HingeEdge, HingeSettings, Piece};
 use super::owner::Owner;
@@ -12,33 +11,15 @@ use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ColliderHandle, Group, ImpulseJointHandle, InteractionGroups,
-    InteractionTestMode, PhysicsWorld, RevoluteJointBuilder, RigidBodyBuilder, RigidBodyHandle,
-    RigidBodyType,
+    ColliderBuilder, ColliderHandle, ImpulseJointHandle, PhysicsWorld, RevoluteJointBuilder,
+    RigidBodyBuilder, RigidBodyHandle, RigidBodyType,
 };
 
-/// What cables lie on: they do not touch each other.
-pub(super) const SOLID_GROUP: Group = Group::GROUP_4;
 /// Slower than this, a body lies still.
 pub(super) const RESTING_MPS: f64 = 0.02;
 pub(super) const RESTING_RAD_S: f64 = 0.1;
 /// Extra solver passes for contacts of light bodies with a train.
 pub(super) const EXTRA_PASSES: usize = 8;
-
-/// Who may touch whom: by groups that contain each other.
-pub(super) fn groups(member: Group, of: Group) -> InteractionGroups {
-    InteractionGroups::new(member, of, InteractionTestMode::And)
-}
-
-fn loose() -> InteractionGroups {
-    let all = OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP;
-    groups(OBSTACLE_GROUP | SOLID_GROUP, all)
-}
-
-/// What is fixed would stop the train dead: the train meets it without force, which tears it off.
-fn fixed() -> InteractionGroups {
-    groups(OBSTACLE_GROUP | SOLID_GROUP, OBSTACLE_GROUP | GROUND_GROUP)
-}
 
 /// What still holds a thing.
 #[derive(Clone, Copy)]

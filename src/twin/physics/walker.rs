@@ -4,12 +4,11 @@
 //! and meets the train only, so that the solver lets the train hit a body of his mass, not a wall.
 //! From then on it is a body like others: it is thrown, falls, and lies.
 
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
-use super::ground::GROUND_GROUP;
+use super::groups::{OBSTACLE_GROUP, TRAIN_GROUP, groups, loose};
 use super::obstacle::Piece;
 use super::owner::Owner;
-use super::thing::{EXTRA_PASSES, SOLID_GROUP, groups};
+use super::thing::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
 use crate::twin::render::Body;
@@ -138,10 +137,9 @@ impl Walker {
             return;
         };
         body.set_gravity_scale(1.0, true);
-        let all = OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP;
         for collider in body.colliders() {
             if let Some(collider) = world.colliders.get_mut(*collider) {
-                collider.set_collision_groups(groups(OBSTACLE_GROUP | SOLID_GROUP, all));
+                collider.set_collision_groups(loose());
             }
         }
     }
