@@ -10,7 +10,7 @@ use super::catenary::Catenary;
 use super::convert::{isometry, point3, pose, vector3};
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUP, groups};
 use super::owner::Owner;
-use super::thing::RESTING_MPS;
+use super::thing::{RESTING_MPS, Rest};
 use super::vehicle::GRAVITY_MPS2;
 use crate::bus::SimTime;
 use crate::track::{Alignment, Checker, Problem, TrackPoint, key_below};
@@ -168,7 +168,7 @@ pub(super) struct Cable {
     pulls_n: Vec<f64>,
     /// Where it was last along the line.
     pub near_m: f64,
-    still_since: Option<SimTime>,
+    pub rest: Rest,
     loose: bool,
 }
 
@@ -240,7 +240,7 @@ impl Cable {
             joints,
             pulls_n: vec![0.0; count - 1],
             near_m: settings.from.chainage_m,
-            still_since: None,
+            rest: Rest::default(),
             loose: false,
         }
     }
@@ -298,7 +298,7 @@ impl Cable {
         };
         world.remove_impulse_joint(handle);
         self.loose = true;
-        self.still_since = None;
+        self.rest = Rest::default();
         // The piece at the wall did not touch it while it hung there.
         let ends = [self.links.first(), self.links.last()];
         for link in ends.into_iter().flatten() {
@@ -320,12 +320,7 @@ impl Cable {
             (world.bodies.get(link.body))
                 .is_some_and(|body| body.is_sleeping() || body.linvel().length() < RESTING_MPS)
         });
-        self.still_since = still.then(|| self.still_since.unwrap_or(now));
-    }
-
-    /// Since when it has not moved.
-    pub(super) fn still_since(&self) -> Option<SimTime> {
-        self.still_since
+        self.rest.note(still, now);
     }
 
     /// Both ends of each link.

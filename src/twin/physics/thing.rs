@@ -21,6 +21,19 @@ pub(super) const RESTING_RAD_S: f64 = 0.1;
 /// Extra solver passes for contacts of light bodies with a train.
 pub(super) const EXTRA_PASSES: usize = 8;
 
+/// Since when something has not moved; `None` while it moves.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Rest {
+    pub since: Option<SimTime>,
+}
+
+impl Rest {
+    /// It is still now, or moves.
+    pub(super) fn note(&mut self, still: bool, now: SimTime) {
+        self.since = still.then(|| self.since.unwrap_or(now));
+    }
+}
+
 /// What still holds a thing.
 #[derive(Clone, Copy)]
 enum Hold {
@@ -43,7 +56,7 @@ pub(super) struct Thing {
     hold: Hold,
     /// Where it was last along the line.
     pub near_m: f64,
-    still_since: Option<SimTime>,
+    pub rest: Rest,
 }
 
 impl Thing {
@@ -94,7 +107,7 @@ impl Thing {
             piece: piece.clone(),
             hold,
             near_m: settings.chainage_m,
-            still_since: None,
+            rest: Rest::default(),
         }
     }
 
@@ -134,7 +147,7 @@ impl Thing {
         if let Some(body) = world.bodies.get_mut(self.body) {
             body.set_body_type(RigidBodyType::Dynamic, true);
         }
-        self.still_since = None;
+        self.rest = Rest::default();
     }
 
     fn let_go(&mut self, world: &mut PhysicsWorld) {
@@ -174,12 +187,7 @@ impl Thing {
             body.is_sleeping()
                 || body.linvel().length() < RESTING_MPS && body.angvel().length() < RESTING_RAD_S
         });
-        self.still_since = still.then(|| self.still_since.unwrap_or(now));
-    }
-
-    /// Since when it has not moved.
-    pub(super) fn still_since(&self) -> Option<SimTime> {
-        self.still_since
+        self.rest.note(still, now);
     }
 
     /// Where it is and how it moves.

@@ -116,7 +116,7 @@ pub(super) fn thing_truth<'a>(
         half_extents_m: half.into(),
         world_from_body,
         velocity_mps,
-        resting_since: resting(thing.still_since(), now),
+        resting_since: resting(thing.rest.since, now),
         temperature_c: settings.temperature_c,
     })
 }
@@ -148,7 +148,7 @@ pub(super) fn cable_truth<'a>(
         half_extents_m,
         world_from_body: Isometry3::from_parts(centre.into(), frame.rotation),
         velocity_mps: cable.velocity_mps(world),
-        resting_since: resting(cable.still_since(), now),
+        resting_since: resting(cable.rest.since, now),
         temperature_c: settings.temperature_c,
     })
 }
