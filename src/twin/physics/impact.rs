@@ -26,12 +26,14 @@ use crate::bus::SimTime;
 use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderHandle, Group, PhysicsWorld, RigidBodyHandle};
-use serde::{Deserialize, Serialize};
+use serde::{Serialize, Serializer};
+use std::fmt;
 
 /// One hit of the train on something.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Impact {
-    /// When it began.
+    /// When it began; seconds in files.
+    #[serde(rename = "time_s", serialize_with = "seconds")]
     pub time: SimTime,
     /// Name of what was hit.
     pub with: String,
@@ -47,8 +49,12 @@ pub struct Impact {
     pub damage: Damage,
 }
 
+fn seconds<S: Serializer>(time: &SimTime, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.secs())
+}
+
 /// What a hit does to the train, by the energy that it uses up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
     /// Scratches: no more than the front glazing must withstand.
@@ -64,16 +70,15 @@ pub enum Damage {
     BeyondDesign,
 }
 
-impl Damage {
-    /// As in files and tables.
-    pub fn name(self) -> &'static str {
-        match self {
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
             Self::Superficial => "superficial",
             Self::Light => "light",
             Self::Repairable => "repairable",
             Self::Structural => "structural",
-            Self::BeyondDesign => "beyond_design",
-        }
+            Self::BeyondDesign => "beyond design",
+        })
     }
 }
 
