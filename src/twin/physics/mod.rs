@@ -27,7 +27,7 @@
 //! |---|---|
 //! | track | `irregularity` and `defect` (where the rails lie), `adhesion` (how slippery they are), `line` (all of it, as a wheelset asks) |
 //! | train | `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train` |
-//! | things | `obstacle`, `shape`, `thing`, `cable` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact`, `owner`, `things` |
+//! | things | `obstacle`, `shape`, `thing`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact`, `owner`, `things` |
 //! | world | `settings`, `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
 //!
 //! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
@@ -42,6 +42,7 @@
 
 mod adhesion;
 mod cable;
+mod cable_settings;
 mod catenary;
 mod consist;
 mod convert;
@@ -77,7 +78,7 @@ mod wheelset;
 mod worker;
 
 pub use adhesion::{RailState, RailZone};
-pub use cable::{CableEnd, CableSettings};
+pub use cable_settings::{CableEnd, CableSettings};
 pub use defect::{DefectSettings, DefectShape, Side};
 pub use energy::EnergyBook;
 pub use history::VehicleMotion;
