@@ -366,6 +366,27 @@ fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Optio
 mod tests {
     use super::*;
 
+    /// Fails where a key of summary.json or the name of a class of damage in it is another one.
+    #[test]
+    fn files_keep_their_keys() {
+        let impact = Impact {
+            time: SimTime::from_nanos(1_500_000_000),
+            with: "crate".to_owned(),
+            speed_mps: 10.0,
+            momentum_n_s: 2.5,
+            energy_j: 4.0,
+            energy_lost_j: 3.0,
+            damage: Damage::BeyondDesign,
+        };
+        assert_eq!(
+            serde_json::to_string(&impact).ok().as_deref(),
+            Some(
+                "{\"time_s\":1.5,\"with\":\"crate\",\"speed_mps\":10.0,\"momentum_n_s\":2.5,\
+                 \"energy_j\":4.0,\"energy_lost_j\":3.0,\"damage\":\"beyond_design\"}"
+            )
+        );
+    }
+
     /// Fails where the bounds are not those of two like trains, or classes are out of order.
     #[test]
     fn damage_classes_are_those_of_like_trains() {
