@@ -149,12 +149,12 @@ fn protection(text: &mut String, s: &Summary) -> std::fmt::Result {
             text,
             "  hit {} at {:.2} s with {:.1} km/h: {:.0} N s, {:.2} kJ of {:.2} kJ lost, {} damage",
             hit.with,
-            hit.time_s,
+            hit.time.secs(),
             3.6 * hit.speed_mps,
             hit.momentum_n_s,
             1e-3 * hit.energy_lost_j,
             1e-3 * hit.energy_j,
-            hit.damage.name().replace('_', " "),
+            hit.damage,
         )?;
     }
     match p.impacts.len().saturating_sub(IMPACTS) {

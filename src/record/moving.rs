@@ -64,8 +64,8 @@ pub(super) struct Moving {
     /// The head, then the cars; empty where there is neither train nor rig.
     train: Vec<Poses>,
     left: Option<Isometry3<f64>>,
-    /// Which kinds of bodies are on show: boxes, cylinders, spheres, capsules.
-    shown: [bool; 4],
+    /// Which kinds of bodies are on show.
+    shown: [bool; KINDS.len()],
     hulls_shown: bool,
     sight_shown: bool,
     methods: Vec<Method>,
@@ -102,7 +102,7 @@ impl Moving {
             rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
             train,
             left: None,
-            shown: [false; 4],
+            shown: [false; KINDS.len()],
             hulls_shown: false,
             sight_shown: false,
             methods: Vec::new(),
@@ -149,12 +149,13 @@ impl Moving {
         bodies: &[Body],
     ) -> Result<(), ObserverError> {
         stream.at(time);
-        let mut groups: [Solids; 4] = Default::default();
+        let mut groups: [Solids; KINDS.len()] = Default::default();
         let mut hulls = Hulls::default();
         for body in bodies {
-            match &body.shape {
-                Shape::Hull(hull) => hulls.push(scene, body, hull),
-                shape => groups[kind(shape)].push(scene, body),
+            if let Some(kind) = Kind::from(&body.shape) {
+                groups[kind as usize].push(scene, body);
+            } else if let Shape::Hull(hull) = &body.shape {
+                hulls.push(scene, body, hull);
             }
         }
         // An empty mesh once, where there were hulls before.
@@ -162,13 +163,13 @@ impl Moving {
         if std::mem::replace(&mut self.hulls_shown, any) || any {
             hulls.log(stream)?;
         }
-        for (kind, group) in groups.into_iter().enumerate() {
+        for ((kind, group), shown) in KINDS.into_iter().zip(groups).zip(&mut self.shown) {
             let any = !group.sizes.is_empty();
             // An empty row once, where there were some, takes the last ones away.
-            if any || self.shown[kind] {
+            if any || *shown {
                 group.log(stream, kind)?;
             }
-            self.shown[kind] = any;
+            *shown = any;
         }
         Ok(())
     }
@@ -286,13 +287,28 @@ struct Solids {
     colours: Vec<Color>,
 }
 
-/// Which group a shape is drawn with.
-fn kind(shape: &Shape) -> usize {
-    match shape {
-        Shape::Box(_) | Shape::Hull(_) => 0,
-        Shape::Cylinder(..) => 1,
-        Shape::Sphere(_) => 2,
-        Shape::Capsule(..) => 3,
+/// Shapes that rerun draws by their sizes.
+#[derive(Clone, Copy)]
+enum Kind {
+    Box,
+    Cylinder,
+    Sphere,
+    Capsule,
+}
+
+/// In the order in which they are counted.
+const KINDS: [Kind; 4] = [Kind::Box, Kind::Cylinder, Kind::Sphere, Kind::Capsule];
+
+impl Kind {
+    /// `None` of hulls, which are drawn by their corners.
+    fn from(shape: &Shape) -> Option<Self> {
+        match shape {
+            Shape::Box(_) => Some(Self::Box),
+            Shape::Cylinder(..) => Some(Self::Cylinder),
+            Shape::Sphere(_) => Some(Self::Sphere),
+            Shape::Capsule(..) => Some(Self::Capsule),
+            Shape::Hull(_) => None,
+        }
     }
 }
 
@@ -331,12 +347,11 @@ impl Hulls {
 
 impl Solids {
     fn push(&mut self, scene: &Scene, body: &Body) {
-        let (size, shift_m) = match body.shape {
-            Shape::Box(_) | Shape::Hull(_) => (body.shape.half_extents_m(), 0.0),
-            Shape::Cylinder(radius, half) => (Vector3::new(radius, 2.0 * half, 0.0), 0.0),
-            Shape::Sphere(radius) => (Vector3::repeat(radius), 0.0),
+        let (size, shift_m) = match &body.shape {
+            Shape::Cylinder(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), 0.0),
             // rerun's capsule starts at its origin, ours is centred on it.
-            Shape::Capsule(radius, half) => (Vector3::new(radius, 2.0 * half, 0.0), -half),
+            Shape::Capsule(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), -half),
+            shape => (shape.half_extents_m(), 0.0),
         };
         let place = body.world_from_body * Point3::new(0.0, 0.0, shift_m);
         self.places.push(scene.local(&place));
@@ -350,18 +365,18 @@ impl Solids {
         });
     }
 
-    fn log(self, stream: &Stream, kind: usize) -> Result<(), ObserverError> {
+    fn log(self, stream: &Stream, kind: Kind) -> Result<(), ObserverError> {
         let (radii, lengths): (Vec<f32>, Vec<f32>) =
             self.sizes.iter().map(|size| (size[0], size[1])).unzip();
         match kind {
-            0 => stream.log(
+            Kind::Box => stream.log(
                 "world/bodies/boxes",
                 &Boxes3D::from_centers_and_half_sizes(self.places, self.sizes)
                     .with_quaternions(self.turns)
                     .with_colors(self.colours)
                     .with_fill_mode(FillMode::Solid),
             ),
-            1 => stream.log(
+            Kind::Cylinder => stream.log(
                 "world/bodies/cylinders",
                 &Cylinders3D::from_lengths_and_radii(lengths, radii)
                     .with_centers(self.places)
@@ -369,13 +384,13 @@ impl Solids {
                     .with_colors(self.colours)
                     .with_fill_mode(FillMode::Solid),
             ),
-            2 => stream.log(
+            Kind::Sphere => stream.log(
                 "world/bodies/spheres",
                 &Ellipsoids3D::from_centers_and_half_sizes(self.places, self.sizes)
                     .with_colors(self.colours)
                     .with_fill_mode(FillMode::Solid),
             ),
-            _ => stream.log(
+            Kind::Capsule => stream.log(
                 "world/bodies/capsules",
                 &Capsules3D::from_lengths_and_radii(lengths, radii)
                     .with_translations(self.places)

@@ -42,96 +42,98 @@ const fn line(path: &'static str, name: &'static str, rgb: (u8, u8, u8), width: 
     }
 }
 
+const EMERGENCY: Line = line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5);
+const SERVICE: Line = line("plots/speed/service", "service", (255, 170, 60), 1.5);
+const PERMITTED: Line = line("plots/speed/permitted", "permitted", (235, 225, 100), 1.5);
+const ODOMETER: Line = line("plots/speed/odometer", "odometer", (120, 180, 255), 1.0);
 /// Of the trains that have one.
-const RADAR: &str = "plots/speed/radar";
+const RADAR: Line = line("plots/speed/radar", "radar", (220, 130, 255), 1.0);
+const ESTIMATED: Line = line("plots/speed/estimated", "estimated", (90, 230, 120), 2.0);
+const TRUE: Line = line("plots/speed/true", "true", (240, 240, 240), 2.0);
 
 const SPEED: Group = Group {
     title: "Speed, km/h",
     origin: "plots/speed",
     legend: Corner2D::LeftBottom,
     lines: &[
-        line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5),
-        line("plots/speed/service", "service", (255, 170, 60), 1.5),
-        line("plots/speed/permitted", "permitted", (235, 225, 100), 1.5),
-        line("plots/speed/odometer", "odometer", (120, 180, 255), 1.0),
-        line(RADAR, "radar", (220, 130, 255), 1.0),
-        line("plots/speed/estimated", "estimated", (90, 230, 120), 2.0),
-        line("plots/speed/true", "true", (240, 240, 240), 2.0),
+        EMERGENCY, SERVICE, PERMITTED, ODOMETER, RADAR, ESTIMATED, TRUE,
     ],
 };
+
+const FLOOR_VERTICAL: Line = line("plots/vibration/vertical", "vertical", (120, 180, 255), 1.0);
+const FLOOR_LATERAL: Line = line("plots/vibration/lateral", "lateral", (255, 170, 60), 1.0);
 
 const VIBRATION: Group = Group {
     title: "Floor acceleration, m/s²",
     origin: "plots/vibration",
     legend: Corner2D::RightTop,
-    lines: &[
-        line("plots/vibration/vertical", "vertical", (120, 180, 255), 1.0),
-        line("plots/vibration/lateral", "lateral", (255, 170, 60), 1.0),
-    ],
+    lines: &[FLOOR_VERTICAL, FLOOR_LATERAL],
 };
+
+const PRIMARY: Line = line(
+    "plots/suspension/primary",
+    "primary, first axle",
+    (90, 200, 255),
+    1.0,
+);
+const SECONDARY: Line = line(
+    "plots/suspension/secondary",
+    "secondary over it",
+    (170, 220, 130),
+    1.5,
+);
 
 const SUSPENSION: Group = Group {
     title: "Suspension travel, mm",
     origin: "plots/suspension",
     legend: Corner2D::RightTop,
-    lines: &[
-        line(
-            "plots/suspension/primary",
-            "primary, first axle",
-            (90, 200, 255),
-            1.0,
-        ),
-        line(
-            "plots/suspension/secondary",
-            "secondary over it",
-            (170, 220, 130),
-            1.5,
-        ),
-    ],
+    lines: &[PRIMARY, SECONDARY],
 };
+
+const LEFT: Line = line("plots/wheels/left", "normal, left", (120, 180, 255), 1.0);
+const RIGHT: Line = line("plots/wheels/right", "normal, right", (255, 170, 60), 1.0);
+const LATERAL: Line = line("plots/wheels/lateral", "lateral", (170, 220, 130), 1.0);
+const ALONG: Line = line("plots/wheels/along", "along", (240, 240, 240), 1.0);
 
 const WHEELS: Group = Group {
     title: "Wheel forces, first axle, kN",
     origin: "plots/wheels",
     legend: Corner2D::RightTop,
-    lines: &[
-        line("plots/wheels/left", "normal, left", (120, 180, 255), 1.0),
-        line("plots/wheels/right", "normal, right", (255, 170, 60), 1.0),
-        line("plots/wheels/lateral", "lateral", (170, 220, 130), 1.0),
-        line("plots/wheels/along", "along", (240, 240, 240), 1.0),
-    ],
+    lines: &[LEFT, RIGHT, LATERAL, ALONG],
 };
+
+const MOST_SLIP: Line = line("plots/slip/most", "most of all axles", (255, 170, 60), 1.0);
+const FIRST_SLIP: Line = line("plots/slip/first", "first axle", (120, 180, 255), 1.0);
 
 const SLIP: Group = Group {
     title: "Slip of the wheels, m/s",
     origin: "plots/slip",
     legend: Corner2D::RightTop,
-    lines: &[
-        line("plots/slip/most", "most of all axles", (255, 170, 60), 1.0),
-        line("plots/slip/first", "first axle", (120, 180, 255), 1.0),
-    ],
+    lines: &[MOST_SLIP, FIRST_SLIP],
 };
+
+const FIRST_COUPLER: Line = line("plots/couplers/first", "first", (120, 180, 255), 1.0);
+const LAST_COUPLER: Line = line("plots/couplers/last", "last", (255, 170, 60), 1.0);
 
 const COUPLERS: Group = Group {
     title: "Pull of the couplers, kN",
     origin: "plots/couplers",
     legend: Corner2D::RightTop,
-    lines: &[
-        line("plots/couplers/first", "first", (120, 180, 255), 1.0),
-        line("plots/couplers/last", "last", (255, 170, 60), 1.0),
-    ],
+    lines: &[FIRST_COUPLER, LAST_COUPLER],
 };
+
+const DISPLAY: Line = line(
+    "plots/distance/display",
+    "driver's display",
+    (240, 240, 240),
+    2.0,
+);
 
 const DISTANCE: Group = Group {
     title: "Distance to obstacle, m",
     origin: "plots/distance",
     legend: Corner2D::LeftBottom,
-    lines: &[line(
-        "plots/distance/display",
-        "driver's display",
-        (240, 240, 240),
-        2.0,
-    )],
+    lines: &[DISPLAY],
 };
 
 /// Of wayside devices, in turn.
@@ -198,7 +200,7 @@ impl Plots {
             .iter()
             .flatten()
             .flat_map(|group| group.lines)
-            .filter(|line| contents.radar || line.path != RADAR)
+            .filter(|line| contents.radar || line.path != RADAR.path)
         {
             let (r, g, b) = line.rgb;
             style(
@@ -240,22 +242,18 @@ impl Plots {
     /// True speed and shaking.
     pub(super) fn train(&mut self, truth: &TrainState) {
         let t = truth.time;
-        self.push("plots/speed/true", t, truth.speed_mps * KMH);
-        self.push("plots/vibration/vertical", t, truth.floor_accel_mps2.z);
-        self.push("plots/vibration/lateral", t, truth.floor_accel_mps2.y);
-        self.push("plots/suspension/primary", t, truth.primary_travel_m * MM);
-        self.push(
-            "plots/suspension/secondary",
-            t,
-            truth.secondary_travel_m * MM,
-        );
+        self.push(&TRUE, t, truth.speed_mps * KMH);
+        self.push(&FLOOR_VERTICAL, t, truth.floor_accel_mps2.z);
+        self.push(&FLOOR_LATERAL, t, truth.floor_accel_mps2.y);
+        self.push(&PRIMARY, t, truth.primary_travel_m * MM);
+        self.push(&SECONDARY, t, truth.secondary_travel_m * MM);
         self.wheels(truth);
-        for (path, pull) in [
-            ("plots/couplers/first", truth.couplers_n.first()),
-            ("plots/couplers/last", truth.couplers_n.last()),
+        for (line, pull) in [
+            (&FIRST_COUPLER, truth.couplers_n.first()),
+            (&LAST_COUPLER, truth.couplers_n.last()),
         ] {
             if let Some(pull_n) = pull {
-                self.push(path, t, pull_n / KN);
+                self.push(line, t, pull_n / KN);
             }
         }
     }
@@ -269,36 +267,36 @@ impl Plots {
         let slips = truth.wheels.iter().map(|w| w.slip_mps);
         let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
         let [left_n, right_n] = first.normal_n;
-        self.push("plots/wheels/left", t, left_n / KN);
-        self.push("plots/wheels/right", t, right_n / KN);
-        self.push("plots/wheels/lateral", t, first.lateral_n / KN);
-        self.push("plots/wheels/along", t, first.along_n / KN);
-        self.push("plots/slip/first", t, first.slip_mps);
-        self.push("plots/slip/most", t, most);
+        self.push(&LEFT, t, left_n / KN);
+        self.push(&RIGHT, t, right_n / KN);
+        self.push(&LATERAL, t, first.lateral_n / KN);
+        self.push(&ALONG, t, first.along_n / KN);
+        self.push(&FIRST_SLIP, t, first.slip_mps);
+        self.push(&MOST_SLIP, t, most);
     }
 
     /// Speed of the wheels.
     pub(super) fn odometer(&mut self, sample: &OdometerSample) {
         let speed_kmh = sample.speed_mps * KMH;
-        self.push("plots/speed/odometer", sample.time, speed_kmh);
+        self.push(&ODOMETER, sample.time, speed_kmh);
     }
 
     /// Speed over ground, where it is measured.
     pub(super) fn doppler(&mut self, sample: &DopplerSample) {
         let speed_kmh = sample.speed_mps.map(|v| v * KMH);
-        push_or_gap(&mut self.series, RADAR, sample.time, speed_kmh);
+        push_or_gap(&mut self.series, RADAR.path, sample.time, speed_kmh);
     }
 
     /// What the protection holds the speed against.
     pub(super) fn protection(&mut self, report: &ProtectionReport) {
         let t = report.time;
-        self.push("plots/speed/estimated", t, report.speed_mps * KMH);
-        self.push("plots/speed/permitted", t, report.permitted_mps * KMH);
-        self.push("plots/speed/service", t, report.service_mps * KMH);
-        self.push("plots/speed/emergency", t, report.emergency_mps * KMH);
+        self.push(&ESTIMATED, t, report.speed_mps * KMH);
+        self.push(&PERMITTED, t, report.permitted_mps * KMH);
+        self.push(&SERVICE, t, report.service_mps * KMH);
+        self.push(&EMERGENCY, t, report.emergency_mps * KMH);
         push_or_gap(
             &mut self.series,
-            "plots/distance/display",
+            DISPLAY.path,
             t,
             report.display.distance_to_obstacle_m,
         );
@@ -307,10 +305,11 @@ impl Plots {
     /// How far each fix is from the truth at its time.
     pub(super) fn fixes(&mut self, report: &LedReport, true_chainages_m: &[f64]) {
         for (fix, true_m) in report.fixes.iter().zip(true_chainages_m) {
-            let [error, upper, lower] = error_paths(fix.method);
-            self.push(error, fix.time, fix.chainage_m - true_m);
-            self.push(upper, fix.time, 2.0 * fix.sigma_m);
-            self.push(lower, fix.time, -2.0 * fix.sigma_m);
+            let bound_m = 2.0 * fix.sigma_m;
+            let values_m = [fix.chainage_m - true_m, bound_m, -bound_m];
+            for (path, value_m) in error_paths(fix.method).into_iter().zip(values_m) {
+                push_or_gap(&mut self.series, path, fix.time, Some(value_m));
+            }
         }
     }
 
@@ -339,8 +338,8 @@ impl Plots {
         Ok(())
     }
 
-    fn push(&mut self, path: &str, time: SimTime, value: f64) {
-        push_or_gap(&mut self.series, path, time, Some(value));
+    fn push(&mut self, line: &Line, time: SimTime, value: f64) {
+        push_or_gap(&mut self.series, line.path, time, Some(value));
     }
 }
 

@@ -35,7 +35,7 @@ mod watch;
 pub use event::{Event, Observer, ObserverError, Opening};
 pub use speed::{Speeds, measure};
 pub use summary::{
-    Cost, Distribution, End, ImpactScore, ObstacleScore, Physics, Positioning, Protection, Summary,
+    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary,
     TrainFigures, WallShares, Wayside,
 };
 

@@ -1,6 +1,6 @@
 //! How the train fared: whether it ran, braked for an obstacle, stood, hit something.
 
-use super::summary::{ImpactScore, Protection};
+use super::summary::Protection;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
 use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
@@ -62,7 +62,7 @@ impl Outcome {
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.stop_margin_m,
             collision: !world.impacts().is_empty(),
-            impacts: world.impacts().iter().map(ImpactScore::of).collect(),
+            impacts: world.impacts().to_vec(),
         })
     }
 }

@@ -3,7 +3,7 @@
 use super::watch::{Costs, Watchers};
 use crate::bus::Method;
 use crate::scenario::Scenario;
-use crate::twin::physics::{Damage, EnergyBook, Impact};
+use crate::twin::physics::{EnergyBook, Impact};
 use crate::twin::render::Backend;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -259,41 +259,7 @@ pub struct Protection {
     /// The train hit something.
     pub collision: bool,
     /// What it hit, in order of time.
-    pub impacts: Vec<ImpactScore>,
-}
-
-/// One hit of the train on something.
-#[derive(Clone, Debug, Serialize)]
-pub struct ImpactScore {
-    /// When it began, s.
-    pub time_s: f64,
-    /// Name of what was hit.
-    pub with: String,
-    /// Speed of the train against it just before, m/s.
-    pub speed_mps: f64,
-    /// Momentum that it took from the train, N s.
-    pub momentum_n_s: f64,
-    /// Kinetic energy that it had, seen from the train, just before, J.
-    pub energy_j: f64,
-    /// Kinetic energy that both lost, J.
-    pub energy_lost_j: f64,
-    /// Damage to the train, by the energy lost: bounds from EN 15152 and EN 15227.
-    pub damage: Damage,
-}
-
-impl ImpactScore {
-    /// Of a hit in the world.
-    pub(super) fn of(impact: &Impact) -> Self {
-        Self {
-            time_s: impact.time.secs(),
-            with: impact.with.clone(),
-            speed_mps: impact.speed_mps,
-            momentum_n_s: impact.momentum_n_s,
-            energy_j: impact.energy_j,
-            energy_lost_j: impact.energy_lost_j,
-            damage: impact.damage,
-        }
-    }
+    pub impacts: Vec<Impact>,
 }
 
 #[cfg(test)]

@@ -6,156 +6,32 @@
 //! to the air and between its strands, the links lose to a drag in proportion to their speed: a
 //! swing dies out within some ten seconds, a falling end loses less than a tenth of its speed.
 
+pub(super) use super::cable_settings::CableSettings;
+
 use super::catenary::Catenary;
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, point3, pose, vector3};
-use super::ground::GROUND_GROUP;
-use super::thing::{RESTING_MPS, SOLID_GROUP, groups};
-use super::vehicle::GRAVITY_MPS2;
+use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUP, groups};
+use super::owner::Owner;
+use super::thing::{RESTING_MPS, Rest};
 use crate::bus::SimTime;
-use crate::track::{Alignment, Checker, Problem, TrackPoint, key_below};
+use crate::track::Alignment;
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ImpulseJointHandle, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
-    SphericalJointBuilder,
+    ColliderBuilder, ImpulseJointHandle, InteractionGroups, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle, SphericalJointBuilder,
 };
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
-
-/// A cable that hangs between two points of the lining.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CableSettings {
-    /// Name, for the summary.
-    pub name: String,
-    /// Its first end.
-    pub from: CableEnd,
-    /// Its other end.
-    pub to: CableEnd,
-    /// Its length, metres: at least what the ends are apart.
-    pub length_m: f64,
-    /// Diameter, metres.
-    pub diameter_m: f64,
-    /// Mass of a metre, kilograms.
-    pub mass_kg_per_m: f64,
-    /// It tears where it is pulled harder than this, newtons. Default: a copper cable of 120 mm^2
-    /// (200 N/mm^2).
-    pub breaking_n: f64,
-    /// Coulomb friction.
-    pub friction: f64,
-    /// Share of light reflected, 0 to 1.
-    pub albedo: f64,
-    /// Temperature of its surface, degrees Celsius.
-    pub temperature_c: f64,
-}
-
-/// Where a cable is fixed.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CableEnd {
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Left of the centreline, metres.
-    pub lateral_m: f64,
-    /// Above top of rail, metres.
-    pub height_m: f64,
-    /// When this end lets go, seconds. Default: never.
-    pub lets_go_s: Option<f64>,
-}
-
-impl Default for CableSettings {
-    fn default() -> Self {
-        let end = |chainage_m| CableEnd {
-            chainage_m,
-            lateral_m: 2.0,
-            height_m: 3.0,
-            lets_go_s: None,
-        };
-        Self {
-            name: "cable".to_owned(),
-            from: end(0.0),
-            to: end(6.0),
-            length_m: 6.3,
-            diameter_m: 0.025,
-            mass_kg_per_m: 1.2,
-            breaking_n: 24_000.0,
-            friction: 0.5,
-            albedo: 0.1,
-            temperature_c: 25.0,
-        }
-    }
-}
-
-impl CableEnd {
-    fn place(&self) -> TrackPoint {
-        TrackPoint {
-            s_m: self.chainage_m,
-            l_m: self.lateral_m,
-            h_m: self.height_m,
-        }
-    }
-}
-
-impl CableSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("length_m", self.length_m, 0.5..=50.0, "m");
-        check.within("diameter_m", self.diameter_m, 0.005..=0.2, "m");
-        check.within("mass_kg_per_m", self.mass_kg_per_m, 0.05..=100.0, "kg/m");
-        check.within("breaking_n", self.breaking_n, 10.0..=1e7, "N");
-        check.within("friction", self.friction, 0.0..=2.0, "");
-        check.within("albedo", self.albedo, 0.0..=1.0, "");
-        check.within("temperature_c", self.temperature_c, -50.0..=1500.0, "deg C");
-        for (key, end) in [("from", &self.from), ("to", &self.to)] {
-            let at = key_below(at, key);
-            let mut check = Checker::new(&at, problems);
-            check.within("chainage_m", end.chainage_m, -1e6..=1e6, "m");
-            check.within("lateral_m", end.lateral_m, -10.0..=10.0, "m");
-            check.within("height_m", end.height_m, -1.0..=10.0, "m");
-            if let Some(at_s) = end.lets_go_s {
-                check.within("lets_go_s", at_s, 0.0..=1e6, "s");
-            }
-        }
-    }
-
-    /// Appends what is wrong with it on a line: it must reach from end to end.
-    pub fn check_reach(&self, at: &str, alignment: &Alignment, problems: &mut Vec<Problem>) {
-        let [a, b] = [&self.from, &self.to].map(|end| alignment.world_from_track(end.place()));
-        let apart_m = (b - a).norm();
-        if self.length_m < apart_m {
-            problems.push(Problem::new(
-                key_below(at, "length_m"),
-                format!(
-                    "{} m do not reach: its ends are {apart_m:.2} m apart",
-                    self.length_m
-                ),
-                format!("give more than {apart_m:.2} m: it sags by what it is longer"),
-            ));
-        }
-    }
-}
 
 /// Length of a link.
 const LINK_M: f64 = 0.25;
 const LINKS: (usize, usize) = (8, 64);
 /// Solver passes for a chain of links under tension.
 const CHAIN_PASSES: usize = 7;
-/// Damping ratio of the swing of a cable that hangs from one end.
-const SWING_DAMPING: f64 = 0.05;
 /// Drag on the turning of a link, which nothing else keeps from spinning about its own axis.
 const TWIST_PER_S: f64 = 2.0;
 /// Pull is averaged over this: blows of the solver's single steps do not tear a cable.
 const PULL_S: f64 = 0.01;
-
-impl CableSettings {
-    /// Drag over momentum: 2 zeta w of the rod that the cable hangs as, w^2 = 3 g / 2 L.
-    fn drag_per_s(&self) -> f64 {
-        2.0 * SWING_DAMPING * (1.5 * GRAVITY_MPS2 / self.length_m).sqrt()
-    }
-}
 
 /// A cable in the world.
 #[derive(Clone)]
@@ -166,7 +42,9 @@ pub(super) struct Cable {
     joints: Vec<Option<ImpulseJointHandle>>,
     /// Pull between its links, averaged over a short time.
     pulls_n: Vec<f64>,
-    still_since: Option<SimTime>,
+    /// Where it was last along the line.
+    pub near_m: f64,
+    pub rest: Rest,
     loose: bool,
 }
 
@@ -183,7 +61,7 @@ impl Cable {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         settings: &CableSettings,
-        id: u128,
+        owner: Owner,
     ) -> Self {
         let [from, to] =
             [&settings.from, &settings.to].map(|end| alignment.world_from_track(end.place()));
@@ -192,7 +70,7 @@ impl Cable {
         let curve: Vec<Point3<f64>> = Catenary::new(from, to, settings.length_m)
             .points(count)
             .collect();
-        Self::along(world, settings, &curve, id)
+        Self::along(world, settings, &curve, owner)
     }
 
     /// A cable whose joints are at the points of a curve.
@@ -200,13 +78,13 @@ impl Cable {
         world: &mut PhysicsWorld,
         settings: &CableSettings,
         curve: &[Point3<f64>],
-        id: u128,
+        owner: Owner,
     ) -> Self {
         let count = curve.len() - 1;
         let links: Vec<Link> = (curve.windows(2).enumerate())
             .map(|(k, ends)| {
                 let end = k == 0 || k + 1 == count;
-                insert_link(world, settings, [ends[0], ends[1]], end, id)
+                insert_link(world, settings, [ends[0], ends[1]], end, owner)
             })
             .collect();
         let joints = (0..=count).map(|k| {
@@ -237,7 +115,8 @@ impl Cable {
             links,
             joints,
             pulls_n: vec![0.0; count - 1],
-            still_since: None,
+            near_m: settings.from.chainage_m,
+            rest: Rest::default(),
             loose: false,
         }
     }
@@ -295,7 +174,7 @@ impl Cable {
         };
         world.remove_impulse_joint(handle);
         self.loose = true;
-        self.still_since = None;
+        self.rest = Rest::default();
         // The piece at the wall did not touch it while it hung there.
         let ends = [self.links.first(), self.links.last()];
         for link in ends.into_iter().flatten() {
@@ -317,12 +196,7 @@ impl Cable {
             (world.bodies.get(link.body))
                 .is_some_and(|body| body.is_sleeping() || body.linvel().length() < RESTING_MPS)
         });
-        self.still_since = still.then(|| self.still_since.unwrap_or(now));
-    }
-
-    /// Since when it has not moved.
-    pub(super) fn still_since(&self) -> Option<SimTime> {
-        self.still_since
+        self.rest.note(still, now);
     }
 
     /// Both ends of each link.
@@ -360,7 +234,7 @@ impl Cable {
 }
 
 /// What a link touches; the pieces at its ends do not touch the wall that they are fixed to.
-fn touching(at_wall: bool) -> rapier3d_f64::prelude::InteractionGroups {
+fn touching(at_wall: bool) -> InteractionGroups {
     let others = TRAIN_GROUP | SOLID_GROUP;
     let of = if at_wall {
         others
@@ -375,7 +249,7 @@ fn insert_link(
     settings: &CableSettings,
     ends: [Point3<f64>; 2],
     at_wall: bool,
-    id: u128,
+    owner: Owner,
 ) -> Link {
     let along = ends[1] - ends[0];
     let half_m = 0.5 * along.norm();
@@ -388,7 +262,7 @@ fn insert_link(
             .pose(pose(&place))
             .linear_damping(settings.drag_per_s())
             .angular_damping(TWIST_PER_S)
-            .user_data(id)
+            .user_data(owner.id())
             .additional_solver_iterations(CHAIN_PASSES),
     );
     if let Some(body) = world.bodies.get_mut(body) {
@@ -399,7 +273,7 @@ fn insert_link(
         .mass(2.0 * half_m * settings.mass_kg_per_m)
         .friction(settings.friction)
         .restitution(0.0)
-        .user_data(id)
+        .user_data(owner.id())
         .collision_groups(touching(at_wall));
     world.insert_collider(collider, Some(body));
     Link { body, half_m }

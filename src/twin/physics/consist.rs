@@ -5,8 +5,10 @@ use super::PhysicsError;
 use super::convert::{isometry, vector, vector3};
 use super::driver::{Effort, Instruments};
 use super::energy::{EnergyBook, Ledger};
+use super::groups::{OBSTACLE_GROUP, OTHER_TRAIN_GROUP, TRAIN_GROUP, groups};
 use super::history::VehicleMotion;
 use super::line::Line;
+use super::owner::Owner;
 use super::placement::{self, AXLES, BODIES, Part};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
@@ -17,14 +19,10 @@ use crate::track::Tunnel;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, MassProperties,
-    PhysicsWorld, RigidBodyBuilder, RigidBodyHandle,
+    ColliderBuilder, ColliderHandle, MassProperties, PhysicsWorld, RigidBodyBuilder,
+    RigidBodyHandle,
 };
 
-/// The train that a scenario is about hits obstacles and other trains.
-pub(super) const TRAIN_GROUP: Group = Group::GROUP_1;
-pub(super) const OBSTACLE_GROUP: Group = Group::GROUP_2;
-const OTHER_TRAIN_GROUP: Group = Group::GROUP_5;
 /// Lowest parts of a car over top of rail: guard irons hang 60 mm over the rails.
 const UNDERSIDE_M: f64 = 0.06;
 /// Slower than this, resistance fades, so that it does not push a standing train.
@@ -32,14 +30,8 @@ const FADE_MPS: f64 = 0.1;
 /// How quickly a train that is brought to its starting state is held to its speed.
 const HOLD_PER_S: f64 = 50.0;
 
-/// Whose train it is.
-#[derive(Clone, Copy)]
-pub(super) enum Crowd {
-    /// The one that a scenario is about.
-    Own,
-    /// Another one, whose bodies say so by this number.
-    Other(u128),
-}
+/// Whose train it is; `None` is the one that a scenario is about.
+pub(super) type Crowd = Option<Owner>;
 
 /// The train.
 #[derive(Clone)]
@@ -72,7 +64,7 @@ impl Consist {
         tunnel: &Tunnel,
         settings: &TrainSettings,
         head_m: f64,
-        crowd: Crowd,
+        owner: Option<Owner>,
     ) -> Self {
         let vehicle = settings.vehicle();
         let alignment = &tunnel.alignment;
@@ -98,7 +90,7 @@ impl Consist {
             start_potential_j: 0.0,
         };
         for car in &cars {
-            consist.insert(world, car, crowd);
+            consist.insert(world, car, owner);
             for state in &car[3..] {
                 let p = super::convert::point3(state.position);
                 let s_m = alignment.track_from_world(&p, head_m).s_m;
@@ -110,10 +102,15 @@ impl Consist {
     }
 
     /// The bodies of a car, and the box that hits things.
-    fn insert(&mut self, world: &mut PhysicsWorld, states: &[BodyState; BODIES], crowd: Crowd) {
-        let (groups, id) = match crowd {
-            Crowd::Own => ((TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP), 0),
-            Crowd::Other(id) => ((OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP), id),
+    fn insert(
+        &mut self,
+        world: &mut PhysicsWorld,
+        states: &[BodyState; BODIES],
+        owner: Option<Owner>,
+    ) {
+        let touching = match owner {
+            None => groups(TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
+            Some(_) => groups(OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
         };
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
@@ -132,12 +129,8 @@ impl Consist {
             .density(0.0)
             .friction(0.3)
             .restitution(0.1)
-            .collision_groups(InteractionGroups::new(
-                groups.0,
-                groups.1,
-                InteractionTestMode::And,
-            ))
-            .user_data(id);
+            .collision_groups(touching)
+            .user_data(owner.map_or(0, Owner::id));
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders
             .push(world.insert_collider(collider, Some(car)));

@@ -1,19 +1,15 @@
 //! What obstacles fall on: slabs behind the tunnel's outline and boxes for the rails, laid along
 //! the line in short lengths, and only where there is something to fall.
 
-use super::consist::OBSTACLE_GROUP;
 use super::convert::{pose, vector};
+use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, groups};
 use crate::track::{
     BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Tunnel, rail_outline,
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use rapier3d_f64::prelude::{
-    ColliderBuilder, Group, InteractionGroups, InteractionTestMode, PhysicsWorld,
-};
+use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
 use std::collections::BTreeSet;
 
-/// The ground is hit by obstacles only.
-pub(super) const GROUND_GROUP: Group = Group::GROUP_3;
 /// Length of a slab: at a radius of 300 m it is 2 mm off the curve.
 const SLAB_M: f64 = 2.0;
 const SLAB_THICKNESS_M: f64 = 0.2;
@@ -102,10 +98,6 @@ fn insert(world: &mut PhysicsWorld, half: Vector3<f64>, place: Isometry3<f64>) {
     let slab = ColliderBuilder::cuboid(half.x, half.y, half.z)
         .position(pose(&place))
         .friction(FRICTION)
-        .collision_groups(InteractionGroups::new(
-            GROUND_GROUP,
-            OBSTACLE_GROUP,
-            InteractionTestMode::And,
-        ));
+        .collision_groups(groups(GROUND_GROUP, OBSTACLE_GROUP));
     world.insert_collider(slab, None);
 }

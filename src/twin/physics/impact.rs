@@ -20,18 +20,20 @@
 //! The bounds hold for hits where these parts are. A thing that hits equipment below the floor does
 //! harm at less.
 
-use super::consist::TRAIN_GROUP;
-use super::thing::groups;
+use super::groups::{TRAIN_GROUP, groups};
+use super::owner::Owner;
 use crate::bus::SimTime;
 use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderHandle, Group, PhysicsWorld, RigidBodyHandle};
-use serde::{Deserialize, Serialize};
+use serde::{Serialize, Serializer};
+use std::fmt;
 
 /// One hit of the train on something.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Impact {
-    /// When it began.
+    /// When it began; seconds in files.
+    #[serde(rename = "time_s", serialize_with = "seconds")]
     pub time: SimTime,
     /// Name of what was hit.
     pub with: String,
@@ -47,8 +49,12 @@ pub struct Impact {
     pub damage: Damage,
 }
 
+fn seconds<S: Serializer>(time: &SimTime, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.secs())
+}
+
 /// What a hit does to the train, by the energy that it uses up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
     /// Scratches: no more than the front glazing must withstand.
@@ -64,16 +70,15 @@ pub enum Damage {
     BeyondDesign,
 }
 
-impl Damage {
-    /// As in files and tables.
-    pub fn name(self) -> &'static str {
-        match self {
+impl fmt::Display for Damage {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
             Self::Superficial => "superficial",
             Self::Light => "light",
             Self::Repairable => "repairable",
             Self::Structural => "structural",
-            Self::BeyondDesign => "beyond_design",
-        }
+            Self::BeyondDesign => "beyond design",
+        })
     }
 }
 
@@ -159,7 +164,7 @@ struct Part {
 /// A thing in touch with the train.
 #[derive(Clone)]
 struct Touch {
-    id: u128,
+    owner: Owner,
     /// Which hit, unless that was too slow or too late to be kept.
     impact: Option<usize>,
     since: SimTime,
@@ -172,7 +177,7 @@ struct Touch {
 /// One contact of the train in one step.
 pub(super) struct Hit {
     /// Who was hit.
-    pub id: u128,
+    pub owner: Owner,
     /// With force, not by its touch alone.
     pub force: bool,
     body: RigidBodyHandle,
@@ -254,7 +259,7 @@ impl Impacts {
         let closing = |push: &Push| was.at(push.arm) - train_was.at(push.train_arm);
         let fastest = hit.pair.iter().map(|push| closing(push).length());
         let speed_mps = fastest.fold(0.0, f64::max);
-        let k = self.touch(hit.id, name, speed_mps, now);
+        let k = self.touch(hit.owner, name, speed_mps, now);
         let touch = &mut self.touches[k];
         touch.last = now;
         let blow = now.since(touch.since) <= BLOW_S;
@@ -282,8 +287,8 @@ impl Impacts {
     }
 
     /// The touch that goes on, or a new one, with a hit of its own where it is one.
-    fn touch(&mut self, id: u128, name: &str, speed_mps: f64, now: SimTime) -> usize {
-        let known = self.touches.iter().position(|touch| touch.id == id);
+    fn touch(&mut self, owner: Owner, name: &str, speed_mps: f64, now: SimTime) -> usize {
+        let known = self.touches.iter().position(|touch| touch.owner == owner);
         if let Some(k) = known
             && now.since(self.touches[k].last) <= GAP_S
         {
@@ -291,7 +296,7 @@ impl Impacts {
         }
         let hit = (known.is_none() || speed_mps >= AGAIN_MPS) && self.list.len() < MOST;
         let touch = Touch {
-            id,
+            owner,
             impact: hit.then_some(self.list.len()),
             since: now,
             last: now,
@@ -349,7 +354,7 @@ fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Optio
         points.into_iter().any(|point| point.dist <= 0.0)
     };
     (!pushes.is_empty() || touching()).then_some(Hit {
-        id: other.user_data,
+        owner: Owner::of(other.user_data)?,
         force: !pushes.is_empty(),
         body: other.parent()?,
         part: k,
@@ -360,6 +365,27 @@ fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Optio
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Fails where a key of summary.json or the name of a class of damage in it is another one.
+    #[test]
+    fn files_keep_their_keys() {
+        let impact = Impact {
+            time: SimTime::from_nanos(1_500_000_000),
+            with: "crate".to_owned(),
+            speed_mps: 10.0,
+            momentum_n_s: 2.5,
+            energy_j: 4.0,
+            energy_lost_j: 3.0,
+            damage: Damage::BeyondDesign,
+        };
+        assert_eq!(
+            serde_json::to_string(&impact).ok().as_deref(),
+            Some(
+                "{\"time_s\":1.5,\"with\":\"crate\",\"speed_mps\":10.0,\"momentum_n_s\":2.5,\
+                 \"energy_j\":4.0,\"energy_lost_j\":3.0,\"damage\":\"beyond_design\"}"
+            )
+        );
+    }
 
     /// Fails where the bounds are not those of two like trains, or classes are out of order.
     #[test]

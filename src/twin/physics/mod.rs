@@ -27,7 +27,7 @@
 //! |---|---|
 //! | track | `irregularity` and `defect` (where the rails lie), `adhesion` (how slippery they are), `line` (all of it, as a wheelset asks) |
 //! | train | `vehicle_file` and `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train` |
-//! | things | `obstacle`, `shape`, `thing`, `cable` and `catenary`, `worker` and `walker`, `ground`, `impact`, `things` |
+//! | things | `obstacle`, `shape`, `thing`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact`, `owner`, `things` |
 //! | world | `settings`, `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
 //!
 //! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
@@ -43,6 +43,7 @@
 
 mod adhesion;
 mod cable;
+mod cable_settings;
 mod catenary;
 mod consist;
 mod convert;
@@ -50,11 +51,13 @@ mod defect;
 mod driver;
 mod energy;
 mod ground;
+mod groups;
 mod history;
 mod impact;
 mod irregularity;
 mod line;
 mod obstacle;
+mod owner;
 mod placement;
 mod saved;
 mod settings;
@@ -78,7 +81,7 @@ mod wheelset;
 mod worker;
 
 pub use adhesion::{RailState, RailZone};
-pub use cable::{CableEnd, CableSettings};
+pub use cable_settings::{CableEnd, CableSettings};
 pub use defect::{DefectSettings, DefectShape, Side};
 pub use energy::EnergyBook;
 pub use history::VehicleMotion;
@@ -88,7 +91,7 @@ pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
-pub use things::{ObstacleTruth, WorkerTruth};
+pub use truth::{ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
 };
@@ -98,10 +101,10 @@ pub use worker::{Waypoint, WorkerSettings};
 use crate::bus::{BrakeDemand, SimTime, TrainCommand};
 use crate::track::{Problem, Tunnel};
 use crate::twin::render::{Body, Headlight};
-use consist::Crowd;
 use irregularity::Irregularity;
 use line::Line;
 use nalgebra::{Isometry3, Vector3};
+use owner::Owner;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
 use std::sync::Arc;
@@ -210,9 +213,9 @@ impl World {
         let history = (settings.history_s / step_s).ceil() as usize + 1;
         let mut train = |train, crowd, steps| Train::new(&mut rapier, &tunnel, train, crowd, steps);
         let own = settings.train.as_ref();
-        let own = own.map(|own| train(own, Crowd::Own, history));
+        let own = own.map(|own| train(own, None, history));
         let others = settings.other_trains.iter().enumerate();
-        let others = others.map(|(k, other)| train(other, Crowd::Other(things::train_id(k)), 2));
+        let others = others.map(|(k, other)| train(other, Some(Owner::Train(k)), 2));
         let others = others.collect();
         let train_mass_kg = own.as_ref().map(|train| train.consist.mass_kg());
         let irregularity = Irregularity::new(

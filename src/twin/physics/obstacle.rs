@@ -230,11 +230,11 @@ impl ObstacleSettings {
         self.height_m + body.reach_m(&down)
     }
 
-    /// The single things of this entry, number `entry` of the scenario.
-    pub(super) fn single(&self, entry: &str, seed: u64, index: u64) -> Vec<Single> {
+    /// The pieces of this entry, number `entry` of the scenario.
+    pub(super) fn pieces(&self, entry: &str, seed: u64, index: u64) -> Vec<Piece> {
         let stream = |what: &str| Stream::new(seed, index, &format!("{entry} {what}"));
         let draws = stream("places");
-        let mut made: Vec<Single> = Vec::new();
+        let mut made: Vec<Piece> = Vec::new();
         for k in 0..u64::from(self.count) {
             let draw = |n: u64| 2.0 * draws.uniform(k * 4 * (DRAWS + 1) + n) - 1.0;
             let mut settings = self.clone();
@@ -248,6 +248,8 @@ impl ObstacleSettings {
             let Some(body) = settings.body.body(stream(&format!("shape {k}"))) else {
                 continue;
             };
+            // Should no draw be free, the last one stands and the solver parts what overlaps:
+            // `check_room` leaves so much room that this is rare.
             for attempt in 1..=DRAWS {
                 settings.chainage_m = self.chainage_m + self.spread_m[0] * draw(4 * attempt);
                 settings.lateral_m = self.lateral_m + self.spread_m[1] * draw(4 * attempt + 1);
@@ -256,14 +258,14 @@ impl ObstacleSettings {
                     break;
                 }
             }
-            made.push(Single { settings, body });
+            made.push(Piece { settings, body });
         }
         made
     }
 }
 
 /// Whether the balls around two things do not overlap.
-fn apart(settings: &ObstacleSettings, body: &Shape, other: &Single) -> bool {
+fn apart(settings: &ObstacleSettings, body: &Shape, other: &Piece) -> bool {
     let place = |s: &ObstacleSettings| Vector3::new(s.chainage_m, s.lateral_m, s.height_m);
     let distance_m = (place(settings) - place(&other.settings)).norm();
     distance_m > body.half_extents_m().max() + other.body.half_extents_m().max()
@@ -271,10 +273,13 @@ fn apart(settings: &ObstacleSettings, body: &Shape, other: &Single) -> bool {
 
 /// One thing to come.
 #[derive(Clone, Debug)]
-pub(super) struct Single {
+pub(super) struct Piece {
     pub settings: ObstacleSettings,
     pub body: Shape,
 }
+
+/// As workers name what they carry.
+pub(super) type Single = Piece;
 
 #[cfg(test)]
 mod tests {
@@ -298,7 +303,7 @@ mod tests {
         let mut problems = Vec::new();
         rocks.check("obstacles[0]", &mut problems);
         assert!(problems.is_empty(), "{problems:?}");
-        let made = rocks.single("obstacle 0", 1, 0);
+        let made = rocks.pieces("obstacle 0", 1, 0);
         assert_eq!(made.len(), 12);
         assert_eq!(made[2].settings.name, "rock 3");
         for (k, one) in made.iter().enumerate() {
@@ -309,13 +314,13 @@ mod tests {
             assert!(made[..k].iter().all(|other| apart(s, &one.body, other)));
         }
         let masses =
-            |made: &[Single]| -> Vec<f64> { made.iter().map(|one| one.settings.mass_kg).collect() };
+            |made: &[Piece]| -> Vec<f64> { made.iter().map(|one| one.settings.mass_kg).collect() };
         assert_eq!(
             masses(&made),
-            masses(&rocks.single("obstacle 0", 1, 0)),
+            masses(&rocks.pieces("obstacle 0", 1, 0)),
             "not the same twice"
         );
-        assert_ne!(masses(&made), masses(&rocks.single("obstacle 0", 1, 1)));
+        assert_ne!(masses(&made), masses(&rocks.pieces("obstacle 0", 1, 1)));
         let crowded = ObstacleSettings {
             spread_m: [0.1; 3],
             ..rocks

@@ -1,42 +1,37 @@
 //! A thing in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
 
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
-use super::ground::GROUND_GROUP;
+use super::groups::{fixed, loose};
 use super::impact::Motion;
-use super::obstacle::{HingeEdge, HingeSettings, Single};
+use super::obstacle::{HingeEdge, HingeSettings, Piece};
+use super::owner::Owner;
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ColliderHandle, Group, ImpulseJointHandle, InteractionGroups,
-    InteractionTestMode, PhysicsWorld, RevoluteJointBuilder, RigidBodyBuilder, RigidBodyHandle,
-    RigidBodyType,
+    ColliderBuilder, ColliderHandle, ImpulseJointHandle, PhysicsWorld, RevoluteJointBuilder,
+    RigidBodyBuilder, RigidBodyHandle, RigidBodyType,
 };
 
-/// What cables lie on: they do not touch each other.
-pub(super) const SOLID_GROUP: Group = Group::GROUP_4;
 /// Slower than this, a body lies still.
 pub(super) const RESTING_MPS: f64 = 0.02;
 pub(super) const RESTING_RAD_S: f64 = 0.1;
 /// Extra solver passes for contacts of light bodies with a train.
 pub(super) const EXTRA_PASSES: usize = 8;
 
-/// Who may touch whom: by groups that contain each other.
-pub(super) fn groups(member: Group, of: Group) -> InteractionGroups {
-    InteractionGroups::new(member, of, InteractionTestMode::And)
+/// Since when something has not moved; `None` while it moves.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Rest {
+    pub since: Option<SimTime>,
 }
 
-fn loose() -> InteractionGroups {
-    let all = OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP;
-    groups(OBSTACLE_GROUP | SOLID_GROUP, all)
-}
-
-/// What is fixed would stop the train dead: the train meets it without force, which tears it off.
-fn fixed() -> InteractionGroups {
-    groups(OBSTACLE_GROUP | SOLID_GROUP, OBSTACLE_GROUP | GROUND_GROUP)
+impl Rest {
+    /// It is still now, or moves.
+    pub(super) fn note(&mut self, still: bool, now: SimTime) {
+        self.since = still.then(|| self.since.unwrap_or(now));
+    }
 }
 
 /// What still holds a thing.
@@ -55,11 +50,13 @@ enum Hold {
 /// A thing.
 #[derive(Clone)]
 pub(super) struct Thing {
-    pub single: Single,
+    pub piece: Piece,
     pub body: RigidBodyHandle,
     pub collider: ColliderHandle,
     hold: Hold,
-    still_since: Option<SimTime>,
+    /// Where it was last along the line.
+    pub near_m: f64,
+    pub rest: Rest,
 }
 
 impl Thing {
@@ -67,15 +64,15 @@ impl Thing {
     pub(super) fn insert(
         world: &mut PhysicsWorld,
         alignment: &Alignment,
-        single: &Single,
-        id: u128,
+        piece: &Piece,
+        owner: Owner,
     ) -> Self {
-        let settings = &single.settings;
+        let settings = &piece.settings;
         let frame = alignment.at(settings.chainage_m);
         let centre = alignment.world_from_track(TrackPoint {
             s_m: settings.chainage_m,
             l_m: settings.lateral_m,
-            h_m: settings.centre_height_m(&single.body),
+            h_m: settings.centre_height_m(&piece.body),
         });
         let heading = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), frame.heading_rad);
         let place =
@@ -90,26 +87,27 @@ impl Thing {
             builder
                 .pose(pose(&place))
                 .ccd_enabled(true)
-                .user_data(id)
+                .user_data(owner.id())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let (hold, solver) = match settings.held_until_s {
             Some(until_s) => (Hold::Fixed { until_s }, fixed()),
             None => (Hold::Nothing, loose()),
         };
-        let collider = collider_of(&single.body)
+        let collider = collider_of(&piece.body)
             .mass(settings.mass_kg)
             .friction(settings.friction)
             .restitution(settings.restitution)
-            .user_data(id)
+            .user_data(owner.id())
             .collision_groups(loose())
             .solver_groups(solver);
         Self {
             body,
             collider: world.insert_collider(collider, Some(body)),
-            single: single.clone(),
+            piece: piece.clone(),
             hold,
-            still_since: None,
+            near_m: settings.chainage_m,
+            rest: Rest::default(),
         }
     }
 
@@ -133,7 +131,7 @@ impl Thing {
     /// Lets go what is due.
     pub(super) fn release(&mut self, world: &mut PhysicsWorld, now_s: f64) {
         match self.hold {
-            Hold::Fixed { until_s } if until_s <= now_s => match self.single.settings.hinge {
+            Hold::Fixed { until_s } if until_s <= now_s => match self.piece.settings.hinge {
                 Some(hinge) => self.swing(world, &hinge),
                 None => self.let_go(world),
             },
@@ -149,7 +147,7 @@ impl Thing {
         if let Some(body) = world.bodies.get_mut(self.body) {
             body.set_body_type(RigidBodyType::Dynamic, true);
         }
-        self.still_since = None;
+        self.rest = Rest::default();
     }
 
     fn let_go(&mut self, world: &mut PhysicsWorld) {
@@ -165,7 +163,7 @@ impl Thing {
             return;
         };
         self.set_free(world);
-        let half = self.single.body.half_extents_m();
+        let half = self.piece.body.half_extents_m();
         let (edge, axis) = match hinge.edge {
             HingeEdge::Top => (Vector3::z() * half.z, Vector::X),
             HingeEdge::Bottom => (Vector3::z() * -half.z, Vector::X),
@@ -189,12 +187,7 @@ impl Thing {
             body.is_sleeping()
                 || body.linvel().length() < RESTING_MPS && body.angvel().length() < RESTING_RAD_S
         });
-        self.still_since = still.then(|| self.still_since.unwrap_or(now));
-    }
-
-    /// Since when it has not moved.
-    pub(super) fn still_since(&self) -> Option<SimTime> {
-        self.still_since
+        self.rest.note(still, now);
     }
 
     /// Where it is and how it moves.
@@ -210,10 +203,10 @@ impl Thing {
     pub(super) fn draw(&self, world: &PhysicsWorld) -> Option<Body> {
         let (world_from_body, velocity_mps) = self.state(world)?;
         Some(Body {
-            shape: self.single.body.clone(),
+            shape: self.piece.body.clone(),
             world_from_body,
             velocity_mps,
-            albedo: self.single.settings.albedo,
+            albedo: self.piece.settings.albedo,
             luminance_cd_m2: 0.0,
         })
     }
@@ -246,13 +239,13 @@ impl Thing {
         let Some(body) = world.bodies.get_mut(self.body).filter(|_| arm_m > 0.0) else {
             return;
         };
-        if let Shape::Cylinder(..) = self.single.body {
+        if let Shape::Cylinder(..) = self.piece.body {
             let axis = *body.rotation() * Vector::Z;
             body.apply_torque_impulse(axis * -axis.dot(turning), false);
         }
         let normal = normal.normalize_or_zero();
         let load_n_s = (body.linvel() - before.linear - gravity * dt_s).dot(normal) * body.mass();
-        let moment = self.single.settings.rolling_resistance * load_n_s.max(0.0) * arm_m;
+        let moment = self.piece.settings.rolling_resistance * load_n_s.max(0.0) * arm_m;
         let spin = body.angvel() - normal * normal.dot(body.angvel());
         let rate = spin.length();
         if rate > 1e-9 {

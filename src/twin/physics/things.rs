@@ -5,104 +5,28 @@
 //! here looks at a sleeping body, and the contacts of the train are asked of the train.
 
 use super::PhysicsError;
-use super::cable::{Cable, bounds};
+use super::cable::Cable;
+use super::convert::point3;
 use super::ground::Ground;
 use super::impact::{Impact, Impacts, Motion};
-use super::obstacle::Single;
+use super::obstacle::Piece;
+use super::owner::Owner;
 use super::settings::PhysicsSettings;
 use super::thing::Thing;
+use super::truth::{ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
 use super::walker::{Act, Walker};
 use crate::bus::SimTime;
 use crate::track::{Alignment, Tunnel};
 use crate::twin::render::Body;
-use nalgebra::{Isometry3, Point3, Vector3};
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
-
-/// One obstacle as it really is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ObstacleTruth<'a> {
-    /// Name.
-    pub name: &'a str,
-    /// Length, width and height of its own box.
-    pub size_m: Vector3<f64>,
-    /// Chainage of its centre.
-    pub chainage_m: f64,
-    /// Its centre, left of the centreline.
-    pub lateral_m: f64,
-    /// Its centre, above top of rail.
-    pub height_m: f64,
-    /// Half of what it extends along the line, across and up, turned as it is.
-    pub half_extents_m: Vector3<f64>,
-    /// Pose of its centre.
-    pub world_from_body: Isometry3<f64>,
-    /// Velocity of its centre, in the world's axes.
-    pub velocity_mps: Vector3<f64>,
-    /// Since when it lies still; `None` while it moves.
-    pub resting_since: Option<SimTime>,
-    /// Temperature of its surface, degrees Celsius.
-    pub temperature_c: f64,
-}
-
-/// One worker as he really is.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WorkerTruth<'a> {
-    /// Name.
-    pub name: &'a str,
-    /// Height of the body.
-    pub stature_m: f64,
-    /// Where he is along the line.
-    pub chainage_m: f64,
-    /// Left of the centreline.
-    pub lateral_m: f64,
-}
 
 /// Steps between looks at where a moving thing is along the line.
 const LOOK_STEPS: u64 = 50;
-/// What has been still for this long rests.
-const RESTING_S: f64 = 0.25;
-
-/// Who a body belongs to, as rapier keeps it with the body: 0 is nobody's.
-#[derive(Clone, Copy)]
-enum Owner {
-    Thing(usize),
-    Cable(usize),
-    Worker(usize),
-    Train(usize),
-}
-
-/// How the bodies of the other train `k` say whose they are.
-pub(super) fn train_id(k: usize) -> u128 {
-    Owner::Train(k).id()
-}
-
-impl Owner {
-    fn id(self) -> u128 {
-        let (kind, k) = match self {
-            Self::Thing(k) => (1, k),
-            Self::Cable(k) => (2, k),
-            Self::Worker(k) => (3, k),
-            Self::Train(k) => (4, k),
-        };
-        (kind << 64) | k as u128
-    }
-
-    fn of(id: u128) -> Option<Self> {
-        let k = id as u64 as usize;
-        match id >> 64 {
-            1 => Some(Self::Thing(k)),
-            2 => Some(Self::Cable(k)),
-            3 => Some(Self::Worker(k)),
-            4 => Some(Self::Train(k)),
-            _ => None,
-        }
-    }
-}
-
 /// A body that was awake before the step.
 #[derive(Clone)]
 struct Awake {
     body: RigidBodyHandle,
-    id: u128,
+    owner: Owner,
     before: Motion,
 }
 
@@ -117,7 +41,7 @@ pub(super) struct Things {
     trains: Vec<String>,
     ground: Ground,
     /// Still to come, the next one last.
-    to_come: Vec<Single>,
+    to_come: Vec<Piece>,
     /// Times when something fixed lets go, the next one last.
     releases_s: Vec<f64>,
     impacts: Impacts,
@@ -141,15 +65,15 @@ impl Things {
         // Contacts that are kept while a body turns by some degrees make a wheel a polygon.
         solver.contact_recycling = false;
         let entries = settings.obstacles.iter().enumerate();
-        let mut to_come: Vec<Single> = entries
-            .flat_map(|(k, entry)| entry.single(&format!("obstacle {k}"), seed, index))
+        let mut to_come: Vec<Piece> = entries
+            .flat_map(|(k, entry)| entry.pieces(&format!("obstacle {k}"), seed, index))
             .collect();
         to_come.sort_by(|a, b| a.settings.appears_s.total_cmp(&b.settings.appears_s));
         to_come.reverse();
         let walkers = settings.workers.iter().enumerate().map(|(k, worker)| {
             let load = worker.carries.as_ref();
-            let load = load.map(|load| load.single(&format!("load {k}"), seed, index));
-            Walker::new(worker, load.and_then(|single| single.into_iter().next()))
+            let load = load.map(|load| load.pieces(&format!("load {k}"), seed, index));
+            Walker::new(worker, load.and_then(|pieces| pieces.into_iter().next()))
         });
         let mut things = Self {
             walkers: walkers.collect(),
@@ -168,8 +92,8 @@ impl Things {
         for (k, cable) in settings.cables.iter().enumerate() {
             things.ground.lay(world, tunnel, cable.from.chainage_m);
             things.ground.lay(world, tunnel, cable.to.chainage_m);
-            let id = Owner::Cable(k).id();
-            let cable = Cable::insert(world, &tunnel.alignment, cable, id);
+            let owner = Owner::Cable(k);
+            let cable = Cable::insert(world, &tunnel.alignment, cable, owner);
             things.cables.push(cable);
         }
         things.go_on(world, tunnel, 0.0);
@@ -180,14 +104,14 @@ impl Things {
     pub(super) fn before_step(&mut self, world: &mut PhysicsWorld) {
         self.impacts.before_step(world);
         self.awake.clear();
-        let awake = world
-            .active_bodies()
-            .filter(|(_, body)| body.user_data != 0);
-        self.awake.extend(awake.map(|(body, state)| Awake {
-            body,
-            id: state.user_data,
-            before: Motion::of(world, body),
-        }));
+        let awake = world.active_bodies().filter_map(|(body, state)| {
+            Some(Awake {
+                body,
+                owner: Owner::of(state.user_data)?,
+                before: Motion::of(world, body),
+            })
+        });
+        self.awake.extend(awake);
     }
 
     /// Something moves, or did before the last step.
@@ -219,25 +143,29 @@ impl Things {
         let look = self.steps.is_multiple_of(LOOK_STEPS);
         let mut last_cable = None;
         for k in 0..self.awake.len() {
-            let Awake { body, id, before } = self.awake[k];
+            let Awake {
+                body,
+                owner,
+                before,
+            } = self.awake[k];
             if !world.bodies.get(body).is_some_and(|b| b.is_enabled()) {
                 return Err(PhysicsError::NonFinite {
-                    body: self.name(id).to_owned(),
+                    body: self.name(owner).to_owned(),
                     time: now,
                 });
             }
             if look {
-                self.lay_ground(world, tunnel, body, id);
+                self.lay_ground(world, tunnel, body, owner);
             }
-            match Owner::of(id) {
-                Some(Owner::Thing(k)) => {
+            match owner {
+                Owner::Thing(k) => {
                     if let Some(thing) = &mut self.things[k] {
                         thing.observe(world, now);
                         thing.resist_rolling(world, &before);
                     }
                 }
                 // The links of a cable follow one another.
-                Some(Owner::Cable(k)) if last_cable != Some(k) => {
+                Owner::Cable(k) if last_cable != Some(k) => {
                     last_cable = Some(k);
                     self.cables[k].observe(world, now);
                     self.cables[k].tear(world);
@@ -254,54 +182,43 @@ impl Things {
         world: &mut PhysicsWorld,
         tunnel: &Tunnel,
         body: RigidBodyHandle,
-        id: u128,
+        owner: Owner,
     ) {
         let Some(at) = world.bodies.get(body).map(|body| body.translation()) else {
             return;
         };
-        let near_m = match Owner::of(id) {
-            Some(Owner::Thing(k)) => {
-                let thing = self.things.get(k).and_then(Option::as_ref);
-                thing.map(|thing| thing.single.settings.chainage_m)
-            }
-            Some(Owner::Cable(k)) => self.cables.get(k).map(|c| c.settings.from.chainage_m),
-            Some(Owner::Worker(k)) => {
-                let path = self.walkers.get(k).map(|w| &w.settings.path);
-                path.and_then(|path| path.first()).map(|p| p.chainage_m)
-            }
-            Some(Owner::Train(_)) | None => None,
+        let near_m = match owner {
+            Owner::Thing(k) => self.things[k].as_mut().map(|thing| &mut thing.near_m),
+            Owner::Cable(k) => Some(&mut self.cables[k].near_m),
+            Owner::Worker(k) => Some(&mut self.walkers[k].near_m),
+            Owner::Train(_) => None,
         };
         let Some(near_m) = near_m else {
             return;
         };
-        let centre = super::convert::point3(at);
-        let s_m = tunnel.alignment.track_from_world(&centre, near_m).s_m;
-        if let Some(Owner::Thing(k)) = Owner::of(id)
-            && let Some(thing) = &mut self.things[k]
-        {
-            thing.single.settings.chainage_m = s_m;
-        }
-        self.ground.lay(world, tunnel, s_m);
+        let centre = point3(at);
+        *near_m = tunnel.alignment.track_from_world(&centre, *near_m).s_m;
+        self.ground.lay(world, tunnel, *near_m);
     }
 
     /// Hits of the train, and what they tear off and knock down.
     fn watch_train(&mut self, world: &mut PhysicsWorld, now: SimTime) {
         for hit in self.impacts.hits(world) {
             if hit.force {
-                let name = self.name(hit.id).to_owned();
+                let name = self.name(hit.owner).to_owned();
                 let before = |body| {
                     let awake = self.awake.iter().find(|awake| awake.body == body);
                     awake.map_or(Motion::default(), |awake| awake.before)
                 };
                 self.impacts.record(world, &hit, &name, before, now);
             }
-            match Owner::of(hit.id) {
-                Some(Owner::Thing(k)) => {
+            match hit.owner {
+                Owner::Thing(k) => {
                     if let Some(thing) = &mut self.things[k] {
                         thing.tear_off(world);
                     }
                 }
-                Some(Owner::Worker(k)) if hit.force => {
+                Owner::Worker(k) if hit.force => {
                     self.walkers[k].knock_down(world, now.secs());
                 }
                 _ => {}
@@ -323,8 +240,7 @@ impl Things {
             }
         }
         for k in 0..self.walkers.len() {
-            let id = Owner::Worker(k).id();
-            self.walkers[k].lead(world, &tunnel.alignment, now_s, id);
+            self.walkers[k].lead(world, &tunnel.alignment, now_s, Owner::Worker(k));
             match self.walkers[k].act(now_s) {
                 Some(Act::PutDown(load)) => {
                     let number = self.insert(world, tunnel, &load);
@@ -339,11 +255,11 @@ impl Things {
         }
     }
 
-    fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, single: &Single) -> usize {
+    fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, piece: &Piece) -> usize {
         let number = self.things.len();
-        self.ground.lay(world, tunnel, single.settings.chainage_m);
-        let id = Owner::Thing(number).id();
-        let thing = Thing::insert(world, &tunnel.alignment, single, id);
+        self.ground.lay(world, tunnel, piece.settings.chainage_m);
+        let owner = Owner::Thing(number);
+        let thing = Thing::insert(world, &tunnel.alignment, piece, owner);
         self.things.push(Some(thing));
         number
     }
@@ -369,16 +285,15 @@ impl Things {
         reached.is_some()
     }
 
-    fn name(&self, id: u128) -> &str {
-        match Owner::of(id) {
-            Some(Owner::Thing(k)) => {
+    fn name(&self, owner: Owner) -> &str {
+        match owner {
+            Owner::Thing(k) => {
                 let thing = self.things.get(k).and_then(Option::as_ref);
-                thing.map_or("obstacle", |thing| &thing.single.settings.name)
+                thing.map_or("obstacle", |thing| &thing.piece.settings.name)
             }
-            Some(Owner::Cable(k)) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
-            Some(Owner::Worker(k)) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
-            Some(Owner::Train(k)) => self.trains.get(k).map_or("train", String::as_str),
-            None => "a body",
+            Owner::Cable(k) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
+            Owner::Worker(k) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
+            Owner::Train(k) => self.trains.get(k).map_or("train", String::as_str),
         }
     }
 
@@ -443,69 +358,4 @@ fn releases_s(settings: &PhysicsSettings) -> Vec<f64> {
     let mut times: Vec<f64> = things.chain(cables).flatten().collect();
     times.sort_by(|a, b| b.total_cmp(a));
     times
-}
-
-fn resting(since: Option<SimTime>, now: SimTime) -> Option<SimTime> {
-    since.filter(|since| now.since(*since) >= RESTING_S)
-}
-
-fn thing_truth<'a>(
-    thing: &'a Thing,
-    world: &PhysicsWorld,
-    line: &Alignment,
-    now: SimTime,
-) -> Option<ObstacleTruth<'a>> {
-    let (world_from_body, velocity_mps) = thing.state(world)?;
-    let Single { settings, body } = &thing.single;
-    let centre = world_from_body.translation.vector.into();
-    let place = line.track_from_world(&centre, settings.chainage_m);
-    let world_from_line = line.at(place.s_m).world_from_line().rotation;
-    let body_from_line = world_from_body.rotation.inverse() * world_from_line;
-    let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
-        let axis = body_from_line * axis;
-        body.reach_m(&axis).max(body.reach_m(&-axis))
-    });
-    Some(ObstacleTruth {
-        name: &settings.name,
-        size_m: 2.0 * body.half_extents_m(),
-        chainage_m: place.s_m,
-        lateral_m: place.l_m,
-        height_m: place.h_m,
-        half_extents_m: half.into(),
-        world_from_body,
-        velocity_mps,
-        resting_since: resting(thing.still_since(), now),
-        temperature_c: settings.temperature_c,
-    })
-}
-
-/// A cable as the box around it.
-fn cable_truth<'a>(
-    cable: &'a Cable,
-    world: &PhysicsWorld,
-    line: &Alignment,
-    now: SimTime,
-) -> Option<ObstacleTruth<'a>> {
-    let settings = &cable.settings;
-    let middle = cable.ends(world).flatten().map(|p| p.coords);
-    let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
-    let near_m = settings.from.chainage_m;
-    let s_m = line.track_from_world(&Point3::from(middle), near_m).s_m;
-    let frame = line.at(s_m).world_from_line();
-    let [low, high] = bounds(cable.ends(world).flatten(), &frame.inverse())?;
-    let half_extents_m = 0.5 * (high - low).add_scalar(settings.diameter_m);
-    let centre = frame * Point3::from(0.5 * (low + high));
-    let place = line.track_from_world(&centre, s_m);
-    Some(ObstacleTruth {
-        name: &settings.name,
-        size_m: 2.0 * half_extents_m,
-        chainage_m: place.s_m,
-        lateral_m: place.l_m,
-        height_m: place.h_m,
-        half_extents_m,
-        world_from_body: Isometry3::from_parts(centre.into(), frame.rotation),
-        velocity_mps: cable.velocity_mps(world),
-        resting_since: resting(cable.still_since(), now),
-        temperature_c: settings.temperature_c,
-    })
 }

@@ -1,8 +1,54 @@
 //! What sessions ask of the world to score by.
 
+use super::cable::{Cable, bounds};
+use super::obstacle::Piece;
+use super::thing::Thing;
 use super::{WheelExtremes, World};
 use crate::bus::SimTime;
-use nalgebra::Isometry3;
+use crate::track::Alignment;
+use nalgebra::{Isometry3, Point3, Vector3};
+use rapier3d_f64::prelude::PhysicsWorld;
+
+/// One obstacle as it really is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ObstacleTruth<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Length, width and height of its own box.
+    pub size_m: Vector3<f64>,
+    /// Chainage of its centre.
+    pub chainage_m: f64,
+    /// Its centre, left of the centreline.
+    pub lateral_m: f64,
+    /// Its centre, above top of rail.
+    pub height_m: f64,
+    /// Half of what it extends along the line, across and up, turned as it is.
+    pub half_extents_m: Vector3<f64>,
+    /// Pose of its centre.
+    pub world_from_body: Isometry3<f64>,
+    /// Velocity of its centre, in the world's axes.
+    pub velocity_mps: Vector3<f64>,
+    /// Since when it lies still; `None` while it moves.
+    pub resting_since: Option<SimTime>,
+    /// Temperature of its surface, degrees Celsius.
+    pub temperature_c: f64,
+}
+
+/// One worker as he really is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkerTruth<'a> {
+    /// Name.
+    pub name: &'a str,
+    /// Height of the body.
+    pub stature_m: f64,
+    /// Where he is along the line.
+    pub chainage_m: f64,
+    /// Left of the centreline.
+    pub lateral_m: f64,
+}
+
+/// What has been still for this long rests.
+const RESTING_S: f64 = 0.25;
 
 impl World {
     /// Chainage of the train head now; `None` without a train.
@@ -44,4 +90,71 @@ impl World {
         let train = self.train.as_ref()?;
         Some(train.chainage_m(&self.tunnel, world_from_vehicle))
     }
+}
+
+fn resting(since: Option<SimTime>, now: SimTime) -> Option<SimTime> {
+    since.filter(|since| now.since(*since) >= RESTING_S)
+}
+
+/// A thing as it lies, flies or swings.
+pub(super) fn thing_truth<'a>(
+    thing: &'a Thing,
+    world: &PhysicsWorld,
+    line: &Alignment,
+    now: SimTime,
+) -> Option<ObstacleTruth<'a>> {
+    let (world_from_body, velocity_mps) = thing.state(world)?;
+    let Piece { settings, body } = &thing.piece;
+    let centre = world_from_body.translation.vector.into();
+    let place = line.track_from_world(&centre, thing.near_m);
+    let world_from_line = line.at(place.s_m).world_from_line().rotation;
+    let body_from_line = world_from_body.rotation.inverse() * world_from_line;
+    let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
+        let axis = body_from_line * axis;
+        body.reach_m(&axis).max(body.reach_m(&-axis))
+    });
+    Some(ObstacleTruth {
+        name: &settings.name,
+        size_m: 2.0 * body.half_extents_m(),
+        chainage_m: place.s_m,
+        lateral_m: place.l_m,
+        height_m: place.h_m,
+        half_extents_m: half.into(),
+        world_from_body,
+        velocity_mps,
+        resting_since: resting(thing.rest.since, now),
+        temperature_c: settings.temperature_c,
+    })
+}
+
+/// A cable as the box around it.
+pub(super) fn cable_truth<'a>(
+    cable: &'a Cable,
+    world: &PhysicsWorld,
+    line: &Alignment,
+    now: SimTime,
+) -> Option<ObstacleTruth<'a>> {
+    let settings = &cable.settings;
+    let middle = cable.ends(world).flatten().map(|p| p.coords);
+    let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
+    let s_m = line
+        .track_from_world(&Point3::from(middle), cable.near_m)
+        .s_m;
+    let frame = line.at(s_m).world_from_line();
+    let [low, high] = bounds(cable.ends(world).flatten(), &frame.inverse())?;
+    let half_extents_m = 0.5 * (high - low).add_scalar(settings.diameter_m);
+    let centre = frame * Point3::from(0.5 * (low + high));
+    let place = line.track_from_world(&centre, s_m);
+    Some(ObstacleTruth {
+        name: &settings.name,
+        size_m: 2.0 * half_extents_m,
+        chainage_m: place.s_m,
+        lateral_m: place.l_m,
+        height_m: place.h_m,
+        half_extents_m,
+        world_from_body: Isometry3::from_parts(centre.into(), frame.rotation),
+        velocity_mps: cable.velocity_mps(world),
+        resting_since: resting(cable.rest.since, now),
+        temperature_c: settings.temperature_c,
+    })
 }

@@ -4,11 +4,11 @@
 //! and meets the train only, so that the solver lets the train hit a body of his mass, not a wall.
 //! From then on it is a body like others: it is thrown, falls, and lies.
 
-use super::consist::{OBSTACLE_GROUP, TRAIN_GROUP};
 use super::convert::{isometry, pose, vector, vector3};
-use super::ground::GROUND_GROUP;
-use super::obstacle::Single;
-use super::thing::{EXTRA_PASSES, SOLID_GROUP, groups};
+use super::groups::{OBSTACLE_GROUP, TRAIN_GROUP, groups, loose};
+use super::obstacle::Piece;
+use super::owner::Owner;
+use super::thing::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
 use crate::twin::render::Body;
@@ -25,10 +25,12 @@ const REACH_M: f64 = 1.5;
 pub(super) struct Walker {
     pub settings: WorkerSettings,
     /// What he carries, or has put down.
-    load: Option<Single>,
+    load: Option<Piece>,
     load_is: Load,
     /// While he is on the line.
     pub body: Option<RigidBodyHandle>,
+    /// Where he was last along the line.
+    pub near_m: f64,
     /// How he stood when the train hit him.
     hit: Option<Stance>,
 }
@@ -44,7 +46,7 @@ enum Load {
 
 /// What a worker does with his load now.
 pub(super) enum Act {
-    PutDown(Box<Single>),
+    PutDown(Box<Piece>),
     /// Wants to pick up what lies under this number, if it is within his reach of a place (chainage,
     /// left of the centreline).
     PickUp(usize, [f64; 2]),
@@ -52,12 +54,13 @@ pub(super) enum Act {
 
 impl Walker {
     /// A worker, with what he carries.
-    pub(super) fn new(settings: &WorkerSettings, load: Option<Single>) -> Self {
+    pub(super) fn new(settings: &WorkerSettings, load: Option<Piece>) -> Self {
         Self {
             settings: settings.clone(),
             load,
             load_is: Load::InHand,
             body: None,
+            near_m: settings.path.first().map_or(0.0, |p| p.chainage_m),
             hit: None,
         }
     }
@@ -77,7 +80,7 @@ impl Walker {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         now_s: f64,
-        id: u128,
+        owner: Owner,
     ) {
         if self.hit.is_some() {
             return;
@@ -92,7 +95,7 @@ impl Walker {
         let centre = feet * Isometry3::translation(0.0, 0.0, self.half_m());
         let body = match self.body {
             Some(body) => body,
-            None => *self.body.insert(self.insert(world, &centre, id)),
+            None => *self.body.insert(self.insert(world, &centre, owner)),
         };
         if let Some(body) = world.bodies.get_mut(body) {
             body.set_position(pose(&centre), true);
@@ -101,19 +104,24 @@ impl Walker {
         }
     }
 
-    fn insert(&self, world: &mut PhysicsWorld, at: &Isometry3<f64>, id: u128) -> RigidBodyHandle {
+    fn insert(
+        &self,
+        world: &mut PhysicsWorld,
+        at: &Isometry3<f64>,
+        owner: Owner,
+    ) -> RigidBodyHandle {
         let body = world.insert_body(
             RigidBodyBuilder::dynamic()
                 .pose(pose(at))
                 .gravity_scale(0.0)
-                .user_data(id)
+                .user_data(owner.id())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let collider = ColliderBuilder::capsule_z(self.half_m() - RADIUS_M, RADIUS_M)
             .mass(self.settings.mass_kg)
             .friction(0.6)
             .restitution(0.0)
-            .user_data(id)
+            .user_data(owner.id())
             .collision_groups(groups(OBSTACLE_GROUP, TRAIN_GROUP));
         world.insert_collider(collider, Some(body));
         body
@@ -129,10 +137,9 @@ impl Walker {
             return;
         };
         body.set_gravity_scale(1.0, true);
-        let all = OBSTACLE_GROUP | TRAIN_GROUP | GROUND_GROUP;
         for collider in body.colliders() {
             if let Some(collider) = world.colliders.get_mut(*collider) {
-                collider.set_collision_groups(groups(OBSTACLE_GROUP | SOLID_GROUP, all));
+                collider.set_collision_groups(loose());
             }
         }
     }
