@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
 Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
-A file with any of [[plan]], [[sections]], [lamps] is a tunnel, any other a scenario; of a
-scenario the tunnel that it names is checked too.
+A file with any of [[plan]], [[sections]], [lamps] is a tunnel, one with [body] and [bogie] a
+vehicle, any other a scenario; of a scenario the files that it names are checked too.
 
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
@@ -16,11 +16,11 @@ Examples:
 
 Exit code 0 where all files are right, 2 where any is wrong.";
 
-/// Check tunnels and scenarios: errors and a short report
+/// Check tunnels, vehicles and scenarios: errors and a short report
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct CheckArgs {
-    /// Tunnel and scenario files
+    /// Tunnel, vehicle and scenario files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
 }
@@ -46,16 +46,20 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
 
 fn report_on(path: &Path) -> Result<String, ScenarioError> {
     let text = scenario::read(path)?;
-    if is_tunnel(&text) {
+    let has = |keys: &[&str]| {
+        text.parse::<toml::Table>()
+            .is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
+    };
+    if has(&TUNNEL_KEYS) {
         scenario::parse_tunnel(path, &text).map(|tunnel| report::tunnel(&tunnel))
+    } else if has(&VEHICLE_KEYS) {
+        scenario::parse_vehicle(path, &text).map(|vehicle| report::vehicle(&vehicle))
     } else {
         Scenario::from_text(path, &text, &[]).map(|scenario| report::scenario(&scenario))
     }
 }
 
 /// Keys that only tunnels have. What is not TOML is left to the scenario's parser to complain of.
-fn is_tunnel(text: &str) -> bool {
-    let keys = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
-    text.parse::<toml::Table>()
-        .is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
-}
+const TUNNEL_KEYS: [&str; 6] = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
+/// Keys that only vehicles have.
+const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

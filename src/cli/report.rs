@@ -3,6 +3,7 @@
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
 use crate::track::Tunnel;
+use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
 
 /// Length, radii, grades, sections, lamps, devices.
@@ -69,6 +70,29 @@ fn lamps(tunnel: &Tunnel) -> String {
     }
 }
 
+/// Dimensions and masses.
+pub(super) fn vehicle(vehicle: &VehicleFile) -> String {
+    let (body, bogie, wheelset) = (&vehicle.body, &vehicle.bogie, &vehicle.wheelset);
+    let mass_kg = vehicle.mass_kg();
+    let lines = [
+        format!("vehicle `{}`: {}", vehicle.name, vehicle.source),
+        format!(
+            "{} x {} x {} m, {:.1} t with {:.1} t of body, {:.1} t an axle",
+            body.length_m,
+            body.width_m,
+            body.height_m,
+            1e-3 * mass_kg,
+            1e-3 * body.mass_kg,
+            0.25e-3 * mass_kg
+        ),
+        format!(
+            "bogies {} m apart, wheelbase {} m, wheels of {} m radius",
+            bogie.distance_m, bogie.wheelbase_m, wheelset.radius_m
+        ),
+    ];
+    indented(&lines)
+}
+
 /// What it runs, what the rig sees, how many images to expect.
 pub(super) fn scenario(scenario: &Scenario) -> String {
     let mut lines = vec![format!(
@@ -79,13 +103,20 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         "{:.1} s on `{}`, seed {}",
         scenario.duration_s, scenario.tunnel.name, scenario.seed
     ));
-    if let Some(train) = &scenario.physics.train {
+    let own = scenario.physics.train.iter().map(|t| ("train", t));
+    let others = scenario.physics.other_trains.iter();
+    for (what, train) in own.chain(others.map(|t| ("other train", t))) {
         let stop = train
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));
         lines.push(format!(
-            "train of {} cars, head at {} m, cruises at {} km/h{stop}",
-            train.cars, train.start_chainage_m, train.cruise_speed_kmh
+            "{what}: {} x `{}`, {:.1} m, {:.1} t, head at {} m, cruises at {} km/h{stop}",
+            train.cars,
+            train.vehicle,
+            train.length_m(),
+            1e-3 * train.mass_kg(),
+            train.start_chainage_m,
+            train.cruise_speed_kmh
         ));
     }
     if let Some(bench) = &scenario.bench {

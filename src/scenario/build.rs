@@ -5,7 +5,7 @@ use super::file::{BenchSettings, ScenarioFile, StackSettings};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
-use crate::track::{FileError, Problem, Tunnel, read_toml};
+use crate::track::{FileError, Problem, Tunnel, key_below, read_toml};
 use crate::twin::comms::RadioSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
@@ -130,14 +130,16 @@ impl Scenario {
             file = overridden(path, text, overrides)?;
         }
 
-        for train in file.train.iter_mut().chain(&mut file.other_trains) {
-            load_vehicle(path, train)?;
-        }
-
         let mut problems = Vec::new();
         let folder = path.parent().unwrap_or(Path::new(""));
+        let own = file.train.iter_mut().map(|t| ("train".to_owned(), t));
+        let others = file.other_trains.iter_mut().enumerate();
+        let others = others.map(|(k, t)| (format!("other_trains[{k}]"), t));
+        for (at, train) in own.chain(others) {
+            load_vehicle(folder, (key_below(&at, "vehicle"), train), &mut problems)?;
+        }
         read_meshes(&mut file, folder, &mut problems);
-        // A mesh that could not be read would be missed once more.
+        // What could not be read would be missed once more.
         if problems.is_empty() {
             check::alone(&file, &mut problems);
         }
@@ -214,20 +216,34 @@ impl Scenario {
 }
 
 /// Reads the vehicle file that a train names; a name without `.toml` is one of the program's own.
-fn load_vehicle(path: &Path, train: &mut TrainSettings) -> Result<(), ScenarioError> {
+fn load_vehicle(
+    folder: &Path,
+    (key, train): (String, &mut TrainSettings),
+    problems: &mut Vec<Problem>,
+) -> Result<(), ScenarioError> {
     if Path::new(&train.vehicle).extension().is_none() {
         return Ok(());
     }
-    let path = path.parent().unwrap_or(Path::new("")).join(&train.vehicle);
-    let text = read(&path)?;
-    let file = VehicleFile::from_toml(&text).map_err(|source| ScenarioError::File {
-        path,
-        text,
+    let path = folder.join(&train.vehicle);
+    match std::fs::read_to_string(&path) {
+        Ok(text) => train.vehicle_file = Some(parse_vehicle(&path, &text)?),
+        Err(error) => problems.push(Problem::new(
+            key,
+            format!("cannot read {}: {error}", path.display()),
+            "give the path of a vehicle file, counted from the scenario's folder",
+        )),
+    }
+    Ok(())
+}
+
+/// Reads and checks a vehicle file's text; `path` is for the messages.
+pub(crate) fn parse_vehicle(path: &Path, text: &str) -> Result<VehicleFile, ScenarioError> {
+    VehicleFile::from_toml(text).map_err(|source| ScenarioError::File {
+        path: path.to_owned(),
+        text: text.to_owned(),
         overrides: Vec::new(),
         source,
-    })?;
-    train.vehicle_file = Some(file);
-    Ok(())
+    })
 }
 
 /// Reads and checks a tunnel's text; `path` is for the messages.

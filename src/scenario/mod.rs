@@ -41,7 +41,7 @@ mod recording;
 pub mod schema;
 
 pub use build::{Scenario, ScenarioError, WaysidePost};
-pub(crate) use build::{parse_tunnel, read};
+pub(crate) use build::{parse_tunnel, parse_vehicle, read};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
 pub use overrides::{Override, OverrideError};
 pub use recording::RecordSettings;

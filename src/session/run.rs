@@ -142,8 +142,13 @@ impl<'s> Run<'s> {
     fn step(&mut self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
         let before_m = self.world.head_m();
         let (world, command) = (&mut self.world, &self.command);
+        let hits = world.impacts().len();
         self.cost.physics.time(|| world.step(command)).0?;
         let now = self.world.time();
+        for hit in &self.world.impacts()[hits..] {
+            let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
+            watchers.show(&Event::Note(now, &format!("hit {with} at {kmh:.1} km/h")))?;
+        }
         self.sample_motion(watchers)?;
         self.meet_messages(now, before_m, watchers)?;
         self.trigger(now)?;

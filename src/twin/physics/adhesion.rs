@@ -14,7 +14,7 @@
 //! (2005) 992-1000, whose table has `dry` and `wet`. A film of crushed leaves leaves 0.02 to 0.06
 //! (RSSB, "Low adhesion" research reports); its other parameters are those of `wet`.
 
-use crate::track::{Checker, Problem};
+use crate::track::{Checker, Problem, key_below};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
@@ -55,7 +55,17 @@ impl RailZone {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         let mut check = Checker::new(at, problems);
         check.within("from_m", self.from_m, -1e6..=1e6, "m");
-        check.within("to_m", self.to_m, self.from_m..=1e6, "m");
+        check.within("to_m", self.to_m, -1e6..=1e6, "m");
+        if self.to_m < self.from_m {
+            problems.push(Problem::new(
+                key_below(at, "to_m"),
+                format!(
+                    "it ends at {} m, before it begins at {} m",
+                    self.to_m, self.from_m
+                ),
+                "swap the two",
+            ));
+        }
     }
 }
 

@@ -6,7 +6,7 @@
 //! to the air and between its strands, the links lose to a drag in proportion to their speed: a
 //! swing dies out within some ten seconds, a falling end loses less than a tenth of its speed.
 
-pub(super) use super::cable_settings::CableSettings;
+use super::cable_settings::CableSettings;
 
 use super::catenary::Catenary;
 use super::convert::{isometry, point3, pose, vector3};

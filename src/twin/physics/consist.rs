@@ -30,9 +30,6 @@ const FADE_MPS: f64 = 0.1;
 /// How quickly a train that is brought to its starting state is held to its speed.
 const HOLD_PER_S: f64 = 50.0;
 
-/// Whose train it is; `None` is the one that a scenario is about.
-pub(super) type Crowd = Option<Owner>;
-
 /// The train.
 #[derive(Clone)]
 pub(super) struct Consist {
@@ -61,15 +58,15 @@ impl Consist {
     /// Puts the train on the track with its head at a chainage, running.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        line: &Line<'_>,
         settings: &TrainSettings,
         head_m: f64,
         owner: Option<Owner>,
     ) -> Self {
         let vehicle = settings.vehicle();
-        let alignment = &tunnel.alignment;
+        let alignment = line.alignment;
         let speed_mps = settings.start_speed_kmh / 3.6;
-        let cars = placement::train(&vehicle, alignment, settings.cars, head_m, speed_mps);
+        let cars = placement::train(&vehicle, line, settings.cars, head_m, speed_mps);
         let Some(previous) = cars.first().map(|car| car[0]) else {
             unreachable!("a train has at least one car: the settings are checked");
         };
@@ -112,6 +109,7 @@ impl Consist {
             None => groups(TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
             Some(_) => groups(OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
         };
+        let id = owner.map_or(0, Owner::id);
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
             let body = RigidBodyBuilder::dynamic()
@@ -120,7 +118,8 @@ impl Consist {
                 .angvel(state.angular)
                 .additional_mass_properties(MassProperties::new(Vector::ZERO, kg, kg_m2))
                 .gyroscopic_forces_enabled(matches!(Part::of(k), Part::Wheelset))
-                .can_sleep(false);
+                .can_sleep(false)
+                .user_data(if k == 0 { id } else { 0 });
             self.handles.push(world.insert_body(body));
         }
         let half = self.half_extents_m();
@@ -130,7 +129,7 @@ impl Consist {
             .friction(0.3)
             .restitution(0.1)
             .collision_groups(touching)
-            .user_data(owner.map_or(0, Owner::id));
+            .user_data(id);
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders
             .push(world.insert_collider(collider, Some(car)));
@@ -325,6 +324,11 @@ impl Consist {
                 angular: body.angvel(),
             };
         }
+        Ok(())
+    }
+
+    /// Whether a wheelset has left the rails.
+    pub(super) fn on_rails(&self, time: SimTime) -> Result<(), PhysicsError> {
         let off = self.wheelsets.iter().position(Wheelset::derailed);
         off.map_or(Ok(()), |axle| {
             let body = placement::name(placement::wheelset(axle));

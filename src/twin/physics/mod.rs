@@ -210,14 +210,6 @@ impl World {
         rapier.integration_parameters.dt = step_s;
         // Substeps would move bodies with forces that belong to the step's start.
         rapier.integration_parameters.num_solver_iterations = 1;
-        let history = (settings.history_s / step_s).ceil() as usize + 1;
-        let mut train = |train, crowd, steps| Train::new(&mut rapier, &tunnel, train, crowd, steps);
-        let own = settings.train.as_ref();
-        let own = own.map(|own| train(own, None, history));
-        let others = settings.other_trains.iter().enumerate();
-        let others = others.map(|(k, other)| train(other, Some(Owner::Train(k)), 2));
-        let others = others.collect();
-        let train_mass_kg = own.as_ref().map(|train| train.consist.mass_kg());
         let irregularity = Irregularity::new(
             &settings.track.irregularity,
             tunnel.alignment.length_m(),
@@ -225,6 +217,15 @@ impl World {
             index,
         )
         .with_defects(&settings.track.defects);
+        let line = Line::new(&tunnel, &irregularity, &settings.track);
+        let history = (settings.history_s / step_s).ceil() as usize + 1;
+        let mut train = |train, owner, steps| Train::new(&mut rapier, &line, train, owner, steps);
+        let own = settings.train.as_ref();
+        let own = own.map(|own| train(own, None, history));
+        let others = settings.other_trains.iter().enumerate();
+        let others = others.map(|(k, other)| train(other, Some(Owner::Train(k)), 2));
+        let others = others.collect();
+        let train_mass_kg = own.as_ref().map(|train| train.consist.mass_kg());
         let mut world = Self {
             settings: settings.clone(),
             tunnel,

@@ -278,9 +278,6 @@ pub(super) struct Piece {
     pub body: Shape,
 }
 
-/// As workers name what they carry.
-pub(super) type Single = Piece;
-
 #[cfg(test)]
 mod tests {
     use super::*;

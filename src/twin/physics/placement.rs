@@ -1,10 +1,9 @@
-//! Where the bodies of a train are at the start: cars over the designed track, couplers closed.
+//! Where the bodies of a train are at the start: cars over the track as it lies, couplers closed.
 
-use super::convert::{point, rotation, vector3};
-use super::line::rail_axes;
+use super::convert::{rotation, vector3};
+use super::line::{Line, rail_axes};
 use super::suspension::BodyState;
 use super::vehicle::Vehicle;
-use crate::track::Alignment;
 use rapier3d_f64::math::{Rotation, Vector};
 
 /// Bodies of a car: itself, front and rear bogie, four wheelsets from the front.
@@ -50,7 +49,7 @@ pub(super) fn name(k: usize) -> String {
 /// One car after the other, the head of the train at a chainage, running.
 pub(super) fn train(
     vehicle: &Vehicle,
-    alignment: &Alignment,
+    line: &Line<'_>,
     cars: u32,
     head_m: f64,
     speed_mps: f64,
@@ -59,13 +58,13 @@ pub(super) fn train(
     let mut front_m = head_m - (0.5 * vehicle.length_m - vehicle.semi_bogie_distance_m);
     let mut placed = Vec::new();
     for _ in 0..cars {
-        let mut states = car(vehicle, alignment, front_m, speed_mps);
+        let mut states = car(vehicle, line, front_m, speed_mps);
         // Where the track bends, cars are chords: their couplers shall meet all the same.
         if let Some(meet) = front_end {
             for _ in 0..6 {
                 let gap = meet - states[0].point(vehicle.coupler_m(1.0));
                 front_m += gap.dot(states[0].rotation * Vector::X);
-                states = car(vehicle, alignment, front_m, speed_mps);
+                states = car(vehicle, line, front_m, speed_mps);
             }
         }
         front_end = Some(states[0].point(vehicle.coupler_m(-1.0)));
@@ -75,15 +74,10 @@ pub(super) fn train(
     placed
 }
 
-/// A car on the track's designed place, its front bogie at a chainage.
-fn car(
-    vehicle: &Vehicle,
-    alignment: &Alignment,
-    front_m: f64,
-    speed_mps: f64,
-) -> [BodyState; BODIES] {
+/// A car on the track, its front bogie at a chainage.
+fn car(vehicle: &Vehicle, line: &Line<'_>, front_m: f64, speed_mps: f64) -> [BodyState; BODIES] {
     let distance = 2.0 * vehicle.semi_bogie_distance_m;
-    let at = |s_m: f64, height_m: f64| on_rails(alignment, s_m, height_m, speed_mps);
+    let at = |s_m: f64, height_m: f64| on_rails(line, s_m, height_m, speed_mps);
     let front = at(front_m, vehicle.bogie_cg_m);
     let mut rear_m = front_m - distance;
     let mut rear = at(rear_m, vehicle.bogie_cg_m);
@@ -115,11 +109,12 @@ fn car(
 }
 
 /// A body over the rails that runs along them.
-fn on_rails(alignment: &Alignment, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
-    let frame = alignment.at(s_m);
-    let (_, axes) = rail_axes(&frame);
+fn on_rails(line: &Line<'_>, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
+    let frame = line.alignment.at(s_m);
+    let (origin, axes) = rail_axes(&frame);
+    let d = line.irregularity.at(s_m);
     BodyState {
-        position: point(frame.origin) + axes.z * height_m,
+        position: origin + axes.y * d.left_m + axes.z * (d.up_m + height_m),
         rotation: turned(axes.x, axes.y, axes.z),
         velocity: axes.x * speed_mps,
         angular: Vector::Z * (speed_mps * frame.curvature_per_m),

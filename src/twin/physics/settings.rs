@@ -1,7 +1,7 @@
 //! What a scenario may say about train, track, obstacles and workers.
 
 use super::adhesion::{RailState, RailZone};
-use super::cable::CableSettings;
+use super::cable_settings::CableSettings;
 use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
@@ -245,6 +245,11 @@ impl TrainSettings {
             Some(file) => Vehicle::new(file),
             None => unreachable!("a test reads the vehicles that come with the program"),
         }
+    }
+
+    /// Mass of the train.
+    pub fn mass_kg(&self) -> f64 {
+        f64::from(self.cars) * self.vehicle().total_kg()
     }
 
     /// Wheelsets of the train.

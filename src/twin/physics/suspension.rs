@@ -9,6 +9,7 @@
 use super::energy::Ledger;
 use super::vehicle::{Coupler, Element, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
+use std::cmp::Ordering;
 
 /// Pose of a centre of gravity with its velocities, world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -190,11 +191,12 @@ pub(super) fn coupler(
     let play = 0.5 * coupler.slack_m;
     let (spring, stored) = beyond(along.dot(a - b), play, coupler.stiffness_n_m);
     let damper = coupler.damping_n_s_m * rate;
-    // With slack, what buffs does not pull, and what pulls does not buff.
-    let damper = match (coupler.slack_m > 0.0, spring > 0.0) {
-        (false, _) => damper,
-        (true, true) => damper.min(spring),
-        (true, false) => damper.max(spring),
+    // With slack, what buffs does not pull, what pulls does not buff, and between is nothing.
+    let damper = match spring.partial_cmp(&0.0) {
+        _ if coupler.slack_m <= 0.0 => damper,
+        Some(Ordering::Less) => damper.max(spring),
+        Some(Ordering::Greater) => damper.min(spring),
+        _ => 0.0,
     };
     ledger.springs_j += stored;
     ledger.dampers_w += damper * rate;

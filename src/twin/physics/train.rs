@@ -1,9 +1,10 @@
 //! A train under way: its bodies, its driver, its recent past, and what it looks like.
 
-use super::consist::{Consist, Crowd};
+use super::consist::Consist;
 use super::driver::{Driver, Effort, STANDING_MPS};
 use super::history::{History, VehicleMotion};
 use super::line::Line;
+use super::owner::Owner;
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
@@ -39,14 +40,14 @@ impl Train {
     /// A train that has yet to run in over the last metres before its starting place.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        line: &Line<'_>,
         settings: &TrainSettings,
-        crowd: Crowd,
+        owner: Option<Owner>,
         history_steps: usize,
     ) -> Self {
         let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
         Self {
-            consist: Consist::new(world, tunnel, settings, head_m, crowd),
+            consist: Consist::new(world, line, settings, head_m, owner),
             history: History::new(history_steps),
             driver: Driver::new(settings),
             effort: Effort::default(),
@@ -102,6 +103,7 @@ impl Train {
     /// What a step came to.
     pub(super) fn read(&mut self, world: &PhysicsWorld, now: SimTime) -> Result<(), PhysicsError> {
         self.consist.read(world, now)?;
+        self.consist.on_rails(now)?;
         self.history.push(self.consist.motion(now));
         Ok(())
     }

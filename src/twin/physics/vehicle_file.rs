@@ -172,6 +172,11 @@ impl VehicleFile {
         SHIPPED.map(|(name, _)| name)
     }
 
+    /// Mass of the car with bogies and wheelsets.
+    pub fn mass_kg(&self) -> f64 {
+        self.body.mass_kg + 2.0 * self.bogie.mass_kg + 4.0 * self.wheelset.mass_kg
+    }
+
     /// Appends what is wrong.
     fn check(&self, problems: &mut Vec<Problem>) {
         self.body.check(&mut Checker::new("body", problems));

@@ -1,7 +1,7 @@
 //! People on the line: they walk where their path says, carry something, put it down and pick it up
 //! again.
 
-use super::obstacle::{ObstacleSettings, Single};
+use super::obstacle::{ObstacleSettings, Piece};
 use crate::track::{Alignment, BED_M, Checker, Problem, TrackPoint, key_below};
 use crate::twin::render::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -183,7 +183,7 @@ impl WorkerSettings {
     }
 
     /// What he carries, to be put down beside him where he stands.
-    pub(super) fn put_down(&self, stance: &Stance, load: &Single) -> Single {
+    pub(super) fn put_down(&self, stance: &Stance, load: &Piece) -> Piece {
         let (sin, cos) = stance.facing_rad.sin_cos();
         // His right hand.
         let (s_m, l_m) = (stance.s_m + HAND_M * sin, stance.l_m - HAND_M * cos);
@@ -198,7 +198,7 @@ impl WorkerSettings {
             hinge: None,
             ..load.settings.clone()
         };
-        Single {
+        Piece {
             settings,
             body: load.body.clone(),
         }
@@ -227,7 +227,7 @@ impl WorkerSettings {
         &self,
         stance: &Stance,
         (world_from_feet, velocity): Feet,
-        load: Option<&Single>,
+        load: Option<&Piece>,
         bodies: &mut Vec<Body>,
     ) {
         let mut put = |shape, feet_from_part: Isometry3<f64>, albedo| {

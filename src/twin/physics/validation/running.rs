@@ -447,4 +447,5 @@ fn val_energy_over_the_line() {
     );
     assert!(state.standing && (state.chainage_m - 2875.0).abs() < 0.3);
     assert!(book.gap_share() < 0.005);
+    assert!(book.gap_j().abs() < 0.02 * (book.dampers_j + book.creep_j));
 }
