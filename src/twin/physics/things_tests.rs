@@ -175,7 +175,7 @@ fn worker_leaves_his_toolbox() {
 #[test]
 fn val_two_body_collision() {
     let file = VehicleFile::shipped(&TrainSettings::default().vehicle).unwrap();
-    let v = Vehicle::new(&file);
+    let v = Vehicle::new(file);
     for (mass_kg, restitution) in [(20.0, 0.9), (200.0, 0.1), (2000.0, 0.5)] {
         let ball = ObstacleSettings {
             name: "ball".to_owned(),
