@@ -17,8 +17,8 @@
 //! Everything lies on the timeline `sim_time`, images and what was found in them also on `frame`.
 //! What is true and what was estimated are siblings: `world/train`, `world/bodies` against
 //! `world/estimate/...`. Two runs with one seed give equal recordings (`rerun rrd compare`): ids
-//! of files come from scenario and seed, no row carries the wall clock, and batches are cut once every
-//! second of simulated time. Nothing older than that second is held in memory.
+//! of files come from scenario and seed, no row carries the wall clock, and batches are cut every ten
+//! seconds of simulated time. Nothing older than that is held in memory.
 //!
 //! Coordinates are the world's, relative to a point in the middle of the line; rerun's transforms
 //! are single precision (<https://rerun.io/docs/concepts/logging-and-ingestion/transforms>).
