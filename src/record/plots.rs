@@ -108,7 +108,7 @@ const FIRST_SLIP: Line = line("plots/slip/first", "first axle", (120, 180, 255),
 const SLIP: Group = Group {
     title: "Slip of the wheels, m/s",
     origin: "plots/slip",
-    legend: Corner2D::RightTop,
+    legend: Corner2D::LeftTop,
     lines: &[MOST_SLIP, FIRST_SLIP],
 };
 
