@@ -65,6 +65,8 @@ mod shape;
 mod stability;
 mod suspension;
 #[cfg(test)]
+mod testing;
+#[cfg(test)]
 mod tests;
 mod thing;
 mod things;
@@ -285,7 +287,7 @@ impl World {
 
     /// A step of everything under the forces that act, and what comes of it.
     fn go(&mut self) -> Result<(), PhysicsError> {
-        self.things.before_step(&mut self.rapier);
+        self.things.before_step(&self.rapier);
         self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
         // What lies or is not there needs no search for what it flies through.
         let substeps = usize::from(self.things.moving());
@@ -306,12 +308,6 @@ impl World {
     /// The train now; `None` where there is none.
     pub fn train(&self) -> Option<TrainState> {
         self.train.as_ref()?.state(&self.tunnel, self.step_s)
-    }
-
-    /// Other trains on the line.
-    pub fn other_trains(&self) -> impl Iterator<Item = TrainState> + '_ {
-        let others = self.others.iter();
-        others.filter_map(|train| train.state(&self.tunnel, self.step_s))
     }
 
     /// Pose of the vehicle frame at a time of the recent past; `None` without a train, after now,

@@ -11,7 +11,6 @@ use rapier3d_f64::math::Vector;
 
 /// The longest step, and what limits it, for rails of a stiffness and damping under a wheel.
 pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static str) {
-    let own = element_pair(v);
     let (primary, half) = (v.primary, v.half_primary_m);
     let (kp, cp) = (primary.stiffness_n_m, primary.damping_n_s_m);
     let turned = |e: Vector, arm: Vector| {
@@ -28,7 +27,7 @@ pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static
         v.half_secondary_m,
         v.secondary_m - v.car_cg_m,
     );
-    let (ks, cs) = own;
+    let (ks, cs) = bogie_side(v);
     let rail = |r: f64| {
         let down = Vector::new(0.0, 0.0, 2.0 * r);
         (
@@ -84,7 +83,7 @@ pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static
 }
 
 /// Stiffness and damping of a bogie's side, with its share of traction rod, stops and roll bar.
-fn element_pair(v: &Vehicle) -> (Vector, Vector) {
+fn bogie_side(v: &Vehicle) -> (Vector, Vector) {
     let (rod_k, rod_c) = v.traction_rod;
     let bar = v.roll_bar_n_m_rad / (2.0 * v.half_secondary_m * v.half_secondary_m);
     let stop = Vector::new(0.0, v.stop.1, v.stop.1);

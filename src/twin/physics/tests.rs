@@ -10,36 +10,16 @@
 use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
-use crate::track::{Alignment, Grade, PlanElement};
-use nalgebra::Point3;
+use crate::track::PlanElement;
+use testing::line;
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 fn car(name: &str) -> Vehicle {
     Vehicle::new(VehicleFile::shipped(name).unwrap())
 }
 
-fn tunnel(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {
-    let grade = Grade {
-        from_m: 0.0,
-        slope,
-        radius_m: 0.0,
-    };
-    Arc::new(Tunnel {
-        name: "test".to_owned(),
-        alignment: Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, elements, &[grade]),
-        sections: Vec::new(),
-        lamps: Vec::new(),
-        wayside: Vec::new(),
-        balises: Vec::new(),
-        base_stations: Vec::new(),
-        line_number: 1,
-        stations: Vec::new(),
-        ambient_lx: 0.0,
-    })
-}
-
 fn straight() -> Arc<Tunnel> {
-    tunnel(&[PlanElement::straight(3000.0)], 0.0)
+    line(&[PlanElement::straight(3000.0)], 0.0)
 }
 
 /// One train on perfect track.
@@ -91,7 +71,7 @@ fn stands_in_equilibrium() {
 /// A standing train does not creep down a gradient.
 #[test]
 fn holds_on_a_gradient() {
-    let line = tunnel(&[PlanElement::straight(3000.0)], 0.03);
+    let line = line(&[PlanElement::straight(3000.0)], 0.03);
     let mut world = World::new(line, &settings(TrainSettings::default()), 1, 0).unwrap();
     run(&mut world, 5.0, &command(BrakeDemand::None, 0.0));
     let a = world.train().unwrap().chainage_m;
@@ -419,7 +399,7 @@ fn val_energy_closes() {
         let mut settings = settings(train);
         settings.track.irregularity.class = class;
         settings.track.rail = rail;
-        let mut world = World::new(tunnel(&[element], slope), &settings, 1, 0).unwrap();
+        let mut world = World::new(line(&[element], slope), &settings, 1, 0).unwrap();
         run(&mut world, 15.0, &command(brake, GO));
         let book = world.energy().unwrap();
         eprintln!("{name}: gap {:.5} %, {book:?}", 100.0 * book.gap_share());
@@ -495,7 +475,7 @@ fn follows_a_crooked_track() {
 #[test]
 fn val_curve_resistance() {
     for (radius_m, kmh) in [(250.0, 45.0), (300.0, 50.0), (400.0, 60.0), (600.0, 60.0)] {
-        let line = tunnel(&[PlanElement::arc(3000.0, 1.0 / radius_m, 0.06)], 0.0);
+        let line = line(&[PlanElement::arc(3000.0, 1.0 / radius_m, 0.06)], 0.0);
         let train = TrainSettings {
             start_speed_kmh: kmh,
             cruise_speed_kmh: kmh,

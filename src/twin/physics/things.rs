@@ -100,8 +100,8 @@ impl Things {
         things
     }
 
-    /// To be called before a step to `next`.
-    pub(super) fn before_step(&mut self, world: &mut PhysicsWorld) {
+    /// To be called before a step.
+    pub(super) fn before_step(&mut self, world: &PhysicsWorld) {
         self.impacts.before_step(world);
         self.awake.clear();
         let awake = world.active_bodies().filter_map(|(body, state)| {

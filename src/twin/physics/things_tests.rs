@@ -9,30 +9,13 @@
 
 use super::*;
 use crate::bus::BrakeDemand;
-use crate::track::{Alignment, BED_M, Grade, PlanElement};
+use crate::track::{BED_M, PlanElement};
 use nalgebra::Point3;
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 /// A straight line of 3 km without walls, 5 m over zero.
 fn straight() -> Arc<Tunnel> {
-    let grade = Grade {
-        from_m: 0.0,
-        slope: 0.0,
-        radius_m: 0.0,
-    };
-    let plan = [PlanElement::straight(3000.0)];
-    Arc::new(Tunnel {
-        name: "test".to_owned(),
-        alignment: Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, &plan, &[grade]),
-        sections: Vec::new(),
-        lamps: Vec::new(),
-        wayside: Vec::new(),
-        balises: Vec::new(),
-        base_stations: Vec::new(),
-        line_number: 1,
-        stations: Vec::new(),
-        ambient_lx: 0.0,
-    })
+    testing::line(&[PlanElement::straight(3000.0)], 0.0)
 }
 
 fn without_train() -> PhysicsSettings {

@@ -162,7 +162,7 @@ impl Wheelset {
         dt_s: f64,
     ) -> Vector {
         let rails = self.follow(line, state, dt_s);
-        let off_m = self.carry(vehicle, line, &rails, (state, wrench), ledger);
+        self.carry(vehicle, line, &rails, (state, wrench), ledger);
         let axle = state.rotation * Vector::Y;
         let spin = state.angular.dot(axle);
         let tread_mps = spin * vehicle.wheel_radius_m;
@@ -172,7 +172,7 @@ impl Wheelset {
         ledger.brake_w -= brake * tread_mps;
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
         wrench.torque += torque;
-        self.creep(vehicle, line, &rails, off_m, (state, wrench), ledger, dt_s);
+        self.creep(vehicle, line, &rails, (state, wrench), ledger, dt_s);
         self.extremes = self.extremes.and(WheelExtremes {
             least_normal_n: self.forces.normal_n[0].min(self.forces.normal_n[1]),
             most_slip_mps: self.forces.slip_mps.abs(),
@@ -215,7 +215,7 @@ impl Wheelset {
         }
     }
 
-    /// Normal forces, and those of the flanges. Returns how far left of the rails' middle it is.
+    /// Normal forces, and those of the flanges.
     fn carry(
         &mut self,
         vehicle: &Vehicle,
@@ -223,7 +223,7 @@ impl Wheelset {
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
-    ) -> f64 {
+    ) {
         let Axes { x, y, z } = rails.axes;
         let (d, speed) = (&rails.deviation, rails.speed_mps);
         let roll_per_m = self.roll_rad_per_m + d.roll_rad_per_m;
@@ -267,7 +267,6 @@ impl Wheelset {
         let aside_per_m = d.left_per_m + 0.5 * d.gauge_per_m * past.signum();
         wrench.force += (y - x * aside_per_m) * lateral;
         wrench.torque += tilt * (vehicle.wheel_radius_m * lateral);
-        off_m
     }
 
     /// Forces of traction and brake at the tread, through slide and slip protection.
@@ -291,16 +290,11 @@ impl Wheelset {
     }
 
     /// Creep along, across and in yaw; all that acts else is in the wrench already.
-    #[allow(
-        clippy::too_many_arguments,
-        reason = "the last step of one computation"
-    )]
     fn creep(
         &mut self,
         vehicle: &Vehicle,
         line: &Line<'_>,
         rails: &Rails,
-        off_m: f64,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
         dt_s: f64,
@@ -311,7 +305,7 @@ impl Wheelset {
         let creep_mps = state.velocity_at(foot);
         let (along_mps, across_mps) = (creep_mps.dot(x), creep_mps.dot(y));
         // The wheels of a wheelset that turns, or runs on different radii, slip against each other.
-        let cone = CONICITY * off_m / HALF_CONTACT_M;
+        let cone = CONICITY * self.off_m / HALF_CONTACT_M;
         let yaw_rate = state.angular.dot(z) + cone * state.angular.dot(y);
 
         let per_mps = 1.0 / rails.speed_mps.abs().max(LEAST_SPEED_MPS);

@@ -19,6 +19,7 @@ mod running;
 
 use super::consist::Consist;
 use super::driver::Effort;
+use super::testing::line;
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::{Alignment, Grade, PlanElement};
@@ -41,27 +42,6 @@ fn free_car(file: VehicleFile, speed_kmh: f64) -> TrainSettings {
 
 fn shipped(name: &str) -> VehicleFile {
     VehicleFile::shipped(name).unwrap().clone()
-}
-
-/// A line without tunnel walls.
-fn line(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {
-    let grade = Grade {
-        from_m: 0.0,
-        slope,
-        radius_m: 0.0,
-    };
-    Arc::new(Tunnel {
-        name: "test".to_owned(),
-        alignment: Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, elements, &[grade]),
-        sections: Vec::new(),
-        lamps: Vec::new(),
-        wayside: Vec::new(),
-        balises: Vec::new(),
-        base_stations: Vec::new(),
-        line_number: 1,
-        stations: Vec::new(),
-        ambient_lx: 0.0,
-    })
 }
 
 fn straight(length_m: f64) -> Arc<Tunnel> {
