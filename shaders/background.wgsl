@@ -1,4 +1,4 @@
-// Tunnel, rails and bodies under a rolling shutter. Writes the signal in grey levels over black.
+// Tunnel, rails and bodies under a rolling shutter. Writes the signal in electrons.
 
 struct Pose {
     // Rows of camera_from_world, the translation last, relative to the view's reference point.
@@ -147,5 +147,5 @@ fn shade(in: Surface) -> @location(0) vec4f {
 
     let light = in.irradiance_lx + headlights_lx(p, in.normal);
     let luminance = albedo * light * (1.0 / PI) + in.luminance_cd_m2;
-    return vec4f(min(luminance * view.grey_per_cd_m2, SATURATION_GREY), 0.0, 0.0, 1.0);
+    return vec4f(min(luminance * view.electrons_per_cd_m2, view.saturation_e), 0.0, 0.0, 1.0);
 }

@@ -25,14 +25,14 @@ struct View {
     time_first_s: f32,
     pose_step_s: f32,
     pose_last: f32,
-    grey_per_cd_m2: f32,
+    electrons_per_cd_m2: f32,
     black_grey: f32,
-    electrons_per_grey: f32,
-    read_variance_grey2: f32,
+    grey_per_e: f32,
+    read_variance_e2: f32,
     noise: u32,
     frame: u32,
     halo_px: f32,
-    unused: u32,
+    saturation_e: f32,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

@@ -14,7 +14,7 @@ struct Lamp {
     // Exponent of luminance against the cosine.
     exponent: f32,
     // Signal of the disc while off.
-    dark_grey: f32,
+    dark_e: f32,
 }
 
 struct LampRow {
@@ -79,14 +79,14 @@ fn disc(in: Corner) -> @location(0) vec4f {
     }
     let towards = dot(normal, ray);
     let cosine = clamp(-towards * inverseSqrt(dot(ray, ray)), 0.0, 1.0);
-    signal = signal * pow(cosine, lamp.exponent) + cover * lamp.dark_grey;
+    signal = signal * pow(cosine, lamp.exponent) + cover * lamp.dark_e;
 
     // Something nearer than the disc hides the pixel; a centimetre of slack keeps a lamp that is
     // flush with its wall in sight.
     let disc_m = dot(normal, row.quarters[1].xyz) / towards;
     let solid_m = NEAR_M / max(textureLoad(depth, vec2i(pixel), 0), 1e-9);
     let seen = select(0.0, 1.0, solid_m > disc_m - 0.01);
-    return vec4f(min(signal, SATURATION_GREY), 0.0, 0.0, cover) * seen;
+    return vec4f(min(signal, view.saturation_e), 0.0, 0.0, cover) * seen;
 }
 
 @fragment
@@ -96,5 +96,5 @@ fn halo(in: Corner) -> @location(0) vec4f {
     let row = rows[lamp.table + u32(i32(pixel.y) - lamp.first_row)];
     let outside = max(length(pixel - row.image_px.xy) - row.image_px.z, 0.0) / view.halo_px;
     let glare = select(0.0, row.normal_halo.w * exp(-outside), outside <= HALO_REACH);
-    return vec4f(min(glare, SATURATION_GREY), 0.0, 0.0, 0.0);
+    return vec4f(min(glare, view.saturation_e), 0.0, 0.0, 0.0);
 }

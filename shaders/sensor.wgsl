@@ -31,12 +31,12 @@ fn develop(@builtin(position) at: vec4f) -> @location(0) vec4f {
         textureLoad(signal, vec2i(x + 2, y), 0).r,
         textureLoad(signal, vec2i(x + 3, y), 0).r,
     );
-    var grey = min(s + view.black_grey, vec4f(SATURATION_GREY));
+    var electrons = min(s, vec4f(view.saturation_e));
     if view.noise != 0u {
-        let shot = max(grey - view.black_grey, vec4f(0.0)) / view.electrons_per_grey;
         let per_row = (u32(view.size_px.x) + 3u) / 4u;
         let n = normals(u32(y) * per_row + u32(at.x));
-        grey += sqrt(shot + view.read_variance_grey2) * n;
+        electrons += sqrt(max(electrons, vec4f(0.0)) + view.read_variance_e2) * n;
     }
+    let grey = view.black_grey + view.grey_per_e * electrons;
     return round(clamp(grey, vec4f(0.0), vec4f(255.0))) / 255.0;
 }

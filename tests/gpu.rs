@@ -29,9 +29,10 @@ fn draw(renderer: &mut GpuRenderer, job: &Job) -> Vec<GrayImage> {
 /// A sensor without noise, glare and offset, and light enough for 200 grey levels a `luminance`.
 fn plain(view: &mut View, luminance_cd_m2: f64) {
     view.sensor.noise = false;
-    view.sensor.halo_share = 0.0;
+    view.lens.halo_share = 0.0;
     view.sensor.black_level_grey = 0.0;
-    view.sensor.grey_per_cd_s = 200.0 / (luminance_cd_m2 * view.camera.shutter.exposure_s);
+    view.lens.vignetting = 0.0;
+    view.set_gain_for(luminance_cd_m2, 200.0);
 }
 
 /// Nothing shines but the lamps given.
@@ -264,11 +265,13 @@ fn same_job_same_bytes() {
 #[test]
 fn noise_is_that_of_the_sensor() {
     let mut view = sample::rig_view(&sample::tunnel(), 100.0, 0.0);
-    view.sensor.halo_share = 0.0;
-    view.sensor.grey_per_cd_s = 100.0 / view.camera.shutter.exposure_s;
+    view.lens.halo_share = 0.0;
+    view.lens.vignetting = 0.0;
+    let luminance_cd_m2 = 100.0 / view.grey_per_cd_m2();
     let eye = view.motion.poses[0];
     let around = Body {
         shape: Shape::Box(Vector3::repeat(3.0)),
+        luminance_cd_m2,
         ..ball(Point3::from(eye.translation.vector), Vector3::zeros())
     };
     let job = Job {
@@ -281,9 +284,8 @@ fn noise_is_that_of_the_sensor() {
     let images = draw(&mut renderer(&dark_scene(Vec::new())), &job);
     let sensor = view.sensor;
     let mean = sensor.black_level_grey + 100.0;
-    let variance = 100.0 / sensor.electrons_per_grey
-        + (sensor.read_noise_e / sensor.electrons_per_grey).powi(2)
-        + 1.0 / 12.0;
+    let gain = sensor.grey_per_e();
+    let variance = 100.0 * gain + (gain * sensor.read_noise_e).powi(2) + 1.0 / 12.0;
     let noise = |k: usize, x: u32, y: u32| f64::from(images[k].get_pixel(x, y)[0]) - mean;
     let (width, height) = images[0].dimensions();
     let product = |k: usize, dx: u32, dy: u32, m: usize| {

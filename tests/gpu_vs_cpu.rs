@@ -63,7 +63,7 @@ fn quiet(job: &Job) -> Job {
 }
 
 fn scaled(view: &mut View, gain: f64, divisor: u32) {
-    view.sensor.grey_per_cd_s *= gain;
+    view.sensor.gain_db += 20.0 * gain.log10();
     let i = view.camera.intrinsics;
     view.camera.intrinsics = Intrinsics::centred(
         i.width_px / divisor,
@@ -425,8 +425,7 @@ fn lone_lamp(view: &View, grey: f64) -> Scene {
     scene.lamps.truncate(1);
     let lamp = &mut scene.lamps[0];
     lamp.exponent = 1.0;
-    lamp.luminance_cd_m2 = (grey - view.sensor.black_level_grey)
-        / (view.sensor.grey_per_cd_s * view.camera.shutter.exposure_s);
+    lamp.luminance_cd_m2 = (grey - view.sensor.black_level_grey) / view.grey_per_cd_m2();
     lamp.waveform = Waveform {
         frame: ChipFrame { bits: 1, len: 1 },
         chip_s: 1.0,
@@ -457,7 +456,7 @@ fn a_disc_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
     view.start = SimTime::from_secs(3.2);
     view.motion = shaken(&tunnel, 101.0, view.start);
     view.sensor.noise = false;
-    view.sensor.halo_share = 0.0;
+    view.lens.halo_share = 0.0;
     let (black, full) = (view.sensor.black_level_grey, 200.0);
     let scene = lone_lamp(&view, full);
     let polygon = outline(&view, rim(&scene.lamps[0]), view.start);
@@ -540,7 +539,7 @@ fn a_board_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
         )
     });
     let polygon = outline(&view, rim, at);
-    let full = view.sensor.black_level_grey + 6000.0 * 0.03;
+    let full = view.sensor.black_level_grey + 6000.0 * view.grey_per_cd_m2();
     let black = view.sensor.black_level_grey;
     let mut scene = sample::scene();
     scene.lamps.clear();

@@ -115,14 +115,14 @@ fn structs_agree() {
         time_first_s,
         pose_step_s,
         pose_last,
-        grey_per_cd_m2,
+        electrons_per_cd_m2,
         black_grey,
-        electrons_per_grey,
-        read_variance_grey2,
+        grey_per_e,
+        read_variance_e2,
         noise,
         frame,
         halo_px,
-        unused,
+        saturation_e,
         headlights
     );
     same_layout!(
@@ -136,7 +136,7 @@ fn structs_agree() {
     same_layout!("background", Pose, x, y, z);
     same_layout!(
         "lamps", Lamp, disc_low, disc_high, halo_low, halo_high, first_row, table, radius_m,
-        exponent, dark_grey
+        exponent, dark_e
     );
     same_layout!("lamps", LampRow, quarters, normal_halo, image_px);
 }

@@ -8,7 +8,7 @@
 //!
 //! ```
 //! use metrotwin::bus::{Shutter, SimTime};
-//! let shutter = Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6 };
+//! let shutter = Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6, first_row: 0 };
 //! let start = SimTime::from_secs(1.0);
 //! // Row 100 is exposed from 2.22 ms after the frame's start.
 //! assert_eq!(shutter.row_open(start, 100.0), SimTime::from_nanos(1_002_220_000));
@@ -22,7 +22,7 @@ mod motion;
 mod time;
 mod wayside;
 
-pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
+pub use camera::{CameraModel, Distortion, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
 pub use message::{Delivery, ObstacleWarning, Via};

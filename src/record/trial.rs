@@ -130,6 +130,7 @@ fn camera(width_px: u32, height_px: u32, f_px: f64, shrink: u32) -> CameraModel 
         shutter: Shutter {
             line_time_s: 22.2e-6,
             exposure_s: 30e-6,
+            first_row: 0,
         },
     }
 }

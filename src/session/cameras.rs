@@ -2,8 +2,8 @@
 
 use crate::bus::{Frame, RigCalibration, SimTime, StereoPair, WaysideCalibration};
 use crate::twin::random::Stream;
-use crate::twin::render::{CameraMotion, NoiseKey, SensorSettings, View};
-use crate::twin::sensors::RigSettings;
+use crate::twin::render::{CameraMotion, NoiseKey, View};
+use crate::twin::sensors::{RigSettings, WaysideCameraSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 
@@ -58,8 +58,8 @@ pub struct StereoCamera {
     pub rig: RigCalibration,
     /// The right eye's true pose in the left one's frame.
     pub left_from_right: Isometry3<f64>,
-    /// From light to grey.
-    pub sensor: SensorSettings,
+    /// Pixels, glass and sensor of either eye.
+    pub settings: RigSettings,
     /// Noise of the left and right eye.
     pub streams: [Stream; 2],
 }
@@ -70,7 +70,7 @@ impl StereoCamera {
         Self {
             rig: rig.actual(),
             left_from_right: rig.left_from_right(),
-            sensor: rig.sensor,
+            settings: rig.clone(),
             streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
         }
     }
@@ -110,7 +110,9 @@ impl StereoCamera {
                 step_s: POSE_STEP_S,
                 poses,
             },
-            sensor: self.sensor,
+            pixel_m: 1e-6 * self.settings.pixel_um,
+            lens: self.settings.lens,
+            sensor: self.settings.sensor,
             noise: NoiseKey {
                 stream,
                 frame: number,
@@ -133,7 +135,7 @@ pub fn pair(number: u32, start: SimTime, images: [GrayImage; 2]) -> StereoPair {
 /// The view of a wayside camera.
 pub fn wayside_view(
     calibration: &WaysideCalibration,
-    sensor: SensorSettings,
+    camera: &WaysideCameraSettings,
     stream: Stream,
     number: u32,
     start: SimTime,
@@ -142,7 +144,9 @@ pub fn wayside_view(
         camera: calibration.camera,
         start,
         motion: CameraMotion::still(calibration.world_from_camera),
-        sensor,
+        pixel_m: 1e-6 * camera.pixel_um,
+        lens: camera.lens,
+        sensor: camera.sensor,
         noise: NoiseKey {
             stream,
             frame: number,

@@ -13,9 +13,9 @@ use crate::track::{BED_M, Tunnel};
 use crate::twin::comms::Comms;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
+use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
-use crate::twin::render::{SensorSettings, View};
-use crate::twin::sensors::Lidar;
+use crate::twin::sensors::{Lidar, WaysideCameraSettings};
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -24,7 +24,7 @@ pub struct Device {
     calibration: WaysideCalibration,
     outlook: Outlook,
     balise: String,
-    sensor: SensorSettings,
+    camera: WaysideCameraSettings,
     stream: Stream,
     clock: Clock,
     lidar: Option<(Lidar, Clock)>,
@@ -54,7 +54,7 @@ impl Device {
             calibration: post.calibration.clone(),
             outlook: Outlook::new(scenario, &post.actual),
             balise: post.balise.clone(),
-            sensor: post.camera.sensor_behind_lens(),
+            camera: post.camera.clone(),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
             lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
@@ -88,7 +88,7 @@ impl Device {
         let (number, start) = self.clock.due(now, span_s)?;
         let view = wayside_view(
             &self.outlook.device,
-            self.sensor,
+            &self.camera,
             self.stream,
             number,
             start,

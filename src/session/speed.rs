@@ -161,13 +161,7 @@ fn wayside_seconds(
     let mut times = Times::default();
     for k in 0..(learning + 1 + rounds * ROUND) as u32 {
         let start = SimTime::from_secs(f64::from(k) / post.camera.frames_per_s);
-        let view = wayside_view(
-            &post.calibration,
-            post.camera.sensor_behind_lens(),
-            stream,
-            k,
-            start,
-        );
+        let view = wayside_view(&post.calibration, &post.camera, stream, k, start);
         let (mut images, draw_s) = draw(renderer, world, vec![view])?;
         let image = images.pop().ok_or("the renderer did not draw a frame")?;
         let frame = Frame {

@@ -206,6 +206,7 @@ mod tests {
     const SHUTTER: Shutter = Shutter {
         line_time_s: 22.2e-6,
         exposure_s: 30e-6,
+        first_row: 0,
     };
 
     /// 100 rows of a lamp whose light would be `grey` if the sensor did not saturate at 251.

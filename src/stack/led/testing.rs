@@ -51,6 +51,7 @@ pub fn rig() -> RigCalibration {
             shutter: Shutter {
                 line_time_s: 22.2e-6,
                 exposure_s: 30e-6,
+                first_row: 0,
             },
         },
         baseline_m: 0.12,

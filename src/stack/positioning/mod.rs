@@ -17,7 +17,7 @@
 //! ").unwrap();
 //! let camera = CameraModel {
 //!     intrinsics: Intrinsics::centred(64, 48, 52.0),
-//!     shutter: Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6 },
+//!     shutter: Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6, first_row: 0 },
 //! };
 //! let rig = RigCalibration {
 //!     camera,

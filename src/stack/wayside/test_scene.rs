@@ -108,6 +108,7 @@ pub fn calibration(map: &Tunnel, width: u32, height: u32) -> WaysideCalibration 
             shutter: Shutter {
                 line_time_s: 14.8e-6,
                 exposure_s: 8e-3,
+                first_row: 0,
             },
         },
         world_from_camera: line * Isometry3::from_parts(Translation3::new(0.0, 2.4, 2.8), camera),

@@ -8,7 +8,9 @@
 //! assert_eq!(scene.lamps.len(), 60);
 //! ```
 
-use super::{Body, CameraMotion, Job, LampLight, NoiseKey, Scene, SensorSettings, Shape, View};
+use super::{
+    Body, CameraMotion, Job, LampLight, LensSettings, NoiseKey, Scene, SensorSettings, Shape, View,
+};
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use crate::track::uid::{LineCode, Uid};
 use crate::track::{
@@ -26,6 +28,8 @@ pub const LENGTH_M: f64 = 600.0;
 pub const LAMP_SPACING_M: f64 = 10.0;
 /// Chainage of the first lamp.
 pub const FIRST_LAMP_M: f64 = 5.0;
+/// Width of the pixels of both cameras.
+const PIXEL_M: f64 = 3.75e-6;
 /// Top of the bed under top of rail.
 const BED_M: f64 = -0.17;
 /// Radius of the lining, and the height of its centre above top of rail: a lamp 2.78 m left and
@@ -126,6 +130,7 @@ pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
             shutter: Shutter {
                 line_time_s: 22.2e-6,
                 exposure_s: 30e-6,
+                first_row: 0,
             },
         },
         start: SimTime::ZERO,
@@ -134,6 +139,8 @@ pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
             step_s,
             poses,
         },
+        pixel_m: PIXEL_M,
+        lens: LensSettings::default(),
         sensor: SensorSettings::default(),
         noise: NoiseKey {
             stream: Stream::new(1, 0, "sample rig"),
@@ -181,10 +188,13 @@ pub fn wayside_job(tunnel: &Tunnel, s_m: f64) -> Job {
                 shutter: Shutter {
                     line_time_s: 14.8e-6,
                     exposure_s: 8e-3,
+                    first_row: 0,
                 },
             },
             start: SimTime::ZERO,
             motion: CameraMotion::still(pose),
+            pixel_m: PIXEL_M,
+            lens: LensSettings::default(),
             sensor: SensorSettings::default(),
             noise: NoiseKey {
                 stream: Stream::new(1, 0, "sample wayside"),

@@ -1,13 +1,13 @@
 //! What there is to see, and through which camera.
 
 use super::hull::Hull;
+use super::sensor::{LensSettings, SensorSettings};
+use super::surface::SATURATION;
 use crate::bus::{CameraModel, SimTime};
+use crate::track::Tunnel;
 use crate::track::uid::Waveform;
-use crate::track::{Checker, Problem, Tunnel};
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// All that stands still for a whole run.
@@ -137,58 +137,6 @@ impl CameraMotion {
     }
 }
 
-/// From light to grey levels.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorSettings {
-    /// Grey levels (of 255) that a luminance of 1 cd/m^2 gives in an exposure of 1 s.
-    pub grey_per_cd_s: f64,
-    /// Grey level of darkness.
-    pub black_level_grey: f64,
-    /// Electrons a grey level (sets the shot noise).
-    pub electrons_per_grey: f64,
-    /// Read noise, electrons.
-    pub read_noise_e: f64,
-    /// Share of a lamp's light that glare spreads around it.
-    pub halo_share: f64,
-    /// Distance in which the glare falls to 1/e, pixels.
-    pub halo_px: f64,
-    /// Draw noise at all.
-    pub noise: bool,
-}
-
-impl SensorSettings {
-    /// Appends what is wrong, with keys below `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("grey_per_cd_s", self.grey_per_cd_s, 1e-3..=1e9, "");
-        check.within("black_level_grey", self.black_level_grey, 0.0..=255.0, "");
-        check.within(
-            "electrons_per_grey",
-            self.electrons_per_grey,
-            1e-3..=1e6,
-            "e",
-        );
-        check.within("read_noise_e", self.read_noise_e, 0.0..=1e5, "e");
-        check.within("halo_share", self.halo_share, 0.0..=1.0, "");
-        check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
-    }
-}
-
-impl Default for SensorSettings {
-    fn default() -> Self {
-        Self {
-            grey_per_cd_s: 1000.0,
-            black_level_grey: 4.0,
-            electrons_per_grey: 40.0,
-            read_noise_e: 25.0,
-            halo_share: 0.02,
-            halo_px: 12.0,
-            noise: true,
-        }
-    }
-}
-
 /// Names the noise of a frame: pixel noise is a hash of stream, frame and pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct NoiseKey {
@@ -207,10 +155,39 @@ pub struct View {
     pub start: SimTime,
     /// Where the camera is, row by row.
     pub motion: CameraMotion,
+    /// Width and height of a pixel.
+    pub pixel_m: f64,
+    /// The glass in front of the sensor.
+    pub lens: LensSettings,
     /// The sensor.
     pub sensor: SensorSettings,
     /// Its noise.
     pub noise: NoiseKey,
+}
+
+impl View {
+    /// Photo-electrons that a luminance of 1 cd/m^2 on the axis gives in a row's exposure.
+    pub fn electrons_per_cd_m2(&self) -> f64 {
+        let lux_s = self.lens.lux_per_cd_m2() * self.camera.shutter.exposure_s;
+        lux_s * self.sensor.electrons_per_lux_s(self.pixel_m)
+    }
+
+    /// Grey levels of 255 that a luminance of 1 cd/m^2 on the axis gives.
+    pub fn grey_per_cd_m2(&self) -> f64 {
+        self.sensor.grey_per_e() * self.electrons_per_cd_m2()
+    }
+
+    /// Sets the sensor's gain so that a luminance on the axis gives that many grey levels over
+    /// black.
+    pub fn set_gain_for(&mut self, luminance_cd_m2: f64, grey: f64) {
+        let now = self.grey_per_cd_m2() * luminance_cd_m2;
+        self.sensor.gain_db += 20.0 * (grey / now).log10();
+    }
+
+    /// Most electrons that a pixel's signal is followed to: beyond it everything is white.
+    pub fn saturation_e(&self) -> f64 {
+        SATURATION * self.sensor.full_well_e
+    }
 }
 
 /// Images of one instant, and what moves in them.

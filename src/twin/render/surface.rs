@@ -34,8 +34,8 @@ pub const LAMP_SIGHT_M: f64 = 80.0;
 pub const DARK_DISC_ALBEDO: f64 = 0.3;
 /// The glare of a lamp ends this many decay lengths outside its disc.
 pub const HALO_REACH: f64 = 8.0;
-/// Grey levels above this are clamped before noise is added.
-pub const SATURATION_GREY: f64 = 1020.0;
+/// Signals are followed up to this many times the full well.
+pub const SATURATION: f64 = 4.0;
 
 /// Distance between lattice points of the stains.
 pub const STAIN_CELL_M: f64 = 0.5;
@@ -105,7 +105,6 @@ pub fn wgsl() -> String {
     let floats = [
         ("MIN_SINE", MIN_SINE),
         ("HALO_REACH", HALO_REACH),
-        ("SATURATION_GREY", SATURATION_GREY),
         ("STAIN_CELL_M", STAIN_CELL_M),
         ("STAIN_CONTRAST", STAIN_CONTRAST),
         ("STAIN_FADE_M", STAIN_FADE_M),

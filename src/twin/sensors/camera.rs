@@ -6,7 +6,7 @@
 
 use crate::bus::{CameraModel, Intrinsics, Shutter, WaysideCalibration};
 use crate::track::{Checker, Problem, TrackPoint, Tunnel, WaysideSite};
-use crate::twin::render::SensorSettings;
+use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -35,6 +35,7 @@ impl Optics {
             shutter: Shutter {
                 line_time_s: self.line_time_us * 1e-6,
                 exposure_s: self.exposure_us * 1e-6,
+                first_row: 0,
             },
         }
     }
@@ -117,17 +118,16 @@ pub struct WaysideCameraSettings {
     pub height_px: u32,
     /// Time from the opening of a row to the opening of the next, us. Default 14.8.
     pub line_time_us: f64,
-    /// How long every row collects light, us. Default 8000.
+    /// How long every row collects light, us. Default 16000.
     pub exposure_us: f64,
     /// Frames a second. Default 10.
     pub frames_per_s: f64,
     /// By how much the device really differs from the calibration that the stack is given.
     /// Default: not at all.
     pub calibration_error: WaysideError,
-    /// Light that its lens collects, as a multiple of what `sensor.grey_per_cd_s` is meant for.
-    /// Default 8: f/1.0, where the rig has f/2.8.
-    pub lens_gain: f64,
-    /// From light to grey levels.
+    /// The glass.
+    pub lens: LensSettings,
+    /// From photons to digital numbers.
     pub sensor: SensorSettings,
 }
 
@@ -139,11 +139,17 @@ impl Default for WaysideCameraSettings {
             width_px: 1920,
             height_px: 1080,
             line_time_us: 14.8,
-            exposure_us: 8000.0,
+            exposure_us: 16_000.0,
             frames_per_s: 10.0,
             calibration_error: WaysideError::default(),
-            lens_gain: 8.0,
-            sensor: SensorSettings::default(),
+            lens: LensSettings {
+                f_number: 1.0,
+                ..LensSettings::default()
+            },
+            sensor: SensorSettings {
+                gain_db: 9.4,
+                ..SensorSettings::default()
+            },
         }
     }
 }
@@ -171,14 +177,6 @@ impl WaysideCameraSettings {
     /// The camera alone.
     pub fn camera(&self) -> CameraModel {
         self.optics().camera()
-    }
-
-    /// From light to grey levels, behind its lens.
-    pub fn sensor_behind_lens(&self) -> SensorSettings {
-        SensorSettings {
-            grey_per_cd_s: self.lens_gain * self.sensor.grey_per_cd_s,
-            ..self.sensor
-        }
     }
 
     /// The device as surveyed: this camera at that site, with a lidar in the same housing where
@@ -228,7 +226,7 @@ impl WaysideCameraSettings {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
-        positive(problems, at, "lens_gain", self.lens_gain, "", 8.0);
+        self.lens.check(&format!("{at}.lens"), problems);
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let mut check = Checker::new(&at, problems);

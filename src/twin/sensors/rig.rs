@@ -20,7 +20,7 @@
 use super::camera::{Optics, mounted, positive};
 use crate::bus::RigCalibration;
 use crate::track::{Checker, LampSite, Problem, Tunnel};
-use crate::twin::render::SensorSettings;
+use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,9 @@ pub struct RigSettings {
     /// By how much the mount really differs from the calibration that the stack is given.
     /// Default: not at all.
     pub calibration_error: RigError,
-    /// From light to grey levels.
+    /// The glass of either eye.
+    pub lens: LensSettings,
+    /// From photons to digital numbers.
     pub sensor: SensorSettings,
 }
 
@@ -83,6 +85,7 @@ impl Default for RigSettings {
             yaw_deg: 39.0,
             pitch_deg: 22.0,
             calibration_error: RigError::default(),
+            lens: LensSettings::default(),
             sensor: SensorSettings::default(),
         }
     }
@@ -145,6 +148,7 @@ impl RigSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.lens.check(&format!("{at}.lens"), problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);

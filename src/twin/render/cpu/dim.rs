@@ -39,7 +39,7 @@ impl DimView {
                     *corner = rays.tunnel(j * CELL_PX, &job.headlights).0;
                 }
             });
-        let grey_per_luminance = view.sensor.grey_per_cd_s * view.camera.shutter.exposure_s;
+        let grey_per_luminance = view.grey_per_cd_m2();
         Self {
             corners,
             columns,

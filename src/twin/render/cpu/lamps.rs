@@ -134,9 +134,9 @@ pub(super) fn add_halo(lamp: &LampLight, view: &View, row: &RowExposure, luminan
     let Some(c) = camera.project(&centre) else {
         return;
     };
-    let fall = view.sensor.halo_px;
+    let fall = view.lens.halo_px;
     let apparent = camera.fx_px * lamp.radius_m * cos.sqrt() / centre.z;
-    let strength = view.sensor.halo_share
+    let strength = view.lens.halo_share
         * lamp.luminance_cd_m2
         * cos.powf(lamp.exponent - 1.0)
         * row.on_share(lamp, 0, SLOTS)

@@ -6,7 +6,9 @@ use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
 use crate::twin::random::Stream;
-use crate::twin::render::{Body, CameraMotion, NoiseKey, SensorSettings, Shape, sample};
+use crate::twin::render::{
+    Body, CameraMotion, LensSettings, NoiseKey, SensorSettings, Shape, sample,
+};
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
 use std::sync::Arc;
 
@@ -81,10 +83,16 @@ fn view(intrinsics: Intrinsics) -> View {
             shutter: Shutter {
                 line_time_s: 20e-6,
                 exposure_s: 30e-6,
+                first_row: 0,
             },
         },
         start: SimTime::from_secs(0.5),
         motion: CameraMotion::still(looking_left()),
+        pixel_m: 3.75e-6,
+        lens: LensSettings {
+            vignetting: 0.0,
+            ..LensSettings::default()
+        },
         sensor: SensorSettings {
             noise: false,
             ..SensorSettings::default()
@@ -116,8 +124,7 @@ fn always_on() -> Waveform {
 }
 
 fn grey_of(view: &View, luminance: f64) -> f64 {
-    let sensor = &view.sensor;
-    sensor.black_level_grey + sensor.grey_per_cd_s * view.camera.shutter.exposure_s * luminance
+    view.sensor.black_level_grey + view.grey_per_cd_m2() * luminance
 }
 
 /// Fails where light, albedo, pi or gain is lost on the way: a wall lit by a lamp behind the
@@ -129,7 +136,7 @@ fn a_wall_has_the_luminance_of_the_closed_form() {
     light.facing = Unit::new_unchecked(Vector3::y());
     let intensity = light.axial_intensity_cd();
     let mut view = view(Intrinsics::centred(9, 9, 6.0));
-    view.sensor.grey_per_cd_s = 2.5e5;
+    view.set_gain_for(1.0, 2.5e5 * view.camera.shutter.exposure_s);
     let image = renderer(vec![light]).draw(&Job::default(), &view);
     for (u, v, pixel) in image.enumerate_pixels() {
         let ray = view.camera.intrinsics.ray(f64::from(u), f64::from(v));
@@ -158,7 +165,7 @@ fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
     let mut light = lamp(waveform);
     light.luminance_cd_m2 = 7000.0;
     let mut view = view(Intrinsics::centred(200, 300, 700.0));
-    view.sensor.halo_share = 0.0;
+    view.lens.halo_share = 0.0;
     let image = renderer(vec![light]).draw(&Job::default(), &view);
     let (mut low, mut high) = (255.0f64, 0.0f64);
     for v in 0..300 {
@@ -183,7 +190,7 @@ fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
 fn rows_see_moving_bodies_where_they_are_by_then() {
     let mut view = view(Intrinsics::centred(400, 300, 400.0));
     view.camera.shutter.line_time_s = 40e-6;
-    view.sensor.grey_per_cd_s = 1e5;
+    view.set_gain_for(1.0, 1e5 * view.camera.shutter.exposure_s);
     let job = Job {
         time: SimTime::from_secs(0.49),
         bodies: vec![Body {
@@ -213,7 +220,7 @@ fn rows_see_moving_bodies_where_they_are_by_then() {
 fn noise_has_the_mean_and_variance_of_the_sensor() {
     let mut view = view(Intrinsics::centred(300, 200, 300.0));
     view.sensor.noise = true;
-    view.sensor.grey_per_cd_s = 1e5;
+    view.set_gain_for(1.0, 1e5 * view.camera.shutter.exposure_s);
     for luminance in [0.0, 5.0, 60.0] {
         let job = Job {
             time: view.start,
@@ -232,7 +239,9 @@ fn noise_has_the_mean_and_variance_of_the_sensor() {
         let mean = image.iter().map(|p| f64::from(*p)).sum::<f64>() / n;
         let deviation = |p: &u8| f64::from(*p) - mean;
         let variance = image.iter().map(|p| deviation(p).powi(2)).sum::<f64>() / n;
-        let expected = (grey_of(&view, luminance) - 4.0) / 40.0 + (25.0f64 / 40.0).powi(2);
+        let gain = view.sensor.grey_per_e();
+        let shot = gain * (grey_of(&view, luminance) - view.sensor.black_level_grey);
+        let expected = shot + (gain * view.sensor.read_noise_e).powi(2);
         // Five standard errors of mean and variance; rounding adds 1/12.
         assert!((mean - grey_of(&view, luminance)).abs() < 5.0 * (expected / n).sqrt());
         assert!((variance - expected - 1.0 / 12.0).abs() < 5.0 * expected * (2.0 / n).sqrt());

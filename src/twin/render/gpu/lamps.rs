@@ -8,8 +8,8 @@ use crate::twin::render::surface;
 use nalgebra::{Isometry3, Point3};
 use std::f64::consts::PI;
 
-/// Glare fainter than this is not drawn: eight bits cannot show it.
-const FAINT_GREY: f64 = 0.01;
+/// Glare fainter than this many electrons is not drawn.
+const FAINT_E: f64 = 0.4;
 /// No disc nearer than this in optical depth is drawn.
 const MIN_DEPTH_M: f64 = 0.1;
 
@@ -70,12 +70,12 @@ impl LampTable {
     }
 
     fn add(&mut self, framed: &Framed<'_>, lamp: &LampLight, ambient_lx: f64) {
-        let grey_per_cd_m2 = framed.grey_per_cd_m2();
+        let signal_e = framed.view.electrons_per_cd_m2();
         let mut bounds = Bounds::default();
         let table = self.rows.len();
         let mut first_row = 0;
         for (v, poses) in self.poses.iter().enumerate() {
-            let row = bounds.row(framed, lamp, poses, v as f64, grey_per_cd_m2);
+            let row = bounds.row(framed, lamp, poses, v as f64, signal_e);
             if let Some(row) = row {
                 if self.rows.len() == table {
                     first_row = v;
@@ -100,7 +100,7 @@ impl LampTable {
             table: table as u32,
             radius_m: lamp.radius_m as f32,
             exponent: (lamp.exponent - 1.0) as f32,
-            dark_grey: (surface::DARK_DISC_ALBEDO * ambient_lx / PI * grey_per_cd_m2) as f32,
+            dark_e: (surface::DARK_DISC_ALBEDO * ambient_lx / PI * signal_e) as f32,
             unused: [0; 1],
         });
     }
@@ -121,9 +121,9 @@ impl Bounds {
         lamp: &LampLight,
         poses: &RowPoses,
         v: f64,
-        grey_per_cd_m2: f64,
+        electrons_per_cd_m2: f64,
     ) -> Option<LampRow> {
-        let (lens, sensor) = (&framed.view.camera.intrinsics, &framed.view.sensor);
+        let (lens, glass) = (&framed.view.camera.intrinsics, &framed.view.lens);
         let exposure_s = framed.view.camera.shutter.exposure_s;
         let c = poses.middle * lamp.centre;
         let normal = poses.middle.rotation * lamp.facing.into_inner();
@@ -133,13 +133,13 @@ impl Bounds {
         }
         let centre = lens.project(&c)?;
         let apparent_px = lens.fx_px * lamp.radius_m * cosine.sqrt() / c.z;
-        let axial_grey = lamp.luminance_cd_m2 * grey_per_cd_m2;
-        let glare_grey =
-            sensor.halo_share * axial_grey * cosine.powf(lamp.exponent - 1.0) * apparent_px.powi(2)
-                / (apparent_px.powi(2) + sensor.halo_px.powi(2));
-        let decays = (glare_grey / FAINT_GREY).ln().min(surface::HALO_REACH);
+        let axial_e = lamp.luminance_cd_m2 * electrons_per_cd_m2;
+        let glare_e =
+            glass.halo_share * axial_e * cosine.powf(lamp.exponent - 1.0) * apparent_px.powi(2)
+                / (apparent_px.powi(2) + glass.halo_px.powi(2));
+        let decays = (glare_e / FAINT_E).ln().min(surface::HALO_REACH);
         let halo_reach_px = if decays > 0.0 {
-            apparent_px + decays * sensor.halo_px
+            apparent_px + decays * glass.halo_px
         } else {
             0.0
         };
@@ -170,7 +170,7 @@ impl Bounds {
                 poses.open_s + to * exposure_s,
             )
         };
-        let glare = glare_grey * on(0.0, 1.0);
+        let glare = glare_e * on(0.0, 1.0);
         let mut row = LampRow {
             normal_halo: [normal.x, normal.y, normal.z, glare].map(|x| x as f32),
             image_px: [centre.x, centre.y, apparent_px, 0.0].map(|x| x as f32),
@@ -178,7 +178,7 @@ impl Bounds {
         };
         for (k, (entry, q)) in row.quarters.iter_mut().zip(quarters).enumerate() {
             let share = on(0.25 * k as f64, 0.25 * (k + 1) as f64);
-            *entry = [q.x, q.y, q.z, share * axial_grey].map(|x| x as f32);
+            *entry = [q.x, q.y, q.z, share * axial_e].map(|x| x as f32);
         }
         Some(row)
     }

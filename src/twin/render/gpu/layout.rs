@@ -97,22 +97,22 @@ pub struct View {
     pub pose_step_s: f32,
     /// Index of the last pose.
     pub pose_last: f32,
-    /// Signal of 1 cd/m^2.
-    pub grey_per_cd_m2: f32,
+    /// Signal of 1 cd/m^2, electrons.
+    pub electrons_per_cd_m2: f32,
     /// Grey level of darkness.
     pub black_grey: f32,
-    /// Electrons a grey level.
-    pub electrons_per_grey: f32,
-    /// Square of the read noise in grey levels.
-    pub read_variance_grey2: f32,
+    /// Grey levels an electron.
+    pub grey_per_e: f32,
+    /// Square of the read noise in electrons.
+    pub read_variance_e2: f32,
     /// Whether to draw noise.
     pub noise: u32,
     /// Frame number of the noise.
     pub frame: u32,
     /// Decay length of the glare.
     pub halo_px: f32,
-    /// Fills up to the alignment of what follows.
-    pub unused: u32,
+    /// Signals are clamped at this many electrons.
+    pub saturation_e: f32,
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }
@@ -138,7 +138,7 @@ pub struct Lamp {
     /// Exponent of luminance against the cosine.
     pub exponent: f32,
     /// Signal of the disc while off.
-    pub dark_grey: f32,
+    pub dark_e: f32,
     /// Fills the stride.
     pub unused: [u32; 1],
 }

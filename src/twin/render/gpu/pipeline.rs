@@ -4,7 +4,7 @@ use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use crate::twin::render::surface;
 use std::mem::{offset_of, size_of};
 
-/// Signal in grey levels over black; half precision keeps 11 bits, finer than the noise anywhere.
+/// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
 pub const SIGNAL: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 /// Reversed depth.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;

@@ -8,7 +8,7 @@ use image::GrayImage;
 pub struct Target {
     /// Size of the image.
     pub size_px: (u32, u32),
-    /// Signal in grey levels.
+    /// Signal in electrons.
     pub signal: wgpu::TextureView,
     /// Reversed depth.
     pub depth: wgpu::TextureView,

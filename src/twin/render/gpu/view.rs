@@ -33,11 +33,6 @@ impl<'a> Framed<'a> {
         Point3::from(self.middle.translation.vector)
     }
 
-    /// Signal of a luminance of 1 cd/m^2.
-    pub fn grey_per_cd_m2(&self) -> f64 {
-        self.view.sensor.grey_per_cd_s * self.view.camera.shutter.exposure_s
-    }
-
     /// Fills the table of poses and gives the view's constants.
     pub fn constants(&self, job: &Job, poses: &mut Vec<Pose>) -> layout::View {
         let (camera, sensor) = (&self.view.camera, &self.view.sensor);
@@ -68,14 +63,15 @@ impl<'a> Framed<'a> {
             time_first_s: first.since(job.time) as f32,
             pose_step_s: step_s as f32,
             pose_last: steps as f32,
-            grey_per_cd_m2: self.grey_per_cd_m2() as f32,
+            electrons_per_cd_m2: self.view.electrons_per_cd_m2() as f32,
             black_grey: sensor.black_level_grey as f32,
-            electrons_per_grey: sensor.electrons_per_grey as f32,
-            read_variance_grey2: (sensor.read_noise_e / sensor.electrons_per_grey).powi(2) as f32,
+            grey_per_e: sensor.grey_per_e() as f32,
+            read_variance_e2: sensor.read_noise_e.powi(2) as f32,
             noise: u32::from(sensor.noise),
             key: self.view.noise.stream.key,
             frame: self.view.noise.frame,
-            halo_px: sensor.halo_px as f32,
+            halo_px: self.view.lens.halo_px as f32,
+            saturation_e: self.view.saturation_e() as f32,
             ..layout::View::default()
         };
         self.place_headlights(&job.headlights, &mut constants);
