@@ -16,6 +16,14 @@ use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{Job, Renderer, sample};
 use std::time::Instant;
 
+/// Processor time that all threads of this process have used, milliseconds (Linux; 0 elsewhere).
+fn processor_ms() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    let fields = stat.rsplit(')').next().unwrap_or_default();
+    let ticks = fields.split_whitespace().skip(11).take(2);
+    10.0 * ticks.map(|t| t.parse::<f64>().unwrap()).sum::<f64>()
+}
+
 fn cost_ms(renderer: &mut dyn Renderer, jobs: &[Job]) -> f64 {
     let mut times = Vec::new();
     for job in jobs.iter().chain(jobs) {
@@ -29,6 +37,15 @@ fn cost_ms(renderer: &mut dyn Renderer, jobs: &[Job]) -> f64 {
     late[late.len() / 2]
 }
 
+/// Wall time and processor time a job.
+fn report(name: &str, renderer: &mut dyn Renderer, jobs: &[Job]) {
+    cost_ms(renderer, jobs);
+    let before = processor_ms();
+    let wall_ms = cost_ms(renderer, jobs);
+    let used_ms = (processor_ms() - before) / (2 * jobs.len()) as f64;
+    println!("{name:30} {wall_ms:8.2} ms, {used_ms:8.2} ms of processors");
+}
+
 fn main() {
     let scene = sample::scene();
     let tunnel = scene.tunnel.clone();
@@ -36,9 +53,9 @@ fn main() {
     let stereo: Vec<_> = (0..20)
         .map(|k| sample::stereo_job(&tunnel, 100.0 + f64::from(k), 60.0 / 3.6))
         .collect();
-    println!("stereo {:.2} ms", cost_ms(&mut renderer, &stereo));
+    report("stereo", &mut renderer, &stereo);
     let wayside: Vec<_> = (0..20)
         .map(|_| sample::wayside_job(&tunnel, 100.0))
         .collect();
-    println!("wayside {:.2} ms", cost_ms(&mut renderer, &wayside));
+    report("wayside", &mut renderer, &wayside);
 }

@@ -19,7 +19,7 @@ struct View {
     centre_px: vec2f,
     size_px: vec2f,
     key: vec2u,
-    // Steps of the table of poses a row; the first pose is that of row 0 in mid-exposure.
+    // Steps of the table of poses a row; negative where the sensor is read upwards.
     pose_per_row: f32,
     // From the bodies' time to the first pose, and from pose to pose.
     time_first_s: f32,
@@ -33,10 +33,26 @@ struct View {
     frame: u32,
     halo_px: f32,
     saturation_e: f32,
+    // k1, k2, k3 and the square of the reach of the lens's distortion; p1, p2.
+    radial: vec4f,
+    tangential: vec2f,
+    // Place of row 0 in the table of poses.
+    pose_middle: f32,
+    unused: f32,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 
 @group(0) @binding(0) var<uniform> view: View;
+
+// Where a point in the camera's frame is seen at depth 1, times its depth: bus/camera.rs.
+fn distort(c: vec3f) -> vec2f {
+    let p = c.xy / max(c.z, NEAR_M);
+    let r2 = min(dot(p, p), view.radial.w);
+    let radial = 1.0 + r2 * (view.radial.x + r2 * (view.radial.y + r2 * view.radial.z));
+    let t = view.tangential;
+    let aside = 2.0 * p.x * p.y * t + t.yx * (r2 + 2.0 * p * p);
+    return c.xy * radial + c.z * aside;
+}
 
 // Jarzynski and Olano, JCGT 9(3), 2020; the same as twin/random.rs.
 fn pcg4d(seed: vec4u) -> vec4u {

@@ -123,6 +123,10 @@ fn structs_agree() {
         frame,
         halo_px,
         saturation_e,
+        radial,
+        tangential,
+        pose_middle,
+        unused,
         headlights
     );
     same_layout!(

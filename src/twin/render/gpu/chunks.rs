@@ -1,7 +1,7 @@
 //! Chunks of the tunnel on the adapter: meshed when first seen, dropped when long unseen.
 
 use super::adapter::Gpu;
-use super::tunnel::{CHUNK_M, ChunkKey, Detail, chunk_mesh};
+use super::tunnel::{CHUNK_M, ChunkKey, Detail, Part, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::render::light::LampField;
@@ -12,9 +12,6 @@ use wgpu::util::DeviceExt;
 /// Range drawn before and behind a camera.
 const AHEAD_M: f64 = 160.0;
 const BEHIND_M: f64 = 20.0;
-/// Chunks from here on are drawn ring by ring, and coarsely.
-const MIDDLE_FROM_M: f64 = 5.0;
-const FAR_FROM_M: f64 = 60.0;
 /// Jobs after which an unseen chunk is dropped.
 const KEEP_JOBS: u64 = 200;
 /// Steps of the search for a camera far from where one was last.
@@ -32,10 +29,17 @@ pub struct Chunk {
     pub vertices: wgpu::Buffer,
     /// Triangles.
     pub indices: wgpu::Buffer,
-    /// Number of indices.
-    pub count: u32,
+    /// The lamp whose blinking shows on its walls.
+    pub lamp: Option<usize>,
+    /// Ranges of indices.
+    pub parts: Vec<Part>,
+    /// Some of its corners and their normals, in the world.
+    pub probes: Vec<(Point3<f64>, Vector3<f64>)>,
     seen_in: u64,
 }
+
+/// Every so many corners one is a probe.
+const PROBE_EVERY: usize = 16;
 
 /// All chunks in use.
 #[derive(Default)]
@@ -82,13 +86,7 @@ impl Chunks {
             let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
             let key = ChunkKey {
                 index,
-                detail: if away_m > FAR_FROM_M {
-                    Detail::Far
-                } else if away_m > MIDDLE_FROM_M {
-                    Detail::Middle
-                } else {
-                    Detail::Near
-                },
+                detail: Detail::at(away_m, framed.view.motion.poses.len() > 1),
             };
             let job = self.job;
             let chunk = self
@@ -142,7 +140,8 @@ fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
 }
 
 fn upload(gpu: &Gpu, tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Option<Chunk> {
-    let (origin, mesh) = chunk_mesh(tunnel, lamps, key);
+    let made = chunk_mesh(tunnel, lamps, key);
+    let mesh = made.mesh;
     let buffer = |contents: &[u8], usage| {
         gpu.device
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -152,7 +151,7 @@ fn upload(gpu: &Gpu, tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Optio
             })
     };
     (!mesh.indices.is_empty()).then(|| Chunk {
-        origin,
+        origin: made.origin,
         radius_m: mesh.radius_m(),
         vertices: buffer(
             bytemuck::cast_slice(&mesh.vertices),
@@ -162,7 +161,14 @@ fn upload(gpu: &Gpu, tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Optio
             bytemuck::cast_slice(&mesh.indices),
             wgpu::BufferUsages::INDEX,
         ),
-        count: mesh.indices.len() as u32,
+        lamp: made.lamp,
+        parts: made.parts,
+        probes: (mesh.vertices.iter().step_by(PROBE_EVERY))
+            .map(|v| {
+                let [p, n] = [v.position_m, v.normal].map(|x| Vector3::from(x).cast::<f64>());
+                (made.origin + p, n)
+            })
+            .collect(),
         seen_in: 0,
     })
 }

@@ -12,29 +12,22 @@ pub const MAX_HEADLIGHTS: usize = 8;
 pub struct Vertex {
     /// From the mesh's origin, world axes.
     pub position_m: [f32; 3],
-    /// By lamps and ambient light.
-    pub irradiance_lx: f32,
     /// Unit normal on the lit side, world axes.
     pub normal: [f32; 3],
-    /// Share of light reflected, before any pattern.
-    pub albedo: f32,
+    /// By ambient light and all lamps but the one that the mesh names, and by that one in the mean
+    /// over time.
+    pub light_lx: [f32; 2],
     /// Chainage from the mesh's origin, and metres along the outline.
-    pub pattern_m: [f32; 2],
+    pub place_m: [f32; 2],
+    /// Albedo is the painting's times `paint`, plus `bare`.
+    pub paint: f32,
+    /// See `paint`.
+    pub bare: f32,
+    /// Share of light reflected in the mean.
+    pub albedo: f32,
     /// Own luminance.
     pub luminance_cd_m2: f32,
-    /// Number of the repeating mark, 0 for none.
-    pub pulse: u32,
-    /// Lower left corner of the stain cells of the facet that this vertex begins, in cells.
-    pub stain_cell: [f32; 2],
-    /// Stains at the corners of its two cells, over 65535: three along the line, then three beside
-    /// them, [`STAIN_NONE`] in the seventh where there are none.
-    pub stains: [u16; 8],
 }
-
-/// Seventh entry of a vertex's stains on a surface that has none.
-pub const STAIN_NONE: u16 = 0;
-/// Seventh entry on a surface that has some.
-pub const STAIN_SOME: u16 = u16::MAX;
 
 /// Where one mesh is drawn.
 #[repr(C)]
@@ -42,12 +35,16 @@ pub const STAIN_SOME: u16 = u16::MAX;
 pub struct Placement {
     /// The mesh's origin from the view's reference point, world axes.
     pub offset_m: [f32; 3],
-    /// Fills up to the alignment of what follows.
-    pub unused: u32,
+    /// Part of the painting's period at the mesh's origin.
+    pub period_share: f32,
     /// Where the mesh goes, world axes.
     pub velocity_mps: [f32; 3],
-    /// Fills the stride.
-    pub unused_too: u32,
+    /// Of the instant drawn, after the middle of a row's exposure.
+    pub late_s: f32,
+    /// First entry of the table of light shares that its lamp has, one a row.
+    pub shares: u32,
+    /// Share of the painting that a metre takes, each way.
+    pub paint_per_m: [f32; 2],
 }
 
 /// `camera_from_world` at one time, relative to the view's reference point: rows of the matrix,
@@ -89,7 +86,7 @@ pub struct View {
     pub size_px: [f32; 2],
     /// Key of the noise.
     pub key: [u32; 2],
-    /// Steps of the table of poses a row; the first pose is that of row 0.
+    /// Steps of the table of poses a row; negative where the sensor is read upwards.
     pub pose_per_row: f32,
     /// From the bodies' time to the first pose.
     pub time_first_s: f32,
@@ -113,6 +110,14 @@ pub struct View {
     pub halo_px: f32,
     /// Signals are clamped at this many electrons.
     pub saturation_e: f32,
+    /// k1, k2, k3 and the square of the reach of the lens's distortion.
+    pub radial: [f32; 4],
+    /// p1, p2.
+    pub tangential: [f32; 2],
+    /// Place of row 0 in the table of poses.
+    pub pose_middle: f32,
+    /// Fills up to the alignment of what follows.
+    pub unused: f32,
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }

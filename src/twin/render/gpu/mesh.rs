@@ -5,15 +5,15 @@ use crate::twin::render::hull::Hull;
 use crate::twin::render::light::LampField;
 use crate::twin::render::scene::{Body, Shape};
 use nalgebra::{Point3, Vector3};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Faces and straight sides are cut to this size, so that light varies little over one cell.
 const CELL_M: f64 = 0.5;
 const MAX_CELLS: f64 = 48.0;
-/// Corners around a round shape: its outline errs by under 0.5 % of its radius.
-const SECTORS: usize = 32;
-/// Rings from a pole to the equator of a round end.
-const RINGS: usize = 8;
+/// Corners around a round shape are so many that its outline errs by less than this in the
+/// picture, but no more than these.
+const OUTLINE_PX: f64 = 0.1;
+const MAX_SECTORS: usize = 32;
 
 /// Vertices, and triangles as triples of them.
 #[derive(Clone, Debug, Default)]
@@ -72,8 +72,9 @@ impl Mesh {
             .into()
     }
 
-    /// Appends a body, lit where it stands.
-    pub fn add_body(&mut self, body: &Body, lamps: &LampField, ambient_lx: f64) {
+    /// Appends a body, lit where it stands, for views in which a metre of it takes so many pixels
+    /// at most.
+    pub fn add_body(&mut self, body: &Body, lamps: &LampField, ambient_lx: f64, px_per_m: f64) {
         let from = self.vertices.len() as u32;
         let mut corner = |p: Vector3<f64>, n: Vector3<f64>| {
             let at = body.world_from_body * Point3::from(p);
@@ -81,18 +82,24 @@ impl Mesh {
             let out = body.world_from_body.rotation * p;
             self.vertices.push(Vertex {
                 position_m: out.map(|x| x as f32).into(),
-                irradiance_lx: (lamps.irradiance_lx(&at, &normal) + ambient_lx) as f32,
+                light_lx: [(lamps.irradiance_lx(&at, &normal) + ambient_lx) as f32, 0.0],
                 normal: normal.map(|x| x as f32).into(),
+                bare: body.albedo as f32,
                 albedo: body.albedo as f32,
                 luminance_cd_m2: body.luminance_cd_m2 as f32,
                 ..Vertex::default()
             });
         };
+        let round = |r: f64| sectors(r * px_per_m);
         let grids = match &body.shape {
             Shape::Box(half) => box_grids(half, &mut corner),
-            Shape::Cylinder(r, h) => turned(&cylinder_profile(*r, *h), &mut corner),
-            Shape::Sphere(r) => turned(&capsule_profile(*r, 0.0), &mut corner),
-            Shape::Capsule(r, h) => turned(&capsule_profile(*r, *h), &mut corner),
+            Shape::Cylinder(r, h) => turned(&cylinder_profile(*r, *h), round(*r), &mut corner),
+            Shape::Sphere(r) => {
+                turned(&capsule_profile(*r, 0.0, round(*r)), round(*r), &mut corner)
+            }
+            Shape::Capsule(r, h) => {
+                turned(&capsule_profile(*r, *h, round(*r)), round(*r), &mut corner)
+            }
             Shape::Hull(hull) => {
                 let corners = hull_triangles(hull, &mut corner);
                 self.indices.extend(corners.iter().map(|k| from + k));
@@ -106,6 +113,16 @@ impl Mesh {
             first += rows * columns;
         }
     }
+}
+
+/// Corners around a circle of a radius in pixels: with n of them the outline is off by
+/// r (1 - cos(pi / n)), about r pi^2 / (2 n^2).
+fn sectors(radius_px: f64) -> usize {
+    let n = PI * (0.5 * radius_px / OUTLINE_PX).sqrt();
+    // A multiple of four: a quarter of them is from a pole to the equator.
+    (n.ceil() as usize)
+        .clamp(8, MAX_SECTORS)
+        .next_multiple_of(4)
 }
 
 /// Rows and columns of a grid of vertices.
@@ -201,11 +218,12 @@ fn cylinder_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
     vec![cap(-1.0), side, cap(1.0)]
 }
 
-fn capsule_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
+fn capsule_profile(radius_m: f64, half_m: f64, sectors: usize) -> Vec<Vec<ProfilePoint>> {
+    let rings = sectors / 4;
     let dome = |side: f64| {
-        (0..=RINGS).map(move |k| {
-            let k = if side < 0.0 { k } else { RINGS - k };
-            let (up, out) = (FRAC_PI_2 * (1.0 - k as f64 / RINGS as f64)).sin_cos();
+        (0..=rings).map(move |k| {
+            let k = if side < 0.0 { k } else { rings - k };
+            let (up, out) = (FRAC_PI_2 * (1.0 - k as f64 / rings as f64)).sin_cos();
             ProfilePoint {
                 radius_m: radius_m * out,
                 z_m: side * (half_m + radius_m * up),
@@ -225,11 +243,12 @@ fn capsule_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
 /// Turns outlines about z.
 fn turned(
     pieces: &[Vec<ProfilePoint>],
+    sectors: usize,
     corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>),
 ) -> Vec<Grid> {
     for point in pieces.iter().flatten() {
-        for k in 0..=SECTORS {
-            let (sin, cos) = (TAU * (k % SECTORS) as f64 / SECTORS as f64).sin_cos();
+        for k in 0..=sectors {
+            let (sin, cos) = (TAU * (k % sectors) as f64 / sectors as f64).sin_cos();
             let around = |r: f64, z: f64| Vector3::new(r * cos, r * sin, z);
             corner(
                 around(point.radius_m, point.z_m),
@@ -237,7 +256,7 @@ fn turned(
             );
         }
     }
-    pieces.iter().map(|p| (p.len(), SECTORS + 1)).collect()
+    pieces.iter().map(|p| (p.len(), sectors + 1)).collect()
 }
 
 #[cfg(test)]
@@ -255,7 +274,7 @@ mod tests {
             luminance_cd_m2: 0.0,
         };
         let mut mesh = Mesh::default();
-        mesh.add_body(&body, &LampField::new(&[]), 1.0);
+        mesh.add_body(&body, &LampField::new(&[]), 1.0, 1e4);
         mesh
     }
 

@@ -38,8 +38,10 @@ mod chunks;
 mod lamps;
 pub mod layout;
 mod mesh;
+mod paintings;
 mod passes;
 mod pipeline;
+mod sight;
 mod target;
 mod tunnel;
 mod view;
@@ -48,21 +50,21 @@ pub use adapter::adapters;
 pub use pipeline::shader_source;
 
 use super::light::LampField;
-use super::scene::{Job, Scene};
+use super::scene::{Body, Job, Scene, View};
 use super::{Backend, RenderError, Renderer};
 use adapter::Gpu;
 use chunks::Chunks;
 use image::GrayImage;
 use lamps::LampTable;
-use layout::{Placement, Pose};
+use layout::Pose;
 use mesh::Mesh;
-use nalgebra::Point3;
-use passes::{BodyBuffers, ViewBuffers, ViewData};
+use paintings::Paintings;
+use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::Pipelines;
+use sight::Sight;
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
-use tunnel::ChunkKey;
-use view::{Framed, single};
+use view::Framed;
 
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
 pub struct GpuRenderer {
@@ -71,6 +73,7 @@ pub struct GpuRenderer {
     scene: Scene,
     field: LampField,
     chunks: Chunks,
+    paintings: Paintings,
     bodies: BodyBuffers,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
@@ -89,9 +92,8 @@ struct InFlight {
 struct Scratch {
     mesh: Mesh,
     poses: Vec<Pose>,
-    placements: Vec<Placement>,
+    sight: Sight,
     lamps: LampTable,
-    keys: Vec<ChunkKey>,
 }
 
 impl GpuRenderer {
@@ -103,8 +105,9 @@ impl GpuRenderer {
         Ok(Self {
             pipelines,
             field: LampField::new(&scene.lamps),
-            scene,
             chunks: Chunks::default(),
+            paintings: Paintings::new(&gpu, &scene.tunnel),
+            scene,
             bodies: BodyBuffers::new(&gpu),
             views: Vec::new(),
             targets: Vec::new(),
@@ -122,7 +125,10 @@ impl GpuRenderer {
         self.bodies.ranges.clear();
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
-            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx);
+            let px_per_m = (job.views.iter())
+                .map(|view| px_per_m(view, body))
+                .fold(0.0, f64::max);
+            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx, px_per_m);
             self.bodies.ranges.push(first..mesh.indices.len() as u32);
         }
         self.bodies.write(&self.gpu, mesh);
@@ -144,9 +150,18 @@ impl GpuRenderer {
         };
         if let Some(target) = self.targets.iter().find(|t| t.size_px == size_px) {
             let buffers = &self.views[k];
-            let sight = (&self.chunks, self.scratch.keys.as_slice());
-            let background = self.pipelines.background(&gpu.device, job.headlights.len());
-            buffers.draw_background(gpu, background, encoder, target, sight, &self.bodies);
+            let stock = Stock {
+                chunks: &self.chunks,
+                bodies: &self.bodies,
+                paintings: &self.paintings,
+            };
+            let background = self
+                .pipelines
+                .background(&gpu.device, job.headlights.len())
+                .clone();
+            let background = (&self.pipelines, &background);
+            let sight = &self.scratch.sight;
+            buffers.draw_background(gpu, background, encoder, target, sight, &stock);
             let pipelines = &self.pipelines;
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_sensor(gpu, pipelines, encoder, target);
@@ -157,27 +172,16 @@ impl GpuRenderer {
 
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
         let (gpu, tunnel, scratch) = (&self.gpu, &self.scene.tunnel, &mut self.scratch);
-        self.chunks
-            .in_sight(gpu, tunnel, &self.field, framed, &mut scratch.keys);
-        let reference = framed.reference();
-        scratch.placements.clear();
-        for key in &scratch.keys {
-            if let Some(chunk) = self.chunks.get(*key) {
-                scratch.placements.push(Placement {
-                    offset_m: single(&(chunk.origin - reference)),
-                    ..Placement::default()
-                });
-            }
-        }
-        scratch
-            .placements
-            .extend(job.bodies.iter().map(|body| Placement {
-                offset_m: single(
-                    &(Point3::from(body.world_from_body.translation.vector) - reference),
-                ),
-                velocity_mps: single(&body.velocity_mps),
-                ..Placement::default()
-            }));
+        let keys = scratch.sight.keys();
+        self.chunks.in_sight(gpu, tunnel, &self.field, framed, keys);
+        scratch.sight.fill(
+            framed,
+            job,
+            &self.scene.lamps,
+            &self.chunks,
+            &self.paintings,
+            &self.bodies,
+        );
         scratch
             .lamps
             .fill(framed, &self.scene.lamps, tunnel.ambient_lx);
@@ -190,12 +194,20 @@ impl GpuRenderer {
             &ViewData {
                 constants,
                 poses: &scratch.poses,
-                placements: &scratch.placements,
+                sight: &scratch.sight,
                 lamps: &scratch.lamps.lamps,
                 rows: &scratch.lamps.rows,
             },
         );
     }
+}
+
+/// Pixels that a metre takes on the near side of a body.
+fn px_per_m(view: &View, body: &Body) -> f64 {
+    let eye = view.motion.pose_at(view.start).translation.vector;
+    let away_m = (body.world_from_body.translation.vector - eye).norm();
+    let near_m = (away_m - body.shape.half_extents_m().norm()).max(0.1);
+    view.camera.intrinsics.fx_px / near_m
 }
 
 impl Renderer for GpuRenderer {

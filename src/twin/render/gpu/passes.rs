@@ -2,10 +2,11 @@
 
 use super::adapter::Gpu;
 use super::chunks::Chunks;
-use super::layout::{Lamp, LampRow, Placement, Pose, View};
-use super::pipeline::{Pipelines, bind};
+use super::layout::{Lamp, LampRow, Pose, View};
+use super::paintings::Paintings;
+use super::pipeline::{Background, Pipelines, bind};
+use super::sight::Sight;
 use super::target::Target;
-use super::tunnel::ChunkKey;
 use std::mem::size_of;
 use std::ops::Range;
 
@@ -79,6 +80,7 @@ impl BodyBuffers {
 pub struct ViewBuffers {
     view: Upload,
     poses: Upload,
+    shares: Upload,
     placements: Upload,
     lamps: Upload,
     rows: Upload,
@@ -91,12 +93,30 @@ pub struct ViewData<'a> {
     pub constants: View,
     /// Its poses.
     pub poses: &'a [Pose],
-    /// Of the chunks, then of the bodies.
-    pub placements: &'a [Placement],
+    /// Tunnel and bodies.
+    pub sight: &'a Sight,
     /// Its lamps.
     pub lamps: &'a [Lamp],
     /// Their rows.
     pub rows: &'a [LampRow],
+}
+
+/// Bind groups of the background's pipelines; one a painting.
+struct Groups<'a> {
+    /// Draws what is lit.
+    pipeline: &'a wgpu::RenderPipeline,
+    lit: Vec<wgpu::BindGroup>,
+    dim: wgpu::BindGroup,
+}
+
+/// What stands behind the draws of a view.
+pub struct Stock<'a> {
+    /// Meshes of the tunnel.
+    pub chunks: &'a Chunks,
+    /// Meshes of the bodies.
+    pub bodies: &'a BodyBuffers,
+    /// What is painted on the tunnel.
+    pub paintings: &'a Paintings,
 }
 
 impl ViewBuffers {
@@ -106,6 +126,7 @@ impl ViewBuffers {
         Self {
             view: Upload::new(gpu, wgpu::BufferUsages::UNIFORM, size_of::<View>()),
             poses: Upload::new(gpu, storage, 2 * size_of::<Pose>()),
+            shares: Upload::new(gpu, storage, 1 << 12),
             placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 10),
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
             rows: Upload::new(gpu, storage, size_of::<LampRow>()),
@@ -117,48 +138,107 @@ impl ViewBuffers {
     pub fn write(&mut self, gpu: &Gpu, data: &ViewData<'_>) {
         self.view.write(gpu, &[data.constants]);
         self.poses.write(gpu, data.poses);
-        self.placements.write(gpu, data.placements);
+        self.shares.write(gpu, &data.sight.shares);
+        self.placements.write(gpu, &data.sight.placements);
         self.lamps.write(gpu, data.lamps);
         self.rows.write(gpu, data.rows);
         self.lamp_count = data.lamps.len() as u32;
     }
 
-    /// Tunnel and bodies.
+    /// Tunnel and bodies at every instant of the exposure.
     pub fn draw_background(
         &self,
         gpu: &Gpu,
-        pipeline: &wgpu::RenderPipeline,
+        (pipelines, background): (&Pipelines, &Background),
         encoder: &mut wgpu::CommandEncoder,
         target: &Target,
-        (chunks, keys): (&Chunks, &[ChunkKey]),
-        bodies: &BodyBuffers,
+        sight: &Sight,
+        stock: &Stock<'_>,
     ) {
-        let group = bind(
-            &gpu.device,
+        let pipeline = if sight.banded {
+            &background.banded
+        } else {
+            &background.lit
+        };
+        let lit = (stock.paintings.views().iter())
+            .map(|painting| {
+                let resources = [
+                    self.view.binding(),
+                    self.poses.binding(),
+                    self.shares.binding(),
+                    wgpu::BindingResource::TextureView(painting),
+                    wgpu::BindingResource::Sampler(&stock.paintings.sampler),
+                ];
+                bind(&gpu.device, pipeline, &resources)
+            })
+            .collect();
+        let dim = [self.view.binding(), self.poses.binding()];
+        let groups = Groups {
             pipeline,
-            &[self.view.binding(), self.poses.binding()],
-        );
-        let mut pass = begin(
-            encoder,
-            &target.signal,
-            wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-            Some(&target.depth),
-        );
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
-        let mut instance = 0;
-        for chunk in keys.iter().filter_map(|key| chunks.get(*key)) {
-            pass.set_vertex_buffer(0, chunk.vertices.slice(..));
-            pass.set_index_buffer(chunk.indices.slice(..), wgpu::IndexFormat::Uint32);
-            pass.draw_indexed(0..chunk.count, 0, instance..instance + 1);
-            instance += 1;
+            lit,
+            dim: bind(&gpu.device, &background.dim, &dim),
+        };
+        if sight.instants == 1 {
+            let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+            let mut pass = begin(encoder, &target.signal, clear, Some(&target.depth));
+            self.draw_instant(&mut pass, background, &groups, sight, stock, 0);
+            return;
         }
-        pass.set_vertex_buffer(0, bodies.vertices.buffer.slice(..));
-        pass.set_index_buffer(bodies.indices.buffer.slice(..), wgpu::IndexFormat::Uint32);
-        for range in &bodies.ranges {
-            pass.draw_indexed(range.clone(), 0, instance..instance + 1);
-            instance += 1;
+        let instant = target.instant(&gpu.device);
+        let resources = [
+            self.view.binding(),
+            wgpu::BindingResource::TextureView(&instant),
+        ];
+        let blend = bind(&gpu.device, &pipelines.blend, &resources);
+        for k in 0..sight.instants {
+            let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+            let mut pass = begin(encoder, &instant, clear, Some(&target.depth));
+            self.draw_instant(&mut pass, background, &groups, sight, stock, k);
+            drop(pass);
+            let load = if k == 0 { clear } else { wgpu::LoadOp::Load };
+            let mut pass = begin(encoder, &target.signal, load, None);
+            pass.set_pipeline(&pipelines.blend);
+            pass.set_bind_group(0, &blend, &[]);
+            let share = 1.0 / f64::from(sight.instants);
+            pass.set_blend_constant(wgpu::Color {
+                r: share,
+                g: share,
+                b: share,
+                a: share,
+            });
+            pass.draw(0..6, 0..1);
+        }
+    }
+
+    fn draw_instant(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        background: &Background,
+        groups: &Groups<'_>,
+        sight: &Sight,
+        stock: &Stock<'_>,
+        instant: u32,
+    ) {
+        pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
+        for draw in &sight.draws {
+            let (vertices, indices) = match draw.chunk.map(|key| stock.chunks.get(key)) {
+                Some(None) => continue,
+                Some(Some(chunk)) => (&chunk.vertices, &chunk.indices),
+                None => (&stock.bodies.vertices.buffer, &stock.bodies.indices.buffer),
+            };
+            pass.set_vertex_buffer(0, vertices.slice(..));
+            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            let at = instant * sight.meshes + draw.mesh;
+            if !draw.lit.is_empty() {
+                pass.set_pipeline(groups.pipeline);
+                pass.set_bind_group(0, &groups.lit[draw.painting], &[]);
+                pass.draw_indexed(draw.lit.clone(), 0, at..at + 1);
+            }
+            if !draw.dim.is_empty() {
+                pass.set_pipeline(&background.dim);
+                pass.set_bind_group(0, &groups.dim, &[]);
+                pass.draw_indexed(draw.dim.clone(), 0, at..at + 1);
+            }
         }
     }
 

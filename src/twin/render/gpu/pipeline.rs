@@ -12,12 +12,13 @@ pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 4] = [
+const FILES: [(&str, &str); 5] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
     (
         "background",
         include_str!("../../../../shaders/background.wgsl"),
     ),
+    ("blend", include_str!("../../../../shaders/blend.wgsl")),
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
     ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
 ];
@@ -33,11 +34,24 @@ pub fn shader_source(name: &str) -> Option<String> {
     Some(source)
 }
 
+/// Tunnel and bodies.
+#[derive(Clone)]
+pub struct Background {
+    /// With their paint and the blinking of lamps.
+    pub banded: wgpu::RenderPipeline,
+    /// With their paint.
+    pub lit: wgpu::RenderPipeline,
+    /// Where it is too dark for either.
+    pub dim: wgpu::RenderPipeline,
+}
+
 /// One pipeline a pass.
 pub struct Pipelines {
     /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
-    backgrounds: Vec<Option<wgpu::RenderPipeline>>,
+    backgrounds: Vec<Option<Background>>,
     background: wgpu::ShaderModule,
+    /// Adds a share of one picture to another.
+    pub blend: wgpu::RenderPipeline,
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added.
@@ -64,7 +78,7 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (lamps, sensor) = (shader("lamps"), shader("sensor"));
+        let (lamps, sensor, blend) = (shader("lamps"), shader("sensor"), shader("blend"));
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -80,6 +94,7 @@ impl Pipelines {
         Self {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
+            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
             sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
@@ -87,22 +102,28 @@ impl Pipelines {
     }
 
     /// The pipeline that draws tunnel and bodies under so many headlights.
-    pub fn background(
-        &mut self,
-        device: &wgpu::Device,
-        headlights: usize,
-    ) -> &wgpu::RenderPipeline {
+    pub fn background(&mut self, device: &wgpu::Device, headlights: usize) -> &Background {
         let headlights = headlights.min(MAX_HEADLIGHTS);
-        self.backgrounds[headlights]
-            .get_or_insert_with(|| background(device, &self.background, headlights))
+        self.backgrounds[headlights].get_or_insert_with(|| {
+            let make =
+                |kind, banded| background(device, &self.background, kind, headlights, banded);
+            Background {
+                banded: make("lit", true),
+                lit: make("lit", false),
+                dim: make("dim", false),
+            }
+        })
     }
 }
 
 fn background(
     device: &wgpu::Device,
     shader: &wgpu::ShaderModule,
+    kind: &str,
     headlights: usize,
+    banded: bool,
 ) -> wgpu::RenderPipeline {
+    let entries = [format!("project_{kind}"), format!("shade_{kind}")];
     let layout = |stride, step_mode, attributes| {
         Some(wgpu::VertexBufferLayout {
             array_stride: stride as u64,
@@ -112,7 +133,7 @@ fn background(
     };
     let stage = Stage {
         shader,
-        entries: ["project", "shade"],
+        entries: [&entries[0], &entries[1]],
         buffers: &[
             layout(size_of::<Vertex>(), wgpu::VertexStepMode::Vertex, &VERTEX),
             layout(
@@ -129,10 +150,26 @@ fn background(
             bias: wgpu::DepthBiasState::default(),
         }),
         target: target(SIGNAL, None),
-        constants: &[("HEADLIGHTS", headlights as f64)],
+        constants: &[
+            ("HEADLIGHTS", headlights as f64),
+            ("BANDED", f64::from(u8::from(banded))),
+        ],
     };
     pipeline(device, stage)
 }
+
+/// Adds the source, times the blend constant.
+const SHARE: wgpu::BlendState = {
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::Constant,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: add,
+        alpha: add,
+    }
+};
 
 /// The resources of group 0, in the order of their bindings.
 pub fn bind(
@@ -167,27 +204,28 @@ const fn attribute(
     }
 }
 
-const VERTEX: [wgpu::VertexAttribute; 10] = {
-    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32, Unorm16x4};
+const VERTEX: [wgpu::VertexAttribute; 7] = {
+    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3};
     [
         attribute(Float32x3, offset_of!(Vertex, position_m), 0),
-        attribute(Float32, offset_of!(Vertex, irradiance_lx), 1),
-        attribute(Float32x3, offset_of!(Vertex, normal), 2),
-        attribute(Float32, offset_of!(Vertex, albedo), 3),
-        attribute(Float32x2, offset_of!(Vertex, pattern_m), 4),
-        attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 5),
-        attribute(Uint32, offset_of!(Vertex, pulse), 6),
-        attribute(Float32x2, offset_of!(Vertex, stain_cell), 7),
-        attribute(Unorm16x4, offset_of!(Vertex, stains), 8),
-        attribute(Unorm16x4, offset_of!(Vertex, stains) + 8, 9),
+        attribute(Float32x3, offset_of!(Vertex, normal), 1),
+        attribute(Float32x2, offset_of!(Vertex, light_lx), 2),
+        attribute(Float32x2, offset_of!(Vertex, place_m), 3),
+        attribute(Float32x2, offset_of!(Vertex, paint), 4),
+        attribute(Float32, offset_of!(Vertex, albedo), 5),
+        attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 6),
     ]
 };
 
-const PLACEMENT: [wgpu::VertexAttribute; 2] = {
-    use wgpu::VertexFormat::Float32x3;
+const PLACEMENT: [wgpu::VertexAttribute; 6] = {
+    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32};
     [
-        attribute(Float32x3, offset_of!(Placement, offset_m), 10),
-        attribute(Float32x3, offset_of!(Placement, velocity_mps), 11),
+        attribute(Float32x3, offset_of!(Placement, offset_m), 7),
+        attribute(Float32, offset_of!(Placement, period_share), 8),
+        attribute(Float32x3, offset_of!(Placement, velocity_mps), 9),
+        attribute(Float32, offset_of!(Placement, late_s), 10),
+        attribute(Uint32, offset_of!(Placement, shares), 11),
+        attribute(Float32x2, offset_of!(Placement, paint_per_m), 12),
     ]
 };
 

@@ -3,6 +3,7 @@
 use super::pipeline::{DEPTH, PACKED, SIGNAL};
 use crate::twin::render::RenderError;
 use image::GrayImage;
+use std::cell::OnceCell;
 
 /// Textures of one image size, used again for every view of that size.
 pub struct Target {
@@ -15,26 +16,15 @@ pub struct Target {
     /// The finished image.
     pub packed: wgpu::TextureView,
     packed_texture: wgpu::Texture,
+    instant: OnceCell<wgpu::TextureView>,
 }
 
 impl Target {
     /// For images of one size.
     pub fn new(device: &wgpu::Device, size_px: (u32, u32)) -> Self {
         let texture = |width, format, extra| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: None,
-                size: wgpu::Extent3d {
-                    width,
-                    height: size_px.1,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | extra,
-                view_formats: &[],
-            })
+            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | extra;
+            texture(device, (width, size_px.1), format, usage)
         };
         let view = |t: &wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
@@ -45,7 +35,18 @@ impl Target {
             depth: view(&texture(size_px.0, DEPTH, read)),
             packed: view(&packed_texture),
             packed_texture,
+            instant: OnceCell::new(),
         }
+    }
+
+    /// The signal at one instant of an exposure that shows motion; made when first needed.
+    pub fn instant(&self, device: &wgpu::Device) -> &wgpu::TextureView {
+        self.instant.get_or_init(|| {
+            let usage =
+                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
+            texture(device, self.size_px, SIGNAL, usage)
+                .create_view(&wgpu::TextureViewDescriptor::default())
+        })
     }
 
     /// Copies the finished image to a buffer.
@@ -63,6 +64,28 @@ impl Target {
             self.packed_texture.size(),
         );
     }
+}
+
+fn texture(
+    device: &wgpu::Device,
+    (width, height): (u32, u32),
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::Texture {
+    device.create_texture(&wgpu::TextureDescriptor {
+        label: None,
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers: 1,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    })
 }
 
 /// An image on its way back.

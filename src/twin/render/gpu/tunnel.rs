@@ -1,25 +1,22 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
-use super::layout::{STAIN_NONE, STAIN_SOME, Vertex};
+use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{
     CrossSection, Edge, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel, rail_outline,
 };
-use crate::twin::random::pcg4d;
+use crate::twin::render::LampLight;
 use crate::twin::render::light::LampField;
 use crate::twin::render::surface;
-use crate::twin::render::surface::STAIN_CELL_M;
 use nalgebra::{Point3, Vector2, Vector3};
+use std::f64::consts::PI;
+use std::ops::Range;
 
-/// Length of a chunk: a whole number of rings, joints, sleepers and stain cells, so that every
-/// pattern starts afresh at a chunk's origin and chainage stays exact in f32.
-pub const CHUNK_M: f64 = 15.0;
+/// Length of a chunk: a whole number of rings, and a whole part of a painting's period.
+pub const CHUNK_M: f64 = 5.0;
 
-/// A cell of the mesh is halved until it is smaller than this share of its distance from the
-/// nearest lamp: light falls with a power of that distance, and is interpolated over the cell.
-const CELL_PER_LAMP_DISTANCE: f64 = 0.25;
-/// No cell is smaller, however near its lamp.
-const FINEST_CELL_M: f64 = 0.06;
+/// A painted surface is at most this many times as bright as its material in the mean.
+const BRIGHTEST_PAINT: f64 = 2.0;
 
 /// How finely a chunk is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -27,17 +24,42 @@ pub enum Detail {
     /// Every ring halved: where the rolling shutter bends what is straight.
     Near,
     /// Ring by ring.
+    Close,
+    /// Half a chunk at a time: a chord that long is under 3 mm off a curve of 300 m.
     Middle,
-    /// Stations far apart and no stains: no pixel resolves them from there.
+    /// From end to end.
     Far,
 }
 
 impl Detail {
+    /// How fine a chunk is drawn whose nearest end is so far from a camera that moves or not.
+    pub fn at(away_m: f64, moves: bool) -> Self {
+        match away_m {
+            ..6.0 if moves => Self::Near,
+            ..20.0 => Self::Close,
+            ..60.0 => Self::Middle,
+            _ => Self::Far,
+        }
+    }
+
     fn step_m(self) -> f64 {
         match self {
             Self::Near => 0.5 * surface::RING_M,
-            Self::Middle => surface::RING_M,
-            Self::Far => 5.0 * surface::RING_M,
+            Self::Close => surface::RING_M,
+            Self::Middle => 0.5 * CHUNK_M,
+            Self::Far => CHUNK_M,
+        }
+    }
+
+    /// A cell of the mesh is halved until it is smaller than this share of its distance from the
+    /// nearest lamp, since light falls with a power of that distance and is interpolated over the
+    /// cell; but it never gets smaller than this, which is 6 to 12 pixels of the usual cameras.
+    fn finest(self) -> (f64, f64) {
+        match self {
+            Self::Near => (0.25, 0.06),
+            Self::Close => (0.3, 0.15),
+            Self::Middle => (0.5, 0.4),
+            Self::Far => (1.0, CHUNK_M),
         }
     }
 }
@@ -58,61 +80,162 @@ impl ChunkKey {
     }
 }
 
+/// A chunk as meshed.
+#[derive(Clone, Debug)]
+pub struct ChunkMesh {
+    /// Its place in the world.
+    pub origin: Point3<f64>,
+    /// Its triangles; in every part the brightest first.
+    pub mesh: Mesh,
+    /// The lamp whose blinking shows on its walls.
+    pub lamp: Option<usize>,
+    /// One a cross-section in it.
+    pub parts: Vec<Part>,
+}
+
+/// The triangles of one cross-section in a chunk.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// Which of the tunnel's ranges of cross-sections.
+    pub section: usize,
+    /// Its indices in the mesh.
+    pub indices: Range<u32>,
+    /// Of each triangle, the most luminance that any of it may have, cd/m^2; falling.
+    pub peaks: Vec<f32>,
+}
+
 /// A strip along the line between two corners of an outline.
 struct Facet {
     ends: [OutlinePoint; 2],
     q_m: [f64; 2],
     albedo: f64,
-    material: u32,
-    pulse: u32,
+    painted: bool,
 }
 
-impl Facet {
-    /// Row of stain cells that it lies in.
-    fn stain_row(&self) -> f64 {
-        (0.5 * (self.q_m[0] + self.q_m[1]) / STAIN_CELL_M).floor()
-    }
-
-    /// Stains at the corners of the stain cells `column` and the next.
-    fn stains(&self, column: f64) -> [u16; 8] {
-        let row = self.stain_row();
-        let corner = |i: u32, j: u32| {
-            let at = [column + f64::from(i), row + f64::from(j)].map(|x| x as i64 as u32);
-            (pcg4d([at[0], at[1], self.material, 0])[0] >> 16) as u16
-        };
-        let [a, b] = [0, 1].map(|j| [0, 1, 2].map(|i| corner(i, j)));
-        [a[0], a[1], a[2], b[0], b[1], b[2], STAIN_SOME, 0]
-    }
+/// What all strips of a chunk share.
+struct Site<'a> {
+    tunnel: &'a Tunnel,
+    field: &'a LampField,
+    lamp: Option<&'a LampLight>,
+    near: Vec<TrackPoint>,
+    key: ChunkKey,
+    origin: Point3<f64>,
 }
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
-pub fn chunk_mesh(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> (Point3<f64>, Mesh) {
+pub fn chunk_mesh(tunnel: &Tunnel, field: &LampField, key: ChunkKey) -> ChunkMesh {
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
-    let origin = tunnel.alignment.at(from_m).origin;
-    let near = lamps_near(tunnel, lamps, key);
+    let middle_m = from_m + 0.5 * CHUNK_M;
+    let middle = tunnel.alignment.at(middle_m).origin;
+    let lamp = strongest(field, &middle);
+    let site = Site {
+        tunnel,
+        field,
+        lamp: lamp.map(|k| &field.lamps()[k]),
+        near: (field.near(&middle))
+            .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
+            .collect(),
+        key,
+        origin: tunnel.alignment.at(from_m).origin,
+    };
     let mut mesh = Mesh::default();
-    for range in &tunnel.sections {
+    let mut parts = Vec::new();
+    for (section, range) in tunnel.sections.iter().enumerate() {
         let stations = stations(range, from_m, to_m, key.detail.step_m());
         if stations.len() < 2 {
             continue;
         }
-        for facet in facets_of(range, &near) {
-            add_strip(
-                &mut mesh, tunnel, lamps, &near, &facet, &stations, key, &origin,
-            );
+        let first = mesh.indices.len();
+        for facet in facets_of(range, &site.near, key) {
+            site.add_strip(&mut mesh, &facet, &stations);
         }
+        parts.push(brightest_first(&mut mesh, first, section));
     }
-    (origin, mesh)
+    ChunkMesh {
+        origin: site.origin,
+        mesh,
+        lamp,
+        parts,
+    }
 }
 
-/// Where lamps are that a chunk may need finer cells for.
-fn lamps_near(tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Vec<TrackPoint> {
-    let middle_m = key.start_m() + 0.5 * CHUNK_M;
-    let middle = tunnel.alignment.at(middle_m).origin;
+/// The lamp that throws most light at a place, whatever the surface there.
+fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
+    let towards = |lamp: &LampLight| (lamp.centre - p).try_normalize(1e-9);
+    let light = |lamp: &LampLight| towards(lamp).map_or(0.0, |n| lamp.irradiance_lx(p, &n));
+    let lamps = field.lamps().iter().enumerate();
     lamps
-        .near(&middle)
-        .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
-        .collect()
+        .map(|(k, lamp)| (k, light(lamp)))
+        .filter(|(_, lux)| *lux > 0.0)
+        .max_by(|a, b| f64::total_cmp(&a.1, &b.1))
+        .map(|(k, _)| k)
+}
+
+/// Sorts the triangles of a mesh from index `first` on by their brightest corner.
+fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
+    let peak = |triangle: &[u32; 3]| {
+        let peaks = triangle.map(|k| mesh.vertices[k as usize].peak_cd_m2());
+        peaks.into_iter().fold(0.0, f32::max)
+    };
+    let (triangles, _) = mesh.indices[first..].as_chunks::<3>();
+    let mut sorted: Vec<_> = triangles.iter().map(|t| (peak(t), *t)).collect();
+    sorted.sort_by(|a, b| f32::total_cmp(&b.0, &a.0));
+    mesh.indices.truncate(first);
+    mesh.indices.extend(sorted.iter().flat_map(|(_, t)| *t));
+    Part {
+        section,
+        indices: first as u32..mesh.indices.len() as u32,
+        peaks: sorted.iter().map(|(peak, _)| *peak).collect(),
+    }
+}
+
+impl Vertex {
+    /// The most luminance that the surface here may have.
+    fn peak_cd_m2(&self) -> f32 {
+        // A lamp that is on gives more than its mean over time; no code is on for less than half.
+        let [steady, blinking] = self.light_lx;
+        let reflected = self.albedo * (BRIGHTEST_PAINT / PI) as f32 * (steady + 2.0 * blinking);
+        reflected + self.luminance_cd_m2
+    }
+}
+
+impl Site<'_> {
+    fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
+        let first = mesh.vertices.len() as u32;
+        let sides = facet
+            .ends
+            .map(|end| finer_stations(stations, end, &self.near, self.key.detail));
+        for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
+            for &s_m in side {
+                mesh.vertices.push(self.vertex(facet, *end, q_m, s_m));
+            }
+        }
+        mesh.add_ribbon(first, [&sides[0], &sides[1]]);
+    }
+
+    fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
+        let normal = facet_normal(self.tunnel, facet, s_m);
+        let p = ruled(self.tunnel, s_m, end, self.key.detail);
+        let blinking = self
+            .lamp
+            .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
+        let all = self.field.irradiance_lx(&p, &normal) + self.tunnel.ambient_lx;
+        let (paint, bare) = if facet.painted {
+            (1.0, 0.0)
+        } else {
+            (0.0, facet.albedo)
+        };
+        Vertex {
+            position_m: (p - self.origin).map(|x| x as f32).into(),
+            normal: normal.map(|x| x as f32).into(),
+            light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
+            place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
+            paint,
+            bare: bare as f32,
+            albedo: facet.albedo as f32,
+            luminance_cd_m2: 0.0,
+        }
+    }
 }
 
 /// Halves the interval `[from, to]` until every piece `fits`; puts the ends of the pieces into
@@ -128,20 +251,26 @@ fn halve(from: f64, to: f64, fits: &impl Fn(f64, f64) -> bool, cuts: &mut Vec<f6
 }
 
 /// Whether light varies little over a cell this long, this far from a lamp.
-fn is_fine(cell_m: f64, away_m: f64) -> bool {
-    cell_m <= CELL_PER_LAMP_DISTANCE * away_m || cell_m < 2.0 * FINEST_CELL_M
+fn is_fine(cell_m: f64, away_m: f64, detail: Detail) -> bool {
+    let (share, least_m) = detail.finest();
+    cell_m <= share * away_m || cell_m < 2.0 * least_m
 }
 
 /// The stations, with more of them where the line through `at` passes lamps. What shares the line
 /// shares its stations, so that no gap opens between strips of different fineness.
-fn finer_stations(stations: &[f64], at: OutlinePoint, near: &[TrackPoint]) -> Vec<f64> {
+fn finer_stations(
+    stations: &[f64],
+    at: OutlinePoint,
+    near: &[TrackPoint],
+    detail: Detail,
+) -> Vec<f64> {
     let mut finer = vec![stations[0]];
     for pair in stations.windows(2) {
         let fits = |from_m: f64, to_m: f64| {
             near.iter().all(|lamp| {
                 let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
                 let across_m = (at.l_m - lamp.l_m).hypot(at.h_m - lamp.h_m);
-                is_fine(to_m - from_m, along_m.hypot(across_m))
+                is_fine(to_m - from_m, along_m.hypot(across_m), detail)
             })
         };
         halve(pair[0], pair[1], &fits, &mut finer);
@@ -161,72 +290,61 @@ fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f6
     std::iter::once(from).chain(inside).chain([to]).collect()
 }
 
-fn facets_of(range: &SectionRange, near: &[TrackPoint]) -> Vec<Facet> {
+fn facets_of(range: &SectionRange, near: &[TrackPoint], key: ChunkKey) -> Vec<Facet> {
     let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section, near);
+    add_outline(&mut facets, &range.section, true, near, key);
     for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
-        add_outline(&mut facets, &rail_outline(centre_m), near);
+        add_outline(&mut facets, &rail_outline(centre_m), false, near, key);
     }
     facets
 }
 
-fn add_outline(facets: &mut Vec<Facet>, section: &CrossSection, near: &[TrackPoint]) {
+fn add_outline(
+    facets: &mut Vec<Facet>,
+    section: &CrossSection,
+    painted: bool,
+    near: &[TrackPoint],
+    key: ChunkKey,
+) {
     let mut q_m = 0.0;
     for edge in section.edges() {
         if edge.length_m() > 0.0 {
-            cut_edge(facets, &edge, q_m, near);
+            cut_edge(facets, &edge, (q_m, painted), near, key);
         }
         q_m += edge.length_m();
     }
 }
 
-/// Cuts an edge into facets: where it leaves a row of stain cells, where the marks on it end, and
-/// where it passes lamps.
-fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint]) {
+/// Cuts an edge into facets where it passes lamps.
+fn cut_edge(
+    facets: &mut Vec<Facet>,
+    edge: &Edge,
+    (q_m, painted): (f64, bool),
+    near: &[TrackPoint],
+    key: ChunkKey,
+) {
     let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
-    let look = surface::look(material);
-    let lines = (q_m / STAIN_CELL_M).floor() as i64 + 1..;
-    let mut cuts: Vec<f64> = lines
-        .map(|k| (k as f64 * STAIN_CELL_M - q_m) / length_m)
-        .take_while(|t| *t < 1.0)
-        .collect();
-    cuts.extend([0.0, 1.0]);
-    if let Some(pulse) = look.pulse {
-        let ends = [pulse.half_width_m, -pulse.half_width_m];
-        cuts.extend(
-            ends.map(|end| (end - a.l_m) / (b.l_m - a.l_m))
-                .into_iter()
-                .filter(|t| *t > 0.0 && *t < 1.0),
-        );
-    }
-    cuts.sort_by(f64::total_cmp);
     let at = |t: f64| OutlinePoint {
         l_m: a.l_m + t * (b.l_m - a.l_m),
         h_m: a.h_m + t * (b.h_m - a.h_m),
     };
     let fits = |from: f64, to: f64| {
         let ends = [at(from), at(to)];
-        near.iter()
-            .all(|lamp| is_fine((to - from) * length_m, across_m(ends, lamp)))
+        near.iter().all(|lamp| {
+            let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
+            let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
+            let away_m = along_m.hypot(across_m(ends, lamp));
+            is_fine((to - from) * length_m, away_m, key.detail)
+        })
     };
-    let mut finer = vec![0.0];
+    let mut cuts = vec![0.0];
+    halve(0.0, 1.0, &fits, &mut cuts);
     for pair in cuts.windows(2) {
-        halve(pair[0], pair[1], &fits, &mut finer);
-    }
-    for pair in finer.windows(2) {
-        let ends = [at(pair[0]), at(pair[1])];
-        let middle_m = 0.5 * (ends[0].l_m + ends[1].l_m);
-        let pulse = look
-            .pulse
-            .filter(|p| middle_m.abs() < p.half_width_m)
-            .and_then(|p| surface::PULSES.iter().position(|q| *q == p))
-            .map_or(0, |k| k as u32 + 1);
         facets.push(Facet {
-            ends,
+            ends: [at(pair[0]), at(pair[1])],
             q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
-            albedo: look.albedo,
-            material: look.id,
-            pulse,
+            albedo: surface::look(material).albedo,
+            painted,
         });
     }
 }
@@ -237,55 +355,6 @@ fn across_m([a, b]: [OutlinePoint; 2], lamp: &TrackPoint) -> f64 {
     let to_lamp = Vector2::new(lamp.l_m - a.l_m, lamp.h_m - a.h_m);
     let share = (edge.dot(&to_lamp) / edge.norm_squared().max(1e-12)).clamp(0.0, 1.0);
     (to_lamp - edge * share).norm()
-}
-
-#[allow(clippy::too_many_arguments, reason = "what a strip is made of")]
-fn add_strip(
-    mesh: &mut Mesh,
-    tunnel: &Tunnel,
-    lamps: &LampField,
-    near: &[TrackPoint],
-    facet: &Facet,
-    stations: &[f64],
-    key: ChunkKey,
-    origin: &Point3<f64>,
-) {
-    let from_m = key.start_m();
-    let first = mesh.vertices.len() as u32;
-    let sides = facet.ends.map(|end| {
-        if key.detail == Detail::Far {
-            stations.to_vec()
-        } else {
-            finer_stations(stations, end, near)
-        }
-    });
-    for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
-        for &s_m in side {
-            let normal = facet_normal(tunnel, facet, s_m);
-            let column = (s_m / STAIN_CELL_M).floor();
-            let stains = if key.detail == Detail::Far {
-                [STAIN_NONE; 8]
-            } else {
-                facet.stains(column)
-            };
-            let p = ruled(tunnel, s_m, *end, key.detail);
-            mesh.vertices.push(Vertex {
-                position_m: (p - origin).map(|x| x as f32).into(),
-                irradiance_lx: (lamps.irradiance_lx(&p, &normal) + tunnel.ambient_lx) as f32,
-                normal: normal.map(|x| x as f32).into(),
-                albedo: facet.albedo as f32,
-                pattern_m: [(s_m - from_m) as f32, q_m as f32],
-                luminance_cd_m2: 0.0,
-                pulse: facet.pulse,
-                stain_cell: [
-                    (column - from_m / STAIN_CELL_M) as f32,
-                    facet.stain_row() as f32,
-                ],
-                stains,
-            });
-        }
-    }
-    mesh.add_ribbon(first, [&sides[0], &sides[1]]);
 }
 
 /// A point of the surface, which runs straight from ring to ring.
@@ -299,7 +368,7 @@ fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3
     };
     let ring = s_m / surface::RING_M;
     let share = ring - ring.floor();
-    if detail == Detail::Far || share <= 0.0 {
+    if detail >= Detail::Middle || share <= 0.0 {
         return at(s_m);
     }
     let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * surface::RING_M));
@@ -323,7 +392,7 @@ mod tests {
     use super::*;
     use crate::twin::render::sample;
 
-    fn chunk(index: i64, detail: Detail) -> (Point3<f64>, Mesh) {
+    fn chunk(index: i64, detail: Detail) -> ChunkMesh {
         let scene = sample::scene();
         let lamps = LampField::new(&scene.lamps);
         chunk_mesh(&scene.tunnel, &lamps, ChunkKey { index, detail })
@@ -332,7 +401,7 @@ mod tests {
     /// Provokes facets that face the rock: every normal of the lining points to the axis.
     #[test]
     fn lining_faces_inwards() {
-        let (origin, mesh) = chunk(4, Detail::Near);
+        let ChunkMesh { origin, mesh, .. } = chunk(13, Detail::Near);
         let tunnel = sample::tunnel();
         let mut seen = 0;
         for v in mesh
@@ -356,15 +425,15 @@ mod tests {
     /// Provokes gaps between chunks: the last ring of one is the first ring of the next.
     #[test]
     fn chunks_meet() {
-        for detail in [Detail::Near, Detail::Middle, Detail::Far] {
+        for detail in [Detail::Near, Detail::Close, Detail::Middle, Detail::Far] {
             let at_end = |index: i64, end_m: f64| {
-                let (origin, mesh) = chunk(index, detail);
+                let ChunkMesh { origin, mesh, .. } = chunk(index, detail);
                 let at = |v: &Vertex| origin + Vector3::from(v.position_m).cast::<f64>();
-                let on_end = |v: &&Vertex| (f64::from(v.pattern_m[0]) - end_m).abs() < 1e-6;
+                let on_end = |v: &&Vertex| (f64::from(v.place_m[0]) - end_m).abs() < 1e-6;
                 let points: Vec<_> = mesh.vertices.iter().filter(on_end).map(at).collect();
                 points
             };
-            let (before, after) = (at_end(20, CHUNK_M), at_end(21, 0.0));
+            let (before, after) = (at_end(60, CHUNK_M), at_end(61, 0.0));
             assert!(before.len() > 100);
             assert_eq!(before.len(), after.len());
             for (last, first) in before.iter().zip(&after) {
@@ -376,8 +445,8 @@ mod tests {
     /// Provokes meshes beyond the ends of the tunnel, or none at its ends.
     #[test]
     fn chunks_end_with_the_tunnel() {
-        assert!(chunk(-1, Detail::Middle).1.vertices.is_empty());
-        assert!(!chunk(39, Detail::Middle).1.vertices.is_empty());
-        assert!(chunk(40, Detail::Middle).1.vertices.is_empty());
+        assert!(chunk(-1, Detail::Middle).mesh.vertices.is_empty());
+        assert!(!chunk(119, Detail::Middle).mesh.vertices.is_empty());
+        assert!(chunk(120, Detail::Middle).mesh.vertices.is_empty());
     }
 }

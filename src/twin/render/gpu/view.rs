@@ -37,8 +37,7 @@ impl<'a> Framed<'a> {
     pub fn constants(&self, job: &Job, poses: &mut Vec<Pose>) -> layout::View {
         let (camera, sensor) = (&self.view.camera, &self.view.sensor);
         let (lens, shutter) = (&camera.intrinsics, &camera.shutter);
-        let first = shutter.row_mid(self.view.start, 0.0);
-        let span_s = f64::from(lens.height_px.max(2) - 1) * shutter.line_time_s;
+        let span_s = shutter.frame_span_s(lens.height_px).max(1e-9);
         let steps = if self.view.motion.poses.len() > 1 {
             (span_s / POSE_STEP_S).ceil().clamp(1.0, MAX_POSES)
         } else {
@@ -46,21 +45,22 @@ impl<'a> Framed<'a> {
         };
         let step_s = span_s / steps;
         let reference = self.reference().coords;
+        let bent = &lens.distortion;
         poses.clear();
         poses.extend((0..=steps as u32).map(|k| {
-            let pose = self.view.motion.pose_at(first.plus(f64::from(k) * step_s));
+            let pose = self
+                .view
+                .motion
+                .pose_at(self.view.start.plus(f64::from(k) * step_s));
             relative_pose(&pose, &reference)
         }));
         let mut constants = layout::View {
             focal_px: [lens.fx_px as f32, lens.fy_px as f32],
             centre_px: [lens.cx_px as f32, lens.cy_px as f32],
             size_px: [lens.width_px as f32, lens.height_px as f32],
-            pose_per_row: if step_s > 0.0 {
-                (shutter.line_time_s / step_s) as f32
-            } else {
-                0.0
-            },
-            time_first_s: first.since(job.time) as f32,
+            pose_per_row: (shutter.row_step_s() / step_s) as f32,
+            pose_middle: ((shutter.delay_s(0.0) + 0.5 * shutter.exposure_s) / step_s) as f32,
+            time_first_s: self.view.start.since(job.time) as f32,
             pose_step_s: step_s as f32,
             pose_last: steps as f32,
             electrons_per_cd_m2: self.view.electrons_per_cd_m2() as f32,
@@ -70,6 +70,8 @@ impl<'a> Framed<'a> {
             noise: u32::from(sensor.noise),
             key: self.view.noise.stream.key,
             frame: self.view.noise.frame,
+            radial: [bent.k1, bent.k2, bent.k3, bent.reach().powi(2)].map(|x| x as f32),
+            tangential: [bent.p1, bent.p2].map(|x| x as f32),
             halo_px: self.view.lens.halo_px as f32,
             saturation_e: self.view.saturation_e() as f32,
             ..layout::View::default()

@@ -1,0 +1,218 @@
+//! What a view draws: which triangles in full and which cheaply, at which instants of the exposure,
+//! under which lamps' blinking.
+
+use super::chunks::{Chunk, Chunks};
+use super::layout::Placement;
+use super::paintings::Paintings;
+use super::passes::BodyBuffers;
+use super::tunnel::ChunkKey;
+use super::view::{Framed, single};
+use crate::twin::render::light::headlights_lx;
+use crate::twin::render::paint;
+use crate::twin::render::scene::{Body, Job, LampLight};
+use nalgebra::Point3;
+use std::f64::consts::PI;
+use std::ops::Range;
+
+/// Grey levels below which paint and blinking do not show: less than the read noise, since paint
+/// changes them by half at most.
+const DIM_GREY: f64 = 0.25;
+/// Between two instants of the exposure nothing moves by more than this in the picture.
+const INSTANT_PX: f64 = 1.0;
+/// Light that changes by less than this from row to row shows no bands.
+const BAND: f32 = 0.004;
+/// Bodies have less to show inside their outline.
+const BODY_INSTANT_PX: f64 = 2.0;
+/// Most instants.
+const MAX_INSTANTS: f64 = 64.0;
+/// No surface is taken to be nearer to a camera than this.
+const NEAREST_M: f64 = 0.8;
+
+/// Triangles of one mesh with one painting.
+pub struct Draw {
+    /// The chunk that they are of; none for bodies.
+    pub chunk: Option<ChunkKey>,
+    /// Their painting.
+    pub painting: usize,
+    /// Number of their placement.
+    pub mesh: u32,
+    /// Indices of those that are drawn in full.
+    pub lit: Range<u32>,
+    /// Indices of those that are too dark for that.
+    pub dim: Range<u32>,
+}
+
+/// All that a view draws of tunnel and bodies, and the buffers to find it in.
+#[derive(Default)]
+pub struct Sight {
+    keys: Vec<ChunkKey>,
+    /// Near ones first.
+    pub draws: Vec<Draw>,
+    /// Of every mesh at the first instant, then of every mesh at the second, and so on.
+    pub placements: Vec<Placement>,
+    /// Number of meshes.
+    pub meshes: u32,
+    /// Number of instants.
+    pub instants: u32,
+    /// Light of lamps over their mean, row by row; the first lot is 1.
+    pub shares: Vec<f32>,
+    /// Whether any of it differs from 1 so that one can see it.
+    pub banded: bool,
+    lamps: Vec<usize>,
+}
+
+impl Sight {
+    /// The buffer of the chunks in sight, for [`Chunks::in_sight`] to fill first.
+    pub fn keys(&mut self) -> &mut Vec<ChunkKey> {
+        &mut self.keys
+    }
+
+    /// Finds what to draw of the chunks whose keys were given, and of the bodies.
+    pub fn fill(
+        &mut self,
+        framed: &Framed<'_>,
+        job: &Job,
+        lamps: &[LampLight],
+        chunks: &Chunks,
+        paintings: &Paintings,
+        bodies: &BodyBuffers,
+    ) {
+        self.draws.clear();
+        self.placements.clear();
+        self.lamps.clear();
+        let rows = framed.view.camera.intrinsics.height_px;
+        self.shares.clear();
+        self.shares.resize(rows as usize, 1.0);
+        let dim_cd_m2 = DIM_GREY / framed.view.grey_per_cd_m2();
+        let reference = framed.reference();
+        let keys = std::mem::take(&mut self.keys);
+        for key in &keys {
+            if let Some(chunk) = chunks.get(*key) {
+                self.add_chunk(framed, job, lamps, (*key, chunk), paintings, dim_cd_m2);
+            }
+        }
+        self.keys = keys;
+        for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
+            self.draws.push(Draw {
+                chunk: None,
+                painting: 0,
+                mesh: self.placements.len() as u32,
+                lit: range.clone(),
+                dim: 0..0,
+            });
+            let place = Point3::from(body.world_from_body.translation.vector);
+            self.placements.push(Placement {
+                offset_m: single(&(place - reference)),
+                velocity_mps: single(&body.velocity_mps),
+                ..Placement::default()
+            });
+        }
+        self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
+        self.repeat(framed, job);
+    }
+
+    fn add_chunk(
+        &mut self,
+        framed: &Framed<'_>,
+        job: &Job,
+        lamps: &[LampLight],
+        (key, chunk): (ChunkKey, &Chunk),
+        paintings: &Paintings,
+        dim_cd_m2: f64,
+    ) {
+        let floodlit = (chunk.probes.iter())
+            .any(|(p, n)| headlights_lx(&job.headlights, p, n) / PI > dim_cd_m2);
+        let period = key.start_m() / paint::PERIOD_M;
+        for part in &chunk.parts {
+            let bright = if floodlit {
+                part.peaks.len()
+            } else {
+                (part.peaks).partition_point(|peak| f64::from(*peak) > dim_cd_m2)
+            };
+            let border = part.indices.start + 3 * bright as u32;
+            let painting = paintings.of_range(part.section);
+            self.draws.push(Draw {
+                chunk: Some(key),
+                painting,
+                mesh: self.placements.len() as u32,
+                lit: part.indices.start..border,
+                dim: border..part.indices.end,
+            });
+            let shares = match chunk.lamp.filter(|_| bright > 0) {
+                Some(lamp) => self.shares_of(framed, lamps, lamp),
+                None => 0,
+            };
+            self.placements.push(Placement {
+                offset_m: single(&(chunk.origin - framed.reference())),
+                period_share: (period - period.floor()) as f32,
+                shares,
+                paint_per_m: paintings.per_m(painting),
+                ..Placement::default()
+            });
+        }
+    }
+
+    /// First entry of a lamp in the table of shares, which is made at the first call.
+    fn shares_of(&mut self, framed: &Framed<'_>, lamps: &[LampLight], lamp: usize) -> u32 {
+        let rows = framed.view.camera.intrinsics.height_px;
+        let known = self.lamps.iter().position(|k| *k == lamp);
+        let at = known.unwrap_or(self.lamps.len()) as u32;
+        if known.is_none() {
+            self.lamps.push(lamp);
+            let shutter = &framed.view.camera.shutter;
+            let (light, mean) = (&lamps[lamp], lamps[lamp].duty().max(1e-9));
+            self.shares.extend((0..rows).map(|v| {
+                let open = shutter.row_open(framed.view.start, f64::from(v)).secs();
+                (light.waveform.on_share(open, open + shutter.exposure_s) / mean) as f32
+            }));
+        }
+        (at + 1) * rows
+    }
+
+    /// Copies the placements for every instant of the exposure.
+    fn repeat(&mut self, framed: &Framed<'_>, job: &Job) {
+        self.meshes = self.placements.len() as u32;
+        let anything = self.draws.iter().any(|d| !d.lit.is_empty());
+        self.instants = if anything {
+            instants(framed, &job.bodies)
+        } else {
+            1
+        };
+        let exposure_s = framed.view.camera.shutter.exposure_s;
+        let count = f64::from(self.instants);
+        for k in 0..self.instants {
+            // The middle comes last: its depths decide what hides the lamps.
+            let k = (k + self.instants / 2 + 1) % self.instants;
+            let late_s = ((f64::from(k) + 0.5) / count - 0.5) * exposure_s;
+            for mesh in 0..self.meshes as usize {
+                self.placements.push(Placement {
+                    late_s: late_s as f32,
+                    ..self.placements[mesh]
+                });
+            }
+        }
+        self.placements.drain(..self.meshes as usize);
+    }
+}
+
+/// How many instants of a row's exposure show all motion in it.
+fn instants(framed: &Framed<'_>, bodies: &[Body]) -> u32 {
+    let (view, shutter) = (framed.view, &framed.view.camera.shutter);
+    let f_px = view.camera.intrinsics.fx_px;
+    let rows = f64::from(view.camera.intrinsics.height_px);
+    let middle = shutter.row_open(view.start, 0.5 * rows);
+    let [a, b] = [middle, middle.plus(shutter.exposure_s)].map(|t| view.motion.pose_at(t));
+    let travel = b.translation.vector - a.translation.vector;
+    let turned_px = f_px * a.rotation.angle_to(&b.rotation);
+    let smear_px = turned_px + f_px * travel.norm() / NEAREST_M;
+    let bodies_px = bodies.iter().map(|body| {
+        let to = body.world_from_body.translation.vector - framed.middle.translation.vector;
+        let away_m = (to.norm() - body.shape.half_extents_m().norm()).max(NEAREST_M);
+        let moved = body.velocity_mps * shutter.exposure_s - travel;
+        turned_px + f_px * moved.norm() / away_m
+    });
+    let wanted = bodies_px
+        .map(|px| px / BODY_INSTANT_PX)
+        .fold(smear_px / INSTANT_PX, f64::max);
+    wanted.ceil().clamp(1.0, MAX_INSTANTS) as u32
+}
