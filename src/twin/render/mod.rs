@@ -5,6 +5,7 @@ pub mod cpu;
 pub mod gpu;
 mod hull;
 pub mod light;
+pub mod paint;
 pub mod sample;
 mod scene;
 pub mod sensor;
