@@ -102,7 +102,7 @@ impl GpuRenderer {
         gpu.check()?;
         Ok(Self {
             pipelines,
-            field: LampField::new(&scene.lamps),
+            field: LampField::new(&scene.lamps).in_air(scene.air),
             scene,
             chunks: Chunks::default(),
             bodies: BodyBuffers::new(&gpu),
