@@ -74,8 +74,11 @@ fn seen(p: vec3f, late_s: f32, velocity: vec3f) -> vec3f {
     return seen_at(v1 + (v2 - v1) / (1.0 - slope), late_s, p, velocity);
 }
 
-fn clip_of(in: Vertex) -> vec4f {
-    let c = seen(in.position_m + in.offset_m, in.late_s, in.velocity_mps);
+fn seen_vertex(in: Vertex) -> vec3f {
+    return seen(in.position_m + in.offset_m, in.late_s, in.velocity_mps);
+}
+
+fn clip_of(c: vec3f) -> vec4f {
     let ndc = (imaged(c) + 0.5 * c.z) * 2.0 / view.size_px - c.z;
     return vec4f(ndc.x, -ndc.y, NEAR_M, c.z);
 }
@@ -88,7 +91,8 @@ fn headlights_lx(p: vec3f, n: vec3f) -> f32 {
         let inverse = inverseSqrt(max(dot(d, d), 1e-4));
         let out = max(dot(light.axis, d) * inverse, 0.0);
         let into = max(-dot(n, d) * inverse, 0.0);
-        sum += light.intensity_cd * pow(out, light.exponent) * into * inverse * inverse;
+        let clear = exp(-view.extinction_per_m / inverse);
+        sum += light.intensity_cd * pow(out, light.exponent) * into * inverse * inverse * clear;
     }
     return sum;
 }
@@ -104,7 +108,10 @@ struct Dim {
 fn project_dim(in: Vertex) -> Dim {
     let light = in.light_lx.x + in.light_lx.y + headlights_lx(in.position_m + in.offset_m, in.normal);
     let luminance = in.albedo * light * (1.0 / PI) + in.luminance_cd_m2;
-    return Dim(clip_of(in), luminance * view.electrons_per_cd_m2);
+    let c = seen_vertex(in);
+    let clear = exp(-view.extinction_per_m * length(c));
+    let signal_e = mix(view.airlight_e, luminance * view.electrons_per_cd_m2, clear);
+    return Dim(clip_of(c), signal_e);
 }
 
 @fragment
@@ -117,20 +124,23 @@ struct Lit {
     @location(0) light_e: vec2f,
     @location(1) place: vec2f,
     @location(2) @interpolate(flat, either) paint: vec2f,
-    @location(3) @interpolate(flat, either) own_e: f32,
+    // Its own light, and that of the air before it.
+    @location(3) own_e: f32,
     @location(4) @interpolate(flat, either) shares: u32,
 }
 
 @vertex
 fn project_lit(in: Vertex) -> Lit {
     var out: Lit;
-    out.clip = clip_of(in);
-    let electrons_per_lx = view.electrons_per_cd_m2 / PI;
+    let c = seen_vertex(in);
+    let clear = exp(-view.extinction_per_m * length(c));
+    out.clip = clip_of(c);
+    let electrons_per_lx = clear * view.electrons_per_cd_m2 / PI;
     let steady = in.light_lx.x + headlights_lx(in.position_m + in.offset_m, in.normal);
     out.light_e = vec2f(steady, in.light_lx.y) * electrons_per_lx;
     out.place = in.place_m * in.paint_per_m + vec2f(in.period_share, 0.0);
     out.paint = in.paint;
-    out.own_e = in.luminance_cd_m2 * view.electrons_per_cd_m2;
+    out.own_e = mix(view.airlight_e, in.luminance_cd_m2 * view.electrons_per_cd_m2, clear);
     out.shares = in.shares;
     return out;
 }

@@ -38,7 +38,11 @@ struct View {
     tangential: vec2f,
     // Place of row 0 in the table of poses.
     pose_middle: f32,
+    // Share of light that the air takes on a metre, and the signal of endless air.
+    extinction_per_m: f32,
+    airlight_e: f32,
     unused: f32,
+    unused_too: vec2f,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

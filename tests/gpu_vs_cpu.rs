@@ -5,7 +5,8 @@
 //!
 //! | where | why | bound |
 //! |---|---|---|
-//! | silhouettes, facet edges, joints far away | one sample a pixel, f32 against f64, coarse rings far away | pixels off by more than 2 grey levels: 1 % |
+//! | silhouettes, facet edges | one sample a pixel, f32 against f64, coarse rings far away | pixels off by more than 2 grey levels: 1 % |
+//! | paint in floodlight | one texel of one mip level, square, against the mean over the pixel's slanted footprint | off by more than 2: 4 % |
 //! | the same, where both sides differ much | no more than silhouettes have pixels | off by more than 20: 0.3 % |
 //! | everywhere else | f32, light interpolated over facets | 2 grey levels |
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
@@ -63,7 +64,7 @@ fn quiet(job: &Job) -> Job {
 }
 
 fn scaled(view: &mut View, gain: f64, divisor: u32) {
-    view.sensor.gain_db += 20.0 * gain.log10();
+    view.sensor.quantum_efficiency *= gain;
     let i = view.camera.intrinsics;
     view.camera.intrinsics = Intrinsics::centred(
         i.width_px / divisor,
@@ -179,6 +180,8 @@ fn share_off(a: &GrayImage, b: &GrayImage, levels: u8) -> f64 {
 
 /// Shares of pixels that may be off by more than 2 and by more than 20 grey levels.
 const OVER_2: f64 = 0.01;
+/// The first where every bolt shows.
+const OVER_2_PAINT: f64 = 0.04;
 const OVER_20: f64 = 0.003;
 
 fn compare(name: &str, scene: &Scene, job: &Job) {
@@ -196,7 +199,12 @@ fn compare(name: &str, scene: &Scene, job: &Job) {
     }
     let spread = cpu.iter().max().unwrap() - cpu.iter().min().unwrap();
     assert!(spread > 80, "{name} shows nothing: {spread}");
-    assert!(over_2 <= OVER_2, "{name}: {over_2} over 2 grey levels");
+    let allowed = if name.starts_with("flood") {
+        OVER_2_PAINT
+    } else {
+        OVER_2
+    };
+    assert!(over_2 <= allowed, "{name}: {over_2} over 2 grey levels");
     assert!(over_20 <= OVER_20, "{name}: {over_20} over 20 grey levels");
 }
 

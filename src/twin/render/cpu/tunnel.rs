@@ -45,7 +45,7 @@ struct Slab {
 pub struct Strike {
     /// Along the ray, in lengths of its direction.
     pub t: f64,
-    slab: u32,
+    pub(super) slab: u32,
     edge: u16,
 }
 
@@ -64,6 +64,10 @@ pub struct SurfacePoint {
     pub q_m: f64,
     /// What it is made of.
     pub material: Material,
+    /// Which of the tunnel's section ranges it belongs to.
+    pub range: usize,
+    /// How s and q grow with the position, per metre.
+    pub(super) gradients: [Vector3<f64>; 2],
 }
 
 /// A slab begins this much early, so that rounding opens no crack between two of them.
@@ -115,6 +119,26 @@ impl TunnelCaster {
                 .map(|r| Outline::new(&r.section))
                 .collect(),
         }
+    }
+
+    /// How many slabs there are.
+    pub(super) fn slabs(&self) -> usize {
+        self.slabs.len()
+    }
+
+    /// Where a slab begins.
+    pub(super) fn chainage_m(&self, slab: usize) -> f64 {
+        self.stations[slab].s_m
+    }
+
+    /// A ball around a slab's surface.
+    pub(super) fn slab_ball(&self, slab: usize) -> (Point3<f64>, f64) {
+        let [near, far] = [0, 1].map(|k| self.stations[slab + k].origin);
+        let (up_m, radius_m) = self.slabs[slab]
+            .outline
+            .map_or((0.0, 0.0), |i| self.outlines[i].disc());
+        let middle = nalgebra::center(&near, &far) + Vector3::z() * up_m;
+        (middle, radius_m + (far - near).norm())
     }
 
     /// The slab that a place is in: from a slab close by, or else by search for the nearest
@@ -227,7 +251,8 @@ impl TunnelCaster {
             self.ahead_of(k, &position),
             -self.ahead_of(k + 1, &position),
         );
-        let edge = &self.outlines[slab.outline.unwrap_or(0)].edges[strike.edge as usize];
+        let range = slab.outline.unwrap_or(0);
+        let edge = &self.outlines[range].edges[strike.edge as usize];
         // Across the edge and across the ruling, which climbs with the slope.
         let (n, along) = (edge.normal, -edge.normal.y * slab.slope);
         let level = slab.left * n.x + slab.chord * along;
@@ -238,7 +263,20 @@ impl TunnelCaster {
             l_m: lh.x,
             q_m: edge.q_m + edge.along.dot(&(lh - edge.start)),
             material: edge.material,
+            range,
+            gradients: [
+                Vector3::new(slab.chord.x, slab.chord.y, 0.0)
+                    * ((far_m - near_m) / (past + before)),
+                Self::up_edge(slab, &edge.along),
+            ],
         }
+    }
+
+    /// How metres along an edge grow with the position: the transpose of what
+    /// [`Self::across`] does to directions.
+    fn up_edge(slab: &Slab, along: &Vector2<f64>) -> Vector3<f64> {
+        let level = slab.left * along.x - slab.chord * (slab.slope * along.y);
+        Vector3::new(level.x, level.y, along.y)
     }
 }
 

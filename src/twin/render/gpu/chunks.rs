@@ -5,6 +5,7 @@ use super::tunnel::{CHUNK_M, ChunkKey, Detail, Part, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::render::light::LampField;
+use crate::twin::render::paint::Paintings;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use wgpu::util::DeviceExt;
@@ -62,12 +63,12 @@ impl Chunks {
     pub fn in_sight(
         &mut self,
         gpu: &Gpu,
-        tunnel: &Tunnel,
-        lamps: &LampField,
+        world: (&Tunnel, &LampField, &Paintings),
         framed: &Framed<'_>,
         keys: &mut Vec<ChunkKey>,
     ) {
         keys.clear();
+        let (tunnel, ..) = world;
         let eye = framed.reference();
         let s_m = self.locate(tunnel, &eye);
         let frame = tunnel.alignment.at(s_m);
@@ -92,7 +93,7 @@ impl Chunks {
             let chunk = self
                 .made
                 .entry(key)
-                .or_insert_with(|| upload(gpu, tunnel, lamps, key));
+                .or_insert_with(|| upload(gpu, world, key));
             if let Some(chunk) = chunk
                 && framed.may_see(&chunk.origin, chunk.radius_m, slack_m)
             {
@@ -106,6 +107,11 @@ impl Chunks {
     /// A chunk that [`Self::in_sight`] has named.
     pub fn get(&self, key: ChunkKey) -> Option<&Chunk> {
         self.made.get(&key).and_then(Option::as_ref)
+    }
+
+    /// Chainage of the camera that looked last.
+    pub fn last_seen_s_m(&self) -> f64 {
+        self.last_seen_s_m
     }
 
     /// Chainage of a camera: by Newton's method from where the last one was, else by search.
@@ -139,8 +145,12 @@ fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
         .map_or(from_m, |(_, s_m)| s_m)
 }
 
-fn upload(gpu: &Gpu, tunnel: &Tunnel, lamps: &LampField, key: ChunkKey) -> Option<Chunk> {
-    let made = chunk_mesh(tunnel, lamps, key);
+fn upload(
+    gpu: &Gpu,
+    (tunnel, lamps, paintings): (&Tunnel, &LampField, &Paintings),
+    key: ChunkKey,
+) -> Option<Chunk> {
+    let made = chunk_mesh(tunnel, lamps, paintings, key);
     let mesh = made.mesh;
     let buffer = |contents: &[u8], usage| {
         gpu.device

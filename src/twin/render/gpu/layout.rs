@@ -116,8 +116,14 @@ pub struct View {
     pub tangential: [f32; 2],
     /// Place of row 0 in the table of poses.
     pub pose_middle: f32,
+    /// Share of light that the air takes on a metre.
+    pub extinction_per_m: f32,
+    /// Signal of endless air.
+    pub airlight_e: f32,
     /// Fills up to the alignment of what follows.
     pub unused: f32,
+    /// The same.
+    pub unused_too: [f32; 2],
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }

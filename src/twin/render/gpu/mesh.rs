@@ -12,7 +12,7 @@ const CELL_M: f64 = 0.5;
 const MAX_CELLS: f64 = 48.0;
 /// Corners around a round shape are so many that its outline errs by less than this in the
 /// picture, but no more than these.
-const OUTLINE_PX: f64 = 0.1;
+const OUTLINE_PX: f64 = 0.04;
 const MAX_SECTORS: usize = 32;
 
 /// Vertices, and triangles as triples of them.

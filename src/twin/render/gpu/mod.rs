@@ -38,11 +38,11 @@ mod chunks;
 mod lamps;
 pub mod layout;
 mod mesh;
-mod paintings;
 mod passes;
 mod pipeline;
 mod sight;
 mod target;
+mod textures;
 mod tunnel;
 mod view;
 
@@ -50,6 +50,7 @@ pub use adapter::adapters;
 pub use pipeline::shader_source;
 
 use super::light::LampField;
+use super::paint::Paintings;
 use super::scene::{Body, Job, Scene, View};
 use super::{Backend, RenderError, Renderer};
 use adapter::Gpu;
@@ -58,12 +59,12 @@ use image::GrayImage;
 use lamps::LampTable;
 use layout::Pose;
 use mesh::Mesh;
-use paintings::Paintings;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::Pipelines;
-use sight::Sight;
+use sight::{Sight, World};
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
+use textures::Textures;
 use view::Framed;
 
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
@@ -74,6 +75,7 @@ pub struct GpuRenderer {
     field: LampField,
     chunks: Chunks,
     paintings: Paintings,
+    textures: Textures,
     bodies: BodyBuffers,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
@@ -102,11 +104,13 @@ impl GpuRenderer {
         let gpu = Gpu::open()?;
         let pipelines = Pipelines::new(&gpu.device);
         gpu.check()?;
+        let paintings = Paintings::of(&scene.tunnel);
         Ok(Self {
             pipelines,
-            field: LampField::new(&scene.lamps),
+            field: LampField::new(&scene.lamps).in_air(scene.air),
             chunks: Chunks::default(),
-            paintings: Paintings::new(&gpu, &scene.tunnel),
+            textures: Textures::new(&gpu, &paintings),
+            paintings,
             scene,
             bodies: BodyBuffers::new(&gpu),
             views: Vec::new(),
@@ -153,7 +157,7 @@ impl GpuRenderer {
             let stock = Stock {
                 chunks: &self.chunks,
                 bodies: &self.bodies,
-                paintings: &self.paintings,
+                textures: &self.textures,
             };
             let background = self
                 .pipelines
@@ -173,19 +177,23 @@ impl GpuRenderer {
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
         let (gpu, tunnel, scratch) = (&self.gpu, &self.scene.tunnel, &mut self.scratch);
         let keys = scratch.sight.keys();
-        self.chunks.in_sight(gpu, tunnel, &self.field, framed, keys);
-        scratch.sight.fill(
-            framed,
-            job,
-            &self.scene.lamps,
-            &self.chunks,
-            &self.paintings,
-            &self.bodies,
-        );
+        let line = (&**tunnel, &self.field, &self.paintings);
+        self.chunks.in_sight(gpu, line, framed, keys);
+        let world = World {
+            lamps: &self.scene.lamps,
+            air: &self.scene.air,
+            paintings: &self.paintings,
+        };
+        let meshes = (&self.chunks, &self.bodies);
+        scratch.sight.fill(framed, job, &world, meshes);
         scratch
             .lamps
             .fill(framed, &self.scene.lamps, tunnel.ambient_lx);
-        let constants = framed.constants(job, &mut scratch.poses);
+        let airlight_cd_m2 = self
+            .field
+            .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
+        let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
+        let constants = framed.constants(job, air, &mut scratch.poses);
         while self.views.len() <= k {
             self.views.push(ViewBuffers::new(gpu));
         }

@@ -3,10 +3,10 @@
 use super::adapter::Gpu;
 use super::chunks::Chunks;
 use super::layout::{Lamp, LampRow, Pose, View};
-use super::paintings::Paintings;
 use super::pipeline::{Background, Pipelines, bind};
 use super::sight::Sight;
 use super::target::Target;
+use super::textures::Textures;
 use std::mem::size_of;
 use std::ops::Range;
 
@@ -116,7 +116,7 @@ pub struct Stock<'a> {
     /// Meshes of the bodies.
     pub bodies: &'a BodyBuffers,
     /// What is painted on the tunnel.
-    pub paintings: &'a Paintings,
+    pub textures: &'a Textures,
 }
 
 impl ViewBuffers {
@@ -160,14 +160,14 @@ impl ViewBuffers {
         } else {
             &background.lit
         };
-        let lit = (stock.paintings.views().iter())
+        let lit = (stock.textures.views.iter())
             .map(|painting| {
                 let resources = [
                     self.view.binding(),
                     self.poses.binding(),
                     self.shares.binding(),
                     wgpu::BindingResource::TextureView(painting),
-                    wgpu::BindingResource::Sampler(&stock.paintings.sampler),
+                    wgpu::BindingResource::Sampler(&stock.textures.sampler),
                 ];
                 bind(&gpu.device, pipeline, &resources)
             })

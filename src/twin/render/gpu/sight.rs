@@ -3,13 +3,13 @@
 
 use super::chunks::{Chunk, Chunks};
 use super::layout::Placement;
-use super::paintings::Paintings;
 use super::passes::BodyBuffers;
+use super::textures;
 use super::tunnel::ChunkKey;
 use super::view::{Framed, single};
 use crate::twin::render::light::headlights_lx;
-use crate::twin::render::paint;
-use crate::twin::render::scene::{Body, Job, LampLight};
+use crate::twin::render::paint::{self, Paintings};
+use crate::twin::render::scene::{Air, Body, Job, LampLight};
 use nalgebra::Point3;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -18,15 +18,25 @@ use std::ops::Range;
 /// changes them by half at most.
 const DIM_GREY: f64 = 0.25;
 /// Between two instants of the exposure nothing moves by more than this in the picture.
-const INSTANT_PX: f64 = 1.0;
+const INSTANT_PX: f64 = 1.5;
 /// Light that changes by less than this from row to row shows no bands.
 const BAND: f32 = 0.004;
 /// Bodies have less to show inside their outline.
-const BODY_INSTANT_PX: f64 = 2.0;
+const BODY_INSTANT_PX: f64 = 3.0;
 /// Most instants.
 const MAX_INSTANTS: f64 = 64.0;
 /// No surface is taken to be nearer to a camera than this.
 const NEAREST_M: f64 = 0.8;
+
+/// What is lit and how.
+pub struct World<'a> {
+    /// All lamps.
+    pub lamps: &'a [LampLight],
+    /// Between them and what they light.
+    pub air: &'a Air,
+    /// On the tunnel.
+    pub paintings: &'a Paintings,
+}
 
 /// Triangles of one mesh with one painting.
 pub struct Draw {
@@ -72,10 +82,8 @@ impl Sight {
         &mut self,
         framed: &Framed<'_>,
         job: &Job,
-        lamps: &[LampLight],
-        chunks: &Chunks,
-        paintings: &Paintings,
-        bodies: &BodyBuffers,
+        world: &World<'_>,
+        (chunks, bodies): (&Chunks, &BodyBuffers),
     ) {
         self.draws.clear();
         self.placements.clear();
@@ -88,7 +96,7 @@ impl Sight {
         let keys = std::mem::take(&mut self.keys);
         for key in &keys {
             if let Some(chunk) = chunks.get(*key) {
-                self.add_chunk(framed, job, lamps, (*key, chunk), paintings, dim_cd_m2);
+                self.add_chunk(framed, job, world, (*key, chunk), dim_cd_m2);
             }
         }
         self.keys = keys;
@@ -115,13 +123,12 @@ impl Sight {
         &mut self,
         framed: &Framed<'_>,
         job: &Job,
-        lamps: &[LampLight],
+        world: &World<'_>,
         (key, chunk): (ChunkKey, &Chunk),
-        paintings: &Paintings,
         dim_cd_m2: f64,
     ) {
         let floodlit = (chunk.probes.iter())
-            .any(|(p, n)| headlights_lx(&job.headlights, p, n) / PI > dim_cd_m2);
+            .any(|(p, n)| headlights_lx(&job.headlights, world.air, p, n) / PI > dim_cd_m2);
         let period = key.start_m() / paint::PERIOD_M;
         for part in &chunk.parts {
             let bright = if floodlit {
@@ -130,7 +137,7 @@ impl Sight {
                 (part.peaks).partition_point(|peak| f64::from(*peak) > dim_cd_m2)
             };
             let border = part.indices.start + 3 * bright as u32;
-            let painting = paintings.of_range(part.section);
+            let painting = world.paintings.of_range[part.section];
             self.draws.push(Draw {
                 chunk: Some(key),
                 painting,
@@ -139,14 +146,14 @@ impl Sight {
                 dim: border..part.indices.end,
             });
             let shares = match chunk.lamp.filter(|_| bright > 0) {
-                Some(lamp) => self.shares_of(framed, lamps, lamp),
+                Some(lamp) => self.shares_of(framed, world.lamps, lamp),
                 None => 0,
             };
             self.placements.push(Placement {
                 offset_m: single(&(chunk.origin - framed.reference())),
                 period_share: (period - period.floor()) as f32,
                 shares,
-                paint_per_m: paintings.per_m(painting),
+                paint_per_m: textures::per_m(&world.paintings.all[painting]),
                 ..Placement::default()
             });
         }

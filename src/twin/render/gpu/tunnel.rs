@@ -7,6 +7,7 @@ use crate::track::{
 };
 use crate::twin::render::LampLight;
 use crate::twin::render::light::LampField;
+use crate::twin::render::paint::{Painting, Paintings};
 use crate::twin::render::surface;
 use nalgebra::{Point3, Vector2, Vector3};
 use std::f64::consts::PI;
@@ -109,7 +110,6 @@ struct Facet {
     ends: [OutlinePoint; 2],
     q_m: [f64; 2],
     albedo: f64,
-    painted: bool,
 }
 
 /// What all strips of a chunk share.
@@ -123,7 +123,12 @@ struct Site<'a> {
 }
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
-pub fn chunk_mesh(tunnel: &Tunnel, field: &LampField, key: ChunkKey) -> ChunkMesh {
+pub fn chunk_mesh(
+    tunnel: &Tunnel,
+    field: &LampField,
+    paintings: &Paintings,
+    key: ChunkKey,
+) -> ChunkMesh {
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let middle_m = from_m + 0.5 * CHUNK_M;
     let middle = tunnel.alignment.at(middle_m).origin;
@@ -146,7 +151,10 @@ pub fn chunk_mesh(tunnel: &Tunnel, field: &LampField, key: ChunkKey) -> ChunkMes
             continue;
         }
         let first = mesh.indices.len();
-        for facet in facets_of(range, &site.near, key) {
+        let rail_q_m = (paintings.of_range.get(section))
+            .and_then(|k| paintings.all.get(*k))
+            .map_or(0.0, Painting::rail_q_m);
+        for facet in facets_of(range, rail_q_m, &site.near, key) {
             site.add_strip(&mut mesh, &facet, &stations);
         }
         parts.push(brightest_first(&mut mesh, first, section));
@@ -220,18 +228,13 @@ impl Site<'_> {
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
         let all = self.field.irradiance_lx(&p, &normal) + self.tunnel.ambient_lx;
-        let (paint, bare) = if facet.painted {
-            (1.0, 0.0)
-        } else {
-            (0.0, facet.albedo)
-        };
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
-            paint,
-            bare: bare as f32,
+            paint: 1.0,
+            bare: 0.0,
             albedo: facet.albedo as f32,
             luminance_cd_m2: 0.0,
         }
@@ -290,11 +293,16 @@ fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f6
     std::iter::once(from).chain(inside).chain([to]).collect()
 }
 
-fn facets_of(range: &SectionRange, near: &[TrackPoint], key: ChunkKey) -> Vec<Facet> {
+fn facets_of(
+    range: &SectionRange,
+    rail_q_m: f64,
+    near: &[TrackPoint],
+    key: ChunkKey,
+) -> Vec<Facet> {
     let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section, true, near, key);
+    add_outline(&mut facets, &range.section, 0.0, near, key);
     for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
-        add_outline(&mut facets, &rail_outline(centre_m), false, near, key);
+        add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, near, key);
     }
     facets
 }
@@ -302,27 +310,20 @@ fn facets_of(range: &SectionRange, near: &[TrackPoint], key: ChunkKey) -> Vec<Fa
 fn add_outline(
     facets: &mut Vec<Facet>,
     section: &CrossSection,
-    painted: bool,
+    mut q_m: f64,
     near: &[TrackPoint],
     key: ChunkKey,
 ) {
-    let mut q_m = 0.0;
     for edge in section.edges() {
         if edge.length_m() > 0.0 {
-            cut_edge(facets, &edge, (q_m, painted), near, key);
+            cut_edge(facets, &edge, q_m, near, key);
         }
         q_m += edge.length_m();
     }
 }
 
 /// Cuts an edge into facets where it passes lamps.
-fn cut_edge(
-    facets: &mut Vec<Facet>,
-    edge: &Edge,
-    (q_m, painted): (f64, bool),
-    near: &[TrackPoint],
-    key: ChunkKey,
-) {
+fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint], key: ChunkKey) {
     let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
     let at = |t: f64| OutlinePoint {
         l_m: a.l_m + t * (b.l_m - a.l_m),
@@ -343,8 +344,7 @@ fn cut_edge(
         facets.push(Facet {
             ends: [at(pair[0]), at(pair[1])],
             q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
-            albedo: surface::look(material).albedo,
-            painted,
+            albedo: surface::mean_albedo(material),
         });
     }
 }
@@ -395,7 +395,16 @@ mod tests {
     fn chunk(index: i64, detail: Detail) -> ChunkMesh {
         let scene = sample::scene();
         let lamps = LampField::new(&scene.lamps);
-        chunk_mesh(&scene.tunnel, &lamps, ChunkKey { index, detail })
+        let paintings = Paintings {
+            all: Vec::new(),
+            of_range: Vec::new(),
+        };
+        chunk_mesh(
+            &scene.tunnel,
+            &lamps,
+            &paintings,
+            ChunkKey { index, detail },
+        )
     }
 
     /// Provokes facets that face the rock: every normal of the lining points to the axis.

@@ -34,7 +34,12 @@ impl<'a> Framed<'a> {
     }
 
     /// Fills the table of poses and gives the view's constants.
-    pub fn constants(&self, job: &Job, poses: &mut Vec<Pose>) -> layout::View {
+    pub fn constants(
+        &self,
+        job: &Job,
+        (extinction_per_m, airlight_cd_m2): (f64, f64),
+        poses: &mut Vec<Pose>,
+    ) -> layout::View {
         let (camera, sensor) = (&self.view.camera, &self.view.sensor);
         let (lens, shutter) = (&camera.intrinsics, &camera.shutter);
         let span_s = shutter.frame_span_s(lens.height_px).max(1e-9);
@@ -72,6 +77,8 @@ impl<'a> Framed<'a> {
             frame: self.view.noise.frame,
             radial: [bent.k1, bent.k2, bent.k3, bent.reach().powi(2)].map(|x| x as f32),
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
+            extinction_per_m: extinction_per_m as f32,
+            airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,
             halo_px: self.view.lens.halo_px as f32,
             saturation_e: self.view.saturation_e() as f32,
             ..layout::View::default()
