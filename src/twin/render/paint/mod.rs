@@ -1,0 +1,284 @@
+//! What is painted on the walls: for each cross-section one image of its albedo, made once.
+//!
+//! A metro tunnel is anything but plain: rings of segments with gaskets and bolt pockets, leaks,
+//! cables on brackets, a handrail, plates, sleepers with fasteners, drains. To look all of that up
+//! costs a renderer nothing for each pixel but a texture fetch, so it is *painted*: onto a raster
+//! over (s, q), s being metres along the line, q metres along the outline from its first point.
+//!
+//! ```
+//! use metrotwin::track::{CrossSection, Side};
+//! use metrotwin::twin::render::paint::Painting;
+//!
+//! let painting = Painting::of(&CrossSection::circular(3.0, 2.26, Some(Side::Left)));
+//! let joint = painting.albedo(1.5, 4.0);
+//! let concrete = painting.mean_over([0.75, 4.0], [[0.5, 0.0], [0.0, 0.5]]);
+//! assert!(joint < 0.6 * concrete);
+//! ```
+//!
+//! # The raster
+//!
+//! 64 texels a metre, 8 bits: a texel holds 255 times the mean albedo over its square. Texel
+//! (i, j) is centred at s = (i + 1/2) / 64, q = (j + 1/2) / 64. Along s it repeats after
+//! [`PERIOD_M`], which rings, sleepers and brackets divide; what should not show that, dirt and
+//! chance, does repeat, but two ends 60 m apart are never seen sharply together. **Albedo is the
+//! bilinear interpolation of the texels** (wrapping in s, clamped in q): both renderers hold to
+//! that. Below the outline lie the rails' rows: [`Painting::rail_q_m`] is where
+//! [`rail_outline`] begins.
+//!
+//! The pyramid above it halves both axes, each texel the mean of its four (Williams, "Pyramidal
+//! parametrics", SIGGRAPH 1983), computed from the exact sums, so that levels keep the mean. The
+//! height is padded to a multiple of 256, so all nine levels halve without remainder.
+//!
+//! # What it shows, and after what
+//!
+//! | thing | measures | after |
+//! |---|---|---|
+//! | rings of a round lining | 1.5 m, 6 segments: key 21.5 deg, 2 x 68, 3 x 67.5, key alternating 18 deg off the crown | usual for 6 m shield-driven Chinese metros; terms of the ITA guidelines for shield tunnel lining (2000) |
+//! | bolts | ring to ring every 36 deg, 2 at each segment joint | the same linings (10 and 12 bolts) |
+//! | other linings | cast in 12 m blocks, formwork panels of 1.5 m x 1.2 m with tie holes | usual formwork |
+//! | sleepers | every 0.6 m, 0.26 m x 2.5 m | as the track everywhere here |
+//! | slab joints | every 6 m | ballastless track in tunnels, 5 to 6.5 m |
+//! | cables | on brackets every 1 m, on the wall without walkway | GB 50157: power and signal cables apart |
+//! | handrail, stripes | 1.05 m above the walkway, 45 deg stripes on its edge | safety signs, ISO 3864 |
+//! | plates, light boxes | every 30 m, every 15 m | own choice |
+//!
+//! Everything accidental is a hash of what it is about (ring, segment, ...), see
+//! [`random`](crate::twin::random).
+//!
+//! Not here: relief (joints and cables are flat paint with painted shades), gloss, numbers that
+//! could be read (the image repeats).
+
+mod brush;
+mod furniture;
+mod ground;
+mod lining;
+mod unroll;
+
+use crate::track::{CrossSection, Material, Tunnel, rail_outline};
+use brush::{Chance, Noise, Strip, chance};
+use rayon::prelude::*;
+use unroll::{Place, Unrolled};
+
+/// Along the line everything repeats after this.
+pub const PERIOD_M: f64 = 60.0;
+/// Texels a metre.
+pub const TEXELS_PER_M: u32 = 64;
+/// Images of the pyramid; a texel of the last is 4 m wide.
+pub const LEVELS: usize = 9;
+/// Rings of segments, or panels of formwork, along the line.
+const RING_M: f64 = 1.5;
+/// Rows between the outline and the rails, half of them like either.
+const GAP_ROWS: usize = 16;
+
+/// The albedo of a cross-section and of the rails in it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Painting {
+    /// Texels along the line.
+    pub width: u32,
+    /// Texels along the outline, and more for rails and padding.
+    pub height: u32,
+    /// 255 times albedo, row by row (a row runs along the line); level k has `width >> k` columns
+    /// and `height >> k` rows.
+    pub levels: Vec<Vec<u8>>,
+    rail_row: usize,
+}
+
+/// The paintings of a tunnel; equal cross-sections share one.
+#[derive(Clone, Debug)]
+pub struct Paintings {
+    /// Each once.
+    pub all: Vec<Painting>,
+    /// Of each of the tunnel's section ranges, its painting.
+    pub of_range: Vec<usize>,
+}
+
+impl Paintings {
+    /// Paints all cross-sections of a tunnel.
+    pub fn of(tunnel: &Tunnel) -> Self {
+        let mut sections: Vec<&CrossSection> = Vec::new();
+        let mut of_range = Vec::new();
+        for range in &tunnel.sections {
+            let known = sections.iter().position(|s| **s == range.section);
+            of_range.push(known.unwrap_or(sections.len()));
+            if known.is_none() {
+                sections.push(&range.section);
+            }
+        }
+        Self {
+            all: sections.into_iter().map(Painting::of).collect(),
+            of_range,
+        }
+    }
+}
+
+impl Painting {
+    /// Paints a cross-section.
+    pub fn of(section: &CrossSection) -> Self {
+        let outline = Unrolled::of(section);
+        let rail = Unrolled::of(&rail_outline(0.0));
+        let rows = |u: &Unrolled| (u.length_m * f64::from(TEXELS_PER_M)).ceil() as usize;
+        let rail_row = rows(&outline) + GAP_ROWS;
+        let height = (rail_row + rows(&rail)).next_multiple_of(1 << (LEVELS - 1));
+        let (width, strip) = (
+            (PERIOD_M * f64::from(TEXELS_PER_M)) as usize,
+            (RING_M * f64::from(TEXELS_PER_M)) as usize,
+        );
+        let places = places(&outline, &rail, rail_row, height);
+        let strips: Vec<Vec<u8>> = (0..width / strip)
+            .into_par_iter()
+            .map(|ring| {
+                let mut strip = Strip::new(ring * strip, strip, height);
+                paint(&mut strip, ring as i32, &outline, &places);
+                let to_byte = |a: &f32| (a.clamp(0.0, 1.0) * 255.0).round() as u8;
+                strip.albedo.iter().map(to_byte).collect()
+            })
+            .collect();
+        let mut sharp = Vec::with_capacity(width * height);
+        for y in 0..height {
+            for painted in &strips {
+                sharp.extend_from_slice(&painted[y * strip..][..strip]);
+            }
+        }
+        Self {
+            width: width as u32,
+            height: height as u32,
+            levels: pyramid(sharp, width),
+            rail_row,
+        }
+    }
+
+    /// Where the rails' outline begins: a rail shows what is this far along plus metres along
+    /// [`rail_outline`].
+    pub fn rail_q_m(&self) -> f64 {
+        self.rail_row as f64 / f64::from(TEXELS_PER_M)
+    }
+
+    /// Albedo at a point.
+    pub fn albedo(&self, s_m: f64, q_m: f64) -> f64 {
+        self.sample(0, [s_m, q_m])
+    }
+
+    /// Mean albedo over a parallelogram around a point (s, q), whose sides are `across`, such as
+    /// a pixel's footprint.
+    ///
+    /// It is sampled on an even grid of points no farther apart than a quarter of its width, each
+    /// from the level whose texels are that fine.
+    pub fn mean_over(&self, at: [f64; 2], across: [[f64; 2]; 2]) -> f64 {
+        let sides = across.map(|a| a[0].hypot(a[1]));
+        let area = (across[0][0] * across[1][1] - across[0][1] * across[1][0]).abs();
+        let width_m = area / sides[0].max(sides[1]).max(1e-12);
+        let texel_m = 1.0 / f64::from(TEXELS_PER_M);
+        let level = (0.25 * width_m / texel_m)
+            .log2()
+            .clamp(0.0, (LEVELS - 1) as f64) as usize;
+        let step_m = (0.25 * width_m).max(0.5 * texel_m);
+        // A needle of a pixel at the horizon is no reason to count for ever.
+        let [n, m] = sides.map(|side| (side / step_m).ceil().clamp(1.0, 256.0) as usize);
+        let mut sum = 0.0;
+        for i in 0..n * m {
+            let share = |k: usize, of: usize| (k as f64 + 0.5) / of as f64 - 0.5;
+            let (a, b) = (share(i % n, n), share(i / n, m));
+            let along = |axis: usize| at[axis] + a * across[0][axis] + b * across[1][axis];
+            sum += self.sample(level, [along(0), along(1)]);
+        }
+        sum / (n * m) as f64
+    }
+
+    fn sample(&self, level: usize, at: [f64; 2]) -> f64 {
+        let texels = &self.levels[level];
+        let (columns, rows) = (self.width as usize >> level, self.height as usize >> level);
+        let per_m = f64::from(TEXELS_PER_M) / f64::from(1u32 << level);
+        let (x, y) = (
+            (at[0] * per_m - 0.5).rem_euclid(columns as f64),
+            (at[1] * per_m - 0.5).clamp(0.0, (rows - 1) as f64),
+        );
+        let (i, j) = (x as usize % columns, y as usize);
+        let (right, above) = ((i + 1) % columns, (j + 1).min(rows - 1));
+        let (a, b) = (x - x.floor(), y - y.floor());
+        let texel = |i: usize, j: usize| f64::from(texels[j * columns + i]);
+        let near = texel(i, j) * (1.0 - a) + texel(right, j) * a;
+        let far = texel(i, above) * (1.0 - a) + texel(right, above) * a;
+        (near * (1.0 - b) + far * b) / 255.0
+    }
+}
+
+/// What each row of the image shows: the outline, the rails, and the nearer of both between and
+/// beyond them.
+fn places(
+    outline: &Unrolled,
+    rail: &Unrolled,
+    rail_row: usize,
+    height: usize,
+) -> Vec<Option<Place>> {
+    let q_of = |rows: f64| (rows + 0.5) / f64::from(TEXELS_PER_M);
+    (0..height)
+        .map(|row| {
+            if row < rail_row - GAP_ROWS / 2 {
+                outline.at(q_of(row as f64))
+            } else {
+                rail.at(q_of(row as f64 - rail_row as f64).max(0.0))
+            }
+        })
+        .collect()
+}
+
+/// Paints a strip of one ring.
+fn paint(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Place>]) {
+    prime(strip, ring, outline, places);
+    lining::paint(strip, outline);
+    ground::paint(strip, outline);
+    furniture::paint(strip, outline);
+}
+
+/// Bare surfaces: the tone of each segment, dust, streaks and grain.
+fn prime(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Place>]) {
+    let patches = Noise::under(strip, [48, 48], 0);
+    let streaks = Noise::under(strip, [12, 96], 1);
+    let specks = Noise::under(strip, [8, 8], 2);
+    for (y, place) in places.iter().enumerate() {
+        let Some(place) = place else { continue };
+        let tone = match place.material {
+            Material::Lining => lining::tone(ring, outline, place),
+            Material::Bed => ground::BED_ALBEDO,
+            Material::Walkway => ground::walkway_tone(place),
+            Material::Platform => ground::platform_tone(place),
+            Material::Rail => ground::rail_tone(place),
+        };
+        let (streaky, first) = (0.30 * place.upright as f32, strip.first_column);
+        let mut grain = [0.0; 4];
+        for (x, albedo) in strip.row(y).iter_mut().enumerate() {
+            if x % 4 == 0 {
+                grain = chance(Chance::Grain, (first + x) as i32, y as i32);
+            }
+            let dirt = 0.22 * patches.at(x, y)
+                + streaky * streaks.at(x, y)
+                + 0.12 * specks.at(x, y)
+                + 0.08 * grain[x % 4] as f32;
+            let mean = 0.5 * (0.42 + streaky);
+            *albedo = tone as f32 * (1.0 + mean - dirt);
+        }
+    }
+}
+
+/// All levels above an image, from the exact sums of its texels.
+fn pyramid(sharp: Vec<u8>, width: usize) -> Vec<Vec<u8>> {
+    let mut sums: Vec<u32> = sharp.iter().map(|a| u32::from(*a)).collect();
+    let mut columns = width;
+    let mut levels = vec![sharp];
+    for level in 1..LEVELS {
+        let pairs = sums.par_chunks(2 * columns).flat_map_iter(|rows| {
+            let (above, below) = rows.split_at(columns);
+            let pairs = above.chunks(2).zip(below.chunks(2));
+            pairs.map(|(a, b)| a.iter().sum::<u32>() + b.iter().sum::<u32>())
+        });
+        sums = pairs.collect();
+        columns /= 2;
+        let half = 1u32 << (2 * level - 1);
+        let mean = |sum: &u32| ((sum + half) >> (2 * level)) as u8;
+        levels.push(sums.iter().map(mean).collect());
+    }
+    levels
+}
+
+#[cfg(test)]
+mod tests;
