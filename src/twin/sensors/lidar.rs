@@ -11,6 +11,7 @@ use crate::track::{Checker, Problem, Tunnel};
 use crate::twin::random::Stream;
 use crate::twin::render::Body;
 use crate::twin::render::cpu::{Solid, TunnelCaster};
+use crate::twin::render::surface;
 use nalgebra::{Isometry3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -159,7 +160,7 @@ impl Lidar {
                     let at = caster.surface_at(&origin, &direction, &strike);
                     Echo {
                         range_m: strike.t,
-                        brightness: at.albedo(0.0) * -at.normal.dot(&direction),
+                        brightness: surface::look(at.material).albedo * -at.normal.dot(&direction),
                     }
                 });
                 beams.push(Beam {

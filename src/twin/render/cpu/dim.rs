@@ -34,7 +34,8 @@ impl DimView {
             .enumerate()
             .for_each(|(i, corners)| {
                 let row = RowExposure::new(view, i * CELL_PX);
-                let rays = RowRays::new(world, view, &row, slab, Behind::Unknown);
+                let mut rays = RowRays::new(world, view, &row, slab, Behind::Unknown);
+                rays.side_px = CELL_PX as f64;
                 for (j, corner) in corners.iter_mut().enumerate() {
                     *corner = rays.tunnel(j * CELL_PX, &job.headlights).0;
                 }

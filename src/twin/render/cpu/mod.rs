@@ -43,6 +43,7 @@ pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
 use super::light::{LampField, headlights_lx};
+use super::paint::Paintings;
 use super::{Backend, Headlight, Job, LampLight, RenderError, Renderer, Scene, View};
 use crate::bus::{CameraModel, Intrinsics};
 use dim::{CELL_PX, DimView};
@@ -70,6 +71,7 @@ pub struct CpuRenderer {
 /// What stands still.
 struct World {
     tunnel: TunnelCaster,
+    paintings: Paintings,
     lamps: LampField,
     ambient_lx: f64,
 }
@@ -118,6 +120,8 @@ struct RowRays<'a> {
     behind: Behind<'a>,
     eye: Point3<f64>,
     slab: usize,
+    /// Patterns are averaged over squares of so many pixels.
+    side_px: f64,
 }
 
 impl CpuRenderer {
@@ -135,6 +139,7 @@ impl CpuRenderer {
         Self {
             world: World {
                 tunnel: TunnelCaster::new(&scene.tunnel),
+                paintings: Paintings::of(&scene.tunnel),
                 lamps: LampField::new(&scene.lamps),
                 ambient_lx: scene.tunnel.ambient_lx,
             },
@@ -236,16 +241,16 @@ impl World {
             .into_par_iter()
             .with_min_len(width.max(1))
             .map(|k| {
-                let ray = pose * camera.ray((k % width) as f64, (k / width) as f64);
-                self.ground(slab, &eye, &ray, camera.fx_px)
+                let pencil = Pencil::through(camera, pose, (k % width, k / width), 1.0);
+                self.ground(slab, &eye, &pencil)
             })
             .collect()
     }
 
-    /// The tunnel along one ray (scaled to z = 1 in the camera's frame).
-    fn ground(&self, slab: usize, eye: &Point3<f64>, ray: &Vector3<f64>, f_px: f64) -> Ground {
-        let stretch = ray.norm();
-        let Some(strike) = self.tunnel.cast(slab, eye, ray, SIGHT_M / stretch) else {
+    /// The tunnel along one ray.
+    fn ground(&self, slab: usize, eye: &Point3<f64>, pencil: &Pencil) -> Ground {
+        let ray = &pencil.ray;
+        let Some(strike) = self.tunnel.cast(slab, eye, ray, SIGHT_M / ray.norm()) else {
             return Ground {
                 strike: None,
                 albedo: 0.0,
@@ -253,15 +258,39 @@ impl World {
             };
         };
         let at = self.tunnel.surface_at(eye, ray, &strike);
-        let sine = (at.normal.dot(ray) / stretch)
-            .abs()
-            .max(super::surface::MIN_SINE);
-        let albedo = at.albedo(strike.t * stretch / f_px / sine);
+        let albedo = look::albedo(&self.paintings, &at, ray, strike.t, pencil.aside);
         let lux = self.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
             strike: Some(strike),
             albedo,
             luminance: albedo * lux / PI,
+        }
+    }
+}
+
+/// What a pixel sees: the ray through its centre, scaled to z = 1 in the camera's frame, and by
+/// how much it changes over the pixel's width and height.
+struct Pencil {
+    ray: Vector3<f64>,
+    aside: [Vector3<f64>; 2],
+}
+
+impl Pencil {
+    /// Of a square of `side_px` pixels around a pixel.
+    fn through(
+        camera: &Intrinsics,
+        pose: &Isometry3<f64>,
+        (u, v): (usize, usize),
+        side_px: f64,
+    ) -> Self {
+        let (u, v, half) = (u as f64, v as f64, 0.5 * side_px);
+        let ray = |du: f64, dv: f64| pose * camera.ray(u + du, v + dv);
+        Self {
+            ray: ray(0.0, 0.0),
+            aside: [
+                ray(half, 0.0) - ray(-half, 0.0),
+                ray(0.0, half) - ray(0.0, -half),
+            ],
         }
     }
 }
@@ -282,6 +311,7 @@ impl<'a> RowRays<'a> {
             slab: world.tunnel.slab_of(&eye, Some(near)),
             eye,
             behind,
+            side_px: 1.0,
         }
     }
 
@@ -293,17 +323,21 @@ impl<'a> RowRays<'a> {
 
     /// Luminance and depth of the tunnel in pixel `u`.
     fn tunnel(&self, u: usize, headlights: &[Headlight]) -> (f64, f64) {
-        let ray = self.ray(u);
         let camera = &self.view.camera.intrinsics;
         let ground = match self.behind {
             Behind::Kept(ground) => ground[self.row.v * camera.width_px as usize + u],
-            _ => (self.world).ground(self.slab, &self.eye, &ray, camera.fx_px),
+            _ => {
+                let pixel = (u, self.row.v);
+                let pencil = Pencil::through(camera, &self.row.mid, pixel, self.side_px);
+                (self.world).ground(self.slab, &self.eye, &pencil)
+            }
         };
         let Some(strike) = &ground.strike else {
             return (ground.luminance, f64::INFINITY);
         };
         let mut luminance = ground.luminance;
         if !headlights.is_empty() {
+            let ray = self.ray(u);
             let at = self.world.tunnel.surface_at(&self.eye, &ray, strike);
             let lux = headlights_lx(headlights, &at.position, &at.normal);
             luminance += ground.albedo * lux / PI;

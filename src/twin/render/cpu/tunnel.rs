@@ -64,6 +64,10 @@ pub struct SurfacePoint {
     pub q_m: f64,
     /// What it is made of.
     pub material: Material,
+    /// Which of the tunnel's section ranges it belongs to.
+    pub range: usize,
+    /// How s and q grow with the position, per metre.
+    pub(super) gradients: [Vector3<f64>; 2],
 }
 
 /// A slab begins this much early, so that rounding opens no crack between two of them.
@@ -227,7 +231,8 @@ impl TunnelCaster {
             self.ahead_of(k, &position),
             -self.ahead_of(k + 1, &position),
         );
-        let edge = &self.outlines[slab.outline.unwrap_or(0)].edges[strike.edge as usize];
+        let range = slab.outline.unwrap_or(0);
+        let edge = &self.outlines[range].edges[strike.edge as usize];
         // Across the edge and across the ruling, which climbs with the slope.
         let (n, along) = (edge.normal, -edge.normal.y * slab.slope);
         let level = slab.left * n.x + slab.chord * along;
@@ -238,7 +243,19 @@ impl TunnelCaster {
             l_m: lh.x,
             q_m: edge.q_m + edge.along.dot(&(lh - edge.start)),
             material: edge.material,
+            range,
+            gradients: [
+                Vector3::new(slab.chord.x, slab.chord.y, 0.0) * ((far_m - near_m) / (past + before)),
+                Self::up_edge(slab, &edge.along),
+            ],
         }
+    }
+
+    /// How metres along an edge grow with the position: the transpose of what
+    /// [`Self::across`] does to directions.
+    fn up_edge(slab: &Slab, along: &Vector2<f64>) -> Vector3<f64> {
+        let level = slab.left * along.x - slab.chord * (slab.slope * along.y);
+        Vector3::new(level.x, level.y, along.y)
     }
 }
 

@@ -156,7 +156,7 @@ fn drain(strip: &mut Strip, foot: f64, inwards: f64) {
 /// Yellow and black at 45 degrees on both faces of an edge.
 fn stripes(strip: &mut Strip, edge: f64) {
     let yellow = |s: f64, q: f64| {
-        let phase = ((s + (q - edge).abs()) / STRIPE_M).rem_euclid(1.0);
+        let phase = ((s + q - edge) / STRIPE_M).rem_euclid(1.0);
         // Distance into the stripe, in texels across the edge.
         let inside = (0.25 - (phase - 0.5).abs()) * STRIPE_M * f64::from(TEXELS_PER_M);
         (inside + 0.5).clamp(0.0, 1.0)
