@@ -12,7 +12,7 @@ use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Body, Job, LampLight, Renderer, Scene, Shape, View, sample};
+use metrotwin::twin::render::{Air, Body, Job, LampLight, Renderer, Scene, Shape, View, sample};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
@@ -43,6 +43,7 @@ fn dark_scene(lamps: Vec<LampLight>) -> Scene {
     Scene {
         tunnel: tunnel.into(),
         lamps,
+        air: Air::default(),
     }
 }
 

@@ -7,15 +7,68 @@
 //!
 //! A surface far from the disc compared with its radius gets E = I cos(a_in) / d^2. A lamp is off
 //! half of the time (Manchester code), far too fast for surfaces to show it; they get the mean.
-//! No shadows.
+//!
+//! # Shadows
+//!
+//! A body between a light and a surface hides part of the light's disc. The surface loses the same
+//! share of its illuminance:
+//!
+//! ```text
+//! E = E0 (1 - hidden / 16)
+//! ```
+//!
+//! where E0 is the illuminance without bodies and `hidden` counts those of 16 places on the disc,
+//! spread evenly over its area ([`disc_places`]), to which a straight line from the surface is cut
+//! by a body. So an edge throws a penumbra as wide as the disc seen through it, in 16 steps. Lines
+//! start [`OFFSET_M`] off the surface; within [`MOUNT_M`] of a headlight nothing cuts them: what
+//! is there carries it. Only bodies hide light, the tunnel and the rails do not.
+//!
+//! # Air
+//!
+//! Mist and dust ([`Air`]) take light away over a distance d as e^(-k d), on its way to a surface
+//! and from there to the eye, and add what they scatter towards it (Koschmieder, "Theorie der
+//! horizontalen Sichtweite", Beitraege zur Physik der freien Atmosphaere 12, 1924):
+//!
+//! ```text
+//! L = L0 e^(-k d) + A (1 - e^(-k d))
+//! ```
+//!
+//! The airlight A is that of air evenly lit by what reaches a point about the camera, scattered
+//! alike in all directions: A = w E_s / (4 pi), w the share scattered, E_s the light that passes a
+//! point from all sides, see [`LampField::airlight_cd_m2`]. Headlights' own beams in the mist, and
+//! the halo of lamps through it, are left out.
 
-use super::scene::{Headlight, LampLight};
-use crate::track::{LampSite, uid::Waveform};
+use super::scene::{Air, Headlight, LampLight};
+use crate::track::{LampSite, TrackPoint, Tunnel, uid::Waveform};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// Lamps farther than this from a surface do not light it.
 pub const LAMP_REACH_M: f64 = 30.0;
+
+/// Radius of a headlight's luminous disc.
+pub const HEADLIGHT_RADIUS_M: f64 = 0.09;
+/// What is nearer to a headlight than this carries it and does not shade it.
+pub const MOUNT_M: f64 = 0.3;
+/// Lines to lights start this far off their surface, along its normal.
+pub const OFFSET_M: f64 = 1e-3;
+/// Airlight is the mean along the line to this distance before and behind the camera, a few
+/// lamps.
+pub const AIRLIGHT_REACH_M: f64 = 20.0;
+
+/// 16 places on a disc, each for a sixteenth of its area: on a spiral of the golden angle (Vogel,
+/// "A better way to construct the sunflower head", Mathematical Biosciences 44, 1979).
+pub fn disc_places(centre: &Point3<f64>, axis: &Vector3<f64>, radius_m: f64) -> [Point3<f64>; 16] {
+    let golden_rad = PI * (3.0 - 5f64.sqrt());
+    let aside = axis.cross(&Vector3::z());
+    let aside = aside.try_normalize(1e-6).unwrap_or_else(Vector3::x);
+    let up = aside.cross(axis);
+    std::array::from_fn(|k| {
+        let (sin, cos) = (k as f64 * golden_rad).sin_cos();
+        let r = radius_m * ((k as f64 + 0.5) / 16.0).sqrt();
+        centre + (aside * cos + up * sin) * r
+    })
+}
 
 /// Exponent m for which the intensity has fallen to half at half the full beam angle.
 pub fn exponent_of_beam(full_beam_rad: f64) -> f64 {
@@ -103,6 +156,7 @@ fn point_source_lx(
 #[derive(Clone, Debug)]
 pub struct LampField {
     lamps: Vec<LampLight>,
+    air: Air,
     /// Cell and lamp, sorted, so that the lamps of a cell are one run.
     reach: Vec<((i32, i32), u32)>,
 }
@@ -128,8 +182,16 @@ impl LampField {
         reach.sort_unstable();
         Self {
             lamps: lamps.to_vec(),
+            air: Air::default(),
             reach,
         }
+    }
+
+    /// The same lamps in air that is not clear.
+    #[must_use]
+    pub fn in_air(mut self, air: Air) -> Self {
+        self.air = air;
+        self
     }
 
     /// All lamps, in the order given.
@@ -149,13 +211,70 @@ impl LampField {
 
     /// Mean illuminance by all lamps of a surface at `p` with unit normal `n`, lux.
     pub fn irradiance_lx(&self, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-        self.near(p).map(|lamp| lamp.irradiance_lx(p, n)).sum()
+        self.near(p)
+            .map(|lamp| {
+                let lux = lamp.irradiance_lx(p, n);
+                // Most lamps about a place turn their back on it.
+                if lux > 0.0 {
+                    lux * self.air.transmission((p - lamp.centre).norm())
+                } else {
+                    0.0
+                }
+            })
+            .sum()
+    }
+
+    /// Mean light of all lamps that passes a place from any side, lux: the sum of I / d^2.
+    fn scalar_lx(&self, p: &Point3<f64>) -> f64 {
+        self.near(p)
+            .map(|lamp| {
+                let d = p - lamp.centre;
+                // A surface that faces the lamp gets all of it.
+                d.try_normalize(1e-3).map_or(0.0, |to| {
+                    lamp.irradiance_lx(p, &-to) * self.air.transmission(d.norm())
+                })
+            })
+            .sum()
+    }
+
+    /// Luminance of endless lit air about a chainage: the mean, over places a metre apart along
+    /// the line to [`AIRLIGHT_REACH_M`] on both sides and 2 m above top of rail, of what it
+    /// scatters. Ambient light of E lux on every surface is a luminance of E / pi from all sides,
+    /// so 4 E pass any place.
+    pub fn airlight_cd_m2(&self, tunnel: &Tunnel, s_m: f64) -> f64 {
+        if self.air.is_clear() {
+            return 0.0;
+        }
+        let places = AIRLIGHT_REACH_M as i32;
+        let lamps_lx: f64 = (-places..=places)
+            .map(|k| {
+                let place = TrackPoint {
+                    s_m: s_m + f64::from(k),
+                    l_m: 0.0,
+                    h_m: 2.0,
+                };
+                self.scalar_lx(&tunnel.alignment.world_from_track(place))
+            })
+            .sum();
+        let mean_lx = lamps_lx / f64::from(2 * places + 1) + 4.0 * tunnel.ambient_lx;
+        self.air.scattered_share * mean_lx / (4.0 * PI)
     }
 }
 
-/// Illuminance by all headlights of a surface at `p` with unit normal `n`, lux.
-pub fn headlights_lx(headlights: &[Headlight], p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-    headlights.iter().map(|h| h.irradiance_lx(p, n)).sum()
+/// Illuminance by all headlights of a surface at `p` with unit normal `n` through air, lux.
+pub fn headlights_lx(
+    headlights: &[Headlight],
+    air: &Air,
+    p: &Point3<f64>,
+    n: &Vector3<f64>,
+) -> f64 {
+    headlights
+        .iter()
+        .map(|light| {
+            let away = p.coords - light.world_from_light.translation.vector;
+            light.irradiance_lx(p, n) * air.transmission(away.norm())
+        })
+        .sum()
 }
 
 #[cfg(test)]
@@ -266,6 +385,7 @@ mod tests {
         };
         let e = headlights_lx(
             &[light.clone(), light],
+            &Air::default(),
             &Point3::new(1.0, 3.0, 0.0),
             &-Vector3::y(),
         );

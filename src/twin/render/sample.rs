@@ -9,7 +9,8 @@
 //! ```
 
 use super::{
-    Body, CameraMotion, Job, LampLight, LensSettings, NoiseKey, Scene, SensorSettings, Shape, View,
+    Air, Body, CameraMotion, Job, LampLight, LensSettings, NoiseKey, Scene, SensorSettings, Shape,
+    View,
 };
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use crate::track::uid::{LineCode, Uid};
@@ -84,6 +85,7 @@ pub fn scene() -> Scene {
     Scene {
         tunnel: Arc::new(tunnel),
         lamps,
+        air: Air::default(),
     }
 }
 

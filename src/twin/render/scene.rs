@@ -17,6 +17,62 @@ pub struct Scene {
     pub tunnel: Arc<Tunnel>,
     /// The lamps as they really are (the survey may be wrong about them).
     pub lamps: Vec<LampLight>,
+    /// What there is to see through.
+    pub air: Air,
+}
+
+/// The tunnel's air: clear, or full of mist or dust. What it does to light is told in
+/// [`light`](super::light).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Air {
+    /// Share of light that is lost on a metre (k in e^(-k d)); 0 is clear.
+    pub extinction_per_m: f64,
+    /// Share of the lost light that goes on in another direction: near 1 for the drops of mist,
+    /// 0.6 to 0.9 for mineral dust; the rest is absorbed.
+    pub scattered_share: f64,
+}
+
+/// Contrast that an eye just sees: what meteorological visibility is defined by (WMO-No. 8,
+/// after Koschmieder).
+const JUST_SEEN: f64 = 0.02;
+
+impl Default for Air {
+    fn default() -> Self {
+        Self {
+            extinction_per_m: 0.0,
+            scattered_share: 1.0,
+        }
+    }
+}
+
+impl Air {
+    /// Mist in which a black body before lit air is just seen at a distance: k = 3.912 / V.
+    ///
+    /// ```
+    /// use metrotwin::twin::render::Air;
+    /// let air = Air::of_visibility(100.0);
+    /// assert!((air.extinction_per_m - 0.039_12).abs() < 1e-5);
+    /// ```
+    pub fn of_visibility(visibility_m: f64) -> Self {
+        Self {
+            extinction_per_m: -JUST_SEEN.ln() / visibility_m,
+            ..Self::default()
+        }
+    }
+
+    /// Whether nothing is lost.
+    pub fn is_clear(&self) -> bool {
+        self.extinction_per_m <= 0.0
+    }
+
+    /// Share of light that is left after a distance.
+    pub fn transmission(&self, distance_m: f64) -> f64 {
+        if self.is_clear() {
+            1.0
+        } else {
+            (-self.extinction_per_m * distance_m).exp()
+        }
+    }
 }
 
 /// A lamp: a luminous disc that blinks.

@@ -6,9 +6,9 @@
 //! at most ([`surface::PULSES`](crate::twin::render::surface::PULSES)), and light itself changes
 //! little over 8 pixels but close to a lamp, where it is bright. Such cells are filled linearly.
 
-use super::{Behind, RowRays, World};
+use super::{Behind, RowRays, Scenery, World};
+use crate::twin::render::View;
 use crate::twin::render::cpu::lamps::RowExposure;
-use crate::twin::render::{Job, View};
 use rayon::prelude::*;
 
 /// Side of a cell, pixels.
@@ -24,7 +24,7 @@ pub(super) struct DimView {
 }
 
 impl DimView {
-    pub fn new(world: &World, job: &Job, view: &View, slab: usize) -> Self {
+    pub fn new(world: &World, scenery: &Scenery<'_>, view: &View) -> Self {
         let camera = &view.camera.intrinsics;
         let columns = camera.width_px as usize / CELL_PX + 2;
         let rows = camera.height_px as usize / CELL_PX + 2;
@@ -34,10 +34,10 @@ impl DimView {
             .enumerate()
             .for_each(|(i, corners)| {
                 let row = RowExposure::new(view, i * CELL_PX);
-                let mut rays = RowRays::new(world, view, &row, slab, Behind::Unknown);
+                let mut rays = RowRays::new(world, scenery, view, &row, Behind::Unknown);
                 rays.side_px = CELL_PX as f64;
                 for (j, corner) in corners.iter_mut().enumerate() {
-                    *corner = rays.tunnel(j * CELL_PX, &job.headlights).0;
+                    *corner = rays.tunnel(j * CELL_PX).0;
                 }
             });
         let grey_per_luminance = view.grey_per_cd_m2();

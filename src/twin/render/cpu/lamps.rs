@@ -17,6 +17,13 @@ const FLUSH_M: f64 = 0.01;
 /// Lamps nearer to the camera's plane than this are not drawn.
 const NEAREST_M: f64 = 0.1;
 
+/// The air between the camera and a lamp: the share of light that comes through, and its own.
+#[derive(Clone, Copy)]
+pub(super) struct Haze {
+    pub clear: f64,
+    pub light_cd_m2: f64,
+}
+
 /// When a row of a view is exposed, and from where.
 pub(super) struct RowExposure {
     pub v: usize,
@@ -67,7 +74,7 @@ pub(super) fn draw_disc(
     lamp: &LampLight,
     view: &View,
     row: &RowExposure,
-    ambient_lx: f64,
+    (ambient_lx, haze): (f64, Haze),
     mut depth_of: impl FnMut(usize) -> f64,
     luminances: &mut [f64],
 ) {
@@ -94,7 +101,8 @@ pub(super) fn draw_disc(
     if y < rows.0 - margin || y > rows.1 + margin {
         return;
     }
-    let dark = DARK_DISC_ALBEDO * ambient_lx / PI;
+    let dark = haze.clear * DARK_DISC_ALBEDO * ambient_lx / PI + haze.light_cd_m2;
+    let luminance = haze.clear * lamp.luminance_cd_m2;
     let begin = (columns.0 * camera.fx_px + camera.cx_px - 1.0).max(0.0) as usize;
     let end = (columns.1 * camera.fx_px + camera.cx_px + 2.0).max(0.0) as usize;
     let samples = (SLOTS * SUB_PIXELS * SUB_PIXELS) as f64;
@@ -116,7 +124,7 @@ pub(super) fn draw_disc(
                 covered += 1;
                 if disc.on_share > 0.0 {
                     let cos = -disc.normal.dot(&ray) / ray.norm();
-                    light += disc.on_share * lamp.luminance_cd_m2 * cos.powf(lamp.exponent - 1.0);
+                    light += disc.on_share * luminance * cos.powf(lamp.exponent - 1.0);
                 }
             }
         }
@@ -126,7 +134,13 @@ pub(super) fn draw_disc(
 }
 
 /// Adds the glare of a lamp to the row's luminances.
-pub(super) fn add_halo(lamp: &LampLight, view: &View, row: &RowExposure, luminances: &mut [f64]) {
+pub(super) fn add_halo(
+    lamp: &LampLight,
+    view: &View,
+    row: &RowExposure,
+    haze: Haze,
+    luminances: &mut [f64],
+) {
     let Some((centre, cos)) = seen_from(lamp, &row.mid) else {
         return;
     };
@@ -136,7 +150,8 @@ pub(super) fn add_halo(lamp: &LampLight, view: &View, row: &RowExposure, luminan
     };
     let fall = view.lens.halo_px;
     let apparent = camera.fx_px * lamp.radius_m * cos.sqrt() / centre.z;
-    let strength = view.lens.halo_share
+    let strength = haze.clear
+        * view.lens.halo_share
         * lamp.luminance_cd_m2
         * cos.powf(lamp.exponent - 1.0)
         * row.on_share(lamp, 0, SLOTS)

@@ -20,7 +20,9 @@
 //! What it computes for a pixel:
 //! 1. the surface that the pixel's centre ray meets first: tunnel ([`TunnelCaster`]) or body
 //!    ([`Solid`]);
-//! 2. its reflected luminance, albedo * E / pi ([`light`](super::light));
+//! 2. its reflected luminance, albedo * E / pi, the albedo from its [painting](super::paint) over
+//!    the pixel's footprint, E less what bodies shade ([`light`](super::light)), seen through the
+//!    air;
 //! 3. lamp discs, from 4 x 4 sub-pixels at 4 instants of the row's exposure;
 //! 4. the glare of each lamp;
 //! 5. grey level, noise, rounding.
@@ -28,14 +30,15 @@
 //! Rows are independent of each other, so any number of threads gives the same bytes. What a
 //! camera that stands still sees of the tunnel is kept from frame to frame.
 //!
-//! Not here: shadows, reflections, motion blur of anything but lamps, lens distortion. Beyond
-//! [`SIGHT_M`] the tunnel is dark.
+//! Not here: reflections, motion blur of anything but lamps, lens distortion. Beyond [`SIGHT_M`]
+//! the tunnel is dark.
 
 mod dim;
 mod lamps;
 mod look;
 mod outline;
 mod sensor;
+mod shadow;
 mod solid;
 mod tunnel;
 
@@ -44,15 +47,18 @@ pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
 use super::light::{LampField, headlights_lx};
 use super::paint::Paintings;
-use super::{Backend, Headlight, Job, LampLight, RenderError, Renderer, Scene, View};
+use super::{Air, Backend, Job, LampLight, RenderError, Renderer, Scene, View};
 use crate::bus::{CameraModel, Intrinsics};
+use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
 use image::GrayImage;
-use lamps::RowExposure;
+use lamps::{Haze, RowExposure};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use shadow::{Blocker, Shades};
 use std::collections::VecDeque;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Surfaces farther away than this are not seen.
 pub const SIGHT_M: f64 = 160.0;
@@ -72,8 +78,9 @@ pub struct CpuRenderer {
 struct World {
     tunnel: TunnelCaster,
     paintings: Paintings,
+    line: Arc<Tunnel>,
     lamps: LampField,
-    ambient_lx: f64,
+    air: Air,
 }
 
 /// The tunnel through one pixel.
@@ -91,6 +98,15 @@ struct KeptView {
     camera: CameraModel,
     pose: Isometry3<f64>,
     ground: Vec<Ground>,
+}
+
+/// What a view adds to the tunnel.
+struct Scenery<'a> {
+    job: &'a Job,
+    shades: Shades<'a>,
+    airlight_cd_m2: f64,
+    /// Slab of the first pose.
+    slab: usize,
 }
 
 /// What is known about the tunnel behind a view before its rows are drawn.
@@ -115,11 +131,14 @@ struct RowBuffers {
 /// The rays of a row through the tunnel.
 struct RowRays<'a> {
     world: &'a World,
+    scenery: &'a Scenery<'a>,
     view: &'a View,
     row: &'a RowExposure,
     behind: Behind<'a>,
     eye: Point3<f64>,
     slab: usize,
+    /// The job's bodies as they are by now.
+    blockers: Vec<Blocker<'a>>,
     /// Patterns are averaged over squares of so many pixels.
     side_px: f64,
 }
@@ -140,8 +159,9 @@ impl CpuRenderer {
             world: World {
                 tunnel: TunnelCaster::new(&scene.tunnel),
                 paintings: Paintings::of(&scene.tunnel),
-                lamps: LampField::new(&scene.lamps),
-                ambient_lx: scene.tunnel.ambient_lx,
+                lamps: LampField::new(&scene.lamps).in_air(scene.air),
+                line: scene.tunnel,
+                air: scene.air,
             },
             every_ray,
             kept: VecDeque::new(),
@@ -160,7 +180,8 @@ impl CpuRenderer {
         let kept = still.then(|| self.keep(&view.camera, pose));
         let lamps = self.world.lamps_by_distance(&pose);
         let slab = (self.world.tunnel).slab_of(&Point3::from(pose.translation.vector), None);
-        let dim = (!still && !self.every_ray).then(|| DimView::new(&self.world, job, view, slab));
+        let scenery = Scenery::new(&self.world, job, view, slab);
+        let dim = (!still && !self.every_ray).then(|| DimView::new(&self.world, &scenery, view));
         let behind = match (kept.and_then(|k| self.kept.get(k)), &dim) {
             (Some(kept), _) => Behind::Kept(&kept.ground),
             (None, Some(dim)) => Behind::Dim(dim),
@@ -172,8 +193,8 @@ impl CpuRenderer {
             .enumerate()
             .for_each_init(RowBuffers::default, |buffers, (v, pixels)| {
                 let row = RowExposure::new(view, v);
-                let rays = RowRays::new(&self.world, view, &row, slab, behind);
-                rays.draw(job, &lamps, buffers);
+                let rays = RowRays::new(&self.world, &scenery, view, &row, behind);
+                rays.draw(&lamps, buffers);
                 sensor::expose(view, v, &buffers.luminances, pixels);
             });
         image
@@ -259,7 +280,7 @@ impl World {
         };
         let at = self.tunnel.surface_at(eye, ray, &strike);
         let albedo = look::albedo(&self.paintings, &at, ray, strike.t, pencil.aside);
-        let lux = self.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
+        let lux = self.line.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
             strike: Some(strike),
             albedo,
@@ -295,20 +316,35 @@ impl Pencil {
     }
 }
 
+impl<'a> Scenery<'a> {
+    fn new(world: &'a World, job: &'a Job, view: &View, slab: usize) -> Self {
+        let s_m = world.tunnel.chainage_m(slab);
+        Self {
+            job,
+            shades: Shades::new(world, job, view, slab),
+            airlight_cd_m2: world.lamps.airlight_cd_m2(&world.line, s_m),
+            slab,
+        }
+    }
+}
+
 impl<'a> RowRays<'a> {
     fn new(
         world: &'a World,
+        scenery: &'a Scenery<'a>,
         view: &'a View,
         row: &'a RowExposure,
-        near: usize,
         behind: Behind<'a>,
     ) -> Self {
         let eye = Point3::from(row.mid.translation.vector);
+        let mid = (view.camera.shutter).row_mid(view.start, row.v as f64);
         Self {
             world,
+            scenery,
             view,
             row,
-            slab: world.tunnel.slab_of(&eye, Some(near)),
+            slab: world.tunnel.slab_of(&eye, Some(scenery.slab)),
+            blockers: scenery.shades.blockers(mid.since(scenery.job.time)),
             eye,
             behind,
             side_px: 1.0,
@@ -322,7 +358,7 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance and depth of the tunnel in pixel `u`.
-    fn tunnel(&self, u: usize, headlights: &[Headlight]) -> (f64, f64) {
+    fn tunnel(&self, u: usize) -> (f64, f64) {
         let camera = &self.view.camera.intrinsics;
         let ground = match self.behind {
             Behind::Kept(ground) => ground[self.row.v * camera.width_px as usize + u],
@@ -335,14 +371,22 @@ impl<'a> RowRays<'a> {
         let Some(strike) = &ground.strike else {
             return (ground.luminance, f64::INFINITY);
         };
+        let job = self.scenery.job;
         let mut luminance = ground.luminance;
-        if !headlights.is_empty() {
+        if !job.headlights.is_empty() || !job.bodies.is_empty() {
             let ray = self.ray(u);
             let at = self.world.tunnel.surface_at(&self.eye, &ray, strike);
-            let lux = headlights_lx(headlights, &at.position, &at.normal);
+            let lux = self.by_job_lx(strike.slab as usize, &at.position, &at.normal);
             luminance += ground.albedo * lux / PI;
         }
         (luminance, strike.t)
+    }
+
+    /// What a job's headlights and bodies change in the illuminance of a surface.
+    fn by_job_lx(&self, slab: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
+        let Scenery { job, shades, .. } = self.scenery;
+        headlights_lx(&job.headlights, &self.world.air, p, n)
+            - shades.hidden_lx(slab, p, n, &self.blockers, self.world)
     }
 
     /// Depth of what is seen in pixel `u` so far; followed up now where the tunnel was too dark
@@ -357,14 +401,13 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    fn draw(&self, job: &Job, lamps: &[&LampLight], buffers: &mut RowBuffers) {
-        self.draw_tunnel(&job.headlights, buffers);
+    fn draw(&self, lamps: &[&LampLight], buffers: &mut RowBuffers) {
+        self.draw_tunnel(buffers);
         let view = self.view;
-        let mid = (view.camera.shutter).row_mid(view.start, self.row.v as f64);
-        for body in &job.bodies {
-            let solid = Solid::at(body, mid.since(job.time));
-            self.draw_solid(&solid, &job.headlights, buffers);
+        for blocker in &self.blockers {
+            self.draw_solid(&blocker.solid, buffers);
         }
+        self.veil(buffers);
         let RowBuffers { depths, luminances } = buffers;
         for lamp in lamps {
             let depth = |u| self.depth(u, depths);
@@ -372,17 +415,17 @@ impl<'a> RowRays<'a> {
                 lamp,
                 view,
                 self.row,
-                self.world.ambient_lx,
+                (self.world.line.ambient_lx, self.haze(lamp)),
                 depth,
                 luminances,
             );
         }
         for lamp in lamps {
-            lamps::add_halo(lamp, view, self.row, luminances);
+            lamps::add_halo(lamp, view, self.row, self.haze(lamp), luminances);
         }
     }
 
-    fn draw_tunnel(&self, headlights: &[Headlight], buffers: &mut RowBuffers) {
+    fn draw_tunnel(&self, buffers: &mut RowBuffers) {
         let RowBuffers { depths, luminances } = buffers;
         depths.clear();
         luminances.clear();
@@ -398,7 +441,7 @@ impl<'a> RowRays<'a> {
                         let share = (u - begin) as f64 / CELL_PX as f64;
                         (left + (right - left) * share, f64::NAN)
                     }
-                    None => self.tunnel(u, headlights),
+                    None => self.tunnel(u),
                 };
                 luminances.push(luminance);
                 depths.push(depth);
@@ -406,10 +449,8 @@ impl<'a> RowRays<'a> {
         }
     }
 
-    fn draw_solid(&self, solid: &Solid<'_>, headlights: &[Headlight], buffers: &mut RowBuffers) {
-        let World {
-            lamps, ambient_lx, ..
-        } = self.world;
+    fn draw_solid(&self, solid: &Solid<'_>, buffers: &mut RowBuffers) {
+        let world = self.world;
         for u in columns_of(solid, &self.view.camera.intrinsics, self.row) {
             let ray = self.ray(u);
             let Some((t, normal)) = solid.cast(&self.eye, &ray) else {
@@ -417,13 +458,37 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let lux = ambient_lx
-                    + lamps.irradiance_lx(&at, &normal)
-                    + headlights_lx(headlights, &at, &normal);
+                let slab = world.tunnel.slab_of(&at, Some(self.slab));
+                let lux = world.line.ambient_lx
+                    + world.lamps.irradiance_lx(&at, &normal)
+                    + self.by_job_lx(slab, &at, &normal);
                 let body = solid.body();
                 buffers.depths[u] = t;
                 buffers.luminances[u] = body.luminance_cd_m2 + body.albedo * lux / PI;
             }
+        }
+    }
+
+    /// Draws the air before all surfaces.
+    fn veil(&self, buffers: &mut RowBuffers) {
+        let (air, airlight) = (&self.world.air, self.scenery.airlight_cd_m2);
+        if air.is_clear() {
+            return;
+        }
+        for u in 0..buffers.luminances.len() {
+            let depth = self.depth(u, &mut buffers.depths);
+            let clear = air.transmission(depth * self.ray(u).norm());
+            let luminance = &mut buffers.luminances[u];
+            *luminance = *luminance * clear + airlight * (1.0 - clear);
+        }
+    }
+
+    /// What is before a lamp's disc.
+    fn haze(&self, lamp: &LampLight) -> Haze {
+        let clear = (self.world.air).transmission((lamp.centre - self.eye).norm());
+        Haze {
+            clear,
+            light_cd_m2: self.scenery.airlight_cd_m2 * (1.0 - clear),
         }
     }
 }

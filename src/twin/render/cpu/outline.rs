@@ -146,6 +146,13 @@ impl Outline {
         }
     }
 
+    /// A disc around a point over the centreline that holds it: the point's height, and radius.
+    pub fn disc(&self) -> (f64, f64) {
+        let up_m = 0.5 * (self.low.y + self.high.y);
+        let half = Vector2::new(self.low.x.abs().max(self.high.x.abs()), self.high.y - up_m);
+        (up_m, half.norm())
+    }
+
     /// Whether a point is in free space, for closed outlines; open ones say yes.
     pub fn contains(&self, p: &Vector2<f64>) -> bool {
         let n = self.ring.len();

@@ -7,7 +7,7 @@ use crate::track::{
 };
 use crate::twin::random::Stream;
 use crate::twin::render::{
-    Body, CameraMotion, LensSettings, NoiseKey, SensorSettings, Shape, sample,
+    Air, Body, CameraMotion, LensSettings, NoiseKey, SensorSettings, Shape, sample,
 };
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
 use std::sync::Arc;
@@ -60,6 +60,7 @@ fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
     CpuRenderer::oracle(Scene {
         tunnel: Arc::new(hall()),
         lamps,
+        air: Air::default(),
     })
 }
 

@@ -45,7 +45,7 @@ struct Slab {
 pub struct Strike {
     /// Along the ray, in lengths of its direction.
     pub t: f64,
-    slab: u32,
+    pub(super) slab: u32,
     edge: u16,
 }
 
@@ -119,6 +119,26 @@ impl TunnelCaster {
                 .map(|r| Outline::new(&r.section))
                 .collect(),
         }
+    }
+
+    /// How many slabs there are.
+    pub(super) fn slabs(&self) -> usize {
+        self.slabs.len()
+    }
+
+    /// Where a slab begins.
+    pub(super) fn chainage_m(&self, slab: usize) -> f64 {
+        self.stations[slab].s_m
+    }
+
+    /// A ball around a slab's surface.
+    pub(super) fn slab_ball(&self, slab: usize) -> (Point3<f64>, f64) {
+        let [near, far] = [0, 1].map(|k| self.stations[slab + k].origin);
+        let (up_m, radius_m) = self.slabs[slab]
+            .outline
+            .map_or((0.0, 0.0), |i| self.outlines[i].disc());
+        let middle = nalgebra::center(&near, &far) + Vector3::z() * up_m;
+        (middle, radius_m + (far - near).norm())
     }
 
     /// The slab that a place is in: from a slab close by, or else by search for the nearest
@@ -245,7 +265,8 @@ impl TunnelCaster {
             material: edge.material,
             range,
             gradients: [
-                Vector3::new(slab.chord.x, slab.chord.y, 0.0) * ((far_m - near_m) / (past + before)),
+                Vector3::new(slab.chord.x, slab.chord.y, 0.0)
+                    * ((far_m - near_m) / (past + before)),
                 Self::up_edge(slab, &edge.along),
             ],
         }

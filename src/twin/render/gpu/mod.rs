@@ -104,7 +104,7 @@ impl GpuRenderer {
         gpu.check()?;
         Ok(Self {
             pipelines,
-            field: LampField::new(&scene.lamps),
+            field: LampField::new(&scene.lamps).in_air(scene.air),
             chunks: Chunks::default(),
             paintings: Paintings::new(&gpu, &scene.tunnel),
             scene,

@@ -1,0 +1,300 @@
+//! Shadows: which share of a lamp's disc bodies hide from a point.
+//!
+//! What is hidden is defined in [`light`](crate::twin::render::light): rays from the point to 16
+//! places on the disc. To look at every light and body for every pixel would take minutes, so it
+//! is known beforehand which bodies may throw a shadow of which light into which slab of the
+//! tunnel: where the ball around the slab meets the shadow of the ball around the body.
+
+use super::solid::Solid;
+use super::tunnel::TunnelCaster;
+use super::{SIGHT_M, World};
+use crate::twin::render::light::{
+    HEADLIGHT_RADIUS_M, LAMP_REACH_M, MOUNT_M, OFFSET_M, disc_places,
+};
+use crate::twin::render::{Body, Headlight, Job, LampLight, View};
+use nalgebra::{Point3, Vector3};
+use std::f64::consts::PI;
+
+/// A light with the places on its disc.
+pub(super) struct Source<'a> {
+    kind: Kind<'a>,
+    centre: Point3<f64>,
+    axis: Vector3<f64>,
+    radius_m: f64,
+    reach_m: f64,
+    /// Bodies closer to it than this carry it.
+    mount_m: f64,
+    places: [Point3<f64>; 16],
+}
+
+enum Kind<'a> {
+    Lamp(&'a LampLight),
+    Headlight(&'a Headlight),
+}
+
+/// A body at one instant, in a ball.
+pub(super) struct Blocker<'a> {
+    pub solid: Solid<'a>,
+    centre: Point3<f64>,
+    radius_m: f64,
+}
+
+/// The lights and bodies of a job that may make shadows in a view.
+#[derive(Default)]
+pub(super) struct Shades<'a> {
+    sources: Vec<Source<'a>>,
+    bodies: Vec<(&'a Body, f64)>,
+    first_slab: usize,
+    /// Pairs of slab k of those in sight: `pairs[begins[k]..begins[k + 1]]`, by light.
+    begins: Vec<usize>,
+    pairs: Vec<(usize, usize)>,
+}
+
+/// A ball of a body as a light sees it.
+struct Shadow {
+    source: usize,
+    body: usize,
+    towards: Vector3<f64>,
+    /// Half the angle that it takes up.
+    half_rad: f64,
+    nearest_m: f64,
+}
+
+impl<'a> Source<'a> {
+    pub fn lamp(lamp: &'a LampLight) -> Self {
+        let (axis, radius_m) = (lamp.facing.into_inner(), lamp.radius_m);
+        Self::new(
+            Kind::Lamp(lamp),
+            lamp.centre,
+            axis,
+            radius_m,
+            LAMP_REACH_M,
+            0.0,
+        )
+    }
+
+    pub fn headlight(light: &'a Headlight) -> Self {
+        let centre = Point3::from(light.world_from_light.translation.vector);
+        let axis = light.world_from_light.rotation * Vector3::x();
+        let kind = Kind::Headlight(light);
+        Self::new(
+            kind,
+            centre,
+            axis,
+            HEADLIGHT_RADIUS_M,
+            f64::INFINITY,
+            MOUNT_M,
+        )
+    }
+
+    fn new(
+        kind: Kind<'a>,
+        centre: Point3<f64>,
+        axis: Vector3<f64>,
+        radius_m: f64,
+        reach_m: f64,
+        mount_m: f64,
+    ) -> Self {
+        Self {
+            kind,
+            centre,
+            axis,
+            radius_m,
+            reach_m,
+            mount_m,
+            places: disc_places(&centre, &axis, radius_m),
+        }
+    }
+
+    fn irradiance_lx(&self, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
+        match self.kind {
+            Kind::Lamp(lamp) => lamp.irradiance_lx(p, n),
+            Kind::Headlight(light) => light.irradiance_lx(p, n),
+        }
+    }
+
+    /// Share of the disc that bodies hide from a point of a surface with unit normal `n`.
+    pub fn hidden_share<'b>(
+        &self,
+        p: &Point3<f64>,
+        n: &Vector3<f64>,
+        blockers: impl Iterator<Item = &'b Blocker<'b>> + Clone,
+    ) -> f64 {
+        let from = p + n * OFFSET_M;
+        let between = blockers.filter(|b| b.may_hide(&from, self));
+        if between.clone().next().is_none() {
+            return 0.0;
+        }
+        let hidden = self.places.iter().filter(|place| {
+            let to = *place - from;
+            // Up to where a body would carry the light.
+            let end = 1.0 - self.mount_m / to.norm();
+            let hides = |b: &Blocker<'_>| (b.solid.cast(&from, &to)).is_some_and(|(t, _)| t < end);
+            between.clone().any(hides)
+        });
+        hidden.count() as f64 / self.places.len() as f64
+    }
+
+    /// A body between it and something, if its ball is within reach and not behind.
+    fn shadow(&self, centre: &Point3<f64>, radius_m: f64) -> Option<(Vector3<f64>, f64, f64)> {
+        let (away, radius) = (centre - self.centre, radius_m + self.radius_m);
+        let distance = away.norm();
+        let reached = distance - radius < self.reach_m && self.axis.dot(&away) + radius > 0.0;
+        reached.then(|| (away, half_angle(radius, distance), distance - radius))
+    }
+}
+
+impl<'a> Blocker<'a> {
+    pub fn at(body: &'a Body, radius_m: f64, after_s: f64) -> Self {
+        Self {
+            solid: Solid::at(body, after_s),
+            centre: Point3::from(body.world_from_body.translation.vector)
+                + body.velocity_mps * after_s,
+            radius_m,
+        }
+    }
+
+    /// Whether the ball around it reaches into the cone from a point to a light's disc.
+    fn may_hide(&self, from: &Point3<f64>, source: &Source<'_>) -> bool {
+        let (to, off) = (source.centre - from, self.centre - from);
+        let share = (off.dot(&to) / to.norm_squared()).clamp(0.0, 1.0);
+        let reach = self.radius_m + source.radius_m * share;
+        (off - to * share).norm_squared() < reach * reach
+    }
+}
+
+impl<'a> Shades<'a> {
+    /// Of a view from somewhere in a slab.
+    pub fn new(world: &'a World, job: &'a Job, view: &View, slab: usize) -> Self {
+        if job.bodies.is_empty() {
+            return Self::default();
+        }
+        let in_sight = world.tunnel.slabs_about(slab, SIGHT_M);
+        let bodies: Vec<_> = job.bodies.iter().map(|b| (b, ball_m(b))).collect();
+        let lamps = world.lamps.lamps().iter().map(Source::lamp);
+        let headlights = job.headlights.iter().map(Source::headlight);
+        let sources: Vec<_> = lamps.chain(headlights).collect();
+        let shadows = shadows(&sources, &bodies, job, view);
+        let (mut begins, mut pairs) = (vec![0], Vec::new());
+        for slab in in_sight.clone() {
+            let (centre, radius) = world.tunnel.slab_ball(slab);
+            let reached = shadows.iter().filter(|shadow| {
+                let source = &sources[shadow.source];
+                shadow.may_fall_on(&(centre - source.centre), radius, source)
+            });
+            pairs.extend(reached.map(|shadow| (shadow.source, shadow.body)));
+            begins.push(pairs.len());
+        }
+        Self {
+            sources,
+            bodies,
+            first_slab: in_sight.start,
+            begins,
+            pairs,
+        }
+    }
+
+    /// The bodies so long after the job's time.
+    pub fn blockers(&self, after_s: f64) -> Vec<Blocker<'a>> {
+        let bodies = self.bodies.iter();
+        bodies
+            .map(|(body, radius)| Blocker::at(body, *radius, after_s))
+            .collect()
+    }
+
+    /// Illuminance that bodies take from a point of a surface in a slab.
+    pub fn hidden_lx(
+        &self,
+        slab: usize,
+        p: &Point3<f64>,
+        n: &Vector3<f64>,
+        blockers: &[Blocker<'_>],
+        world: &World,
+    ) -> f64 {
+        let here = slab.wrapping_sub(self.first_slab);
+        let (Some(begin), Some(end)) =
+            (self.begins.get(here), self.begins.get(here.wrapping_add(1)))
+        else {
+            return 0.0;
+        };
+        let by_light = self.pairs[*begin..*end].chunk_by(|a, b| a.0 == b.0);
+        by_light
+            .map(|pairs| {
+                let source = &self.sources[pairs[0].0];
+                let lux = source.irradiance_lx(p, n);
+                if lux <= 0.0 {
+                    return 0.0;
+                }
+                let bodies = pairs.iter().map(|(_, body)| &blockers[*body]);
+                let clear = world.air.transmission((p - source.centre).norm());
+                lux * clear * source.hidden_share(p, n, bodies)
+            })
+            .sum()
+    }
+}
+
+impl Shadow {
+    /// Whether the shadow of its ball may meet another, whose centre is `to` away from the light.
+    fn may_fall_on(&self, to: &Vector3<f64>, radius_m: f64, source: &Source<'_>) -> bool {
+        let distance = to.norm();
+        distance - radius_m < source.reach_m
+            && distance + radius_m > self.nearest_m
+            && source.axis.dot(to) + radius_m > 0.0
+            && to.angle(&self.towards) < self.half_rad + half_angle(radius_m, distance)
+    }
+}
+
+/// All bodies that are in the light of something, wherever they go while a view is exposed.
+fn shadows(sources: &[Source<'_>], bodies: &[(&Body, f64)], job: &Job, view: &View) -> Vec<Shadow> {
+    let shutter = &view.camera.shutter;
+    let last_row = f64::from(view.camera.intrinsics.height_px.saturating_sub(1));
+    let ends = [0.0, last_row].map(|row| shutter.row_mid(view.start, row).since(job.time));
+    let (mid_s, half_s) = (
+        0.5 * (ends[0] + ends[1]),
+        0.5 * ((ends[1] - ends[0]).abs() + shutter.exposure_s),
+    );
+    let mut all = Vec::new();
+    for (source, light) in sources.iter().enumerate() {
+        for (body, (solid, radius_m)) in bodies.iter().enumerate() {
+            let ball = Blocker::at(solid, *radius_m, mid_s);
+            let wide_m = radius_m + solid.velocity_mps.norm() * half_s;
+            if let Some((towards, half_rad, nearest_m)) = light.shadow(&ball.centre, wide_m) {
+                all.push(Shadow {
+                    source,
+                    body,
+                    towards,
+                    half_rad,
+                    nearest_m,
+                });
+            }
+        }
+    }
+    all
+}
+
+/// Radius of a ball around a body's origin that holds it.
+fn ball_m(body: &Body) -> f64 {
+    body.shape.half_extents_m().norm()
+}
+
+fn half_angle(radius_m: f64, distance_m: f64) -> f64 {
+    if radius_m < distance_m {
+        (radius_m / distance_m).asin()
+    } else {
+        PI
+    }
+}
+
+impl TunnelCaster {
+    /// Slabs within some metres of chainage of one.
+    fn slabs_about(&self, slab: usize, reach_m: f64) -> std::ops::Range<usize> {
+        if slab >= self.slabs() {
+            return 0..0;
+        }
+        let at = self.chainage_m(slab);
+        let near = |k: &usize| (self.chainage_m(*k) - at).abs() <= reach_m;
+        let begin = (0..slab).rev().take_while(near).last().unwrap_or(slab);
+        let end = (slab..self.slabs()).take_while(near).last().unwrap_or(slab);
+        begin..end + 1
+    }
+}
