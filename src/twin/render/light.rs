@@ -372,6 +372,58 @@ mod tests {
         }
     }
 
+    /// Fails where the places on a disc leave a part of it out: their mean and mean square
+    /// distance are those of an even disc.
+    #[test]
+    fn places_are_even_over_the_disc() {
+        let (centre, axis) = (Point3::new(3.0, -2.0, 7.0), Vector3::new(0.6, 0.0, -0.8));
+        let places = disc_places(&centre, &axis, 0.5);
+        let offs = places.map(|p| p - centre);
+        let mean = offs.iter().sum::<Vector3<f64>>() / 16.0;
+        let square = offs.iter().map(Vector3::norm_squared).sum::<f64>() / 16.0;
+        assert!(mean.norm() < 0.03 && (square / 0.125 - 1.0).abs() < 1e-9);
+        assert!(offs.iter().all(|o| o.dot(&axis).abs() < 1e-12));
+        for k in 0..32 {
+            // No half of it has more than one and a half places too many.
+            let (sin, cos) = (TAU * f64::from(k) / 32.0).sin_cos();
+            let half = Vector3::y() * sin + Vector3::new(0.8, 0.0, 0.6) * cos;
+            let over = offs.iter().filter(|o| o.dot(&half) > 0.0).count();
+            assert!((7..=9).contains(&over), "{over}");
+        }
+    }
+
+    /// Fails where lamps shine through mist as through clear air, or twice dimmed.
+    #[test]
+    fn mist_dims_lamps_by_beer_and_lambert() {
+        let lamps = [lamp(Point3::origin(), Vector3::x())];
+        let air = Air::of_visibility(50.0);
+        let (clear, misty) = (LampField::new(&lamps), LampField::new(&lamps).in_air(air));
+        for d in [1.0f64, 7.0, 20.0] {
+            let at =
+                |field: &LampField| field.irradiance_lx(&Point3::new(d, 0.0, 0.0), &-Vector3::x());
+            let expected = (-3.912_023 / 50.0 * d).exp();
+            assert!((at(&misty) / at(&clear) - expected).abs() < 1e-6);
+        }
+    }
+
+    /// Fails where the airlight of evenly lit mist is not that of its surroundings: where light
+    /// of luminance L comes from all sides, air that absorbs nothing glows with L.
+    #[test]
+    fn evenly_lit_mist_is_as_bright_as_what_lights_it() {
+        let mut tunnel = crate::twin::render::sample::tunnel();
+        tunnel.ambient_lx = 12.0 * PI;
+        let mut air = Air::of_visibility(80.0);
+        let dark = LampField::new(&[]).in_air(air);
+        assert!((dark.airlight_cd_m2(&tunnel, 100.0) - 12.0).abs() < 1e-9);
+        air.scattered_share = 0.7;
+        let dust = LampField::new(&[]).in_air(air);
+        assert!((dust.airlight_cd_m2(&tunnel, 100.0) - 8.4).abs() < 1e-9);
+        // Lamps add to it, clear air has none.
+        let lit = LampField::new(&crate::twin::render::sample::scene().lamps);
+        assert!(lit.airlight_cd_m2(&tunnel, 100.0).abs() < 1e-300);
+        assert!(lit.in_air(air).airlight_cd_m2(&tunnel, 100.0) > 8.5);
+    }
+
     /// Fails where a headlight shines along another axis than x, or blinks.
     #[test]
     fn a_headlight_shines_along_its_x_axis() {

@@ -7,6 +7,9 @@
 //!
 //! # Patterns
 //!
+//! The plain renderer looks at the [painting](super::paint) of a cross-section. These patterns are
+//! what the GPU renderer still draws instead.
+//!
 //! Ring joints and sleepers are pulse trains in chainage s, each pulse centred on a multiple of
 //! the period. Through a pixel that spans `w` metres of s around `s` one sees their mean,
 //!

@@ -371,12 +371,12 @@ impl<'a> RowRays<'a> {
         let Some(strike) = &ground.strike else {
             return (ground.luminance, f64::INFINITY);
         };
-        let job = self.scenery.job;
-        let mut luminance = ground.luminance;
-        if !job.headlights.is_empty() || !job.bodies.is_empty() {
+        let Scenery { job, shades, .. } = self.scenery;
+        let (mut luminance, slab) = (ground.luminance, strike.slab as usize);
+        if !job.headlights.is_empty() || !shades.leave_alone(slab) {
             let ray = self.ray(u);
             let at = self.world.tunnel.surface_at(&self.eye, &ray, strike);
-            let lux = self.by_job_lx(strike.slab as usize, &at.position, &at.normal);
+            let lux = self.by_job_lx(slab, &at.position, &at.normal);
             luminance += ground.albedo * lux / PI;
         }
         (luminance, strike.t)

@@ -211,25 +211,35 @@ impl<'a> Shades<'a> {
         blockers: &[Blocker<'_>],
         world: &World,
     ) -> f64 {
-        let here = slab.wrapping_sub(self.first_slab);
-        let (Some(begin), Some(end)) =
-            (self.begins.get(here), self.begins.get(here.wrapping_add(1)))
-        else {
-            return 0.0;
-        };
-        let by_light = self.pairs[*begin..*end].chunk_by(|a, b| a.0 == b.0);
+        let by_light = self.pairs_in(slab).chunk_by(|a, b| a.0 == b.0);
         by_light
             .map(|pairs| {
                 let source = &self.sources[pairs[0].0];
-                let lux = source.irradiance_lx(p, n);
-                if lux <= 0.0 {
+                let to = source.centre - p;
+                if n.dot(&to) <= 0.0 || source.axis.dot(&to) >= 0.0 {
                     return 0.0;
                 }
                 let bodies = pairs.iter().map(|(_, body)| &blockers[*body]);
-                let clear = world.air.transmission((p - source.centre).norm());
-                lux * clear * source.hidden_share(p, n, bodies)
+                let share = source.hidden_share(p, n, bodies);
+                if share <= 0.0 {
+                    return 0.0;
+                }
+                share * source.irradiance_lx(p, n) * world.air.transmission(to.norm())
             })
             .sum()
+    }
+
+    /// Whether nothing shades a slab.
+    pub fn leave_alone(&self, slab: usize) -> bool {
+        self.pairs_in(slab).is_empty()
+    }
+
+    fn pairs_in(&self, slab: usize) -> &[(usize, usize)] {
+        let here = slab.wrapping_sub(self.first_slab);
+        match (self.begins.get(here), self.begins.get(here.wrapping_add(1))) {
+            (Some(begin), Some(end)) => &self.pairs[*begin..*end],
+            _ => &[],
+        }
     }
 }
 
@@ -298,3 +308,6 @@ impl TunnelCaster {
         begin..end + 1
     }
 }
+
+#[cfg(test)]
+mod tests;

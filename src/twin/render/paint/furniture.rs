@@ -173,7 +173,7 @@ fn handrail(strip: &mut Strip, outline: &Unrolled, side: Side) {
 
 /// Emergency lights, unlit: a box with a pale cover and a running figure's patch.
 fn boxes(strip: &mut Strip, outline: &Unrolled, side: Side) {
-    let Some((q, up)) = outline.wall(side, 2.35) else {
+    let Some((q, up)) = outline.wall(side, 2.70) else {
         return;
     };
     for k in strip.multiples(15.0, 15.0) {
@@ -195,7 +195,7 @@ fn boxes(strip: &mut Strip, outline: &Unrolled, side: Side) {
 /// Plates with a row of signs that look like digits.
 fn plates(strip: &mut Strip, outline: &Unrolled, side: Side, shift_m: f64) {
     const PITCH_M: f64 = 30.0;
-    let Some((q, up)) = outline.wall(side, 2.15) else {
+    let Some((q, up)) = outline.wall(side, 2.45) else {
         return;
     };
     let count = (PERIOD_M / PITCH_M) as i32;

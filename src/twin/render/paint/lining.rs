@@ -41,7 +41,7 @@ pub(super) fn tone(ring: i32, outline: &Unrolled, place: &Place) -> f64 {
     let whole = chance(Chance::Tone, ring, -1);
     // Brake dust lies thickest near the track.
     let dust = 1.0 - 0.22 * (-(h - crate::track::BED_M).max(0.0) / 0.9).exp();
-    CONCRETE_ALBEDO * dust * (1.0 + 0.14 * (own[0] - 0.5) + 0.10 * (whole[0] - 0.5))
+    CONCRETE_ALBEDO * dust * (1.0 + 0.20 * (own[0] - 0.5) + 0.12 * (whole[0] - 0.5))
 }
 
 /// Where the key of a ring is, from the crown to the left.
@@ -116,7 +116,7 @@ fn ring_joint(strip: &mut Strip, outline: &Unrolled, s: f64, ring: i32) {
             let q = q[0] + place * (q[1] - q[0]);
             let s = s + if side < 0.5 { -0.02 } else { 0.02 };
             let (size, paint) = (
-                0.012 + 0.03 * size * size,
+                0.008 + 0.022 * size * size,
                 if fresh < 0.6 { 0.42 } else { 0.12 },
             );
             strip.disc([s, q], size, Paint::Coat(paint));
@@ -192,7 +192,11 @@ fn leaks(strip: &mut Strip, outline: &Unrolled) {
                 if luck > 0.22 {
                     continue;
                 }
-                let Some(up) = outline.up_at(q) else { continue };
+                // Under the crown water drips.
+                let runs = outline.at(q).is_some_and(|place| place.upright > 0.4);
+                let Some(up) = outline.up_at(q).filter(|_| runs) else {
+                    continue;
+                };
                 let [lime, shift, ..] = chance(Chance::Leak, ring, which + 4096);
                 let s = f64::from(k) * RING_M
                     + if lime < 0.5 {

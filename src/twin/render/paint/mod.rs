@@ -273,8 +273,9 @@ fn pyramid(sharp: Vec<u8>, width: usize) -> Vec<Vec<u8>> {
         });
         sums = pairs.collect();
         columns /= 2;
-        let half = 1u32 << (2 * level - 1);
-        let mean = |sum: &u32| ((sum + half) >> (2 * level)) as u8;
+        // Halves go to the even neighbour: upwards each level would be paler than the last.
+        let (shift, half) = (2 * level, 1u32 << (2 * level - 1));
+        let mean = |sum: &u32| ((sum + half - 1 + (sum >> shift & 1)) >> shift) as u8;
         levels.push(sums.iter().map(mean).collect());
     }
     levels
