@@ -14,6 +14,7 @@ use crate::twin::render::light::{
 use crate::twin::render::{Body, Headlight, Job, LampLight, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
+use std::ops::Range;
 
 /// A light with the places on its disc.
 pub(super) struct Source<'a> {
@@ -45,9 +46,21 @@ pub(super) struct Shades<'a> {
     sources: Vec<Source<'a>>,
     bodies: Vec<(&'a Body, f64)>,
     first_slab: usize,
-    /// Pairs of slab k of those in sight: `pairs[begins[k]..begins[k + 1]]`, by light.
+    /// What falls on slab k of those in sight: `falling[begins[k]..begins[k + 1]]`.
     begins: Vec<usize>,
-    pairs: Vec<(usize, usize)>,
+    falling: Vec<Falling>,
+    /// Bodies, listed by what falls on slabs.
+    listed: Vec<usize>,
+}
+
+/// The shadows of one light that may fall on a slab.
+struct Falling {
+    source: usize,
+    /// Of the list of bodies.
+    listed: Range<usize>,
+    /// A cone from the light that holds them all: its unit axis and the cosine of half its angle.
+    axis: Vector3<f64>,
+    cos_half: f64,
 }
 
 /// A ball of a body as a light sees it.
@@ -175,23 +188,50 @@ impl<'a> Shades<'a> {
         let headlights = job.headlights.iter().map(Source::headlight);
         let sources: Vec<_> = lamps.chain(headlights).collect();
         let shadows = shadows(&sources, &bodies, job, view);
-        let (mut begins, mut pairs) = (vec![0], Vec::new());
-        for slab in in_sight.clone() {
-            let (centre, radius) = world.tunnel.slab_ball(slab);
-            let reached = shadows.iter().filter(|shadow| {
-                let source = &sources[shadow.source];
-                shadow.may_fall_on(&(centre - source.centre), radius, source)
-            });
-            pairs.extend(reached.map(|shadow| (shadow.source, shadow.body)));
-            begins.push(pairs.len());
-        }
-        Self {
-            sources,
+        let mut shades = Self {
             bodies,
             first_slab: in_sight.start,
-            begins,
-            pairs,
+            begins: vec![0],
+            ..Self::default()
+        };
+        for slab in in_sight {
+            let (centre, radius) = world.tunnel.slab_ball(slab);
+            for of_light in shadows.chunk_by(|a, b| a.source == b.source) {
+                let source = &sources[of_light[0].source];
+                let to = centre - source.centre;
+                shades.list(
+                    of_light
+                        .iter()
+                        .filter(|s| s.may_fall_on(&to, radius, source)),
+                );
+            }
+            shades.begins.push(shades.falling.len());
         }
+        shades.sources = sources;
+        shades
+    }
+
+    /// Lists the shadows of one light, if there are any.
+    fn list<'s>(&mut self, shadows: impl Iterator<Item = &'s Shadow> + Clone) {
+        let begin = self.listed.len();
+        // Bodies around the light itself have no direction, and all of space for their shadow.
+        let directions = shadows
+            .clone()
+            .filter_map(|s| s.towards.try_normalize(1e-9));
+        let sum: Vector3<f64> = directions.sum();
+        let axis = sum.try_normalize(1e-9).unwrap_or_else(Vector3::x);
+        let (mut half_rad, mut source) = (0.0f64, None);
+        for shadow in shadows {
+            half_rad = half_rad.max(axis.angle(&shadow.towards) + shadow.half_rad);
+            source = Some(shadow.source);
+            self.listed.push(shadow.body);
+        }
+        self.falling.extend(source.map(|source| Falling {
+            source,
+            listed: begin..self.listed.len(),
+            axis,
+            cos_half: half_rad.min(PI).cos(),
+        }));
     }
 
     /// The bodies so long after the job's time.
@@ -211,33 +251,37 @@ impl<'a> Shades<'a> {
         blockers: &[Blocker<'_>],
         world: &World,
     ) -> f64 {
-        let by_light = self.pairs_in(slab).chunk_by(|a, b| a.0 == b.0);
-        by_light
-            .map(|pairs| {
-                let source = &self.sources[pairs[0].0];
-                let to = source.centre - p;
-                if n.dot(&to) <= 0.0 || source.axis.dot(&to) >= 0.0 {
+        let lights = self.falling_on(slab).iter();
+        lights
+            .map(|falling| {
+                let source = &self.sources[falling.source];
+                let from = p - source.centre;
+                let distance = from.norm();
+                if falling.axis.dot(&from) < falling.cos_half * distance
+                    || n.dot(&from) >= 0.0
+                    || source.axis.dot(&from) <= 0.0
+                {
                     return 0.0;
                 }
-                let bodies = pairs.iter().map(|(_, body)| &blockers[*body]);
-                let share = source.hidden_share(p, n, bodies);
+                let bodies = self.listed[falling.listed.clone()].iter();
+                let share = source.hidden_share(p, n, bodies.map(|k| &blockers[*k]));
                 if share <= 0.0 {
                     return 0.0;
                 }
-                share * source.irradiance_lx(p, n) * world.air.transmission(to.norm())
+                share * source.irradiance_lx(p, n) * world.air.transmission(distance)
             })
             .sum()
     }
 
     /// Whether nothing shades a slab.
     pub fn leave_alone(&self, slab: usize) -> bool {
-        self.pairs_in(slab).is_empty()
+        self.falling_on(slab).is_empty()
     }
 
-    fn pairs_in(&self, slab: usize) -> &[(usize, usize)] {
+    fn falling_on(&self, slab: usize) -> &[Falling] {
         let here = slab.wrapping_sub(self.first_slab);
         match (self.begins.get(here), self.begins.get(here.wrapping_add(1))) {
-            (Some(begin), Some(end)) => &self.pairs[*begin..*end],
+            (Some(begin), Some(end)) => &self.falling[*begin..*end],
             _ => &[],
         }
     }
@@ -297,7 +341,7 @@ fn half_angle(radius_m: f64, distance_m: f64) -> f64 {
 
 impl TunnelCaster {
     /// Slabs within some metres of chainage of one.
-    fn slabs_about(&self, slab: usize, reach_m: f64) -> std::ops::Range<usize> {
+    fn slabs_about(&self, slab: usize, reach_m: f64) -> Range<usize> {
         if slab >= self.slabs() {
             return 0..0;
         }

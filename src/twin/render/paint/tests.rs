@@ -151,19 +151,18 @@ fn means_are_those_of_the_interpolated_texels() {
 fn rings_are_one_and_a_half_metres_long() {
     let painting = Painting::of(&bored());
     let column = |s_m: f64| painting.mean_over([s_m, 7.0], [[0.02, 0.0], [0.0, 2.0]]);
-    for ring in 0..40 {
-        let s_m = 1.5 * f64::from(ring);
+    let found = (0..40).filter(|ring| {
+        let s_m = 1.5 * f64::from(*ring);
         let between = 0.5 * (column(s_m - 0.6) + column(s_m + 0.6));
-        assert!(
-            column(s_m) < 0.8 * between,
-            "{s_m}: {} {between}",
-            column(s_m)
-        );
-        assert!(
-            (column(s_m + 0.08) - between).abs() < 0.35 * between,
-            "{s_m}"
-        );
-    }
+        column(s_m) < 0.8 * between && column(s_m + 0.08) > 0.85 * between
+    });
+    // A leak or a chip may hide one.
+    assert!(found.count() >= 36);
+    let elsewhere = (0..40).filter(|ring| {
+        let s_m = 1.5 * f64::from(*ring) + 0.6;
+        column(s_m) < 0.8 * column(s_m + 0.2)
+    });
+    assert!(elsewhere.count() <= 2);
 }
 
 /// Fails where a rail's rows are not where they are said to be: its head shines, its sides are
