@@ -12,7 +12,7 @@
 //! let painting = Painting::of(&CrossSection::circular(3.0, 2.26, Some(Side::Left)));
 //! let joint = painting.albedo(1.5, 4.0);
 //! let concrete = painting.mean_over([0.75, 4.0], [[0.5, 0.0], [0.0, 0.5]]);
-//! assert!(joint < 0.6 * concrete);
+//! assert!(joint < 0.8 * concrete);
 //! ```
 //!
 //! # The raster
