@@ -9,7 +9,7 @@ use super::tunnel::ChunkKey;
 use super::view::{Framed, single};
 use crate::twin::render::light::headlights_lx;
 use crate::twin::render::paint;
-use crate::twin::render::scene::{Body, Job, LampLight};
+use crate::twin::render::scene::{Air, Body, Job, LampLight};
 use nalgebra::Point3;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -121,7 +121,7 @@ impl Sight {
         dim_cd_m2: f64,
     ) {
         let floodlit = (chunk.probes.iter())
-            .any(|(p, n)| headlights_lx(&job.headlights, p, n) / PI > dim_cd_m2);
+            .any(|(p, n)| headlights_lx(&job.headlights, &Air::default(), p, n) / PI > dim_cd_m2);
         let period = key.start_m() / paint::PERIOD_M;
         for part in &chunk.parts {
             let bright = if floodlit {
