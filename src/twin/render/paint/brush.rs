@@ -118,7 +118,6 @@ pub(super) enum Chance {
     Grain,
     Joint,
     Leak,
-    Bolt,
     Plug,
     Sign,
     Tile,

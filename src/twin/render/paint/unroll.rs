@@ -222,9 +222,9 @@ mod tests {
         }
         let q = u.floor(Material::Bed, -0.75).unwrap();
         assert!((u.at(q).unwrap().at.l_m + 0.75).abs() < 1e-9);
-        let [(q, in_)] = u.ledges(Material::Walkway)[..] else {
-            panic!("one ledge");
-        };
+        let ledges = u.ledges(Material::Walkway);
+        assert_eq!(ledges.len(), 1);
+        let (q, in_) = ledges[0];
         let top = u.at(q + 0.1 * in_).unwrap().at;
         assert!((top.h_m - 0.9).abs() < 1e-9 && (top.l_m - 1.7).abs() < 1e-9);
         assert_eq!(u.side_of(Material::Walkway), Some(Side::Left));
