@@ -6,7 +6,7 @@
 //! | where | why | bound |
 //! |---|---|---|
 //! | silhouettes, facet edges | one sample a pixel, f32 against f64, coarse rings far away | pixels off by more than 2 grey levels: 1 % |
-//! | paint in floodlight | one texel of one mip level, square, against the mean over the pixel's slanted footprint | off by more than 2: 4 % |
+//! | paint in floodlight | one texel of a mip or rip map against the mean over the pixel's slanted footprint: softer edges | off by more than 2: 20 %, by more than 20: 2 %; and no shift by a pixel fits as well |
 //! | the same, where both sides differ much | no more than silhouettes have pixels | off by more than 20: 0.3 % |
 //! | everywhere else | f32, light interpolated over facets | 2 grey levels |
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
@@ -180,8 +180,9 @@ fn share_off(a: &GrayImage, b: &GrayImage, levels: u8) -> f64 {
 
 /// Shares of pixels that may be off by more than 2 and by more than 20 grey levels.
 const OVER_2: f64 = 0.01;
-/// The first where every bolt shows.
-const OVER_2_PAINT: f64 = 0.04;
+/// The same where every bolt shows.
+const PAINT_OVER_2: f64 = 0.2;
+const PAINT_OVER_20: f64 = 0.02;
 const OVER_20: f64 = 0.003;
 
 fn compare(name: &str, scene: &Scene, job: &Job) {
@@ -199,13 +200,36 @@ fn compare(name: &str, scene: &Scene, job: &Job) {
     }
     let spread = cpu.iter().max().unwrap() - cpu.iter().min().unwrap();
     assert!(spread > 80, "{name} shows nothing: {spread}");
-    let allowed = if name.starts_with("flood") {
-        OVER_2_PAINT
+    let (most_2, most_20) = if name.starts_with("flood") {
+        let shifted = squares_shifted(&gpu, &cpu);
+        println!("{name}: shifted by a pixel {shifted:.2} times as far off");
+        assert!(shifted > 1.5, "{name}: fits {shifted} when shifted");
+        (PAINT_OVER_2, PAINT_OVER_20)
     } else {
-        OVER_2
+        (OVER_2, OVER_20)
     };
-    assert!(over_2 <= allowed, "{name}: {over_2} over 2 grey levels");
-    assert!(over_20 <= OVER_20, "{name}: {over_20} over 20 grey levels");
+    assert!(over_2 <= most_2, "{name}: {over_2} over 2 grey levels");
+    assert!(over_20 <= most_20, "{name}: {over_20} over 20 grey levels");
+}
+
+/// Least sum of squared differences of pictures shifted by a pixel against each other, over that
+/// of the pictures as they are.
+fn squares_shifted(a: &GrayImage, b: &GrayImage) -> f64 {
+    let squares = |du: i32, dv: i32| -> f64 {
+        let (width, height) = (a.width() as i32, a.height() as i32);
+        let at =
+            |image: &GrayImage, u: i32, v: i32| f64::from(image.get_pixel(u as u32, v as u32)[0]);
+        (1..height - 1)
+            .flat_map(|v| (1..width - 1).map(move |u| (u, v)))
+            .map(|(u, v)| (at(a, u, v) - at(b, u + du, v + dv)).powi(2))
+            .sum()
+    };
+    let shifts = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+    let least = shifts
+        .map(|(du, dv)| squares(du, dv))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    least / squares(0, 0)
 }
 
 /// Both pictures and ten times their difference, to look at.

@@ -101,7 +101,7 @@ pub struct ViewData<'a> {
     pub rows: &'a [LampRow],
 }
 
-/// Bind groups of the background's pipelines; one a painting.
+/// Bind groups of the background's pipelines; one a texture.
 struct Groups<'a> {
     /// Draws what is lit.
     pipeline: &'a wgpu::RenderPipeline,
@@ -231,7 +231,7 @@ impl ViewBuffers {
             let at = instant * sight.meshes + draw.mesh;
             if !draw.lit.is_empty() {
                 pass.set_pipeline(groups.pipeline);
-                pass.set_bind_group(0, &groups.lit[draw.painting], &[]);
+                pass.set_bind_group(0, &groups.lit[draw.texture], &[]);
                 pass.draw_indexed(draw.lit.clone(), 0, at..at + 1);
             }
             if !draw.dim.is_empty() {

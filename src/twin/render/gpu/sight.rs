@@ -42,8 +42,8 @@ pub struct World<'a> {
 pub struct Draw {
     /// The chunk that they are of; none for bodies.
     pub chunk: Option<ChunkKey>,
-    /// Their painting.
-    pub painting: usize,
+    /// Number of their texture.
+    pub texture: usize,
     /// Number of their placement.
     pub mesh: u32,
     /// Indices of those that are drawn in full.
@@ -103,7 +103,7 @@ impl Sight {
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
             self.draws.push(Draw {
                 chunk: None,
-                painting: 0,
+                texture: 0,
                 mesh: self.placements.len() as u32,
                 lit: range.clone(),
                 dim: 0..0,
@@ -130,6 +130,7 @@ impl Sight {
         let floodlit = (chunk.probes.iter())
             .any(|(p, n)| headlights_lx(&job.headlights, world.air, p, n) / PI > dim_cd_m2);
         let period = key.start_m() / paint::PERIOD_M;
+        let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {
             let bright = if floodlit {
                 part.peaks.len()
@@ -140,7 +141,7 @@ impl Sight {
             let painting = world.paintings.of_range[part.section];
             self.draws.push(Draw {
                 chunk: Some(key),
-                painting,
+                texture: textures::slanted(painting, away_m),
                 mesh: self.placements.len() as u32,
                 lit: part.indices.start..border,
                 dim: border..part.indices.end,

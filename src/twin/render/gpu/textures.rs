@@ -1,11 +1,23 @@
 //! The paintings of a tunnel on the adapter.
+//!
+//! A camera that looks along a tunnel sees its walls at a slant: a pixel at distance d on a wall r
+//! aside spans d / r times as many metres of the line as of the outline. A mip pyramid has square
+//! texels and would blur one way or alias the other. So every painting is there several times, with
+//! texels that are 1, 2, 4 and 8 times as long as wide (rip maps), and a chunk of the tunnel takes
+//! the one that suits its distance; within it an ordinary pyramid does.
 
 use super::adapter::Gpu;
 use crate::twin::render::paint::{PERIOD_M, Painting, Paintings, TEXELS_PER_M};
 
-/// A texture for every painting, and how to read them.
+/// Every painting is there with texels of this many lengths.
+const SLANTS: u32 = 4;
+/// Walls are about this far aside of the line of sight.
+const ASIDE_M: f64 = 5.0;
+
+/// Textures for every painting, and how to read them.
 pub struct Textures {
-    /// In the order of the paintings; where there are none, one blank texel for the bodies to bind.
+    /// All slants of the first painting, then of the second, and so on; where there are none, one
+    /// blank texel for the bodies to bind.
     pub views: Vec<wgpu::TextureView>,
     /// Repeats along the line, clamps at the outline's ends.
     pub sampler: wgpu::Sampler,
@@ -14,7 +26,8 @@ pub struct Textures {
 impl Textures {
     /// Uploads the paintings.
     pub fn new(gpu: &Gpu, paintings: &Paintings) -> Self {
-        let mut views: Vec<_> = paintings.all.iter().map(|p| upload(gpu, p)).collect();
+        let slants = |p| (0..SLANTS).map(move |slant| upload(gpu, p, slant));
+        let mut views: Vec<_> = paintings.all.iter().flat_map(slants).collect();
         if views.is_empty() {
             views.push(texture(gpu, (1, 1), &[vec![0]]));
         }
@@ -36,8 +49,30 @@ pub fn per_m(painting: &Painting) -> [f32; 2] {
     [PERIOD_M, height_m].map(|m| (1.0 / m) as f32)
 }
 
-fn upload(gpu: &Gpu, painting: &Painting) -> wgpu::TextureView {
-    texture(gpu, (painting.width, painting.height), &painting.levels)
+/// Number of the texture in which to see a painting from so far along the tunnel.
+pub fn slanted(painting: usize, away_m: f64) -> usize {
+    let slant = (away_m / ASIDE_M).max(1.0).log2().round() as u32;
+    painting * SLANTS as usize + slant.min(SLANTS - 1) as usize
+}
+
+/// A painting with texels `2^slant` times as long as wide, and its pyramid.
+fn upload(gpu: &Gpu, painting: &Painting, slant: u32) -> wgpu::TextureView {
+    if slant == 0 {
+        return texture(gpu, (painting.width, painting.height), &painting.levels);
+    }
+    let mut levels = Vec::with_capacity(painting.levels.len());
+    for (k, level) in painting.levels.iter().enumerate() {
+        let width = painting.width >> k;
+        if width % (1 << slant) != 0 {
+            break;
+        }
+        let mean = |run: &[u8]| {
+            let sum: u32 = run.iter().map(|t| u32::from(*t)).sum();
+            ((sum + (1 << (slant - 1))) >> slant) as u8
+        };
+        levels.push(level.chunks_exact(1 << slant).map(mean).collect());
+    }
+    texture(gpu, (painting.width >> slant, painting.height), &levels)
 }
 
 fn texture(gpu: &Gpu, (width, height): (u32, u32), levels: &[Vec<u8>]) -> wgpu::TextureView {
