@@ -44,6 +44,7 @@ fn draw(make: Make, lamp: &LampLight, view: &View) -> GrayImage {
     let mut renderer = make(Scene {
         tunnel: tunnel.into(),
         lamps: vec![lamp.clone()],
+        air: Air::default(),
     });
     let job = Job {
         views: vec![view.clone()],
