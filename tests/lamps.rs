@@ -18,7 +18,7 @@ use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{CameraMotion, Job, LampLight, Renderer, Scene, View, sample};
+use metrotwin::twin::render::{Air, CameraMotion, Job, LampLight, Renderer, Scene, View, sample};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
