@@ -41,8 +41,9 @@ struct View {
     // Share of light that the air takes on a metre, and the signal of endless air.
     extinction_per_m: f32,
     airlight_e: f32,
-    unused: f32,
-    unused_too: vec2f,
+    // Standard deviation of the point spread.
+    blur_px: f32,
+    unused: vec2f,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

@@ -2,6 +2,14 @@
 // packed in one RGBA texel: the target's bytes are the image, and one hash serves four pixels.
 
 @group(0) @binding(1) var signal: texture_2d<f32>;
+@group(0) @binding(2) var glare: texture_2d<f32>;
+
+// Glare in four pixels of a row, which lie between two texels of it.
+fn glare_in(at: vec2i) -> vec4f {
+    let here = textureLoad(glare, at, 0).r;
+    let next = textureLoad(glare, at + vec2i(1, 0), 0).r;
+    return here + (next - here) * vec4f(0.0, 0.25, 0.5, 0.75);
+}
 
 @vertex
 fn whole(@builtin(vertex_index) k: u32) -> @builtin(position) vec4f {
@@ -31,7 +39,7 @@ fn develop(@builtin(position) at: vec4f) -> @location(0) vec4f {
         textureLoad(signal, vec2i(x + 2, y), 0).r,
         textureLoad(signal, vec2i(x + 3, y), 0).r,
     );
-    var electrons = min(s, vec4f(view.saturation_e));
+    var electrons = min(s + glare_in(vec2i(at.xy)), vec4f(view.saturation_e));
     if view.noise != 0u {
         let per_row = (u32(view.size_px.x) + 3u) / 4u;
         let n = normals(u32(y) * per_row + u32(at.x));

@@ -458,11 +458,7 @@ fn lone_lamp(view: &View, grey: f64) -> Scene {
     let lamp = &mut scene.lamps[0];
     lamp.exponent = 1.0;
     lamp.luminance_cd_m2 = (grey - view.sensor.black_level_grey) / view.grey_per_cd_m2();
-    lamp.waveform = Waveform {
-        frame: ChipFrame { bits: 1, len: 1 },
-        chip_s: 1.0,
-        phase_s: 0.0,
-    };
+    lamp.waveform = Waveform::sharp(ChipFrame { bits: 1, len: 1 }, 1.0, 0.0);
     scene
 }
 

@@ -42,9 +42,9 @@ fn every_file_validates() {
 fn constants_have_one_source() {
     assert_eq!(constant("MAX_HEADLIGHTS"), layout::MAX_HEADLIGHTS as u32);
     let from_rust = surface::wgsl();
-    for name in ["HALO_REACH"] {
+    for name in ["GLARE_STEP_PX"] {
         assert!(from_rust.contains(&format!("const {name}")));
-        for file in ["common", "background", "blend", "lamps", "sensor"] {
+        for file in ["common", "background", "blend", "lamps", "glare", "sensor"] {
             let times = shader_source(file)
                 .unwrap()
                 .matches(&format!("const {name}"))
@@ -128,8 +128,8 @@ fn structs_agree() {
         pose_middle,
         extinction_per_m,
         airlight_e,
+        blur_px,
         unused,
-        unused_too,
         headlights
     );
     same_layout!(
@@ -142,8 +142,28 @@ fn structs_agree() {
     );
     same_layout!("background", Pose, x, y, z);
     same_layout!(
-        "lamps", Lamp, disc_low, disc_high, halo_low, halo_high, first_row, table, radius_m,
-        exponent, dark_e
+        "lamps",
+        Lamp,
+        low,
+        high,
+        first_row,
+        rows_at,
+        instants_at,
+        instants,
+        radius_m,
+        exponent,
+        dark_e
     );
-    same_layout!("lamps", LampRow, quarters, normal_halo, image_px);
+    same_layout!("lamps", LampRow, normal, unused);
+    same_layout!("lamps", Instant, centre, signal_e);
+    same_layout!("glare", Glare, low, high, first_row, rows_at);
+    same_layout!(
+        "glare",
+        GlareRow,
+        centre_px,
+        apparent_px,
+        near_e,
+        wide_e,
+        wide_px2
+    );
 }

@@ -55,6 +55,7 @@ mod gauge;
 mod problem;
 mod section;
 pub mod uid;
+mod waveform;
 
 pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
 pub use document::{did_you_mean, locate, read_toml};

@@ -24,6 +24,8 @@
 //! assert_eq!(Uid::from_frame(frame, LineCode::Manchester), Some(uid));
 //! ```
 
+pub use super::waveform::{LightCurve, Ripple, Waveform};
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -56,64 +58,6 @@ impl ChipFrame {
     /// Whether the lamp is on in chip `k`; never beyond the frame.
     pub fn is_on(&self, k: u32) -> bool {
         k < self.len && self.bits.checked_shr(k).unwrap_or(0) & 1 == 1
-    }
-}
-
-/// How a lamp blinks: a chip frame sent over and over.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Waveform {
-    /// One period.
-    pub frame: ChipFrame,
-    /// Duration of a chip.
-    pub chip_s: f64,
-    /// Time of the start of some period, seconds.
-    pub phase_s: f64,
-}
-
-impl Waveform {
-    /// Duration of the whole frame.
-    pub fn period_s(&self) -> f64 {
-        self.chip_s * f64::from(self.frame.len)
-    }
-
-    /// Share of the interval from `open_s` to `close_s` in which the lamp is on: the exact
-    /// integral of the waveform.
-    pub fn on_share(&self, open_s: f64, close_s: f64) -> f64 {
-        let (a, b) = (
-            (open_s - self.phase_s) / self.chip_s,
-            (close_s - self.phase_s) / self.chip_s,
-        );
-        if b <= a {
-            return f64::from(u8::from(self.on_at(open_s)));
-        }
-        (self.on_until(b) - self.on_until(a)) / (b - a)
-    }
-
-    /// Whether the lamp is on at a time.
-    pub fn on_at(&self, t_s: f64) -> bool {
-        let chip = ((t_s - self.phase_s) / self.chip_s).floor();
-        self.frame
-            .is_on(chip.rem_euclid(f64::from(self.frame.len)) as u32)
-    }
-
-    /// Chips' worth of light between the phase's origin and `x` chips later.
-    fn on_until(&self, x: f64) -> f64 {
-        let len = f64::from(self.frame.len);
-        let periods = (x / len).floor();
-        let inside = x - periods * len;
-        let whole = inside.floor();
-        let mask = if whole >= 64.0 {
-            u64::MAX
-        } else {
-            (1u64 << whole as u32) - 1
-        };
-        let full = f64::from(self.frame.bits.count_ones());
-        let current = if self.frame.is_on(whole as u32) {
-            inside - whole
-        } else {
-            0.0
-        };
-        periods * full + f64::from((self.frame.bits & mask).count_ones()) + current
     }
 }
 
@@ -356,67 +300,5 @@ mod tests {
             }
             assert_eq!(crc6(data, 14), rest);
         }
-    }
-
-    /// Provokes: an integral that is off at chip borders, over whole periods, before the phase,
-    /// or late in a run: held against 20,000 samples.
-    #[test]
-    fn on_share_is_the_mean_of_dense_samples() {
-        for (k, uid) in all().step_by(997).enumerate() {
-            let waveform = Waveform {
-                frame: uid.frame(CODES[k % 2]),
-                chip_s: 45e-6,
-                phase_s: 3.21e-4 * k as f64,
-            };
-            for (open, span) in [
-                (-0.01, 50e-6),
-                (0.0123, 13e-6),
-                (0.3, 45e-6),
-                (600.0, 100e-6),
-                (2.0, 7e-3),
-            ] {
-                let n = 20_000;
-                let on = (0..n)
-                    .filter(|i| waveform.on_at(open + span * (f64::from(*i) + 0.5) / f64::from(n)))
-                    .count();
-                let sampled = on as f64 / f64::from(n);
-                let share = waveform.on_share(open, open + span);
-                // A sample decides for its cell: half a cell a border of a chip.
-                let borders = 2.0 + span / waveform.chip_s;
-                assert!(
-                    (share - sampled).abs() < 0.5 * borders / f64::from(n) + 1e-6,
-                    "{uid} {open} {span}: {share} {sampled}"
-                );
-            }
-            let whole = waveform.on_share(0.1, 0.1 + 3.0 * waveform.period_s());
-            let mean = f64::from(waveform.frame.bits.count_ones()) / f64::from(waveform.frame.len);
-            assert!((whole - mean).abs() < 1e-9);
-        }
-    }
-
-    /// Provokes: shifts by more bits than there are.
-    #[test]
-    fn odd_frames_do_not_panic() {
-        for (bits, len) in [(u64::MAX, 64), (5, 0), (u64::MAX, 200)] {
-            let waveform = Waveform {
-                frame: ChipFrame { bits, len },
-                chip_s: 45e-6,
-                phase_s: 0.0,
-            };
-            for t in [-1.0, 0.0, 1e-3, f64::NAN] {
-                waveform.on_at(t);
-                waveform.on_share(t, t + 1e-4);
-            }
-        }
-        let full = ChipFrame {
-            bits: u64::MAX,
-            len: 64,
-        };
-        let waveform = Waveform {
-            frame: full,
-            chip_s: 1.0,
-            phase_s: 0.0,
-        };
-        assert!((waveform.on_share(-3.3, 130.7) - 1.0).abs() < 1e-12);
     }
 }

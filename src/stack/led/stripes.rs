@@ -235,11 +235,7 @@ mod tests {
                     line: 1,
                     lamp: 25 * k,
                 };
-                let wave = Waveform {
-                    frame: uid.manchester(),
-                    chip_s: 45e-6,
-                    phase_s: 1e-3 + 3.7e-6 * f64::from(k),
-                };
+                let wave = Waveform::sharp(uid.manchester(), 45e-6, 1e-3 + 3.7e-6 * f64::from(k));
                 let read = reader.read(&profile(&wave, grey), 4.0, &mut reading);
                 assert!(
                     read,
@@ -264,11 +260,7 @@ mod tests {
         let mut reader = StripeReader::new(45e-6, SHUTTER);
         let mut reading = StripeReading::default();
         let uid = Uid { line: 1, lamp: 77 };
-        let other = Waveform {
-            frame: uid.manchester(),
-            chip_s: 61e-6,
-            phase_s: 0.0,
-        };
+        let other = Waveform::sharp(uid.manchester(), 61e-6, 0.0);
         let mut steady = profile(&other, 80.0);
         steady.light.fill(80.0);
         let mut dark = profile(&other, 80.0);

@@ -168,11 +168,11 @@ impl World {
         left_from_eye: &Isometry3<f64>,
     ) {
         let (c, s) = (self.rig.camera.intrinsics, self.rig.camera.shutter);
-        let wave = Waveform {
-            frame: lamp.uid.frame(lamp.code),
-            chip_s: lamp.chip_s * (1.0 + 1e-6 * self.clock_ppm),
-            phase_s: 0.000_123 * f64::from(lamp.uid.lamp),
-        };
+        let wave = Waveform::sharp(
+            lamp.uid.frame(lamp.code),
+            lamp.chip_s * (1.0 + 1e-6 * self.clock_ppm),
+            0.000_123 * f64::from(lamp.uid.lamp),
+        );
         let seen = |t_s: f64| {
             let to_eye = (self.world_from_left(t_s) * left_from_eye).inverse();
             (to_eye * lamp.centre, to_eye * lamp.facing.into_inner())

@@ -39,7 +39,8 @@
 //! the halo of lamps through it, are left out.
 
 use super::scene::{Air, Headlight, LampLight};
-use crate::track::{LampSite, TrackPoint, Tunnel, uid::Waveform};
+use crate::track::uid::{LightCurve, Ripple, Waveform};
+use crate::track::{LampSite, TrackPoint, Tunnel};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -69,6 +70,9 @@ pub fn disc_places(centre: &Point3<f64>, axis: &Vector3<f64>, radius_m: f64) -> 
         centre + (aside * cos + up * sin) * r
     })
 }
+/// Rise and fall time of a lamp's light, from 10 to 90 %: that of an LED driver that switches a
+/// lamp of some ten watts by a transistor; the phosphor's own is a tenth of it.
+const EDGE_S: f64 = 1e-6;
 
 /// Exponent m for which the intensity has fallen to half at half the full beam angle.
 pub fn exponent_of_beam(full_beam_rad: f64) -> f64 {
@@ -88,20 +92,26 @@ impl LampLight {
             luminance_cd_m2: flux_lm * (exponent + 1.0) / (TAU * PI * radius_m * radius_m),
             exponent,
             waveform: Waveform {
-                frame: site.uid.frame(site.code),
-                chip_s: site.chip_s,
-                phase_s,
+                rise_s: EDGE_S,
+                fall_s: EDGE_S,
+                ..Waveform::sharp(site.uid.frame(site.code), site.chip_s, phase_s)
             },
+            level: 1.0,
+            ripple: Ripple::default(),
         }
     }
 
-    /// Share of the time that it is on.
-    pub fn duty(&self) -> f64 {
-        let frame = self.waveform.frame;
-        f64::from(frame.bits.count_ones()) / f64::from(frame.len.max(1))
+    /// Its light in time. Times [`Self::level`] it is the light of a good lamp that stays on.
+    pub fn curve(&self) -> LightCurve {
+        LightCurve::new(&self.waveform, self.ripple)
     }
 
-    /// Intensity along the normal while on.
+    /// Its light in the mean over time, as a share of that of a good lamp that stays on.
+    pub fn duty(&self) -> f64 {
+        self.level * self.curve().long_mean()
+    }
+
+    /// Intensity along the normal of a good lamp while on.
     pub fn axial_intensity_cd(&self) -> f64 {
         self.luminance_cd_m2 * PI * self.radius_m * self.radius_m
     }

@@ -2,6 +2,7 @@
 //! fall-back. Both draw the same [`Scene`] through the same [`View`].
 
 pub mod cpu;
+pub mod glare;
 pub mod gpu;
 mod hull;
 pub mod light;

@@ -5,7 +5,7 @@ use super::sensor::{LensSettings, SensorSettings};
 use super::surface::SATURATION;
 use crate::bus::{CameraModel, SimTime};
 use crate::track::Tunnel;
-use crate::track::uid::Waveform;
+use crate::track::uid::{Ripple, Waveform};
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::sync::Arc;
@@ -91,6 +91,10 @@ pub struct LampLight {
     pub exponent: f64,
     /// When it is on.
     pub waveform: Waveform,
+    /// Its light as a share of that of a good lamp: 1 good, 0 dead, between them dim.
+    pub level: f64,
+    /// What the mains leave in its light.
+    pub ripple: Ripple,
 }
 
 /// A solid shape, centred on its body's origin.

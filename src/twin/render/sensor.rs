@@ -25,10 +25,14 @@ pub struct LensSettings {
     pub transmission: f64,
     /// Standard deviation of the point spread in focus, pixels. Default 0.5.
     pub blur_px: f64,
-    /// Share of a lamp's light that glare spreads around it. Default 0.02.
+    /// Share of a lamp's light that near glare spreads around it. Default 0.02.
     pub halo_share: f64,
-    /// Distance in which the glare falls to 1/e, pixels. Default 12.
+    /// Distance in which the near glare falls to 1/e, pixels. Default 12.
     pub halo_px: f64,
+    /// Share of a lamp's light in the wide veil around it. Default 0.02.
+    pub veil_share: f64,
+    /// Width of the veil, pixels: half of its light lies within 1.73 times this. Default 20.
+    pub veil_px: f64,
     /// How much of the natural vignetting, the fourth power of the cosine to the axis, is left:
     /// 1 all, 0 none. Default 1.
     pub vignetting: f64,
@@ -42,6 +46,8 @@ impl Default for LensSettings {
             blur_px: 0.5,
             halo_share: 0.02,
             halo_px: 12.0,
+            veil_share: 0.02,
+            veil_px: 20.0,
             vignetting: 1.0,
         }
     }
@@ -61,6 +67,8 @@ impl LensSettings {
         check.within("blur_px", self.blur_px, 0.0..=50.0, "px");
         check.within("halo_share", self.halo_share, 0.0..=1.0, "");
         check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
+        check.within("veil_share", self.veil_share, 0.0..=1.0, "");
+        check.within("veil_px", self.veil_px, 0.1..=1e4, "px");
         check.within("vignetting", self.vignetting, 0.0..=1.0, "");
     }
 }

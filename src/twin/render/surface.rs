@@ -12,8 +12,10 @@ pub const MIN_SINE: f64 = 0.05;
 pub const LAMP_SIGHT_M: f64 = 80.0;
 /// Reflectance of a lamp's disc while it is off.
 pub const DARK_DISC_ALBEDO: f64 = 0.3;
-/// The glare of a lamp ends this many decay lengths outside its disc.
-pub const HALO_REACH: f64 = 8.0;
+/// Glare of a lamp is followed to where a part of it has fallen to this many electrons.
+pub const FAINT_E: f64 = 0.3;
+/// From one texel of glare to the next along a row, pixels.
+pub const GLARE_STEP_PX: f64 = 4.0;
 /// Signals are followed up to this many times the full well.
 pub const SATURATION: f64 = 4.0;
 
@@ -33,6 +35,6 @@ pub const fn mean_albedo(material: Material) -> f64 {
 pub fn wgsl() -> String {
     let mut text = String::from("// Written by twin/render/surface.rs.\n");
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "const HALO_REACH: f32 = {HALO_REACH:?};");
+    let _ = writeln!(text, "const GLARE_STEP_PX: f32 = {GLARE_STEP_PX:?};");
     text
 }

@@ -23,14 +23,18 @@
 //! 2. its reflected luminance, albedo * E / pi, the albedo from its [painting](super::paint) over
 //!    the pixel's footprint, E less what bodies shade ([`light`](super::light)), seen through the
 //!    air;
-//! 3. lamp discs, from 4 x 4 sub-pixels at 4 instants of the row's exposure;
+//! 3. lamp discs, by rays spread over the pixel and the lens's point spread in many instants;
 //! 4. the glare of each lamp;
 //! 5. grey level, noise, rounding.
+//!
+//! Where something moves in the picture by more than a pixel while a row is exposed, the exposure
+//! is cut into slices in which nothing does, and all this is done in each of them;
+//! [`CpuRenderer::sliced`] cuts it into as many as one likes.
 //!
 //! Rows are independent of each other, so any number of threads gives the same bytes. What a
 //! camera that stands still sees of the tunnel is kept from frame to frame.
 //!
-//! Not here: reflections, motion blur of anything but lamps, lens distortion. Beyond [`SIGHT_M`]
+//! Not here: reflections, and the point spread of anything but lamps. Beyond [`SIGHT_M`]
 //! the tunnel is dark.
 
 mod dim;
@@ -39,7 +43,9 @@ mod look;
 mod outline;
 mod sensor;
 mod shadow;
+mod smear;
 mod solid;
+mod spread;
 mod tunnel;
 
 pub use solid::Solid;
@@ -52,10 +58,11 @@ use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
 use image::GrayImage;
-use lamps::{Haze, RowExposure};
+use lamps::{Haze, RowExposure, SeenLamp};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use shadow::{Blocker, Shades};
+use spread::Spread;
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -70,6 +77,8 @@ const KEPT_VIEWS: usize = 4;
 pub struct CpuRenderer {
     world: World,
     every_ray: bool,
+    /// Of a row's exposure, where they are given.
+    slices: Option<usize>,
     kept: VecDeque<KeptView>,
     drawn: VecDeque<Vec<GrayImage>>,
 }
@@ -126,6 +135,8 @@ struct RowBuffers {
     /// Of the nearest surface; not a number where nobody has asked yet.
     depths: Vec<f64>,
     luminances: Vec<f64>,
+    /// Of the slices so far.
+    sums: Vec<f64>,
 }
 
 /// The rays of a row through the tunnel.
@@ -154,8 +165,15 @@ impl CpuRenderer {
         Self::new(scene, false)
     }
 
+    /// Cuts every row's exposure into so many slices, whatever moves in it.
+    pub fn sliced(mut self, slices: usize) -> Self {
+        self.slices = Some(slices.max(1));
+        self
+    }
+
     fn new(scene: Scene, every_ray: bool) -> Self {
         Self {
+            slices: None,
             world: World {
                 tunnel: TunnelCaster::new(&scene.tunnel),
                 paintings: Paintings::of(&scene.tunnel),
@@ -187,15 +205,27 @@ impl CpuRenderer {
             (None, Some(dim)) => Behind::Dim(dim),
             (None, None) => Behind::Unknown,
         };
+        let slices = self.slices.unwrap_or_else(|| smear::slices(job, view));
+        let spread = Spread::new(view.lens.blur_px);
         // An image without pixels has no rows.
         image
             .par_chunks_mut((camera.width_px as usize).max(1))
             .enumerate()
             .for_each_init(RowBuffers::default, |buffers, (v, pixels)| {
-                let row = RowExposure::new(view, v);
-                let rays = RowRays::new(&self.world, &scenery, view, &row, behind);
-                rays.draw(&lamps, buffers);
-                sensor::expose(view, v, &buffers.luminances, pixels);
+                buffers.sums.clear();
+                buffers.sums.resize(pixels.len(), 0.0);
+                for k in 0..slices {
+                    let row = RowExposure::slice(view, v, k, slices);
+                    let rays = RowRays::new(&self.world, &scenery, view, &row, behind);
+                    rays.draw(&lamps, &spread, buffers);
+                    let RowBuffers {
+                        sums, luminances, ..
+                    } = &mut *buffers;
+                    for (sum, luminance) in sums.iter_mut().zip(luminances) {
+                        *sum += *luminance / slices as f64;
+                    }
+                }
+                sensor::expose(view, v, &buffers.sums, pixels);
             });
         image
     }
@@ -239,7 +269,7 @@ impl Renderer for CpuRenderer {
 
 impl World {
     /// Lamps that may be seen, the farthest first so that nearer ones are drawn over them.
-    fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<&LampLight> {
+    fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<SeenLamp<'_>> {
         let eye = Point3::from(pose.translation.vector);
         let away = |lamp: &LampLight| (lamp.centre - eye).norm();
         // Through a frame a train moves by a few metres.
@@ -251,7 +281,7 @@ impl World {
             .filter(|l| away(l) < reach)
             .collect();
         lamps.sort_by(|a, b| away(b).total_cmp(&away(a)));
-        lamps
+        lamps.into_iter().map(SeenLamp::new).collect()
     }
 
     fn all_ground(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> Vec<Ground> {
@@ -337,7 +367,7 @@ impl<'a> RowRays<'a> {
         behind: Behind<'a>,
     ) -> Self {
         let eye = Point3::from(row.mid.translation.vector);
-        let mid = (view.camera.shutter).row_mid(view.start, row.v as f64);
+        let mid = view.start.plus(row.mid_s);
         Self {
             world,
             scenery,
@@ -401,32 +431,37 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    fn draw(&self, lamps: &[&LampLight], buffers: &mut RowBuffers) {
+    fn draw(&self, lamps: &[SeenLamp<'_>], spread: &Spread, buffers: &mut RowBuffers) {
         self.draw_tunnel(buffers);
         let view = self.view;
         for blocker in &self.blockers {
             self.draw_solid(&blocker.solid, buffers);
         }
         self.veil(buffers);
-        let RowBuffers { depths, luminances } = buffers;
+        let RowBuffers {
+            depths, luminances, ..
+        } = buffers;
         for lamp in lamps {
             let depth = |u| self.depth(u, depths);
             lamps::draw_disc(
                 lamp,
                 view,
+                spread,
                 self.row,
-                (self.world.line.ambient_lx, self.haze(lamp)),
+                (self.world.line.ambient_lx, self.haze(lamp.light)),
                 depth,
                 luminances,
             );
         }
         for lamp in lamps {
-            lamps::add_halo(lamp, view, self.row, self.haze(lamp), luminances);
+            lamps::add_glare(lamp, view, self.row, self.haze(lamp.light), luminances);
         }
     }
 
     fn draw_tunnel(&self, buffers: &mut RowBuffers) {
-        let RowBuffers { depths, luminances } = buffers;
+        let RowBuffers {
+            depths, luminances, ..
+        } = buffers;
         depths.clear();
         luminances.clear();
         let width = self.view.camera.intrinsics.width_px as usize;

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
 use crate::bus::{Shutter, SimTime};
-use crate::track::uid::{ChipFrame, Uid, Waveform};
+use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
@@ -113,15 +113,13 @@ fn lamp(waveform: Waveform) -> LampLight {
         luminance_cd_m2: 5000.0,
         exponent: 1.0,
         waveform,
+        level: 1.0,
+        ripple: Ripple::default(),
     }
 }
 
 fn always_on() -> Waveform {
-    Waveform {
-        frame: ChipFrame { bits: 1, len: 1 },
-        chip_s: 1.0,
-        phase_s: 0.0,
-    }
+    Waveform::sharp(ChipFrame { bits: 1, len: 1 }, 1.0, 0.0)
 }
 
 fn grey_of(view: &View, luminance: f64) -> f64 {
@@ -265,11 +263,7 @@ fn a_body_throws_its_shadow_on_the_wall_and_takes_it_along() {
 /// instead of a waveform: rows inside a large lamp are the waveform's exact integral.
 #[test]
 fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
-    let waveform = Waveform {
-        frame: Uid { line: 3, lamp: 77 }.manchester(),
-        chip_s: 70e-6,
-        phase_s: 0.123_456,
-    };
+    let waveform = Waveform::sharp(Uid { line: 3, lamp: 77 }.manchester(), 70e-6, 0.123_456);
     let mut light = lamp(waveform);
     light.luminance_cd_m2 = 7000.0;
     let mut view = view(Intrinsics::centred(200, 300, 700.0));

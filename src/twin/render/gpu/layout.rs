@@ -120,30 +120,30 @@ pub struct View {
     pub extinction_per_m: f32,
     /// Signal of endless air.
     pub airlight_e: f32,
+    /// Standard deviation of the point spread.
+    pub blur_px: f32,
     /// Fills up to the alignment of what follows.
-    pub unused: f32,
-    /// The same.
-    pub unused_too: [f32; 2],
+    pub unused: [f32; 2],
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }
 
-/// A lamp in a view.
+/// A lamp's disc in a view.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct Lamp {
-    /// Upper left bound of its disc.
-    pub disc_low: [f32; 2],
-    /// Lower right bound of its disc.
-    pub disc_high: [f32; 2],
-    /// Upper left bound of its glare.
-    pub halo_low: [f32; 2],
-    /// Lower right bound of its glare.
-    pub halo_high: [f32; 2],
+    /// Upper left bound.
+    pub low: [f32; 2],
+    /// Lower right bound.
+    pub high: [f32; 2],
     /// First row that its table has.
     pub first_row: i32,
     /// Entry of the table for that row.
-    pub table: u32,
+    pub rows_at: u32,
+    /// First instant of that row.
+    pub instants_at: u32,
+    /// Instants of every row.
+    pub instants: u32,
     /// Radius of the disc.
     pub radius_m: f32,
     /// Exponent of luminance against the cosine.
@@ -151,18 +151,55 @@ pub struct Lamp {
     /// Signal of the disc while off.
     pub dark_e: f32,
     /// Fills the stride.
-    pub unused: [u32; 1],
+    pub unused: u32,
 }
 
-/// A lamp while one row is exposed.
+/// A disc while one row is exposed.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 pub struct LampRow {
-    /// Centre in the camera's frame in the middle of each quarter of the exposure, and the signal
-    /// along the normal in that quarter.
-    pub quarters: [[f32; 4]; 4],
-    /// Normal in the camera's frame, and the signal of the glare on the rim.
-    pub normal_halo: [f32; 4],
-    /// Centre and apparent radius in the image.
-    pub image_px: [f32; 4],
+    /// In the camera's frame.
+    pub normal: [f32; 3],
+    /// Fills the stride.
+    pub unused: f32,
+}
+
+/// A disc in a part of the time in which one row is exposed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Instant {
+    /// In the camera's frame.
+    pub centre: [f32; 3],
+    /// Signal along the normal in this part of the exposure.
+    pub signal_e: f32,
+}
+
+/// A lamp's glare in a view.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Glare {
+    /// Upper left bound.
+    pub low: [f32; 2],
+    /// Lower right bound.
+    pub high: [f32; 2],
+    /// First row that its table has.
+    pub first_row: i32,
+    /// Entry of the table for that row.
+    pub rows_at: u32,
+}
+
+/// Glare while one row is exposed.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct GlareRow {
+    /// Centre of the lamp in the image.
+    pub centre_px: [f32; 2],
+    /// Radius of a circle as large as the lamp's image.
+    pub apparent_px: f32,
+    /// Signal of the near part on the disc.
+    pub near_e: f32,
+    /// Signal of the wide part times the third power of its width.
+    pub wide_e: f32,
+    /// Square of that width.
+    pub wide_px2: f32,
 }

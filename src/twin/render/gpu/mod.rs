@@ -19,10 +19,11 @@
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
 //!    headlights are added in every pixel.
-//! 2. *Lamps.* Discs are ray-cast in every pixel with four instants in the exposure and 4 x 4
-//!    sub-pixels; where the disc is and how long it is on comes row by row from double precision.
-//!    Then the glare is added.
-//! 3. *Sensor.* Shot and read noise, 8 bits.
+//! 2. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
+//!    closed form along the row and is summed over a few lines across it, at each of the instants
+//!    of the row's exposure; where the disc is and how bright in each comes from double precision.
+//!    The glare is summed up in a texture of its own, a texel for every fourth pixel.
+//! 3. *Sensor.* Glare is added; shot and read noise, 8 bits.
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
@@ -35,6 +36,7 @@
 
 mod adapter;
 mod chunks;
+mod glare;
 mod lamps;
 pub mod layout;
 mod mesh;
@@ -55,8 +57,9 @@ use super::scene::{Body, Job, Scene, View};
 use super::{Backend, RenderError, Renderer};
 use adapter::Gpu;
 use chunks::Chunks;
+use glare::GlareTarget;
 use image::GrayImage;
-use lamps::LampTable;
+use lamps::{Around, LampTable};
 use layout::Pose;
 use mesh::Mesh;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
@@ -79,6 +82,7 @@ pub struct GpuRenderer {
     bodies: BodyBuffers,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
+    glares: Vec<GlareTarget>,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
     scratch: Scratch,
@@ -115,6 +119,7 @@ impl GpuRenderer {
             bodies: BodyBuffers::new(&gpu),
             views: Vec::new(),
             targets: Vec::new(),
+            glares: Vec::new(),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
             scratch: Scratch::default(),
@@ -147,12 +152,15 @@ impl GpuRenderer {
         let gpu = &self.gpu;
         if !self.targets.iter().any(|t| t.size_px == size_px) {
             self.targets.push(Target::new(&gpu.device, size_px));
+            self.glares.push(GlareTarget::new(&gpu.device, size_px));
         }
+        let glare = self.glares.iter().find(|g| g.size_px == size_px);
         let back = match self.spare.iter().position(|b| b.fits(size_px)) {
             Some(at) => self.spare.swap_remove(at),
             None => ReadBack::new(&gpu.device, size_px),
         };
-        if let Some(target) = self.targets.iter().find(|t| t.size_px == size_px) {
+        let target = self.targets.iter().find(|t| t.size_px == size_px);
+        if let (Some(target), Some(glare)) = (target, glare) {
             let buffers = &self.views[k];
             let stock = Stock {
                 chunks: &self.chunks,
@@ -168,7 +176,8 @@ impl GpuRenderer {
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);
             let pipelines = &self.pipelines;
             buffers.draw_lamps(gpu, pipelines, encoder, target);
-            buffers.draw_sensor(gpu, pipelines, encoder, target);
+            buffers.draw_glare(gpu, pipelines, encoder, glare);
+            buffers.draw_sensor(gpu, pipelines, encoder, (target, glare));
             target.copy_to(encoder, &back);
         }
         back
@@ -186,12 +195,15 @@ impl GpuRenderer {
         };
         let meshes = (&self.chunks, &self.bodies);
         scratch.sight.fill(framed, job, &world, meshes);
-        scratch
-            .lamps
-            .fill(framed, &self.scene.lamps, tunnel.ambient_lx);
         let airlight_cd_m2 = self
             .field
             .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
+        let around = Around {
+            ambient_lx: tunnel.ambient_lx,
+            air: &self.scene.air,
+            airlight_cd_m2,
+        };
+        scratch.lamps.fill(framed, &self.scene.lamps, &around);
         let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
         let constants = framed.constants(job, air, &mut scratch.poses);
         while self.views.len() <= k {
@@ -203,8 +215,7 @@ impl GpuRenderer {
                 constants,
                 poses: &scratch.poses,
                 sight: &scratch.sight,
-                lamps: &scratch.lamps.lamps,
-                rows: &scratch.lamps.rows,
+                lamps: &scratch.lamps,
             },
         );
     }

@@ -2,7 +2,9 @@
 
 use super::adapter::Gpu;
 use super::chunks::Chunks;
-use super::layout::{Lamp, LampRow, Pose, View};
+use super::glare::GlareTarget;
+use super::lamps::LampTable;
+use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Pose, View};
 use super::pipeline::{Background, Pipelines, bind};
 use super::sight::Sight;
 use super::target::Target;
@@ -84,7 +86,11 @@ pub struct ViewBuffers {
     placements: Upload,
     lamps: Upload,
     rows: Upload,
+    instants: Upload,
     lamp_count: u32,
+    glares: Upload,
+    glare_rows: Upload,
+    glare_count: u32,
 }
 
 /// What a view uploads, made by the caller.
@@ -96,9 +102,7 @@ pub struct ViewData<'a> {
     /// Tunnel and bodies.
     pub sight: &'a Sight,
     /// Its lamps.
-    pub lamps: &'a [Lamp],
-    /// Their rows.
-    pub rows: &'a [LampRow],
+    pub lamps: &'a LampTable,
 }
 
 /// Bind groups of the background's pipelines; one a texture.
@@ -130,7 +134,11 @@ impl ViewBuffers {
             placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 10),
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
             rows: Upload::new(gpu, storage, size_of::<LampRow>()),
+            instants: Upload::new(gpu, storage, size_of::<Instant>()),
             lamp_count: 0,
+            glares: Upload::new(gpu, storage, size_of::<Glare>()),
+            glare_rows: Upload::new(gpu, storage, size_of::<GlareRow>()),
+            glare_count: 0,
         }
     }
 
@@ -140,9 +148,14 @@ impl ViewBuffers {
         self.poses.write(gpu, data.poses);
         self.shares.write(gpu, &data.sight.shares);
         self.placements.write(gpu, &data.sight.placements);
-        self.lamps.write(gpu, data.lamps);
-        self.rows.write(gpu, data.rows);
-        self.lamp_count = data.lamps.len() as u32;
+        let table = data.lamps;
+        self.lamps.write(gpu, &table.lamps);
+        self.rows.write(gpu, &table.rows);
+        self.instants.write(gpu, &table.instants);
+        self.lamp_count = table.lamps.len() as u32;
+        self.glares.write(gpu, &table.glares);
+        self.glare_rows.write(gpu, &table.glare_rows);
+        self.glare_count = table.glares.len() as u32;
     }
 
     /// Tunnel and bodies at every instant of the exposure.
@@ -242,7 +255,7 @@ impl ViewBuffers {
         }
     }
 
-    /// Discs, then glare.
+    /// Discs over the background.
     pub fn draw_lamps(
         &self,
         gpu: &Gpu,
@@ -257,16 +270,38 @@ impl ViewBuffers {
             self.view.binding(),
             self.lamps.binding(),
             self.rows.binding(),
+            self.instants.binding(),
             wgpu::BindingResource::TextureView(&target.depth),
         ];
-        let discs = bind(&gpu.device, &pipelines.discs, &resources);
-        let halos = bind(&gpu.device, &pipelines.halos, &resources[..3]);
+        let group = bind(&gpu.device, &pipelines.discs, &resources);
         let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
-        for (pipeline, group) in [(&pipelines.discs, &discs), (&pipelines.halos, &halos)] {
-            pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, group, &[]);
-            pass.draw(0..6, 0..self.lamp_count);
+        pass.set_pipeline(&pipelines.discs);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..6, 0..self.lamp_count);
+    }
+
+    /// Glare, in its own texture.
+    pub fn draw_glare(
+        &self,
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &GlareTarget,
+    ) {
+        let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+        let mut pass = begin(encoder, &target.texture, load, None);
+        if self.glare_count == 0 {
+            return;
         }
+        let resources = [
+            self.view.binding(),
+            self.glares.binding(),
+            self.glare_rows.binding(),
+        ];
+        let group = bind(&gpu.device, &pipelines.glare, &resources);
+        pass.set_pipeline(&pipelines.glare);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..6, 0..self.glare_count);
     }
 
     /// Noise and eight bits.
@@ -275,7 +310,7 @@ impl ViewBuffers {
         gpu: &Gpu,
         pipelines: &Pipelines,
         encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
+        (target, glare): (&Target, &GlareTarget),
     ) {
         let group = bind(
             &gpu.device,
@@ -283,6 +318,7 @@ impl ViewBuffers {
             &[
                 self.view.binding(),
                 wgpu::BindingResource::TextureView(&target.signal),
+                wgpu::BindingResource::TextureView(&glare.texture),
             ],
         );
         let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);

@@ -12,7 +12,7 @@ pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 5] = [
+const FILES: [(&str, &str); 6] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
     (
         "background",
@@ -20,6 +20,7 @@ const FILES: [(&str, &str); 5] = [
     ),
     ("blend", include_str!("../../../../shaders/blend.wgsl")),
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
+    ("glare", include_str!("../../../../shaders/glare.wgsl")),
     ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
 ];
 
@@ -54,8 +55,8 @@ pub struct Pipelines {
     pub blend: wgpu::RenderPipeline,
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
-    /// Lamps' glare, added.
-    pub halos: wgpu::RenderPipeline,
+    /// Lamps' glare, added up.
+    pub glare: wgpu::RenderPipeline,
     /// Noise and quantisation.
     pub sensor: wgpu::RenderPipeline,
 }
@@ -78,7 +79,8 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (lamps, sensor, blend) = (shader("lamps"), shader("sensor"), shader("blend"));
+        let (lamps, glare, sensor) = (shader("lamps"), shader("glare"), shader("sensor"));
+        let blend = shader("blend");
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -96,7 +98,7 @@ impl Pipelines {
             background: shader("background"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
-            halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
+            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over)),
             sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
         }
     }

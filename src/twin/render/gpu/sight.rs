@@ -168,10 +168,11 @@ impl Sight {
         if known.is_none() {
             self.lamps.push(lamp);
             let shutter = &framed.view.camera.shutter;
-            let (light, mean) = (&lamps[lamp], lamps[lamp].duty().max(1e-9));
+            let light = &lamps[lamp];
+            let (curve, mean) = (light.curve(), light.duty().max(1e-9));
             self.shares.extend((0..rows).map(|v| {
                 let open = shutter.row_open(framed.view.start, f64::from(v)).secs();
-                (light.waveform.on_share(open, open + shutter.exposure_s) / mean) as f32
+                (light.level * curve.mean(open, open + shutter.exposure_s) / mean) as f32
             }));
         }
         (at + 1) * rows

@@ -79,6 +79,7 @@ impl<'a> Framed<'a> {
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
             extinction_per_m: extinction_per_m as f32,
             airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,
+            blur_px: self.view.lens.blur_px as f32,
             halo_px: self.view.lens.halo_px as f32,
             saturation_e: self.view.saturation_e() as f32,
             ..layout::View::default()
