@@ -11,7 +11,7 @@
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
 //! | walls beside a lamp | light falls with a power of the distance; cells are cut to a quarter of it | within the same bounds |
 //! | a lamp's bounding box, full size | an f32 sub-ray of the disc's rim falls on the other side: 1/16 of the disc's signal | 2 % over 2 |
-//! | noise | another order of the hash's words | equal mean and variance in every grey band |
+//! | noise | none: the same streams (`tests/sensor.rs`) | equal mean and variance in every grey band |
 //!
 //! A machine without a graphics adapter fails here: `apt-get install mesa-vulkan-drivers` gives a
 //! software one.
@@ -120,6 +120,7 @@ fn rig_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
             luminance_cd_m2: 0.0,
         }],
         views: vec![view],
+        ..Job::default()
     }
 }
 

@@ -247,6 +247,7 @@ impl<'s> Run<'s> {
             bodies,
             headlights: self.world.headlights(),
             views,
+            ..Job::default()
         };
         Ok(self.shots.submit(&job, shot, &mut self.cost)?)
     }

@@ -23,7 +23,7 @@
 //! 2. its reflected luminance, albedo * E / pi ([`light`](super::light));
 //! 3. lamp discs, from 4 x 4 sub-pixels at 4 instants of the row's exposure;
 //! 4. the glare of each lamp;
-//! 5. grey level, noise, rounding.
+//! 5. the sensor: fixed pattern, noise, bits ([`sensor`](super::sensor)).
 //!
 //! Rows are independent of each other, so any number of threads gives the same bytes. What a
 //! camera that stands still sees of the tunnel is kept from frame to frame.
@@ -43,15 +43,19 @@ pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
 use super::light::{LampField, headlights_lx};
-use super::{Backend, Headlight, Job, LampLight, RenderError, Renderer, Scene, View};
+use super::pixel_map::{MapCache, MapKey, PixelMap};
+use super::upper_bits;
+use super::{Backend, Headlight, Job, LampLight, RawImage, RenderError, Renderer, Scene, View};
 use crate::bus::{CameraModel, Intrinsics};
 use dim::{CELL_PX, DimView};
 use image::GrayImage;
 use lamps::RowExposure;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use sensor::Sensor;
 use std::collections::VecDeque;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Surfaces farther away than this are not seen.
 pub const SIGHT_M: f64 = 160.0;
@@ -64,7 +68,15 @@ pub struct CpuRenderer {
     world: World,
     every_ray: bool,
     kept: VecDeque<KeptView>,
-    drawn: VecDeque<Vec<GrayImage>>,
+    maps: MapCache<Arc<PixelMap>>,
+    drawn: VecDeque<Drawn>,
+}
+
+/// A job that is done.
+struct Drawn {
+    raw: bool,
+    /// With the bits that an image of eight does not have.
+    images: Vec<(RawImage, u32)>,
 }
 
 /// What stands still.
@@ -140,16 +152,21 @@ impl CpuRenderer {
             },
             every_ray,
             kept: VecDeque::new(),
+            maps: MapCache::default(),
             drawn: VecDeque::new(),
         }
     }
 
-    /// Draws one view of a job.
+    /// Draws one view of a job, in eight bits.
     pub fn draw(&mut self, job: &Job, view: &View) -> GrayImage {
+        upper_bits(&self.draw_raw(job, view), view.sensor.spare_bits())
+    }
+
+    /// Draws one view of a job, in all bits.
+    pub fn draw_raw(&mut self, job: &Job, view: &View) -> RawImage {
         let camera = &view.camera.intrinsics;
-        let mut image = GrayImage::new(camera.width_px, camera.height_px);
         let Some(&pose) = view.motion.poses.first() else {
-            return image;
+            return RawImage::new(camera.width_px, camera.height_px);
         };
         let still = view.motion.poses.len() == 1;
         let kept = still.then(|| self.keep(&view.camera, pose));
@@ -161,17 +178,28 @@ impl CpuRenderer {
             (None, Some(dim)) => Behind::Dim(dim),
             (None, None) => Behind::Unknown,
         };
+        let pixels = camera.width_px as usize * camera.height_px as usize;
+        let mut signals_e = vec![0.0; pixels];
+        let electrons = view.electrons_per_cd_m2();
         // An image without pixels has no rows.
-        image
+        signals_e
             .par_chunks_mut((camera.width_px as usize).max(1))
             .enumerate()
-            .for_each_init(RowBuffers::default, |buffers, (v, pixels)| {
+            .for_each_init(RowBuffers::default, |buffers, (v, signals_e)| {
                 let row = RowExposure::new(view, v);
                 let rays = RowRays::new(&self.world, view, &row, slab, behind);
                 rays.draw(job, &lamps, buffers);
-                sensor::expose(view, v, &buffers.luminances, pixels);
+                for (signal_e, luminance) in signals_e.iter_mut().zip(&buffers.luminances) {
+                    *signal_e = electrons * luminance;
+                }
             });
-        image
+        let map = (self.maps).get(MapKey::new(view), Arc::new);
+        let sensor = Sensor {
+            view,
+            map: &map,
+            signals_e: &signals_e,
+        };
+        sensor.develop()
     }
 
     /// Index of the kept view of a still camera, drawn now if it is new.
@@ -201,13 +229,28 @@ impl Renderer for CpuRenderer {
     }
 
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
-        let images = job.views.iter().map(|view| self.draw(job, view)).collect();
-        self.drawn.push_back(images);
+        let views = job.views.iter();
+        let images = views.map(|view| (self.draw_raw(job, view), view.sensor.spare_bits()));
+        let images = images.collect();
+        self.drawn.push_back(Drawn {
+            raw: job.raw,
+            images,
+        });
         Ok(())
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
-        self.drawn.pop_front().ok_or(RenderError::NothingSubmitted)
+        let job = (self.drawn.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        let images = job.images.iter();
+        Ok(images.map(|(raw, spare)| upper_bits(raw, *spare)).collect())
+    }
+
+    fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
+        if self.drawn.front().is_some_and(|job| !job.raw) {
+            return Err(RenderError::NotRaw);
+        }
+        let job = (self.drawn.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        Ok(job.images.into_iter().map(|(raw, _)| raw).collect())
     }
 }
 

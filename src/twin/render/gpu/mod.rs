@@ -22,7 +22,7 @@
 //! 2. *Lamps.* Discs are ray-cast in every pixel with four instants in the exposure and 4 x 4
 //!    sub-pixels; where the disc is and how long it is on comes row by row from double precision.
 //!    Then the glare is added.
-//! 3. *Sensor.* Shot and read noise, 8 bits.
+//! 3. *Sensor.* Fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
@@ -50,8 +50,9 @@ pub use adapter::adapters;
 pub use pipeline::shader_source;
 
 use super::light::LampField;
+use super::pixel_map::{MapCache, MapKey};
 use super::scene::{Body, Job, Scene, View};
-use super::{Backend, RenderError, Renderer};
+use super::{Backend, RawImage, RenderError, Renderer};
 use adapter::Gpu;
 use chunks::Chunks;
 use image::GrayImage;
@@ -60,7 +61,7 @@ use layout::Pose;
 use mesh::Mesh;
 use paintings::Paintings;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
-use pipeline::Pipelines;
+use pipeline::{Develop, Pipelines};
 use sight::Sight;
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
@@ -75,6 +76,7 @@ pub struct GpuRenderer {
     chunks: Chunks,
     paintings: Paintings,
     bodies: BodyBuffers,
+    maps: MapCache<wgpu::Buffer>,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
     spare: Vec<ReadBack>,
@@ -83,7 +85,10 @@ pub struct GpuRenderer {
 }
 
 struct InFlight {
+    raw: bool,
     images: Vec<ReadBack>,
+    /// Of each view's sensor.
+    spare_bits: Vec<u32>,
     submission: wgpu::SubmissionIndex,
 }
 
@@ -109,6 +114,7 @@ impl GpuRenderer {
             paintings: Paintings::new(&gpu, &scene.tunnel),
             scene,
             bodies: BodyBuffers::new(&gpu),
+            maps: MapCache::default(),
             views: Vec::new(),
             targets: Vec::new(),
             spare: Vec::new(),
@@ -144,9 +150,9 @@ impl GpuRenderer {
         if !self.targets.iter().any(|t| t.size_px == size_px) {
             self.targets.push(Target::new(&gpu.device, size_px));
         }
-        let back = match self.spare.iter().position(|b| b.fits(size_px)) {
+        let back = match self.spare.iter().position(|b| b.fits(size_px, job.raw)) {
             Some(at) => self.spare.swap_remove(at),
-            None => ReadBack::new(&gpu.device, size_px),
+            None => ReadBack::new(&gpu.device, size_px, job.raw),
         };
         if let Some(target) = self.targets.iter().find(|t| t.size_px == size_px) {
             let buffers = &self.views[k];
@@ -164,7 +170,16 @@ impl GpuRenderer {
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);
             let pipelines = &self.pipelines;
             buffers.draw_lamps(gpu, pipelines, encoder, target);
-            buffers.draw_sensor(gpu, pipelines, encoder, target);
+            let map = MapKey::new(framed.view);
+            let map = (self.maps).get(map, |map| target::map_buffer(gpu, &map));
+            let develop = Develop {
+                raw: job.raw,
+                blooming: framed.view.sensor.blooming > 0.0,
+            };
+            let sensor = self.pipelines.sensor(&gpu.device, develop);
+            target.copy_signal(encoder);
+            let read = [&target.signal_words, &map];
+            buffers.draw_sensor(gpu, sensor, encoder, read, target.finished(job.raw));
             target.copy_to(encoder, &back);
         }
         back
@@ -210,6 +225,24 @@ fn px_per_m(view: &View, body: &Body) -> f64 {
     view.camera.intrinsics.fx_px / near_m
 }
 
+impl GpuRenderer {
+    fn finish_oldest(&mut self) -> Result<InFlight, RenderError> {
+        let job = self
+            .in_flight
+            .pop_front()
+            .ok_or(RenderError::NothingSubmitted)?;
+        self.gpu
+            .device
+            .poll(wgpu::PollType::Wait {
+                submission_index: Some(job.submission.clone()),
+                timeout: None,
+            })
+            .map_err(|e| RenderError::Device(e.to_string()))?;
+        self.gpu.check()?;
+        Ok(job)
+    }
+}
+
 impl Renderer for GpuRenderer {
     fn backend(&self) -> Backend {
         self.gpu.backend.clone()
@@ -229,24 +262,30 @@ impl Renderer for GpuRenderer {
         for image in &images {
             image.request();
         }
-        self.in_flight.push_back(InFlight { images, submission });
+        let spare_bits = job.views.iter().map(|v| v.sensor.spare_bits());
+        self.in_flight.push_back(InFlight {
+            raw: job.raw,
+            images,
+            spare_bits: spare_bits.collect(),
+            submission,
+        });
         self.gpu.check()
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
-        let job = self
-            .in_flight
-            .pop_front()
-            .ok_or(RenderError::NothingSubmitted)?;
-        self.gpu
-            .device
-            .poll(wgpu::PollType::Wait {
-                submission_index: Some(job.submission),
-                timeout: None,
-            })
-            .map_err(|e| RenderError::Device(e.to_string()))?;
-        self.gpu.check()?;
-        let images = job.images.iter().map(ReadBack::image).collect();
+        let job = self.finish_oldest()?;
+        let images = job.images.iter().zip(&job.spare_bits);
+        let images = images.map(|(back, spare)| back.image(*spare)).collect();
+        self.spare.extend(job.images);
+        images
+    }
+
+    fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
+        if self.in_flight.front().is_some_and(|job| !job.raw) {
+            return Err(RenderError::NotRaw);
+        }
+        let job = self.finish_oldest()?;
+        let images = job.images.iter().map(ReadBack::raw_image).collect();
         self.spare.extend(job.images);
         images
     }

@@ -269,25 +269,27 @@ impl ViewBuffers {
         }
     }
 
-    /// Noise and eight bits.
+    /// Fixed pattern, noise and bits.
     pub fn draw_sensor(
         &self,
         gpu: &Gpu,
-        pipelines: &Pipelines,
+        pipeline: &wgpu::RenderPipeline,
         encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
+        [signal, map]: [&wgpu::Buffer; 2],
+        finished: &wgpu::TextureView,
     ) {
         let group = bind(
             &gpu.device,
-            &pipelines.sensor,
+            pipeline,
             &[
                 self.view.binding(),
-                wgpu::BindingResource::TextureView(&target.signal),
+                signal.as_entire_binding(),
+                map.as_entire_binding(),
             ],
         );
         let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin(encoder, &target.packed, load, None);
-        pass.set_pipeline(&pipelines.sensor);
+        let mut pass = begin(encoder, finished, load, None);
+        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..1);
     }

@@ -1,7 +1,8 @@
 //! Shaders and the four pipelines made of them.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
-use crate::twin::render::surface;
+use crate::twin::render::sensor::BLOOMING_REACH;
+use crate::twin::render::{pixel_map, surface};
 use std::mem::{offset_of, size_of};
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -10,6 +11,9 @@ pub const SIGNAL: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Four grey pixels a texel.
 pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// Four raw pixels a texel.
+pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Name and text of every file in `shaders/`.
 const FILES: [(&str, &str); 5] = [
@@ -27,6 +31,7 @@ const FILES: [(&str, &str); 5] = [
 pub fn shader_source(name: &str) -> Option<String> {
     let (_, text) = FILES.iter().find(|(n, _)| *n == name)?;
     let mut source = surface::wgsl();
+    source.push_str(&pixel_map::wgsl());
     if name != FILES[0].0 {
         source.push_str(FILES[0].1);
     }
@@ -56,8 +61,18 @@ pub struct Pipelines {
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added.
     pub halos: wgpu::RenderPipeline,
-    /// Noise and quantisation.
-    pub sensor: wgpu::RenderPipeline,
+    /// The sensor, by its [`Develop`], each made when first asked for.
+    sensors: [Option<wgpu::RenderPipeline>; 4],
+    sensor: wgpu::ShaderModule,
+}
+
+/// What the sensor's pass has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Develop {
+    /// All bits of the converter instead of eight.
+    pub raw: bool,
+    /// Charge over the full well spills.
+    pub blooming: bool,
 }
 
 struct Stage<'a> {
@@ -78,7 +93,7 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (lamps, sensor, blend) = (shader("lamps"), shader("sensor"), shader("blend"));
+        let (lamps, blend) = (shader("lamps"), shader("blend"));
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -97,7 +112,8 @@ impl Pipelines {
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
-            sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
+            sensors: [const { None }; 4],
+            sensor: shader("sensor"),
         }
     }
 
@@ -112,6 +128,28 @@ impl Pipelines {
                 lit: make("lit", false),
                 dim: make("dim", false),
             }
+        })
+    }
+
+    /// The pipeline that develops a picture.
+    pub fn sensor(&mut self, device: &wgpu::Device, develop: Develop) -> &wgpu::RenderPipeline {
+        let at = usize::from(develop.raw) + 2 * usize::from(develop.blooming);
+        self.sensors[at].get_or_insert_with(|| {
+            let (entry, format) = if develop.raw {
+                ("develop_raw", RAW)
+            } else {
+                ("develop", PACKED)
+            };
+            let reach = if develop.blooming { BLOOMING_REACH } else { 0 };
+            let stage = Stage {
+                shader: &self.sensor,
+                entries: ["whole", entry],
+                buffers: &[],
+                depth: None,
+                target: target(format, None),
+                constants: &[("BLOOMING_REACH", reach as f64)],
+            };
+            pipeline(device, stage)
         })
     }
 }
