@@ -30,7 +30,7 @@
 //! ```
 
 use crate::track::{Checker, Problem};
-use crate::twin::render::View;
+use crate::twin::render::{SensorSettings, View};
 use image::GrayImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -141,20 +141,6 @@ pub struct Exposed {
 }
 
 impl Exposed {
-    /// Of a view.
-    pub fn of(view: &View) -> Self {
-        Self {
-            exposure_s: view.camera.shutter.exposure_s,
-            gain_db: view.sensor.gain_db,
-        }
-    }
-
-    /// Takes a view with it.
-    pub fn set(&self, view: &mut View) {
-        view.camera.shutter.exposure_s = self.exposure_s;
-        view.sensor.gain_db = self.gain_db;
-    }
-
     /// Exposure times gain.
     fn product_s(&self) -> f64 {
         self.exposure_s * 10f64.powf(self.gain_db / 20.0)
@@ -186,6 +172,15 @@ impl AutoExposure {
         }
     }
 
+    /// Of a camera that is written with this exposure and sensor.
+    pub fn of(settings: &ExposureSettings, exposure_us: f64, sensor: &SensorSettings) -> Self {
+        let start = Exposed {
+            exposure_s: 1e-6 * exposure_us,
+            gain_db: sensor.gain_db,
+        };
+        Self::new(settings, start, sensor.black_level_grey)
+    }
+
     /// What frame `number` is taken with.
     pub fn take(&mut self, number: u32) -> Exposed {
         if self.settings.mode == ExposureMode::Auto {
@@ -195,6 +190,17 @@ impl AutoExposure {
             self.taken.push_back((number, self.now));
         }
         self.now
+    }
+
+    /// Takes frame `number` with it: all views that the camera has of it.
+    pub fn expose(&mut self, number: u32, views: &mut [View]) {
+        if self.settings.mode == ExposureMode::Auto {
+            let with = self.take(number);
+            for view in views {
+                view.camera.shutter.exposure_s = with.exposure_s;
+                view.sensor.gain_db = with.gain_db;
+            }
+        }
     }
 
     /// An image is delivered.

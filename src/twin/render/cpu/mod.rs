@@ -204,7 +204,7 @@ impl CpuRenderer {
 
     /// Index of the kept view of a still camera, drawn now if it is new.
     fn keep(&mut self, camera: &CameraModel, pose: Isometry3<f64>) -> usize {
-        let same = |k: &KeptView| k.camera == *camera && k.pose == pose;
+        let same = |k: &KeptView| k.camera.intrinsics == camera.intrinsics && k.pose == pose;
         if let Some(k) = self.kept.iter().position(same) {
             return k;
         }
