@@ -287,8 +287,8 @@ impl ViewBuffers {
                 map.as_entire_binding(),
             ],
         );
-        let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin(encoder, finished, load, None);
+        // Every pixel is written, so nothing needs clearing.
+        let mut pass = begin(encoder, finished, wgpu::LoadOp::Load, None);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..1);
