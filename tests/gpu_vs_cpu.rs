@@ -31,7 +31,8 @@ use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
+    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, SensorSettings, Shape,
+    View, sample,
 };
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -63,7 +64,9 @@ fn quiet(job: &Job) -> Job {
 }
 
 fn scaled(view: &mut View, gain: f64, divisor: u32) {
-    view.sensor.gain_db += 20.0 * gain.log10();
+    // Less gain than none would show a full well instead of white.
+    view.lens.transmission *= gain.min(1.0);
+    view.sensor.gain_db += 20.0 * gain.max(1.0).log10();
     let i = view.camera.intrinsics;
     view.camera.intrinsics = Intrinsics::centred(
         i.width_px / divisor,
@@ -448,6 +451,19 @@ fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
     })
 }
 
+/// Without noise, and every pixel like the others.
+fn even(view: &mut View) {
+    view.lens.vignetting = 0.0;
+    view.sensor = SensorSettings {
+        noise: false,
+        prnu: 0.0,
+        dsnu_e: 0.0,
+        dark_current_e_per_s: 0.0,
+        hot_pixel_share: 0.0,
+        ..view.sensor
+    };
+}
+
 /// Provokes a disc drawn with the wrong row's pose: at 100 km/h and 4 m a row moves it by 0.15 px,
 /// over its 60 rows by a sixth of its width. A pixel's 4 x 4 sub-rays place one row's edge to an
 /// eighth of a pixel, all rows together the disc's middle to 0.05.
@@ -456,7 +472,7 @@ fn a_disc_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
     let mut view = sample::rig_view(&tunnel, 101.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);
     view.motion = shaken(&tunnel, 101.0, view.start);
-    view.sensor.noise = false;
+    even(&mut view);
     view.lens.halo_share = 0.0;
     let (black, full) = (view.sensor.black_level_grey, 200.0);
     let scene = lone_lamp(&view, full);
@@ -510,7 +526,7 @@ fn a_board_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
     let mut view = sample::rig_view(&tunnel, 150.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);
     view.motion = shaken(&tunnel, 150.0, view.start);
-    view.sensor.noise = false;
+    even(&mut view);
     let middle = view.motion.pose_at(view.start.plus(8e-3));
     // Across the camera's axis, tilted in the image.
     let tilt = Isometry3::from_parts(

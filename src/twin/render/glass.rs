@@ -191,8 +191,8 @@ mod tests {
         lens.dirt_share = 0.2;
         let passed = shade(&lens);
         let touched = passed.iter().filter(|p| **p < 0.999).count() as f64 / passed.len() as f64;
-        // Blotches overlap and reach over the picture's border.
-        assert!((0.1..0.22).contains(&touched), "{touched}");
+        // Some fifty blotches, which overlap, reach over the border and differ in size.
+        assert!((0.12..0.27).contains(&touched), "{touched}");
         assert!(passed.iter().all(|p| *p > 0.0 && *p <= 1.0));
         let other = Shade::new(&lens, &camera(), Stream::new(5, 0, "glass"));
         assert_ne!(

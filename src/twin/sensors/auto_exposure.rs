@@ -269,6 +269,7 @@ mod tests {
     fn auto() -> ExposureSettings {
         ExposureSettings {
             mode: ExposureMode::Auto,
+            min_exposure_us: 5.0,
             max_exposure_us: Some(50.0),
             ..ExposureSettings::default()
         }
@@ -356,7 +357,7 @@ mod tests {
         assert!((last.exposure_s - 50e-6).abs() < 1e-12 && (last.gain_db - 24.0).abs() < 1e-9);
         let bright = run(&settings, 1, |_| 1e3);
         let last = bright[bright.len() - 1];
-        assert!((last.exposure_s - 10e-6).abs() < 1e-12 && last.gain_db.abs() < 1e-9);
+        assert!((last.exposure_s - 5e-6).abs() < 1e-12 && last.gain_db.abs() < 1e-9);
         for with in dark.iter().chain(&bright) {
             assert!(
                 with.gain_db < 1e-9 || with.exposure_s > 49.999e-6,
