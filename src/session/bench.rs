@@ -122,7 +122,7 @@ impl<'s> Bench<'s> {
         let job = Job {
             time: start,
             views: views.into(),
-            ..Job::default()..Job::default()
+            ..Job::default()
         };
         let renderer = &mut self.renderer;
         self.cost.submit.time(|| renderer.submit(&job)).0?;
