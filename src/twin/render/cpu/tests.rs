@@ -224,8 +224,10 @@ fn rows_see_moving_bodies_where_they_are_by_then() {
 fn noise_has_the_mean_and_variance_of_the_sensor() {
     let mut view = view(Intrinsics::centred(300, 200, 300.0));
     view.sensor.noise = true;
-    // At 60 cd/m^2 well under white, in darkness well over 0.
+    // Noise of more than a grey level, and room for it on both sides.
     view.camera.shutter.exposure_s = 0.1;
+    view.sensor.read_noise_e = 60.0;
+    view.sensor.black_level_grey = 20.0;
     view.set_gain_for(60.0, 180.0);
     for luminance in [0.0, 5.0, 60.0] {
         let job = Job {
