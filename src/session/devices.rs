@@ -15,7 +15,7 @@ use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
-use crate::twin::sensors::{Lidar, WaysideCameraSettings};
+use crate::twin::sensors::{AutoExposure, Lidar, WaysideCameraSettings};
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -25,6 +25,7 @@ pub struct Device {
     outlook: Outlook,
     balise: String,
     camera: WaysideCameraSettings,
+    exposure: AutoExposure,
     stream: Stream,
     clock: Clock,
     lidar: Option<(Lidar, Clock)>,
@@ -55,6 +56,11 @@ impl Device {
             outlook: Outlook::new(scenario, &post.actual),
             balise: post.balise.clone(),
             camera: post.camera.clone(),
+            exposure: AutoExposure::of(
+                &post.camera.exposure_control,
+                post.camera.exposure_us,
+                &post.camera.sensor,
+            ),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
             lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
@@ -86,13 +92,14 @@ impl Device {
         let camera = self.calibration.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let (number, start) = self.clock.due(now, span_s)?;
-        let view = wayside_view(
+        let mut view = wayside_view(
             &self.outlook.device,
             &self.camera,
             self.stream,
             number,
             start,
         );
+        (self.exposure).expose(number, std::slice::from_mut(&mut view));
         Some((number, start, view))
     }
 
@@ -125,6 +132,7 @@ impl Device {
         comms: &mut Comms,
         watch: &mut Stopwatch,
     ) -> WaysideReport {
+        self.exposure.on_image(frame.number, &frame.image);
         let train = comms.train_report(now);
         let detector = &mut self.detector;
         let (report, seconds) = watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));

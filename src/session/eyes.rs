@@ -8,7 +8,8 @@ use crate::bus::{LedReport, Method, SimTime, StereoPair};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::track::Tunnel;
-use crate::twin::sensors::RigSettings;
+use crate::twin::render::View;
+use crate::twin::sensors::{AutoExposure, RigSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 use std::sync::Arc;
@@ -17,6 +18,8 @@ use std::sync::Arc;
 pub struct Eyes {
     /// The rig as it really is.
     pub camera: StereoCamera,
+    /// What sets exposure and gain of both eyes, by what the left one sees.
+    exposure: AutoExposure,
     /// When it takes pairs.
     pub clock: Clock,
     /// What reads them.
@@ -40,10 +43,16 @@ impl Eyes {
     pub fn new(scenario: &Scenario, rig: &RigSettings, map: &Arc<Tunnel>) -> Self {
         Self {
             camera: StereoCamera::new(rig, scenario.seed),
+            exposure: AutoExposure::of(&rig.exposure_control, rig.exposure_us, &rig.sensor),
             clock: Clock::new(rig.pairs_per_s),
             positioner: positioner(scenario, rig, map),
             score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
         }
+    }
+
+    /// Sets exposure and gain of a pair's views.
+    pub fn expose(&mut self, number: u32, views: &mut [View]) {
+        self.exposure.expose(number, views);
     }
 
     /// The stack reads a pair and is scored against where vehicle and head really were.
@@ -55,6 +64,9 @@ impl Eyes {
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
         head_at: impl Fn(SimTime) -> Option<f64>,
     ) -> Result<Reading, SessionError> {
+        if let Some(left) = images.first() {
+            self.exposure.on_image(number, left);
+        }
         let images = images
             .try_into()
             .map_err(|images: Vec<_>| SessionError::Images(2, images.len()))?;

@@ -210,10 +210,11 @@ impl<'s> Run<'s> {
             && let Some((number, start)) = eyes.clock.due(now, eyes.camera.delay_s())
         {
             let world = &self.world;
-            let views = eyes
+            let mut views = eyes
                 .camera
                 .views(number, start, |t| world.vehicle_at(t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
+            eyes.expose(number, &mut views);
             let what = What::Pair;
             let shot = Shot {
                 number,
@@ -247,6 +248,7 @@ impl<'s> Run<'s> {
             bodies,
             headlights: self.world.headlights(),
             views,
+            ..Job::default()
         };
         Ok(self.shots.submit(&job, shot, &mut self.cost)?)
     }

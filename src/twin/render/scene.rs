@@ -238,10 +238,13 @@ impl View {
     }
 
     /// Sets the sensor's gain so that a luminance on the axis gives that many grey levels over
-    /// black.
+    /// black. Where that takes less gain than none, which would show a full well instead of white,
+    /// the lens passes less light instead.
     pub fn set_gain_for(&mut self, luminance_cd_m2: f64, grey: f64) {
         let now = self.grey_per_cd_m2() * luminance_cd_m2;
-        self.sensor.gain_db += 20.0 * (grey / now).log10();
+        let gain_db = self.sensor.gain_db + 20.0 * (grey / now).log10();
+        self.sensor.gain_db = gain_db.max(0.0);
+        self.lens.transmission *= 10f64.powf(gain_db.min(0.0) / 20.0);
     }
 
     /// Most electrons that a pixel's signal is followed to: beyond it everything is white.
@@ -261,4 +264,6 @@ pub struct Job {
     pub headlights: Vec<Headlight>,
     /// One image each.
     pub views: Vec<View>,
+    /// Whether raw images are wanted, for [`Renderer::collect_raw`](super::Renderer::collect_raw).
+    pub raw: bool,
 }

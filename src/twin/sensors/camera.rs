@@ -4,6 +4,7 @@
 //! A mount turns by yaw about the vertical (left positive) and then by pitch about its own right
 //! hand axis (up positive). The papers measure psi from the lateral direction: psi = 90 deg - yaw.
 
+use super::ExposureSettings;
 use crate::bus::{CameraModel, Intrinsics, Shutter, WaysideCalibration};
 use crate::track::{Checker, Problem, TrackPoint, Tunnel, WaysideSite};
 use crate::twin::render::{LensSettings, SensorSettings};
@@ -129,6 +130,8 @@ pub struct WaysideCameraSettings {
     pub lens: LensSettings,
     /// From photons to digital numbers.
     pub sensor: SensorSettings,
+    /// Exposure and gain that follow the light. Default: fixed.
+    pub exposure_control: ExposureSettings,
 }
 
 impl Default for WaysideCameraSettings {
@@ -150,6 +153,7 @@ impl Default for WaysideCameraSettings {
                 gain_db: 9.4,
                 ..SensorSettings::default()
             },
+            exposure_control: ExposureSettings::default(),
         }
     }
 }
@@ -227,6 +231,9 @@ impl WaysideCameraSettings {
         self.optics().check(at, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         self.lens.check(&format!("{at}.lens"), problems);
+        let frame_us = 1e6 / self.frames_per_s;
+        let control = format!("{at}.exposure_control");
+        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let mut check = Checker::new(&at, problems);

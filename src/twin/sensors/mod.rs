@@ -1,5 +1,6 @@
 //! Sensors: each turns the world's state at its own mount into raw output.
 
+mod auto_exposure;
 mod camera;
 mod doppler;
 mod imu;
@@ -7,6 +8,7 @@ mod lidar;
 mod odometer;
 mod rig;
 
+pub use auto_exposure::{AutoExposure, Exposed, ExposureMode, ExposureSettings};
 pub use camera::{WaysideCameraSettings, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};

@@ -17,6 +17,7 @@
 //! share one focal length and one principal point; the right eye is neither rolled nor pitched
 //! against the left, nor off the baseline's line; both trigger at the same time.
 
+use super::ExposureSettings;
 use super::camera::{Optics, mounted, positive};
 use crate::bus::RigCalibration;
 use crate::track::{Checker, LampSite, Problem, Tunnel};
@@ -66,6 +67,8 @@ pub struct RigSettings {
     pub lens: LensSettings,
     /// From photons to digital numbers.
     pub sensor: SensorSettings,
+    /// Exposure and gain that follow the light. Default: fixed.
+    pub exposure_control: ExposureSettings,
 }
 
 impl Default for RigSettings {
@@ -87,6 +90,7 @@ impl Default for RigSettings {
             calibration_error: RigError::default(),
             lens: LensSettings::default(),
             sensor: SensorSettings::default(),
+            exposure_control: ExposureSettings::default(),
         }
     }
 }
@@ -149,6 +153,9 @@ impl RigSettings {
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
         self.lens.check(&format!("{at}.lens"), problems);
+        let frame_us = 1e6 / self.pairs_per_s;
+        let control = format!("{at}.exposure_control");
+        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
