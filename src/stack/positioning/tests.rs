@@ -145,11 +145,15 @@ fn drawn_world(map: &Tunnel, k: usize, noise: &mut Noise) -> (World, Tunnel) {
     let rig = &mut world.rig;
     rig.vehicle_from_left.rotation = mount * rig.vehicle_from_left.rotation;
     rig.vehicle_from_left = car * rig.vehicle_from_left;
-    rig.baseline_m += 1e-3 * stated.baseline_sigma_mm * noise.normal();
+    rig.left_from_right.translation.x += 1e-3 * stated.baseline_sigma_mm * noise.normal();
     let focal = 1.0 + stated.focal_sigma_share * noise.normal();
-    rig.camera.intrinsics.fx_px *= focal;
-    rig.camera.intrinsics.fy_px *= focal;
-    world.vergence_rad = stated.vergence_sigma_deg.to_radians() * noise.normal();
+    for eye in [&mut rig.left, &mut rig.right] {
+        eye.intrinsics.fx_px *= focal;
+        eye.intrinsics.fy_px *= focal;
+    }
+    let converge_rad = stated.vergence_sigma_deg.to_radians() * noise.normal();
+    rig.left_from_right.rotation =
+        UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -converge_rad);
     let mut surveyed = map.clone();
     let survey_m = stated.survey_sigma_m * noise.normal();
     surveyed.lamps[k].chainage_m += survey_m;

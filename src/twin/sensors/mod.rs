@@ -7,9 +7,9 @@ mod lidar;
 mod odometer;
 mod rig;
 
-pub use camera::{WaysideCameraSettings, WaysideError};
+pub use camera::{ReadOut, Trigger, WaysideCameraSettings, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-pub use rig::{RigError, RigSettings, ever_sees, visible_interval};
+pub use rig::{RigError, RigSettings, RightEye, ever_sees, visible_interval};
