@@ -256,8 +256,8 @@ mod tests {
     }
 
     /// A disc that passes at 100 km/h, each point of its outline drawn where it is when its row is
-    /// read, downwards or upwards, through a straight or a wide lens: the range is off by per
-    /// cents, and right when the motion is taken off.
+    /// read, downwards or upwards, through a straight or a wide lens: the range of one or the
+    /// other is off by per cents, and right when the motion is taken off.
     #[test]
     fn a_passing_disc_keeps_its_size() {
         let velocity = Vector3::new(-21.6, 6.0, -16.3);
@@ -265,6 +265,7 @@ mod tests {
             let mut camera = rig.left;
             camera.shutter.first_row = first_row;
             let c = &camera.intrinsics;
+            let mut uncorrected: f64 = 0.0;
             for lamp in [Vector3::new(-0.4, -0.3, 2.5), Vector3::new(1.5, -0.2, 4.0)] {
                 let seen = |p: Vector3<f64>| c.project(&Point3::from(p)).unwrap();
                 let centre = seen(lamp);
@@ -286,9 +287,10 @@ mod tests {
                     let found = from_size(&pinhole(c), &c.ideal(&centre), e, 0.25).unwrap();
                     found.norm() / lamp.norm() - 1.0
                 };
-                assert!(error(&read).abs() > 0.005, "{}", error(&read));
-                assert!(error(&still).abs() < 0.001, "{}", error(&still));
+                uncorrected = uncorrected.max(error(&read).abs());
+                assert!(error(&still).abs() < 0.002, "{}", error(&still));
             }
+            assert!(uncorrected > 0.03, "{uncorrected}");
         }
     }
 }

@@ -558,7 +558,7 @@ mod tests {
             (
                 "distortion = { k1 = -0.28, k3 = -0.05 }",
                 "distortion",
-                "it turns back at r = 0.96",
+                "it turns back at r = 0.912 (42.4 deg off the axis), which is seen 736 px",
             ),
             (
                 "calibration_error = { k1 = -0.4 }",

@@ -596,7 +596,7 @@ mod tests {
                 "distortion = { k1 = -0.6 }",
                 "distortion",
                 "it turns back at r = 0.707 (35.3 deg off the axis), which is seen 515 px from the \
-                 principal point, inside the picture: pixel (0, 0) is 734 px from it",
+                 principal point, inside the picture: pixel (1279, 719) is 734 px from it",
             ),
             (
                 "distortion = { p1 = 1.0 }",
