@@ -220,7 +220,7 @@ mod tests {
         let pair = camera.pair(3, start, [GrayImage::new(1, 1), GrayImage::new(1, 1)]);
         assert_eq!(pair.left.start, start);
         assert_eq!(pair.right.start, start.plus(1e-3));
-        assert_eq!(rig.calibration().left.intrinsics.distortion.is_none(), true);
+        assert!(rig.calibration().left.intrinsics.distortion.is_none());
     }
 
     /// Frames start about the time that they say, with the spread that was asked for, never before
