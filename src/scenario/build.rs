@@ -295,10 +295,7 @@ fn overridden(
 
 /// Poses are asked for until the last row of a frame has closed.
 fn history_s(file: &ScenarioFile) -> f64 {
-    let span_s = file.rig.as_ref().map_or(0.0, |rig| {
-        let camera = rig.calibration().camera;
-        camera.shutter.frame_span_s(camera.intrinsics.height_px)
-    });
+    let span_s = (file.rig.as_ref()).map_or(0.0, |rig| rig.as_built().pair_span_s());
     // A fix is scored when it has gone through the stack.
     (2.0 * span_s + 1e-3 * file.stack.latency_ms + 0.1).max(PhysicsSettings::default().history_s)
 }

@@ -15,7 +15,7 @@ use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
-use crate::twin::sensors::{AutoExposure, Lidar, WaysideCameraSettings};
+use crate::twin::sensors::{AutoExposure, Lidar, Trigger, WaysideCameraSettings};
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -27,6 +27,7 @@ pub struct Device {
     camera: WaysideCameraSettings,
     exposure: AutoExposure,
     stream: Stream,
+    trigger: Trigger,
     clock: Clock,
     lidar: Option<(Lidar, Clock)>,
     scan: Option<LidarScan>,
@@ -62,6 +63,10 @@ impl Device {
                 &post.camera.sensor,
             ),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
+            trigger: Trigger::new(
+                Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}/trigger")),
+                post.camera.frame_jitter_us,
+            ),
             clock: Clock::new(post.camera.frames_per_s),
             lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
                 |(settings, pose)| {
@@ -89,15 +94,16 @@ impl Device {
 
     /// A frame whose last row has closed by `now`: its number, start and view.
     pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime, View)> {
-        let camera = self.calibration.camera;
+        let camera = self.outlook.device.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
-        let (number, start) = self.clock.due(now, span_s)?;
+        let delay_s = span_s + self.trigger.latest_s();
+        let (number, start) = self.clock.due(now, delay_s)?;
         let mut view = wayside_view(
             &self.outlook.device,
             &self.camera,
             self.stream,
             number,
-            start,
+            self.trigger.really(number, start),
         );
         (self.exposure).expose(number, std::slice::from_mut(&mut view));
         Some((number, start, view))
@@ -180,10 +186,7 @@ impl Outlook {
         let camera = &self.device.camera.intrinsics;
         let pose = &self.device.world_from_camera;
         let pixel = camera.project(&pose.inverse_transform_point(place));
-        let in_picture = pixel.is_some_and(|p| {
-            (0.0..f64::from(camera.width_px)).contains(&p.x)
-                && (0.0..f64::from(camera.height_px)).contains(&p.y)
-        });
+        let in_picture = pixel.is_some_and(|p| camera.contains(&p));
         let eye = Point3::from(pose.translation.vector);
         let sight = place - eye;
         in_picture

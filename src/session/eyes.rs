@@ -1,7 +1,7 @@
 //! The eyes of a train: its stereo camera, the stack that reads it, and how well it does.
 
 use super::SessionError;
-use super::cameras::{Clock, StereoCamera, pair};
+use super::cameras::{Clock, StereoCamera};
 use super::score::PositioningScore;
 use super::watch::Stopwatch;
 use crate::bus::{LedReport, Method, SimTime, StereoPair};
@@ -70,12 +70,12 @@ impl Eyes {
         let images = images
             .try_into()
             .map_err(|images: Vec<_>| SessionError::Images(2, images.len()))?;
-        let images = pair(number, start, images);
+        let images = self.camera.pair(number, start, images);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
         let rig = &self.camera.rig;
         let left_at = |t| Some(vehicle_at(t)? * rig.vehicle_from_left);
-        let intrinsics = rig.camera.intrinsics;
+        let intrinsics = rig.left.intrinsics;
         self.score
             .report(&report, 1e3 * seconds, &intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());

@@ -9,9 +9,9 @@ mod odometer;
 mod rig;
 
 pub use auto_exposure::{AutoExposure, Exposed, ExposureMode, ExposureSettings};
-pub use camera::{WaysideCameraSettings, WaysideError};
+pub use camera::{ReadOut, Trigger, WaysideCameraSettings, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-pub use rig::{RigError, RigSettings, ever_sees, visible_interval};
+pub use rig::{RigError, RigSettings, RightEye, ever_sees, visible_interval};

@@ -51,7 +51,7 @@ impl<'a> Framed<'a> {
         };
         let step_s = span_s / steps;
         let reference = self.reference().coords;
-        let bent = &lens.distortion;
+        let (bent, reach) = (lens.distortion.coefficients(), lens.distortion.reach());
         poses.clear();
         poses.extend((0..=steps as u32).map(|k| {
             let pose = self
@@ -84,7 +84,7 @@ impl<'a> Framed<'a> {
             noise: u32::from(sensor.noise),
             key: self.view.noise.stream.key,
             frame: self.view.noise.frame,
-            radial: [bent.k1, bent.k2, bent.k3, bent.reach().powi(2)].map(|x| x as f32),
+            radial: [bent.k1, bent.k2, bent.k3, reach.powi(2)].map(|x| x as f32),
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
             extinction_per_m: extinction_per_m as f32,
             airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,
