@@ -222,6 +222,8 @@ impl Open {
                 self.moving.bodies(stream, scene, time, bodies)?;
                 time
             }
+            // Its images come when they reach the stack.
+            Event::Exposure(_) => return Ok(()),
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
                 self.images.pair(stream, pair, report)?;
