@@ -106,7 +106,7 @@ impl<'a> Sight<'a> {
         let seen = self.solve(|v| {
             let above = (v.max(0.0) as usize).min(last.saturating_sub(1));
             let (a, b) = (in_row(above)?, in_row((above + 1).min(last))?);
-            let share = v.clamp(0.0, last as f64) - above as f64;
+            let share = v - above as f64;
             Some(Seen {
                 pixel: a.pixel + (b.pixel - a.pixel) * share,
                 depth_m: a.depth_m + (b.depth_m - a.depth_m) * share,
