@@ -224,3 +224,184 @@ fn visible_share(lamp: &LampLight, job: &Job, sight: &Sight<'_>, labeller: &Labe
     });
     seen.count() as f64 / f64::from(PLACES)
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::super::clean::clean;
+    use super::*;
+    use crate::track::uid::ChipFrame;
+    use crate::twin::render::cpu::CpuRenderer;
+    use crate::twin::render::{Body, Renderer, Scene, Shape, View, sample};
+    use nalgebra::Translation3;
+
+    const SPEED_MPS: f64 = 160.0 / 3.6;
+
+    /// The left eye at 160 km/h, without noise and halo, bright enough that a lamp is not white.
+    fn view(s_m: f64) -> View {
+        let mut view = sample::rig_view(&sample::tunnel(), s_m, SPEED_MPS);
+        view.sensor.bits = 12;
+        view.set_gain_for(sample::scene().lamps[0].luminance_cd_m2, 180.0);
+        clean(&view, 1.0)
+    }
+
+    /// What the table says of the lamps in a view of a job.
+    fn seen(scene: &Scene, job: &Job) -> Vec<Vec<Value>> {
+        let sight = Sight::new(&job.views[0], job.time);
+        rows(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
+    }
+
+    fn value<'a>(row: &'a [Value], name: &str) -> &'a Value {
+        &row[COLUMNS.iter().position(|c| c.name == name).unwrap()]
+    }
+
+    fn real(row: &[Value], name: &str) -> f64 {
+        match value(row, name) {
+            Value::Real(x) => *x,
+            Value::Int(x) => *x as f64,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    fn reals<'a>(row: &'a [Value], name: &str) -> &'a [f64] {
+        match value(row, name) {
+            Value::Reals(list) => list,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    /// Area and centroid of a polygon.
+    fn moments(us: &[f64], vs: &[f64]) -> (f64, [f64; 2]) {
+        let n = us.len();
+        let (mut area, mut u, mut v) = (0.0, 0.0, 0.0);
+        for k in 0..n {
+            let j = (k + 1) % n;
+            let cross = us[k] * vs[j] - us[j] * vs[k];
+            area += cross / 2.0;
+            u += (us[k] + us[j]) * cross / 6.0;
+            v += (vs[k] + vs[j]) * cross / 6.0;
+        }
+        (area.abs(), [u / area, v / area])
+    }
+
+    /// Fails where an outline is off by a half pixel, solved with another row's pose, or not that
+    /// of the disc: the drawn picture has its light where the outline says.
+    #[test]
+    fn outlines_are_where_the_picture_has_its_light() {
+        let mut scene = sample::scene();
+        for lamp in &mut scene.lamps {
+            // Always on: the picture of the whole disc.
+            lamp.waveform.frame = ChipFrame {
+                bits: u64::MAX,
+                len: 64,
+            };
+        }
+        let mut renderer = CpuRenderer::oracle(scene.clone());
+        let mut compared = 0;
+        for s_m in [100.4, 102.0, 402.5] {
+            let job = Job {
+                views: vec![view(s_m)],
+                raw: true,
+                ..Job::default()
+            };
+            renderer.submit(&job).unwrap();
+            let image = renderer.collect_raw().unwrap().remove(0);
+            let sensor = &job.views[0].sensor;
+            for row in seen(&scene, &job) {
+                let [u0, u1, v0, v1] = ["first_column", "last_column", "first_row", "last_row"]
+                    .map(|name| real(&row, name) as u32);
+                let whole = u0 > 3 && u1 < 1276 && v0 > 3 && v1 < 716;
+                if !whole || v1 - v0 < 25 {
+                    continue;
+                }
+                let (mut light, mut u_sum, mut v_sum, mut most) = (0.0, 0.0, 0.0, 0.0f64);
+                for v in v0 - 2..=v1 + 2 {
+                    for u in u0 - 2..=u1 + 2 {
+                        let dn = f64::from(image.get_pixel(u, v).0[0]) - sensor.black_dn();
+                        light += dn;
+                        u_sum += dn * f64::from(u);
+                        v_sum += dn * f64::from(v);
+                        most = most.max(dn);
+                    }
+                }
+                let (us, vs) = (reals(&row, "outline_u_px"), reals(&row, "outline_v_px"));
+                let (area, centroid) = moments(us, vs);
+                let off = [u_sum / light - centroid[0], v_sum / light - centroid[1]];
+                assert!(off[0].hypot(off[1]) < 0.05, "{s_m} m: {off:?}");
+                assert!(
+                    (light / most / area - 1.0).abs() < 0.03,
+                    "{} {area}",
+                    light / most
+                );
+                compared += 1;
+            }
+        }
+        assert!(compared >= 3, "{compared}");
+    }
+
+    /// Fails where the phase is of another row, counts the wrong way, or the chips are mirrored:
+    /// chips, phase and step give the light of every row again.
+    #[test]
+    fn phase_and_chips_give_the_light_of_every_row() {
+        let scene = sample::scene();
+        for first_row in [0, 719] {
+            let mut view = sample::rig_view(&sample::tunnel(), 100.4, SPEED_MPS);
+            view.camera.shutter.first_row = first_row;
+            let exposure_s = view.camera.shutter.exposure_s;
+            let job = Job {
+                views: vec![view],
+                ..Job::default()
+            };
+            let lamps = seen(&scene, &job);
+            assert!(!lamps.is_empty());
+            for row in lamps {
+                let Value::Text(chips) = value(&row, "chips") else {
+                    panic!("chips are text");
+                };
+                let chips: Vec<f64> = chips.bytes().map(|b| f64::from(b - b'0')).collect();
+                let begin = real(&row, "chip") + real(&row, "chip_phase");
+                let open = exposure_s / real(&row, "chip_s");
+                for (k, share) in reals(&row, "on_share").iter().enumerate() {
+                    let from = begin + k as f64 * real(&row, "chips_per_row");
+                    let n = 2000;
+                    let on = (0..n).map(|i| {
+                        let x = from + open * (f64::from(i) + 0.5) / f64::from(n);
+                        chips[x.floor().rem_euclid(chips.len() as f64) as usize]
+                    });
+                    let mean = on.sum::<f64>() / f64::from(n);
+                    assert!((mean - share).abs() < 0.02, "row {k}: {mean} {share}");
+                }
+            }
+        }
+    }
+
+    /// Fails where what hides a lamp does not count, or the lamp hides itself.
+    #[test]
+    fn a_hidden_lamp_is_not_visible() {
+        let scene = sample::scene();
+        let mut job = Job {
+            views: vec![view(100.4)],
+            ..Job::default()
+        };
+        let largest = |rows: &[Vec<Value>]| {
+            let by_depth = |a: &&Vec<Value>, b: &&Vec<Value>| {
+                real(a, "depth_m").total_cmp(&real(b, "depth_m"))
+            };
+            rows.iter().min_by(by_depth).cloned().unwrap()
+        };
+        let free = largest(&seen(&scene, &job));
+        assert!((real(&free, "visible_share") - 1.0).abs() < 1e-9);
+        let pose = job.views[0].motion.poses[0];
+        let lamp =
+            nalgebra::Point3::new(real(&free, "x_m"), real(&free, "y_m"), real(&free, "z_m"));
+        let half_way = nalgebra::center(&lamp, &pose.translation.vector.into());
+        job.bodies.push(Body {
+            shape: Shape::Sphere(0.4),
+            world_from_body: Translation3::from(half_way).into(),
+            velocity_mps: Vector3::zeros(),
+            albedo: 0.5,
+            luminance_cd_m2: 0.0,
+        });
+        assert!(real(&largest(&seen(&scene, &job)), "visible_share").abs() < 1e-9);
+    }
+}
