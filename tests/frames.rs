@@ -89,8 +89,9 @@ impl Observer for Delivered {
     }
 }
 
-/// Makes a set with the plain renderer; a run that comes to `stop_s` is broken off there.
-fn make(out: &Path, seed: u64, plan: Plan, stop_s: f64) -> (usize, Delivered) {
+/// Makes a set with the plain renderer; a run that comes to `stop_s` is broken off there. Gives the
+/// number of frames, what the stack got, and how long the run was.
+fn make(out: &Path, seed: u64, plan: Plan, stop_s: f64) -> (usize, Delivered, f64) {
     let scenario = scenario(seed);
     let draws = renderer(&scenario, RendererChoice::Cpu).unwrap();
     let stop = AtomicBool::new(false);
@@ -106,8 +107,8 @@ fn make(out: &Path, seed: u64, plan: Plan, stop_s: f64) -> (usize, Delivered) {
         progress: Some(&progress),
     };
     let mut delivered = Delivered::default();
-    run(&scenario, &options, &mut [&mut set, &mut delivered]).unwrap();
-    (set.frames(), delivered)
+    let summary = run(&scenario, &options, &mut [&mut set, &mut delivered]).unwrap();
+    (set.frames(), delivered, summary.simulated_s)
 }
 
 fn table(out: &Path, name: &str) -> RecordBatch {
@@ -168,7 +169,7 @@ fn content(folder: &Path, root: &Path, all: &mut BTreeMap<PathBuf, Vec<u8>>) {
 #[test]
 fn files_tables_and_annotations_agree() {
     let out = folder("agree");
-    let (frames, delivered) = make(&out, 1, Plan::default(), f64::INFINITY);
+    let (frames, delivered, _) = make(&out, 1, Plan::default(), f64::INFINITY);
     let table_of = |name: &str| table(&out, name);
     let rows = table_of("frames.parquet");
     assert_eq!(rows.num_rows(), frames);
@@ -248,8 +249,10 @@ fn arrays_have_their_shape_and_still_walls_stand_still() {
         limit: Some(3),
         ..Plan::default()
     };
-    let (frames, _) = make(&out, 1, plan, f64::INFINITY);
+    let (frames, _, simulated_s) = make(&out, 1, plan, f64::INFINITY);
     assert_eq!(frames, 3);
+    // The third frame starts at 0.2 s and is delivered some hundredths later; then it is enough.
+    assert!((0.2..0.35).contains(&simulated_s), "{simulated_s}");
     let (shape, depth) = npy(&out.join("depth/W1530/000000.npy"));
     assert!(shape.contains("'shape': (270, 480)"), "{shape}");
     assert!(depth.iter().all(|d| *d > 0.0) && depth.iter().any(|d| *d < 5.0));
@@ -282,12 +285,14 @@ fn same_seed_same_bytes() {
             to_s: 0.45,
             ..Plan::default()
         };
-        make(
+        let (_, _, simulated_s) = make(
             &out,
             if name == "other" { 2 } else { 1 },
             plan,
             f64::INFINITY,
         );
+        // Ended by the first frames after the last wanted time, not by the scenario.
+        assert!((0.5..0.6).contains(&simulated_s), "{simulated_s}");
         let mut all = BTreeMap::new();
         content(&out, &out, &mut all);
         all
@@ -310,7 +315,7 @@ fn same_seed_same_bytes() {
 #[test]
 fn a_run_broken_off_leaves_a_whole_set() {
     let out = folder("broken_off");
-    let (frames, _) = make(&out, 1, Plan::default(), 0.3);
+    let (frames, _, _) = make(&out, 1, Plan::default(), 0.3);
     assert!((1..18).contains(&frames), "{frames}");
     let rows = table(&out, "frames.parquet");
     assert_eq!(rows.num_rows(), frames);

@@ -124,7 +124,11 @@ struct Camera {
     wanted: bool,
     /// Chainage, of cameras that stand still.
     chainage_m: Option<f64>,
+    /// Frames taken that are wanted.
     taken: u32,
+    /// Those of them whose images have come.
+    written: u32,
+    /// No more are wanted.
     over: bool,
     /// The last frame, whose flow is still to come.
     last: Option<Taken>,
@@ -187,10 +191,13 @@ impl<'a> DataSet<'a> {
         self.frames.len()
     }
 
-    /// Names of the cameras that a scenario has, in the order of their numbers.
+    /// Names of the cameras of which a scenario takes images, in the order of their numbers.
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
-        let rig = scenario.rig.iter().flat_map(|_| EYES);
-        let devices = scenario.wayside.iter().map(|w| w.calibration.name.clone());
+        let bench = scenario.bench.is_some();
+        let rides = bench || scenario.physics.train.is_some();
+        let rig = scenario.rig.iter().filter(|_| rides).flat_map(|_| EYES);
+        let devices = scenario.wayside.iter().filter(|_| !bench);
+        let devices = devices.map(|w| w.calibration.name.clone());
         rig.map(str::to_owned).chain(devices).collect()
     }
 
@@ -217,11 +224,11 @@ impl<'a> DataSet<'a> {
             .iter_mut()
             .filter(|c| c.source == exposure.source)
         {
-            camera.over |= self.plan.is_over(start, camera.taken);
             if camera.wanted && self.plan.takes(exposure.number, start, camera.taken) {
                 camera.taken += 1;
                 wanted = true;
             }
+            camera.over |= self.plan.is_over(start, camera.taken);
         }
         if wanted {
             self.waiting.push(Shot {
@@ -253,12 +260,15 @@ impl<'a> DataSet<'a> {
         let Some(shot) = self.delivered(source, number) else {
             return Ok(());
         };
-        self.take(&shot, images)?;
+        self.take(&shot, images)
+    }
+
+    /// Ends the run once all images that are wanted have come.
+    fn end_if_complete(&mut self) {
         if self.waiting.is_empty() && self.cameras.iter().all(|c| c.over || !c.wanted) {
             self.complete = true;
             self.enough.store(true, Ordering::Relaxed);
         }
-        Ok(())
     }
 
     fn write_json(&self, name: &str, value: &serde_json::Value) -> Result<(), ObserverError> {
@@ -268,10 +278,8 @@ impl<'a> DataSet<'a> {
 
     fn meta(&self) -> serde_json::Value {
         let about = &self.about;
-        let cameras = self.cameras.iter().map(|c| {
-            let frames = self.frames_of(&c.name);
-            json!({"name": c.name, "frames": frames})
-        });
+        let cameras = self.cameras.iter();
+        let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
         let parts = self.plan.parts.0.iter().map(|part| part.word());
         let finite = |s: f64| s.is_finite().then_some(s);
         json!({
@@ -295,11 +303,6 @@ impl<'a> DataSet<'a> {
             },
         })
     }
-
-    fn frames_of(&self, camera: &str) -> usize {
-        let of = |row: &&Vec<Value>| row.contains(&Value::from(camera));
-        self.frames.iter().filter(of).count()
-    }
 }
 
 const EYES: [&str; 2] = ["left", "right"];
@@ -319,6 +322,7 @@ impl Observer for DataSet<'_> {
             wanted: self.plan.has_camera(name),
             chainage_m,
             taken: 0,
+            written: 0,
             over: false,
             last: None,
         };
@@ -347,19 +351,18 @@ impl Observer for DataSet<'_> {
 
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match *event {
-            Event::Exposure(exposure) => {
-                self.expose(exposure);
-                Ok(())
-            }
+            Event::Exposure(exposure) => self.expose(exposure),
             Event::Pair(pair, ..) => {
                 let images = [&pair.left.image, &pair.right.image];
-                self.images(Source::Rig, pair.left.number, &images)
+                self.images(Source::Rig, pair.left.number, &images)?;
             }
             Event::Wayside(k, _, image, report) => {
-                self.images(Source::Wayside(k), report.number, &[image])
+                self.images(Source::Wayside(k), report.number, &[image])?;
             }
-            _ => Ok(()),
+            _ => return Ok(()),
         }
+        self.end_if_complete();
+        Ok(())
     }
 
     /// Also of a run that was broken off: what has been taken is a whole, smaller set.

@@ -138,6 +138,7 @@ impl DataSet<'_> {
         };
         let row = frame::row(row, &sight, left, shot.train.as_ref());
         self.frames.push(row);
+        self.cameras[k].written += 1;
         self.cameras[k].last = labels
             .filter(|_| self.plan.has(Part::Flow))
             .map(|labels| Taken {
