@@ -36,7 +36,7 @@ pub struct Sight<'a> {
     pub view: &'a View,
     /// Time of the bodies' poses.
     time: SimTime,
-    /// Poses of the rows of the image, `camera_from_world`.
+    /// Poses of the rows of the image.
     rows: Vec<Isometry3<f64>>,
 }
 
@@ -58,25 +58,30 @@ impl<'a> Sight<'a> {
             rows: Vec::new(),
         };
         let rows = 0..view.camera.intrinsics.height_px;
-        sight.rows = rows.map(|v| sight.pose(f64::from(v)).inverse()).collect();
+        sight.rows = rows.map(|v| sight.pose(f64::from(v))).collect();
         sight
     }
 
     /// From the time of the bodies' poses to the middle of the exposure of row `v`.
     pub fn after_s(&self, v: f64) -> f64 {
+        self.view.start.since(self.time) + self.mid_s(v)
+    }
+
+    /// From the frame's start to the middle of the exposure of row `v`. Not a [`SimTime`]: its whole
+    /// nanoseconds are steps of 1e-5 pixels, too coarse to solve an equation with.
+    fn mid_s(&self, v: f64) -> f64 {
         let shutter = &self.view.camera.shutter;
-        (shutter.row_mid(self.view.start, v)).since(self.time)
+        shutter.delay_s(v) + 0.5 * shutter.exposure_s
     }
 
     /// `world_from_camera` in the middle of the exposure of row `v`. Rows above and below the
     /// image go on as its first and last poses do.
     pub fn pose(&self, v: f64) -> Isometry3<f64> {
         let motion = &self.view.motion;
-        let time = self.view.camera.shutter.row_mid(self.view.start, v);
-        let x = time.since(motion.first) / motion.step_s;
         let Some(last) = motion.poses.len().checked_sub(2) else {
-            return motion.pose_at(time);
+            return motion.pose_at(self.view.start);
         };
+        let x = (self.view.start.since(motion.first) + self.mid_s(v)) / motion.step_s;
         let k = (x.floor().max(0.0) as usize).min(last);
         motion.poses[k].lerp_slerp(&motion.poses[k + 1], x - k as f64)
     }
@@ -101,7 +106,7 @@ impl<'a> Sight<'a> {
         let last = self.rows.len().checked_sub(1)?;
         let in_row = |row: usize| {
             let at = point + velocity_mps * self.after_s(row as f64);
-            self.project(&(self.rows[row] * at))
+            self.project(&self.rows[row].inverse_transform_point(&at))
         };
         let seen = self.solve(|v| {
             let above = (v.max(0.0) as usize).min(last.saturating_sub(1));

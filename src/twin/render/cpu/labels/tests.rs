@@ -79,6 +79,34 @@ fn what_a_pixel_shows_is_seen_in_that_pixel() {
     }
 }
 
+/// Fails where the equation is not solved for some point, as with times in whole nanoseconds: all
+/// that is in its picture or close by has its row.
+#[test]
+fn every_point_in_view_has_its_row() {
+    for first_row in [0, 719] {
+        let mut view = sample::rig_view(&sample::tunnel(), 100.0, 160.0 / 3.6);
+        view.camera.shutter.first_row = first_row;
+        let sight = Sight::new(&view, view.start);
+        let pose = sight.pose(359.5);
+        for k in 0..2000u32 {
+            let (x, y) = (
+                f64::from(k % 41) / 20.0 - 1.0,
+                f64::from(k / 41) / 24.0 - 1.0,
+            );
+            let depth_m = 5.0 + f64::from(k % 13);
+            let point = pose * (Point3::new(0.55 * x, 0.3 * y, 1.0) * depth_m);
+            let seen = sight.of(&point);
+            let seen = seen.unwrap_or_else(|| panic!("{point} has no row"));
+            let there = sight.pose(seen.pixel.y).inverse_transform_point(&point);
+            let again = view.camera.intrinsics.project(&there).unwrap();
+            assert!(
+                (again - seen.pixel).norm() < 1e-6,
+                "{point}: {again} {seen:?}"
+            );
+        }
+    }
+}
+
 /// Fails where the quick solution parts from the exact one by more than its table may.
 #[test]
 fn interpolated_rows_agree_with_exact_ones() {
