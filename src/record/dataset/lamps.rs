@@ -226,7 +226,11 @@ fn visible_share(lamp: &LampLight, job: &Job, sight: &Sight<'_>, labeller: &Labe
 }
 
 #[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#[allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
 mod tests {
     use super::super::clean::clean;
     use super::*;

@@ -158,10 +158,11 @@ pub(super) fn instances<'a>(
     let size = [camera.height_px as usize, camera.width_px as usize];
     let columns = columns_of_bodies(labels, size[1], job.bodies.len());
     let make = |(owner, (name, bodies)): (BodyOwner, (&'a str, Vec<usize>))| {
-        let own = |k: &usize| columns[*k].clone();
-        let begin = bodies.iter().map(|k| own(k).start).min().unwrap_or(0);
-        let end = bodies.iter().map(|k| own(k).end).max().unwrap_or(0);
-        let mask = Mask::of(size, begin.min(end)..end, |u, v| {
+        let own = bodies.iter().filter_map(|k| columns[*k]);
+        let [begin, end] = own
+            .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
+            .unwrap_or_default();
+        let mask = Mask::of(size, begin..end, |u, v| {
             let surface = labels.surface[v * size[1] + u];
             matches!(surface, Surface::Body(k) if bodies.contains(&usize::from(k)))
         });
@@ -178,13 +179,14 @@ pub(super) fn instances<'a>(
     groups.into_iter().map(make).collect()
 }
 
-/// Columns in which each body shows.
-fn columns_of_bodies(labels: &Labels, width: usize, bodies: usize) -> Vec<std::ops::Range<usize>> {
-    let mut columns = vec![usize::MAX..0; bodies];
+/// First column in which each body shows, and one after the last.
+fn columns_of_bodies(labels: &Labels, width: usize, bodies: usize) -> Vec<Option<[usize; 2]>> {
+    let mut columns = vec![None; bodies];
     for (k, surface) in labels.surface.iter().enumerate() {
         if let Surface::Body(body) = surface {
-            let (c, u) = (&mut columns[usize::from(*body)], k % width);
-            *c = c.start.min(u)..c.end.max(u + 1);
+            let u = k % width;
+            let [begin, end] = columns[usize::from(*body)].get_or_insert([u, u + 1]);
+            (*begin, *end) = ((*begin).min(u), (*end).max(u + 1));
         }
     }
     columns

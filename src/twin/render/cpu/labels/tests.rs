@@ -1,5 +1,9 @@
 //! The labels against closed forms and against each other.
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
 
 use super::super::whole;
 use super::*;
