@@ -226,6 +226,13 @@ pub struct View {
 }
 
 impl View {
+    /// The middle of the exposure of the middle row.
+    pub fn mid(&self) -> SimTime {
+        let rows = self.camera.intrinsics.height_px;
+        let row = 0.5 * (f64::from(rows) - 1.0);
+        self.camera.shutter.row_mid(self.start, row)
+    }
+
     /// Photo-electrons that a luminance of 1 cd/m^2 on the axis gives in a row's exposure.
     pub fn electrons_per_cd_m2(&self) -> f64 {
         let lux_s = self.lens.lux_per_cd_m2() * self.camera.shutter.exposure_s;

@@ -38,16 +38,22 @@
 //! the tunnel is dark.
 
 mod dim;
+mod extent;
+pub mod labels;
 mod lamps;
 mod look;
 mod outline;
 mod sensor;
 mod shadow;
+mod sight;
 mod smear;
 mod solid;
 mod spread;
 mod tunnel;
 
+pub use extent::{Whole, whole};
+pub use labels::{Labeller, Labels, Surface};
+pub use sight::{Seen, Sight};
 pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
