@@ -146,4 +146,32 @@ fn structs_agree() {
         exponent, dark_e
     );
     same_layout!("lamps", LampRow, quarters, normal_halo, image_px);
+    same_layout!("shadows", Corner, origin_m, time_s, ray);
+    same_layout!(
+        "shadows", Tile, low_px, high_px, first, end, ambient_lx, corners
+    );
+    same_layout!(
+        "shadows",
+        Source,
+        position_m,
+        intensity_cd,
+        axis,
+        exponent,
+        aside_m,
+        reach_m,
+        up_m,
+        mount_m
+    );
+    same_layout!(
+        "shadows",
+        Blocker,
+        centre_m,
+        radius_m,
+        velocity_mps,
+        first_slab,
+        axis,
+        end_slab
+    );
+    same_layout!("shadows", Slab, normal, low_m, high_m);
+    same_layout!("shadows", Lit, source, capsules, others, end);
 }

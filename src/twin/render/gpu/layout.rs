@@ -166,3 +166,105 @@ pub struct LampRow {
     /// Centre and apparent radius in the image.
     pub image_px: [f32; 4],
 }
+
+/// What a corner of a tile sees.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Corner {
+    /// A pixel at optical depth z is the point `origin_m` + z `ray` from the reference point.
+    pub origin_m: [f32; 3],
+    /// From the bodies' time to the middle of the row's exposure.
+    pub time_s: f32,
+    /// World axes.
+    pub ray: [f32; 3],
+    /// Fills the stride.
+    pub unused: f32,
+}
+
+/// A part of the picture in which shadows may fall.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Tile {
+    /// Upper left.
+    pub low_px: [f32; 2],
+    /// Lower right.
+    pub high_px: [f32; 2],
+    /// First of its lights.
+    pub first: u32,
+    /// After the last one.
+    pub end: u32,
+    /// Ambient light.
+    pub ambient_lx: f32,
+    /// Fills up to the alignment of what follows.
+    pub unused: f32,
+    /// Upper left, upper right, lower left, lower right.
+    pub corners: [Corner; 4],
+}
+
+/// A lamp or headlight as shadows need it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Source {
+    /// From the view's reference point, world axes.
+    pub position_m: [f32; 3],
+    /// Mean intensity along the axis.
+    pub intensity_cd: f32,
+    /// Unit vector, world axes.
+    pub axis: [f32; 3],
+    /// Exponent of the pattern.
+    pub exponent: f32,
+    /// A radius of its disc.
+    pub aside_m: [f32; 3],
+    /// It does not light what is farther.
+    pub reach_m: f32,
+    /// The radius of its disc across the other.
+    pub up_m: [f32; 3],
+    /// Bodies nearer to it than this carry it.
+    pub mount_m: f32,
+}
+
+/// A body that hides light: a capsule, or the part of a tube that is inside all of some slabs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Blocker {
+    /// Centre at the bodies' time, from the view's reference point.
+    pub centre_m: [f32; 3],
+    /// Radius of capsule or tube.
+    pub radius_m: f32,
+    /// Where it goes.
+    pub velocity_mps: [f32; 3],
+    /// First of its slabs.
+    pub first_slab: u32,
+    /// Of a capsule: to an end of its straight part. Of a tube: unit vector; 0 where there is none.
+    pub axis: [f32; 3],
+    /// After the last of its slabs.
+    pub end_slab: u32,
+}
+
+/// Space between two parallel planes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Slab {
+    /// Unit normal, world axes.
+    pub normal: [f32; 3],
+    /// From the body's centre to one plane.
+    pub low_m: f32,
+    /// To the other.
+    pub high_m: f32,
+    /// Fills the stride.
+    pub unused: [f32; 3],
+}
+
+/// A light over a tile, and what it has in the list of bodies.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct Lit {
+    /// Which light.
+    pub source: u32,
+    /// First of its capsules.
+    pub capsules: u32,
+    /// First of its other bodies.
+    pub others: u32,
+    /// After the last one.
+    pub end: u32,
+}

@@ -19,16 +19,17 @@
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
 //!    headlights are added in every pixel.
-//! 2. *Lamps.* Discs are ray-cast in every pixel with four instants in the exposure and 4 x 4
+//! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture.
+//! 3. *Lamps.* Discs are ray-cast in every pixel with four instants in the exposure and 4 x 4
 //!    sub-pixels; where the disc is and how long it is on comes row by row from double precision.
 //!    Then the glare is added.
-//! 3. *Sensor.* Shot and read noise, 8 bits.
+//! 4. *Sensor.* Shot and read noise, 8 bits.
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
 //! # What it does not do
 //!
-//! Shadows, reflections in wet or polished surfaces, lens distortion, and the end walls where two
+//! Reflections in wet or polished surfaces, lens distortion, and the end walls where two
 //! cross-sections meet (dark). Between vertices positions run straight, so edges close to a fast
 //! camera are bent by the shutter only facet by facet (0.5 m); lamps are exact. Stains end 60 m
 //! away, the tunnel 160 m ahead of the camera; glare under 0.01 grey levels is not drawn.
@@ -40,6 +41,7 @@ pub mod layout;
 mod mesh;
 mod passes;
 mod pipeline;
+mod shadows;
 mod sight;
 mod target;
 mod textures;
@@ -61,6 +63,7 @@ use layout::Pose;
 use mesh::Mesh;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::Pipelines;
+use shadows::Shadows;
 use sight::{Sight, World};
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
@@ -96,6 +99,7 @@ struct Scratch {
     poses: Vec<Pose>,
     sight: Sight,
     lamps: LampTable,
+    shadows: Shadows,
 }
 
 impl GpuRenderer {
@@ -167,6 +171,7 @@ impl GpuRenderer {
             let sight = &self.scratch.sight;
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);
             let pipelines = &self.pipelines;
+            buffers.draw_shadows(gpu, pipelines, encoder, target);
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_sensor(gpu, pipelines, encoder, target);
             target.copy_to(encoder, &back);
@@ -189,6 +194,11 @@ impl GpuRenderer {
         scratch
             .lamps
             .fill(framed, &self.scene.lamps, tunnel.ambient_lx);
+        let in_sight = scratch.sight.keys().iter();
+        let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
+        scratch
+            .shadows
+            .fill(framed, job, (tunnel, &self.field), in_sight);
         let airlight_cd_m2 = self
             .field
             .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
@@ -205,6 +215,7 @@ impl GpuRenderer {
                 sight: &scratch.sight,
                 lamps: &scratch.lamps.lamps,
                 rows: &scratch.lamps.rows,
+                shadows: &scratch.shadows,
             },
         );
     }

@@ -4,6 +4,7 @@ use super::adapter::Gpu;
 use super::chunks::Chunks;
 use super::layout::{Lamp, LampRow, Pose, View};
 use super::pipeline::{Background, Pipelines, bind};
+use super::shadows::{ShadowBuffers, Shadows};
 use super::sight::Sight;
 use super::target::Target;
 use super::textures::Textures;
@@ -11,13 +12,14 @@ use std::mem::size_of;
 use std::ops::Range;
 
 /// A buffer that grows with what is written to it.
-struct Upload {
+pub struct Upload {
     buffer: wgpu::Buffer,
     usage: wgpu::BufferUsages,
 }
 
 impl Upload {
-    fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
+    /// Of at least one item's size, which may not be 0.
+    pub fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
         let usage = usage | wgpu::BufferUsages::COPY_DST;
         Self {
             buffer: allocate(gpu, usage, size as u64),
@@ -26,7 +28,7 @@ impl Upload {
     }
 
     /// Takes effect before anything submitted later, and after anything submitted before.
-    fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
+    pub fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         if bytes.is_empty() {
             return;
@@ -37,7 +39,8 @@ impl Upload {
         gpu.queue.write_buffer(&self.buffer, 0, bytes);
     }
 
-    fn binding(&self) -> wgpu::BindingResource<'_> {
+    /// All of it.
+    pub fn binding(&self) -> wgpu::BindingResource<'_> {
         self.buffer.as_entire_binding()
     }
 }
@@ -78,13 +81,14 @@ impl BodyBuffers {
 
 /// What one view of a job uploads.
 pub struct ViewBuffers {
-    view: Upload,
+    pub(super) view: Upload,
     poses: Upload,
     shares: Upload,
     placements: Upload,
     lamps: Upload,
     rows: Upload,
     lamp_count: u32,
+    pub(super) shadows: ShadowBuffers,
 }
 
 /// What a view uploads, made by the caller.
@@ -99,6 +103,8 @@ pub struct ViewData<'a> {
     pub lamps: &'a [Lamp],
     /// Their rows.
     pub rows: &'a [LampRow],
+    /// Of bodies.
+    pub shadows: &'a Shadows,
 }
 
 /// Bind groups of the background's pipelines; one a painting.
@@ -131,6 +137,7 @@ impl ViewBuffers {
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
             rows: Upload::new(gpu, storage, size_of::<LampRow>()),
             lamp_count: 0,
+            shadows: ShadowBuffers::new(gpu),
         }
     }
 
@@ -143,6 +150,7 @@ impl ViewBuffers {
         self.lamps.write(gpu, data.lamps);
         self.rows.write(gpu, data.rows);
         self.lamp_count = data.lamps.len() as u32;
+        self.shadows.write(gpu, data.shadows);
     }
 
     /// Tunnel and bodies at every instant of the exposure.
@@ -293,7 +301,8 @@ impl ViewBuffers {
     }
 }
 
-fn begin<'a>(
+/// A pass over one colour target.
+pub fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     colour: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,

@@ -1,4 +1,4 @@
-//! Shaders and the four pipelines made of them.
+//! Shaders and the pipelines made of them.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use crate::twin::render::surface;
@@ -12,7 +12,7 @@ pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 5] = [
+const FILES: [(&str, &str); 6] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
     (
         "background",
@@ -21,6 +21,7 @@ const FILES: [(&str, &str); 5] = [
     ("blend", include_str!("../../../../shaders/blend.wgsl")),
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
     ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
+    ("shadows", include_str!("../../../../shaders/shadows.wgsl")),
 ];
 
 /// The complete source of `shaders/<name>.wgsl`: constants, what is common, and the file.
@@ -52,6 +53,8 @@ pub struct Pipelines {
     background: wgpu::ShaderModule,
     /// Adds a share of one picture to another.
     pub blend: wgpu::RenderPipeline,
+    /// Shadows of bodies, over the background.
+    pub shadows: wgpu::RenderPipeline,
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added.
@@ -79,6 +82,7 @@ impl Pipelines {
             })
         };
         let (lamps, sensor, blend) = (shader("lamps"), shader("sensor"), shader("blend"));
+        let shadows = shader("shadows");
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -95,6 +99,11 @@ impl Pipelines {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
+            shadows: flat(
+                &shadows,
+                ["tile_corner", "shade"],
+                target(SIGNAL, Some(FADE)),
+            ),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
             sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
@@ -168,6 +177,19 @@ const SHARE: wgpu::BlendState = {
     wgpu::BlendState {
         color: add,
         alpha: add,
+    }
+};
+
+/// Keeps the share in the alpha of what is there, and adds the source.
+const FADE: wgpu::BlendState = {
+    let fade = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::SrcAlpha,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: fade,
+        alpha: fade,
     }
 };
 
