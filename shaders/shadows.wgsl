@@ -13,8 +13,11 @@ struct Corner {
 struct Tile {
     low_px: vec2f,
     high_px: vec2f,
-    // Of the list of lights.
-    first: u32,
+    // In the lists: shaded lights from here. Each is the number of its source, where its bodies that
+    // are no capsules begin, where its bodies end, and the numbers of its bodies, capsules first.
+    shaded: u32,
+    // From here the numbers of other sources, and their end.
+    plain: u32,
     end: u32,
     ambient_lx: f32,
     // Upper left, upper right, lower left, lower right.
@@ -52,22 +55,21 @@ struct Slab {
     high_m: f32,
 }
 
-// A light over a tile, and its bodies in `listed`: capsules first.
-struct Lit {
-    source: u32,
-    capsules: u32,
-    others: u32,
-    end: u32,
-}
+// Whether some bodies are no capsules: software adapters run a loop's body even for a count of 0.
+override OTHERS: bool = true;
 
 @group(0) @binding(1) var depth: texture_depth_2d;
 @group(0) @binding(2) var<storage, read> tiles: array<Tile>;
-@group(0) @binding(3) var<storage, read> lights: array<Lit>;
-@group(0) @binding(4) var<storage, read> sources: array<Source>;
-@group(0) @binding(5) var<storage, read> listed: array<u32>;
-@group(0) @binding(6) var<storage, read> blockers: array<Blocker>;
-@group(0) @binding(7) var<storage, read> slabs: array<Slab>;
+// Software adapters read these faster from uniforms than from storage.
+@group(0) @binding(3) var<uniform> lists: array<vec4u, MAX_WORDS / 4u>;
+@group(0) @binding(4) var<uniform> sources: array<Source, MAX_SOURCES>;
+@group(0) @binding(5) var<uniform> blockers: array<Blocker, MAX_BLOCKERS>;
+@group(0) @binding(6) var<uniform> slabs: array<Slab, MAX_SLABS>;
 
+const MAX_WORDS: u32 = 16384u;
+const MAX_SOURCES: u32 = 128u;
+const MAX_BLOCKERS: u32 = 512u;
+const MAX_SLABS: u32 = 1024u;
 const PLACES: u32 = 16u;
 const ALL: u32 = 0xffffu;
 // Cosine and sine of the golden angle.
@@ -80,7 +82,8 @@ struct Varying {
     @location(0) origin_m: vec3f,
     @location(1) ray: vec3f,
     @location(2) time_s: f32,
-    @location(3) @interpolate(flat, either) lights: vec2u,
+    // Shaded lights, other lights and their end in the lists.
+    @location(3) @interpolate(flat, either) lights: vec3u,
     @location(4) @interpolate(flat, either) ambient_lx: f32,
 }
 
@@ -94,7 +97,7 @@ fn tile_corner(@builtin(vertex_index) k: u32, @builtin(instance_index) index: u3
         corner.origin_m,
         corner.ray,
         corner.time_s,
-        vec2u(tiles[index].first, tiles[index].end),
+        vec3u(tiles[index].shaded, tiles[index].plain, tiles[index].end),
         tiles[index].ambient_lx,
     );
 }
@@ -120,25 +123,43 @@ fn cut(span: vec2f, over: f32, slope: f32) -> vec2f {
     return select(vec2f(max(span.x, s), span.y), vec2f(span.x, min(span.y, s)), steep > 0.0);
 }
 
-// Where the line from `a` along `way`, which is a cone that gets `wider_m` wide to its end, is
-// in a tube with slabs.
-fn span_in(a: vec3f, way: vec3f, body: Blocker, wider_m: f32) -> vec2f {
-    let radius = max(body.radius_m + wider_m, 0.0);
-    let side = a - body.axis * dot(body.axis, a);
-    let across = way - body.axis * dot(body.axis, way);
-    let q = max(dot(across, across), 1e-9);
-    let half = dot(side, across) / q;
-    let square = half * half - (dot(side, side) - radius * radius) / q;
-    let root = sqrt(max(square, 0.0));
-    var span = select(vec2f(FAR, -FAR), vec2f(-half - root, -half + root), square > 0.0);
+// Where the line from `a` along `way` is in a tube with slabs.
+fn span_in(a: vec3f, way: vec3f, body: Blocker) -> vec2f {
+    var span = span_in_tube(a, way, body.axis, body.radius_m);
     for (var k = body.first_slab; k < body.end_slab; k++) {
         let slab = slabs[k];
         let at = dot(slab.normal, a);
         let slope = dot(slab.normal, way);
-        span = cut(span, at - slab.high_m, slope - wider_m);
-        span = cut(span, slab.low_m - at, -slope - wider_m);
+        span = cut(span, at - slab.high_m, slope);
+        span = cut(span, slab.low_m - at, -slope);
     }
     return span;
+}
+
+fn span_in_tube(a: vec3f, way: vec3f, axis: vec3f, radius_m: f32) -> vec2f {
+    let side = a - axis * dot(axis, a);
+    let across = way - axis * dot(axis, way);
+    let q = max(dot(across, across), 1e-9);
+    let half = dot(side, across) / q;
+    let square = half * half - (dot(side, side) - radius_m * radius_m) / q;
+    let root = sqrt(max(square, 0.0));
+    return select(vec2f(FAR, -FAR), vec2f(-half - root, -half + root), square > 0.0);
+}
+
+// Where a cone about that line, `wide_m` wide at its end, is in it with any part, and with all.
+fn spans_in(a: vec3f, way: vec3f, body: Blocker, wide_m: f32) -> vec4f {
+    var any = span_in_tube(a, way, body.axis, body.radius_m + wide_m);
+    var all = span_in_tube(a, way, body.axis, max(body.radius_m - wide_m, 0.0));
+    for (var k = body.first_slab; k < body.end_slab; k++) {
+        let slab = slabs[k];
+        let at = dot(slab.normal, a);
+        let slope = dot(slab.normal, way);
+        any = cut(any, at - slab.high_m, slope - wide_m);
+        any = cut(any, slab.low_m - at, -slope - wide_m);
+        all = cut(all, at - slab.high_m, slope + wide_m);
+        all = cut(all, slab.low_m - at, -slope + wide_m);
+    }
+    return vec4f(any, all);
 }
 
 // Whether a line enters from outside, before its end.
@@ -159,40 +180,52 @@ fn turned(turn: vec2f) -> vec2f {
     );
 }
 
-// Which places on a light's disc bodies hide from a point; none if it is not lit. Where all or none
-// of the disc is hidden one line to its centre tells.
-fn hidden(at: vec3f, time_s: f32, lit: Lit, shines: bool) -> u32 {
-    let source = sources[lit.source];
+// A number of the lists.
+fn word(at: u32) -> u32 {
+    return lists[at >> 2u][at & 3u];
+}
+
+// Which places on a light's disc the capsules in a range of the lists hide from a point. Where all
+// or none of the disc is hidden one line to its centre tells.
+fn behind_capsules(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
     let radius_m = length(source.aside_m);
     let to = source.position_m - at;
-    let end = 1.0 - source.mount_m / max(length(to), 1e-3);
+    let carried = 1.0 - source.mount_m * inverseSqrt(max(dot(to, to), 1e-6));
     var mask = 0u;
-    for (var j = select(lit.others, lit.capsules, shines); j < lit.others; j++) {
-        let body = blockers[listed[j]];
+    for (var j = begin; j < end; j++) {
+        let body = blockers[word(j)];
         let a = at - body.centre_m - body.velocity_mps * time_s;
         // A line that starts inside meets nothing.
         let outside = gap_m(a, vec3f(0.0), body.axis) >= body.radius_m;
-        let off_m = gap_m(a, to * end, body.axis) - body.radius_m;
+        let off_m = gap_m(a, to * carried, body.axis) - body.radius_m;
         mask |= select(0u, ALL, outside && off_m < -radius_m);
-        let edge = outside && abs(off_m) <= radius_m;
+        let edge = outside && abs(off_m) <= radius_m && mask != ALL;
         var turn = vec2f(1.0, 0.0);
-        for (var k = select(PLACES, 0u, edge && mask != ALL); k < PLACES; k++) {
-            let way = (to + place(source, k, turn)) * end;
+        for (var k = select(PLACES, 0u, edge); k < PLACES; k++) {
+            let way = (to + place(source, k, turn)) * carried;
             mask |= select(0u, 1u << k, gap_m(a, way, body.axis) < body.radius_m);
             turn = turned(turn);
         }
     }
-    for (var j = select(lit.end, lit.others, shines && mask != ALL); j < lit.end; j++) {
-        let body = blockers[listed[j]];
+    return mask;
+}
+
+// The same of other bodies.
+fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
+    let radius_m = length(source.aside_m);
+    let to = source.position_m - at;
+    let carried = 1.0 - source.mount_m * inverseSqrt(max(dot(to, to), 1e-6));
+    var mask = 0u;
+    for (var j = begin; j < end; j++) {
+        let body = blockers[word(j)];
         let a = at - body.centre_m - body.velocity_mps * time_s;
-        let wide = span_in(a, to, body, radius_m);
-        let all = enters(span_in(a, to, body, -radius_m), end);
-        mask |= select(0u, ALL, all);
-        let some = wide.y >= max(wide.x, 0.0) && wide.x < end;
+        let spans = spans_in(a, to, body, radius_m);
+        mask |= select(0u, ALL, enters(spans.zw, carried));
+        let some = spans.y >= max(spans.x, 0.0) && spans.x < carried && mask != ALL;
         var turn = vec2f(1.0, 0.0);
-        for (var k = select(PLACES, 0u, some && mask != ALL); k < PLACES; k++) {
-            let span = span_in(a, to + place(source, k, turn), body, 0.0);
-            mask |= select(0u, 1u << k, enters(span, end));
+        for (var k = select(PLACES, 0u, some); k < PLACES; k++) {
+            let span = span_in(a, to + place(source, k, turn), body);
+            mask |= select(0u, 1u << k, enters(span, carried));
             turn = turned(turn);
         }
     }
@@ -220,14 +253,26 @@ fn shade(in: Varying) -> @location(0) vec4f {
     let p = in.origin_m + from_eye;
     let across = cross(dpdx(p), dpdy(p));
     let n = normalize(select(across, -across, dot(across, in.ray) > 0.0));
+    let start = p + n * OFFSET_M;
     var total_lx = in.ambient_lx;
     var hidden_lx = 0.0;
-    for (var k = in.lights.x; k < in.lights.y; k++) {
-        let lit = lights[k];
-        let lux = irradiance_lx(p, n, sources[lit.source]);
-        let mask = hidden(p + n * OFFSET_M, in.time_s, lit, lux > 0.0);
+    for (var k = in.lights.x; k < in.lights.y; k = word(k + 2u)) {
+        let source = sources[word(k)];
+        let lux = irradiance_lx(p, n, source);
+        let others = word(k + 1u);
+        let end = word(k + 2u);
+        // Nothing is hidden of a light that does not shine here.
+        let dark = lux <= 0.0;
+        var mask = behind_capsules(start, in.time_s, source, select(k + 3u, others, dark), others);
+        if OTHERS {
+            let done = dark || mask == ALL;
+            mask |= behind_others(start, in.time_s, source, select(others, end, done), end);
+        }
         total_lx += lux;
         hidden_lx += lux * f32(countOneBits(mask)) / f32(PLACES);
+    }
+    for (var k = in.lights.y; k < in.lights.z; k++) {
+        total_lx += irradiance_lx(p, n, sources[word(k)]);
     }
     let left = 1.0 - hidden_lx / max(total_lx, 1e-9);
     let air_e = view.airlight_e * (1.0 - exp(-view.extinction_per_m * length(from_eye)));

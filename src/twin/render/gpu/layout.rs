@@ -6,6 +6,15 @@ use bytemuck::{Pod, Zeroable};
 /// Headlights beyond this many do not light a view; the nearest ones do.
 pub const MAX_HEADLIGHTS: usize = 8;
 
+/// Numbers in the lists of a view's shadows.
+pub const MAX_WORDS: usize = 16384;
+/// Lights that may throw shadows in a view: the nearest.
+pub const MAX_SOURCES: usize = 128;
+/// Bodies that may throw shadows in a view: the nearest.
+pub const MAX_BLOCKERS: usize = 512;
+/// Slabs of all of them.
+pub const MAX_SLABS: usize = 1024;
+
 /// A corner of a surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -189,14 +198,14 @@ pub struct Tile {
     pub low_px: [f32; 2],
     /// Lower right.
     pub high_px: [f32; 2],
-    /// First of its lights.
-    pub first: u32,
+    /// Where its shaded lights begin in the lists.
+    pub shaded: u32,
+    /// Where its other lights begin.
+    pub plain: u32,
     /// After the last one.
     pub end: u32,
     /// Ambient light.
     pub ambient_lx: f32,
-    /// Fills up to the alignment of what follows.
-    pub unused: f32,
     /// Upper left, upper right, lower left, lower right.
     pub corners: [Corner; 4],
 }
@@ -253,18 +262,4 @@ pub struct Slab {
     pub high_m: f32,
     /// Fills the stride.
     pub unused: [f32; 3],
-}
-
-/// A light over a tile, and what it has in the list of bodies.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
-pub struct Lit {
-    /// Which light.
-    pub source: u32,
-    /// First of its capsules.
-    pub capsules: u32,
-    /// First of its other bodies.
-    pub others: u32,
-    /// After the last one.
-    pub end: u32,
 }

@@ -53,8 +53,8 @@ pub struct Pipelines {
     background: wgpu::ShaderModule,
     /// Adds a share of one picture to another.
     pub blend: wgpu::RenderPipeline,
-    /// Shadows of bodies, over the background.
-    pub shadows: wgpu::RenderPipeline,
+    /// Shadows of capsules, and of any bodies, over the background.
+    pub shadows: [wgpu::RenderPipeline; 2],
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added.
@@ -99,11 +99,17 @@ impl Pipelines {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
-            shadows: flat(
-                &shadows,
-                ["tile_corner", "shade"],
-                target(SIGNAL, Some(FADE)),
-            ),
+            shadows: [false, true].map(|others| {
+                let stage = Stage {
+                    shader: &shadows,
+                    entries: ["tile_corner", "shade"],
+                    buffers: &[],
+                    depth: None,
+                    target: target(SIGNAL, Some(FADE)),
+                    constants: &[("OTHERS", f64::from(u8::from(others)))],
+                };
+                pipeline(device, stage)
+            }),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             halos: flat(&lamps, ["halo_corner", "halo"], target(SIGNAL, over)),
             sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),

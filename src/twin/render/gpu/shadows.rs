@@ -14,7 +14,9 @@ mod tiles;
 
 use super::adapter::Gpu;
 use super::chunks::Chunk;
-use super::layout::{Blocker, Corner, Lit, Slab, Source, Tile};
+use super::layout::{
+    Blocker, Corner, MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS, Slab, Source, Tile,
+};
 use super::passes::{Upload, ViewBuffers, begin};
 use super::pipeline::{Pipelines, bind};
 use super::target::Target;
@@ -25,10 +27,13 @@ use crate::twin::render::light::{LampField, disc_places};
 use crate::twin::render::scene::{Body, Job, Shape};
 use falling::{Ball, Cast, Light};
 use nalgebra::{Point3, Vector3};
+use std::collections::BTreeMap;
 use std::mem::size_of;
 use std::ops::Range;
 use tiles::{Cell, Eyes, Marks, TILE_PX};
 
+/// Cells are no finer than they would be at this distance.
+const NEAREST_M: f64 = 1.0;
 /// Wider than any scene: a tube that holds everything.
 const WIDE_M: f32 = 1e6;
 
@@ -36,13 +41,30 @@ const WIDE_M: f32 = 1e6;
 #[derive(Default)]
 pub struct Shadows {
     tiles: Vec<Tile>,
-    lights: Vec<Lit>,
+    /// So many of them have capsules only; they come first.
+    capsule_tiles: usize,
+    others: Vec<Tile>,
+    lists: Vec<u32>,
+    known: BTreeMap<Vec<u64>, List>,
     sources: Vec<Source>,
-    listed: Vec<u32>,
     blockers: Vec<Blocker>,
     slabs: Vec<Slab>,
     marks: Marks,
     cells: Vec<Cell>,
+    set: Vec<u64>,
+}
+
+/// Centre and radius of a ball, and the normal of the surface in it if it has one.
+type Around<'a> = (&'a Point3<f64>, f64, Option<&'a Vector3<f64>>);
+
+/// What matters in a tile, in the lists: shaded lights from `shaded` on, others from `plain` on.
+#[derive(Clone, Copy)]
+struct List {
+    shaded: u32,
+    plain: u32,
+    end: u32,
+    /// Whether there are any bodies but capsules.
+    others: bool,
 }
 
 /// Who may shade what.
@@ -55,6 +77,8 @@ struct Falling<'j> {
     casts: Vec<Cast>,
     of_light: Vec<Range<usize>>,
     eyes: Eyes,
+    /// How far the camera gets meanwhile.
+    slack_m: f64,
 }
 
 impl Shadows {
@@ -84,6 +108,7 @@ impl Shadows {
             casts,
             of_light,
             eyes: Eyes::of(framed, job.time),
+            slack_m: framed.slack_m(),
         };
         let lens = &framed.view.camera.intrinsics;
         let numbers = falling.lights.len() + falling.casts.len();
@@ -103,71 +128,106 @@ impl Shadows {
         tunnel: &Tunnel,
         in_sight: impl Iterator<Item = (ChunkKey, &'c Chunk)>,
     ) {
-        let mut set = vec![0; self.marks.words()];
+        let mut casts = Vec::new();
         for (key, chunk) in in_sight {
-            let here = falling.may_fall_on(&chunk.origin, chunk.radius_m);
-            if here.is_empty() {
+            casts.clear();
+            falling.narrow(&mut casts, None, (&chunk.origin, chunk.radius_m, None));
+            if casts.is_empty() {
                 continue;
             }
             Cell::of(tunnel, key.start_m(), CHUNK_M, &mut self.cells);
-            for cell in &self.cells {
-                let radius_m = cell.radius_m();
-                let ball = (&cell.centre, radius_m, cell.normal.as_ref());
-                if framed.may_see(&cell.centre, radius_m, framed.slack_m())
-                    && falling.collect(&here, ball, None, &mut set)
-                {
-                    self.marks.add_cell(framed, &falling.eyes, cell, &set);
+            let cells = std::mem::take(&mut self.cells);
+            for cell in &cells {
+                self.mark_cell(framed, falling, cell, &mut casts, 0);
+            }
+            self.cells = cells;
+        }
+    }
+
+    /// Marks a cell on which may fall what is in `casts` from `first` on.
+    fn mark_cell(
+        &mut self,
+        framed: &Framed<'_>,
+        falling: &Falling<'_>,
+        cell: &Cell,
+        casts: &mut Vec<usize>,
+        first: usize,
+    ) {
+        let radius_m = cell.radius_m();
+        if !framed.may_see(&cell.centre, radius_m, falling.slack_m) {
+            return;
+        }
+        let ball = (&cell.centre, radius_m, cell.normal.as_ref());
+        let end = casts.len();
+        falling.narrow(casts, Some(first), ball);
+        if casts.len() > end {
+            let away_m = (cell.centre - framed.reference()).norm().max(NEAREST_M);
+            let size_px = 2.0 * framed.view.camera.intrinsics.fx_px * radius_m / away_m;
+            if size_px > f64::from(TILE_PX) {
+                // What is large in the picture is looked at in quarters.
+                for quarter in cell.quarters() {
+                    self.mark_cell(framed, falling, &quarter, casts, end);
                 }
+            } else {
+                falling.collect(&casts[end..], ball, &mut self.set);
+                self.marks.add_cell(framed, &falling.eyes, cell, &self.set);
             }
         }
+        casts.truncate(end);
     }
 
     fn mark_bodies(&mut self, framed: &Framed<'_>, falling: &Falling<'_>) {
-        let all: Vec<usize> = (0..falling.casts.len()).collect();
-        let mut set = vec![0; self.marks.words()];
+        let mut casts = Vec::new();
         for ball in &falling.balls {
             let around = (&ball.centre, ball.radius_m, None);
-            if falling.collect(&all, around, Some(ball.body), &mut set) {
+            casts.clear();
+            falling.narrow(&mut casts, None, around);
+            // Nothing convex shades itself.
+            casts.retain(|k| falling.casts[*k].body != ball.body);
+            if !casts.is_empty() {
+                falling.collect(&casts, around, &mut self.set);
                 let body = falling.bodies[ball.body];
-                self.marks.add_body(framed, &falling.eyes, body, &set);
+                self.marks.add_body(framed, &falling.eyes, body, &self.set);
             }
         }
     }
 
-    /// Makes the tiles and their lists.
+    /// Makes the tiles and their lists. What does not fit the lists is not shaded.
     fn list(&mut self, framed: &Framed<'_>, job: &Job, falling: &Falling<'_>, ambient_lx: f64) {
-        (self.lights.clear(), self.listed.clear());
-        let first_cast = falling.lights.len();
+        self.lists.clear();
+        self.known.clear();
+        let lights = falling.lights.len();
         for (column, row, set) in self.marks.tiles() {
-            if !(first_cast..first_cast + falling.casts.len()).any(|k| has(set, k)) {
+            if !(lights..lights + falling.casts.len()).any(|k| has(set, k)) {
                 continue;
             }
-            let first = self.lights.len() as u32;
-            for (k, casts) in falling.of_light.iter().enumerate() {
-                if !has(set, k) {
-                    continue;
+            let list = match self.known.get(set) {
+                Some(list) => *list,
+                None => {
+                    let list = falling.list(set, &mut self.lists);
+                    self.known.insert(set.to_vec(), list);
+                    list
                 }
-                let capsules = self.listed.len() as u32;
-                let cast = |k: &usize| has(set, first_cast + k);
-                let bodies = casts.clone().filter(cast).map(|k| falling.casts[k].body);
-                self.listed.extend(bodies.map(|body| body as u32));
-                let end = self.listed.len() as u32;
-                let border = (self.listed[capsules as usize..])
-                    .partition_point(|body| (*body as usize) < falling.capsules);
-                self.lights.push(Lit {
-                    source: k as u32,
-                    capsules,
-                    others: capsules + border as u32,
-                    end,
-                });
+            };
+            if list.end as usize > MAX_WORDS {
+                continue;
             }
-            self.tiles.push(Tile {
-                first,
-                end: self.lights.len() as u32,
+            let tiles = if list.others {
+                &mut self.others
+            } else {
+                &mut self.tiles
+            };
+            tiles.push(Tile {
+                shaded: list.shaded,
+                plain: list.plain,
+                end: list.end,
                 ambient_lx: ambient_lx as f32,
                 ..tile(framed, job, column, row)
             });
         }
+        self.lists.truncate(MAX_WORDS);
+        self.capsule_tiles = self.tiles.len();
+        self.tiles.append(&mut self.others);
     }
 
     /// Lights and bodies for the shader.
@@ -181,55 +241,83 @@ impl Shadows {
         self.sources
             .extend(falling.lights.iter().map(|light| source(light, &reference)));
         for body in &falling.bodies {
-            let blocker = blocker(body, &reference, &mut self.slabs);
-            self.blockers.push(blocker);
+            let mut made = blocker(body, &reference, &mut self.slabs);
+            if self.slabs.len() > MAX_SLABS {
+                self.slabs.truncate(made.first_slab as usize);
+                // Nothing is inside of it.
+                made = Blocker::default();
+            }
+            self.blockers.push(made);
         }
     }
 }
 
 impl Falling<'_> {
-    /// Which shadows may fall on anything in a ball.
-    fn may_fall_on(&self, centre: &Point3<f64>, radius_m: f64) -> Vec<usize> {
-        let casts = self.casts.iter().enumerate();
-        casts
-            .filter(|(_, cast)| {
-                let light = &self.lights[cast.light];
-                light.may_light(centre, radius_m, None) && cast.may_fall_on(light, centre, radius_m)
-            })
-            .map(|(k, _)| k)
-            .collect()
-    }
-
-    /// Makes the set of lights, and of some casts not by body `but`, that matter on a surface in a
-    /// ball; `false` where no cast does.
-    fn collect(
-        &self,
-        casts: &[usize],
-        (centre, radius_m, normal): (&Point3<f64>, f64, Option<&Vector3<f64>>),
-        but: Option<usize>,
-        set: &mut [u64],
-    ) -> bool {
-        set.fill(0);
-        let mut any = false;
-        for k in casts {
-            let cast = &self.casts[*k];
+    /// Appends those casts, of all or of the list from `first` on, that may fall on anything in a
+    /// ball.
+    fn narrow(&self, casts: &mut Vec<usize>, first: Option<usize>, around: Around<'_>) {
+        let (centre, radius_m, normal) = around;
+        let falls = |k: usize| {
+            let cast = &self.casts[k];
             let light = &self.lights[cast.light];
-            if Some(cast.body) != but
-                && light.may_light(centre, radius_m, normal)
-                && cast.may_fall_on(light, centre, radius_m)
-            {
-                put(set, self.lights.len() + k);
-                any = true;
-            }
-        }
-        if any {
-            for (k, light) in self.lights.iter().enumerate() {
-                if light.may_light(centre, radius_m, normal) {
-                    put(set, k);
+            light.may_light(centre, radius_m, normal) && cast.may_fall_on(light, centre, radius_m)
+        };
+        match first {
+            None => casts.extend((0..self.casts.len()).filter(|k| falls(*k))),
+            Some(first) => {
+                for at in first..casts.len() {
+                    if falls(casts[at]) {
+                        casts.push(casts[at]);
+                    }
                 }
             }
         }
-        any
+    }
+
+    /// Makes the set of some casts, and of the lights on a surface in a ball.
+    fn collect(&self, casts: &[usize], around: Around<'_>, set: &mut Vec<u64>) {
+        let (centre, radius_m, normal) = around;
+        set.clear();
+        set.resize((self.lights.len() + self.casts.len()).div_ceil(64), 0);
+        for k in casts {
+            put(set, self.lights.len() + k);
+        }
+        for (k, light) in self.lights.iter().enumerate() {
+            if light.may_light(centre, radius_m, normal) {
+                put(set, k);
+            }
+        }
+    }
+
+    /// Appends the list of a set.
+    fn list(&self, set: &[u64], lists: &mut Vec<u32>) -> List {
+        let lights = self.lights.len();
+        let (shaded, mut others) = (lists.len() as u32, false);
+        let casts_in = |light: usize| {
+            let casts = self.of_light[light].clone();
+            casts
+                .filter(|k| has(set, lights + k))
+                .map(|k| &self.casts[k])
+        };
+        let (dark, plain): (Vec<usize>, Vec<usize>) = (0..lights)
+            .filter(|k| has(set, *k))
+            .partition(|k| casts_in(*k).next().is_some());
+        for light in dark {
+            let first = lists.len() + 3;
+            let count = casts_in(light).count();
+            let capsules = casts_in(light).filter(|c| c.body < self.capsules).count();
+            others |= count > capsules;
+            lists.extend([light, first + capsules, first + count].map(|k| k as u32));
+            lists.extend(casts_in(light).map(|cast| cast.body as u32));
+        }
+        let border = lists.len() as u32;
+        lists.extend(plain.into_iter().map(|light| light as u32));
+        List {
+            shaded,
+            plain: border,
+            end: lists.len() as u32,
+            others,
+        }
     }
 }
 
@@ -333,39 +421,37 @@ fn blocker(body: &Body, reference: &Point3<f64>, slabs: &mut Vec<Slab>) -> Block
 /// The shadows of one view on the adapter.
 pub struct ShadowBuffers {
     tiles: Upload,
-    lights: Upload,
+    lists: Upload,
     sources: Upload,
-    listed: Upload,
     blockers: Upload,
     slabs: Upload,
-    count: u32,
+    /// Tiles with capsules only, and all.
+    counts: [u32; 2],
 }
 
 impl ShadowBuffers {
     /// Empty.
     pub fn new(gpu: &Gpu) -> Self {
-        let storage = |size| Upload::new(gpu, wgpu::BufferUsages::STORAGE, size);
+        let uniform = |size| Upload::new(gpu, wgpu::BufferUsages::UNIFORM, size);
         Self {
-            tiles: storage(size_of::<Tile>()),
-            lights: storage(size_of::<Lit>()),
-            sources: storage(size_of::<Source>()),
-            listed: storage(size_of::<u32>()),
-            blockers: storage(size_of::<Blocker>()),
-            slabs: storage(size_of::<Slab>()),
-            count: 0,
+            tiles: Upload::new(gpu, wgpu::BufferUsages::STORAGE, size_of::<Tile>()),
+            lists: uniform(MAX_WORDS * size_of::<u32>()),
+            sources: uniform(MAX_SOURCES * size_of::<Source>()),
+            blockers: uniform(MAX_BLOCKERS * size_of::<Blocker>()),
+            slabs: uniform(MAX_SLABS * size_of::<Slab>()),
+            counts: [0; 2],
         }
     }
 
     /// Takes the next job's view.
     pub fn write(&mut self, gpu: &Gpu, shadows: &Shadows) {
-        self.count = shadows.tiles.len() as u32;
-        if self.count == 0 {
+        self.counts = [shadows.capsule_tiles, shadows.tiles.len()].map(|n| n as u32);
+        if self.counts[1] == 0 {
             return;
         }
         self.tiles.write(gpu, &shadows.tiles);
-        self.lights.write(gpu, &shadows.lights);
+        self.lists.write(gpu, &shadows.lists);
         self.sources.write(gpu, &shadows.sources);
-        self.listed.write(gpu, &shadows.listed);
         self.blockers.write(gpu, &shadows.blockers);
         self.slabs.write(gpu, &shadows.slabs);
     }
@@ -381,23 +467,26 @@ impl ViewBuffers {
         target: &Target,
     ) {
         let shadows = &self.shadows;
-        if shadows.count == 0 {
+        let [capsules, all] = shadows.counts;
+        if all == 0 {
             return;
         }
         let resources = [
             self.view.binding(),
             wgpu::BindingResource::TextureView(&target.depth),
             shadows.tiles.binding(),
-            shadows.lights.binding(),
+            shadows.lists.binding(),
             shadows.sources.binding(),
-            shadows.listed.binding(),
             shadows.blockers.binding(),
             shadows.slabs.binding(),
         ];
-        let group = bind(&gpu.device, &pipelines.shadows, &resources);
         let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
-        pass.set_pipeline(&pipelines.shadows);
-        pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..6, 0..shadows.count);
+        for (pipeline, tiles) in pipelines.shadows.iter().zip([0..capsules, capsules..all]) {
+            if !tiles.is_empty() {
+                pass.set_pipeline(pipeline);
+                pass.set_bind_group(0, &bind(&gpu.device, pipeline, &resources), &[]);
+                pass.draw(0..6, tiles);
+            }
+        }
     }
 }

@@ -1,10 +1,10 @@
 //! Which lights may throw the shadow of which body where: by balls and cones, generously.
 
+use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, MOUNT_M};
 use crate::twin::render::scene::{Body, Headlight, Job, LampLight, Shape};
 use nalgebra::{Point3, Vector3};
-use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Bodies and lamps farther than this from the camera throw no shadow that it sees.
@@ -31,9 +31,11 @@ pub struct Ball {
 
 /// The shadow of a ball.
 struct Cone {
-    /// From the light to the ball.
-    towards: Vector3<f64>,
-    half_rad: f64,
+    /// From the light to the ball, length 1.
+    axis: Vector3<f64>,
+    /// Of half its angle.
+    sin: f64,
+    cos: f64,
     nearest_m: f64,
 }
 
@@ -83,15 +85,28 @@ impl Light {
     }
 
     fn cone(&self, ball: &Ball) -> Option<Cone> {
-        self.may_light(&ball.centre, ball.radius_m + self.radius_m, None)
-            .then(|| {
-                let (towards, wide_m) = (ball.centre - self.centre, ball.radius_m + self.radius_m);
-                Cone {
-                    half_rad: half_angle(wide_m, towards.norm()),
-                    nearest_m: towards.norm() - wide_m,
-                    towards,
-                }
-            })
+        let wide_m = ball.radius_m + self.radius_m;
+        self.may_light(&ball.centre, wide_m, None).then(|| {
+            let to = ball.centre - self.centre;
+            let distance = to.norm();
+            let sin = wide_m / distance;
+            // The shadow of a ball around the light is everywhere.
+            let around = distance <= wide_m;
+            Cone {
+                axis: if around {
+                    Vector3::zeros()
+                } else {
+                    to / distance
+                },
+                sin: if around { 0.0 } else { sin },
+                cos: if around {
+                    -1.0
+                } else {
+                    (1.0 - sin * sin).sqrt()
+                },
+                nearest_m: distance - wide_m,
+            }
+        })
     }
 }
 
@@ -99,29 +114,25 @@ impl Cast {
     /// Whether it may fall on anything in a ball that the light lights.
     pub fn may_fall_on(&self, light: &Light, centre: &Point3<f64>, radius_m: f64) -> bool {
         let to = centre - light.centre;
-        let distance = to.norm();
-        let wide_rad = half_angle(radius_m, distance);
+        let square = to.norm_squared();
         self.cones.iter().any(|cone| {
-            distance + radius_m > cone.nearest_m
-                && to.angle(&cone.towards) < cone.half_rad + wide_rad
+            let along = to.dot(&cone.axis);
+            let aside = (square - along * along).max(0.0).sqrt();
+            along + radius_m > cone.nearest_m && aside * cone.cos - along * cone.sin < radius_m
         })
-    }
-}
-
-fn half_angle(radius_m: f64, distance_m: f64) -> f64 {
-    if radius_m < distance_m {
-        (radius_m / distance_m).asin()
-    } else {
-        PI
     }
 }
 
 /// The lights about a camera.
 pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
     let eye = framed.reference();
-    let lamps = (field.lamps().iter()).filter(|lamp| (lamp.centre - eye).norm() < FAR_M);
+    let away_m = |lamp: &LampLight| (lamp.centre - eye).norm();
+    let lamps = field.lamps().iter();
+    let mut lamps: Vec<&LampLight> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
+    lamps.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+    lamps.truncate(MAX_SOURCES - MAX_HEADLIGHTS);
     let headlights = framed.nearest(&job.headlights);
-    (lamps.map(Light::lamp))
+    (lamps.into_iter().map(Light::lamp))
         .chain(headlights.into_iter().map(Light::headlight))
         .collect()
 }
@@ -130,12 +141,16 @@ pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
 /// first. Also how many of the numbers that they give to bodies are capsules'.
 pub fn balls<'j>(framed: &Framed<'_>, job: &'j Job) -> (Vec<&'j Body>, usize, Vec<Ball>) {
     let eye = framed.reference();
-    let near = |body: &&Body| {
+    let away_m = |body: &Body| {
         let to = body.world_from_body.translation.vector - eye.coords;
-        to.norm() - body.shape.half_extents_m().norm() < FAR_M
+        to.norm() - body.shape.half_extents_m().norm()
     };
+    let bodies = job.bodies.iter();
+    let mut bodies: Vec<&Body> = bodies.filter(|body| away_m(body) < FAR_M).collect();
+    bodies.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+    bodies.truncate(MAX_BLOCKERS);
     let (mut bodies, others): (Vec<&Body>, Vec<&Body>) =
-        job.bodies.iter().filter(near).partition(|b| is_capsule(b));
+        bodies.into_iter().partition(|body| is_capsule(body));
     let capsules = bodies.len();
     bodies.extend(others);
     let shutter = &framed.view.camera.shutter;

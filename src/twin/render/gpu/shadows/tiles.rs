@@ -47,7 +47,18 @@ pub struct Marks {
 impl Cell {
     /// Radius of the ball around it.
     pub fn radius_m(&self) -> f64 {
-        self.half[0].norm() + self.half[1].norm()
+        (self.half[0] + self.half[1])
+            .norm()
+            .max((self.half[0] - self.half[1]).norm())
+    }
+
+    /// The same surface in four parts.
+    pub fn quarters(&self) -> [Self; 4] {
+        [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(|(x, y)| Self {
+            centre: self.point(x, y),
+            half: self.half.map(|side| 0.5 * side),
+            normal: self.normal,
+        })
     }
 
     /// All of a stretch of the tunnel, rails too.
@@ -177,11 +188,6 @@ impl Marks {
         self.sets.clear();
         self.sets
             .resize((self.columns * self.rows) as usize * self.words, 0);
-    }
-
-    /// Words of one set.
-    pub fn words(&self) -> usize {
-        self.words
     }
 
     /// Column, row and set of each tile.
