@@ -237,7 +237,7 @@ pub struct Frame {
     pub number: u32,
     /// When row 0 opened.
     pub start: SimTime,
-    /// 8-bit grey.
+    /// 8-bit grey; 0 x 0 where the camera has delivered none.
     pub image: GrayImage,
 }
 

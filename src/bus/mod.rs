@@ -17,6 +17,7 @@
 mod camera;
 mod command;
 mod fix;
+mod health;
 mod message;
 mod motion;
 mod time;
@@ -25,6 +26,7 @@ mod wayside;
 pub use camera::{CameraModel, Distortion, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
+pub use health::{CameraFault, CameraHealth};
 pub use message::{Delivery, ObstacleWarning, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
 pub use time::SimTime;
