@@ -230,6 +230,13 @@ pub struct RigCalibration {
     pub vehicle_from_left: Isometry3<f64>,
 }
 
+impl RigCalibration {
+    /// The right eye in the left one's frame.
+    pub fn left_from_right(&self) -> Isometry3<f64> {
+        Isometry3::translation(self.baseline_m, 0.0, 0.0)
+    }
+}
+
 /// One image as read out.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {

@@ -380,6 +380,7 @@ impl Session<'_> {
             }
         });
         let report = LedReport {
+            eyes: Default::default(),
             time: start,
             number,
             left: std::mem::take(&mut eyes[0].1),

@@ -26,7 +26,14 @@ struct Seen {
     number: u32,
     start: SimTime,
     fingerprint: u64,
+    /// Since the frame before.
+    interval_s: f64,
 }
+
+/// A camera is given this long for its first frames.
+const STARTING_S: f64 = 5.0;
+/// It is not silent before so many frames are missing.
+const MISSING: f64 = 3.0;
 
 impl CameraWatch {
     /// For images of this size. `repeats_allowed` where they are without noise, and may repeat or be
@@ -56,22 +63,25 @@ impl CameraWatch {
         let expected = self
             .last
             .map_or(frame.number, |l| l.number.saturating_add(1));
+        let lost = frame.number.saturating_sub(expected);
+        let since_last_s = self.last.map_or(STARTING_S, |l| frame.start.since(l.start));
         self.last = Some(Seen {
             number: frame.number,
             start: frame.start,
             fingerprint,
+            interval_s: since_last_s / (f64::from(lost) + 1.0),
         });
-        CameraHealth {
-            fault,
-            lost: frame.number.saturating_sub(expected),
-        }
+        CameraHealth { fault, lost }
     }
 
-    /// Whether the last frame, or the start of the scenario where none came, is longer ago than
-    /// `patience_s`.
+    /// Whether the last frame is longer ago than `patience_s`, and than a camera of its rate may
+    /// take.
     pub fn silence(&self, now: SimTime, patience_s: f64) -> bool {
-        let heard = self.last.map_or(SimTime::ZERO, |l| l.start);
-        now.since(heard) > patience_s
+        let (heard, usual_s) = match self.last {
+            Some(last) => (last.start, MISSING * last.interval_s),
+            None => (SimTime::ZERO, STARTING_S),
+        };
+        now.since(heard) > patience_s.max(usual_s)
     }
 }
 
@@ -181,8 +191,20 @@ mod tests {
             .map(|(k, number)| watch.look(&frame(number, &image(k))).lost)
             .collect();
         assert_eq!(lost, [0, 0, 2, 0, 0, 0, 0]);
-        let last = SimTime::from_secs(4.0 / 30.0);
-        assert!(!watch.silence(last.plus(0.5), 0.5));
-        assert!(watch.silence(last.plus(0.51), 0.5));
+    }
+
+    /// A camera that takes its time is not silent: neither at the start nor at a low rate.
+    #[test]
+    fn silence_is_longer_than_patience_and_rate() {
+        let mut watch = CameraWatch::new((33, 7), false);
+        let at = SimTime::from_secs;
+        assert!(!watch.silence(at(4.9), 0.5) && watch.silence(at(5.1), 0.5));
+        for (number, start_s) in [(0, 0.0), (1, 0.1), (3, 0.3)] {
+            let mut frame = frame(number, &image(number));
+            frame.start = at(start_s);
+            watch.look(&frame);
+        }
+        assert!(!watch.silence(at(0.79), 0.5) && watch.silence(at(0.81), 0.5));
+        assert!(!watch.silence(at(0.59), 0.1) && watch.silence(at(0.61), 0.1));
     }
 }

@@ -5,12 +5,14 @@ use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
 use super::stereo::{at_rest, from_size, triangulate};
 use crate::bus::{
-    Identity, ImuSample, LedReport, Method, OdometerSample, PositionFix, RigCalibration, SimTime,
-    StereoPair,
+    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, LedReport, Method,
+    OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
+use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
 use crate::track::uid::Uid;
 use crate::track::{LampSite, Tunnel};
+use image::GrayImage;
 use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -22,6 +24,7 @@ pub struct LedPositioner {
     settings: LedSettings,
     rig: RigCalibration,
     map: Arc<Tunnel>,
+    watches: [CameraWatch; 2],
     finder: LampFinder,
     reckoning: Reckoning,
     naming: Naming,
@@ -72,7 +75,12 @@ impl LedPositioner {
     /// For one rig on one line.
     pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Tunnel>) -> Self {
         let finder = LampFinder::new(settings, &rig.camera, &map.lamps);
+        let watch = |eye: &CameraModel| {
+            let size_px = (eye.intrinsics.width_px, eye.intrinsics.height_px);
+            CameraWatch::new(size_px, settings.allow_repeated_images)
+        };
         Self {
+            watches: [watch(&rig.camera), watch(&rig.camera)],
             reckoning: Reckoning::new(settings),
             naming: Naming {
                 gate_share: settings.gate_share,
@@ -104,8 +112,59 @@ impl LedPositioner {
         self.reckoning.on_odometer(sample);
     }
 
-    /// Takes a pair of images, after the samples up to the end of its exposure.
+    /// Takes a pair of images, after the samples up to the end of its exposure. An eye that shows a
+    /// fault is left out: then the other one measures alone.
     pub fn on_pair(&mut self, pair: &StereoPair) -> LedReport {
+        let eyes = self.look_after(pair);
+        let mut report = match eyes.map(|eye| eye.is_good()) {
+            [true, true] => self.read_pair(pair),
+            [true, false] => self.read_pair(&StereoPair {
+                left: pair.left.clone(),
+                right: without_image(&pair.right),
+            }),
+            [false, true] => self.read_right(pair),
+            [false, false] => self.read_pair(&StereoPair {
+                left: without_image(&pair.left),
+                right: without_image(&pair.right),
+            }),
+        };
+        report.eyes = eyes;
+        report
+    }
+
+    /// Whether no pair has come for so long that there must be something wrong.
+    pub fn is_silent(&self, now: SimTime) -> bool {
+        let patience_s = self.settings.silent_after_s;
+        self.watches.iter().all(|w| w.silence(now, patience_s))
+    }
+
+    fn look_after(&mut self, pair: &StereoPair) -> [CameraHealth; 2] {
+        let late = self.reckoning.has_forgotten(pair.left.start);
+        let [left, right] = &mut self.watches;
+        [left.look(&pair.left), right.look(&pair.right)].map(|eye| CameraHealth {
+            fault: eye.fault.or(late.then_some(CameraFault::Late)),
+            ..eye
+        })
+    }
+
+    /// The right eye stands in for the left one.
+    fn read_right(&mut self, pair: &StereoPair) -> LedReport {
+        let rig = self.rig;
+        self.rig.vehicle_from_left = rig.vehicle_from_left * rig.left_from_right();
+        let mut report = self.read_pair(&StereoPair {
+            left: pair.right.clone(),
+            right: without_image(&pair.right),
+        });
+        self.rig = rig;
+        std::mem::swap(&mut report.left, &mut report.right);
+        for fix in &mut report.fixes {
+            let lamp = rig.left_from_right() * Point3::from(fix.lamp_in_camera);
+            fix.lamp_in_camera = lamp.coords;
+        }
+        report
+    }
+
+    fn read_pair(&mut self, pair: &StereoPair) -> LedReport {
         let start = pair.left.start;
         let seconds = start.since(*self.epoch.get_or_insert(start));
         let (mut left, mut right) = (
@@ -135,7 +194,9 @@ impl LedPositioner {
             keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
             keep_surer(&mut mono, self.mono_fix(&sighting, &left));
         }
-        if let Some(fix) = &paper {
+        // One eye alone has nothing better.
+        let one_eyed = pair.right.image.is_empty();
+        if let Some(fix) = if one_eyed { &mono } else { &paper } {
             self.anchor = Some(Anchor {
                 time: fix.time,
                 chainage_m: fix.chainage_m,
@@ -147,6 +208,7 @@ impl LedPositioner {
         let report = LedReport {
             time: start,
             number: pair.left.number,
+            eyes: [CameraHealth::default(); 2],
             left: spots(&left),
             right: spots(&right),
             fixes,
@@ -391,6 +453,15 @@ impl LedPositioner {
             s.survey_sigma_m,
         ];
         terms.iter().map(|t| t * t).sum::<f64>().sqrt()
+    }
+}
+
+/// The frame of an eye that has delivered nothing.
+fn without_image(frame: &Frame) -> Frame {
+    Frame {
+        number: frame.number,
+        start: frame.start,
+        image: GrayImage::default(),
     }
 }
 

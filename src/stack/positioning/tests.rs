@@ -1,10 +1,13 @@
 //! The whole chain on drawn images: raw pixels in, fixes out, held against the truth.
 
 use super::{LedPositioner, LedSettings};
-use crate::bus::{Identity, ImuSample, LedReport, Method, OdometerSample, SimTime};
+use crate::bus::{
+    CameraFault, Identity, ImuSample, LedReport, Method, OdometerSample, SimTime, StereoPair,
+};
 use crate::stack::led::testing::{Noise, World, rig, tunnel};
 use crate::track::Tunnel;
-use nalgebra::{UnitQuaternion, Vector3};
+use image::GrayImage;
+use nalgebra::{Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -282,4 +285,150 @@ fn a_contradicting_name_is_not_used_at_once() {
         .flat_map(|r| &r.left)
         .any(|s| s.uid.is_none());
     assert!(unknown);
+}
+
+/// Drives past three lamps with each pair worked on before it is read, every odometer sample given.
+fn drive_with(
+    world: &World,
+    map: &Arc<Tunnel>,
+    pairs: u32,
+    mut work: impl FnMut(u32, StereoPair) -> Option<StereoPair>,
+) -> Vec<LedReport> {
+    let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
+    let mut reports = Vec::new();
+    for k in 0..pairs {
+        let start_s = f64::from(k) / 30.0;
+        for tick in 0..4 {
+            let time_s = start_s + f64::from(tick) * 0.008;
+            positioner.on_odometer(&OdometerSample {
+                time: SimTime::from_secs(time_s),
+                distance_m: world.speed_mps * time_s,
+                speed_mps: world.speed_mps,
+            });
+        }
+        let pair = work(k, world.pair(k, start_s));
+        reports.extend(pair.map(|pair| positioner.on_pair(&pair)));
+    }
+    reports
+}
+
+/// A stuck rig shows the same lamp at the same place for ever: a fix from it would be half a metre
+/// off a pair later. None is given, from the first repetition on; afterwards it goes on as before.
+#[test]
+fn a_frozen_rig_gives_no_fix() {
+    let map = Arc::new(tunnel("manchester"));
+    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let mut held = None;
+    let reports = drive_with(&world, &map, 50, |k, mut pair| {
+        if (20..40).contains(&k) {
+            let (left, right): &(GrayImage, GrayImage) = held.as_ref().unwrap();
+            (pair.left.image, pair.right.image) = (left.clone(), right.clone());
+        } else {
+            held = Some((pair.left.image.clone(), pair.right.image.clone()));
+        }
+        Some(pair)
+    });
+    for report in &reports {
+        let stuck = (20..40).contains(&report.number);
+        let fault = stuck.then_some(CameraFault::Frozen);
+        assert!(report.eyes.iter().all(|eye| eye.fault == fault));
+        assert!(!stuck || (report.fixes.is_empty() && report.left.is_empty()));
+    }
+    let after = errors_m(&world, &reports[40..], Method::Paper);
+    assert!(after.len() >= 7 && worst(&after) < 0.3, "{after:?}");
+}
+
+/// One eye dead, frozen or missing, either of them: the other one goes on alone, with what one
+/// camera can do, and no stereo is claimed.
+#[test]
+fn one_eye_goes_on_alone() {
+    let map = Arc::new(tunnel("manchester"));
+    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let dark = GrayImage::new(1280, 720);
+    for (eye, image, fault) in [
+        (0, dark.clone(), CameraFault::Dead),
+        (0, GrayImage::default(), CameraFault::Missing),
+        (1, dark, CameraFault::Dead),
+    ] {
+        let reports = drive_with(&world, &map, 40, |k, mut pair| {
+            if k >= 10 {
+                let frame = if eye == 0 {
+                    &mut pair.left
+                } else {
+                    &mut pair.right
+                };
+                frame.image = image.clone();
+            }
+            Some(pair)
+        });
+        let alone = &reports[11..];
+        for report in alone {
+            assert_eq!(report.eyes[eye].fault, Some(fault));
+            assert_eq!(report.eyes[1 - eye].fault, None);
+            assert!(report.fixes.iter().all(|f| f.method == Method::Mono));
+            assert_eq!(report.best_fix(), report.fixes.first());
+            for fix in &report.fixes {
+                // In the left eye's frame, whichever eye saw it.
+                let train_m = world.start_m + world.speed_mps * fix.time.secs();
+                let lamp = map.lamp(fix.uid).unwrap();
+                let ahead = world.rig.vehicle_from_left * Point3::from(fix.lamp_in_camera);
+                assert!((lamp.chainage_m - train_m - ahead.x).abs() < 0.3);
+            }
+        }
+        let errors = errors_m(&world, alone, Method::Mono);
+        assert!(
+            errors.len() * 10 > alone.len() * 6,
+            "{eye}: {}",
+            errors.len()
+        );
+        assert!(mean(&errors) < 0.15, "{eye}: {}", mean(&errors));
+    }
+}
+
+/// Frames lost singly and in a row, past several lamps: what comes is used, and its gaps told.
+#[test]
+fn lost_pairs_are_counted_and_survived() {
+    let map = Arc::new(tunnel("manchester"));
+    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let lost = |k: u32| k % 3 == 1 || (30..42).contains(&k);
+    let reports = drive_with(&world, &map, 60, |k, pair| (!lost(k)).then_some(pair));
+    let told: u32 = reports.iter().map(|r| r.eyes[0].lost).sum();
+    assert_eq!(told, (0..59).filter(|k| lost(*k)).count() as u32);
+    let errors = errors_m(&world, &reports, Method::Paper);
+    assert!(errors.len() * 10 > reports.len() * 7, "{}", errors.len());
+    assert!(worst(&errors) < 0.33, "{}", worst(&errors));
+}
+
+/// A pair so late that the samples of its time are gone cannot be turned into a fix: it is told
+/// as late. One that is late, but not so late, is a fix of its own time.
+#[test]
+fn a_late_pair_is_a_fix_of_its_time_or_none() {
+    let map = Arc::new(tunnel("manchester"));
+    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    for (late_s, used) in [(1.0, true), (8.0, false)] {
+        let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
+        let mut given = 0;
+        for k in 0..25 {
+            let start_s = f64::from(k) / 30.0;
+            for tick in 0..8 * 120 {
+                let time_s = start_s - 8.0 + late_s + f64::from(tick) / 120.0;
+                positioner.on_odometer(&OdometerSample {
+                    time: SimTime::from_secs(time_s),
+                    distance_m: world.speed_mps * time_s,
+                    speed_mps: world.speed_mps,
+                });
+            }
+            let report = positioner.on_pair(&world.pair(k, start_s));
+            let fault = (!used).then_some(CameraFault::Late);
+            assert!(
+                report.eyes.iter().all(|eye| eye.fault == fault),
+                "{late_s} s"
+            );
+            given += errors_m(&world, &[report], Method::Paper)
+                .iter()
+                .inspect(|error| assert!(error.abs() < 0.3, "{error}"))
+                .count();
+        }
+        assert_eq!(given > 15, used, "{given}");
+    }
 }
