@@ -247,6 +247,10 @@ impl Open {
                 self.texts.display(stream, report.time, &report.display)?;
                 report.time
             }
+            Event::Camera(time, camera, fault) => {
+                Texts::camera(stream, time, camera, fault)?;
+                time
+            }
             Event::Delivery(delivery) => {
                 self.texts.delivery(stream, delivery)?;
                 delivery.received

@@ -510,7 +510,6 @@ impl Session<'_> {
                 far_angle_rad: 0.05,
                 from_chainage_m: OBSTACLE_M - 0.5,
                 to_chainage_m: OBSTACLE_M + 0.5,
-                blind: false,
                 lateral_m: 0.25,
                 width_m: 0.62,
                 height_m: 0.55,
@@ -528,6 +527,7 @@ impl Session<'_> {
                 danger: DangerLevel::High,
                 from_chainage_m: OBSTACLE_M - 0.5,
                 to_chainage_m: OBSTACLE_M + 0.5,
+                blind: false,
             };
             self.tell(&Event::Delivery(&Delivery {
                 received: report.time,

@@ -44,6 +44,8 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
             ));
         }
     }
+    file.faults.check("faults", problems);
+    check_faulty_cameras(file, problems);
     check_carrier(file, problems);
     check_motion(file, problems);
     check_appearances(file, problems);
@@ -55,6 +57,7 @@ pub(super) fn in_tunnel(
     tunnel: &Tunnel,
     problems: &mut Vec<Problem>,
 ) -> Vec<WaysidePost> {
+    file.faults.check_in(tunnel, "faults", problems);
     check_trains(file, tunnel, problems);
     if let Some(bench) = &file.bench {
         let heads: Vec<f64> = bench.heads_m().collect();
@@ -133,6 +136,35 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
                 key,
                 "a bench test has the rig and the lamps only: they would not be there",
                 format!("take out [bench] or [[{key}]]"),
+            ));
+        }
+    }
+}
+
+/// A fault of a camera that is not there would go unnoticed.
+fn check_faulty_cameras(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    let eyes = ["rig", "left", "right"].map(str::to_owned);
+    let eyes = eyes.into_iter().filter(|_| file.rig.is_some());
+    let devices = file.wayside.iter().map(|post| post.device.clone());
+    let names: Vec<String> = eyes.chain(devices).collect();
+    for (k, fault) in file.faults.cameras.iter().enumerate() {
+        if !names.contains(&fault.camera) {
+            let remedy = match did_you_mean(&fault.camera, &names) {
+                Some(name) => format!("did you mean `{name}`?"),
+                None if names.is_empty() => "add [rig] or [[wayside]], or take this out".to_owned(),
+                None => format!("cameras of this scenario: {}", names.join(", ")),
+            };
+            problems.push(Problem::new(
+                format!("faults.cameras[{k}].camera"),
+                format!("there is no camera `{}`", fault.camera),
+                remedy,
+            ));
+        }
+        if file.bench.is_some() && fault.late_s() > 0.0 {
+            problems.push(Problem::new(
+                format!("faults.cameras[{k}].fault.by_ms"),
+                "a rig at rest on a bench does not wait for its images: they cannot be late",
+                "take this out",
             ));
         }
     }

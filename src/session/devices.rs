@@ -6,16 +6,18 @@
 use super::cameras::{Clock, wayside_view};
 use super::score::{Presence, WaysideScore};
 use super::watch::Stopwatch;
-use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
+use crate::bus::{CameraHealth, Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
 use crate::track::{BED_M, Tunnel};
 use crate::twin::comms::Comms;
+use crate::twin::faults::{CameraTrouble, Grabber};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
 use crate::twin::sensors::{Lidar, WaysideCameraSettings};
+use image::GrayImage;
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -27,6 +29,8 @@ pub struct Device {
     camera: WaysideCameraSettings,
     stream: Stream,
     clock: Clock,
+    trouble: CameraTrouble,
+    grabber: Grabber,
     lidar: Option<(Lidar, Clock)>,
     scan: Option<LidarScan>,
     detector: WaysideDetector,
@@ -50,6 +54,8 @@ impl Device {
 
     fn new(scenario: &Scenario, post: &WaysidePost, map: &Arc<Tunnel>) -> Self {
         let name = &post.calibration.name;
+        let faults = &scenario.faults.cameras;
+        let trouble = CameraTrouble::of(&[name], faults, scenario.seed);
         Self {
             calibration: post.calibration.clone(),
             outlook: Outlook::new(scenario, &post.actual),
@@ -57,6 +63,8 @@ impl Device {
             camera: post.camera.clone(),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
             clock: Clock::new(post.camera.frames_per_s),
+            grabber: Grabber::new(trouble.clone()),
+            trouble,
             lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
                 |(settings, pose)| {
                     let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
@@ -81,11 +89,14 @@ impl Device {
         }
     }
 
-    /// A frame whose last row has closed by `now`: its number, start and view.
+    /// A frame whose last row has closed by `now`, and that is not lost: its number, start and view.
     pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime, View)> {
         let camera = self.calibration.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let (number, start) = self.clock.due(now, span_s)?;
+        if self.trouble.drops(number, start) {
+            return None;
+        }
         let view = wayside_view(
             &self.outlook.device,
             &self.camera,
@@ -105,6 +116,21 @@ impl Device {
             let mut bodies = world.bodies();
             bodies.extend(world.train_bodies());
             self.scan = Some(lidar.scan(start, number, world.time(), &bodies));
+        }
+    }
+
+    /// By how much the images of a frame come late.
+    pub fn late_s(&self, start: SimTime) -> f64 {
+        self.trouble.late_s(start)
+    }
+
+    /// A frame as it is handed to the box.
+    pub fn frame(&mut self, number: u32, start: SimTime, image: GrayImage) -> Frame {
+        let image = self.grabber.grab(number, start, image);
+        Frame {
+            number,
+            start,
+            image,
         }
     }
 
@@ -134,6 +160,16 @@ impl Device {
             comms.send(now, &self.balise, warning);
         }
         report
+    }
+
+    /// Time passes in the box; gives how its camera does where it has fallen silent.
+    pub fn wait(&mut self, now: SimTime, comms: &mut Comms) -> Option<CameraHealth> {
+        let train = comms.train_report(now);
+        let report = self.detector.on_time(now, train)?;
+        if let Some(warning) = self.detector.message(&report) {
+            comms.send(now, &self.balise, warning);
+        }
+        Some(report.camera)
     }
 
     /// As surveyed.

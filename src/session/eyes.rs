@@ -8,6 +8,7 @@ use crate::bus::{LedReport, Method, SimTime, StereoPair};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::track::Tunnel;
+use crate::twin::faults::{CameraTrouble, Grabber};
 use crate::twin::sensors::RigSettings;
 use image::GrayImage;
 use nalgebra::Isometry3;
@@ -23,6 +24,10 @@ pub struct Eyes {
     pub positioner: LedPositioner,
     /// The positions given, held against the truth.
     pub score: PositioningScore,
+    /// What befalls whole pairs.
+    pub trouble: CameraTrouble,
+    /// What befalls the images of either eye.
+    grabbers: [Grabber; 2],
 }
 
 /// A pair that the stack has read.
@@ -38,12 +43,28 @@ pub struct Reading {
 impl Eyes {
     /// Before the first pair.
     pub fn new(scenario: &Scenario, rig: &RigSettings, map: &Arc<Tunnel>) -> Self {
+        let trouble =
+            |names: &[&str]| CameraTrouble::of(names, &scenario.faults.cameras, scenario.seed);
         Self {
+            trouble: trouble(&["rig"]),
+            grabbers: ["left", "right"].map(|eye| Grabber::new(trouble(&["rig", eye]))),
             camera: StereoCamera::new(rig, scenario.seed),
             clock: Clock::new(rig.pairs_per_s),
             positioner: positioner(scenario, rig, map),
             score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
         }
+    }
+
+    /// A pair whose rows are over by `now` and that is not lost: its number and start.
+    pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime)> {
+        let (number, start) = self.clock.due(now, self.camera.delay_s())?;
+        (!self.trouble.drops(number, start)).then_some((number, start))
+    }
+
+    /// By how much the images of a pair come late: it is complete with the later eye.
+    pub fn late_s(&self, start: SimTime) -> f64 {
+        let late = self.grabbers.iter().map(|g| g.late_s(start));
+        late.fold(0.0, f64::max)
     }
 
     /// The stack reads a pair and is scored against where vehicle and head really were.
@@ -55,10 +76,14 @@ impl Eyes {
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
         head_at: impl Fn(SimTime) -> Option<f64>,
     ) -> Result<Reading, SessionError> {
-        let images = images
-            .try_into()
-            .map_err(|images: Vec<_>| SessionError::Images(2, images.len()))?;
-        let images = pair(number, start, images);
+        let [left, right] = <[GrayImage; 2]>::try_from(images)
+            .map_err(|images| SessionError::Images(2, images.len()))?;
+        let [of_left, of_right] = &mut self.grabbers;
+        let delivered = [
+            of_left.grab(number, start, left),
+            of_right.grab(number, start, right),
+        ];
+        let images = pair(number, start, delivered);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
         let rig = &self.camera.rig;

@@ -22,6 +22,7 @@ mod cameras;
 mod devices;
 mod event;
 mod eyes;
+mod health;
 mod motion;
 mod outcome;
 mod ride;
@@ -35,11 +36,12 @@ mod watch;
 pub use event::{Event, Observer, ObserverError, Opening};
 pub use speed::{Speeds, measure};
 pub use summary::{
-    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary,
-    TrainFigures, WallShares, Wayside,
+    CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
+    Protection, Summary, TrainFigures, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;
+use crate::twin::faults;
 use crate::twin::physics::PhysicsError;
 use crate::twin::random::Stream;
 use crate::twin::render::cpu::CpuRenderer;
@@ -139,12 +141,13 @@ fn renderer(
 /// One sigma of a lamp's clock: a crystal without temperature compensation.
 const LAMP_CLOCK_SIGMA: f64 = 20e-6;
 
-/// The lamps start to send at times of their own, by clocks of their own.
+/// The lamps start to send at times of their own, by clocks of their own, and fail as the scenario
+/// has it.
 fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
     let phase = Stream::new(scenario.seed, 0, "lamp phase");
     let clock = Stream::new(scenario.seed, 0, "lamp clock");
-    let lamps = (0u64..)
+    let mut lamps: Vec<_> = (0u64..)
         .zip(&tunnel.lamps)
         .map(|(k, site)| {
             let mut lamp = LampLight::from_site(site, phase.uniform(k));
@@ -152,6 +155,7 @@ fn scene(scenario: &Scenario) -> Scene {
             lamp
         })
         .collect();
+    faults::age(&mut lamps, &scenario.faults.lamps, &tunnel, scenario.seed);
     Scene {
         tunnel,
         lamps,

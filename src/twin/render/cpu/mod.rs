@@ -53,7 +53,7 @@ pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
 use super::light::{LampField, headlights_lx};
 use super::paint::Paintings;
-use super::{Air, Backend, Job, LampLight, RenderError, Renderer, Scene, View};
+use super::{Air, Backend, Job, LampLight, LampsInTime, RenderError, Renderer, Scene, View};
 use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
@@ -76,6 +76,7 @@ const KEPT_VIEWS: usize = 4;
 /// Draws jobs as they are submitted.
 pub struct CpuRenderer {
     world: World,
+    lamps: LampsInTime,
     every_ray: bool,
     /// Of a row's exposure, where they are given.
     slices: Option<usize>,
@@ -181,6 +182,7 @@ impl CpuRenderer {
                 line: scene.tunnel,
                 air: scene.air,
             },
+            lamps: LampsInTime::new(&scene.lamps),
             every_ray,
             kept: VecDeque::new(),
             drawn: VecDeque::new(),
@@ -257,6 +259,10 @@ impl Renderer for CpuRenderer {
     }
 
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
+        if let Some(lamps) = self.lamps.changed(job.time) {
+            self.world.lamps = LampField::new(&lamps).in_air(self.world.air);
+            self.kept.clear();
+        }
         let images = job.views.iter().map(|view| self.draw(job, view)).collect();
         self.drawn.push_back(images);
         Ok(())
