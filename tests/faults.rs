@@ -27,12 +27,12 @@ const SMALL: &str = r#"
     stack = { protection = { initial_chainage_m = 1300.0 } }
     [rig]
     pairs_per_s = 10.0
-    width_px = 160
-    height_px = 90
-    pixel_um = 30.0
+    width_px = 64
+    height_px = 36
+    pixel_um = 75.0
     [[wayside]]
     device = "W1530"
-    camera = { width_px = 160, height_px = 90, pixel_um = 45.0 }
+    camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
 "#;
 
 /// Everything that a run delivers and says.
@@ -181,7 +181,7 @@ fn one_eye_dies_alone() {
             _ => whole,
         };
         assert_eq!(*faults, expected, "pair {number}");
-        let black = hash(&image::GrayImage::new(160, 90));
+        let black = hash(&image::GrayImage::new(64, 36));
         assert_eq!(
             images.map(|i| i == black),
             [false, (10..20).contains(number)]

@@ -112,6 +112,8 @@ pub struct LedReport {
     pub left: Vec<Spot>,
     /// Lamps seen by the right eye.
     pub right: Vec<Spot>,
+    /// Lamps that have just gone by without shining.
+    pub dark: Vec<Uid>,
     /// Fixes, at most one a method.
     pub fixes: Vec<PositionFix>,
 }

@@ -30,6 +30,7 @@ fn write_all(text: &mut String, s: &Summary, out: &Path) -> std::fmt::Result {
     positioning(text, s)?;
     wayside(text, s)?;
     cameras(text, s)?;
+    dark_lamps(text, s)?;
     protection(text, s)?;
     train(text, s)?;
     writeln!(text, "\nresults in {}", out.display())
@@ -144,6 +145,24 @@ fn cameras(text: &mut String, s: &Summary) -> std::fmt::Result {
     }
     Ok(())
 }
+
+/// How many lamps are out, with the first ones' names.
+fn dark_lamps(text: &mut String, s: &Summary) -> std::fmt::Result {
+    let names: Vec<_> = s
+        .dark_lamps
+        .iter()
+        .take(LAMPS)
+        .map(String::as_str)
+        .collect();
+    match s.dark_lamps.len() {
+        0 => Ok(()),
+        n if n <= LAMPS => writeln!(text, "dark lamps: {}", names.join(", ")),
+        n => writeln!(text, "{n} dark lamps: {}, ...", names.join(", ")),
+    }
+}
+
+/// Dark lamps that the table names.
+const LAMPS: usize = 8;
 
 /// Faults of a camera that the table lists.
 const FAULTS: usize = 4;

@@ -224,6 +224,7 @@ impl Open {
             }
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
+                Texts::dark_lamps(stream, report)?;
                 self.images.pair(stream, pair, report)?;
                 self.moving.fixes(stream, scene, report)?;
                 report.time

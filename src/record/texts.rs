@@ -3,8 +3,8 @@
 use super::palette;
 use super::stream::Stream;
 use crate::bus::{
-    BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, ProtectionReport, SimTime, Via,
-    WaysideReport,
+    BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, LedReport, ProtectionReport,
+    SimTime, Via, WaysideReport,
 };
 use crate::session::{ObserverError, Opening};
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
@@ -74,6 +74,19 @@ impl Texts {
                 &format!("camera {camera} sees again"),
             ),
         }
+    }
+
+    /// Lamps have gone by without shining.
+    pub(super) fn dark_lamps(stream: &Stream, report: &LedReport) -> Result<(), ObserverError> {
+        for uid in &report.dark {
+            log(
+                stream,
+                report.time,
+                TextLogLevel::WARN,
+                &format!("lamp {uid} is dark"),
+            )?;
+        }
+        Ok(())
     }
 
     /// A message reached the train. Devices repeat theirs; the log does not.

@@ -381,6 +381,7 @@ impl Session<'_> {
         });
         let report = LedReport {
             eyes: Default::default(),
+            dark: Vec::new(),
             time: start,
             number,
             left: std::mem::take(&mut eyes[0].1),

@@ -518,6 +518,52 @@ mod tests {
         assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
     }
 
+    /// Every fault that could not act as written is refused, with its key.
+    #[test]
+    fn faults_must_be_able_to_strike() {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let keys = |faults: &str| {
+            let text = format!(
+                "name = \"test\"\ntunnel = \"given\"\n[train]\nstop_at_m = 900.0\n[rig]\n\
+                 [[wayside]]\ndevice = \"W1530\"\n{faults}"
+            );
+            let (file, mut problems) = (read_toml(&text).unwrap(), Vec::new());
+            alone(&file, &mut problems);
+            in_tunnel(&file, &tunnel, &mut problems);
+            problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+        };
+        let lamp = |rest: &str| keys(&format!("[[faults.lamps]]\n{rest}\n"));
+        assert_eq!(lamp("share = 0.22\nfault = { kind = 'dead' }"), [""; 0]);
+        let bad = "share = 1.5\nfault = { kind = 'dim', level = -0.1 }\nfrom_s = 5.0\nto_s = 4.0";
+        let at = "faults.lamps[0]";
+        let expected = ["to_s", "share", "fault.level"].map(|key| format!("{at}.{key}"));
+        assert_eq!(lamp(bad), expected);
+        let flicker = "fault = { kind = 'flicker', depth = 2.0, frequency_hz = 0.0 }";
+        let expected = ["depth", "frequency_hz"].map(|key| format!("{at}.fault.{key}"));
+        assert_eq!(lamp(flicker), expected);
+        let missing = "numbers = [3, 4000]\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(missing), [format!("{at}.numbers")]);
+        let nowhere = "from_m = 12.0\nto_m = 13.0\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(nowhere), [format!("{at}.from_m")]);
+        let backwards = "from_m = 40.0\nto_m = 30.0\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(backwards)[0], format!("{at}.to_m"));
+
+        let camera = |rest: &str| keys(&format!("[[faults.cameras]]\n{rest}\n"));
+        for name in ["rig", "left", "right", "W1530"] {
+            let freeze = format!("camera = '{name}'\nfault = {{ kind = 'freeze' }}");
+            assert_eq!(camera(&freeze), [""; 0]);
+        }
+        let at = "faults.cameras[0]";
+        let stranger = "camera = 'W1350'\nfault = { kind = 'freeze' }";
+        assert_eq!(camera(stranger), [format!("{at}.camera")]);
+        let share = "camera = 'rig'\nfault = { kind = 'drop', share = -0.1 }\nfrom_s = -1.0";
+        let expected = ["from_s", "fault.share"].map(|key| format!("{at}.{key}"));
+        assert_eq!(camera(share), expected);
+        let late = "camera = 'rig'\nfault = { kind = 'late', by_ms = 1e9 }";
+        assert_eq!(camera(late), [format!("{at}.fault.by_ms")]);
+    }
+
     /// Two trains in one place would burst apart.
     #[test]
     fn trains_stand_clear_of_each_other() {

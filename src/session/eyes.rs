@@ -24,6 +24,8 @@ pub struct Eyes {
     pub positioner: LedPositioner,
     /// The positions given, held against the truth.
     pub score: PositioningScore,
+    /// Lamps that the stack says do not shine.
+    pub dark_lamps: Vec<String>,
     /// What befalls whole pairs.
     pub trouble: CameraTrouble,
     /// What befalls the images of either eye.
@@ -46,6 +48,7 @@ impl Eyes {
         let trouble =
             |names: &[&str]| CameraTrouble::of(names, &scenario.faults.cameras, scenario.seed);
         Self {
+            dark_lamps: Vec::new(),
             trouble: trouble(&["rig"]),
             grabbers: ["left", "right"].map(|eye| Grabber::new(trouble(&["rig", eye]))),
             camera: StereoCamera::new(rig, scenario.seed),
@@ -89,6 +92,7 @@ impl Eyes {
         let rig = &self.camera.rig;
         let left_at = |t| Some(vehicle_at(t)? * rig.vehicle_from_left);
         let intrinsics = rig.camera.intrinsics;
+        (self.dark_lamps).extend(report.dark.iter().map(|uid| uid.to_string()));
         self.score
             .report(&report, 1e3 * seconds, &intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());

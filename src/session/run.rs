@@ -420,7 +420,11 @@ impl<'s> Run<'s> {
             .is_some_and(|(limit, stood)| stood >= limit)
     }
 
-    fn summary(self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
+    fn summary(mut self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
+        let eyes = self.eyes.as_mut();
+        let dark_lamps = eyes
+            .map(|e| std::mem::take(&mut e.dark_lamps))
+            .unwrap_or_default();
         let scores = self.devices.into_iter().map(Device::into_score);
         let wayside = scores.reduce(|mut a, b| {
             a.add(b);
@@ -435,6 +439,7 @@ impl<'s> Run<'s> {
         Summary {
             stereo_frames: self.stereo_frames,
             wayside_frames: self.wayside_frames,
+            dark_lamps,
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),
             cameras: self.health.finish(),

@@ -39,6 +39,8 @@ pub struct Summary {
     pub wayside: Option<Wayside>,
     /// What the stack says of its cameras: `rig.left`, `rig.right`, and the wayside devices by name.
     pub cameras: BTreeMap<String, CameraFigures>,
+    /// Lamps that the stack says do not shine, by their UIDs, in the order passed.
+    pub dark_lamps: Vec<String>,
     /// Train protection.
     pub protection: Option<Protection>,
     /// How the train ran.
@@ -79,6 +81,7 @@ impl Summary {
             positioning: BTreeMap::new(),
             wayside: None,
             cameras: BTreeMap::new(),
+            dark_lamps: Vec::new(),
             protection: None,
             train: None,
         }

@@ -3,6 +3,7 @@
 use super::LedSettings;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
+use super::roll_call::RollCall;
 use super::stereo::{at_rest, from_size, triangulate};
 use crate::bus::{
     CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, LedReport, Method,
@@ -13,7 +14,7 @@ use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
 use crate::track::uid::Uid;
 use crate::track::{LampSite, Tunnel};
 use image::GrayImage;
-use nalgebra::{Point2, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// Positions the train from stereo pairs of a lamp, as it would on board: raw images, odometer
@@ -28,6 +29,7 @@ pub struct LedPositioner {
     finder: LampFinder,
     reckoning: Reckoning,
     naming: Naming,
+    roll_call: RollCall,
     followed: Vec<Followed>,
     anchor: Option<Anchor>,
     epoch: Option<SimTime>,
@@ -91,6 +93,7 @@ impl LedPositioner {
             map,
             alone: finder.votes(),
             finder,
+            roll_call: RollCall::default(),
             followed: Vec::new(),
             anchor: None,
             epoch: None,
@@ -209,12 +212,33 @@ impl LedPositioner {
             time: start,
             number: pair.left.number,
             eyes: [CameraHealth::default(); 2],
+            dark: self.call_lamps(pair, &left),
             left: spots(&left),
             right: spots(&right),
             fixes,
         };
         (self.left, self.right) = (left, right);
         report
+    }
+
+    /// Lamps that have gone out of the left eye's sight without ever having been in it.
+    fn call_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
+        let camera = self.rig.camera;
+        let middle = 0.5 * f64::from(camera.intrinsics.height_px);
+        let time = camera.shutter.row_mid(pair.left.start, middle);
+        let Some(chainage_m) = self
+            .chainage_m(time)
+            .filter(|_| !pair.left.image.is_empty())
+        else {
+            self.roll_call.forget();
+            return Vec::new();
+        };
+        let line = &self.map.alignment;
+        let place = Translation3::from(line.at(chainage_m).origin);
+        let attitude = self.reckoning.attitude(time, line, chainage_m);
+        let eye = Isometry3::from_parts(place, attitude) * self.rig.vehicle_from_left;
+        let spots = left.iter().map(|lamp| lamp.spot.centre);
+        (self.roll_call).call(&self.map, &camera.intrinsics, &eye, spots)
     }
 
     /// Where the train takes itself to be at a time.

@@ -432,3 +432,27 @@ fn a_late_pair_is_a_fix_of_its_time_or_none() {
         assert_eq!(given > 15, used, "{given}");
     }
 }
+
+/// Two lamps of the six passed are out, one of them right after another: both are told, once, and no
+/// other; the position does not shift to a neighbour. Lost pairs and a dead eye make no lamp dark.
+#[test]
+fn dark_lamps_are_told_and_skipped() {
+    let map = Arc::new(tunnel("manchester"));
+    for eye_dies in [false, true] {
+        let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+        let out = [map.lamps[32].uid, map.lamps[33].uid];
+        world.lamps.retain(|lamp| !out.contains(&lamp.uid));
+        let reports = drive_with(&world, &map, 120, |k, mut pair| {
+            if eye_dies && (20..60).contains(&k) {
+                pair.left.image = GrayImage::new(1280, 720);
+            }
+            (k % 7 != 3).then_some(pair)
+        });
+        let told: Vec<_> = reports.iter().flat_map(|r| r.dark.clone()).collect();
+        assert_eq!(told, out);
+        let errors = errors_m(&world, &reports, Method::Paper);
+        assert!(worst(&errors) < 0.33, "{}", worst(&errors));
+        let last = reports.iter().rev().find_map(|r| r.best_fix()).unwrap();
+        assert!(last.uid.lamp >= map.lamps[35].uid.lamp);
+    }
+}
