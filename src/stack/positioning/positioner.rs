@@ -199,7 +199,8 @@ impl LedPositioner {
         }
         // One eye alone has nothing better.
         let one_eyed = pair.right.image.is_empty();
-        if let Some(fix) = if one_eyed { &mono } else { &paper } {
+        let best = if one_eyed { &mono } else { &paper };
+        if let Some(fix) = best {
             self.anchor = Some(Anchor {
                 time: fix.time,
                 chainage_m: fix.chainage_m,
