@@ -6,6 +6,7 @@ use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
 use crate::track::{FileError, Problem, Tunnel, key_below, read_toml};
+use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
@@ -50,6 +51,8 @@ pub struct Scenario {
     pub wayside: Vec<WaysidePost>,
     /// The radio.
     pub radio: RadioSettings,
+    /// What one sees through.
+    pub air: AirSettings,
     /// Lamps and cameras that are out of order.
     pub faults: FaultSettings,
     /// The stack's settings.
@@ -212,6 +215,7 @@ impl Scenario {
             doppler: file.doppler,
             wayside,
             radio: file.radio,
+            air: file.air,
             faults: file.faults,
             stack: file.stack,
             record: file.record,

@@ -44,6 +44,7 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
             ));
         }
     }
+    file.air.check("air", problems);
     file.faults.check("faults", problems);
     check_faulty_cameras(file, problems);
     check_carrier(file, problems);
@@ -548,6 +549,10 @@ mod tests {
         assert_eq!(lamp(nowhere), [format!("{at}.from_m")]);
         let backwards = "from_m = 40.0\nto_m = 30.0\nfault = { kind = 'dead' }";
         assert_eq!(lamp(backwards)[0], format!("{at}.to_m"));
+
+        assert_eq!(keys("[air]\nvisibility_m = 60.0"), [""; 0]);
+        let air = "[air]\nvisibility_m = 0.0\nscattered_share = 2.0";
+        assert_eq!(keys(air), ["air.visibility_m", "air.scattered_share"]);
 
         let camera = |rest: &str| keys(&format!("[[faults.cameras]]\n{rest}\n"));
         for name in ["rig", "left", "right", "W1530"] {

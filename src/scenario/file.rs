@@ -5,6 +5,7 @@ use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
 use crate::track::Problem;
+use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::physics::{
@@ -85,6 +86,9 @@ pub struct ScenarioFile {
     /// The radio from wayside devices to the train.
     #[serde(default)]
     pub radio: RadioSettings,
+    /// What one sees through. Default: clear air.
+    #[serde(default)]
+    pub air: AirSettings,
     /// Lamps and cameras that are out of order. Default: none.
     #[serde(default)]
     pub faults: FaultSettings,

@@ -46,7 +46,7 @@ use crate::twin::physics::PhysicsError;
 use crate::twin::random::Stream;
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::gpu::GpuRenderer;
-use crate::twin::render::{Air, LampLight, RenderError, Renderer, Scene};
+use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What draws the images.
@@ -159,6 +159,6 @@ fn scene(scenario: &Scenario) -> Scene {
     Scene {
         tunnel,
         lamps,
-        air: Air::default(),
+        air: scenario.air.air(),
     }
 }

@@ -7,6 +7,7 @@
 //! line ([`survey`]). Everything random comes from counter-based streams ([`random`]), so nothing
 //! depends on order or threads. What is left out is said in each of these.
 
+pub mod air;
 pub mod comms;
 pub mod faults;
 pub mod physics;
