@@ -25,17 +25,24 @@ struct View {
     time_first_s: f32,
     pose_step_s: f32,
     pose_last: f32,
+    dn_per_e: vec4f,
     electrons_per_cd_m2: f32,
-    black_grey: f32,
-    grey_per_e: f32,
-    read_variance_e2: f32,
+    black_dn: f32,
+    white_dn: f32,
+    grey_per_dn: f32,
+    read_noise_e: f32,
+    full_well_e: f32,
+    blooming: f32,
+    dark_e: f32,
+    level_step_e: f32,
+    hot_step_e: f32,
     noise: u32,
     frame: u32,
     halo_px: f32,
     saturation_e: f32,
-    // k1, k2, k3 and the square of the reach of the lens's distortion; p1, p2.
-    radial: vec4f,
+    // p1, p2 of the lens's distortion; k1, k2, k3 and the square of its reach.
     tangential: vec2f,
+    radial: vec4f,
     // Place of row 0 in the table of poses.
     pose_middle: f32,
     // Share of light that the air takes on a metre, and the signal of endless air.
@@ -43,7 +50,6 @@ struct View {
     airlight_e: f32,
     // Standard deviation of the point spread.
     blur_px: f32,
-    unused: vec2f,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

@@ -1,8 +1,15 @@
-// Shot noise, read noise and eight bits. Every fragment makes four neighbouring pixels of a row,
-// packed in one RGBA texel: the target's bytes are the image, and one hash serves four pixels.
+// The sensor: fixed pattern, noise, bits, as twin/render/sensor.rs has it. Every fragment makes
+// four neighbouring pixels of a row, packed in one RGBA texel: the target's bytes are the image,
+// and one hash serves four pixels.
 
-@group(0) @binding(1) var signal: texture_2d<f32>;
-@group(0) @binding(2) var glare: texture_2d<f32>;
+@group(0) @binding(1) var glare: texture_2d<f32>;
+// Four pixels an entry, in half precision; rows begin at multiples of 256 bytes.
+@group(0) @binding(2) var<storage, read> signal: array<vec2u>;
+// Four pixels' words an entry; see twin/render/pixel_map.rs.
+@group(0) @binding(3) var<storage, read> map: array<vec4u>;
+
+// How far charge spills up and down; 0 where nothing does.
+override BLOOMING_REACH: i32 = 0;
 
 // Glare in four pixels of a row, which lie between two texels of it.
 fn glare_in(at: vec2i) -> vec4f {
@@ -29,22 +36,68 @@ fn normals(counter: u32) -> vec4f {
     return vec4f(radius * cos(turn), radius * sin(turn));
 }
 
-@fragment
-fn develop(@builtin(position) at: vec4f) -> @location(0) vec4f {
-    let x = 4 * i32(at.x);
-    let y = i32(at.y);
-    let s = vec4f(
-        textureLoad(signal, vec2i(x, y), 0).r,
-        textureLoad(signal, vec2i(x + 1, y), 0).r,
-        textureLoad(signal, vec2i(x + 2, y), 0).r,
-        textureLoad(signal, vec2i(x + 3, y), 0).r,
-    );
-    var electrons = min(s + glare_in(vec2i(at.xy)), vec4f(view.saturation_e));
+// Charge of the four pixels of a texel before anything spills.
+fn charge_e(texel: vec2i) -> vec4f {
+    let width = u32(view.size_px.x);
+    let signal_row = (width + 127u) / 128u * 32u;
+    let halves = signal[u32(texel.y) * signal_row + u32(texel.x)];
+    let s = vec4f(unpack2x16float(halves.x), unpack2x16float(halves.y)) + glare_in(texel);
+    let word = map[u32(texel.y) * ((width + 3u) / 4u) + u32(texel.x)];
+    let gain = GAIN_STEP * vec4f(vec4i(word & vec4u(0xffffu)));
+    let level = vec4f(bitcast<vec4i>(word) >> vec4u(LEVEL_SHIFT));
+    let hot = (word & vec4u(HOT)) != vec4u(0u);
+    let step_e = select(vec4f(view.level_step_e), vec4f(view.hot_step_e), hot);
+    return min(s, vec4f(view.saturation_e)) * gain + (level * step_e + view.dark_e);
+}
+
+// What comes into four pixels with `charge` from above and below; see BLOOMING_REACH in
+// twin/render/sensor.rs.
+fn spilled_e(texel: vec2i, charge: vec4f) -> vec4f {
+    let room = 0.5 * max(view.full_well_e - charge, vec4f(0.0));
+    let rows = i32(view.size_px.y);
+    var spilled = vec4f(0.0);
+    for (var side = -1; side <= 1; side += 2) {
+        var flow = vec4f(0.0);
+        for (var k = BLOOMING_REACH; k > 0; k--) {
+            let y = texel.y + side * k;
+            if y >= 0 && y < rows {
+                let over = charge_e(vec2i(texel.x, y)) - view.full_well_e;
+                let added = select(over, view.blooming * over, over > vec4f(0.0));
+                flow = max(flow + 0.5 * added, vec4f(0.0));
+            }
+        }
+        spilled += min(flow, room);
+    }
+    return spilled;
+}
+
+// Digital numbers of the four pixels of a texel.
+fn converted(texel: vec2i) -> vec4f {
+    var charge = charge_e(texel);
+    if BLOOMING_REACH > 0 {
+        charge += spilled_e(texel, charge);
+    }
+    var n = vec4f(0.0);
     if view.noise != 0u {
         let per_row = (u32(view.size_px.x) + 3u) / 4u;
-        let n = normals(u32(y) * per_row + u32(at.x));
-        electrons += sqrt(max(electrons, vec4f(0.0)) + view.read_variance_e2) * n;
+        n = normals(u32(texel.y) * per_row + u32(texel.x));
     }
-    let grey = view.black_grey + view.grey_per_e * electrons;
-    return round(clamp(grey, vec4f(0.0), vec4f(255.0))) / 255.0;
+    let read_e = view.read_noise_e;
+    let deviation = sqrt(max(charge + read_e * read_e, vec4f(0.0)));
+    // A full pixel has no shot noise, but still read noise.
+    let electrons = min(charge + deviation * n, view.full_well_e + read_e * n);
+    let dn_per_e = select(view.dn_per_e.xyxy, view.dn_per_e.zwzw, (texel.y & 1) == 1);
+    let dn = view.black_dn + dn_per_e * electrons;
+    return round(clamp(dn, vec4f(0.0), vec4f(view.white_dn)));
+}
+
+// The eight upper bits.
+@fragment
+fn develop(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    return floor(converted(vec2i(at.xy)) * view.grey_per_dn) / 255.0;
+}
+
+@fragment
+fn develop_raw(@builtin(position) at: vec4f) -> @location(0) vec4u {
+    return vec4u(converted(vec2i(at.xy)));
 }

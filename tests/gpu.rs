@@ -12,7 +12,9 @@ use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Air, Body, Job, LampLight, Renderer, Scene, Shape, View, sample};
+use metrotwin::twin::render::{
+    Air, Body, Job, LampLight, Renderer, Scene, SensorSettings, Shape, View, sample,
+};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
@@ -32,7 +34,16 @@ fn plain(view: &mut View, luminance_cd_m2: f64) {
     view.lens.halo_share = 0.0;
     view.sensor.black_level_grey = 0.0;
     view.lens.vignetting = 0.0;
+    even(&mut view.sensor);
     view.set_gain_for(luminance_cd_m2, 200.0);
+}
+
+/// Every pixel like the others.
+fn even(sensor: &mut SensorSettings) {
+    sensor.prnu = 0.0;
+    sensor.dsnu_e = 0.0;
+    sensor.dark_current_e_per_s = 0.0;
+    sensor.hot_pixel_share = 0.0;
 }
 
 /// Nothing shines but the lamps given.
@@ -268,6 +279,7 @@ fn noise_is_that_of_the_sensor() {
     let mut view = sample::rig_view(&sample::tunnel(), 100.0, 0.0);
     view.lens.halo_share = 0.0;
     view.lens.vignetting = 0.0;
+    even(&mut view.sensor);
     let luminance_cd_m2 = 100.0 / view.grey_per_cd_m2();
     let eye = view.motion.poses[0];
     let around = Body {

@@ -12,7 +12,7 @@
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
 //! | walls beside a lamp | light falls with a power of the distance; cells are cut to a quarter of it | within the same bounds |
 //! | a lamp's bounding box, full size | an f32 sub-ray of the disc's rim falls on the other side: 1/16 of the disc's signal | 2 % over 2 |
-//! | noise | another order of the hash's words | equal mean and variance in every grey band |
+//! | noise | none: the same streams (`tests/sensor.rs`) | equal mean and variance in every grey band |
 //!
 //! A machine without a graphics adapter fails here: `apt-get install mesa-vulkan-drivers` gives a
 //! software one.
@@ -32,7 +32,8 @@ use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
+    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, SensorSettings, Shape,
+    View, sample,
 };
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -64,7 +65,9 @@ fn quiet(job: &Job) -> Job {
 }
 
 fn scaled(view: &mut View, gain: f64, divisor: u32) {
-    view.sensor.quantum_efficiency *= gain;
+    // Less gain than none would show a full well instead of white.
+    view.lens.transmission *= gain.min(1.0);
+    view.sensor.gain_db += 20.0 * gain.max(1.0).log10();
     let i = view.camera.intrinsics;
     view.camera.intrinsics = Intrinsics::centred(
         i.width_px / divisor,
@@ -121,6 +124,7 @@ fn rig_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
             luminance_cd_m2: 0.0,
         }],
         views: vec![view],
+        ..Job::default()
     }
 }
 
@@ -475,6 +479,19 @@ fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
     })
 }
 
+/// Without noise, and every pixel like the others.
+fn even(view: &mut View) {
+    view.lens.vignetting = 0.0;
+    view.sensor = SensorSettings {
+        noise: false,
+        prnu: 0.0,
+        dsnu_e: 0.0,
+        dark_current_e_per_s: 0.0,
+        hot_pixel_share: 0.0,
+        ..view.sensor
+    };
+}
+
 /// Provokes a disc drawn with the wrong row's pose: at 100 km/h and 4 m a row moves it by 0.15 px,
 /// over its 60 rows by a sixth of its width. A pixel's 4 x 4 sub-rays place one row's edge to an
 /// eighth of a pixel, all rows together the disc's middle to 0.05.
@@ -483,7 +500,7 @@ fn a_disc_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
     let mut view = sample::rig_view(&tunnel, 101.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);
     view.motion = shaken(&tunnel, 101.0, view.start);
-    view.sensor.noise = false;
+    even(&mut view);
     view.lens.halo_share = 0.0;
     let (black, full) = (view.sensor.black_level_grey, 200.0);
     let scene = lone_lamp(&view, full);
@@ -537,7 +554,7 @@ fn a_board_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
     let mut view = sample::rig_view(&tunnel, 150.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);
     view.motion = shaken(&tunnel, 150.0, view.start);
-    view.sensor.noise = false;
+    even(&mut view);
     let middle = view.motion.pose_at(view.start.plus(8e-3));
     // Across the camera's axis, tilted in the image.
     let tilt = Isometry3::from_parts(

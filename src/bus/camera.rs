@@ -1,11 +1,11 @@
 //! Cameras as their calibration sheets describe them, and the frames that they deliver.
 
-use super::SimTime;
+use super::{Distortion, SimTime};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// A pinhole camera. Pixel coordinates have the centre of the top left pixel at (0, 0), u to the
+/// A camera's projection: a pinhole behind a lens that distorts. Pixel coordinates have the centre of the top left pixel at (0, 0), u to the
 /// right and v down, as OpenCV has them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Intrinsics {
@@ -53,107 +53,36 @@ impl Intrinsics {
         let [x, y] = self.distortion.undistort(seen);
         Vector3::new(x, y, 1.0)
     }
-}
 
-/// Distortion of a lens after Brown and Conrady, in OpenCV's five coefficients: with
-/// r^2 = x^2 + y^2 at depth 1, a point (x, y) is seen at
-///
-/// ```text
-/// x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 x y + p2 (r^2 + 2 x^2)
-/// y' = y (1 + k1 r^2 + k2 r^4 + k3 r^6) + p1 (r^2 + 2 y^2) + 2 p2 x y
-/// ```
-///
-/// Beyond [`Self::reach`], where a polynomial turns back and would show a point twice, the factor
-/// of the radius stays as it is there.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Distortion {
-    /// Radial, of r^2.
-    pub k1: f64,
-    /// Radial, of r^4.
-    pub k2: f64,
-    /// Radial, of r^6.
-    pub k3: f64,
-    /// Tangential.
-    pub p1: f64,
-    /// Tangential.
-    pub p2: f64,
-}
-
-/// Steps of Newton's method; each doubles the digits.
-const NEWTON_STEPS: usize = 8;
-/// Radii beyond this are 84 deg off the axis, outside any picture of this projection.
-const MAX_RADIUS: f64 = 10.0;
-
-impl Distortion {
-    /// Whether there is any.
-    pub fn is_none(&self) -> bool {
-        *self == Self::default()
-    }
-
-    /// Where a point (x, y) at depth 1 is seen.
-    pub fn distort(&self, p: [f64; 2]) -> [f64; 2] {
-        if self.is_none() {
-            return p;
+    /// Where a pixel would be if the lens had no distortion.
+    pub fn ideal(&self, pixel: &Point2<f64>) -> Point2<f64> {
+        if self.distortion.is_none() {
+            return *pixel;
         }
-        let reach2 = self.reach().powi(2);
-        self.distort_within(reach2, p)
+        let ray = self.ray(pixel.x, pixel.y);
+        Point2::new(
+            self.fx_px * ray.x + self.cx_px,
+            self.fy_px * ray.y + self.cy_px,
+        )
     }
 
-    fn distort_within(&self, reach2: f64, [x, y]: [f64; 2]) -> [f64; 2] {
-        let r2 = (x * x + y * y).min(reach2);
-        let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
-        [
-            x * radial + 2.0 * self.p1 * x * y + self.p2 * (r2 + 2.0 * x * x),
-            y * radial + self.p1 * (r2 + 2.0 * y * y) + 2.0 * self.p2 * x * y,
-        ]
-    }
-
-    /// The point at depth 1 that is seen at (x', y'), by Newton's method.
-    pub fn undistort(&self, seen: [f64; 2]) -> [f64; 2] {
-        if self.is_none() {
-            return seen;
+    /// Where a pixel of a lens without distortion is seen: the inverse of [`Self::ideal`].
+    pub fn seen(&self, ideal: &Point2<f64>) -> Point2<f64> {
+        if self.distortion.is_none() {
+            return *ideal;
         }
-        let reach2 = self.reach().powi(2);
-        let [mut x, mut y] = seen;
-        for _ in 0..NEWTON_STEPS {
-            let [u, v] = self.distort_within(reach2, [x, y]);
-            let (du, dv) = (seen[0] - u, seen[1] - v);
-            let r2 = x * x + y * y;
-            let inside = r2 < reach2;
-            let r2 = r2.min(reach2);
-            let radial = 1.0 + r2 * (self.k1 + r2 * (self.k2 + r2 * self.k3));
-            let slope = if inside {
-                self.k1 + r2 * (2.0 * self.k2 + r2 * 3.0 * self.k3)
-            } else {
-                0.0
-            };
-            // The derivative, which is symmetric but for the clamp's share.
-            let a = radial + 2.0 * x * x * slope + 2.0 * self.p1 * y + 6.0 * self.p2 * x;
-            let b = 2.0 * x * y * slope + 2.0 * self.p1 * x + 2.0 * self.p2 * y;
-            let d = radial + 2.0 * y * y * slope + 6.0 * self.p1 * y + 2.0 * self.p2 * x;
-            let det = a * d - b * b;
-            if det.abs() < 1e-12 {
-                break;
-            }
-            x += (d * du - b * dv) / det;
-            y += (a * dv - b * du) / det;
-        }
-        [x, y]
+        let (x, y) = (
+            (ideal.x - self.cx_px) / self.fx_px,
+            (ideal.y - self.cy_px) / self.fy_px,
+        );
+        let [x, y] = self.distortion.distort([x, y]);
+        Point2::new(self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px)
     }
 
-    /// The radius at depth 1 up to which a larger radius is seen farther out: where
-    /// r (1 + k1 r^2 + k2 r^4 + k3 r^6) first stops growing.
-    pub fn reach(&self) -> f64 {
-        let slope = |r: f64| {
-            let r2 = r * r;
-            1.0 + r2 * (3.0 * self.k1 + r2 * (5.0 * self.k2 + r2 * 7.0 * self.k3))
-        };
-        let steps = 1000;
-        let step = MAX_RADIUS / f64::from(steps);
-        (1..=steps)
-            .map(|k| step * f64::from(k))
-            .find(|r| slope(*r) <= 0.0)
-            .map_or(MAX_RADIUS, |r| r - step)
+    /// Whether a pixel is in the picture.
+    pub fn contains(&self, pixel: &Point2<f64>) -> bool {
+        (0.0..=f64::from(self.width_px) - 1.0).contains(&pixel.x)
+            && (0.0..=f64::from(self.height_px) - 1.0).contains(&pixel.y)
     }
 }
 
@@ -170,6 +99,11 @@ pub struct Shutter {
 }
 
 impl Shutter {
+    /// Whether all rows open at once, so that what blinks shows no stripes.
+    pub fn is_global(&self) -> bool {
+        self.line_time_s <= 0.0
+    }
+
     /// From the frame's start to the opening of row `v`.
     pub fn delay_s(&self, v: f64) -> f64 {
         let rows = if self.first_row == 0 {
@@ -215,15 +149,17 @@ pub struct CameraModel {
     pub shutter: Shutter,
 }
 
-/// The stereo rig on the train head, rectified: both eyes share intrinsics and orientation, and
-/// the right eye sits `baseline_m` along the left eye's x axis. This is the sheet; the rig as it is
-/// built may differ from it.
+/// The stereo rig on the train head: two cameras, each with intrinsics and a shutter of its own.
+/// This is the sheet; the rig as it is built may differ from it. When an eye was triggered is said
+/// by each [`Frame`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RigCalibration {
-    /// Either eye.
-    pub camera: CameraModel,
-    /// Distance between the eyes.
-    pub baseline_m: f64,
+    /// Left eye.
+    pub left: CameraModel,
+    /// Right eye.
+    pub right: CameraModel,
+    /// The right eye in the left eye's frame: x right, y down, z ahead.
+    pub left_from_right: Isometry3<f64>,
     /// The left eye on the leading car. The vehicle frame is fixed to that car's body; with the
     /// car at rest on straight level track its origin is on the centreline, at top of rail, under
     /// the train head.
@@ -231,9 +167,23 @@ pub struct RigCalibration {
 }
 
 impl RigCalibration {
-    /// The right eye in the left one's frame.
-    pub fn left_from_right(&self) -> Isometry3<f64> {
-        Isometry3::translation(self.baseline_m, 0.0, 0.0)
+    /// Both eyes the same, parallel, the right one `baseline_m` along the left one's x axis.
+    pub fn rectified(
+        camera: CameraModel,
+        baseline_m: f64,
+        vehicle_from_left: Isometry3<f64>,
+    ) -> Self {
+        Self {
+            left: camera,
+            right: camera,
+            left_from_right: Isometry3::translation(baseline_m, 0.0, 0.0),
+            vehicle_from_left,
+        }
+    }
+
+    /// Distance between the eyes.
+    pub fn baseline_m(&self) -> f64 {
+        self.left_from_right.translation.vector.norm()
     }
 }
 
@@ -242,13 +192,13 @@ impl RigCalibration {
 pub struct Frame {
     /// Counts up from 0, gaps are lost frames.
     pub number: u32,
-    /// When row 0 opened.
+    /// When its first row opened, as the camera says.
     pub start: SimTime,
     /// 8-bit grey; 0 x 0 where the camera has delivered none.
     pub image: GrayImage,
 }
 
-/// Both eyes, triggered together.
+/// Both eyes, triggered together or one a known time after the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StereoPair {
     /// Left eye.

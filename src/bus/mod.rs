@@ -16,15 +16,19 @@
 
 mod camera;
 mod command;
+mod distortion;
 mod fix;
 mod health;
+#[cfg(test)]
+pub mod lenses;
 mod message;
 mod motion;
 mod time;
 mod wayside;
 
-pub use camera::{CameraModel, Distortion, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
+pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
+pub use distortion::{Distortion, DistortionCoefficients};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
 pub use health::{CameraFault, CameraHealth};
 pub use message::{Delivery, ObstacleWarning, Via};

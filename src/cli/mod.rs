@@ -5,6 +5,7 @@
 //!
 //! ```text
 //! metrotwin run SCENARIO      one run: recording.rrd, summary.json, fixes.csv
+//! metrotwin frames SCENARIO   images + labels as a data set
 //! metrotwin check FILE...     tunnels and scenarios: errors and a short report
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
@@ -12,8 +13,10 @@
 mod check;
 mod doctor;
 mod fault;
+mod frames;
 mod report;
 mod run;
+mod running;
 mod table;
 
 use clap::{ArgAction, Parser, Subcommand};
@@ -51,6 +54,7 @@ struct Cli {
 #[derive(Subcommand)]
 enum Command {
     Run(run::RunArgs),
+    Frames(frames::FramesArgs),
     Check(check::CheckArgs),
     Doctor(doctor::DoctorArgs),
 }
@@ -61,6 +65,7 @@ pub fn main() -> ExitCode {
     start_messages(cli.verbose);
     let result = match cli.command {
         Command::Run(args) => run::run(&args),
+        Command::Frames(args) => frames::frames(&args),
         Command::Check(args) => check::check(&args),
         Command::Doctor(args) => doctor::doctor(&args),
     };

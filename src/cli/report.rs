@@ -129,12 +129,12 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         let calibration = rig.calibration();
         lines.push(format!(
             "rig: {}",
-            frames(&calibration.camera, rig.pairs_per_s)
+            frames(&calibration.left, rig.pairs_per_s)
         ));
         lines.push(format!("rig: {}", view(&calibration, scenario)));
         lines.push(format!(
             "rig: {}",
-            stripes(&calibration.camera, &scenario.tunnel)
+            stripes(&calibration.left, &scenario.tunnel)
         ));
         let pairs = images(scenario.duration_s, rig.pairs_per_s);
         lines.push(format!("about {pairs:.0} pairs of images"));

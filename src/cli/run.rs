@@ -1,17 +1,14 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
+use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
 use crate::record::{FixTable, Recording};
 use crate::scenario::{Override, Scenario};
-use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
-use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::cell::Cell;
+use crate::session::{self, End, Observer, RunOptions, Summary};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
 
 const AFTER: &str = "\
 Into the output folder go:
@@ -62,29 +59,6 @@ pub(super) struct RunArgs {
     connect: Option<String>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
-enum RendererArg {
-    /// The graphics adapter, or the plain renderer where there is none
-    Auto,
-    /// The graphics adapter (a GPU, or a software adapter) or nothing
-    Gpu,
-    /// The plain renderer, on the CPU alone
-    Cpu,
-}
-
-impl From<RendererArg> for RendererChoice {
-    fn from(arg: RendererArg) -> Self {
-        match arg {
-            RendererArg::Auto => Self::Auto,
-            RendererArg::Gpu => Self::Gpu,
-            RendererArg::Cpu => Self::Cpu,
-        }
-    }
-}
-
-/// Set by the first Ctrl-C.
-static STOP: AtomicBool = AtomicBool::new(false);
-
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let mut scenario = Scenario::load(&args.scenario, &args.overrides)?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
@@ -93,13 +67,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         .out
         .clone()
         .unwrap_or_else(|| Path::new("out").join(&scenario.name));
-    prepare(&out).map_err(|error| {
-        let what = format!("cannot write into {}: {error}", out.display());
-        Failure::input(
-            what,
-            "choose another folder with --out, or make that one writable",
-        )
-    })?;
+    prepare(&out)?;
 
     stop_on_ctrl_c();
     let summary = observed(args, &scenario, live, &out)?;
@@ -146,23 +114,15 @@ fn observed(
     observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));
 
-    let bar = progress_bar(scenario.duration_s);
-    let tenths = Cell::new(0);
-    let progress = |now_s: f64| {
-        bar.set_position(millis(now_s));
-        // Where there is no terminal for a bar, a line for every tenth of the run.
-        let reached = (10.0 * now_s / scenario.duration_s).min(10.0) as u32;
-        if bar.is_hidden() && reached > tenths.replace(reached) {
-            eprintln!("{} % of the run", 10 * reached);
-        }
-    };
+    let progress = Progress::new(scenario.duration_s);
+    let show = |now_s| progress.show(now_s);
     let options = RunOptions {
         renderer: args.renderer.into(),
         stop: Some(&STOP),
-        progress: Some(&progress),
+        progress: Some(&show),
     };
     let summary = session::run(scenario, &options, &mut observers);
-    bar.finish_and_clear();
+    progress.finish();
     summary.map_err(Failure::run)
 }
 
@@ -182,14 +142,6 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
                 "run without --view, and open recording.rrd afterwards",
             )
         })
-}
-
-/// Makes the folder, and makes sure that files can be written there.
-fn prepare(out: &Path) -> io::Result<()> {
-    fs::create_dir_all(out)?;
-    let probe = out.join(".metrotwin-probe");
-    fs::write(&probe, b"")?;
-    fs::remove_file(&probe)
 }
 
 /// What this run did not write, but an earlier one into the same folder, would not belong to its
@@ -213,30 +165,4 @@ fn write_whole(path: &Path, text: &str) -> io::Result<()> {
     let part = path.with_extension("json.part");
     fs::write(&part, format!("{text}\n"))?;
     fs::rename(&part, path)
-}
-
-fn stop_on_ctrl_c() {
-    let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
-        eprintln!("ending the run; Ctrl-C again ends it at once");
-    };
-    if let Err(error) = ctrlc::set_handler(handler) {
-        tracing::warn!("Ctrl-C will end the run at once: {error}");
-    }
-}
-
-/// Drawn on a terminal only.
-fn progress_bar(duration_s: f64) -> ProgressBar {
-    let bar = ProgressBar::new(millis(duration_s));
-    let template = "{bar:40} {percent:>3} % of the run, {elapsed} so far, {eta} to go";
-    match ProgressStyle::with_template(template) {
-        Ok(style) => bar.with_style(style),
-        Err(_) => bar,
-    }
-}
-
-fn millis(seconds: f64) -> u64 {
-    (seconds * 1e3) as u64
 }

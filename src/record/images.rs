@@ -50,7 +50,8 @@ impl WaysidePaths {
     }
 }
 
-/// A camera's frustum, drawn `depth_m` deep.
+/// A camera's frustum, drawn `depth_m` deep: that of a lens without distortion, which is all that
+/// rerun knows. Images and what is drawn into them stay as they were read.
 pub(super) fn pinhole(intrinsics: &Intrinsics, depth_m: f32) -> Pinhole {
     let focal = [intrinsics.fx_px as f32, intrinsics.fy_px as f32];
     let size = [intrinsics.width_px as f32, intrinsics.height_px as f32];

@@ -1,4 +1,5 @@
-//! What a session shows: a rerun recording with a layout of its own, and tables.
+//! What a session shows: a rerun recording with a layout of its own, tables, and data sets
+//! ([`dataset`]).
 //!
 //! The only room that knows rerun. A [`Recording`] is an observer: it gets what passes in a
 //! session and cannot change it.
@@ -27,6 +28,7 @@
 //! the scores could read back. Tables are for that.
 
 mod blueprint;
+pub mod dataset;
 mod images;
 mod moving;
 mod palette;
@@ -222,6 +224,8 @@ impl Open {
                 self.moving.bodies(stream, scene, time, bodies)?;
                 time
             }
+            // Its images come when they reach the stack.
+            Event::Exposure(_) => return Ok(()),
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
                 Texts::dark_lamps(stream, report)?;

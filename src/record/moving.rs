@@ -84,9 +84,8 @@ impl Moving {
         }
         let eyes = [images::LEFT, images::RIGHT];
         if let Some(rig) = opening.rig {
-            let pinhole = images::pinhole(&rig.camera.intrinsics, 1.2);
-            for eye in eyes {
-                stream.log_static(eye, &pinhole)?;
+            for (eye, camera) in eyes.into_iter().zip([rig.left, rig.right]) {
+                stream.log_static(eye, &images::pinhole(&camera.intrinsics, 1.2))?;
             }
         }
         let mut train = Vec::new();
@@ -123,7 +122,7 @@ impl Moving {
             poses.push(scene, truth.time, pose);
         }
         if let (Some(left), Some((rig, eyes))) = (world_from_left, &mut self.rig) {
-            let right = left * Isometry3::translation(rig.baseline_m, 0.0, 0.0);
+            let right = left * rig.left_from_right;
             for (poses, pose) in eyes.iter_mut().zip([*left, right]) {
                 poses.push(scene, truth.time, &pose);
             }

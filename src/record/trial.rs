@@ -147,11 +147,11 @@ fn looking(place: Vector3<f64>, yaw_rad: f64, pitch_rad: f64) -> Isometry3<f64> 
 }
 
 fn rig(shrink: u32) -> RigCalibration {
-    RigCalibration {
-        camera: camera(1280, 720, 1040.0, shrink),
-        baseline_m: 0.12,
-        vehicle_from_left: looking(Vector3::new(0.2, 0.5, 1.9), 0.7, 0.3),
-    }
+    RigCalibration::rectified(
+        camera(1280, 720, 1040.0, shrink),
+        0.12,
+        looking(Vector3::new(0.2, 0.5, 1.9), 0.7, 0.3),
+    )
 }
 
 fn device(alignment: &Alignment, shrink: u32) -> WaysideCalibration {
@@ -362,10 +362,8 @@ impl Session<'_> {
     fn pair(&mut self, t_s: f64, number: u32) {
         let start = SimTime::from_secs(t_s);
         let world_from_left = self.vehicle(t_s) * self.rig.vehicle_from_left;
-        let mut eyes = [0.0, self.rig.baseline_m].map(|x_m| {
-            let pose = world_from_left * Isometry3::translation(x_m, 0.0, 0.0);
-            self.eye(&pose, number)
-        });
+        let mut eyes = [Isometry3::identity(), self.rig.left_from_right]
+            .map(|left_from_eye| self.eye(&(world_from_left * left_from_eye), number));
         let fixes = match eyes[0].2 {
             Some((uid, lamp)) => self.fixes(t_s, uid, lamp),
             None => Vec::new(),
@@ -420,7 +418,7 @@ impl Session<'_> {
         world_from_eye: &Isometry3<f64>,
         number: u32,
     ) -> (GrayImage, Vec<Spot>, Option<(Uid, Vector3<f64>)>) {
-        let k = self.rig.camera.intrinsics;
+        let k = self.rig.left.intrinsics;
         let mut image = noise(k.width_px, k.height_px, self.random, number);
         let mut spots = Vec::new();
         let mut nearest: Option<(Uid, Vector3<f64>)> = None;

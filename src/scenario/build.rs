@@ -303,10 +303,7 @@ fn overridden(
 
 /// Poses are asked for until the last row of a frame has closed.
 fn history_s(file: &ScenarioFile) -> f64 {
-    let span_s = file.rig.as_ref().map_or(0.0, |rig| {
-        let camera = rig.calibration().camera;
-        camera.shutter.frame_span_s(camera.intrinsics.height_px)
-    });
+    let span_s = (file.rig.as_ref()).map_or(0.0, |rig| rig.as_built().pair_span_s());
     let late_s = file.faults.cameras.iter().map(|fault| fault.late_s());
     let latency_s = 1e-3 * file.stack.latency_ms + late_s.fold(0.0, f64::max);
     // A fix is scored when it has gone through the stack.

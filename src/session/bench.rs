@@ -6,7 +6,9 @@
 
 use super::eyes::{Eyes, positioner};
 use super::watch::{Costs, Watchers};
-use super::{End, Event, Observer, Opening, RunOptions, SessionError, Summary};
+use super::{
+    End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary, TrainPoint,
+};
 use crate::bus::{Method, SimTime};
 use crate::scenario::{BenchSettings, Scenario};
 use crate::track::Tunnel;
@@ -127,6 +129,17 @@ impl<'s> Bench<'s> {
             views: views.into(),
             ..Job::default()
         };
+        watchers.show(&Event::Exposure(&Exposure {
+            source: Source::Rig,
+            number,
+            job: &job,
+            owners: &[],
+            train: Some(TrainPoint {
+                chainage_m: head_m,
+                speed_mps: 0.0,
+                world_from_vehicle: *vehicle,
+            }),
+        }))?;
         let renderer = &mut self.renderer;
         self.cost.submit.time(|| renderer.submit(&job)).0?;
         let images = self.cost.wait.time(|| renderer.collect()).0?;

@@ -1,9 +1,9 @@
 //! When cameras trigger, and what the renderer needs to know to draw their frames.
 
-use crate::bus::{Frame, RigCalibration, SimTime, StereoPair, WaysideCalibration};
+use crate::bus::{CameraModel, Frame, RigCalibration, SimTime, StereoPair, WaysideCalibration};
 use crate::twin::random::Stream;
 use crate::twin::render::{CameraMotion, NoiseKey, View};
-use crate::twin::sensors::{RigSettings, WaysideCameraSettings};
+use crate::twin::sensors::{RigSettings, Trigger, WaysideCameraSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 
@@ -46,40 +46,45 @@ impl Clock {
     }
 }
 
-/// How many poses, [`POSE_STEP_S`] apart, cover a frame of `span_s`.
-fn poses_in(span_s: f64) -> usize {
+/// How many poses, [`POSE_STEP_S`] apart, cover a frame.
+fn poses_of(camera: &CameraModel) -> usize {
+    let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
     (span_s / POSE_STEP_S).ceil() as usize + 1
 }
 
-/// The stereo camera as it is built: its true mount may differ from the calibration.
+/// The stereo camera as it is built: it may differ from the calibration.
 #[derive(Clone, Debug)]
 pub struct StereoCamera {
-    /// Both eyes and the left one's true mount.
+    /// Both eyes and the mount as they really are.
     pub rig: RigCalibration,
-    /// The right eye's true pose in the left one's frame.
-    pub left_from_right: Isometry3<f64>,
-    /// Pixels, glass and sensor of either eye.
-    pub settings: RigSettings,
+    /// Pixels, glass and sensor of either eye, and what the sheet says of the trigger.
+    settings: RigSettings,
+    trigger: Trigger,
+    /// How much later than the left eye the right one is really triggered.
+    right_later_s: f64,
     /// Noise of the left and right eye.
-    pub streams: [Stream; 2],
+    streams: [Stream; 2],
 }
 
 impl StereoCamera {
     /// The rig as it really is, with the noise of a run's seed.
     pub fn new(rig: &RigSettings, seed: u64) -> Self {
+        let trigger = Stream::new(seed, 0, "stereo/trigger");
         Self {
             rig: rig.actual(),
-            left_from_right: rig.left_from_right(),
             settings: rig.clone(),
+            trigger: Trigger::new(trigger, rig.frame_jitter_us),
+            right_later_s: rig.as_built().trigger_offset_s(),
             streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
         }
     }
 
-    /// From the opening of the first row to the last pose that drawing a pair needs.
+    /// From the start of a pair to the last pose that drawing it needs.
     pub fn delay_s(&self) -> f64 {
-        let shutter = self.rig.camera.shutter;
-        let span_s = shutter.frame_span_s(self.rig.camera.intrinsics.height_px);
-        (poses_in(span_s) - 1) as f64 * POSE_STEP_S
+        let poses_s = |eye: &CameraModel| (poses_of(eye) - 1) as f64 * POSE_STEP_S;
+        let left_s = poses_s(&self.rig.left);
+        let right_s = poses_s(&self.rig.right) + self.right_later_s;
+        left_s.max(right_s) + self.trigger.latest_s()
     }
 
     /// The views of a pair, left then right, for a vehicle that moves as `vehicle_at` says.
@@ -90,25 +95,33 @@ impl StereoCamera {
         start: SimTime,
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
     ) -> Option<[View; 2]> {
-        let count = (self.delay_s() / POSE_STEP_S).round() as usize + 1;
-        let left: Option<Vec<_>> = (0..count)
-            .map(|k| {
-                let vehicle = vehicle_at(start.plus(k as f64 * POSE_STEP_S))?;
-                Some(vehicle * self.rig.vehicle_from_left)
-            })
-            .collect();
-        let left = left?;
-        let right = left
-            .iter()
-            .map(|pose| pose * self.left_from_right)
-            .collect();
-        let view = |poses, stream| View {
-            camera: self.rig.camera,
+        let start = self.trigger.really(number, start);
+        let right_start = start.plus(self.right_later_s).max(SimTime::ZERO);
+        let left_at = |time| Some(vehicle_at(time)? * self.rig.vehicle_from_left);
+        let right_at = |time| Some(left_at(time)? * self.rig.left_from_right);
+        let left = (&self.rig.left, self.streams[0]);
+        let right = (&self.rig.right, self.streams[1]);
+        Some([
+            self.view(left, number, start, left_at)?,
+            self.view(right, number, right_start, right_at)?,
+        ])
+    }
+
+    fn view(
+        &self,
+        (eye, stream): (&CameraModel, Stream),
+        number: u32,
+        start: SimTime,
+        eye_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
+    ) -> Option<View> {
+        let poses = (0..poses_of(eye)).map(|k| eye_at(start.plus(k as f64 * POSE_STEP_S)));
+        Some(View {
+            camera: *eye,
             start,
             motion: CameraMotion {
                 first: start,
                 step_s: POSE_STEP_S,
-                poses,
+                poses: poses.collect::<Option<_>>()?,
             },
             pixel_m: 1e-6 * self.settings.pixel_um,
             lens: self.settings.lens,
@@ -117,22 +130,25 @@ impl StereoCamera {
                 stream,
                 frame: number,
             },
+        })
+    }
+
+    /// Puts two images together as the camera delivers them, with the times that its sheet has.
+    pub fn pair(&self, number: u32, start: SimTime, images: [GrayImage; 2]) -> StereoPair {
+        let frame = |start, image| Frame {
+            number,
+            start,
+            image,
         };
-        Some([view(left, self.streams[0]), view(right, self.streams[1])])
+        let [left, right] = images;
+        StereoPair {
+            left: frame(start, left),
+            right: frame(start.plus(self.settings.trigger_offset_s()), right),
+        }
     }
 }
 
-/// Puts two images together as the camera delivers them.
-pub fn pair(number: u32, start: SimTime, images: [GrayImage; 2]) -> StereoPair {
-    let [left, right] = images.map(|image| Frame {
-        number,
-        start,
-        image,
-    });
-    StereoPair { left, right }
-}
-
-/// The view of a wayside camera.
+/// The view of a wayside camera whose frame really starts at `start`.
 pub fn wayside_view(
     calibration: &WaysideCalibration,
     camera: &WaysideCameraSettings,
@@ -151,5 +167,90 @@ pub fn wayside_view(
             stream,
             frame: number,
         },
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::twin::sensors::{ReadOut, RigError};
+
+    /// A train that runs along x at 30 m/s from time zero on.
+    fn running(time: SimTime) -> Option<Isometry3<f64>> {
+        let run = Isometry3::translation(30.0 * time.secs(), 0.0, 0.0);
+        (time >= SimTime::ZERO).then_some(run)
+    }
+
+    /// What the frames say is the sheet; what is drawn is the truth: with its own start and lens
+    /// for either eye, at the place where the train is by then.
+    #[test]
+    fn frames_say_what_the_sheet_says() {
+        let rig = RigSettings {
+            trigger_offset_us: 1000.0,
+            read_out: ReadOut::Up,
+            calibration_error: RigError {
+                trigger_offset_us: 200.0,
+                k1: -0.01,
+                ..RigError::default()
+            },
+            ..RigSettings::default()
+        };
+        let camera = StereoCamera::new(&rig, 1);
+        let start = SimTime::from_secs(0.5);
+        let [left, right] = camera.views(3, start, running).unwrap();
+        assert_eq!(left.start, start);
+        assert_eq!(right.start, start.plus(1.2e-3));
+        assert_eq!(right.camera.shutter.first_row, 719);
+        let k1 = right.camera.intrinsics.distortion.coefficients().k1;
+        assert!((k1 + 0.01).abs() < 1e-12);
+        let row = |view: &View, v: f64| {
+            let time = view.camera.shutter.row_open(view.start, v);
+            view.motion.pose_at(time).translation.x
+        };
+        let apart_m = row(&right, 719.0) - row(&left, 719.0);
+        let eyes_m = (rig.calibration().vehicle_from_left * camera.rig.left_from_right)
+            .translation
+            .x
+            + 0.5;
+        assert!(
+            (apart_m - eyes_m - 0.036).abs() < 1e-9,
+            "{apart_m} {eyes_m}"
+        );
+        let pair = camera.pair(3, start, [GrayImage::new(1, 1), GrayImage::new(1, 1)]);
+        assert_eq!(pair.left.start, start);
+        assert_eq!(pair.right.start, start.plus(1e-3));
+        assert!(rig.calibration().left.intrinsics.distortion.is_none());
+    }
+
+    /// Frames start about the time that they say, with the spread that was asked for, never before
+    /// time zero, never later than the poses are waited for; the pair's eyes alike.
+    #[test]
+    fn frames_jitter_about_their_times() {
+        let rig = RigSettings {
+            frame_jitter_us: 100.0,
+            trigger_offset_us: -400.0,
+            ..RigSettings::default()
+        };
+        let camera = StereoCamera::new(&rig, 1);
+        let mut squares = 0.0;
+        for number in 0..500 {
+            let start = SimTime::from_secs(f64::from(number) / 30.0);
+            let [left, right] = camera.views(number, start, running).unwrap();
+            let late_s = left.start.since(start);
+            if number > 0 {
+                assert!((right.start.since(left.start) + 4e-4).abs() < 1e-9);
+                squares += late_s * late_s / 499.0;
+            }
+            for view in [&left, &right] {
+                assert!(view.start >= SimTime::ZERO);
+                let last = view
+                    .start
+                    .plus(0.001 * (view.motion.poses.len() - 1) as f64);
+                assert!(last.since(start) <= camera.delay_s() + 1e-9);
+            }
+        }
+        let sigma_us = 1e6 * squares.sqrt();
+        assert!((90.0..110.0).contains(&sigma_us), "{sigma_us}");
     }
 }

@@ -16,7 +16,7 @@ use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
-use crate::twin::sensors::{Lidar, WaysideCameraSettings};
+use crate::twin::sensors::{AutoExposure, Lidar, Trigger, WaysideCameraSettings};
 use image::GrayImage;
 use nalgebra::Point3;
 use std::sync::Arc;
@@ -27,7 +27,9 @@ pub struct Device {
     outlook: Outlook,
     balise: String,
     camera: WaysideCameraSettings,
+    exposure: AutoExposure,
     stream: Stream,
+    trigger: Trigger,
     clock: Clock,
     trouble: CameraTrouble,
     grabber: Grabber,
@@ -61,7 +63,16 @@ impl Device {
             outlook: Outlook::new(scenario, &post.actual),
             balise: post.balise.clone(),
             camera: post.camera.clone(),
+            exposure: AutoExposure::of(
+                &post.camera.exposure_control,
+                post.camera.exposure_us,
+                &post.camera.sensor,
+            ),
             stream: Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}")),
+            trigger: Trigger::new(
+                Stream::new(scenario.seed, 0, &format!("wayside_camera/{name}/trigger")),
+                post.camera.frame_jitter_us,
+            ),
             clock: Clock::new(post.camera.frames_per_s),
             grabber: Grabber::new(trouble.clone()),
             trouble,
@@ -91,19 +102,21 @@ impl Device {
 
     /// A frame whose last row has closed by `now`, and that is not lost: its number, start and view.
     pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime, View)> {
-        let camera = self.calibration.camera;
+        let camera = self.outlook.device.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
-        let (number, start) = self.clock.due(now, span_s)?;
+        let delay_s = span_s + self.trigger.latest_s();
+        let (number, start) = self.clock.due(now, delay_s)?;
         if self.trouble.drops(number, start) {
             return None;
         }
-        let view = wayside_view(
+        let mut view = wayside_view(
             &self.outlook.device,
             &self.camera,
             self.stream,
             number,
-            start,
+            self.trigger.really(number, start),
         );
+        (self.exposure).expose(number, std::slice::from_mut(&mut view));
         Some((number, start, view))
     }
 
@@ -124,8 +137,9 @@ impl Device {
         self.trouble.late_s(start)
     }
 
-    /// A frame as it is handed to the box.
+    /// A frame as it is handed to the box. Exposure is set by what the sensor saw.
     pub fn frame(&mut self, number: u32, start: SimTime, image: GrayImage) -> Frame {
+        self.exposure.on_image(number, &image);
         let image = self.grabber.grab(number, start, image);
         Frame {
             number,
@@ -208,10 +222,7 @@ impl Outlook {
         let camera = &self.device.camera.intrinsics;
         let pose = &self.device.world_from_camera;
         let pixel = camera.project(&pose.inverse_transform_point(place));
-        let in_picture = pixel.is_some_and(|p| {
-            (0.0..f64::from(camera.width_px)).contains(&p.x)
-                && (0.0..f64::from(camera.height_px)).contains(&p.y)
-        });
+        let in_picture = pixel.is_some_and(|p| camera.contains(&p));
         let eye = Point3::from(pose.translation.vector);
         let sight = place - eye;
         in_picture

@@ -5,8 +5,8 @@ use crate::bus::{
     RigCalibration, SimTime, StereoPair, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
-use crate::twin::physics::TrainState;
-use crate::twin::render::Body;
+use crate::twin::physics::{Belonging, TrainState};
+use crate::twin::render::{Body, Job};
 use image::GrayImage;
 use nalgebra::{Isometry3, Vector3};
 
@@ -33,6 +33,42 @@ pub struct Opening<'a> {
     pub protection: bool,
 }
 
+/// Whose images they are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// The rig's pair, left then right.
+    Rig,
+    /// A wayside device; the index is into [`Opening::wayside`].
+    Wayside(usize),
+}
+
+/// What there is to see when the last row of a frame has closed. The images themselves reach the
+/// stack later: [`Event::Pair`] and [`Event::Wayside`] of the same number.
+#[derive(Clone, Copy, Debug)]
+pub struct Exposure<'a> {
+    /// Whose.
+    pub source: Source,
+    /// Number of the frame.
+    pub number: u32,
+    /// The scene and the views, as the renderer is given them.
+    pub job: &'a Job,
+    /// Owners of the job's bodies, in order.
+    pub owners: &'a [Belonging<'a>],
+    /// The train in the middle of the exposure of the first view's middle row.
+    pub train: Option<TrainPoint>,
+}
+
+/// Where a train is at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrainPoint {
+    /// Chainage of its head.
+    pub chainage_m: f64,
+    /// Speed along the line.
+    pub speed_mps: f64,
+    /// Pose of the vehicle frame.
+    pub world_from_vehicle: Isometry3<f64>,
+}
+
 /// One thing that happened. Events come in order of their time of completion.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
@@ -45,6 +81,8 @@ pub enum Event<'a> {
     Doppler(&'a DopplerSample),
     /// Everything solid but the train, 10 times a second.
     Bodies(SimTime, &'a [Body]),
+    /// A frame has been taken.
+    Exposure(&'a Exposure<'a>),
     /// A pair of images, what the stack said of it, and the true chainage at each fix's time.
     Pair(&'a StereoPair, &'a LedReport, &'a [f64]),
     /// A wayside frame and its report; the index is into [`Opening::wayside`].

@@ -1,7 +1,7 @@
 //! The eyes of a train: its stereo camera, the stack that reads it, and how well it does.
 
 use super::SessionError;
-use super::cameras::{Clock, StereoCamera, pair};
+use super::cameras::{Clock, StereoCamera};
 use super::score::PositioningScore;
 use super::watch::Stopwatch;
 use crate::bus::{LedReport, Method, SimTime, StereoPair};
@@ -9,7 +9,8 @@ use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::track::Tunnel;
 use crate::twin::faults::{CameraTrouble, Grabber};
-use crate::twin::sensors::RigSettings;
+use crate::twin::render::View;
+use crate::twin::sensors::{AutoExposure, RigSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 use std::sync::Arc;
@@ -18,6 +19,8 @@ use std::sync::Arc;
 pub struct Eyes {
     /// The rig as it really is.
     pub camera: StereoCamera,
+    /// What sets exposure and gain of both eyes, by what the left one sees.
+    exposure: AutoExposure,
     /// When it takes pairs.
     pub clock: Clock,
     /// What reads them.
@@ -52,6 +55,7 @@ impl Eyes {
             trouble: trouble(&["rig"]),
             grabbers: ["left", "right"].map(|eye| Grabber::new(trouble(&["rig", eye]))),
             camera: StereoCamera::new(rig, scenario.seed),
+            exposure: AutoExposure::of(&rig.exposure_control, rig.exposure_us, &rig.sensor),
             clock: Clock::new(rig.pairs_per_s),
             positioner: positioner(scenario, rig, map),
             score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
@@ -70,6 +74,11 @@ impl Eyes {
         late.fold(0.0, f64::max)
     }
 
+    /// Sets exposure and gain of a pair's views.
+    pub fn expose(&mut self, number: u32, views: &mut [View]) {
+        self.exposure.expose(number, views);
+    }
+
     /// The stack reads a pair and is scored against where vehicle and head really were.
     pub fn read(
         &mut self,
@@ -79,6 +88,9 @@ impl Eyes {
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
         head_at: impl Fn(SimTime) -> Option<f64>,
     ) -> Result<Reading, SessionError> {
+        if let Some(left) = images.first() {
+            self.exposure.on_image(number, left);
+        }
         let [left, right] = <[GrayImage; 2]>::try_from(images)
             .map_err(|images| SessionError::Images(2, images.len()))?;
         let [of_left, of_right] = &mut self.grabbers;
@@ -86,12 +98,12 @@ impl Eyes {
             of_left.grab(number, start, left),
             of_right.grab(number, start, right),
         ];
-        let images = pair(number, start, delivered);
+        let images = self.camera.pair(number, start, delivered);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
         let rig = &self.camera.rig;
         let left_at = |t| Some(vehicle_at(t)? * rig.vehicle_from_left);
-        let intrinsics = rig.camera.intrinsics;
+        let intrinsics = rig.left.intrinsics;
         (self.dark_lamps).extend(report.dark.iter().map(|uid| uid.to_string()));
         self.score
             .report(&report, 1e3 * seconds, &intrinsics, left_at);

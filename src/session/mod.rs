@@ -33,7 +33,7 @@ mod speed;
 mod summary;
 mod watch;
 
-pub use event::{Event, Observer, ObserverError, Opening};
+pub use event::{Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
 pub use speed::{Speeds, measure};
 pub use summary::{
     CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
@@ -116,8 +116,8 @@ pub fn run(
     }
 }
 
-/// The renderer of a scenario; says so once where it has to fall back on the plain one.
-fn renderer(
+/// The renderer of a scenario, as [`run`] uses it; says so once where it has to fall back on the plain one.
+pub fn renderer(
     scenario: &Scenario,
     choice: RendererChoice,
 ) -> Result<Box<dyn Renderer>, SessionError> {
@@ -141,9 +141,9 @@ fn renderer(
 /// One sigma of a lamp's clock: a crystal without temperature compensation.
 const LAMP_CLOCK_SIGMA: f64 = 20e-6;
 
-/// The lamps start to send at times of their own, by clocks of their own, and fail as the scenario
-/// has it.
-fn scene(scenario: &Scenario) -> Scene {
+/// What stands still in a scenario. The lamps start to send at times of their own, by clocks of
+/// their own, and fail as the scenario has it.
+pub fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
     let phase = Stream::new(scenario.seed, 0, "lamp phase");
     let clock = Stream::new(scenario.seed, 0, "lamp clock");

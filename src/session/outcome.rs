@@ -76,13 +76,11 @@ fn margin_m(world: &World, line: &Alignment, head_m: f64) -> Option<f64> {
         .min_by(f64::total_cmp)
 }
 
-/// Whether any of an obstacle is within the gauge across the track. Under top of rail the train's
-/// own gear hangs, as wide as the gauge's foot.
+/// Whether any of an obstacle is within the gauge across the track.
 fn fouls(line: &Alignment, o: &ObstacleTruth<'_>) -> bool {
-    let curvature = line.at(o.chainage_m).curvature_per_m;
-    let low_m = (o.height_m - o.half_extents_m.z).max(0.0);
-    let half_m = Gauge::b1(curvature).half_width_m(low_m);
-    half_m.is_some_and(|half_m| o.lateral_m.abs() - o.half_extents_m.y < half_m)
+    let gauge = Gauge::b1(line.at(o.chainage_m).curvature_per_m);
+    let half = o.half_extents_m;
+    gauge.fouled_by([o.lateral_m, o.height_m], [half.y, half.z])
 }
 
 #[cfg(test)]

@@ -10,7 +10,9 @@ use super::outcome::Outcome;
 use super::ride::Ride;
 use super::shots::{Shot, Shots, What};
 use super::watch::{Costs, Watchers};
-use super::{End, Event, Observer, Opening, RunOptions, SessionError, Summary};
+use super::{
+    End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary, TrainPoint,
+};
 use crate::bus::{CameraFault, CameraHealth, Frame, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
 use crate::stack::protection::Protection;
@@ -164,7 +166,7 @@ impl<'s> Run<'s> {
         }
         self.sample_motion(watchers)?;
         self.meet_messages(now, before_m, watchers)?;
-        self.trigger(now)?;
+        self.trigger(now, watchers)?;
         while let Some((shot, images)) = self.shots.due(now, &mut self.cost)? {
             self.deliver(now, shot, images, watchers)?;
         }
@@ -219,22 +221,27 @@ impl<'s> Run<'s> {
     }
 
     /// Frames whose last row has closed go to the renderer.
-    fn trigger(&mut self, now: SimTime) -> Result<(), SessionError> {
+    fn trigger(
+        &mut self,
+        now: SimTime,
+        watchers: &mut Watchers<'_, '_>,
+    ) -> Result<(), SessionError> {
         if let Some(eyes) = &mut self.eyes
             && let Some((number, start)) = eyes.due(now)
         {
             let world = &self.world;
-            let views = eyes
+            let mut views = eyes
                 .camera
                 .views(number, start, |t| world.vehicle_at(t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
+            eyes.expose(number, &mut views);
             let shot = Shot {
                 number,
                 start,
                 what: What::Pair,
                 late_s: eyes.late_s(start),
             };
-            self.submit(now, views.into(), shot)?;
+            self.submit(now, views.into(), shot, watchers)?;
         }
         for k in 0..self.devices.len() {
             self.devices[k].sweep(&self.world);
@@ -246,24 +253,49 @@ impl<'s> Run<'s> {
                     what,
                     late_s: self.devices[k].late_s(start),
                 };
-                self.submit(now, vec![view], shot)?;
+                self.submit(now, vec![view], shot, watchers)?;
             }
         }
         Ok(())
     }
 
-    fn submit(&mut self, now: SimTime, views: Vec<View>, shot: Shot) -> Result<(), SessionError> {
-        let mut bodies = self.world.bodies();
-        if matches!(shot.what, What::Wayside(..)) {
-            bodies.extend(self.world.train_bodies());
-        }
+    fn submit(
+        &mut self,
+        now: SimTime,
+        views: Vec<View>,
+        shot: Shot,
+        watchers: &mut Watchers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let source = match shot.what {
+            What::Pair => Source::Rig,
+            What::Wayside(k, _) => Source::Wayside(k),
+        };
+        let (bodies, owners) = self.world.owned_bodies(source != Source::Rig);
+        let train = views.first().and_then(|view| self.train_at(view.mid()));
         let job = Job {
             time: now,
             bodies,
             headlights: self.world.headlights(),
             views,
+            ..Job::default()
         };
+        watchers.show(&Event::Exposure(&Exposure {
+            source,
+            number: shot.number,
+            job: &job,
+            owners: &owners,
+            train,
+        }))?;
         Ok(self.shots.submit(&job, shot, &mut self.cost)?)
+    }
+
+    /// The train at a time of the recent past, by the speed that it has now.
+    fn train_at(&self, time: SimTime) -> Option<TrainPoint> {
+        Some(TrainPoint {
+            chainage_m: self.world.chainage_at(time)?,
+            speed_mps: self.world.train()?.speed_mps,
+            world_from_vehicle: self.world.vehicle_at(time)?,
+        })
     }
 
     /// Images reach the stack.

@@ -190,6 +190,7 @@ fn draw(
             bodies: world.bodies(),
             headlights: world.headlights(),
             views,
+            ..Job::default()
         })?;
         renderer.collect()
     };

@@ -81,6 +81,15 @@ impl Gauge {
         self.half_width_m(h_m).is_some_and(|w| l_m.abs() <= w)
     }
 
+    /// Whether any of a box is inside: its centre left of the centreline and above top of rail, and
+    /// half of its width and height. Under top of rail the train's own gear hangs, as wide as the
+    /// gauge's foot.
+    pub fn fouled_by(&self, centre: [f64; 2], half: [f64; 2]) -> bool {
+        let low_m = (centre[1] - half[1]).max(0.0);
+        let half_m = self.half_width_m(low_m);
+        half_m.is_some_and(|half_m| centre[0].abs() - half[0] < half_m)
+    }
+
     /// Its corners: up the right side, down the left one.
     pub fn outline(&self) -> Vec<OutlinePoint> {
         let corner = |sign: f64| {

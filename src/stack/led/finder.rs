@@ -11,28 +11,32 @@ use super::profile::{Profile, REACH_ROWS};
 use super::search::{SearchScratch, SearchSettings, find_regions};
 use super::stripes::{StripeReader, StripeReading};
 use super::wiener::Wiener;
-use crate::bus::{CameraModel, Ellipse, PixelBox, Spot};
+use crate::bus::{CameraModel, Ellipse, Intrinsics, PixelBox, Spot};
 use crate::stack::positioning::LedSettings;
 use crate::track::LampSite;
 use crate::track::uid::LineCode;
 use image::GrayImage;
-use nalgebra::Point2;
+use nalgebra::{Point2, Vector2};
 
-/// A lamp in an image, with what the fix needs beyond the report's [`Spot`].
+/// A lamp in an image, with what the fix needs beyond the report's [`Spot`]. The spot is in pixels
+/// as they were read; what is measured is in ideal pixels, where a lens without distortion would
+/// have them ([`Intrinsics::ideal`]).
 #[derive(Clone, Debug)]
 pub struct LampImage {
     /// As reported.
     pub spot: Spot,
+    /// Centre, ideal pixel.
+    pub centre: Point2<f64>,
     /// Standard deviation of the centre along u, from the scatter of the edge points about the
     /// ellipse: noise, exposure, pixel size and what smear leaves are in it.
     pub sigma_px: f64,
-    /// The lamp's own outline: the fitted one less the spill of its saturated rows.
+    /// The lamp's own outline in ideal pixels: the fitted one less the spill of its saturated rows.
     pub own_outline: Option<Ellipse>,
     /// Standard deviation of that outline's half axes.
     pub axis_sigma_px: f64,
     /// Level of darkness around it.
     black: f64,
-    /// Outline to read the profile in, fitted or from the bounds.
+    /// Outline to read the profile in, as seen, fitted or from the bounds.
     shape: Ellipse,
 }
 
@@ -40,6 +44,7 @@ pub struct LampImage {
 #[derive(Debug)]
 pub struct LampFinder {
     settings: LedSettings,
+    lens: Intrinsics,
     search: SearchSettings,
     dark_rows: usize,
     chip_s: f64,
@@ -50,6 +55,7 @@ pub struct LampFinder {
     filtered: Patch,
     median: MedianScratch,
     outline: Outline,
+    ideal: Vec<Point2<f64>>,
     grey: GreyCentroid,
     wiener: Wiener,
     profile: Profile,
@@ -62,17 +68,23 @@ const MARGIN_PX: u32 = 14;
 const MAX_MISFIT: f64 = 0.08;
 
 impl LampFinder {
-    /// For lamps of the first lamp's chip time and code, as a line has one kind of lamp.
+    /// For one camera, and lamps of the first lamp's chip time and code, as a line has one kind of
+    /// lamp.
     pub fn new(settings: &LedSettings, camera: &CameraModel, lamps: &[LampSite]) -> Self {
         let (chip_s, code) = lamps
             .first()
             .map_or((45e-6, LineCode::default()), |l| (l.chip_s, l.code));
         let frames = lamps.iter().map(|l| l.uid.frame(code));
-        let line_s = camera.shutter.line_time_s.max(1e-7);
         let dark_s = f64::from(longest_dark_run(frames).max(2)) * chip_s;
-        let dark_rows = ((dark_s / line_s).ceil() as usize + 2).min(100);
+        // All rows of a global shutter see the same: no lamp is cut into stripes.
+        let dark_rows = if camera.shutter.is_global() {
+            0
+        } else {
+            ((dark_s / camera.shutter.line_time_s).ceil() as usize + 2).min(100)
+        };
         Self {
             settings: settings.clone(),
+            lens: camera.intrinsics,
             search: SearchSettings {
                 min_contrast_grey: settings.min_contrast_grey,
                 // A bright chip that two rows share is lost in the median: dark runs on both
@@ -89,6 +101,7 @@ impl LampFinder {
             filtered: Patch::default(),
             median: MedianScratch::default(),
             outline: Outline::default(),
+            ideal: Vec::new(),
             grey: GreyCentroid::default(),
             wiener: Wiener::default(),
             profile: Profile::default(),
@@ -158,9 +171,24 @@ impl LampFinder {
         }
         let size = (image.width() as usize, image.height() as usize);
         self.outline.trace(&self.raw, black, split.threshold, size);
-        let fit = fit_ellipse(&self.outline.points)
-            .filter(|f| f.rms_px < 0.3 + MAX_MISFIT * f.ellipse.semi_minor_px);
-        self.describe(bounds, rough, fit, black)
+        let fits = self.fits();
+        self.describe(bounds, rough, fits, black)
+    }
+
+    /// Ellipses through the edge points as they are seen, and as they would be without distortion.
+    fn fits(&mut self) -> Option<(EllipseFit, EllipseFit)> {
+        let fit = |points: &[Point2<f64>]| {
+            let close = |f: &EllipseFit| f.rms_px < 0.3 + MAX_MISFIT * f.ellipse.semi_minor_px;
+            fit_ellipse(points).filter(close)
+        };
+        let seen = fit(&self.outline.points)?;
+        if self.lens.distortion.is_none() {
+            return Some((seen, seen));
+        }
+        self.ideal.clear();
+        let points = self.outline.points.iter();
+        self.ideal.extend(points.map(|p| self.lens.ideal(p)));
+        Some((seen, fit(&self.ideal)?))
     }
 
     /// Weighs the two centres.
@@ -168,10 +196,11 @@ impl LampFinder {
         &mut self,
         bounds: PixelBox,
         rough: Point2<f64>,
-        fit: Option<EllipseFit>,
+        fits: Option<(EllipseFit, EllipseFit)>,
         black: f64,
     ) -> Option<LampImage> {
         let cut = self.outline.cut;
+        let fit = fits.map(|f| f.1);
         let ellipse = fit.map(|f| f.ellipse);
         // What the border cuts off pulls the grey centroid, not the ellipse.
         let alpha = match &ellipse {
@@ -179,22 +208,24 @@ impl LampFinder {
             Some(e) => roundness(e),
             None => 1.0,
         };
-        let grey = self.grey_centre();
-        let centre = match (grey, ellipse) {
+        let centre = match (self.ideal_grey_centre(fits), ellipse) {
             (Some(g), Some(e)) => Point2::from(alpha * g.coords + (1.0 - alpha) * e.centre.coords),
             (None, Some(e)) => e.centre,
             (Some(g), None) => g,
             (None, None) => return None,
         };
-        let shape = ellipse.unwrap_or(Ellipse {
+        let seen = fits.map(|f| f.0.ellipse);
+        let shape = seen.unwrap_or(Ellipse {
             centre: rough,
             semi_major_px: 0.5 * f64::from(bounds.v1 - bounds.v0).max(2.0),
             semi_minor_px: 0.5 * f64::from(bounds.u1 - bounds.u0).max(2.0),
             angle_rad: std::f64::consts::FRAC_PI_2,
         });
         let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
-        let spill = self.outline.spill_px;
+        let scale = self.ideal_scale(&centre);
+        let spill = scale * self.outline.spill_px;
         Some(LampImage {
+            centre,
             own_outline: ellipse
                 .filter(|e| e.semi_minor_px > spill)
                 .map(|e| Ellipse {
@@ -202,11 +233,11 @@ impl LampFinder {
                     semi_minor_px: e.semi_minor_px - spill,
                     ..e
                 }),
-            axis_sigma_px: sigma_px.hypot(self.outline.spill_sigma_px),
+            axis_sigma_px: sigma_px.hypot(scale * self.outline.spill_sigma_px),
             spot: Spot {
                 bounds,
-                centre,
-                ellipse,
+                centre: self.lens.seen(&centre),
+                ellipse: seen,
                 roundness: ellipse.map_or(0.0, |e| roundness(&e)),
                 cut,
                 uid: None,
@@ -229,7 +260,30 @@ impl LampFinder {
         })
     }
 
-    /// Log-Gaussian centre from the chords of the lit rows.
+    /// The grey centre in ideal pixels. A lens that bends a disc moves the middle of its outline
+    /// off the image of its centre; by how much, the two ellipses tell.
+    fn ideal_grey_centre(&mut self, fits: Option<(EllipseFit, EllipseFit)>) -> Option<Point2<f64>> {
+        let grey = self.grey_centre()?;
+        let bent =
+            fits.map(|(seen, ideal)| self.lens.seen(&ideal.ellipse.centre) - seen.ellipse.centre);
+        Some(self.lens.ideal(&(grey + bent.unwrap_or_default())))
+    }
+
+    /// Ideal pixels a pixel, at an ideal pixel.
+    fn ideal_scale(&self, at: &Point2<f64>) -> f64 {
+        if self.lens.distortion.is_none() {
+            return 1.0;
+        }
+        let seen = |du: f64, dv: f64| self.lens.seen(&(at + Vector2::new(du, dv)));
+        let (right, down) = (
+            seen(1.0, 0.0) - seen(-1.0, 0.0),
+            seen(0.0, 1.0) - seen(0.0, -1.0),
+        );
+        let seen_area = 0.25 * (right.x * down.y - right.y * down.x);
+        seen_area.abs().max(1e-6).sqrt().recip()
+    }
+
+    /// Log-Gaussian centre from the chords of the lit rows, as seen.
     fn grey_centre(&mut self) -> Option<Point2<f64>> {
         let whole = |e: &&(usize, f64, f64)| e.1.is_finite() && e.2.is_finite();
         let edges = self.outline.edges.iter().filter(whole);
@@ -270,7 +324,7 @@ mod tests {
     ) -> (Vec<LampImage>, [f64; 2], Option<crate::track::uid::Uid>) {
         let start_s = 0.1 + f64::from(number) / 30.0;
         let pair = world.pair(number, start_s);
-        let mut finder = LampFinder::new(&LedSettings::default(), &world.rig.camera, &world.lamps);
+        let mut finder = LampFinder::new(&LedSettings::default(), &world.rig.left, &world.lamps);
         let (mut found, mut disparities) = (Vec::new(), [f64::NAN; 2]);
         finder.find(&pair.right.image, |_| 0.0, &mut found);
         let right = found.first().map(|l| l.spot.centre.x);
@@ -279,11 +333,11 @@ mod tests {
             let eye = |x_m| {
                 let pose = world.world_from_left(start_s) * Translation3::new(x_m, 0.0, 0.0);
                 let seen = pose.inverse() * lamp.centre;
-                world.rig.camera.intrinsics.project(&seen).unwrap().x
+                world.rig.left.intrinsics.project(&seen).unwrap().x
             };
             disparities = [
                 l.spot.centre.x - right,
-                eye(0.0) - eye(world.rig.baseline_m),
+                eye(0.0) - eye(world.rig.baseline_m()),
             ];
         }
         let mut reading = StripeReading::default();
@@ -333,7 +387,7 @@ mod tests {
     #[test]
     fn images_without_a_lamp_give_nothing() {
         let map = tunnel("manchester");
-        let camera = crate::stack::led::testing::rig().camera;
+        let camera = crate::stack::led::testing::rig().left;
         let mut finder = LampFinder::new(&LedSettings::default(), &camera, &map.lamps);
         let mut found = Vec::new();
         for (w, h) in [(0, 0), (1, 1), (3, 200), (1280, 720)] {

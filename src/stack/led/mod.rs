@@ -23,15 +23,16 @@
 //! for the name: stripes upright, cropped, their widths to bits, header, footer, check sum. Where
 //! the paper leaves a choice, the file's header states it with its reason. What is added:
 //! names are joined from several images, since a lamp at 8 m shows only a third of its code in
-//! one.
+//! one. And the lens: images stay as they were read, since rows are times; the points measured in
+//! them are moved to where a lens without distortion would have them, before an ellipse is fitted.
 //!
 //! Departures from the paper, with reasons: the median filter serves the search and the threshold
 //! only, as a 3x3 median deletes stripes of a single row (a dark chip of 45 us beside saturated
 //! rows is 28 us, 1.3 rows); edge points come from lit rows only, as the closed spot ends wrongly
 //! where a dark stripe touches its end; stripes are rotated only if measurably tilted.
 //!
-//! **What it does not do.** It expects one chip time and one code on a line. It has no model of the
-//! lens: images are taken as rectified. Two lamps whose images overlap are one spot to it. Where
+//! **What it does not do.** It expects one chip time and one code on a line. Through a global shutter
+//! lamps show no stripes: they are found, but cannot be named. Two lamps whose images overlap are one spot to it. Where
 //! the sensor saturates, fitted outlines are too large (centres are not affected); what is taken
 //! off for it is good to 0.06 px (one sigma) up to tenfold saturation, while the glare beside the
 //! lamp stays under the half of its plateau.

@@ -9,8 +9,9 @@
 //! long as the envelope stands out, which doubles the rows that a far lamp gives.
 //!
 //! **Tilt.** "Rotating the stripes upright" is a photographer's step: stripes are rows of the
-//! sensor, so they can only be tilted by the resampling that rectifies a stereo pair, by the small
-//! angle between the eye's own rows and the epipolar lines. A tilt of 0.5 deg shears stripes by a
+//! sensor, so they can only be tilted by resampling. Here nothing is (points are rectified, not
+//! images), but recorded images may have been, by the small angle between an eye's own rows and the
+//! epipolar lines. A tilt of 0.5 deg shears stripes by a
 //! quarter row across 30 columns (harmless) but by one row across 120. So the shear is measured, by
 //! matching the profiles of the left and right part of the spot, and undone where it matters.
 

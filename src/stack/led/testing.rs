@@ -1,6 +1,10 @@
 //! A small renderer for the tests of this room: one disc a lamp, ray by ray, row by row.
 
-use crate::bus::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, SimTime, StereoPair};
+use crate::bus::lenses::EUROC;
+use crate::bus::{
+    CameraModel, DistortionCoefficients, Frame, Intrinsics, RigCalibration, Shutter, SimTime,
+    StereoPair,
+};
 use crate::track::uid::Waveform;
 use crate::track::{LampSite, Tunnel};
 use image::GrayImage;
@@ -45,18 +49,36 @@ pub fn camera_attitude(yaw_deg: f64, pitch_deg: f64) -> UnitQuaternion<f64> {
 /// The reference rig.
 pub fn rig() -> RigCalibration {
     let mount = Translation3::new(0.0, 1.0, 1.7);
-    RigCalibration {
-        camera: CameraModel {
-            intrinsics: Intrinsics::centred(1280, 720, 1040.0),
-            shutter: Shutter {
-                line_time_s: 22.2e-6,
-                exposure_s: 30e-6,
-                first_row: 0,
-            },
+    let camera = CameraModel {
+        intrinsics: Intrinsics::centred(1280, 720, 1040.0),
+        shutter: Shutter {
+            line_time_s: 22.2e-6,
+            exposure_s: 30e-6,
+            first_row: 0,
         },
-        baseline_m: 0.12,
-        vehicle_from_left: Isometry3::from_parts(mount, camera_attitude(41.0, 26.0)),
-    }
+    };
+    let vehicle_from_left = Isometry3::from_parts(mount, camera_attitude(41.0, 26.0));
+    RigCalibration::rectified(camera, 0.12, vehicle_from_left)
+}
+
+/// The same mount with two wide lenses that differ, as a real pair does (`EUROC`): 79 deg across,
+/// 2.3 % barrel at the edge of a lamp's height and 20 % in the corner; the right eye with 0.2 % less
+/// focal length, another principal point, 0.5 deg off in every angle and off the baseline's line.
+pub fn wide_rig() -> RigCalibration {
+    let mut rig = rig();
+    let eye = |f_px: f64, centre_px: [f64; 2], lens: DistortionCoefficients| Intrinsics {
+        cx_px: centre_px[0],
+        cy_px: centre_px[1],
+        distortion: lens.into(),
+        ..Intrinsics::centred(1280, 720, f_px)
+    };
+    rig.left.intrinsics = eye(780.7, [634.0, 352.0], EUROC[0]);
+    rig.right.intrinsics = eye(778.9, [651.0, 366.0], EUROC[1]);
+    rig.left_from_right = Isometry3::new(
+        Vector3::new(0.12, 0.001, -0.0015),
+        Vector3::new(0.009, -0.0085, 0.0087),
+    );
+    rig
 }
 
 /// Lamps every 10 m from chainage 10 of a straight line of 2 km.
@@ -67,15 +89,24 @@ pub fn tunnel(code: &str) -> Tunnel {
     Tunnel::from_toml(&text).unwrap()
 }
 
+/// An eye that draws.
+struct Eye {
+    camera: CameraModel,
+    left_from_eye: Isometry3<f64>,
+    start_s: f64,
+}
+
 /// The world seen from a train on the straight line.
 #[derive(Clone, Debug)]
 pub struct World {
     /// What is seen.
     pub lamps: Vec<LampSite>,
-    /// The rig.
+    /// The rig as it is built.
     pub rig: RigCalibration,
-    /// Yaw of the right eye against the left, positive where they converge.
-    pub vergence_rad: f64,
+    /// How much later than the left eye the right one is triggered, as its frames say.
+    pub right_later_s: f64,
+    /// And by how much later than that it really is.
+    pub right_late_s: f64,
     /// Error of every lamp's clock.
     pub clock_ppm: f64,
     /// Turn of the car off the track's direction, to the left, at a time.
@@ -96,7 +127,8 @@ impl World {
         Self {
             lamps: map.lamps.clone(),
             rig: rig(),
-            vergence_rad: 0.0,
+            right_later_s: 0.0,
+            right_late_s: 0.0,
             clock_ppm: 0.0,
             yaw_rad: |_| 0.0,
             start_m,
@@ -113,33 +145,36 @@ impl World {
         Isometry3::from_parts(origin, turn) * self.rig.vehicle_from_left
     }
 
-    /// Draws a pair whose rows open from `start_s` on.
+    /// Draws a pair whose left rows open from `start_s` on.
     pub fn pair(&self, number: u32, start_s: f64) -> StereoPair {
-        let left_from_right = Isometry3::from_parts(
-            Translation3::new(self.rig.baseline_m, 0.0, 0.0),
-            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -self.vergence_rad),
-        );
-        let eye = |left_from_eye: Isometry3<f64>, seed: u64| Frame {
+        let right_s = start_s + self.right_later_s;
+        let eye = |start_s: f64, eye: Eye, seed: u64| Frame {
             number,
             start: SimTime::from_secs(start_s),
-            image: self.draw(
-                start_s,
-                &left_from_eye,
-                &mut Noise::new(2 * u64::from(number) + seed),
-            ),
+            image: self.draw(&eye, &mut Noise::new(2 * u64::from(number) + seed)),
+        };
+        let left = Eye {
+            camera: self.rig.left,
+            left_from_eye: Isometry3::identity(),
+            start_s,
+        };
+        let right = Eye {
+            camera: self.rig.right,
+            left_from_eye: self.rig.left_from_right,
+            start_s: right_s + self.right_late_s,
         };
         StereoPair {
-            left: eye(Isometry3::identity(), 0),
-            right: eye(left_from_right, 1),
+            left: eye(start_s, left, 0),
+            right: eye(right_s, right, 1),
         }
     }
 
-    fn draw(&self, start_s: f64, left_from_eye: &Isometry3<f64>, noise: &mut Noise) -> GrayImage {
-        let c = self.rig.camera.intrinsics;
+    fn draw(&self, eye: &Eye, noise: &mut Noise) -> GrayImage {
+        let c = eye.camera.intrinsics;
         let (w, h) = (c.width_px as usize, c.height_px as usize);
         let mut grey = vec![0.0; w * h];
         for lamp in &self.lamps {
-            self.add_lamp(&mut grey, lamp, start_s, left_from_eye);
+            self.add_lamp(&mut grey, lamp, eye);
         }
         // A table of normal numbers, entered anew for every row, keeps the tests fast.
         let table: Vec<f64> = (0..4096).map(|_| noise.normal()).collect();
@@ -160,21 +195,15 @@ impl World {
         image
     }
 
-    fn add_lamp(
-        &self,
-        grey: &mut [f64],
-        lamp: &LampSite,
-        start_s: f64,
-        left_from_eye: &Isometry3<f64>,
-    ) {
-        let (c, s) = (self.rig.camera.intrinsics, self.rig.camera.shutter);
+    fn add_lamp(&self, grey: &mut [f64], lamp: &LampSite, eye: &Eye) {
+        let (c, s) = (eye.camera.intrinsics, eye.camera.shutter);
         let wave = Waveform::sharp(
             lamp.uid.frame(lamp.code),
             lamp.chip_s * (1.0 + 1e-6 * self.clock_ppm),
             0.000_123 * f64::from(lamp.uid.lamp),
         );
         let seen = |t_s: f64| {
-            let to_eye = (self.world_from_left(t_s) * left_from_eye).inverse();
+            let to_eye = (self.world_from_left(t_s) * eye.left_from_eye).inverse();
             (to_eye * lamp.centre, to_eye * lamp.facing.into_inner())
         };
         let shine = |p: &Point3<f64>, n: &Vector3<f64>| {
@@ -183,7 +212,7 @@ impl World {
         };
         let radius = 0.5 * lamp.diameter_m;
         for v in 0..c.height_px as usize {
-            let open = start_s + v as f64 * s.line_time_s;
+            let open = eye.start_s + s.delay_s(v as f64);
             let (p, n) = seen(open + 0.5 * s.exposure_s);
             let Some(middle) = c.project(&p).filter(|_| p.z < 30.0) else {
                 return;
@@ -212,8 +241,9 @@ impl World {
                     0.0
                 };
                 if beyond < 0.6 * apparent + 3.0 {
+                    let rays = rays(&c, (u, v));
                     for (p, n, share, grey) in &slots {
-                        light += grey * share * coverage(&c, (u, v), p, n, radius) / 4.0;
+                        light += grey * share * coverage(&rays, p, n, radius) / 4.0;
                     }
                 }
                 grey[v * c.width_px as usize + u] += light;
@@ -222,23 +252,19 @@ impl World {
     }
 }
 
-/// Share of a pixel that a disc covers, by 4 x 4 rays.
-fn coverage(
-    c: &Intrinsics,
-    (u, v): (usize, usize),
-    p: &Point3<f64>,
-    n: &Vector3<f64>,
-    radius: f64,
-) -> f64 {
-    let mut hits = 0;
-    for k in 0..16 {
-        let (du, dv) = (
-            f64::from(k % 4) / 4.0 - 0.375,
-            f64::from(k / 4) / 4.0 - 0.375,
-        );
-        let ray = c.ray(u as f64 + du, v as f64 + dv);
-        let t = n.dot(&p.coords) / n.dot(&ray);
-        hits += i32::from((ray * t - p.coords).norm_squared() <= radius * radius);
-    }
-    f64::from(hits) / 16.0
+/// 4 x 4 rays of a pixel.
+fn rays(c: &Intrinsics, (u, v): (usize, usize)) -> [Vector3<f64>; 16] {
+    std::array::from_fn(|k| {
+        let (du, dv) = ((k % 4) as f64 / 4.0 - 0.375, (k / 4) as f64 / 4.0 - 0.375);
+        c.ray(u as f64 + du, v as f64 + dv)
+    })
+}
+
+/// Share of a pixel's rays that meet a disc.
+fn coverage(rays: &[Vector3<f64>], p: &Point3<f64>, n: &Vector3<f64>, radius: f64) -> f64 {
+    let meets = |ray: &&Vector3<f64>| {
+        let t = n.dot(&p.coords) / n.dot(ray);
+        (*ray * t - p.coords).norm_squared() <= radius * radius
+    };
+    rays.iter().filter(meets).count() as f64 / rays.len() as f64
 }

@@ -19,11 +19,7 @@
 //!     intrinsics: Intrinsics::centred(64, 48, 52.0),
 //!     shutter: Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6, first_row: 0 },
 //! };
-//! let rig = RigCalibration {
-//!     camera,
-//!     baseline_m: 0.12,
-//!     vehicle_from_left: nalgebra::Isometry3::identity(),
-//! };
+//! let rig = RigCalibration::rectified(camera, 0.12, nalgebra::Isometry3::identity());
 //! let mut positioner = LedPositioner::new(&LedSettings::default(), rig, Arc::new(map));
 //! let dark = Frame { number: 0, start: SimTime::ZERO, image: image::GrayImage::new(64, 48) };
 //! let report = positioner.on_pair(&StereoPair { left: dark.clone(), right: dark });
@@ -32,7 +28,8 @@
 //!
 //! **Theory.** Y. Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912: disparity d of the
 //! lamp's centres gives z = f b / d, x = (u - cx) z / f, y = (v - cy) z / f, and train = lamp -
-//! R (lamp in camera). R is the track's attitude at the expected chainage, from the map, turned by
+//! R (lamp in camera). The points are rectified, not the images (`stereo`).
+//! R is the track's attitude at the expected chainage, from the map, turned by
 //! what the gyro says of the car's swings. A fix belongs to the mid-exposure of the row of the
 //! lamp's centre, not to the start of the image (16 ms apart, 0.27 m at 60 km/h).
 //!
@@ -50,8 +47,10 @@
 //!
 //! **What it does not do.** One fix rests on one pair and one lamp: nothing is filtered over time,
 //! as in the paper; earlier fixes serve to expect the next lamp and the track's attitude only.
-//! The eyes are taken as rectified but for a vergence in sigma: distortion, a roll or pitch between
-//! the eyes and an error of their synchronisation are not in it.
+//! What the sheet says of the eyes it lives with: lenses that distort, eyes that differ, look past
+//! each other, are triggered apart or read upwards. What the sheet gets wrong of that is in sigma as
+//! a vergence only: errors of distortion, of a roll or pitch between the eyes, of the line time and
+//! of the trigger times are not in it.
 //! It takes the train to run up the line, its rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 

@@ -4,10 +4,10 @@ use super::LedSettings;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
 use super::roll_call::RollCall;
-use super::stereo::{at_rest, from_size, triangulate};
+use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
-    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, LedReport, Method,
-    OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
+    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
+    Method, OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
 use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
@@ -25,8 +25,10 @@ pub struct LedPositioner {
     settings: LedSettings,
     rig: RigCalibration,
     map: Arc<Tunnel>,
+    /// One an eye, left and right.
     watches: [CameraWatch; 2],
-    finder: LampFinder,
+    /// One an eye, left and right.
+    finders: [LampFinder; 2],
     reckoning: Reckoning,
     naming: Naming,
     roll_call: RollCall,
@@ -52,7 +54,7 @@ struct Anchor {
 struct Sighting {
     left: usize,
     right: Option<usize>,
-    stereo: Option<Vector3<f64>>,
+    stereo: Option<Pairing>,
     mono: Option<Vector3<f64>>,
     time: SimTime,
     named: Option<(Uid, Identity)>,
@@ -60,7 +62,7 @@ struct Sighting {
 
 impl Sighting {
     fn lamp_in_camera(&self) -> Option<Vector3<f64>> {
-        self.stereo.or(self.mono)
+        self.stereo.map(|s| s.lamp).or(self.mono)
     }
 }
 
@@ -76,13 +78,14 @@ struct Spread {
 impl LedPositioner {
     /// For one rig on one line.
     pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Tunnel>) -> Self {
-        let finder = LampFinder::new(settings, &rig.camera, &map.lamps);
+        let finder = |eye: &CameraModel| LampFinder::new(settings, eye, &map.lamps);
+        let finders = [finder(&rig.left), finder(&rig.right)];
         let watch = |eye: &CameraModel| {
             let size_px = (eye.intrinsics.width_px, eye.intrinsics.height_px);
             CameraWatch::new(size_px, settings.allow_repeated_images)
         };
         Self {
-            watches: [watch(&rig.camera), watch(&rig.camera)],
+            watches: [watch(&rig.left), watch(&rig.right)],
             reckoning: Reckoning::new(settings),
             naming: Naming {
                 gate_share: settings.gate_share,
@@ -91,8 +94,8 @@ impl LedPositioner {
             settings: settings.clone(),
             rig,
             map,
-            alone: finder.votes(),
-            finder,
+            alone: finders[0].votes(),
+            finders,
             roll_call: RollCall::default(),
             followed: Vec::new(),
             anchor: None,
@@ -153,15 +156,18 @@ impl LedPositioner {
     /// The right eye stands in for the left one.
     fn read_right(&mut self, pair: &StereoPair) -> LedReport {
         let rig = self.rig;
-        self.rig.vehicle_from_left = rig.vehicle_from_left * rig.left_from_right();
+        self.rig.left = rig.right;
+        self.rig.vehicle_from_left = rig.vehicle_from_left * rig.left_from_right;
+        self.finders.swap(0, 1);
         let mut report = self.read_pair(&StereoPair {
             left: pair.right.clone(),
             right: without_image(&pair.right),
         });
         self.rig = rig;
+        self.finders.swap(0, 1);
         std::mem::swap(&mut report.left, &mut report.right);
         for fix in &mut report.fixes {
-            let lamp = rig.left_from_right() * Point3::from(fix.lamp_in_camera);
+            let lamp = rig.left_from_right * Point3::from(fix.lamp_in_camera);
             fix.lamp_in_camera = lamp.coords;
         }
         report
@@ -174,16 +180,7 @@ impl LedPositioner {
             std::mem::take(&mut self.left),
             std::mem::take(&mut self.right),
         );
-        let smear = Smear {
-            rig: self.rig,
-            lamps: &self.map.lamps,
-            head_m: self.chainage_m(start),
-            travel_m: self.reckoning.speed_mps(start) * self.rig.camera.shutter.exposure_s,
-        };
-        self.finder
-            .find(&pair.left.image, |p| smear.along_row_px(p), &mut left);
-        self.finder
-            .find(&pair.right.image, |p| smear.along_row_px(p), &mut right);
+        self.find(pair, &mut left, &mut right);
         self.followed
             .retain(|f| seconds - f.seen_s <= self.settings.forget_s);
         let (mut paper, mut mono) = (None, None);
@@ -224,7 +221,7 @@ impl LedPositioner {
 
     /// Lamps that have gone out of the left eye's sight without ever having been in it.
     fn call_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
-        let camera = self.rig.camera;
+        let camera = self.rig.left;
         let middle = 0.5 * f64::from(camera.intrinsics.height_px);
         let time = camera.shutter.row_mid(pair.left.start, middle);
         let Some(chainage_m) = self
@@ -240,6 +237,28 @@ impl LedPositioner {
         let eye = Isometry3::from_parts(place, attitude) * self.rig.vehicle_from_left;
         let spots = left.iter().map(|lamp| lamp.spot.centre);
         (self.roll_call).call(&self.map, &camera.intrinsics, &eye, spots)
+    }
+
+    /// Finds the lamps of both eyes' images.
+    fn find(&mut self, pair: &StereoPair, left: &mut Vec<LampImage>, right: &mut Vec<LampImage>) {
+        let start = pair.left.start;
+        let (head_m, speed_mps) = (self.chainage_m(start), self.reckoning.speed_mps(start));
+        let vehicle_from_left = self.rig.vehicle_from_left;
+        let smear = |eye: &CameraModel, vehicle_from_eye: Isometry3<f64>| Smear {
+            lens: eye.intrinsics,
+            vehicle_from_eye,
+            lamps: &self.map.lamps,
+            head_m,
+            travel_m: speed_mps * eye.shutter.exposure_s,
+        };
+        let from_right = vehicle_from_left * self.rig.left_from_right;
+        let smears = [
+            smear(&self.rig.left, vehicle_from_left),
+            smear(&self.rig.right, from_right),
+        ];
+        let [of_left, of_right] = &mut self.finders;
+        of_left.find(&pair.left.image, |p| smears[0].along_row_px(p), left);
+        of_right.find(&pair.right.image, |p| smears[1].along_row_px(p), right);
     }
 
     /// Where the train takes itself to be at a time.
@@ -260,35 +279,85 @@ impl LedPositioner {
         right: &[LampImage],
         k: usize,
     ) -> Sighting {
-        let lamp = &left[k].spot;
-        let height = f64::from(lamp.bounds.v1 - lamp.bounds.v0 + 1);
-        let miss = |r: &LampImage| (r.spot.centre.y - lamp.centre.y).abs();
-        let fits = |r: &&(usize, &LampImage)| {
-            miss(r.1) < 4.0 + 0.15 * height
-                && triangulate(&self.rig, &lamp.centre, &r.1.spot.centre).is_some()
-        };
+        let lamp = &left[k];
+        let height = f64::from(lamp.spot.bounds.v1 - lamp.spot.bounds.v0 + 1);
+        let most = (4.0 + 0.15 * height) / self.rig.left.intrinsics.fy_px;
         let partner = right
             .iter()
             .enumerate()
-            .filter(|r| fits(&r))
-            .min_by(|a, b| miss(a.1).total_cmp(&miss(b.1)));
-        let shutter = &self.rig.camera.shutter;
-        let time = shutter.row_mid(pair.left.start, lamp.centre.y);
+            .filter_map(|(r, other)| Some((r, self.put_together(pair, lamp, other)?)))
+            .filter(|(_, pairing)| pairing.miss < most)
+            .min_by(|a, b| a.1.miss.total_cmp(&b.1.miss));
+        let shutter = &self.rig.left.shutter;
+        let time = shutter.row_mid(pair.left.start, lamp.spot.centre.y);
         Sighting {
             left: k,
-            right: partner.map(|r| r.0),
-            stereo: partner.and_then(|r| triangulate(&self.rig, &lamp.centre, &r.1.spot.centre)),
-            mono: self.by_size(&left[k], time),
+            right: partner.map(|p| p.0),
+            stereo: partner.map(|p| p.1),
+            mono: self.by_size(lamp, time),
             time,
             named: None,
         }
     }
 
+    /// Both eyes' images of a lamp, with what the train runs between their rows. The rows' times
+    /// are taken from the images first, then, without their noise, from where the lamp is.
+    fn put_together(
+        &self,
+        pair: &StereoPair,
+        left: &LampImage,
+        right: &LampImage,
+    ) -> Option<Pairing> {
+        let rig = &self.rig;
+        let times = |left_row: f64, right_row: f64| {
+            let left = rig.left.shutter.row_mid(pair.left.start, left_row);
+            (left, rig.right.shutter.row_mid(pair.right.start, right_row))
+        };
+        let (l, r) = (
+            sight(&rig.left.intrinsics, left),
+            sight(&rig.right.intrinsics, right),
+        );
+        let at_rows = |(now, then)| {
+            let left_from_right = self.left_from_right(now, then);
+            Some((left_from_right, triangulate(&left_from_right, &l, &r)?))
+        };
+        let (left_from_right, rough) = at_rows(times(left.spot.centre.y, right.spot.centre.y))?;
+        let lamp = Point3::from(rough.lamp);
+        let left_row = rig.left.intrinsics.project(&lamp)?.y;
+        let seen_right = left_from_right.inverse_transform_point(&lamp);
+        let right_row = rig.right.intrinsics.project(&seen_right)?.y;
+        Some(at_rows(times(left_row, right_row))?.1)
+    }
+
+    /// The right eye at one time in the frame of the left eye at another.
+    fn left_from_right(&self, now: SimTime, then: SimTime) -> Isometry3<f64> {
+        if now == then {
+            return self.rig.left_from_right;
+        }
+        let mount = self.rig.vehicle_from_left;
+        mount.inverse() * self.moved(now, then) * mount * self.rig.left_from_right
+    }
+
+    /// The vehicle at one time in the vehicle at another, shortly before or after.
+    fn moved(&self, now: SimTime, then: SimTime) -> Isometry3<f64> {
+        let ran_m = self.reckoning.speed_mps(now) * then.since(now);
+        let Some(chainage_m) = self.chainage_m(now) else {
+            return Isometry3::translation(ran_m, 0.0, 0.0);
+        };
+        let line = &self.map.alignment;
+        let vehicle = |time: SimTime, chainage_m: f64| {
+            let place = Translation3::from(line.at(chainage_m).origin);
+            Isometry3::from_parts(place, self.reckoning.attitude(time, line, chainage_m))
+        };
+        vehicle(now, chainage_m).inv_mul(&vehicle(then, chainage_m + ran_m))
+    }
+
     /// Where a lamp is by its size in one image.
     fn by_size(&self, lamp: &LampImage, time: SimTime) -> Option<Vector3<f64>> {
-        let (camera, outline) = (&self.rig.camera, lamp.own_outline?);
+        let (camera, outline) = (&self.rig.left, lamp.own_outline?);
         let diameter_m = self.map.lamps.first()?.diameter_m;
-        let place = |e| from_size(&camera.intrinsics, &lamp.spot.centre, e, diameter_m);
+        let pinhole = pinhole(&camera.intrinsics);
+        let place = |e| from_size(&pinhole, &lamp.centre, e, diameter_m);
         let run = Vector3::x() * self.reckoning.speed_mps(time);
         let velocity = -(self.rig.vehicle_from_left.rotation.inverse() * run);
         place(&at_rest(camera, &outline, &place(&outline)?, &velocity)?)
@@ -336,7 +405,7 @@ impl LedPositioner {
             (f.lamp_m, f.distance_m, f.seen_s) = (lamp_m, distance_m, seconds);
             return k;
         }
-        let votes = self.finder.votes();
+        let votes = self.finders[0].votes();
         self.followed
             .push(Followed::new(lamp_m, distance_m, seconds, votes));
         self.followed.len() - 1
@@ -354,13 +423,14 @@ impl LedPositioner {
     ) -> Option<Uid> {
         let lamp = &left[sighting.left];
         let whole = |r: &usize| !right[*r].spot.cut;
-        let (frame, lamp) = match sighting.right.filter(whole) {
-            Some(r) if lamp.spot.cut => (&pair.right, &right[r]),
-            _ => (&pair.left, lamp),
+        let (eye, frame, lamp) = match sighting.right.filter(whole) {
+            Some(r) if lamp.spot.cut => (1, &pair.right, &right[r]),
+            _ => (0, &pair.left, lamp),
         };
-        if !self.finder.read(&frame.image, lamp, &mut self.reading) {
+        if !self.finders[eye].read(&frame.image, lamp, &mut self.reading) {
             return None;
         }
+        let seconds = seconds + frame.start.since(pair.left.start);
         self.followed[k].votes.add(seconds, &self.reading);
         self.alone.clear();
         self.alone.add(seconds, &self.reading);
@@ -386,24 +456,23 @@ impl LedPositioner {
     ) -> Option<PositionFix> {
         let (stereo, r) = (sighting.stereo?, sighting.right?);
         let (l, r) = (&left[sighting.left], &right[r]);
-        let disparity_px = l.spot.centre.x - r.spot.centre.x;
-        let baseline_mm = 1e3 * self.rig.baseline_m;
-        let sigma_px = l.sigma_px.hypot(r.sigma_px);
-        let vergence_px = self.vergence_sigma_px(r.spot.centre.x);
+        let baseline_mm = 1e3 * self.rig.baseline_m();
+        let focal_px = |eye: &CameraModel| eye.intrinsics.fx_px;
+        let sigma = (l.sigma_px / focal_px(&self.rig.left))
+            .hypot(r.sigma_px / focal_px(&self.rig.right))
+            .hypot(self.vergence_sigma(stereo.right_x));
         let spread = Spread {
-            distance: (sigma_px.hypot(vergence_px) / disparity_px)
+            distance: (sigma / stereo.disparity)
                 .hypot(self.settings.baseline_sigma_mm / baseline_mm),
             image_px: l.sigma_px,
         };
-        self.fix(Method::Paper, sighting, stereo, spread)
+        self.fix(Method::Paper, sighting, stereo.lamp, spread)
     }
 
-    /// What the right eye's yaw against the left makes of its u: u = cx + f tan(angle), so
-    /// du = f (1 + tan^2) d(angle).
-    fn vergence_sigma_px(&self, right_u_px: f64) -> f64 {
-        let c = &self.rig.camera.intrinsics;
-        let tan = (right_u_px - c.cx_px) / c.fx_px;
-        c.fx_px * (1.0 + tan * tan) * self.settings.vergence_sigma_deg.to_radians()
+    /// What the right eye's yaw against the left makes of its x at depth 1: x = tan(angle), so
+    /// dx = (1 + tan^2) d(angle).
+    fn vergence_sigma(&self, right_x: f64) -> f64 {
+        (1.0 + right_x * right_x) * self.settings.vergence_sigma_deg.to_radians()
     }
 
     fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
@@ -471,7 +540,7 @@ impl LedPositioner {
         let s = &self.settings;
         let terms = [
             along.dot(&in_world) * spread.distance,
-            spread.image_px * lamp.z / self.rig.camera.intrinsics.fx_px,
+            spread.image_px * lamp.z / self.rig.left.intrinsics.fx_px,
             along.dot(&depth) * s.focal_sigma_share,
             turned_by(&in_world, s.mount_sigma_deg),
             turned_by(&(turn * vehicle.coords), s.attitude_sigma_deg),
@@ -498,15 +567,20 @@ fn keep_surer(best: &mut Option<PositionFix>, fix: Option<PositionFix>) {
     }
 }
 
-/// How far a lamp moves in the image while a row is exposed.
+/// Line of sight of a lamp's centre in an eye's frame, at depth 1.
+fn sight(lens: &Intrinsics, lamp: &LampImage) -> Vector3<f64> {
+    pinhole(lens).ray(lamp.centre.x, lamp.centre.y)
+}
+
+/// How far a lamp moves in an eye's image while a row is exposed.
 ///
 /// The paper has V cos(psi) f t / W for a lamp at lateral distance W: the speed across the axis
 /// at depth W. Here the depth is that of the lamp's line along the pixel's own ray, which also
-/// holds off the axis: du = V t f (x_x z - x z_x)/z^2 with (x_x, z_x) the running direction in
-/// the camera's frame.
+/// holds off the axis, and the way is that of its image before and after.
 #[derive(Clone, Copy, Debug)]
 struct Smear<'a> {
-    rig: RigCalibration,
+    lens: Intrinsics,
+    vehicle_from_eye: Isometry3<f64>,
     lamps: &'a [LampSite],
     /// Where the train takes its head to be.
     head_m: Option<f64>,
@@ -515,23 +589,26 @@ struct Smear<'a> {
 
 impl Smear<'_> {
     fn along_row_px(&self, p: &Point2<f64>) -> f64 {
-        let c = &self.rig.camera.intrinsics;
-        let ray = c.ray(p.x, p.y);
-        let turn = self.rig.vehicle_from_left.rotation;
+        let ray = self.lens.ray(p.x, p.y);
+        let turn = self.vehicle_from_eye.rotation;
         let in_vehicle = turn * ray;
-        let left_m = self.lateral_m(&in_vehicle) - self.rig.vehicle_from_left.translation.y;
+        let left_m = self.lateral_m(&in_vehicle) - self.vehicle_from_eye.translation.y;
         let z = left_m / in_vehicle.y;
         if !(0.3..60.0).contains(&z) {
             return 0.0;
         }
-        let running = turn.inverse() * Vector3::x();
-        self.travel_m * c.fx_px * (running.x - ray.x * running.z) / z
+        let half_way = turn.inverse() * Vector3::x() * (0.5 * self.travel_m);
+        let seen = |lamp: Vector3<f64>| Some(self.lens.project(&Point3::from(lamp))?.x);
+        let (before, after) = (seen(ray * z + half_way), seen(ray * z - half_way));
+        before
+            .zip(after)
+            .map_or(0.0, |(before, after)| after - before)
     }
 
-    /// Of the lamp that is expected nearest to a ray from the left eye; of the first lamp while
+    /// Of the lamp that is expected nearest to a ray from the eye; of the first lamp while
     /// the train does not know where it is. The track is taken as straight over the few metres.
     fn lateral_m(&self, ray: &Vector3<f64>) -> f64 {
-        let eye = self.rig.vehicle_from_left.translation.vector;
+        let eye = self.vehicle_from_eye.translation.vector;
         let off = |lamp: &LampSite, head_m: f64| {
             let ahead_m = lamp.chainage_m - head_m;
             ray.angle(&(Vector3::new(ahead_m, lamp.lateral_m, lamp.height_m) - eye))
@@ -551,34 +628,44 @@ const LAMPS_WITHIN_M: f64 = 60.0;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::{rig, tunnel};
+    use crate::stack::led::testing::{rig, tunnel, wide_rig};
 
     /// Lamps on the left wall and on a nearer pillar between them, on the other side of the line
-    /// first: each pixel takes the lamp that is there, and without a position the first.
+    /// first: each pixel of either eye, straight or wide, takes the lamp that is there, and without
+    /// a position the first.
     #[test]
     fn smear_is_of_the_lamp_that_is_looked_at() {
         let mut lamps = tunnel("manchester").lamps;
         (lamps[0].lateral_m, lamps[4].lateral_m) = (-2.0, 1.8);
-        let rig = rig();
-        let at_px = |lamp: &LampSite, head_m: f64| {
-            let seen = Point3::new(lamp.chainage_m - head_m, lamp.lateral_m, lamp.height_m);
-            let pixel = (rig.camera.intrinsics).project(&(rig.vehicle_from_left.inverse() * seen));
-            pixel.unwrap_or_else(Point2::origin)
-        };
         let head_m = lamps[4].chainage_m - 2.0;
-        let smear = |head_m| Smear {
-            rig,
-            lamps: &lamps,
-            head_m,
-            travel_m: 5e-4,
-        };
-        for lamp in &lamps[4..6] {
-            let seen = at_px(lamp, head_m);
-            let moved = at_px(lamp, head_m + 5e-4).x - seen.x;
-            let said = smear(Some(head_m)).along_row_px(&seen);
-            assert!((said + moved).abs() < 0.02 * moved.abs(), "{said} {moved}");
+        let (rig, wide) = (rig(), wide_rig());
+        let from_right = |rig: &RigCalibration| rig.vehicle_from_left * rig.left_from_right;
+        for (lens, vehicle_from_eye) in [
+            (rig.left.intrinsics, rig.vehicle_from_left),
+            (rig.right.intrinsics, from_right(&rig)),
+            (wide.left.intrinsics, wide.vehicle_from_left),
+            (wide.right.intrinsics, from_right(&wide)),
+        ] {
+            let at_px = |lamp: &LampSite, head_m: f64| {
+                let seen = Point3::new(lamp.chainage_m - head_m, lamp.lateral_m, lamp.height_m);
+                let pixel = lens.project(&vehicle_from_eye.inverse_transform_point(&seen));
+                pixel.unwrap_or_else(Point2::origin)
+            };
+            let smear = |head_m| Smear {
+                lens,
+                vehicle_from_eye,
+                lamps: &lamps,
+                head_m,
+                travel_m: 5e-4,
+            };
+            for lamp in &lamps[4..6] {
+                let seen = at_px(lamp, head_m);
+                let moved = at_px(lamp, head_m + 5e-4).x - seen.x;
+                let said = smear(Some(head_m)).along_row_px(&seen);
+                assert!((said - moved).abs() < 0.02 * moved.abs(), "{said} {moved}");
+            }
+            let seen = at_px(&lamps[4], head_m);
+            assert!(smear(None).along_row_px(&seen).abs() < 1e-12);
         }
-        let seen = at_px(&lamps[4], head_m);
-        assert!(smear(None).along_row_px(&seen).abs() < 1e-12);
     }
 }

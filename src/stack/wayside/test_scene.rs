@@ -164,8 +164,15 @@ pub struct Scene {
 
 impl Scene {
     pub fn new(width: u32, height: u32) -> Self {
+        Self::through(Intrinsics::centred(width, height, f64::from(width) * 0.573))
+    }
+
+    /// Through a lens of choice.
+    pub fn through(lens: Intrinsics) -> Self {
+        let (width, height) = (lens.width_px, lens.height_px);
         let map = tunnel(0.0);
-        let calibration = calibration(&map, width, height);
+        let mut calibration = calibration(&map, width, height);
+        calibration.camera.intrinsics = lens;
         // Stains of some 16 pixels, and rows of sleepers: light and dark all over.
         let background = (0..width * height)
             .map(|k| {

@@ -3,7 +3,8 @@
 
 use super::test_scene::*;
 use super::*;
-use crate::bus::CameraFault;
+use crate::bus::lenses::EUROC;
+use crate::bus::{CameraFault, Distortion, DistortionCoefficients, Intrinsics, SimTime};
 
 const STEADY: fn(u32, u32) -> f64 = |_, _| 1.0;
 
@@ -45,21 +46,36 @@ fn noise_raises_no_alarm() {
     }
 }
 
-/// Crates over distance, size and contrast: place, width and height within two pixels' worth.
-/// The camera cannot see depth; the crate's near face is what it places.
+/// A wide lens with 20 % of barrel in the corners.
+fn wide() -> Intrinsics {
+    Intrinsics {
+        distortion: EUROC[0].into(),
+        ..Intrinsics::centred(1280, 720, 780.7)
+    }
+}
+
+/// Crates over distance, size and contrast, through a straight and a wide lens: place, width and
+/// height within two pixels' worth. The camera cannot see depth; the crate's near face is what it
+/// places.
 #[test]
 fn crates_are_found_where_they_are() {
-    let scene = Scene::new(1280, 720);
+    for lens in [Intrinsics::centred(1280, 720, 733.4), wide()] {
+        find_crates(&Scene::through(lens));
+    }
+}
+
+fn find_crates(scene: &Scene) {
     let settings = quiet();
     let f_px = scene.calibration.camera.intrinsics.fx_px;
     for (s, l, size, grey) in [
+        (193.0, 1.3, 0.3, 200.0),
         (190.0, 0.0, 0.3, 20.0),
         (180.0, 0.4, 0.4, 190.0),
         (165.0, -0.6, 0.5, 15.0),
         (150.0, 0.0, 0.8, 200.0),
         (135.0, 0.3, 1.0, 20.0),
     ] {
-        let mut d = taught(&scene, &settings);
+        let mut d = taught(scene, &settings);
         let item = Crate::on_bed(s, l, size);
         let mut last = None;
         for n in 10..14 {
@@ -98,6 +114,52 @@ fn crates_are_found_where_they_are() {
         );
         assert_eq!(o.danger, DangerLevel::High);
         assert!(report.emergency_needed && !report.passage_possible);
+    }
+}
+
+/// A detector that is not told of the distortion places what is off the axis wrongly; so the test
+/// above tells whether it is used.
+#[test]
+fn a_lens_that_is_not_known_misplaces() {
+    let scene = Scene::through(wide());
+    let mut straight = scene.calibration.clone();
+    straight.camera.intrinsics.distortion = Distortion::default();
+    let settings = quiet();
+    let item = Crate::on_bed(193.0, -1.0, 0.3);
+    let [told, untold] = [scene.calibration.clone(), straight].map(|calibration| {
+        let mut d = WaysideDetector::new(&settings, calibration, scene.map.clone());
+        for n in 0..settings.reference_frames {
+            d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        }
+        let frame = |n| scene.frame(n, STEADY, &[(item, 200.0)]);
+        (10..13).for_each(|n| drop(d.on_frame(&frame(n), None, None)));
+        let report = d.on_frame(&frame(13), None, None);
+        (report.obstacles[0].to_chainage_m - item.s.1).abs()
+    });
+    assert!(untold > 0.3 && untold > 3.0 * told, "{told} {untold}");
+}
+
+/// Echoes of a lidar from beside and behind the picture must not fall into it through a lens whose
+/// polynomial turns back beyond its corners.
+#[test]
+fn what_is_out_of_the_picture_stays_out() {
+    let lens = Intrinsics {
+        distortion: DistortionCoefficients {
+            k1: -0.3,
+            k2: 0.03,
+            ..DistortionCoefficients::default()
+        }
+        .into(),
+        ..Intrinsics::centred(1280, 720, 1040.0)
+    };
+    assert!(lens.ray(0.0, 0.0).xy().norm() < lens.distortion.reach());
+    for k in 0..400 {
+        let off = 1.0 + 0.05 * f64::from(k);
+        for angle in (0..8).map(|k| f64::from(k) * 0.7) {
+            let echo = nalgebra::Point3::new(off * angle.cos(), off * angle.sin(), 1.0);
+            let pixel = lens.project(&echo).unwrap();
+            assert!(!lens.contains(&pixel), "{echo}: {pixel}");
+        }
     }
 }
 
@@ -330,7 +392,7 @@ fn odd_input_is_survived() {
     assert!(d.on_frame(&other, None, None).learning);
     let mut calibration = scene.calibration.clone();
     for (w, h) in [(0, 0), (1, 1), (2, 7), (9, 2)] {
-        calibration.camera.intrinsics = crate::bus::Intrinsics::centred(w, h, 10.0);
+        calibration.camera.intrinsics = Intrinsics::centred(w, h, 10.0);
         let mut d = WaysideDetector::new(&quiet(), calibration.clone(), scene.map.clone());
         for number in 0..14 {
             let image = GrayImage::from_pixel(w, h, image::Luma([(number * 20) as u8]));

@@ -93,7 +93,7 @@ pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
 pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
-pub use truth::{ObstacleTruth, WorkerTruth};
+pub use truth::{Belonging, BodyOwner, ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
 };
@@ -339,10 +339,7 @@ impl World {
 
     /// Obstacles, cables, workers and other trains that are there now, to draw.
     pub fn bodies(&self) -> Vec<Body> {
-        let line = &self.tunnel.alignment;
-        let mut bodies = self.things.draw(&self.rapier, line, self.time.secs());
-        bodies.extend(self.others.iter().flat_map(Train::bodies));
-        bodies
+        self.owned_bodies(false).0
     }
 
     /// The train as boxes with the lenses of its headlights, for cameras that stand outside.

@@ -13,7 +13,7 @@ use super::obstacle::Piece;
 use super::owner::Owner;
 use super::settings::PhysicsSettings;
 use super::thing::Thing;
-use super::truth::{ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
+use super::truth::{Belonging, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
 use super::walker::{Act, Walker};
 use crate::bus::SimTime;
 use crate::track::{Alignment, Tunnel};
@@ -302,17 +302,43 @@ impl Things {
         self.impacts.list()
     }
 
-    /// As renderers draw them.
-    pub(super) fn draw(&self, world: &PhysicsWorld, line: &Alignment, now_s: f64) -> Vec<Body> {
-        let things = self.things.iter().flatten();
-        let mut bodies: Vec<Body> = things.filter_map(|thing| thing.draw(world)).collect();
-        for cable in &self.cables {
+    /// As renderers draw them, with their owners.
+    pub(super) fn draw_owned(
+        &self,
+        world: &PhysicsWorld,
+        line: &Alignment,
+        now_s: f64,
+    ) -> Vec<(Body, Belonging<'_>)> {
+        let mut owned = Vec::new();
+        for (k, thing) in self.things.iter().enumerate() {
+            let Some((body, thing)) = thing.as_ref().and_then(|t| Some((t.draw(world)?, t))) else {
+                continue;
+            };
+            let (owner, name) = (BodyOwner::Thing(k), thing.piece.settings.name.as_str());
+            owned.push((body, Belonging { owner, name }));
+        }
+        let mut bodies = Vec::new();
+        for (k, cable) in self.cables.iter().enumerate() {
             cable.draw(world, &mut bodies);
+            let (owner, name) = (BodyOwner::Cable(k), cable.settings.name.as_str());
+            owned.extend(bodies.drain(..).map(|b| (b, Belonging { owner, name })));
         }
-        for walker in &self.walkers {
+        for (k, walker) in self.walkers.iter().enumerate() {
             walker.draw(world, line, now_s, &mut bodies);
+            let load = walker.draw_load(world, line, now_s);
+            let (owner, name) = (BodyOwner::Worker(k), walker.settings.name.as_str());
+            owned.extend(bodies.drain(..).map(|b| (b, Belonging { owner, name })));
+            if let Some((body, name)) = load {
+                let owner = BodyOwner::Load(k);
+                owned.push((body, Belonging { owner, name }));
+            }
         }
-        bodies
+        owned
+    }
+
+    /// Name of another train.
+    pub(super) fn train_name(&self, number: usize) -> &str {
+        self.name(Owner::Train(number))
     }
 
     /// Obstacles that are there now; what is fixed to the lining is none.

@@ -6,6 +6,7 @@ use super::thing::Thing;
 use super::{WheelExtremes, World};
 use crate::bus::SimTime;
 use crate::track::Alignment;
+use crate::twin::render::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rapier3d_f64::prelude::PhysicsWorld;
 
@@ -47,6 +48,30 @@ pub struct WorkerTruth<'a> {
     pub lateral_m: f64,
 }
 
+/// Who a body belongs to. Numbers stay with their owner for a whole run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum BodyOwner {
+    /// Something loose or fixed to the lining, in the order of appearance.
+    Thing(usize),
+    /// A cable.
+    Cable(usize),
+    /// A worker.
+    Worker(usize),
+    /// What a worker carries; put down, it is a thing.
+    Load(usize),
+    /// A car of a train, from its front. Train 0 is the scenario's own, 1 the first of the others.
+    Car(usize, usize),
+}
+
+/// A body's owner and the name that the scenario gives it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Belonging<'a> {
+    /// Who it belongs to.
+    pub owner: BodyOwner,
+    /// Name.
+    pub name: &'a str,
+}
+
 /// What has been still for this long rests.
 const RESTING_S: f64 = 0.25;
 
@@ -84,6 +109,26 @@ impl World {
     /// Normal force of a wheel at rest; `None` without a train.
     pub fn wheel_load_n(&self) -> Option<f64> {
         Some(self.train.as_ref()?.consist.vehicle.wheel_load_n())
+    }
+
+    /// [`World::bodies`] and, where asked for, [`World::train_bodies`], each with its owner.
+    pub fn owned_bodies(&self, with_train: bool) -> (Vec<Body>, Vec<Belonging<'_>>) {
+        let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
+        let mut owned = self.things.draw_owned(&self.rapier, line, now_s);
+        let others = self.others.iter().enumerate();
+        let others = others.map(|(k, train)| (k + 1, train, self.things.train_name(k)));
+        let own = self.train.iter().filter(|_| with_train);
+        let own = own.map(|train| (0, train, "train"));
+        for (number, train, name) in others.chain(own) {
+            let cars = train.consist.boxes().count();
+            for (k, body) in train.bodies().into_iter().enumerate() {
+                // After the cars come the lenses on the leading one.
+                let car = if k < cars { k } else { 0 };
+                let owner = BodyOwner::Car(number, car);
+                owned.push((body, Belonging { owner, name }));
+            }
+        }
+        owned.into_iter().unzip()
     }
 
     fn chainage_of(&self, world_from_vehicle: &Isometry3<f64>) -> Option<f64> {

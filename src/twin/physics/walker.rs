@@ -219,9 +219,20 @@ impl Walker {
         bodies: &mut Vec<Body>,
     ) {
         if let Some((stance, feet)) = self.feet(world, alignment, now_s) {
-            let in_hand = !matches!(self.load_is, Load::Down(_));
-            let load = self.load.as_ref().filter(|_| in_hand);
-            self.settings.draw(&stance, feet, load, bodies);
+            self.settings.draw(&stance, feet, bodies);
         }
+    }
+
+    /// What he has in his hand as the renderer draws it, with its name.
+    pub(super) fn draw_load(
+        &self,
+        world: &PhysicsWorld,
+        alignment: &Alignment,
+        now_s: f64,
+    ) -> Option<(Body, &str)> {
+        let in_hand = !matches!(self.load_is, Load::Down(_));
+        let load = self.load.as_ref().filter(|_| in_hand)?;
+        let (_, feet) = self.feet(world, alignment, now_s)?;
+        Some((self.settings.draw_load(feet, load), &load.settings.name))
     }
 }

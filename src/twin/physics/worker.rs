@@ -222,20 +222,19 @@ impl WorkerSettings {
         )
     }
 
-    /// Appends his limbs, and what he carries.
+    /// Appends his limbs.
     pub(super) fn draw(
         &self,
         stance: &Stance,
         (world_from_feet, velocity): Feet,
-        load: Option<&Piece>,
         bodies: &mut Vec<Body>,
     ) {
-        let mut put = |shape, feet_from_part: Isometry3<f64>, albedo| {
+        let mut put = |shape, feet_from_part: Isometry3<f64>| {
             bodies.push(Body {
                 shape,
                 world_from_body: world_from_feet * feet_from_part,
                 velocity_mps: velocity,
-                albedo,
+                albedo: self.albedo,
                 luminance_cd_m2: 0.0,
             });
         };
@@ -245,9 +244,8 @@ impl WorkerSettings {
         put(
             Shape::Capsule(0.17, 0.31 * tall / 2.0 - 0.1),
             at(0.0, 0.0, 0.68 * tall),
-            self.albedo,
         );
-        put(Shape::Sphere(0.11), at(0.0, 0.0, tall - 0.11), self.albedo);
+        put(Shape::Sphere(0.11), at(0.0, 0.0, tall - 0.11));
         let [along, left] = stance.velocity_mps;
         let pace = (along.hypot(left) / 1.4).min(1.2);
         let phase = std::f64::consts::TAU * stance.walked_m / STRIDE_M;
@@ -257,13 +255,20 @@ impl WorkerSettings {
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -swing);
             let leg = Isometry3::from_parts(Translation3::new(0.0, side, hip), turn)
                 * at(0.0, 0.0, -hip / 2.0);
-            put(Shape::Capsule(0.08, hip / 2.0 - 0.08), leg, self.albedo);
+            put(Shape::Capsule(0.08, hip / 2.0 - 0.08), leg);
         }
-        if let Some(load) = load {
-            let half = load.body.half_extents_m().z;
-            let centre = (0.42 * tall - half).max(half);
-            let albedo = load.settings.albedo;
-            put(load.body.clone(), at(0.0, -HAND_M, centre), albedo);
+    }
+
+    /// What he carries, in his right hand.
+    pub(super) fn draw_load(&self, (world_from_feet, velocity): Feet, load: &Piece) -> Body {
+        let half = load.body.half_extents_m().z;
+        let centre = (0.42 * self.stature_m - half).max(half);
+        Body {
+            shape: load.body.clone(),
+            world_from_body: world_from_feet * Isometry3::translation(0.0, -HAND_M, centre),
+            velocity_mps: velocity,
+            albedo: load.settings.albedo,
+            luminance_cd_m2: 0.0,
         }
     }
 }

@@ -3,10 +3,12 @@
 
 pub mod cpu;
 pub mod glare;
+mod glass;
 pub mod gpu;
 mod hull;
 pub mod light;
 pub mod paint;
+pub mod pixel_map;
 pub mod sample;
 mod scene;
 pub mod sensor;
@@ -17,9 +19,13 @@ pub use scene::{
     Air, Body, CameraMotion, Headlight, Job, LampChange, LampLight, LampsInTime, NoiseKey, Scene,
     Shape, View,
 };
-pub use sensor::{LensSettings, SensorSettings};
+pub use sensor::{LensSettings, Pattern, SensorSettings, upper_bits};
 
-use image::GrayImage;
+use image::{GrayImage, ImageBuffer, Luma};
+
+/// Digital numbers as the converter gives them, black level included: linear, at the full depth of
+/// [`SensorSettings::bits`], in the low bits. A colour sensor's is the mosaic.
+pub type RawImage = ImageBuffer<Luma<u16>, Vec<u16>>;
 
 /// Which renderer drew, for the summary.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
@@ -42,6 +48,9 @@ pub enum RenderError {
     /// `collect` without `submit`.
     #[error("no picture was asked for")]
     NothingSubmitted,
+    /// `collect_raw` for a job that did not ask for raw images.
+    #[error("the job did not ask for raw images")]
+    NotRaw,
 }
 
 /// A renderer holds the scene and draws jobs, one in flight while the caller does other work.
@@ -52,4 +61,7 @@ pub trait Renderer: Send {
     fn submit(&mut self, job: &Job) -> Result<(), RenderError>;
     /// Waits for the oldest submitted job; one image a view, in order.
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError>;
+    /// The same for a job with [`Job::raw`]: all bits of the converter. `collect` gives the upper
+    /// eight of the same numbers.
+    fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError>;
 }

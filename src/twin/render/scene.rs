@@ -287,6 +287,13 @@ pub struct View {
 }
 
 impl View {
+    /// The middle of the exposure of the middle row.
+    pub fn mid(&self) -> SimTime {
+        let rows = self.camera.intrinsics.height_px;
+        let row = 0.5 * (f64::from(rows) - 1.0);
+        self.camera.shutter.row_mid(self.start, row)
+    }
+
     /// Photo-electrons that a luminance of 1 cd/m^2 on the axis gives in a row's exposure.
     pub fn electrons_per_cd_m2(&self) -> f64 {
         let lux_s = self.lens.lux_per_cd_m2() * self.camera.shutter.exposure_s;
@@ -299,10 +306,13 @@ impl View {
     }
 
     /// Sets the sensor's gain so that a luminance on the axis gives that many grey levels over
-    /// black.
+    /// black. Where that takes less gain than none, which would show a full well instead of white,
+    /// the lens passes less light instead.
     pub fn set_gain_for(&mut self, luminance_cd_m2: f64, grey: f64) {
         let now = self.grey_per_cd_m2() * luminance_cd_m2;
-        self.sensor.gain_db += 20.0 * (grey / now).log10();
+        let gain_db = self.sensor.gain_db + 20.0 * (grey / now).log10();
+        self.sensor.gain_db = gain_db.max(0.0);
+        self.lens.transmission *= 10f64.powf(gain_db.min(0.0) / 20.0);
     }
 
     /// Most electrons that a pixel's signal is followed to: beyond it everything is white.
@@ -322,4 +332,6 @@ pub struct Job {
     pub headlights: Vec<Headlight>,
     /// One image each.
     pub views: Vec<View>,
+    /// Whether raw images are wanted, for [`Renderer::collect_raw`](super::Renderer::collect_raw).
+    pub raw: bool,
 }

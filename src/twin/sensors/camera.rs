@@ -4,12 +4,62 @@
 //! A mount turns by yaw about the vertical (left positive) and then by pitch about its own right
 //! hand axis (up positive). The papers measure psi from the lateral direction: psi = 90 deg - yaw.
 
-use crate::bus::{CameraModel, Intrinsics, Shutter, WaysideCalibration};
+use super::ExposureSettings;
+use crate::bus::{
+    CameraModel, DistortionCoefficients, Intrinsics, Shutter, SimTime, WaysideCalibration,
+};
 use crate::track::{Checker, Problem, TrackPoint, Tunnel, WaysideSite};
+use crate::twin::random::Stream;
 use crate::twin::render::{LensSettings, SensorSettings};
-use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// Which row of a rolling shutter opens first.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum ReadOut {
+    /// The top one.
+    #[default]
+    Down,
+    /// The bottom one, as behind a sensor that is mounted upside down.
+    Up,
+}
+
+/// When a camera is really triggered: about the time that its frame says, by a frame's own jitter.
+#[derive(Clone, Copy, Debug)]
+pub struct Trigger {
+    stream: Stream,
+    jitter_us: f64,
+}
+
+/// Draws farther off than this many standard deviations are held there.
+const MOST_SIGMAS: f64 = 4.0;
+
+impl Trigger {
+    /// With jitter of this standard deviation, from a stream of its own.
+    pub fn new(stream: Stream, jitter_us: f64) -> Self {
+        Self { stream, jitter_us }
+    }
+
+    /// When frame `number`, triggered at `start` as it says, really starts. Nothing is seen before
+    /// time zero.
+    pub fn really(&self, number: u32, start: SimTime) -> SimTime {
+        let sigmas = self.stream.normal(u64::from(number));
+        let late_us = self.jitter_us * sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS);
+        start.plus(1e-6 * late_us).max(SimTime::ZERO)
+    }
+
+    /// The latest that a frame can start after the time that it says.
+    pub fn latest_s(&self) -> f64 {
+        most_jitter_s(self.jitter_us)
+    }
+}
+
+/// The most that jitter of this standard deviation can be.
+pub(super) fn most_jitter_s(jitter_us: f64) -> f64 {
+    1e-6 * MOST_SIGMAS * jitter_us
+}
 
 /// Shape and timing of one image sensor behind its lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,6 +68,9 @@ pub(super) struct Optics {
     pub pixel_um: f64,
     pub width_px: u32,
     pub height_px: u32,
+    pub principal_px: [f64; 2],
+    pub distortion: DistortionCoefficients,
+    pub read_out: ReadOut,
     pub line_time_us: f64,
     pub exposure_us: f64,
     pub frames_per_s: f64,
@@ -26,16 +79,22 @@ pub(super) struct Optics {
 
 impl Optics {
     pub fn camera(&self) -> CameraModel {
+        let f_px = self.focal_length_mm * 1e3 / self.pixel_um;
+        let centred = Intrinsics::centred(self.width_px, self.height_px, f_px);
         CameraModel {
-            intrinsics: Intrinsics::centred(
-                self.width_px,
-                self.height_px,
-                self.focal_length_mm * 1e3 / self.pixel_um,
-            ),
+            intrinsics: Intrinsics {
+                cx_px: centred.cx_px + self.principal_px[0],
+                cy_px: centred.cy_px + self.principal_px[1],
+                distortion: self.distortion.into(),
+                ..centred
+            },
             shutter: Shutter {
                 line_time_s: self.line_time_us * 1e-6,
                 exposure_s: self.exposure_us * 1e-6,
-                first_row: 0,
+                first_row: match self.read_out {
+                    ReadOut::Down => 0,
+                    ReadOut::Up => self.height_px.saturating_sub(1),
+                },
             },
         }
     }
@@ -67,6 +126,89 @@ impl Optics {
             ));
         }
         self.check_frame_time(at, problems);
+        self.check_lens(at, problems);
+    }
+
+    /// Principal point and distortion.
+    pub fn check_lens(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut check = Checker::new(at, problems);
+        let size_px = [self.width_px, self.height_px].map(f64::from);
+        let keys = ["principal_u_px", "principal_v_px"];
+        for ((key, value), size_px) in keys.into_iter().zip(self.principal_px).zip(size_px) {
+            check.within(key, value, -0.5 * size_px..=0.5 * size_px, "px");
+        }
+        let at = format!("{at}.distortion");
+        let mut check = Checker::new(&at, problems);
+        let DistortionCoefficients { k1, k2, k3, p1, p2 } = self.distortion;
+        for (key, value) in [("k1", k1), ("k2", k2), ("k3", k3)] {
+            check.within(key, value, -10.0..=10.0, "");
+        }
+        for (key, value) in [("p1", p1), ("p2", p2)] {
+            check.within(key, value, -0.2..=0.2, "");
+        }
+        self.check_reach(&at, problems);
+    }
+
+    /// The polynomial must hold all over the picture.
+    fn check_reach(&self, at: &str, problems: &mut Vec<Problem>) {
+        let lens = self.camera().intrinsics;
+        let (right, bottom) = (
+            f64::from(self.width_px) - 1.0,
+            f64::from(self.height_px) - 1.0,
+        );
+        let reach = lens.distortion.reach();
+        let corners = [(0.0, 0.0), (right, 0.0), (0.0, bottom), (right, bottom)];
+        let beyond = corners
+            .into_iter()
+            .map(|(u, v)| (u, v, lens.ray(u, v).xy().norm()))
+            .filter(|(.., radius)| radius.is_finite() && *radius > reach);
+        let Some((u, v, radius)) = beyond.max_by(|a, b| a.2.total_cmp(&b.2)) else {
+            return;
+        };
+        let towards = lens.ray(u, v).xy() * (reach / radius);
+        let rim = lens.project(&towards.push(1.0).into());
+        let middle = Point2::new(lens.cx_px, lens.cy_px);
+        let rim_px = rim.map_or(0.0, |p| (p - middle).norm());
+        let corner_px = (Point2::new(u, v) - middle).norm();
+        problems.push(Problem::new(
+            at,
+            format!(
+                "it turns back at r = {reach:.3} ({:.1} deg off the axis), which is seen \
+                 {rim_px:.0} px from the principal point, inside the picture: pixel ({u}, {v}) is \
+                 {corner_px:.0} px from it",
+                reach.atan().to_degrees()
+            ),
+            "take coefficients that were fitted out to the corners, or a longer focal length or \
+             fewer pixels",
+        ));
+    }
+
+    /// Whether nothing is wrong.
+    fn is_sound(&self) -> bool {
+        let mut problems = Vec::new();
+        self.check("", &mut problems);
+        problems.is_empty()
+    }
+
+    /// What the errors under the key `at` spoil of a camera that is sound by its sheet.
+    pub fn check_actual(&self, sheet: &Self, at: &str, problems: &mut Vec<Problem>) {
+        if !sheet.is_sound() {
+            return;
+        }
+        self.check_reach(at, problems);
+        let span_us = 1e6 * self.camera().shutter.frame_span_s(self.height_px);
+        let frame_us = 1e6 / self.frames_per_s;
+        if span_us > frame_us {
+            problems.push(Problem::new(
+                format!("{at}.line_time_us"),
+                format!(
+                    "the line time is really {} us, in which {} rows take {span_us:.0} us, but a \
+                     frame lasts {frame_us:.0} us",
+                    self.line_time_us, self.height_px
+                ),
+                "give a smaller error",
+            ));
+        }
     }
 
     /// The last row must close before the next frame's first one opens.
@@ -116,12 +258,23 @@ pub struct WaysideCameraSettings {
     pub width_px: u32,
     /// Rows. Default 1080.
     pub height_px: u32,
+    /// Principal point right of the picture's middle, px. Default 0.
+    pub principal_u_px: f64,
+    /// Principal point below the picture's middle, px. Default 0.
+    pub principal_v_px: f64,
+    /// Distortion of the lens, as OpenCV has it. Default: none.
+    pub distortion: DistortionCoefficients,
     /// Time from the opening of a row to the opening of the next, us. Default 14.8.
     pub line_time_us: f64,
+    /// Whether rows are read downwards or upwards. Default "down".
+    pub read_out: ReadOut,
     /// How long every row collects light, us. Default 16000.
     pub exposure_us: f64,
     /// Frames a second. Default 10.
     pub frames_per_s: f64,
+    /// Standard deviation of a frame's true start about the one that it says, us, drawn anew for
+    /// each; held at four times that. Default 0.
+    pub frame_jitter_us: f64,
     /// By how much the device really differs from the calibration that the stack is given.
     /// Default: not at all.
     pub calibration_error: WaysideError,
@@ -129,6 +282,8 @@ pub struct WaysideCameraSettings {
     pub lens: LensSettings,
     /// From photons to digital numbers.
     pub sensor: SensorSettings,
+    /// Exposure and gain that follow the light. Default: fixed.
+    pub exposure_control: ExposureSettings,
 }
 
 impl Default for WaysideCameraSettings {
@@ -138,9 +293,14 @@ impl Default for WaysideCameraSettings {
             pixel_um: 3.75,
             width_px: 1920,
             height_px: 1080,
+            principal_u_px: 0.0,
+            principal_v_px: 0.0,
+            distortion: DistortionCoefficients::default(),
             line_time_us: 14.8,
+            read_out: ReadOut::Down,
             exposure_us: 16_000.0,
             frames_per_s: 10.0,
+            frame_jitter_us: 0.0,
             calibration_error: WaysideError::default(),
             lens: LensSettings {
                 f_number: 1.0,
@@ -150,6 +310,7 @@ impl Default for WaysideCameraSettings {
                 gain_db: 9.4,
                 ..SensorSettings::default()
             },
+            exposure_control: ExposureSettings::default(),
         }
     }
 }
@@ -161,6 +322,14 @@ impl Default for WaysideCameraSettings {
 pub struct WaysideError {
     /// Focal length, mm. Default 0.
     pub focal_length_mm: f64,
+    /// Principal point, px to the right. Default 0.
+    pub principal_u_px: f64,
+    /// Principal point, px down. Default 0.
+    pub principal_v_px: f64,
+    /// Distortion of r^2. Default 0.
+    pub k1: f64,
+    /// Line time, us. Default 0.
+    pub line_time_us: f64,
     /// Yaw, deg, left positive. Default 0.
     pub yaw_deg: f64,
     /// Pitch, deg, up positive. Default 0.
@@ -207,10 +376,7 @@ impl WaysideCameraSettings {
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
         let error = self.calibration_error;
-        let camera = Self {
-            focal_length_mm: self.focal_length_mm + error.focal_length_mm,
-            ..self.clone()
-        };
+        let camera = self.actual_camera();
         let site = WaysideSite {
             chainage_m: site.chainage_m + error.chainage_m,
             lateral_m: site.lateral_m + error.lateral_m,
@@ -222,11 +388,32 @@ impl WaysideCameraSettings {
         camera.calibration(&site, tunnel, with_lidar)
     }
 
+    /// This camera as it really is; its errors are now in its values.
+    fn actual_camera(&self) -> Self {
+        let error = self.calibration_error;
+        Self {
+            focal_length_mm: self.focal_length_mm + error.focal_length_mm,
+            principal_u_px: self.principal_u_px + error.principal_u_px,
+            principal_v_px: self.principal_v_px + error.principal_v_px,
+            distortion: DistortionCoefficients {
+                k1: self.distortion.k1 + error.k1,
+                ..self.distortion
+            },
+            line_time_us: self.line_time_us + error.line_time_us,
+            calibration_error: WaysideError::default(),
+            ..self.clone()
+        }
+    }
+
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        check_jitter(at, self.frame_jitter_us, self.frames_per_s, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         self.lens.check(&format!("{at}.lens"), problems);
+        let frame_us = 1e6 / self.frames_per_s;
+        let control = format!("{at}.exposure_control");
+        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let mut check = Checker::new(&at, problems);
@@ -234,12 +421,19 @@ impl WaysideCameraSettings {
             check.within(key, value, -most..=most, unit);
         };
         let half_focal = 0.5 * self.focal_length_mm.abs();
+        let half_line = 0.5 * self.line_time_us.abs();
         within("focal_length_mm", error.focal_length_mm, "mm", half_focal);
+        within("principal_u_px", error.principal_u_px, "px", 100.0);
+        within("principal_v_px", error.principal_v_px, "px", 100.0);
+        within("k1", error.k1, "", 1.0);
+        within("line_time_us", error.line_time_us, "us", half_line);
         within("yaw_deg", error.yaw_deg, "deg", 45.0);
         within("pitch_deg", error.pitch_deg, "deg", 45.0);
         within("chainage_m", error.chainage_m, "m", 1.0);
         within("lateral_m", error.lateral_m, "m", 0.5);
         within("height_m", error.height_m, "m", 0.5);
+        let actual = self.actual_camera().optics();
+        actual.check_actual(&self.optics(), &at, problems);
     }
 
     fn optics(&self) -> Optics {
@@ -248,6 +442,9 @@ impl WaysideCameraSettings {
             pixel_um: self.pixel_um,
             width_px: self.width_px,
             height_px: self.height_px,
+            principal_px: [self.principal_u_px, self.principal_v_px],
+            distortion: self.distortion,
+            read_out: self.read_out,
             line_time_us: self.line_time_us,
             exposure_us: self.exposure_us,
             frames_per_s: self.frames_per_s,
@@ -300,6 +497,15 @@ fn axes(columns: Matrix3<f64>) -> Isometry3<f64> {
     )
 }
 
+/// Complains about jitter that would let frames overtake each other.
+pub(super) fn check_jitter(at: &str, jitter_us: f64, rate_hz: f64, problems: &mut Vec<Problem>) {
+    let most_us = 1e6 / (2.0 * MOST_SIGMAS * rate_hz);
+    if most_us.is_finite() && most_us > 0.0 {
+        let mut check = Checker::new(at, problems);
+        check.within("frame_jitter_us", jitter_us, 0.0..=most_us.floor(), "us");
+    }
+}
+
 /// Complains unless a number is greater than 0; `usual` is one that is.
 pub(super) fn positive(
     problems: &mut Vec<Problem>,
@@ -344,6 +550,53 @@ mod tests {
         assert!((turned(&is.unwrap(), &said.unwrap()) - half_deg).abs() < 1e-9);
         let up = actual.world_from_camera.translation.z - exact.world_from_camera.translation.z;
         assert!((up - 0.02).abs() < 1e-9, "{up}");
+    }
+
+    /// As for the rig: lens, read-out, errors and jitter are refused where they are said.
+    #[test]
+    fn impossible_cameras_are_refused() {
+        let problems = |text: &str| {
+            let camera: WaysideCameraSettings = toml::from_str(text).unwrap();
+            let mut problems = Vec::new();
+            camera.check("camera", &mut problems);
+            problems
+        };
+        for (text, key, what) in [
+            (
+                "distortion = { k1 = -0.28, k3 = -0.05 }",
+                "distortion",
+                "it turns back at r = 0.912 (42.4 deg off the axis), which is seen 736 px",
+            ),
+            (
+                "calibration_error = { k1 = -0.4 }",
+                "calibration_error",
+                "it turns back at r = 0.866 (40.9 deg off the axis)",
+            ),
+            (
+                "line_time_us = 80.0\nexposure_us = 13000.0\n\
+                 calibration_error = { line_time_us = 1.0 }",
+                "calibration_error.line_time_us",
+                "the line time is really 81 us, in which 1080 rows take 100399 us",
+            ),
+            (
+                "frame_jitter_us = 2e4",
+                "frame_jitter_us",
+                "20000 us is out of range",
+            ),
+            (
+                "principal_v_px = -600.0",
+                "principal_v_px",
+                "-600 px is out of range",
+            ),
+        ] {
+            let found = problems(text);
+            let said = |p: &Problem| {
+                p.key == format!("camera.{key}") && p.what.starts_with(what) && !p.remedy.is_empty()
+            };
+            assert!(found.iter().any(said), "{text}: {found:?}");
+        }
+        let wide = "distortion = { k1 = -0.283, k2 = 0.074 }\nread_out = \"up\"\n";
+        assert_eq!(problems(wide), []);
     }
 
     /// Camera and lidar of a housing look the same way, which is the site's yaw and pitch.

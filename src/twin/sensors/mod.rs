@@ -1,5 +1,6 @@
 //! Sensors: each turns the world's state at its own mount into raw output.
 
+mod auto_exposure;
 mod camera;
 mod doppler;
 mod imu;
@@ -7,9 +8,10 @@ mod lidar;
 mod odometer;
 mod rig;
 
-pub use camera::{WaysideCameraSettings, WaysideError};
+pub use auto_exposure::{AutoExposure, Exposed, ExposureMode, ExposureSettings};
+pub use camera::{ReadOut, Trigger, WaysideCameraSettings, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-pub use rig::{RigError, RigSettings, ever_sees, visible_interval};
+pub use rig::{RigError, RigSettings, RightEye, ever_sees, visible_interval};

@@ -9,19 +9,27 @@
 //! then 1.04 m to 11.46 m ahead on straight track, 10.4 m of 10 ([`visible_interval`]); with
 //! psi = 49 deg no pitch gives more than 8.4 m.
 //!
-//! **What a calibration misses.** [`RigError`]: focal length and baseline of both eyes, attitude of
-//! the rig, and the vergence of its eyes, the one angle between them that enters every disparity:
-//! f times it, 0.07 px for 0.004 deg, which at 10 m puts a lamp off by 5 cm.
+//! **Two eyes.** They share a kind of sensor and its timing. Each has a lens of its own: the right
+//! one's focal length, principal point and distortion may differ ([`RightEye`]), it may look past
+//! the left one and be triggered later. All that is on the calibration sheet, and the stack has to
+//! live with it.
 //!
-//! **What it does not do.** The eyes have no distortion, nor what a calibration leaves of it; they
-//! share one focal length and one principal point; the right eye is neither rolled nor pitched
-//! against the left, nor off the baseline's line; both trigger at the same time.
+//! **What a calibration misses.** [`RigError`]: of both eyes focal length, principal point,
+//! distortion of r^2, line time; the baseline; the attitude of the rig; the right eye's attitude
+//! against the left and its trigger. Of the angles between the eyes one enters every disparity, the
+//! vergence: f times it, 0.07 px for 0.004 deg, which at 10 m puts a lamp off by 5 cm. A trigger
+//! that is late by 0.1 ms, at 100 km/h, is a baseline off by 2.8 mm of 120.
+//!
+//! **What it does not do.** The right eye sits on the left one's x axis. What a calibration misses
+//! of the lenses it misses of both alike. Both eyes share the jitter of the trigger, and one line
+//! time: it does not drift. Nothing changes with temperature or vibration.
 
-use super::camera::{Optics, mounted, positive};
-use crate::bus::RigCalibration;
+use super::ExposureSettings;
+use super::camera::{Optics, ReadOut, check_jitter, most_jitter_s, mounted, positive};
+use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration};
 use crate::track::{Checker, LampSite, Problem, Tunnel};
 use crate::twin::render::{LensSettings, SensorSettings};
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +37,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RigSettings {
-    /// Focal length of either eye, mm. Default 3.9 (1040 px).
+    /// Focal length of the left eye, mm. Default 3.9 (1040 px).
     pub focal_length_mm: f64,
     /// Width and height of a pixel, um. Default 3.75.
     pub pixel_um: f64,
@@ -37,17 +45,33 @@ pub struct RigSettings {
     pub width_px: u32,
     /// Rows of either eye's image. Default 720.
     pub height_px: u32,
+    /// Left eye's principal point right of the picture's middle, px. Default 0.
+    pub principal_u_px: f64,
+    /// Left eye's principal point below the picture's middle, px. Default 0.
+    pub principal_v_px: f64,
+    /// Distortion of the left eye's lens, as OpenCV has it. Default: none.
+    pub distortion: DistortionCoefficients,
+    /// By how much the right eye differs from the left one. Default: not at all.
+    pub right: RightEye,
     /// Distance between the eyes, mm; the right eye sits that far along the left eye's right hand
     /// axis. Default 120.
     pub baseline_mm: f64,
     /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
     /// Default 22.2.
     pub line_time_us: f64,
+    /// Whether rows are read downwards or upwards, in both eyes. Default "down".
+    pub read_out: ReadOut,
     /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in the shipped tunnels)
     /// it blurs the stripes away. Default 30.
     pub exposure_us: f64,
     /// Pairs of images a second. Default 30.
     pub pairs_per_s: f64,
+    /// By how much later than the left eye the right one is triggered, us; negative: earlier. Its
+    /// frames say so. Default 0.
+    pub trigger_offset_us: f64,
+    /// Standard deviation of a pair's true start about the one that its frames say, us, drawn anew
+    /// for each and the same for both eyes; held at four times that. Default 0.
+    pub frame_jitter_us: f64,
     /// Left eye, m ahead of the train head (negative: behind the windscreen). Default -0.5.
     pub forward_m: f64,
     /// Left eye, m to the left of the centreline. Default 1.0.
@@ -66,6 +90,8 @@ pub struct RigSettings {
     pub lens: LensSettings,
     /// From photons to digital numbers.
     pub sensor: SensorSettings,
+    /// Exposure and gain that follow the light. Default: fixed.
+    pub exposure_control: ExposureSettings,
 }
 
 impl Default for RigSettings {
@@ -75,10 +101,17 @@ impl Default for RigSettings {
             pixel_um: 3.75,
             width_px: 1280,
             height_px: 720,
+            principal_u_px: 0.0,
+            principal_v_px: 0.0,
+            distortion: DistortionCoefficients::default(),
+            right: RightEye::default(),
             baseline_mm: 120.0,
             line_time_us: 22.2,
+            read_out: ReadOut::Down,
             exposure_us: 30.0,
             pairs_per_s: 30.0,
+            trigger_offset_us: 0.0,
+            frame_jitter_us: 0.0,
             forward_m: -0.5,
             lateral_m: 1.0,
             height_m: 1.7,
@@ -87,8 +120,31 @@ impl Default for RigSettings {
             calibration_error: RigError::default(),
             lens: LensSettings::default(),
             sensor: SensorSettings::default(),
+            exposure_control: ExposureSettings::default(),
         }
     }
+}
+
+/// By how much the right eye differs from the left, as the calibration sheet has it: its value less
+/// the left eye's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RightEye {
+    /// Focal length, mm. Default 0.
+    pub focal_length_mm: f64,
+    /// Principal point, px to the right. Default 0.
+    pub principal_u_px: f64,
+    /// Principal point, px down. Default 0.
+    pub principal_v_px: f64,
+    /// Coefficients of distortion. Default 0.
+    pub distortion: DistortionCoefficients,
+    /// Turn of its optical axis in the left eye's frame, deg, to the left: positive where the eyes
+    /// converge. Default 0.
+    pub yaw_deg: f64,
+    /// Tilt of its optical axis in the left eye's frame, deg, up positive. Default 0.
+    pub pitch_deg: f64,
+    /// Turn about its optical axis, deg, clockwise as it looks. Default 0.
+    pub roll_deg: f64,
 }
 
 /// What a calibration got wrong: the true value less the calibrated one.
@@ -97,23 +153,38 @@ impl Default for RigSettings {
 pub struct RigError {
     /// Focal length, mm. Default 0.
     pub focal_length_mm: f64,
+    /// Principal point of both eyes, px to the right. Default 0.
+    pub principal_u_px: f64,
+    /// Principal point of both eyes, px down. Default 0.
+    pub principal_v_px: f64,
+    /// Distortion of r^2 of both lenses. Default 0.
+    pub k1: f64,
+    /// Line time, us. Default 0.
+    pub line_time_us: f64,
+    /// How much later the right eye is triggered than its frames say, us. Default 0.
+    pub trigger_offset_us: f64,
     /// Baseline, mm. Default 0.
     pub baseline_mm: f64,
     /// Yaw, deg. Default 0.
     pub yaw_deg: f64,
     /// Pitch, deg. Default 0.
     pub pitch_deg: f64,
-    /// Yaw of the right eye against the left, deg, positive where the eyes converge. The
-    /// calibration sheet has them parallel. Default 0.
+    /// Yaw of the right eye against the left, deg, positive where the eyes converge more than the
+    /// sheet has it. Default 0.
     pub vergence_deg: f64,
+    /// Pitch of the right eye against the left, deg, up positive. Default 0.
+    pub right_pitch_deg: f64,
+    /// Roll of the right eye against the left, deg, clockwise as it looks. Default 0.
+    pub right_roll_deg: f64,
 }
 
 impl RigSettings {
     /// The calibration sheet, which the stack gets.
     pub fn calibration(&self) -> RigCalibration {
         RigCalibration {
-            camera: self.optics().camera(),
-            baseline_m: self.baseline_mm * 1e-3,
+            left: self.optics().camera(),
+            right: self.right_optics().camera(),
+            left_from_right: self.left_from_right(),
             vehicle_from_left: mounted(
                 Vector3::new(self.forward_m, self.lateral_m, self.height_m),
                 self.yaw_deg.to_radians(),
@@ -124,59 +195,115 @@ impl RigSettings {
 
     /// The rig as it really is, through which the world is drawn.
     pub fn actual(&self) -> RigCalibration {
+        self.as_built().calibration()
+    }
+
+    /// By how much later than the left eye the right one is triggered, as the sheet has it.
+    pub fn trigger_offset_s(&self) -> f64 {
+        1e-6 * self.trigger_offset_us
+    }
+
+    /// From the start that a pair says to the closing of its last row, at the latest.
+    pub fn pair_span_s(&self) -> f64 {
+        let camera = self.optics().camera();
+        camera.shutter.frame_span_s(self.height_px)
+            + self.trigger_offset_s().max(0.0)
+            + most_jitter_s(self.frame_jitter_us)
+    }
+
+    /// These settings with their errors of calibration put into the values.
+    pub fn as_built(&self) -> Self {
         let error = self.calibration_error;
         Self {
             focal_length_mm: self.focal_length_mm + error.focal_length_mm,
+            principal_u_px: self.principal_u_px + error.principal_u_px,
+            principal_v_px: self.principal_v_px + error.principal_v_px,
+            distortion: DistortionCoefficients {
+                k1: self.distortion.k1 + error.k1,
+                ..self.distortion
+            },
+            line_time_us: self.line_time_us + error.line_time_us,
+            trigger_offset_us: self.trigger_offset_us + error.trigger_offset_us,
             baseline_mm: self.baseline_mm + error.baseline_mm,
             yaw_deg: self.yaw_deg + error.yaw_deg,
             pitch_deg: self.pitch_deg + error.pitch_deg,
+            right: RightEye {
+                yaw_deg: self.right.yaw_deg + error.vergence_deg,
+                pitch_deg: self.right.pitch_deg + error.right_pitch_deg,
+                roll_deg: self.right.roll_deg + error.right_roll_deg,
+                ..self.right
+            },
+            calibration_error: RigError::default(),
             ..self.clone()
         }
-        .calibration()
     }
 
-    /// Where the right eye really is, in the left eye's frame (x right, y down, z ahead). The
-    /// calibration has it at `baseline_m` on the x axis and parallel.
-    pub fn left_from_right(&self) -> Isometry3<f64> {
-        let to_the_left = -self.calibration_error.vergence_deg.to_radians();
+    /// Where the right eye is, in the left eye's frame (x right, y down, z ahead).
+    fn left_from_right(&self) -> Isometry3<f64> {
+        let turn = |axis: &Unit<Vector3<f64>>, deg: f64| {
+            UnitQuaternion::from_axis_angle(axis, deg.to_radians())
+        };
+        let eye = &self.right;
         Isometry3::from_parts(
-            Translation3::new(self.actual().baseline_m, 0.0, 0.0),
-            UnitQuaternion::from_axis_angle(&Vector3::y_axis(), to_the_left),
+            Translation3::new(1e-3 * self.baseline_mm, 0.0, 0.0),
+            turn(&Vector3::y_axis(), -eye.yaw_deg)
+                * turn(&Vector3::x_axis(), eye.pitch_deg)
+                * turn(&Vector3::z_axis(), eye.roll_deg),
         )
     }
 
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.right
+            .check(&format!("{at}.right"), &self.optics(), problems);
         self.lens.check(&format!("{at}.lens"), problems);
+        let frame_us = 1e6 / self.pairs_per_s;
+        let control = format!("{at}.exposure_control");
+        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
+        check_jitter(at, self.frame_jitter_us, self.pairs_per_s, problems);
         let mut check = Checker::new(at, problems);
+        let offset_us = self.trigger_offset_us;
+        check.within("trigger_offset_us", offset_us, MOST_OFFSET_US, "us");
         check.within("forward_m", self.forward_m, -5.0..=5.0, "m");
         check.within("lateral_m", self.lateral_m, -2.0..=2.0, "m");
         check.within("yaw_deg", self.yaw_deg, -180.0..=180.0, "deg");
         check.within("pitch_deg", self.pitch_deg, -89.0..=89.0, "deg");
+        self.check_errors(&format!("{at}.calibration_error"), problems);
+    }
+
+    fn check_errors(&self, at: &str, problems: &mut Vec<Problem>) {
         let error = self.calibration_error;
-        let at = format!("{at}.calibration_error");
+        let mut check = Checker::new(at, problems);
+        let mut within = |key: &str, value: f64, unit: &str, most: f64| {
+            check.within(key, value, -most..=most, unit);
+        };
         let half_focal = 0.5 * self.focal_length_mm.abs();
+        let half_line = 0.5 * self.line_time_us.abs();
         let half_baseline = 0.5 * self.baseline_mm.abs();
-        let mut check = Checker::new(&at, problems);
-        check.within(
-            "focal_length_mm",
-            error.focal_length_mm,
-            -half_focal..=half_focal,
-            "mm",
-        );
-        check.within(
-            "baseline_mm",
-            error.baseline_mm,
-            -half_baseline..=half_baseline,
-            "mm",
-        );
-        check.within("yaw_deg", error.yaw_deg, -45.0..=45.0, "deg");
-        check.within("pitch_deg", error.pitch_deg, -45.0..=45.0, "deg");
-        check.within("vergence_deg", error.vergence_deg, -5.0..=5.0, "deg");
+        within("focal_length_mm", error.focal_length_mm, "mm", half_focal);
+        within("principal_u_px", error.principal_u_px, "px", 100.0);
+        within("principal_v_px", error.principal_v_px, "px", 100.0);
+        within("k1", error.k1, "", 1.0);
+        within("line_time_us", error.line_time_us, "us", half_line);
+        let most_us = *MOST_OFFSET_US.end();
+        within("trigger_offset_us", error.trigger_offset_us, "us", most_us);
+        within("baseline_mm", error.baseline_mm, "mm", half_baseline);
+        within("yaw_deg", error.yaw_deg, "deg", 45.0);
+        within("pitch_deg", error.pitch_deg, "deg", 45.0);
+        within("vergence_deg", error.vergence_deg, "deg", 5.0);
+        within("right_pitch_deg", error.right_pitch_deg, "deg", 5.0);
+        within("right_roll_deg", error.right_roll_deg, "deg", 5.0);
+        let actual = self.as_built();
+        let left = actual.optics();
+        left.check_actual(&self.optics(), at, problems);
+    }
+
+    fn right_optics(&self) -> Optics {
+        self.right.optics(&self.optics())
     }
 
     fn optics(&self) -> Optics {
@@ -185,11 +312,58 @@ impl RigSettings {
             pixel_um: self.pixel_um,
             width_px: self.width_px,
             height_px: self.height_px,
+            principal_px: [self.principal_u_px, self.principal_v_px],
+            distortion: self.distortion,
+            read_out: self.read_out,
             line_time_us: self.line_time_us,
             exposure_us: self.exposure_us,
             frames_per_s: self.pairs_per_s,
             rate_key: "pairs_per_s",
         }
+    }
+}
+
+/// Further apart two triggers are not one pair's.
+const MOST_OFFSET_US: std::ops::RangeInclusive<f64> = -10_000.0..=10_000.0;
+
+impl RightEye {
+    /// The right eye, where the left one is `left`.
+    fn optics(&self, left: &Optics) -> Optics {
+        let (own, left_lens) = (self.distortion, left.distortion);
+        Optics {
+            focal_length_mm: left.focal_length_mm + self.focal_length_mm,
+            principal_px: [
+                left.principal_px[0] + self.principal_u_px,
+                left.principal_px[1] + self.principal_v_px,
+            ],
+            distortion: DistortionCoefficients {
+                k1: left_lens.k1 + own.k1,
+                k2: left_lens.k2 + own.k2,
+                k3: left_lens.k3 + own.k3,
+                p1: left_lens.p1 + own.p1,
+                p2: left_lens.p2 + own.p2,
+            },
+            ..*left
+        }
+    }
+
+    fn check(&self, at: &str, left: &Optics, problems: &mut Vec<Problem>) {
+        let half_focal = 0.5 * left.focal_length_mm.abs();
+        let mut check = Checker::new(at, problems);
+        check.within(
+            "focal_length_mm",
+            self.focal_length_mm,
+            -half_focal..=half_focal,
+            "mm",
+        );
+        for (key, value) in [
+            ("yaw_deg", self.yaw_deg),
+            ("pitch_deg", self.pitch_deg),
+            ("roll_deg", self.roll_deg),
+        ] {
+            check.within(key, value, -20.0..=20.0, "deg");
+        }
+        self.optics(left).check_lens(at, problems);
     }
 }
 
@@ -254,18 +428,15 @@ fn sees(
     let world_from_left = tunnel.alignment.at(head_m).world_from_rails() * rig.vehicle_from_left;
     let left_from_world = world_from_left.inverse();
     let towards = Point3::from(world_from_left.translation.vector) - lamp.centre;
-    let camera = &rig.camera.intrinsics;
-    let inside = |p: Point3<f64>| {
-        p.z > 0.1
-            && camera.project(&p).is_some_and(|uv| {
-                (0.0..=f64::from(camera.width_px) - 1.0).contains(&uv.x)
-                    && (0.0..=f64::from(camera.height_px) - 1.0).contains(&uv.y)
-            })
+    let right_from_left = rig.left_from_right.inverse();
+    let inside = |eye: &CameraModel, p: Point3<f64>| {
+        let lens = &eye.intrinsics;
+        p.z > 0.1 && lens.project(&p).is_some_and(|pixel| lens.contains(&pixel))
     };
     towards.dot(&lamp.facing) > 0.0
         && rim.iter().all(|p| {
             let left = left_from_world * p;
-            inside(left) && inside(left - Vector3::new(rig.baseline_m, 0.0, 0.0))
+            inside(&rig.left, left) && inside(&rig.right, right_from_left * left)
         })
 }
 
@@ -322,13 +493,32 @@ mod tests {
         }
     }
 
-    /// The error belongs to the rig as built, not to its calibration sheet.
+    /// The errors belong to the rig as built, not to its calibration sheet.
     #[test]
     fn calibration_error_moves_the_actual_rig_only() {
-        let mut rig = RigSettings::default();
-        rig.calibration_error.baseline_mm = 1.0;
-        assert!((rig.calibration().baseline_m - 0.120).abs() < 1e-12);
-        assert!((rig.actual().baseline_m - 0.121).abs() < 1e-12);
+        let exact = RigSettings::default().calibration();
+        let rig = RigSettings {
+            calibration_error: RigError {
+                baseline_mm: 1.0,
+                k1: 0.01,
+                principal_u_px: 2.0,
+                line_time_us: 0.1,
+                right_roll_deg: 0.2,
+                ..RigError::default()
+            },
+            ..RigSettings::default()
+        };
+        assert_eq!(rig.calibration(), exact);
+        let actual = rig.actual();
+        assert!((actual.baseline_m() - 0.121).abs() < 1e-12);
+        for eye in [actual.left, actual.right] {
+            let k1 = eye.intrinsics.distortion.coefficients().k1;
+            assert!((k1 - 0.01).abs() < 1e-12);
+            assert!((eye.intrinsics.cx_px - exact.left.intrinsics.cx_px - 2.0).abs() < 1e-12);
+            assert!((eye.shutter.line_time_s - 22.3e-6).abs() < 1e-12);
+        }
+        let turned = actual.left_from_right.rotation.angle();
+        assert!((turned - 0.2_f64.to_radians()).abs() < 1e-12);
     }
 
     /// Eyes that converge see a smaller disparity, by f (1 + x^2) times the angle with x = (u -
@@ -339,7 +529,7 @@ mod tests {
         let lamp = Point3::new(4.0, 2.0, 8.0);
         let camera = rig.optics().camera().intrinsics;
         let right_u_px = |rig: &RigSettings| {
-            let seen = rig.left_from_right().inverse() * lamp;
+            let seen = rig.actual().left_from_right.inverse() * lamp;
             camera.project(&seen).unwrap().x
         };
         let parallel = right_u_px(&rig);
@@ -348,5 +538,135 @@ mod tests {
         let x: f64 = 3.88 / 8.0;
         let off_px = camera.fx_px * (1.0 + x * x) * 0.01_f64.to_radians();
         assert!((right_u_px(&rig) - parallel - off_px).abs() < 1e-4);
+    }
+
+    /// A right eye that is pitched up sees things lower, one rolled clockwise sees what is right of
+    /// its axis higher: wrong signs, axes exchanged.
+    #[test]
+    fn the_right_eye_turns_as_it_says() {
+        let seen = |right: RightEye, x: f64| {
+            let rig = RigSettings {
+                right,
+                ..RigSettings::default()
+            };
+            rig.left_from_right().rotation.inverse() * Vector3::new(x, 0.0, 1.0)
+        };
+        let eye = RightEye::default();
+        let up = RightEye {
+            pitch_deg: 1.0,
+            ..eye
+        };
+        assert!((seen(up, 0.0).y - 1_f64.to_radians().sin()).abs() < 1e-12);
+        let clockwise = RightEye {
+            roll_deg: 1.0,
+            ..eye
+        };
+        assert!((seen(clockwise, 0.5).y + 0.5 * 1_f64.to_radians().sin()).abs() < 1e-12);
+        let left = RightEye {
+            yaw_deg: 1.0,
+            ..eye
+        };
+        assert!((seen(left, 0.0).x - 1_f64.to_radians().sin()).abs() < 1e-12);
+    }
+
+    fn problems(text: &str) -> Vec<Problem> {
+        let rig: RigSettings = toml::from_str(text).unwrap();
+        let mut problems = Vec::new();
+        rig.check("rig", &mut problems);
+        problems
+    }
+
+    /// Each thing that no camera can be is refused where it is said, with the numbers; what is
+    /// just about possible is not.
+    #[test]
+    fn impossible_cameras_are_refused() {
+        for (text, key, what) in [
+            (
+                "focal_length_mm = 0.0",
+                "focal_length_mm",
+                "0 mm is not greater than 0",
+            ),
+            (
+                "exposure_us = 40000.0",
+                "exposure_us",
+                "an exposure of 40000 us is longer than the frame, 33333 us at 30 pairs_per_s",
+            ),
+            (
+                "height_px = 1600",
+                "height_px",
+                "1600 rows of 22.2 us take 35528 us, but a frame lasts 33333 us at 30 pairs_per_s",
+            ),
+            (
+                "principal_u_px = 700.0",
+                "principal_u_px",
+                "700 px is out of range",
+            ),
+            (
+                "distortion = { k1 = -0.6 }",
+                "distortion",
+                "it turns back at r = 0.707 (35.3 deg off the axis), which is seen 515 px from the \
+                 principal point, inside the picture: pixel (1279, 719) is 734 px from it",
+            ),
+            (
+                "distortion = { p1 = 1.0 }",
+                "distortion.p1",
+                "1 is out of range",
+            ),
+            (
+                "right = { distortion = { k1 = -0.6 } }",
+                "right.distortion",
+                "it turns back at r = 0.707",
+            ),
+            (
+                "right = { focal_length_mm = -3.9 }",
+                "right.focal_length_mm",
+                "-3.9 mm",
+            ),
+            (
+                "right = { yaw_deg = 30.0 }",
+                "right.yaw_deg",
+                "30 deg is out of range",
+            ),
+            (
+                "trigger_offset_us = 20000.0",
+                "trigger_offset_us",
+                "20000 us is out of range",
+            ),
+            (
+                "frame_jitter_us = 5000.0",
+                "frame_jitter_us",
+                "5000 us is out of range",
+            ),
+            (
+                "frame_jitter_us = -1.0",
+                "frame_jitter_us",
+                "-1 us is out of range",
+            ),
+            (
+                "calibration_error = { k1 = -0.6 }",
+                "calibration_error",
+                "it turns back",
+            ),
+            (
+                "height_px = 1490\ncalibration_error = { line_time_us = 1.0 }",
+                "calibration_error.line_time_us",
+                "the line time is really 23.2 us, in which 1490 rows take 34575 us",
+            ),
+        ] {
+            let found = problems(text);
+            let said = |p: &Problem| {
+                p.key == format!("rig.{key}") && p.what.starts_with(what) && !p.remedy.is_empty()
+            };
+            assert!(found.iter().any(said), "{text}: {found:?}");
+        }
+        for fine in [
+            "",
+            "line_time_us = 0.0",
+            "read_out = \"up\"\ntrigger_offset_us = -500.0\nframe_jitter_us = 20.0",
+            "focal_length_mm = 2.93\ndistortion = { k1 = -0.283, k2 = 0.074, p1 = 2e-4 }",
+            "right = { roll_deg = -0.5, principal_v_px = 12.0, distortion = { k1 = 0.01 } }",
+        ] {
+            assert_eq!(problems(fine), [], "{fine}");
+        }
     }
 }

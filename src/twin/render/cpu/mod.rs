@@ -25,7 +25,7 @@
 //!    air;
 //! 3. lamp discs, by rays spread over the pixel and the lens's point spread in many instants;
 //! 4. the glare of each lamp;
-//! 5. grey level, noise, rounding.
+//! 5. the sensor: fixed pattern, noise, bits ([`sensor`](super::sensor)).
 //!
 //! Where something moves in the picture by more than a pixel while a row is exposed, the exposure
 //! is cut into slices in which nothing does, and all this is done in each of them;
@@ -38,22 +38,32 @@
 //! the tunnel is dark.
 
 mod dim;
+mod extent;
+pub mod labels;
 mod lamps;
 mod look;
 mod outline;
 mod sensor;
 mod shadow;
+mod sight;
 mod smear;
 mod solid;
 mod spread;
 mod tunnel;
 
+pub use extent::{Whole, whole};
+pub use labels::{Labeller, Labels, Surface};
+pub use sight::{Seen, Sight};
 pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
 use super::light::{LampField, headlights_lx};
 use super::paint::Paintings;
-use super::{Air, Backend, Job, LampLight, LampsInTime, RenderError, Renderer, Scene, View};
+use super::pixel_map::{MapCache, MapKey, PixelMap};
+use super::upper_bits;
+use super::{
+    Air, Backend, Job, LampLight, LampsInTime, RawImage, RenderError, Renderer, Scene, View,
+};
 use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
@@ -61,6 +71,7 @@ use image::GrayImage;
 use lamps::{Haze, RowExposure, SeenLamp};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
+use sensor::Sensor;
 use shadow::{Blocker, Shades};
 use spread::Spread;
 use std::collections::VecDeque;
@@ -81,7 +92,15 @@ pub struct CpuRenderer {
     /// Of a row's exposure, where they are given.
     slices: Option<usize>,
     kept: VecDeque<KeptView>,
-    drawn: VecDeque<Vec<GrayImage>>,
+    maps: MapCache<Arc<PixelMap>>,
+    drawn: VecDeque<Drawn>,
+}
+
+/// A job that is done.
+struct Drawn {
+    raw: bool,
+    /// With the bits that an image of eight does not have.
+    images: Vec<(RawImage, u32)>,
 }
 
 /// What stands still.
@@ -185,16 +204,21 @@ impl CpuRenderer {
             lamps: LampsInTime::new(&scene.lamps),
             every_ray,
             kept: VecDeque::new(),
+            maps: MapCache::default(),
             drawn: VecDeque::new(),
         }
     }
 
-    /// Draws one view of a job.
+    /// Draws one view of a job, in eight bits.
     pub fn draw(&mut self, job: &Job, view: &View) -> GrayImage {
+        upper_bits(&self.draw_raw(job, view), view.sensor.spare_bits())
+    }
+
+    /// Draws one view of a job, in all bits.
+    pub fn draw_raw(&mut self, job: &Job, view: &View) -> RawImage {
         let camera = &view.camera.intrinsics;
-        let mut image = GrayImage::new(camera.width_px, camera.height_px);
         let Some(&pose) = view.motion.poses.first() else {
-            return image;
+            return RawImage::new(camera.width_px, camera.height_px);
         };
         let still = view.motion.poses.len() == 1;
         let kept = still.then(|| self.keep(&view.camera, pose));
@@ -209,32 +233,35 @@ impl CpuRenderer {
         };
         let slices = self.slices.unwrap_or_else(|| smear::slices(job, view));
         let spread = Spread::new(view.lens.blur_px);
+        let pixels = camera.width_px as usize * camera.height_px as usize;
+        let mut signals_e = vec![0.0; pixels];
+        let electrons = view.electrons_per_cd_m2() / slices as f64;
         // An image without pixels has no rows.
-        image
+        signals_e
             .par_chunks_mut((camera.width_px as usize).max(1))
             .enumerate()
-            .for_each_init(RowBuffers::default, |buffers, (v, pixels)| {
-                buffers.sums.clear();
-                buffers.sums.resize(pixels.len(), 0.0);
+            .for_each_init(RowBuffers::default, |buffers, (v, signals_e)| {
                 for k in 0..slices {
                     let row = RowExposure::slice(view, v, k, slices);
                     let rays = RowRays::new(&self.world, &scenery, view, &row, behind);
                     rays.draw(&lamps, &spread, buffers);
-                    let RowBuffers {
-                        sums, luminances, ..
-                    } = &mut *buffers;
-                    for (sum, luminance) in sums.iter_mut().zip(luminances) {
-                        *sum += *luminance / slices as f64;
+                    for (signal_e, luminance) in signals_e.iter_mut().zip(&buffers.luminances) {
+                        *signal_e += electrons * luminance;
                     }
                 }
-                sensor::expose(view, v, &buffers.sums, pixels);
             });
-        image
+        let map = (self.maps).get(MapKey::new(view), Arc::new);
+        let sensor = Sensor {
+            view,
+            map: &map,
+            signals_e: &signals_e,
+        };
+        sensor.develop()
     }
 
     /// Index of the kept view of a still camera, drawn now if it is new.
     fn keep(&mut self, camera: &CameraModel, pose: Isometry3<f64>) -> usize {
-        let same = |k: &KeptView| k.camera == *camera && k.pose == pose;
+        let same = |k: &KeptView| k.camera.intrinsics == camera.intrinsics && k.pose == pose;
         if let Some(k) = self.kept.iter().position(same) {
             return k;
         }
@@ -263,13 +290,28 @@ impl Renderer for CpuRenderer {
             self.world.lamps = LampField::new(&lamps).in_air(self.world.air);
             self.kept.clear();
         }
-        let images = job.views.iter().map(|view| self.draw(job, view)).collect();
-        self.drawn.push_back(images);
+        let views = job.views.iter();
+        let images = views.map(|view| (self.draw_raw(job, view), view.sensor.spare_bits()));
+        let images = images.collect();
+        self.drawn.push_back(Drawn {
+            raw: job.raw,
+            images,
+        });
         Ok(())
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
-        self.drawn.pop_front().ok_or(RenderError::NothingSubmitted)
+        let job = (self.drawn.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        let images = job.images.iter();
+        Ok(images.map(|(raw, spare)| upper_bits(raw, *spare)).collect())
+    }
+
+    fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
+        if self.drawn.front().is_some_and(|job| !job.raw) {
+            return Err(RenderError::NotRaw);
+        }
+        let job = (self.drawn.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        Ok(job.images.into_iter().map(|(raw, _)| raw).collect())
     }
 }
 

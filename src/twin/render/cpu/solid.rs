@@ -54,6 +54,11 @@ impl<'a> Solid<'a> {
         Some((t, self.world_from_body * n))
     }
 
+    /// A place of the world in the body's own axes.
+    pub fn in_body(&self, place: &Point3<f64>) -> Point3<f64> {
+        self.world_from_body.inverse_transform_point(place)
+    }
+
     /// Corners of a box around it, in the world.
     pub fn corners(&self) -> [Point3<f64>; 8] {
         let half = self.body.shape.half_extents_m();

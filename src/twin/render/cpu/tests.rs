@@ -96,6 +96,10 @@ fn view(intrinsics: Intrinsics) -> View {
         },
         sensor: SensorSettings {
             noise: false,
+            prnu: 0.0,
+            dsnu_e: 0.0,
+            dark_current_e_per_s: 0.0,
+            hot_pixel_share: 0.0,
             ..SensorSettings::default()
         },
         noise: NoiseKey {
@@ -323,7 +327,11 @@ fn rows_see_moving_bodies_where_they_are_by_then() {
 fn noise_has_the_mean_and_variance_of_the_sensor() {
     let mut view = view(Intrinsics::centred(300, 200, 300.0));
     view.sensor.noise = true;
-    view.set_gain_for(1.0, 1e5 * view.camera.shutter.exposure_s);
+    // Noise of more than a grey level, and room for it on both sides.
+    view.camera.shutter.exposure_s = 0.1;
+    view.sensor.read_noise_e = 60.0;
+    view.sensor.black_level_grey = 20.0;
+    view.set_gain_for(60.0, 180.0);
     for luminance in [0.0, 5.0, 60.0] {
         let job = Job {
             time: view.start,

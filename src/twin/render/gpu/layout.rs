@@ -94,14 +94,28 @@ pub struct View {
     pub pose_step_s: f32,
     /// Index of the last pose.
     pub pose_last: f32,
+    /// Digital numbers an electron in the pixels of a 2 x 2 cell, row by row.
+    pub dn_per_e: [f32; 4],
     /// Signal of 1 cd/m^2, electrons.
     pub electrons_per_cd_m2: f32,
-    /// Grey level of darkness.
-    pub black_grey: f32,
-    /// Grey levels an electron.
-    pub grey_per_e: f32,
-    /// Square of the read noise in electrons.
-    pub read_variance_e2: f32,
+    /// Digital number of darkness.
+    pub black_dn: f32,
+    /// Largest digital number.
+    pub white_dn: f32,
+    /// Grey levels of 255 a digital number.
+    pub grey_per_dn: f32,
+    /// Read noise.
+    pub read_noise_e: f32,
+    /// Most electrons that a pixel holds.
+    pub full_well_e: f32,
+    /// Share of what is over it that spills up and down.
+    pub blooming: f32,
+    /// Electrons in the dark.
+    pub dark_e: f32,
+    /// Electrons a step of a pixel's level.
+    pub level_step_e: f32,
+    /// The same in a hot pixel.
+    pub hot_step_e: f32,
     /// Whether to draw noise.
     pub noise: u32,
     /// Frame number of the noise.
@@ -110,10 +124,10 @@ pub struct View {
     pub halo_px: f32,
     /// Signals are clamped at this many electrons.
     pub saturation_e: f32,
-    /// k1, k2, k3 and the square of the reach of the lens's distortion.
-    pub radial: [f32; 4],
-    /// p1, p2.
+    /// p1, p2 of the lens's distortion.
     pub tangential: [f32; 2],
+    /// k1, k2, k3 and the square of its reach.
+    pub radial: [f32; 4],
     /// Place of row 0 in the table of poses.
     pub pose_middle: f32,
     /// Share of light that the air takes on a metre.
@@ -122,8 +136,6 @@ pub struct View {
     pub airlight_e: f32,
     /// Standard deviation of the point spread.
     pub blur_px: f32,
-    /// Fills up to the alignment of what follows.
-    pub unused: [f32; 2],
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }

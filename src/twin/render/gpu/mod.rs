@@ -23,7 +23,7 @@
 //!    closed form along the row and is summed over a few lines across it, at each of the instants
 //!    of the row's exposure; where the disc is and how bright in each comes from double precision.
 //!    The glare is summed up in a texture of its own, a texel for every fourth pixel.
-//! 3. *Sensor.* Glare is added; shot and read noise, 8 bits.
+//! 3. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
@@ -53,8 +53,9 @@ pub use pipeline::shader_source;
 
 use super::light::LampField;
 use super::paint::Paintings;
+use super::pixel_map::{MapCache, MapKey};
 use super::scene::{Body, Job, LampsInTime, Scene, View};
-use super::{Backend, RenderError, Renderer};
+use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::SimTime;
 use adapter::Gpu;
 use chunks::Chunks;
@@ -64,7 +65,7 @@ use lamps::{Around, LampTable};
 use layout::Pose;
 use mesh::Mesh;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
-use pipeline::Pipelines;
+use pipeline::{Develop, Pipelines};
 use sight::{Sight, World};
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
@@ -82,6 +83,7 @@ pub struct GpuRenderer {
     paintings: Paintings,
     textures: Textures,
     bodies: BodyBuffers,
+    maps: MapCache<wgpu::Buffer>,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
     glares: Vec<GlareTarget>,
@@ -91,7 +93,10 @@ pub struct GpuRenderer {
 }
 
 struct InFlight {
+    raw: bool,
     images: Vec<ReadBack>,
+    /// Of each view's sensor.
+    spare_bits: Vec<u32>,
     submission: wgpu::SubmissionIndex,
 }
 
@@ -120,6 +125,7 @@ impl GpuRenderer {
             paintings,
             scene,
             bodies: BodyBuffers::new(&gpu),
+            maps: MapCache::default(),
             views: Vec::new(),
             targets: Vec::new(),
             glares: Vec::new(),
@@ -167,9 +173,9 @@ impl GpuRenderer {
             self.glares.push(GlareTarget::new(&gpu.device, size_px));
         }
         let glare = self.glares.iter().find(|g| g.size_px == size_px);
-        let back = match self.spare.iter().position(|b| b.fits(size_px)) {
+        let back = match self.spare.iter().position(|b| b.fits(size_px, job.raw)) {
             Some(at) => self.spare.swap_remove(at),
-            None => ReadBack::new(&gpu.device, size_px),
+            None => ReadBack::new(&gpu.device, size_px, job.raw),
         };
         let target = self.targets.iter().find(|t| t.size_px == size_px);
         if let (Some(target), Some(glare)) = (target, glare) {
@@ -189,7 +195,17 @@ impl GpuRenderer {
             let pipelines = &self.pipelines;
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_glare(gpu, pipelines, encoder, glare);
-            buffers.draw_sensor(gpu, pipelines, encoder, (target, glare));
+            let map = MapKey::new(framed.view);
+            let map = (self.maps).get(map, |map| target::map_buffer(gpu, &map));
+            let develop = Develop {
+                raw: job.raw,
+                blooming: framed.view.sensor.blooming > 0.0,
+            };
+            let sensor = self.pipelines.sensor(&gpu.device, develop);
+            target.copy_signal(encoder);
+            let read = [&target.signal_words, &map];
+            let finished = target.finished(job.raw);
+            buffers.draw_sensor(gpu, sensor, encoder, (&glare.texture, read), finished);
             target.copy_to(encoder, &back);
         }
         back
@@ -241,6 +257,24 @@ fn px_per_m(view: &View, body: &Body) -> f64 {
     view.camera.intrinsics.fx_px / near_m
 }
 
+impl GpuRenderer {
+    fn finish_oldest(&mut self) -> Result<InFlight, RenderError> {
+        let job = self
+            .in_flight
+            .pop_front()
+            .ok_or(RenderError::NothingSubmitted)?;
+        self.gpu
+            .device
+            .poll(wgpu::PollType::Wait {
+                submission_index: Some(job.submission.clone()),
+                timeout: None,
+            })
+            .map_err(|e| RenderError::Device(e.to_string()))?;
+        self.gpu.check()?;
+        Ok(job)
+    }
+}
+
 impl Renderer for GpuRenderer {
     fn backend(&self) -> Backend {
         self.gpu.backend.clone()
@@ -261,24 +295,30 @@ impl Renderer for GpuRenderer {
         for image in &images {
             image.request();
         }
-        self.in_flight.push_back(InFlight { images, submission });
+        let spare_bits = job.views.iter().map(|v| v.sensor.spare_bits());
+        self.in_flight.push_back(InFlight {
+            raw: job.raw,
+            images,
+            spare_bits: spare_bits.collect(),
+            submission,
+        });
         self.gpu.check()
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
-        let job = self
-            .in_flight
-            .pop_front()
-            .ok_or(RenderError::NothingSubmitted)?;
-        self.gpu
-            .device
-            .poll(wgpu::PollType::Wait {
-                submission_index: Some(job.submission),
-                timeout: None,
-            })
-            .map_err(|e| RenderError::Device(e.to_string()))?;
-        self.gpu.check()?;
-        let images = job.images.iter().map(ReadBack::image).collect();
+        let job = self.finish_oldest()?;
+        let images = job.images.iter().zip(&job.spare_bits);
+        let images = images.map(|(back, spare)| back.image(*spare)).collect();
+        self.spare.extend(job.images);
+        images
+    }
+
+    fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
+        if self.in_flight.front().is_some_and(|job| !job.raw) {
+            return Err(RenderError::NotRaw);
+        }
+        let job = self.finish_oldest()?;
+        let images = job.images.iter().map(ReadBack::raw_image).collect();
         self.spare.extend(job.images);
         images
     }

@@ -304,26 +304,28 @@ impl ViewBuffers {
         pass.draw(0..6, 0..self.glare_count);
     }
 
-    /// Noise and eight bits.
+    /// Fixed pattern, noise and bits.
     pub fn draw_sensor(
         &self,
         gpu: &Gpu,
-        pipelines: &Pipelines,
+        pipeline: &wgpu::RenderPipeline,
         encoder: &mut wgpu::CommandEncoder,
-        (target, glare): (&Target, &GlareTarget),
+        (glare, [signal, map]): (&wgpu::TextureView, [&wgpu::Buffer; 2]),
+        finished: &wgpu::TextureView,
     ) {
         let group = bind(
             &gpu.device,
-            &pipelines.sensor,
+            pipeline,
             &[
                 self.view.binding(),
-                wgpu::BindingResource::TextureView(&target.signal),
-                wgpu::BindingResource::TextureView(&glare.texture),
+                wgpu::BindingResource::TextureView(glare),
+                signal.as_entire_binding(),
+                map.as_entire_binding(),
             ],
         );
-        let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin(encoder, &target.packed, load, None);
-        pass.set_pipeline(&pipelines.sensor);
+        // Every pixel is written, so nothing needs clearing.
+        let mut pass = begin(encoder, finished, wgpu::LoadOp::Load, None);
+        pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..1);
     }

@@ -1,7 +1,8 @@
 //! Shaders and the four pipelines made of them.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
-use crate::twin::render::surface;
+use crate::twin::render::sensor::BLOOMING_REACH;
+use crate::twin::render::{pixel_map, surface};
 use std::mem::{offset_of, size_of};
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -10,6 +11,9 @@ pub const SIGNAL: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Four grey pixels a texel.
 pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// Four raw pixels a texel.
+pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Name and text of every file in `shaders/`.
 const FILES: [(&str, &str); 6] = [
@@ -28,6 +32,7 @@ const FILES: [(&str, &str); 6] = [
 pub fn shader_source(name: &str) -> Option<String> {
     let (_, text) = FILES.iter().find(|(n, _)| *n == name)?;
     let mut source = surface::wgsl();
+    source.push_str(&pixel_map::wgsl());
     if name != FILES[0].0 {
         source.push_str(FILES[0].1);
     }
@@ -57,8 +62,18 @@ pub struct Pipelines {
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added up.
     pub glare: wgpu::RenderPipeline,
-    /// Noise and quantisation.
-    pub sensor: wgpu::RenderPipeline,
+    /// The sensor, by its [`Develop`], each made when first asked for.
+    sensors: [Option<wgpu::RenderPipeline>; 4],
+    sensor: wgpu::ShaderModule,
+}
+
+/// What the sensor's pass has to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Develop {
+    /// All bits of the converter instead of eight.
+    pub raw: bool,
+    /// Charge over the full well spills.
+    pub blooming: bool,
 }
 
 struct Stage<'a> {
@@ -79,8 +94,7 @@ impl Pipelines {
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (lamps, glare, sensor) = (shader("lamps"), shader("glare"), shader("sensor"));
-        let blend = shader("blend");
+        let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -99,7 +113,8 @@ impl Pipelines {
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over)),
-            sensor: flat(&sensor, ["whole", "develop"], target(PACKED, None)),
+            sensors: [const { None }; 4],
+            sensor: shader("sensor"),
         }
     }
 
@@ -114,6 +129,28 @@ impl Pipelines {
                 lit: make("lit", false),
                 dim: make("dim", false),
             }
+        })
+    }
+
+    /// The pipeline that develops a picture.
+    pub fn sensor(&mut self, device: &wgpu::Device, develop: Develop) -> &wgpu::RenderPipeline {
+        let at = usize::from(develop.raw) + 2 * usize::from(develop.blooming);
+        self.sensors[at].get_or_insert_with(|| {
+            let (entry, format) = if develop.raw {
+                ("develop_raw", RAW)
+            } else {
+                ("develop", PACKED)
+            };
+            let reach = if develop.blooming { BLOOMING_REACH } else { 0 };
+            let stage = Stage {
+                shader: &self.sensor,
+                entries: ["whole", entry],
+                buffers: &[],
+                depth: None,
+                target: target(format, None),
+                constants: &[("BLOOMING_REACH", reach as f64)],
+            };
+            pipeline(device, stage)
         })
     }
 }

@@ -1,7 +1,9 @@
 //! What the passes draw into, and the way back to memory.
 
-use super::pipeline::{DEPTH, PACKED, SIGNAL};
-use crate::twin::render::RenderError;
+use super::adapter::Gpu;
+use super::pipeline::{DEPTH, PACKED, RAW, SIGNAL};
+use crate::twin::render::pixel_map::PixelMap;
+use crate::twin::render::{RawImage, RenderError, upper_bits};
 use image::GrayImage;
 use std::cell::OnceCell;
 
@@ -11,12 +13,21 @@ pub struct Target {
     pub size_px: (u32, u32),
     /// Signal in electrons.
     pub signal: wgpu::TextureView,
+    signal_texture: wgpu::Texture,
+    /// The signal as the sensor's pass reads it, two pixels a word: four fetches from a texture
+    /// cost a software adapter more than the copy.
+    pub signal_words: wgpu::Buffer,
     /// Reversed depth.
     pub depth: wgpu::TextureView,
-    /// The finished image.
-    pub packed: wgpu::TextureView,
-    packed_texture: wgpu::Texture,
     instant: OnceCell<wgpu::TextureView>,
+    /// The finished image, of eight bits and raw.
+    finished: [Finished; 2],
+}
+
+/// A finished image, four pixels a texel.
+struct Finished {
+    view: wgpu::TextureView,
+    texture: wgpu::Texture,
 }
 
 impl Target {
@@ -28,14 +39,29 @@ impl Target {
         };
         let view = |t: &wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
         let read = wgpu::TextureUsages::TEXTURE_BINDING;
-        let packed_texture = texture(packed_width(size_px), PACKED, wgpu::TextureUsages::COPY_SRC);
+        let finished = |format| {
+            let texture = texture(packed_width(size_px), format, wgpu::TextureUsages::COPY_SRC);
+            Finished {
+                view: view(&texture),
+                texture,
+            }
+        };
+        let signal_usage = read | wgpu::TextureUsages::COPY_SRC;
+        let signal_texture = texture(size_px.0, SIGNAL, signal_usage);
+        let signal_words = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("signal"),
+            size: u64::from(signal_stride(size_px)) * u64::from(size_px.1),
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
         Self {
             size_px,
-            signal: view(&texture(size_px.0, SIGNAL, read)),
+            signal: view(&signal_texture),
+            signal_texture,
+            signal_words,
             depth: view(&texture(size_px.0, DEPTH, read)),
-            packed: view(&packed_texture),
-            packed_texture,
             instant: OnceCell::new(),
+            finished: [finished(PACKED), finished(RAW)],
         }
     }
 
@@ -49,19 +75,41 @@ impl Target {
         })
     }
 
+    /// The finished image, raw or not.
+    pub fn finished(&self, raw: bool) -> &wgpu::TextureView {
+        &self.finished[usize::from(raw)].view
+    }
+
+    /// Copies the signal to where the sensor's pass reads it.
+    pub fn copy_signal(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.copy_texture_to_buffer(
+            self.signal_texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &self.signal_words,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(signal_stride(self.size_px)),
+                    rows_per_image: None,
+                },
+            },
+            self.signal_texture.size(),
+        );
+    }
+
     /// Copies the finished image to a buffer.
     pub fn copy_to(&self, encoder: &mut wgpu::CommandEncoder, back: &ReadBack) {
+        let texture = &self.finished[usize::from(back.raw)].texture;
         encoder.copy_texture_to_buffer(
-            self.packed_texture.as_image_copy(),
+            texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &back.buffer,
                 layout: wgpu::TexelCopyBufferLayout {
                     offset: 0,
-                    bytes_per_row: Some(stride(self.size_px)),
+                    bytes_per_row: Some(stride(self.size_px, back.raw)),
                     rows_per_image: None,
                 },
             },
-            self.packed_texture.size(),
+            texture.size(),
         );
     }
 }
@@ -91,24 +139,29 @@ fn texture(
 /// An image on its way back.
 pub struct ReadBack {
     size_px: (u32, u32),
+    raw: bool,
     buffer: wgpu::Buffer,
 }
 
 impl ReadBack {
     /// A buffer for an image.
-    pub fn new(device: &wgpu::Device, size_px: (u32, u32)) -> Self {
+    pub fn new(device: &wgpu::Device, size_px: (u32, u32), raw: bool) -> Self {
         let buffer = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("read-back"),
-            size: u64::from(stride(size_px)) * u64::from(size_px.1),
+            size: u64::from(stride(size_px, raw)) * u64::from(size_px.1),
             usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
             mapped_at_creation: false,
         });
-        Self { size_px, buffer }
+        Self {
+            size_px,
+            raw,
+            buffer,
+        }
     }
 
-    /// Whether it can take an image of that size.
-    pub fn fits(&self, size_px: (u32, u32)) -> bool {
-        self.size_px == size_px
+    /// Whether it can take an image of that size, raw or not.
+    pub fn fits(&self, size_px: (u32, u32), raw: bool) -> bool {
+        self.size_px == size_px && self.raw == raw
     }
 
     /// Asks for access as soon as the copy is done. Whether that went well shows in `image`.
@@ -116,23 +169,64 @@ impl ReadBack {
         self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
-    /// The image, once the adapter is done; gives the buffer free.
-    pub fn image(&self) -> Result<GrayImage, RenderError> {
+    /// The image of eight bits, once the adapter is done; gives the buffer free. Of a raw image
+    /// that has `spare_bits` more, the upper ones.
+    pub fn image(&self, spare_bits: u32) -> Result<GrayImage, RenderError> {
+        if self.raw {
+            return Ok(upper_bits(&self.raw_image()?, spare_bits));
+        }
         let (width, height) = self.size_px;
         let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        self.rows(|row| pixels.extend_from_slice(&row[..width as usize]))?;
+        GrayImage::from_raw(width, height, pixels).ok_or_else(too_short)
+    }
+
+    /// The raw image, for which the buffer was made, once the adapter is done; gives it free.
+    pub fn raw_image(&self) -> Result<RawImage, RenderError> {
+        let (width, height) = self.size_px;
+        let mut pixels = Vec::with_capacity(width as usize * height as usize);
+        self.rows(|row| {
+            let words = row[..2 * width as usize].chunks_exact(2);
+            pixels.extend(words.map(|w| u16::from_le_bytes([w[0], w[1]])));
+        })?;
+        RawImage::from_raw(width, height, pixels).ok_or_else(too_short)
+    }
+
+    fn rows(&self, take: impl FnMut(&[u8])) -> Result<(), RenderError> {
         {
             let bytes = self
                 .buffer
                 .get_mapped_range(..)
                 .map_err(|e| RenderError::Device(e.to_string()))?;
-            for row in bytes.chunks_exact(stride(self.size_px) as usize) {
-                pixels.extend_from_slice(&row[..width as usize]);
-            }
+            bytes
+                .chunks_exact(stride(self.size_px, self.raw) as usize)
+                .for_each(take);
         }
         self.buffer.unmap();
-        GrayImage::from_raw(width, height, pixels)
-            .ok_or_else(|| RenderError::Device("an image came back too short".into()))
+        Ok(())
     }
+}
+
+fn too_short() -> RenderError {
+    RenderError::Device("an image came back too short".into())
+}
+
+/// The words of a camera's pixels, four a texel.
+pub fn map_buffer(gpu: &Gpu, map: &PixelMap) -> wgpu::Buffer {
+    let words: &[u8] = bytemuck::cast_slice(map.words());
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("pixel map"),
+        size: (words.len() as u64).max(16),
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        mapped_at_creation: false,
+    });
+    gpu.queue.write_buffer(&buffer, 0, words);
+    buffer
+}
+
+/// Bytes from row to row of the signal.
+fn signal_stride(size_px: (u32, u32)) -> u32 {
+    (2 * size_px.0).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }
 
 fn packed_width(size_px: (u32, u32)) -> u32 {
@@ -140,6 +234,7 @@ fn packed_width(size_px: (u32, u32)) -> u32 {
 }
 
 /// Bytes from row to row in a buffer that a texture is copied to.
-fn stride(size_px: (u32, u32)) -> u32 {
-    (4 * packed_width(size_px)).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+fn stride(size_px: (u32, u32), raw: bool) -> u32 {
+    let texel = if raw { 8 } else { 4 };
+    (texel * packed_width(size_px)).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
 }

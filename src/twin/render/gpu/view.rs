@@ -2,6 +2,7 @@
 //! the camera's place in mid-frame so that f32 suffices.
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
+use crate::twin::render::pixel_map::Dark;
 use crate::twin::render::scene::{Headlight, Job, View};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -50,7 +51,7 @@ impl<'a> Framed<'a> {
         };
         let step_s = span_s / steps;
         let reference = self.reference().coords;
-        let bent = &lens.distortion;
+        let (bent, reach) = (lens.distortion.coefficients(), lens.distortion.reach());
         poses.clear();
         poses.extend((0..=steps as u32).map(|k| {
             let pose = self
@@ -59,6 +60,7 @@ impl<'a> Framed<'a> {
                 .pose_at(self.view.start.plus(f64::from(k) * step_s));
             relative_pose(&pose, &reference)
         }));
+        let dark = Dark::new(self.view);
         let mut constants = layout::View {
             focal_px: [lens.fx_px as f32, lens.fy_px as f32],
             centre_px: [lens.cx_px as f32, lens.cy_px as f32],
@@ -69,13 +71,20 @@ impl<'a> Framed<'a> {
             pose_step_s: step_s as f32,
             pose_last: steps as f32,
             electrons_per_cd_m2: self.view.electrons_per_cd_m2() as f32,
-            black_grey: sensor.black_level_grey as f32,
-            grey_per_e: sensor.grey_per_e() as f32,
-            read_variance_e2: sensor.read_noise_e.powi(2) as f32,
+            black_dn: sensor.black_dn() as f32,
+            dn_per_e: sensor.cell_dn_per_e().map(|k| k as f32),
+            white_dn: f32::from(sensor.white_dn()),
+            grey_per_dn: 1.0 / f32::from(sensor.dn_per_grey()),
+            read_noise_e: sensor.read_noise_e as f32,
+            full_well_e: sensor.full_well_e as f32,
+            blooming: sensor.blooming as f32,
+            dark_e: dark.base_e as f32,
+            level_step_e: dark.step_e as f32,
+            hot_step_e: dark.hot_step_e as f32,
             noise: u32::from(sensor.noise),
             key: self.view.noise.stream.key,
             frame: self.view.noise.frame,
-            radial: [bent.k1, bent.k2, bent.k3, bent.reach().powi(2)].map(|x| x as f32),
+            radial: [bent.k1, bent.k2, bent.k3, reach.powi(2)].map(|x| x as f32),
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
             extinction_per_m: extinction_per_m as f32,
             airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,

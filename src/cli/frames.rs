@@ -1,0 +1,186 @@
+//! `metrotwin frames`: images with labels, as a data set, from any scenario.
+
+use super::fault::Failure;
+use super::print;
+use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use crate::record::dataset::{self, DataSet, Inputs, Parts, Plan};
+use crate::scenario::{self, Override, Scenario};
+use crate::session::{self, End, RunOptions, Summary};
+use std::path::{Path, PathBuf};
+
+const AFTER: &str = "\
+Into the folder go, for each frame of each camera, the image as the stack gets it, and
+  raw        digital numbers of the converter, 16-bit PNG
+  clean      the same picture without noise, smear and glare
+  depth      metres, float32 .npy; with flow the largest and slowest: 11 MB for 1280 x 720
+  mask       16-bit PNG, the number of the obstacle that a pixel shows
+  flow       pixels to the camera's next frame in the set, float32 .npy
+  rows       rows.parquet: time and pose of every row of every image
+  lamps      lamps.parquet: outline, name, light and code phase of every lamp in view
+  obstacles  obstacles.parquet and coco.json: boxes in the image and in space
+and frames.parquet, README.md (describes every file and column), scenario.toml and meta.json.
+--labels takes some of these words, separated by commas.
+
+The images are those of `metrotwin run` with the same scenario and seed; all that is taken is what
+--every, --from, --to and --limit leave. The scenario runs from its start in any case.
+
+Examples:
+  metrotwin frames scenarios/obstacle_gallery.toml --out out/gallery --every 5
+  metrotwin frames scenarios/line_run.toml --out out/lamps --from 20 --limit 100 --labels lamps,rows
+  metrotwin frames scenarios/line_run.toml --out out/left --cameras left --to 30 --labels clean,depth
+  metrotwin frames scenarios/forgotten_toolbox.toml --out out/day2 --seed 2 --cameras W1530
+
+Ctrl-C ends it cleanly: what has been taken is a whole, smaller set. A second Ctrl-C ends it at once.
+Exit code 0 for a whole set, 1 where the run failed or was broken off, 2 for wrong input.";
+
+/// Images + labels of a scenario as a data set
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(super) struct FramesArgs {
+    /// Scenario file
+    scenario: PathBuf,
+    /// Folder for the data set
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Everything random follows from it [default: the scenario's]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Change a value of the scenario, e.g. rig.width_px=640; may be given again
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
+    /// What draws the images
+    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
+    renderer: RendererArg,
+    /// Take each N-th frame of a camera only
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    every: u32,
+    /// Take frames from this time on
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0)]
+    from: f64,
+    /// Take frames until this time [default: the scenario's end]
+    #[arg(long, value_name = "SECONDS")]
+    to: Option<f64>,
+    /// Take at most N frames of each camera
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    limit: Option<u32>,
+    /// Names of the cameras: left, right, wayside devices [default: all]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    cameras: Vec<String>,
+    /// What to write beside the images: all, none, or words from the list below
+    #[arg(long, value_name = "WORD,...", default_value = "all")]
+    labels: Parts,
+    /// Write into a folder that is not empty; an earlier data set there is removed
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
+    let text = scenario::read(&args.scenario)?;
+    let mut scenario = Scenario::from_text(&args.scenario, &text, &args.overrides)?;
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    let plan = plan(args, &scenario)?;
+    make_room(&args.out, args.force)?;
+
+    stop_on_ctrl_c();
+    let choice = args.renderer.into();
+    let renderer = session::renderer(&scenario, choice).map_err(Failure::run)?;
+    let overrides = args.overrides.iter();
+    let inputs = Inputs {
+        scenario: text,
+        overrides: overrides
+            .map(|o| format!("{}={}", o.key, o.value))
+            .collect(),
+    };
+    let progress = Progress::new(plan.to_s.min(scenario.duration_s));
+    let mut set = DataSet::new(&args.out, &scenario, plan, inputs, renderer, &STOP);
+    let show = |now_s| progress.show(now_s);
+    let options = RunOptions {
+        renderer: choice,
+        stop: Some(&STOP),
+        progress: Some(&show),
+    };
+    let summary = session::run(&scenario, &options, &mut [&mut set]);
+    progress.finish();
+    let summary = summary.map_err(Failure::run)?;
+    print(&closing(&set, &summary, &args.out))?;
+    match summary.end {
+        End::Interrupted if !set.is_complete() => Err(Failure::Run(anyhow::anyhow!(
+            "the run was broken off at {:.1} s; what was taken is kept",
+            summary.simulated_s
+        ))),
+        End::Failed(why) => Err(Failure::Run(anyhow::anyhow!(
+            "the run failed at {:.3} s: {why}; what was taken is kept",
+            summary.simulated_s
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What the arguments ask for, held against what the scenario has.
+fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<Plan, Failure> {
+    let there = DataSet::cameras_of(scenario);
+    if there.is_empty() {
+        return Err(Failure::input(
+            format!("{} has no camera", args.scenario.display()),
+            "give it a [rig] on a [train], or a [[wayside]] device",
+        ));
+    }
+    if let Some(name) = args.cameras.iter().find(|name| !there.contains(name)) {
+        return Err(Failure::input(
+            format!("--cameras {name}: the scenario has no such camera"),
+            format!("give some of: {}", there.join(", ")),
+        ));
+    }
+    let to_s = args.to.unwrap_or(f64::INFINITY);
+    let begins = args.from >= 0.0 && args.from < scenario.duration_s;
+    if !begins || to_s < args.from {
+        return Err(Failure::input(
+            format!(
+                "--from {} --to {to_s}: no frame of the scenario, which lasts {} s, is between them",
+                args.from, scenario.duration_s
+            ),
+            "give seconds since the scenario's start, the earlier one as --from",
+        ));
+    }
+    Ok(Plan {
+        every: args.every,
+        from_s: args.from,
+        to_s,
+        limit: args.limit,
+        cameras: args.cameras.clone(),
+        parts: args.labels.clone(),
+    })
+}
+
+/// An empty folder, or one that the user allows to be written into.
+fn make_room(out: &Path, force: bool) -> Result<(), Failure> {
+    let refused = |error: std::io::Error| {
+        let what = format!("cannot use {}: {error}", out.display());
+        Failure::input(what, "choose another folder with --out")
+    };
+    if force {
+        dataset::clear(out).map_err(refused)?;
+    } else if !dataset::is_empty(out).map_err(refused)? {
+        return Err(Failure::input(
+            format!("{} is not empty", out.display()),
+            "choose another folder with --out, or give --force: an earlier data set there is \
+             then removed, and nothing else",
+        ));
+    }
+    prepare(out)
+}
+
+/// What there is now, and how fast it came.
+fn closing(set: &DataSet<'_>, summary: &Summary, out: &Path) -> String {
+    let (frames, wall_s) = (set.frames(), summary.wall_s);
+    let backend = &summary.renderer;
+    format!(
+        "{frames} frames in {}\n{wall_s:.1} s, {:.2} frames/s; drawn by {} ({})\n\
+         Every file and column: {}",
+        out.display(),
+        frames as f64 / wall_s,
+        backend.backend,
+        backend.adapter,
+        out.join("README.md").display()
+    )
+}

@@ -1,0 +1,416 @@
+//! Lamps as the world has them and a camera sees them: outline, light row by row, phase of the
+//! code. Nothing here comes from the stack.
+
+use super::tables::Kind::{Int, Real, Reals, Text};
+use super::tables::{Column, Value, column};
+use crate::track::LampSite;
+use crate::twin::render::cpu::{Labeller, Seen, Sight};
+use crate::twin::render::surface::LAMP_SIGHT_M;
+use crate::twin::render::{Job, LampLight};
+use nalgebra::{Point3, Vector3};
+use std::f64::consts::TAU;
+
+/// Corners of an outline.
+const CORNERS: u32 = 64;
+/// Places of a disc at which it is looked whether it is hidden.
+const PLACES: u32 = 64;
+/// Lamps nearer to the camera's plane than this are left out.
+const NEAREST_M: f64 = 0.1;
+
+pub(super) const COLUMNS: [Column; 27] = [
+    column("frame_id", Int, "", "the frame, as in frames.parquet"),
+    column("uid", Text, "", "name of the lamp on the air, line-lamp"),
+    column("line", Int, "", "line number, the first part of the name"),
+    column("lamp", Int, "", "lamp number, the second part of the name"),
+    column(
+        "chips",
+        Text,
+        "",
+        "one period of the signal, 1 on and 0 off, as sent",
+    ),
+    column(
+        "chip_s",
+        Real,
+        "s",
+        "length of a chip by the lamp's own clock",
+    ),
+    column(
+        "u_px",
+        Real,
+        "px",
+        "centre of the disc, in the row that sees it",
+    ),
+    column("v_px", Real, "px", "the same, row"),
+    column(
+        "outline_u_px",
+        Reals,
+        "px",
+        "64 places of the rim, each in the row that sees it: a polygon whose corners are on the outline",
+    ),
+    column("outline_v_px", Reals, "px", "the same, rows"),
+    column("depth_m", Real, "m", "of the centre along the optical axis"),
+    column("distance_m", Real, "m", "from the camera to the centre"),
+    column(
+        "off_normal_deg",
+        Real,
+        "deg",
+        "angle at the lamp between its normal and the camera",
+    ),
+    column("x_m", Real, "m", "centre in the world: east"),
+    column("y_m", Real, "m", "north"),
+    column("z_m", Real, "m", "up"),
+    column("radius_m", Real, "m", "of the disc"),
+    column("chainage_m", Real, "m", "of the lamp, as it really hangs"),
+    column(
+        "first_row",
+        Int,
+        "px",
+        "uppermost row of the image that its outline touches",
+    ),
+    column("last_row", Int, "px", "lowest one"),
+    column(
+        "first_column",
+        Int,
+        "px",
+        "leftmost column of the image that its outline touches",
+    ),
+    column("last_column", Int, "px", "rightmost one"),
+    column(
+        "chip",
+        Int,
+        "",
+        "chip that is being sent when first_row opens, counting from 0",
+    ),
+    column(
+        "chip_phase",
+        Real,
+        "",
+        "share of that chip that is over by then",
+    ),
+    column(
+        "chips_per_row",
+        Real,
+        "",
+        "chips from the opening of a row to that of the row below; negative where the sensor is read upwards",
+    ),
+    column(
+        "on_share",
+        Reals,
+        "",
+        "mean light in the exposure of each row from first_row to last_row, with rise, fall, mains ripple and ageing: 1 is a good lamp that is on throughout",
+    ),
+    column(
+        "visible_share",
+        Real,
+        "",
+        "share of the disc that is in the image and not hidden by anything",
+    ),
+];
+
+/// A row for each lamp whose disc is in the image at least in part.
+pub(super) fn rows(
+    frame_id: i64,
+    job: &Job,
+    sight: &Sight<'_>,
+    labeller: &Labeller,
+    sites: &[LampSite],
+) -> Vec<Vec<Value>> {
+    let lamps = labeller.lamps().iter().zip(sites);
+    lamps
+        .filter_map(|(lamp, site)| row(frame_id, job, sight, labeller, (lamp, site)))
+        .collect()
+}
+
+fn row(
+    frame_id: i64,
+    job: &Job,
+    sight: &Sight<'_>,
+    labeller: &Labeller,
+    (lamp, site): (&LampLight, &LampSite),
+) -> Option<Vec<Value>> {
+    let eye = |v: f64| Point3::from(sight.pose(v).translation.vector);
+    // The far ones first, and cheaply: a line has hundreds.
+    if (lamp.centre - eye(0.0)).norm() > LAMP_SIGHT_M + 1.0 {
+        return None;
+    }
+    let lamp = &lamp.at(job.time);
+    let centre = sight.of(&lamp.centre).filter(|c| c.depth_m > NEAREST_M)?;
+    let way = eye(centre.pixel.y) - lamp.centre;
+    let cos = lamp.facing.dot(&way) / way.norm();
+    if cos <= 0.0 || way.norm() > LAMP_SIGHT_M {
+        return None;
+    }
+    let outline: Vec<Seen> = (0..CORNERS)
+        .map(|k| sight.of(&on_disc(lamp, 1.0, TAU * f64::from(k) / f64::from(CORNERS))))
+        .collect::<Option<_>>()?;
+    let (us, vs): (Vec<f64>, Vec<f64>) = outline.iter().map(|s| (s.pixel.x, s.pixel.y)).unzip();
+    let camera = &sight.view.camera;
+    let columns = covered(&us, camera.intrinsics.width_px)?;
+    let rows = covered(&vs, camera.intrinsics.height_px)?;
+    let shutter = &camera.shutter;
+    let open_s = |v: u32| shutter.row_open(sight.view.start, f64::from(v)).secs();
+    let (wave, light) = (&lamp.waveform, lamp.curve());
+    let on_share = (rows[0]..=rows[1]).map(|v| {
+        let open_s = open_s(v);
+        lamp.level * light.mean(open_s, open_s + shutter.exposure_s)
+    });
+    let sent = (open_s(rows[0]) - wave.phase_s) / wave.chip_s;
+    let chips = (0..wave.frame.len).map(|k| if wave.frame.is_on(k) { '1' } else { '0' });
+    Some(vec![
+        frame_id.into(),
+        site.uid.to_string().into(),
+        u32::from(site.uid.line).into(),
+        u32::from(site.uid.lamp).into(),
+        chips.collect::<String>().into(),
+        wave.chip_s.into(),
+        centre.pixel.x.into(),
+        centre.pixel.y.into(),
+        us.into(),
+        vs.into(),
+        centre.depth_m.into(),
+        way.norm().into(),
+        cos.min(1.0).acos().to_degrees().into(),
+        lamp.centre.x.into(),
+        lamp.centre.y.into(),
+        lamp.centre.z.into(),
+        lamp.radius_m.into(),
+        site.chainage_m.into(),
+        rows[0].into(),
+        rows[1].into(),
+        columns[0].into(),
+        columns[1].into(),
+        (sent.floor().rem_euclid(f64::from(wave.frame.len)) as i64).into(),
+        (sent - sent.floor()).into(),
+        (shutter.row_step_s() / wave.chip_s).into(),
+        on_share.collect::<Vec<_>>().into(),
+        visible_share(lamp, job, sight, labeller).into(),
+    ])
+}
+
+/// A place on the disc, at a share of its radius.
+fn on_disc(lamp: &LampLight, share: f64, angle: f64) -> Point3<f64> {
+    let n = lamp.facing.into_inner();
+    let least = if n.x.abs() < 0.6 {
+        Vector3::x()
+    } else {
+        Vector3::y()
+    };
+    let across = n.cross(&least).normalize();
+    let along = n.cross(&across);
+    let (sin, cos) = angle.sin_cos();
+    lamp.centre + share * lamp.radius_m * (across * cos + along * sin)
+}
+
+/// First and last pixel of `0..size` that a range of coordinates touches.
+fn covered(coordinates: &[f64], size: u32) -> Option<[u32; 2]> {
+    let low = coordinates.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = coordinates
+        .iter()
+        .copied()
+        .fold(f64::NEG_INFINITY, f64::max);
+    let last = f64::from(size) - 1.0;
+    let (first, end) = (low.round().max(0.0), high.round().min(last));
+    (first <= last && end >= 0.0 && first <= end).then_some([first as u32, end as u32])
+}
+
+/// Looked at evenly over the disc, on a spiral.
+fn visible_share(lamp: &LampLight, job: &Job, sight: &Sight<'_>, labeller: &Labeller) -> f64 {
+    let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let seen = (0..PLACES).filter(|k| {
+        let share = ((f64::from(*k) + 0.5) / f64::from(PLACES)).sqrt();
+        let place = on_disc(lamp, share, golden * f64::from(*k));
+        sight.of(&place).is_some_and(|s| {
+            sight.contains(&s.pixel) && labeller.sees(job, sight, s.pixel.y, &place)
+        })
+    });
+    seen.count() as f64 / f64::from(PLACES)
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
+mod tests {
+    use super::super::clean::clean;
+    use super::*;
+    use crate::track::uid::ChipFrame;
+    use crate::twin::render::cpu::CpuRenderer;
+    use crate::twin::render::{Body, Renderer, Scene, Shape, View, sample};
+    use nalgebra::Translation3;
+
+    const SPEED_MPS: f64 = 160.0 / 3.6;
+
+    /// The left eye at 160 km/h, without noise and halo, bright enough that a lamp is not white.
+    fn view(s_m: f64) -> View {
+        let mut view = sample::rig_view(&sample::tunnel(), s_m, SPEED_MPS);
+        view.sensor.bits = 12;
+        view.set_gain_for(sample::scene().lamps[0].luminance_cd_m2, 180.0);
+        clean(&view, 1.0)
+    }
+
+    /// What the table says of the lamps in a view of a job.
+    fn seen(scene: &Scene, job: &Job) -> Vec<Vec<Value>> {
+        let sight = Sight::new(&job.views[0], job.time);
+        rows(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
+    }
+
+    fn value<'a>(row: &'a [Value], name: &str) -> &'a Value {
+        &row[COLUMNS.iter().position(|c| c.name == name).unwrap()]
+    }
+
+    fn real(row: &[Value], name: &str) -> f64 {
+        match value(row, name) {
+            Value::Real(x) => *x,
+            Value::Int(x) => *x as f64,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    fn reals<'a>(row: &'a [Value], name: &str) -> &'a [f64] {
+        match value(row, name) {
+            Value::Reals(list) => list,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    /// Area and centroid of a polygon.
+    fn moments(us: &[f64], vs: &[f64]) -> (f64, [f64; 2]) {
+        let n = us.len();
+        let (mut area, mut u, mut v) = (0.0, 0.0, 0.0);
+        for k in 0..n {
+            let j = (k + 1) % n;
+            let cross = us[k] * vs[j] - us[j] * vs[k];
+            area += cross / 2.0;
+            u += (us[k] + us[j]) * cross / 6.0;
+            v += (vs[k] + vs[j]) * cross / 6.0;
+        }
+        (area.abs(), [u / area, v / area])
+    }
+
+    /// Fails where an outline is off by a half pixel, solved with another row's pose, or not that
+    /// of the disc: the drawn picture has its light where the outline says.
+    #[test]
+    fn outlines_are_where_the_picture_has_its_light() {
+        let mut scene = sample::scene();
+        for lamp in &mut scene.lamps {
+            // Always on, and as bright from everywhere: the picture of the whole disc.
+            lamp.exponent = 1.0;
+            lamp.waveform.frame = ChipFrame {
+                bits: u64::MAX,
+                len: 64,
+            };
+        }
+        let mut renderer = CpuRenderer::oracle(scene.clone());
+        let mut compared = 0;
+        for s_m in [100.4, 102.0, 402.5] {
+            let job = Job {
+                views: vec![view(s_m)],
+                raw: true,
+                ..Job::default()
+            };
+            renderer.submit(&job).unwrap();
+            let image = renderer.collect_raw().unwrap().remove(0);
+            let sensor = &job.views[0].sensor;
+            for row in seen(&scene, &job) {
+                let [u0, u1, v0, v1] = ["first_column", "last_column", "first_row", "last_row"]
+                    .map(|name| real(&row, name) as u32);
+                let whole = u0 > 3 && u1 < 1276 && v0 > 3 && v1 < 716;
+                if !whole || v1 - v0 < 25 {
+                    continue;
+                }
+                let (mut light, mut u_sum, mut v_sum, mut most) = (0.0, 0.0, 0.0, 0.0f64);
+                for v in v0 - 2..=v1 + 2 {
+                    for u in u0 - 2..=u1 + 2 {
+                        let dn = f64::from(image.get_pixel(u, v).0[0]) - sensor.black_dn();
+                        light += dn;
+                        u_sum += dn * f64::from(u);
+                        v_sum += dn * f64::from(v);
+                        most = most.max(dn);
+                    }
+                }
+                let (us, vs) = (reals(&row, "outline_u_px"), reals(&row, "outline_v_px"));
+                let (area, centroid) = moments(us, vs);
+                let off = [u_sum / light - centroid[0], v_sum / light - centroid[1]];
+                assert!(off[0].hypot(off[1]) < 0.03, "{s_m} m: {off:?}");
+                assert!(
+                    (light / most / area - 1.0).abs() < 0.03,
+                    "{} {area}",
+                    light / most
+                );
+                compared += 1;
+            }
+        }
+        assert!(compared >= 3, "{compared}");
+    }
+
+    /// Fails where the phase is of another row, counts the wrong way, or the chips are mirrored:
+    /// chips, phase and step give the light of every row again.
+    #[test]
+    fn phase_and_chips_give_the_light_of_every_row() {
+        let mut scene = sample::scene();
+        for lamp in &mut scene.lamps {
+            // On and off at once, as the chips alone say.
+            (lamp.waveform.rise_s, lamp.waveform.fall_s) = (0.0, 0.0);
+        }
+        for first_row in [0, 719] {
+            let mut view = sample::rig_view(&sample::tunnel(), 100.4, SPEED_MPS);
+            view.camera.shutter.first_row = first_row;
+            let exposure_s = view.camera.shutter.exposure_s;
+            let job = Job {
+                views: vec![view],
+                ..Job::default()
+            };
+            let lamps = seen(&scene, &job);
+            assert!(!lamps.is_empty());
+            for row in lamps {
+                let Value::Text(chips) = value(&row, "chips") else {
+                    panic!("chips are text");
+                };
+                let chips: Vec<f64> = chips.bytes().map(|b| f64::from(b - b'0')).collect();
+                let begin = real(&row, "chip") + real(&row, "chip_phase");
+                let open = exposure_s / real(&row, "chip_s");
+                for (k, share) in reals(&row, "on_share").iter().enumerate() {
+                    let from = begin + k as f64 * real(&row, "chips_per_row");
+                    let n = 2000;
+                    let on = (0..n).map(|i| {
+                        let x = from + open * (f64::from(i) + 0.5) / f64::from(n);
+                        chips[x.floor().rem_euclid(chips.len() as f64) as usize]
+                    });
+                    let mean = on.sum::<f64>() / f64::from(n);
+                    assert!((mean - share).abs() < 0.02, "row {k}: {mean} {share}");
+                }
+            }
+        }
+    }
+
+    /// Fails where what hides a lamp does not count, or the lamp hides itself.
+    #[test]
+    fn a_hidden_lamp_is_not_visible() {
+        let scene = sample::scene();
+        let mut job = Job {
+            views: vec![view(100.4)],
+            ..Job::default()
+        };
+        let largest = |rows: &[Vec<Value>]| {
+            let by_depth = |a: &&Vec<Value>, b: &&Vec<Value>| {
+                real(a, "depth_m").total_cmp(&real(b, "depth_m"))
+            };
+            rows.iter().min_by(by_depth).cloned().unwrap()
+        };
+        let free = largest(&seen(&scene, &job));
+        assert!((real(&free, "visible_share") - 1.0).abs() < 1e-9);
+        let pose = job.views[0].motion.poses[0];
+        let lamp = Point3::new(real(&free, "x_m"), real(&free, "y_m"), real(&free, "z_m"));
+        let half_way = nalgebra::center(&lamp, &pose.translation.vector.into());
+        job.bodies.push(Body {
+            shape: Shape::Sphere(0.4),
+            world_from_body: Translation3::from(half_way).into(),
+            velocity_mps: Vector3::zeros(),
+            albedo: 0.5,
+            luminance_cd_m2: 0.0,
+        });
+        assert!(real(&largest(&seen(&scene, &job)), "visible_share").abs() < 1e-9);
+    }
+}

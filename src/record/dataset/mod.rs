@@ -1,0 +1,402 @@
+//! A data set from a run: images with labels, for those who train and test detectors and decoders.
+//!
+//! [`DataSet`] watches a session. It sees every frame as it is taken, with the scene and the views
+//! that the renderer is given ([`Event::Exposure`]), and the images as they reach the stack. Beside
+//! each image it puts what is true: every pixel's depth, owner and flow by rays
+//! ([`Labeller`](crate::twin::render::cpu::Labeller)), the row-time equation solved for every lamp
+//! ([`Sight`](crate::twin::render::cpu::Sight)), boxes, times, poses; and the picture that a better
+//! camera would have taken, for which it has a renderer of its own. So the run is the same, image
+//! by image, as without a data set.
+//!
+//! ```no_run
+//! use metrotwin::record::dataset::{DataSet, Inputs, Plan};
+//! use metrotwin::scenario::Scenario;
+//! use metrotwin::session::{RendererChoice, RunOptions, renderer, run, scene};
+//! use std::path::Path;
+//! use std::sync::atomic::AtomicBool;
+//!
+//! let scenario = Scenario::load(Path::new("scenarios/obstacle_gallery.toml"), &[])?;
+//! let draws = renderer(&scenario, RendererChoice::Auto)?;
+//! let enough = AtomicBool::new(false);
+//! let plan = Plan { limit: Some(10), ..Plan::default() };
+//! let mut set = DataSet::new("out/set".as_ref(), &scenario, plan, Inputs::default(), draws, &enough);
+//! let options = RunOptions { stop: Some(&enough), ..RunOptions::default() };
+//! run(&scenario, &options, &mut [&mut set])?;
+//! println!("{} frames", set.frames());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Conventions of the files are in the `README.md` that every data set has (`readme.md` here): the
+//! COCO format (<https://cocodataset.org/#format-data>), Parquet tables, PNG, and numpy arrays
+//! for depth and flow, because 16-bit PNG has neither the range (160 m in millimetres, 700 pixels
+//! in 64ths) nor the digits.
+//!
+//! It lives in `record` because it is an observer that writes down what a session shows. It does
+//! not know the stack's answers, and writes none: truth is the twin's.
+//!
+//! What it does not do: split into training and test, and mixed pixels (a pixel belongs to what its
+//! centre sees).
+
+mod clean;
+mod coco;
+mod files;
+mod frame;
+mod lamps;
+mod obstacles;
+mod plan;
+mod readme;
+mod tables;
+mod take;
+
+pub use files::{clear, is_empty};
+pub use plan::{NoSuchPart, Part, Parts, Plan};
+
+use super::stream::failed;
+use crate::scenario::Scenario;
+use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
+use crate::track::Tunnel;
+use crate::twin::physics::BodyOwner;
+use crate::twin::render::cpu::Labeller;
+use crate::twin::render::{Job, Renderer};
+use files::{FOLDERS, write};
+use image::GrayImage;
+use serde_json::json;
+use sha2::{Digest, Sha256};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use tables::{Table, Value};
+use take::Taken;
+
+/// Where a data set comes from, to be written down with it.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Inputs {
+    /// The scenario file's text.
+    pub scenario: String,
+    /// Changes to it, `key=value`.
+    pub overrides: Vec<String>,
+}
+
+/// Writes a data set.
+pub struct DataSet<'a> {
+    out: PathBuf,
+    plan: Plan,
+    about: About,
+    tunnel: Arc<Tunnel>,
+    renderer: Box<dyn Renderer>,
+    labeller: Labeller,
+    /// After that time a lamp's signal repeats.
+    period_s: f64,
+    cameras: Vec<Camera>,
+    /// Frames whose images are on their way.
+    waiting: Vec<Shot>,
+    tables: Option<Tables>,
+    frames: Vec<Vec<Value>>,
+    images: Vec<serde_json::Value>,
+    annotations: Vec<coco::Annotation>,
+    enough: &'a AtomicBool,
+    complete: bool,
+}
+
+/// What is said of the whole set.
+struct About {
+    scenario: String,
+    description: String,
+    seed: u64,
+    /// SHA-256 of the scenario as checked, with all that it names.
+    inputs_sha256: String,
+    inputs: Inputs,
+}
+
+struct Tables {
+    rows: Option<Table>,
+    lamps: Option<Table>,
+    obstacles: Option<Table>,
+}
+
+/// One camera of the run.
+struct Camera {
+    name: String,
+    source: Source,
+    /// Place among the views of its source.
+    view: usize,
+    wanted: bool,
+    /// Chainage, of cameras that stand still.
+    chainage_m: Option<f64>,
+    /// Frames taken that are wanted.
+    taken: u32,
+    /// Those of them whose images have come.
+    written: u32,
+    /// No more are wanted.
+    over: bool,
+    /// The last frame, whose flow is still to come.
+    last: Option<Taken>,
+}
+
+/// A frame that has been taken, until its images come.
+struct Shot {
+    source: Source,
+    number: u32,
+    job: Arc<Job>,
+    owners: Arc<[(BodyOwner, String)]>,
+    train: Option<TrainPoint>,
+}
+
+impl<'a> DataSet<'a> {
+    /// Into a folder. `renderer` is for clean and raw pictures; `enough` is set when all frames of
+    /// the plan have been taken.
+    pub fn new(
+        out: &Path,
+        scenario: &Scenario,
+        plan: Plan,
+        inputs: Inputs,
+        renderer: Box<dyn Renderer>,
+        enough: &'a AtomicBool,
+    ) -> Self {
+        let scene = session::scene(scenario);
+        let periods = scene.lamps.iter().map(|lamp| lamp.waveform.period_s());
+        Self {
+            out: out.to_owned(),
+            plan,
+            about: About {
+                scenario: scenario.name.clone(),
+                description: scenario.description.clone(),
+                seed: scenario.seed,
+                inputs_sha256: sha256(&format!("{scenario:?}")),
+                inputs,
+            },
+            tunnel: scenario.tunnel.clone(),
+            renderer,
+            period_s: periods.fold(0.0, f64::max),
+            labeller: Labeller::new(&scene),
+            cameras: Vec::new(),
+            waiting: Vec::new(),
+            tables: None,
+            frames: Vec::new(),
+            images: Vec::new(),
+            annotations: Vec::new(),
+            enough,
+            complete: false,
+        }
+    }
+
+    /// All frames of the plan have been taken, before the scenario's end.
+    pub fn is_complete(&self) -> bool {
+        self.complete
+    }
+
+    /// Frames so far.
+    pub fn frames(&self) -> usize {
+        self.frames.len()
+    }
+
+    /// Names of the cameras of which a scenario takes images, in the order of their numbers.
+    pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
+        let bench = scenario.bench.is_some();
+        let rides = bench || scenario.physics.train.is_some();
+        let rig = scenario.rig.iter().filter(|_| rides).flat_map(|_| EYES);
+        let devices = scenario.wayside.iter().filter(|_| !bench);
+        let devices = devices.map(|w| w.calibration.name.clone());
+        rig.map(str::to_owned).chain(devices).collect()
+    }
+
+    fn table(
+        &self,
+        part: Part,
+        name: &str,
+        columns: &'static [tables::Column],
+    ) -> Result<Option<Table>, ObserverError> {
+        let wanted = self.plan.has(part);
+        wanted
+            .then(|| Table::create(self.out.join(name), columns))
+            .transpose()
+    }
+
+    /// Keeps a frame if it is wanted of any camera.
+    fn expose(&mut self, exposure: &Exposure<'_>) {
+        let Some(start) = exposure.job.views.first().map(|view| view.start.secs()) else {
+            return;
+        };
+        let mut wanted = false;
+        for camera in self
+            .cameras
+            .iter_mut()
+            .filter(|c| c.source == exposure.source)
+        {
+            if camera.wanted && self.plan.takes(exposure.number, start, camera.taken) {
+                camera.taken += 1;
+                wanted = true;
+            }
+            camera.over |= self.plan.is_over(start, camera.taken);
+        }
+        if wanted {
+            self.waiting.push(Shot {
+                source: exposure.source,
+                number: exposure.number,
+                job: Arc::new(exposure.job.clone()),
+                owners: obstacles::kept(exposure.owners).into(),
+                train: exposure.train,
+            });
+        }
+    }
+
+    /// The frame of these images, if it is wanted. Frames before it whose images have not come are
+    /// lost.
+    fn delivered(&mut self, source: Source, number: u32) -> Option<Shot> {
+        let lost = |shot: &Shot| shot.source == source && shot.number < number;
+        self.waiting.retain(|shot| !lost(shot));
+        let own = |shot: &Shot| shot.source == source && shot.number == number;
+        let k = self.waiting.iter().position(own)?;
+        Some(self.waiting.remove(k))
+    }
+
+    fn images(
+        &mut self,
+        source: Source,
+        number: u32,
+        images: &[&GrayImage],
+    ) -> Result<(), ObserverError> {
+        let Some(shot) = self.delivered(source, number) else {
+            return Ok(());
+        };
+        self.take(&shot, images)
+    }
+
+    /// Ends the run once all images that are wanted have come.
+    fn end_if_complete(&mut self) {
+        if self.waiting.is_empty() && self.cameras.iter().all(|c| c.over || !c.wanted) {
+            self.complete = true;
+            self.enough.store(true, Ordering::Relaxed);
+        }
+    }
+
+    fn write_json(&self, name: &str, value: &serde_json::Value) -> Result<(), ObserverError> {
+        let text = serde_json::to_string_pretty(value).map_err(failed("writing JSON"))?;
+        write(&self.out.join(name), format!("{text}\n").as_bytes())
+    }
+
+    fn meta(&self) -> serde_json::Value {
+        let about = &self.about;
+        let cameras = self.cameras.iter();
+        let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
+        let parts = self.plan.parts.0.iter().map(|part| part.word());
+        let finite = |s: f64| s.is_finite().then_some(s);
+        json!({
+            "format": "metrotwin frames",
+            "format_version": 1,
+            "metrotwin": env!("CARGO_PKG_VERSION"),
+            "scenario": about.scenario,
+            "description": about.description,
+            "seed": about.seed,
+            "overrides": about.inputs.overrides,
+            "inputs_sha256": about.inputs_sha256,
+            "renderer": self.renderer.backend(),
+            "frames": self.frames.len(),
+            "cameras": cameras.collect::<Vec<_>>(),
+            "plan": {
+                "every": self.plan.every,
+                "from_s": self.plan.from_s,
+                "to_s": finite(self.plan.to_s),
+                "limit": self.plan.limit,
+                "labels": parts.collect::<Vec<_>>(),
+            },
+        })
+    }
+}
+
+const EYES: [&str; 2] = ["left", "right"];
+
+/// Hexadecimal.
+fn sha256(text: &str) -> String {
+    let digest = Sha256::digest(text);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl Observer for DataSet<'_> {
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+        let camera = |name: &str, source, view, chainage_m| Camera {
+            name: name.to_owned(),
+            source,
+            view,
+            wanted: self.plan.has_camera(name),
+            chainage_m,
+            taken: 0,
+            written: 0,
+            over: false,
+            last: None,
+        };
+        let eyes = opening.rig.iter().flat_map(|_| EYES.iter().enumerate());
+        let eyes = eyes.map(|(k, name)| camera(name, Source::Rig, k, None));
+        let devices = opening.wayside.iter().enumerate();
+        let devices =
+            devices.map(|(k, d)| camera(&d.name, Source::Wayside(k), 0, Some(d.chainage_m)));
+        self.cameras = eyes.chain(devices).collect();
+        for camera in self.cameras.iter().filter(|c| c.wanted) {
+            for folder in FOLDERS {
+                let part = folder.parse::<Parts>();
+                if folder == "images" || part.is_ok_and(|p| p.0.is_subset(&self.plan.parts.0)) {
+                    let folder = self.out.join(folder).join(super::slug(&camera.name));
+                    fs::create_dir_all(folder).map_err(failed("making a folder"))?;
+                }
+            }
+        }
+        self.tables = Some(Tables {
+            rows: self.table(Part::Rows, "rows.parquet", &frame::ROWS)?,
+            lamps: self.table(Part::Lamps, "lamps.parquet", &lamps::COLUMNS)?,
+            obstacles: self.table(Part::Obstacles, "obstacles.parquet", &obstacles::COLUMNS)?,
+        });
+        Ok(())
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match *event {
+            Event::Exposure(exposure) => self.expose(exposure),
+            Event::Pair(pair, ..) => {
+                let images = [&pair.left.image, &pair.right.image];
+                self.images(Source::Rig, pair.left.number, &images)?;
+            }
+            Event::Wayside(k, _, image, report) => {
+                self.images(Source::Wayside(k), report.number, &[image])?;
+            }
+            _ => return Ok(()),
+        }
+        self.end_if_complete();
+        Ok(())
+    }
+
+    /// Also of a run that was broken off: what has been taken is a whole, smaller set.
+    fn close(&mut self) -> Result<(), ObserverError> {
+        let Some(tables) = self.tables.take() else {
+            return Ok(());
+        };
+        for table in [tables.rows, tables.lamps, tables.obstacles]
+            .into_iter()
+            .flatten()
+        {
+            table.close()?;
+        }
+        let mut frames = Table::create(self.out.join("frames.parquet"), &frame::COLUMNS)?;
+        for row in &self.frames {
+            frames.push(row.clone())?;
+        }
+        frames.close()?;
+        let meta = self.meta();
+        if self.plan.has(Part::Obstacles) {
+            let images = std::mem::take(&mut self.images);
+            let info = json!({"description": format!("metrotwin frames of {}", self.about.scenario),
+                "version": env!("CARGO_PKG_VERSION")});
+            self.write_json(
+                "coco.json",
+                &coco::document(info, images, &self.annotations),
+            )?;
+        }
+        let text = readme::of(&self.about.scenario, &self.plan, &meta);
+        write(&self.out.join("README.md"), text.as_bytes())?;
+        write(
+            &self.out.join("scenario.toml"),
+            self.about.inputs.scenario.as_bytes(),
+        )?;
+        self.write_json("meta.json", &meta)
+    }
+}

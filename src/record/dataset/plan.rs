@@ -1,0 +1,195 @@
+//! Which frames go into a data set, and what of each.
+
+use std::collections::BTreeSet;
+use std::str::FromStr;
+
+/// What a frame comes with, besides its image and its row in `frames.parquet`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Part {
+    /// Digital numbers of the converter.
+    Raw,
+    /// The image without flaws.
+    Clean,
+    /// Depth of every pixel.
+    Depth,
+    /// Instance of every pixel.
+    Mask,
+    /// Optical flow to the camera's next frame in the set.
+    Flow,
+    /// Time and pose of every row.
+    Rows,
+    /// Outline, name and light of every lamp in view.
+    Lamps,
+    /// Boxes and shares of every obstacle in view, and COCO annotations.
+    Obstacles,
+}
+
+impl Part {
+    /// All, with the words that name them.
+    pub const ALL: [(&'static str, Self); 8] = [
+        ("raw", Self::Raw),
+        ("clean", Self::Clean),
+        ("depth", Self::Depth),
+        ("mask", Self::Mask),
+        ("flow", Self::Flow),
+        ("rows", Self::Rows),
+        ("lamps", Self::Lamps),
+        ("obstacles", Self::Obstacles),
+    ];
+
+    /// Its word.
+    pub fn word(self) -> &'static str {
+        let named = Self::ALL.iter().find(|(_, part)| *part == self);
+        named.map_or("", |(word, _)| word)
+    }
+
+    /// It needs the surface of every pixel.
+    fn by_rays(self) -> bool {
+        matches!(
+            self,
+            Self::Depth | Self::Mask | Self::Flow | Self::Obstacles
+        )
+    }
+}
+
+/// A word that is none of [`Part::ALL`].
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "there are no labels `{0}`; give raw, clean, depth, mask, flow, rows, lamps, obstacles, all or none"
+)]
+pub struct NoSuchPart(String);
+
+/// A list of parts as a user writes it: words between commas, or `all`, or `none`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Parts(pub BTreeSet<Part>);
+
+impl FromStr for Parts {
+    type Err = NoSuchPart;
+
+    fn from_str(text: &str) -> Result<Self, NoSuchPart> {
+        match text.trim() {
+            "all" => return Ok(Self::default()),
+            "none" => return Ok(Self(BTreeSet::new())),
+            _ => {}
+        }
+        let words = text.split(',').map(str::trim);
+        let part = |word: &str| {
+            let named = Part::ALL.iter().find(|(name, _)| *name == word);
+            named
+                .map(|(_, part)| *part)
+                .ok_or_else(|| NoSuchPart(word.to_owned()))
+        };
+        words.map(part).collect::<Result<_, _>>().map(Self)
+    }
+}
+
+impl Default for Parts {
+    fn default() -> Self {
+        Self(Part::ALL.iter().map(|(_, part)| *part).collect())
+    }
+}
+
+/// Which frames, and what of each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Every which frame of a camera, by its number.
+    pub every: u32,
+    /// Frames that start at this time or later.
+    pub from_s: f64,
+    /// And not later than this.
+    pub to_s: f64,
+    /// Most frames of a camera.
+    pub limit: Option<u32>,
+    /// Names of the cameras; all where empty.
+    pub cameras: Vec<String>,
+    /// What of each.
+    pub parts: Parts,
+}
+
+impl Default for Plan {
+    fn default() -> Self {
+        Self {
+            every: 1,
+            from_s: 0.0,
+            to_s: f64::INFINITY,
+            limit: None,
+            cameras: Vec::new(),
+            parts: Parts::default(),
+        }
+    }
+}
+
+impl Plan {
+    /// Whether a part is wanted.
+    pub fn has(&self, part: Part) -> bool {
+        self.parts.0.contains(&part)
+    }
+
+    pub(super) fn needs_rays(&self) -> bool {
+        self.parts.0.iter().any(|part| part.by_rays())
+    }
+
+    pub(super) fn has_camera(&self, name: &str) -> bool {
+        self.cameras.is_empty() || self.cameras.iter().any(|c| c == name)
+    }
+
+    /// Whether a frame is wanted of a camera that has given `taken` so far.
+    pub(super) fn takes(&self, number: u32, start_s: f64, taken: u32) -> bool {
+        number.is_multiple_of(self.every.max(1))
+            && (self.from_s..=self.to_s).contains(&start_s)
+            && self.limit.is_none_or(|limit| taken < limit)
+    }
+
+    /// Whether no frame from that time on is wanted of a camera that has given `taken` so far.
+    pub(super) fn is_over(&self, start_s: f64, taken: u32) -> bool {
+        start_s > self.to_s || self.limit.is_some_and(|limit| taken >= limit)
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    /// Fails where a part cannot be named, or a wrong word passes.
+    #[test]
+    fn lists_of_parts() {
+        let parts = |text: &str| text.parse::<Parts>();
+        assert_eq!(parts("all").unwrap(), Parts::default());
+        assert!(parts("none").unwrap().0.is_empty());
+        for (word, part) in Part::ALL {
+            assert_eq!(parts(word).unwrap().0, BTreeSet::from([part]));
+            assert_eq!(part.word(), word);
+        }
+        assert_eq!(parts("mask, depth").unwrap().0.len(), 2);
+        assert!(
+            parts("mask,dept")
+                .unwrap_err()
+                .to_string()
+                .contains("`dept`")
+        );
+    }
+
+    /// Fails where a limit is of pictures taken and not of those wanted, or an end is left out.
+    #[test]
+    fn frames_are_chosen_by_number_time_and_count() {
+        let plan = Plan {
+            every: 3,
+            from_s: 0.1,
+            to_s: 0.4,
+            limit: Some(2),
+            ..Plan::default()
+        };
+        let mut taken = 0;
+        let mut chosen = Vec::new();
+        for number in 0..20 {
+            let start_s = 0.05 * f64::from(number);
+            if plan.takes(number, start_s, taken) {
+                taken += 1;
+                chosen.push(number);
+            }
+        }
+        assert_eq!(chosen, [3, 6]);
+        assert!(plan.is_over(0.2, 2) && plan.is_over(0.41, 1) && !plan.is_over(0.4, 1));
+    }
+}

@@ -1,0 +1,47 @@
+//! The description that lies beside every data set.
+
+use super::tables::describe;
+use super::{Part, Plan, frame, lamps, obstacles};
+
+const TEMPLATE: &str = include_str!("readme.md");
+
+/// The text for one set.
+pub(super) fn of(scenario: &str, plan: &Plan, meta: &serde_json::Value) -> String {
+    let missing: Vec<String> = Part::ALL
+        .iter()
+        .filter(|(_, part)| !plan.has(*part))
+        .map(|(word, _)| format!("`{word}`"))
+        .collect();
+    let missing = if missing.is_empty() {
+        String::new()
+    } else {
+        let list = missing.join(", ");
+        format!(
+            "This set was made without {list}; their files and columns are missing or null.\n\n"
+        )
+    };
+    let cameras = meta["cameras"].as_array().into_iter().flatten();
+    let cameras: Vec<String> = cameras
+        .enumerate()
+        .map(|(k, c)| {
+            let name = c["name"].as_str().unwrap_or_default();
+            format!("| {k} | `{name}` | {} |", c["frames"])
+        })
+        .collect();
+    let text = [
+        ("{scenario}", scenario.to_owned()),
+        ("{seed}", meta["seed"].to_string()),
+        ("{frames}", meta["frames"].to_string()),
+        ("{version}", env!("CARGO_PKG_VERSION").to_owned()),
+        ("{missing}", missing),
+        ("{cameras}", cameras.join("\n")),
+        ("{frame columns}", describe(&frame::COLUMNS)),
+        ("{row columns}", describe(&frame::ROWS)),
+        ("{lamp columns}", describe(&lamps::COLUMNS)),
+        ("{obstacle columns}", describe(&obstacles::COLUMNS)),
+    ];
+    text.into_iter()
+        .fold(TEMPLATE.to_owned(), |all, (key, value)| {
+            all.replace(key, &value)
+        })
+}

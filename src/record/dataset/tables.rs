@@ -1,0 +1,241 @@
+//! Parquet tables whose columns say what they are: the same list makes the file and its
+//! description.
+
+use super::files::{broken, finish, part};
+use crate::session::ObserverError;
+use arrow::array::{
+    ArrayRef, BooleanBuilder, Float64Builder, Int64Builder, ListBuilder, RecordBatch, StringBuilder,
+};
+use arrow::datatypes::{DataType, Field, Schema};
+use parquet::arrow::ArrowWriter;
+use parquet::basic::Compression;
+use parquet::file::properties::WriterProperties;
+use std::fs::File;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Rows that are kept in memory before they are written.
+const BATCH_ROWS: usize = 16_384;
+
+/// What a column holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Kind {
+    Int,
+    Real,
+    Text,
+    Flag,
+    Reals,
+}
+
+impl Kind {
+    fn data_type(self) -> DataType {
+        match self {
+            Self::Int => DataType::Int64,
+            Self::Real => DataType::Float64,
+            Self::Text => DataType::Utf8,
+            Self::Flag => DataType::Boolean,
+            Self::Reals => DataType::List(Arc::new(Field::new_list_field(DataType::Float64, true))),
+        }
+    }
+
+    /// As the description of the data set has it.
+    fn name(self) -> &'static str {
+        match self {
+            Self::Int => "int64",
+            Self::Real => "float64",
+            Self::Text => "string",
+            Self::Flag => "bool",
+            Self::Reals => "list<float64>",
+        }
+    }
+}
+
+/// One column.
+pub(super) struct Column {
+    pub name: &'static str,
+    pub kind: Kind,
+    pub unit: &'static str,
+    pub meaning: &'static str,
+}
+
+/// A column in one line.
+pub(super) const fn column(
+    name: &'static str,
+    kind: Kind,
+    unit: &'static str,
+    meaning: &'static str,
+) -> Column {
+    Column {
+        name,
+        kind,
+        unit,
+        meaning,
+    }
+}
+
+/// Columns as a table in Markdown.
+pub(super) fn describe(columns: &[Column]) -> String {
+    let mut text = String::from("| column | type | unit | meaning |\n|---|---|---|---|\n");
+    for c in columns {
+        let kind = c.kind.name();
+        text += &format!("| `{}` | {kind} | {} | {} |\n", c.name, c.unit, c.meaning);
+    }
+    text
+}
+
+/// What stands in one cell.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    Int(i64),
+    Real(f64),
+    Text(String),
+    Flag(bool),
+    Reals(Vec<f64>),
+    Null,
+}
+
+macro_rules! value_from {
+    ($($from:ty => $make:expr),* $(,)?) => {
+        $(impl From<$from> for Value {
+            fn from(x: $from) -> Self {
+                $make(x)
+            }
+        })*
+    };
+}
+
+value_from! {
+    i64 => Value::Int,
+    u32 => |x| Value::Int(i64::from(x)),
+    f64 => Value::Real,
+    bool => Value::Flag,
+    String => Value::Text,
+    &str => |x: &str| Value::Text(x.to_owned()),
+    Vec<f64> => Value::Reals,
+}
+
+impl<T: Into<Value>> From<Option<T>> for Value {
+    fn from(x: Option<T>) -> Self {
+        x.map_or(Self::Null, Into::into)
+    }
+}
+
+enum Cells {
+    Int(Int64Builder),
+    Real(Float64Builder),
+    Text(StringBuilder),
+    Flag(BooleanBuilder),
+    Reals(ListBuilder<Float64Builder>),
+}
+
+impl Cells {
+    fn new(kind: Kind) -> Self {
+        match kind {
+            Kind::Int => Self::Int(Int64Builder::new()),
+            Kind::Real => Self::Real(Float64Builder::new()),
+            Kind::Text => Self::Text(StringBuilder::new()),
+            Kind::Flag => Self::Flag(BooleanBuilder::new()),
+            Kind::Reals => Self::Reals(ListBuilder::new(Float64Builder::new())),
+        }
+    }
+
+    /// Whether the value is of the column's kind.
+    fn push(&mut self, value: Value) -> bool {
+        match (self, value) {
+            (Self::Int(cells), Value::Int(x)) => cells.append_value(x),
+            (Self::Int(cells), Value::Null) => cells.append_null(),
+            (Self::Real(cells), Value::Real(x)) => cells.append_value(x),
+            (Self::Real(cells), Value::Null) => cells.append_null(),
+            (Self::Text(cells), Value::Text(x)) => cells.append_value(x),
+            (Self::Text(cells), Value::Null) => cells.append_null(),
+            (Self::Flag(cells), Value::Flag(x)) => cells.append_value(x),
+            (Self::Flag(cells), Value::Null) => cells.append_null(),
+            (Self::Reals(cells), Value::Reals(list)) => {
+                cells.values().append_slice(&list);
+                cells.append(true);
+            }
+            (Self::Reals(cells), Value::Null) => cells.append(false),
+            _ => return false,
+        }
+        true
+    }
+
+    fn finish(&mut self) -> ArrayRef {
+        match self {
+            Self::Int(cells) => Arc::new(cells.finish()),
+            Self::Real(cells) => Arc::new(cells.finish()),
+            Self::Text(cells) => Arc::new(cells.finish()),
+            Self::Flag(cells) => Arc::new(cells.finish()),
+            Self::Reals(cells) => Arc::new(cells.finish()),
+        }
+    }
+}
+
+/// A table on its way into a file.
+pub(super) struct Table {
+    path: PathBuf,
+    columns: &'static [Column],
+    schema: Arc<Schema>,
+    writer: ArrowWriter<File>,
+    cells: Vec<Cells>,
+    rows: usize,
+}
+
+impl Table {
+    /// Begins a file; it gets its name in [`Self::close`].
+    pub fn create(path: PathBuf, columns: &'static [Column]) -> Result<Self, ObserverError> {
+        let fields = columns.iter().map(|c| {
+            let unit = [("unit".to_owned(), c.unit.to_owned())];
+            Field::new(c.name, c.kind.data_type(), true).with_metadata(unit.into())
+        });
+        let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
+        let settings = WriterProperties::builder()
+            .set_compression(Compression::LZ4_RAW)
+            .set_created_by(format!("metrotwin {}", env!("CARGO_PKG_VERSION")))
+            .build();
+        let file = File::create(part(&path)).map_err(broken(&path))?;
+        let writer = ArrowWriter::try_new(file, schema.clone(), Some(settings));
+        Ok(Self {
+            writer: writer.map_err(broken(&path))?,
+            path,
+            columns,
+            schema,
+            cells: columns.iter().map(|c| Cells::new(c.kind)).collect(),
+            rows: 0,
+        })
+    }
+
+    /// One more row, a value for each column.
+    pub fn push(&mut self, row: Vec<Value>) -> Result<(), ObserverError> {
+        let path = &self.path;
+        if row.len() != self.columns.len() {
+            let text = format!("{} values for {} columns", row.len(), self.columns.len());
+            return Err(broken(path)(text));
+        }
+        for ((cells, column), value) in self.cells.iter_mut().zip(self.columns).zip(row) {
+            if !cells.push(value) {
+                return Err(broken(path)(format!("a wrong value for `{}`", column.name)));
+            }
+        }
+        self.rows += 1;
+        if self.rows >= BATCH_ROWS {
+            self.flush()?;
+        }
+        Ok(())
+    }
+
+    fn flush(&mut self) -> Result<(), ObserverError> {
+        self.rows = 0;
+        let arrays = self.cells.iter_mut().map(Cells::finish).collect();
+        let batch = RecordBatch::try_new(self.schema.clone(), arrays);
+        let batch = batch.map_err(broken(&self.path))?;
+        self.writer.write(&batch).map_err(broken(&self.path))
+    }
+
+    /// Writes the rest and gives the file its name.
+    pub fn close(mut self) -> Result<(), ObserverError> {
+        self.flush()?;
+        self.writer.close().map_err(broken(&self.path))?;
+        finish(&self.path)
+    }
+}

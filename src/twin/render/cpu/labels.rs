@@ -1,0 +1,327 @@
+//! What every pixel of a view shows, as truth for those who train and test with the pictures.
+//!
+//! One ray a pixel, through its centre, from where the camera is in the middle of the exposure of
+//! the pixel's own row: the surface that it meets first, and how far away. Bodies are where they
+//! are at that time. A camera that stands still keeps what it sees of the tunnel.
+//!
+//! ```
+//! use metrotwin::bus::Intrinsics;
+//! use metrotwin::twin::render::cpu::{Labeller, Sight};
+//! use metrotwin::twin::render::sample;
+//!
+//! let mut job = sample::wayside_job(&sample::tunnel(), 100.0);
+//! job.views[0].camera.intrinsics = Intrinsics::centred(96, 54, 55.0);
+//! let sight = Sight::new(&job.views[0], job.time);
+//! let labels = Labeller::new(&sample::scene()).look(&job, &sight);
+//! assert_eq!(labels.depth_m.len(), 96 * 54);
+//! ```
+//!
+//! Not here: what is between surface and camera (mist, dirt on the glass), and mixed pixels: a
+//! pixel belongs to what its centre sees.
+
+use super::extent::Outline;
+use super::{SIGHT_M, Sight, Solid, TunnelCaster};
+use crate::bus::{CameraModel, Intrinsics};
+use crate::twin::render::surface::LAMP_SIGHT_M;
+use crate::twin::render::{Body, Job, LampLight, Scene};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use rayon::prelude::*;
+use std::collections::VecDeque;
+
+/// Views of cameras that stand still, and rays of lenses, that are kept.
+const KEPT: usize = 8;
+/// Surfaces nearer than a lamp's disc by less than this do not hide it: it may be flush.
+pub const FLUSH_M: f64 = 0.01;
+
+/// What a pixel shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Surface {
+    /// Nothing within sight.
+    Nothing,
+    /// The tunnel, with its rails.
+    Tunnel,
+    /// The body of that index in the job.
+    Body(u16),
+    /// The luminous side of the lamp of that index in the scene.
+    Lamp(u16),
+}
+
+/// What every pixel of a view shows, row by row.
+pub struct Labels {
+    /// Along the optical axis; infinite where nothing is within [`SIGHT_M`].
+    pub depth_m: Vec<f64>,
+    /// What it is.
+    pub surface: Vec<Surface>,
+}
+
+/// Looks through views at the scene that it knows.
+pub struct Labeller {
+    tunnel: TunnelCaster,
+    lamps: Vec<LampLight>,
+    still: VecDeque<StillView>,
+    lenses: VecDeque<Lens>,
+}
+
+/// Depth of the tunnel through every pixel of a camera that stands still.
+struct StillView {
+    camera: CameraModel,
+    pose: Isometry3<f64>,
+    depth_m: Vec<f64>,
+}
+
+/// Directions of all pixels, at depth 1: a lens with distortion is costly to invert.
+struct Lens {
+    camera: Intrinsics,
+    rays: Vec<[f64; 2]>,
+}
+
+/// One row's rays.
+struct Row<'a> {
+    v: usize,
+    pose: Isometry3<f64>,
+    rays: &'a [[f64; 2]],
+}
+
+impl Row<'_> {
+    fn eye(&self) -> Point3<f64> {
+        self.pose.translation.vector.into()
+    }
+
+    /// Scaled to z = 1 in the camera's frame, so that depths are multiples of it.
+    fn ray(&self, u: usize) -> Vector3<f64> {
+        let [x, y] = self.rays[u];
+        self.pose * Vector3::new(x, y, 1.0)
+    }
+}
+
+impl Labeller {
+    /// Of a scene.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            tunnel: TunnelCaster::new(&scene.tunnel),
+            lamps: scene.lamps.clone(),
+            still: VecDeque::new(),
+            lenses: VecDeque::new(),
+        }
+    }
+
+    /// What every pixel shows.
+    pub fn look(&mut self, job: &Job, sight: &Sight<'_>) -> Labels {
+        let camera = sight.view.camera.intrinsics;
+        let lens = self.keep_lens(&camera);
+        let still = (sight.view.motion.poses.len() == 1).then(|| self.keep_still(sight, lens));
+        let this = &*self;
+        let width = camera.width_px as usize;
+        let size = width * camera.height_px as usize;
+        let mut labels = Labels {
+            depth_m: vec![f64::INFINITY; size],
+            surface: vec![Surface::Nothing; size],
+        };
+        let kept = still.map(|k| &this.still[k].depth_m);
+        let rows = (labels.depth_m.par_chunks_mut(width.max(1)))
+            .zip(labels.surface.par_chunks_mut(width.max(1)))
+            .enumerate();
+        rows.for_each(|(v, (depth_m, surface))| {
+            let row = Row {
+                v,
+                pose: sight.pose(v as f64),
+                rays: &this.lenses[lens].rays[v * width..(v + 1) * width],
+            };
+            match kept {
+                Some(kept) => depth_m.copy_from_slice(&kept[v * width..(v + 1) * width]),
+                None => this.cast_tunnel(&row, depth_m),
+            }
+            for (depth, surface) in depth_m.iter().zip(surface.iter_mut()) {
+                if depth.is_finite() {
+                    *surface = Surface::Tunnel;
+                }
+            }
+            this.put_bodies(job, sight, &row, depth_m, surface);
+            this.put_lamps(sight, &row, depth_m, surface);
+        });
+        labels
+    }
+
+    /// Whether nothing stands between the camera and a place that it sees in row `v`.
+    pub fn sees(&self, job: &Job, sight: &Sight<'_>, v: f64, place: &Point3<f64>) -> bool {
+        let eye = Point3::from(sight.pose(v).translation.vector);
+        let way = place - eye;
+        let reach = 1.0 - FLUSH_M / way.norm();
+        let slab = self.tunnel.slab_of(&eye, None);
+        let after_s = sight.after_s(v);
+        let hides = |body: &Body| {
+            let hit = Solid::at(body, after_s).cast(&eye, &way);
+            hit.is_some_and(|(t, _)| t < reach)
+        };
+        self.tunnel.cast(slab, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
+    }
+
+    /// The lamps, in the order of the scene.
+    pub fn lamps(&self) -> &[LampLight] {
+        &self.lamps
+    }
+
+    /// Where everything that a view shows is seen in another view, less where it is seen in this
+    /// one, in pixels. Bodies go along with those that `same` names in the other view's job. Not a
+    /// number where nothing is within sight, or the place is outside of the other image.
+    pub fn flow(
+        &mut self,
+        (job, sight, labels): (&Job, &Sight<'_>, &Labels),
+        (next_job, next): (&Job, &Sight<'_>),
+        same: impl Fn(u16) -> Option<usize> + Sync,
+    ) -> Vec<[f32; 2]> {
+        let camera = sight.view.camera.intrinsics;
+        let lens = self.keep_lens(&camera);
+        let rays = &self.lenses[lens].rays;
+        let width = camera.width_px as usize;
+        let (a, b) = (sight.view, next.view);
+        let still = a.motion.poses.len() == 1 && (a.camera, &a.motion) == (b.camera, &b.motion);
+        let goes_to = |k: usize, pose: &Isometry3<f64>| {
+            let [x, y] = rays[k];
+            let v = (k / width) as f64;
+            let from = Point2::new((k % width) as f64, v);
+            let point = pose * Point3::from(Vector3::new(x, y, 1.0) * labels.depth_m[k]);
+            let seen = match labels.surface[k] {
+                Surface::Nothing => None,
+                Surface::Body(body) => {
+                    let then = next_job.bodies.get(same(body)?)?;
+                    let now = Solid::at(&job.bodies[usize::from(body)], sight.after_s(v));
+                    let point = then.world_from_body * now.in_body(&point);
+                    next.within_image(&point, &then.velocity_mps)
+                }
+                _ if still => return Some([0.0; 2]),
+                _ => next.within_image(&point, &Vector3::zeros()),
+            }?;
+            let to = seen.pixel - from;
+            Some([to.x as f32, to.y as f32])
+        };
+        let mut flow = vec![[f32::NAN; 2]; labels.depth_m.len()];
+        let rows = flow.par_chunks_mut(width.max(1)).enumerate();
+        rows.for_each(|(v, flow)| {
+            let pose = sight.pose(v as f64);
+            for (u, flow) in flow.iter_mut().enumerate() {
+                if let Some(to) = goes_to(v * width + u, &pose) {
+                    *flow = to;
+                }
+            }
+        });
+        flow
+    }
+
+    fn keep_lens(&mut self, camera: &Intrinsics) -> usize {
+        if let Some(k) = self.lenses.iter().position(|l| l.camera == *camera) {
+            return k;
+        }
+        if self.lenses.len() >= KEPT {
+            self.lenses.pop_front();
+        }
+        let width = camera.width_px as usize;
+        let rays = (0..width * camera.height_px as usize)
+            .into_par_iter()
+            .with_min_len(width.max(1))
+            .map(|k| {
+                let ray = camera.ray((k % width) as f64, (k / width) as f64);
+                [ray.x, ray.y]
+            });
+        self.lenses.push_back(Lens {
+            camera: *camera,
+            rays: rays.collect(),
+        });
+        self.lenses.len() - 1
+    }
+
+    fn keep_still(&mut self, sight: &Sight<'_>, lens: usize) -> usize {
+        let (camera, pose) = (sight.view.camera, sight.pose(0.0));
+        let same = |k: &StillView| k.camera == camera && k.pose == pose;
+        if let Some(k) = self.still.iter().position(same) {
+            return k;
+        }
+        let width = camera.intrinsics.width_px as usize;
+        let rays = &self.lenses[lens].rays;
+        let mut depth_m = vec![f64::INFINITY; rays.len()];
+        let rows = depth_m.par_chunks_mut(width.max(1)).enumerate();
+        rows.for_each(|(v, depth_m)| {
+            let rays = &rays[v * width..(v + 1) * width];
+            self.cast_tunnel(&Row { v, pose, rays }, depth_m);
+        });
+        if self.still.len() >= KEPT {
+            self.still.pop_front();
+        }
+        self.still.push_back(StillView {
+            camera,
+            pose,
+            depth_m,
+        });
+        self.still.len() - 1
+    }
+
+    fn cast_tunnel(&self, row: &Row<'_>, depth_m: &mut [f64]) {
+        let eye = row.eye();
+        let slab = self.tunnel.slab_of(&eye, None);
+        for (u, depth_m) in depth_m.iter_mut().enumerate() {
+            let ray = row.ray(u);
+            if let Some(strike) = self.tunnel.cast(slab, &eye, &ray, SIGHT_M / ray.norm()) {
+                *depth_m = strike.t;
+            }
+        }
+    }
+
+    fn put_bodies(
+        &self,
+        job: &Job,
+        sight: &Sight<'_>,
+        row: &Row<'_>,
+        depth_m: &mut [f64],
+        surface: &mut [Surface],
+    ) {
+        let (eye, after_s) = (row.eye(), sight.after_s(row.v as f64));
+        for (k, body) in job.bodies.iter().enumerate() {
+            let solid = Solid::at(body, after_s);
+            let camera = &sight.view.camera.intrinsics;
+            let outline = Outline::of(solid.corners(), camera, &row.pose);
+            for u in outline.columns(row.v, row.rays.len()) {
+                let ray = row.ray(u);
+                if let Some((t, _)) = solid.cast(&eye, &ray)
+                    && t < depth_m[u]
+                    && t * ray.norm() < SIGHT_M
+                {
+                    depth_m[u] = t;
+                    surface[u] = Surface::Body(k as u16);
+                }
+            }
+        }
+    }
+
+    fn put_lamps(
+        &self,
+        sight: &Sight<'_>,
+        row: &Row<'_>,
+        depth_m: &mut [f64],
+        surface: &mut [Surface],
+    ) {
+        let eye = row.eye();
+        for (k, lamp) in self.lamps.iter().enumerate() {
+            let way = lamp.centre - eye;
+            if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
+                continue;
+            }
+            let camera = &sight.view.camera.intrinsics;
+            let corners = Outline::cube(&lamp.centre, lamp.radius_m);
+            let outline = Outline::of(corners, camera, &row.pose);
+            for u in outline.columns(row.v, row.rays.len()) {
+                let ray = row.ray(u);
+                let t = lamp.facing.dot(&way) / lamp.facing.dot(&ray);
+                if t > 0.0
+                    && (ray * t - way).norm_squared() <= lamp.radius_m * lamp.radius_m
+                    && t - FLUSH_M <= depth_m[u]
+                {
+                    depth_m[u] = t;
+                    surface[u] = Surface::Lamp(k as u16);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

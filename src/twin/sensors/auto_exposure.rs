@@ -1,0 +1,410 @@
+//! Automatic exposure and gain, as the firmware of a camera has it: from delivered images alone.
+//!
+//! # Theory
+//!
+//! Above black, a grey level is proportional to light * exposure * gain. Frame k, taken with the
+//! product p_k of exposure and gain, measures m_k, so `p_k * target / m_k` would have met the
+//! target. Of that and the product in use now the controller takes the geometric mean, weighted by
+//! [`ExposureSettings::damping`]: the error shrinks by that factor with every frame, from one side,
+//! however late images come in, because each is judged by the product it was taken with. Where an
+//! image is clipped, or near black, its mean tells less than there is to correct; a frame moves the
+//! product by [`MAX_STEP`] at most. Errors below [`DEAD_BAND`] are left alone, so that noise moves
+//! nothing.
+//!
+//! Exposure is lengthened first, for it adds light and gain only adds noise: gain rises when the
+//! exposure is at its limit.
+//!
+//! What it does not do: flicker avoidance, regions of interest, apertures.
+//!
+//! ```
+//! use metrotwin::twin::sensors::{AutoExposure, Exposed, ExposureMode, ExposureSettings};
+//! let settings = ExposureSettings {
+//!     mode: ExposureMode::Auto,
+//!     max_exposure_us: Some(50.0),
+//!     ..ExposureSettings::default()
+//! };
+//! let mut control = AutoExposure::new(&settings, Exposed { exposure_s: 20e-6, gain_db: 0.0 }, 4.0);
+//! let first = control.take(0);
+//! control.on_image(0, &image::GrayImage::new(64, 48));
+//! assert!(control.take(1).exposure_s > first.exposure_s);
+//! ```
+
+use crate::track::{Checker, Problem};
+use crate::twin::render::{SensorSettings, View};
+use image::GrayImage;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Most that one frame changes exposure times gain by, up or down.
+pub const MAX_STEP: f64 = 4.0;
+/// Relative error of the measured level that is left alone.
+pub const DEAD_BAND: f64 = 0.05;
+/// Frames whose exposure is remembered until they arrive.
+const REMEMBERED: usize = 32;
+
+/// Who sets exposure and gain.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum ExposureMode {
+    /// Nobody: they stay as written.
+    #[default]
+    Fixed,
+    /// The camera, from what it has seen.
+    Auto,
+}
+
+/// Automatic exposure and gain of a camera, which start as written in its other settings.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ExposureSettings {
+    /// `fixed` or `auto`. Default `fixed`.
+    pub mode: ExposureMode,
+    /// Share of the pixels that is to be darker than the target: 0.5 for the median, 0.99 to keep
+    /// lamps from clipping; 0 for the mean of all pixels instead. Default 0.
+    pub percentile: f64,
+    /// Grey level over black to reach. Default 80.
+    pub target_grey: f64,
+    /// Shortest exposure, us. Default 10.
+    pub min_exposure_us: f64,
+    /// Longest exposure, us. A rig that reads blinking lamps needs less than their chip time.
+    /// Default: the exposure that the camera begins with.
+    pub max_exposure_us: Option<f64>,
+    /// Least gain, dB. Default 0.
+    pub min_gain_db: f64,
+    /// Most gain, dB. Default 24.
+    pub max_gain_db: f64,
+    /// Share of an error that is left after a frame, 0 to 0.95. Default 0.5.
+    pub damping: f64,
+}
+
+impl Default for ExposureSettings {
+    fn default() -> Self {
+        Self {
+            mode: ExposureMode::Fixed,
+            percentile: 0.0,
+            target_grey: 80.0,
+            min_exposure_us: 10.0,
+            max_exposure_us: None,
+            min_gain_db: 0.0,
+            max_gain_db: 24.0,
+            damping: 0.5,
+        }
+    }
+}
+
+impl ExposureSettings {
+    /// Appends what is wrong, with keys below `at`, for a camera that begins with an exposure of
+    /// `exposure_us` and takes a frame every `frame_us`.
+    pub fn check(&self, at: &str, exposure_us: f64, frame_us: f64, problems: &mut Vec<Problem>) {
+        let max_exposure_us = self.max_exposure_us.unwrap_or(exposure_us);
+        let mut check = Checker::new(at, problems);
+        check.within("percentile", self.percentile, 0.0..=1.0, "");
+        check.within("target_grey", self.target_grey, 1.0..=250.0, "");
+        check.within("min_exposure_us", self.min_exposure_us, 0.1..=1e7, "us");
+        check.within("max_exposure_us", max_exposure_us, 0.1..=1e7, "us");
+        check.within("min_gain_db", self.min_gain_db, -20.0..=60.0, "dB");
+        check.within("max_gain_db", self.max_gain_db, -20.0..=60.0, "dB");
+        check.within("damping", self.damping, 0.0..=0.95, "");
+        let limits = [
+            ("exposure_us", self.min_exposure_us, max_exposure_us, "us"),
+            ("gain_db", self.min_gain_db, self.max_gain_db, "dB"),
+        ];
+        for (key, low, high, unit) in limits {
+            if low > high {
+                problems.push(Problem::new(
+                    format!("{at}.min_{key}"),
+                    format!("{low} {unit} is more than the most, {high} {unit}"),
+                    format!("give {high} {unit} or less, or raise max_{key}"),
+                ));
+            }
+        }
+        if max_exposure_us > frame_us {
+            problems.push(Problem::new(
+                format!("{at}.max_exposure_us"),
+                format!(
+                    "an exposure of {max_exposure_us} us is longer than the frame, {frame_us:.0} us"
+                ),
+                format!("expose for less than {frame_us:.0} us, or take fewer frames a second"),
+            ));
+        }
+    }
+}
+
+/// What a frame is taken with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Exposed {
+    /// How long every row collects light.
+    pub exposure_s: f64,
+    /// Gain before the converter.
+    pub gain_db: f64,
+}
+
+impl Exposed {
+    /// Exposure times gain.
+    fn product_s(&self) -> f64 {
+        self.exposure_s * 10f64.powf(self.gain_db / 20.0)
+    }
+}
+
+/// The controller of one camera, or of the master of a pair.
+#[derive(Clone, Debug)]
+pub struct AutoExposure {
+    settings: ExposureSettings,
+    max_exposure_s: f64,
+    black_grey: f64,
+    now: Exposed,
+    /// Frames on their way, with what they were taken with.
+    taken: VecDeque<(u32, Exposed)>,
+}
+
+impl AutoExposure {
+    /// Begins with `start`; darkness has `black_grey`.
+    pub fn new(settings: &ExposureSettings, start: Exposed, black_grey: f64) -> Self {
+        Self {
+            settings: *settings,
+            max_exposure_s: settings
+                .max_exposure_us
+                .map_or(start.exposure_s, |us| 1e-6 * us),
+            black_grey,
+            now: start,
+            taken: VecDeque::new(),
+        }
+    }
+
+    /// Of a camera that is written with this exposure and sensor.
+    pub fn of(settings: &ExposureSettings, exposure_us: f64, sensor: &SensorSettings) -> Self {
+        let start = Exposed {
+            exposure_s: 1e-6 * exposure_us,
+            gain_db: sensor.gain_db,
+        };
+        Self::new(settings, start, sensor.black_level_grey)
+    }
+
+    /// What frame `number` is taken with.
+    pub fn take(&mut self, number: u32) -> Exposed {
+        if self.settings.mode == ExposureMode::Auto {
+            if self.taken.len() >= REMEMBERED {
+                self.taken.pop_front();
+            }
+            self.taken.push_back((number, self.now));
+        }
+        self.now
+    }
+
+    /// Takes frame `number` with it: all views that the camera has of it.
+    pub fn expose(&mut self, number: u32, views: &mut [View]) {
+        if self.settings.mode == ExposureMode::Auto {
+            let with = self.take(number);
+            for view in views {
+                view.camera.shutter.exposure_s = with.exposure_s;
+                view.sensor.gain_db = with.gain_db;
+            }
+        }
+    }
+
+    /// An image is delivered.
+    pub fn on_image(&mut self, number: u32, image: &GrayImage) {
+        let Some(at) = self.taken.iter().position(|(n, _)| *n == number) else {
+            return;
+        };
+        let Some((_, taken)) = self.taken.drain(..=at).next_back() else {
+            return;
+        };
+        let over_black = self.level(image) - self.black_grey;
+        let wanted = self.settings.target_grey / over_black.max(0.5);
+        if (wanted - 1.0).abs() < DEAD_BAND {
+            return;
+        }
+        let wanted = wanted.clamp(1.0 / MAX_STEP, MAX_STEP);
+        let aim = taken.product_s() * wanted;
+        let left = self.settings.damping;
+        self.now = self.split(self.now.product_s().powf(left) * aim.powf(1.0 - left));
+    }
+
+    /// The level that is held against the target.
+    fn level(&self, image: &GrayImage) -> f64 {
+        if image.is_empty() {
+            return self.black_grey;
+        }
+        let count = image.len() as f64;
+        if self.settings.percentile <= 0.0 {
+            return image.iter().map(|x| f64::from(*x)).sum::<f64>() / count;
+        }
+        let mut histogram = [0u32; 256];
+        for x in image.iter() {
+            histogram[usize::from(*x)] += 1;
+        }
+        let mut left = self.settings.percentile * count;
+        for (grey, pixels) in histogram.iter().enumerate() {
+            left -= f64::from(*pixels);
+            if left <= 0.0 {
+                return grey as f64;
+            }
+        }
+        255.0
+    }
+
+    /// Exposure first, then gain, within their limits.
+    fn split(&self, product_s: f64) -> Exposed {
+        let limits = &self.settings;
+        let least = 10f64.powf(limits.min_gain_db / 20.0);
+        let shortest_s = (1e-6 * limits.min_exposure_us).min(self.max_exposure_s);
+        let exposure_s = (product_s / least).clamp(shortest_s, self.max_exposure_s);
+        let gain_db = 20.0 * (product_s / exposure_s).log10();
+        Exposed {
+            exposure_s,
+            gain_db: gain_db.clamp(limits.min_gain_db, limits.max_gain_db),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::twin::random::Stream;
+
+    const BLACK: f64 = 4.0;
+
+    fn auto() -> ExposureSettings {
+        ExposureSettings {
+            mode: ExposureMode::Auto,
+            min_exposure_us: 5.0,
+            max_exposure_us: Some(50.0),
+            ..ExposureSettings::default()
+        }
+    }
+
+    fn start() -> Exposed {
+        Exposed {
+            exposure_s: 20e-6,
+            gain_db: 0.0,
+        }
+    }
+
+    /// A scene from half to one and a half times `light`, grey levels a microsecond, with noise.
+    fn image(light: f64, with: &Exposed, number: u32) -> GrayImage {
+        let stream = Stream::new(8, number.into(), "picture");
+        GrayImage::from_fn(40, 30, |x, y| {
+            let signal = light * (0.5 + f64::from(x) / 39.0) * 1e6 * with.product_s();
+            let noise = 2.0 * stream.normal(u64::from(40 * y + x));
+            [(BLACK + signal + noise).round().clamp(0.0, 255.0) as u8].into()
+        })
+    }
+
+    /// Products frame by frame; images come in `latency` frames after they are taken.
+    fn run(
+        settings: &ExposureSettings,
+        latency: usize,
+        light: impl Fn(u32) -> f64,
+    ) -> Vec<Exposed> {
+        let mut control = AutoExposure::new(settings, start(), BLACK);
+        let mut on_the_way = VecDeque::new();
+        (0..80)
+            .map(|number| {
+                let with = control.take(number);
+                on_the_way.push_back((number, image(light(number), &with, number)));
+                if on_the_way.len() > latency
+                    && let Some((number, image)) = on_the_way.pop_front()
+                {
+                    control.on_image(number, &image);
+                }
+                with
+            })
+            .collect()
+    }
+
+    /// Fails where late images are corrected twice, which swings, or noise moves what is right:
+    /// after a step of brightness, up or down, the product goes to its place from one side and
+    /// stays there.
+    #[test]
+    fn a_step_of_brightness_is_followed_without_hunting() {
+        for (before, after) in [(4.0, 1.2), (1.2, 4.0), (1.0, 12.0)] {
+            for latency in [0, 1, 2, 4] {
+                let light = |number| if number < 40 { before } else { after };
+                let taken = run(&auto(), latency, light);
+                for (range, light) in [(0..40, before), (40..80, after)] {
+                    let right_s = 1e-6 * auto().target_grey / light;
+                    let off: Vec<_> = taken[range]
+                        .iter()
+                        .map(|e| e.product_s() / right_s)
+                        .collect();
+                    let last = off[off.len() - 1];
+                    assert!((last - 1.0).abs() < 1.5 * DEAD_BAND, "{latency}: {last}");
+                    let settled = off.len() - 15;
+                    assert!(
+                        off[settled..].iter().all(|x| (x - last).abs() < 1e-12),
+                        "{off:?}"
+                    );
+                    // From one side: never beyond by more than the dead band.
+                    let from_below = off[0] < 1.0;
+                    let beyond = |x: &f64| if from_below { x - 1.0 } else { 1.0 - x };
+                    assert!(
+                        off.iter().all(|x| beyond(x) < 1.5 * DEAD_BAND),
+                        "{latency}: {off:?}"
+                    );
+                }
+            }
+        }
+    }
+
+    /// Fails where limits are overstepped, or gain is used before exposure is.
+    #[test]
+    fn limits_hold_and_exposure_goes_first() {
+        let settings = auto();
+        let dark = run(&settings, 1, |_| 0.01);
+        let last = dark[dark.len() - 1];
+        assert!((last.exposure_s - 50e-6).abs() < 1e-12 && (last.gain_db - 24.0).abs() < 1e-9);
+        let bright = run(&settings, 1, |_| 1e3);
+        let last = bright[bright.len() - 1];
+        assert!((last.exposure_s - 5e-6).abs() < 1e-12 && last.gain_db.abs() < 1e-9);
+        for with in dark.iter().chain(&bright) {
+            assert!(
+                with.gain_db < 1e-9 || with.exposure_s > 49.999e-6,
+                "{with:?}"
+            );
+        }
+    }
+
+    /// Fails where a high percentile does not keep the brightest part from clipping, and where a
+    /// fixed camera moves.
+    #[test]
+    fn percentiles_and_fixed_cameras() {
+        let settings = ExposureSettings {
+            percentile: 0.95,
+            target_grey: 200.0,
+            ..auto()
+        };
+        let taken = run(&settings, 1, |_| 4.0);
+        // 95 % of the picture is darker than 1.45 times its mean.
+        let right_s = 1e-6 * 200.0 / (4.0 * 1.45);
+        let last = taken[taken.len() - 1].product_s() / right_s;
+        assert!((last - 1.0).abs() < 1.5 * DEAD_BAND, "{last}");
+        let fixed = run(&ExposureSettings::default(), 1, |_| 4.0);
+        assert!(fixed.iter().all(|with| *with == start()));
+    }
+
+    /// Fails where limits that exclude each other, or an exposure over the frame, get through.
+    #[test]
+    fn bad_limits_are_refused() {
+        let mut problems = Vec::new();
+        auto().check("exposure", 30.0, 33_333.0, &mut problems);
+        ExposureSettings::default().check("exposure", 30.0, 33_333.0, &mut problems);
+        assert!(problems.is_empty());
+        let settings = ExposureSettings {
+            min_exposure_us: 60.0,
+            ..auto()
+        };
+        settings.check("exposure", 30.0, 33_333.0, &mut problems);
+        let settings = ExposureSettings {
+            max_exposure_us: Some(1e5),
+            ..auto()
+        };
+        settings.check("exposure", 30.0, 33_333.0, &mut problems);
+        let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
+        assert_eq!(
+            keys,
+            ["exposure.min_exposure_us", "exposure.max_exposure_us"]
+        );
+    }
+}
