@@ -13,7 +13,7 @@
 )]
 
 use image::GrayImage;
-use metrotwin::bus::{Distortion, SimTime};
+use metrotwin::bus::{Distortion, DistortionCoefficients, SimTime};
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
 use metrotwin::twin::render::cpu::CpuRenderer;
@@ -173,7 +173,7 @@ fn outline_errors(make: Make, view: &View, lamp: &LampLight) -> Vec<f64> {
 }
 
 /// A lens that moves the corners of the picture by 70 px.
-const BENT: Distortion = Distortion {
+const BENT: DistortionCoefficients = DistortionCoefficients {
     k1: -0.28,
     k2: 0.09,
     k3: -0.012,
@@ -186,7 +186,7 @@ const BENT: Distortion = Distortion {
 /// downwards and upwards, through a lens that bends, and sharp or soft.
 #[test]
 fn outlines_are_where_the_row_time_equation_has_them() {
-    let bend: fn(&mut View) = |view| view.camera.intrinsics.distortion = BENT;
+    let bend: fn(&mut View) = |view| view.camera.intrinsics.distortion = Distortion::new(BENT);
     let plain: fn(&mut View) = |_| ();
     let cases: [(&str, &[f64], fn(&mut View)); 6] = [
         ("plain", &[0.0, 40.0, 80.0, 120.0, 160.0], plain),

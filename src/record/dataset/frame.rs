@@ -231,7 +231,7 @@ pub(super) fn row(
         .zip(train)
         .map(|(left, train)| train.world_from_vehicle.inverse() * left.motion.pose_at(left.mid()));
     let vehicle_from_camera = vehicle_from_left.zip(left_from_camera).map(|(a, b)| a * b);
-    let d = &camera.distortion;
+    let d = camera.distortion.coefficients();
     let sensor = &view.sensor;
     let [image, raw, clean, depth, mask] = name.files;
     vec![

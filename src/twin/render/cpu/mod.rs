@@ -155,8 +155,6 @@ struct RowBuffers {
     /// Of the nearest surface; not a number where nobody has asked yet.
     depths: Vec<f64>,
     luminances: Vec<f64>,
-    /// Of the slices so far.
-    sums: Vec<f64>,
 }
 
 /// The rays of a row through the tunnel.

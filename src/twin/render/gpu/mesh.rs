@@ -299,7 +299,7 @@ mod tests {
     /// Provokes holes, wrong sizes and normals that point inwards.
     #[test]
     fn volumes_are_those_of_the_shapes() {
-        let pi = std::f64::consts::PI;
+        let pi = PI;
         let cases = [
             (Shape::Box(Vector3::new(0.5, 1.0, 2.0)), 8.0, 1e-6),
             (Shape::Cylinder(0.5, 1.5), pi * 0.25 * 3.0, 0.01),
