@@ -12,7 +12,7 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
-use metrotwin::bus::Method;
+use metrotwin::bus::{Method, SimTime};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
     Distribution, End, Event, Observer, ObserverError, Opening, RunOptions, Summary, run,
@@ -149,4 +149,82 @@ fn val_forgotten_toolbox() {
     // Before it, and not needlessly far: the authority ends 25 m before the obstacle.
     let margin_m = protection.stop_margin_m.unwrap();
     assert!((10.0..50.0).contains(&margin_m), "{margin_m} m");
+}
+
+/// How far off the position is that the train runs by (lamps, and the odometer between them), ten
+/// times a second, whether there is a fix or not; not before a first one can be there.
+#[derive(Default)]
+struct ErrorByTime {
+    said: Option<(SimTime, f64)>,
+    errors_m: Vec<f64>,
+}
+
+impl Observer for ErrorByTime {
+    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
+        Ok(())
+    }
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match event {
+            Event::Protection(report) => {
+                self.said = report.position_m.map(|m| (report.time, m));
+            }
+            Event::Train(truth, _) => {
+                let settled = truth.time.secs() > 3.0;
+                if let Some((time, said_m)) = self.said.filter(|_| settled)
+                    && time == truth.time
+                {
+                    self.errors_m.push((said_m - truth.chainage_m).abs());
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+    fn close(&mut self) -> Result<(), ObserverError> {
+        Ok(())
+    }
+}
+
+/// Lamps out at random. Published for a vehicle with one LED receiver and an inertial unit: 0.09,
+/// 0.11, 0.15 and 0.18 m in the mean with 0, 5.5, 11 and 22 % of the lamps out (Transportation
+/// Research Record). Provokes: names that shift by one where a lamp is missing, a position that is
+/// lost from one lamp to the next but one.
+///
+/// Prints the table: `cargo test --release --test validation val_lamps_out -- --nocapture`.
+#[test]
+fn val_lamps_out() {
+    println!("lamps out   error mean    p95    max   published   availability   read");
+    for (share, published_m) in [(0.0, 0.09), (0.055, 0.11), (0.11, 0.15), (0.22, 0.18)] {
+        let out = format!("faults.lamps=[{{share={share:?},fault={{kind='dead'}}}}]");
+        let scenario = scenario(
+            "line_run",
+            &[
+                "duration_s=23",
+                "train.start_speed_kmh=60",
+                "train.start_chainage_m=400",
+                "stack.protection.initial_chainage_m=401",
+                &out,
+            ],
+        );
+        let mut errors = ErrorByTime::default();
+        let summary = figures(&scenario, &mut errors);
+        let error = Distribution::of(&mut errors.errors_m).unwrap();
+        let paper = &summary.positioning[&Method::Paper];
+        let availability = paper.availability.unwrap();
+        println!(
+            "{:7.1} %   {:8.3} m {:6.3} {:6.3} {:9.2} m {:12.1} % {:7.1} %",
+            100.0 * share,
+            error.mean,
+            error.p95,
+            error.max,
+            published_m,
+            100.0 * availability,
+            100.0 * paper.uid_decode_rate.unwrap(),
+        );
+        assert!(errors.errors_m.len() >= 199);
+        assert_eq!(paper.wrong_uid, 0, "{share}");
+        assert!(error.mean < published_m, "{share}: {} m", error.mean);
+        // A lamp is in view for a little more than the way to the next one.
+        assert!(availability > 0.97 - 1.2 * share, "{share}: {availability}");
+    }
 }

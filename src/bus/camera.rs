@@ -194,7 +194,7 @@ pub struct Frame {
     pub number: u32,
     /// When its first row opened, as the camera says.
     pub start: SimTime,
-    /// 8-bit grey.
+    /// 8-bit grey; 0 x 0 where the camera has delivered none.
     pub image: GrayImage,
 }
 

@@ -1,6 +1,6 @@
 //! What the positioning stack says of one pair of images.
 
-use super::SimTime;
+use super::{CameraHealth, SimTime};
 use crate::track::uid::Uid;
 use nalgebra::{Point2, Point3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -106,10 +106,23 @@ pub struct LedReport {
     pub time: SimTime,
     /// The pair's frame number.
     pub number: u32,
+    /// How the eyes do, left then right. What one of them shows while it has a fault is not used.
+    pub eyes: [CameraHealth; 2],
     /// Lamps seen by the left eye.
     pub left: Vec<Spot>,
     /// Lamps seen by the right eye.
     pub right: Vec<Spot>,
+    /// Lamps that have just gone by without shining.
+    pub dark: Vec<Uid>,
     /// Fixes, at most one a method.
     pub fixes: Vec<PositionFix>,
+}
+
+impl LedReport {
+    /// The position that a train should run by: that of both eyes, or of the one that is left.
+    pub fn best_fix(&self) -> Option<&PositionFix> {
+        let by = |method| self.fixes.iter().find(|fix| fix.method == method);
+        let one_eyed = self.eyes.iter().any(|eye| !eye.is_good());
+        by(Method::Paper).or_else(|| by(Method::Mono).filter(|_| one_eyed))
+    }
 }

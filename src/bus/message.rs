@@ -13,7 +13,7 @@ pub enum Via {
     Radio,
 }
 
-/// "There is, or is no longer, an obstacle here."
+/// "There is, or is no longer, an obstacle here", or "I cannot see whether there is one".
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ObstacleWarning {
     /// Name of the device.
@@ -28,6 +28,8 @@ pub struct ObstacleWarning {
     pub from_chainage_m: f64,
     /// The far end.
     pub to_chainage_m: f64,
+    /// Nothing was found: the device is blind, and this is the stretch that it cannot vouch for.
+    pub blind: bool,
 }
 
 /// A message as a train gets it.

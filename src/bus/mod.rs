@@ -18,6 +18,7 @@ mod camera;
 mod command;
 mod distortion;
 mod fix;
+mod health;
 #[cfg(test)]
 pub mod lenses;
 mod message;
@@ -29,6 +30,7 @@ pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, Stereo
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use distortion::{Distortion, DistortionCoefficients};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
+pub use health::{CameraFault, CameraHealth};
 pub use message::{Delivery, ObstacleWarning, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
 pub use time::SimTime;

@@ -1,8 +1,9 @@
 //! What a wayside device sees, knows and says.
 
-use super::{CameraModel, PixelBox, SimTime};
+use super::{CameraHealth, CameraModel, PixelBox, SimTime};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -45,7 +46,9 @@ pub struct WaysideCalibration {
 }
 
 /// How dangerous an obstacle is to a train.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum DangerLevel {
     /// Outside the structure gauge, or nothing.
@@ -126,6 +129,10 @@ pub struct WaysideReport {
     pub time: SimTime,
     /// Frame number.
     pub number: u32,
+    /// How the camera does.
+    pub camera: CameraHealth,
+    /// It has shown nothing for so long that its stretch counts as occupied.
+    pub blind: bool,
     /// The reference image is still being learnt: nothing can be found yet.
     pub learning: bool,
     /// A train stands or runs where the camera looks, so that part of its view is blind.

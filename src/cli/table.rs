@@ -29,6 +29,8 @@ fn write_all(text: &mut String, s: &Summary, out: &Path) -> std::fmt::Result {
     )?;
     positioning(text, s)?;
     wayside(text, s)?;
+    cameras(text, s)?;
+    dark_lamps(text, s)?;
     protection(text, s)?;
     train(text, s)?;
     writeln!(text, "\nresults in {}", out.display())
@@ -120,6 +122,50 @@ fn wayside(text: &mut String, s: &Summary) -> std::fmt::Result {
         cost(w.ms_per_frame)
     )
 }
+
+/// Only those that had something.
+fn cameras(text: &mut String, s: &Summary) -> std::fmt::Result {
+    for (name, camera) in &s.cameras {
+        if camera.lost_frames == 0 && camera.faults.is_empty() {
+            continue;
+        }
+        let mut said = Vec::new();
+        if camera.lost_frames > 0 {
+            said.push(format!("{} frames lost", camera.lost_frames));
+        }
+        let shown = camera.faults.iter().take(FAULTS);
+        said.extend(shown.map(|span| match span.to_s {
+            Some(to_s) => format!("{} from {:.2} to {to_s:.2} s", span.fault, span.from_s),
+            None => format!("{} from {:.2} s to the end", span.fault, span.from_s),
+        }));
+        if camera.faults.len() > FAULTS {
+            said.push(format!("{} faults in all", camera.faults.len()));
+        }
+        writeln!(text, "\ncamera {name}: {}", said.join(", "))?;
+    }
+    Ok(())
+}
+
+/// How many lamps are out, with the first ones' names.
+fn dark_lamps(text: &mut String, s: &Summary) -> std::fmt::Result {
+    let names: Vec<_> = s
+        .dark_lamps
+        .iter()
+        .take(LAMPS)
+        .map(String::as_str)
+        .collect();
+    match s.dark_lamps.len() {
+        0 => Ok(()),
+        n if n <= LAMPS => writeln!(text, "dark lamps: {}", names.join(", ")),
+        n => writeln!(text, "{n} dark lamps: {}, ...", names.join(", ")),
+    }
+}
+
+/// Dark lamps that the table names.
+const LAMPS: usize = 8;
+
+/// Faults of a camera that the table lists.
+const FAULTS: usize = 4;
 
 fn protection(text: &mut String, s: &Summary) -> std::fmt::Result {
     let Some(p) = &s.protection else {

@@ -228,6 +228,7 @@ impl Open {
             Event::Exposure(_) => return Ok(()),
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
+                Texts::dark_lamps(stream, report)?;
                 self.images.pair(stream, pair, report)?;
                 self.moving.fixes(stream, scene, report)?;
                 report.time
@@ -250,6 +251,10 @@ impl Open {
                 self.texts.protection(stream, report)?;
                 self.texts.display(stream, report.time, &report.display)?;
                 report.time
+            }
+            Event::Camera(time, camera, fault) => {
+                Texts::camera(stream, time, camera, fault)?;
+                time
             }
             Event::Delivery(delivery) => {
                 self.texts.delivery(stream, delivery)?;

@@ -239,6 +239,7 @@ fn regress_the_log_tells_a_repeated_warning_once() {
                 },
                 from_chainage_m: 100.0,
                 to_chainage_m: 101.0,
+                blind: false,
             },
         };
         recording.observe(&Event::Delivery(&delivery)).unwrap();

@@ -3,8 +3,8 @@
 use super::palette;
 use super::stream::Stream;
 use crate::bus::{
-    BrakeDemand, DangerLevel, Delivery, DriverDisplay, ProtectionReport, SimTime, Via,
-    WaysideReport,
+    BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, LedReport, ProtectionReport,
+    SimTime, Via, WaysideReport,
 };
 use crate::session::{ObserverError, Opening};
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
@@ -53,6 +53,42 @@ impl Texts {
         log(stream, time, TextLogLevel::INFO, text)
     }
 
+    /// The stack says that a camera has failed, or is well again.
+    pub(super) fn camera(
+        stream: &Stream,
+        time: SimTime,
+        camera: &str,
+        fault: Option<CameraFault>,
+    ) -> Result<(), ObserverError> {
+        match fault {
+            Some(fault) => log(
+                stream,
+                time,
+                TextLogLevel::ERROR,
+                &format!("camera {camera}: {fault}"),
+            ),
+            None => log(
+                stream,
+                time,
+                TextLogLevel::INFO,
+                &format!("camera {camera} sees again"),
+            ),
+        }
+    }
+
+    /// Lamps have gone by without shining.
+    pub(super) fn dark_lamps(stream: &Stream, report: &LedReport) -> Result<(), ObserverError> {
+        for uid in &report.dark {
+            log(
+                stream,
+                report.time,
+                TextLogLevel::WARN,
+                &format!("lamp {uid} is dark"),
+            )?;
+        }
+        Ok(())
+    }
+
     /// A message reached the train. Devices repeat theirs; the log does not.
     pub(super) fn delivery(
         &mut self,
@@ -72,6 +108,14 @@ impl Texts {
         let delay_s = delivery.received.since(warning.issued);
         let (level, what) = match warning.danger {
             DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
+            danger if warning.blind => (
+                level(danger),
+                format!(
+                    "track not watched, km {:.4} to {:.4}",
+                    warning.from_chainage_m / 1000.0,
+                    warning.to_chainage_m / 1000.0,
+                ),
+            ),
             danger => (
                 level(danger),
                 format!(

@@ -378,6 +378,8 @@ impl Session<'_> {
             }
         });
         let report = LedReport {
+            eyes: Default::default(),
+            dark: Vec::new(),
             time: start,
             number,
             left: std::mem::take(&mut eyes[0].1),
@@ -524,6 +526,7 @@ impl Session<'_> {
                 danger: DangerLevel::High,
                 from_chainage_m: OBSTACLE_M - 0.5,
                 to_chainage_m: OBSTACLE_M + 0.5,
+                blind: false,
             };
             self.tell(&Event::Delivery(&Delivery {
                 received: report.time,

@@ -6,7 +6,9 @@ use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
 use crate::track::{FileError, Problem, Tunnel, key_below, read_toml};
+use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
+use crate::twin::faults::FaultSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -49,6 +51,10 @@ pub struct Scenario {
     pub wayside: Vec<WaysidePost>,
     /// The radio.
     pub radio: RadioSettings,
+    /// What one sees through.
+    pub air: AirSettings,
+    /// Lamps and cameras that are out of order.
+    pub faults: FaultSettings,
     /// The stack's settings.
     pub stack: StackSettings,
     /// What goes into the recording.
@@ -209,6 +215,8 @@ impl Scenario {
             doppler: file.doppler,
             wayside,
             radio: file.radio,
+            air: file.air,
+            faults: file.faults,
             stack: file.stack,
             record: file.record,
         }
@@ -296,6 +304,8 @@ fn overridden(
 /// Poses are asked for until the last row of a frame has closed.
 fn history_s(file: &ScenarioFile) -> f64 {
     let span_s = (file.rig.as_ref()).map_or(0.0, |rig| rig.as_built().pair_span_s());
+    let late_s = file.faults.cameras.iter().map(|fault| fault.late_s());
+    let latency_s = 1e-3 * file.stack.latency_ms + late_s.fold(0.0, f64::max);
     // A fix is scored when it has gone through the stack.
-    (2.0 * span_s + 1e-3 * file.stack.latency_ms + 0.1).max(PhysicsSettings::default().history_s)
+    (2.0 * span_s + latency_s + 0.1).max(PhysicsSettings::default().history_s)
 }

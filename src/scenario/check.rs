@@ -44,6 +44,9 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
             ));
         }
     }
+    file.air.check("air", problems);
+    file.faults.check("faults", problems);
+    check_faulty_cameras(file, problems);
     check_carrier(file, problems);
     check_motion(file, problems);
     check_appearances(file, problems);
@@ -55,6 +58,7 @@ pub(super) fn in_tunnel(
     tunnel: &Tunnel,
     problems: &mut Vec<Problem>,
 ) -> Vec<WaysidePost> {
+    file.faults.check_in(tunnel, "faults", problems);
     check_trains(file, tunnel, problems);
     if let Some(bench) = &file.bench {
         let heads: Vec<f64> = bench.heads_m().collect();
@@ -133,6 +137,35 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
                 key,
                 "a bench test has the rig and the lamps only: they would not be there",
                 format!("take out [bench] or [[{key}]]"),
+            ));
+        }
+    }
+}
+
+/// A fault of a camera that is not there would go unnoticed.
+fn check_faulty_cameras(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    let eyes = ["rig", "left", "right"].map(str::to_owned);
+    let eyes = eyes.into_iter().filter(|_| file.rig.is_some());
+    let devices = file.wayside.iter().map(|post| post.device.clone());
+    let names: Vec<String> = eyes.chain(devices).collect();
+    for (k, fault) in file.faults.cameras.iter().enumerate() {
+        if !names.contains(&fault.camera) {
+            let remedy = match did_you_mean(&fault.camera, &names) {
+                Some(name) => format!("did you mean `{name}`?"),
+                None if names.is_empty() => "add [rig] or [[wayside]], or take this out".to_owned(),
+                None => format!("cameras of this scenario: {}", names.join(", ")),
+            };
+            problems.push(Problem::new(
+                format!("faults.cameras[{k}].camera"),
+                format!("there is no camera `{}`", fault.camera),
+                remedy,
+            ));
+        }
+        if file.bench.is_some() && fault.late_s() > 0.0 {
+            problems.push(Problem::new(
+                format!("faults.cameras[{k}].fault.by_ms"),
+                "a rig at rest on a bench does not wait for its images: they cannot be late",
+                "take this out",
             ));
         }
     }
@@ -484,6 +517,56 @@ mod tests {
         assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
         let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";
         assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
+    }
+
+    /// Every fault that could not act as written is refused, with its key.
+    #[test]
+    fn faults_must_be_able_to_strike() {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let keys = |faults: &str| {
+            let text = format!(
+                "name = \"test\"\ntunnel = \"given\"\n[train]\nstop_at_m = 900.0\n[rig]\n\
+                 [[wayside]]\ndevice = \"W1530\"\n{faults}"
+            );
+            let (file, mut problems) = (read_toml(&text).unwrap(), Vec::new());
+            alone(&file, &mut problems);
+            in_tunnel(&file, &tunnel, &mut problems);
+            problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+        };
+        let lamp = |rest: &str| keys(&format!("[[faults.lamps]]\n{rest}\n"));
+        assert_eq!(lamp("share = 0.22\nfault = { kind = 'dead' }"), [""; 0]);
+        let bad = "share = 1.5\nfault = { kind = 'dim', level = -0.1 }\nfrom_s = 5.0\nto_s = 4.0";
+        let at = "faults.lamps[0]";
+        let expected = ["to_s", "share", "fault.level"].map(|key| format!("{at}.{key}"));
+        assert_eq!(lamp(bad), expected);
+        let flicker = "fault = { kind = 'flicker', depth = 2.0, frequency_hz = 0.0 }";
+        let expected = ["depth", "frequency_hz"].map(|key| format!("{at}.fault.{key}"));
+        assert_eq!(lamp(flicker), expected);
+        let missing = "numbers = [3, 4000]\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(missing), [format!("{at}.numbers")]);
+        let nowhere = "from_m = 12.0\nto_m = 13.0\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(nowhere), [format!("{at}.from_m")]);
+        let backwards = "from_m = 40.0\nto_m = 30.0\nfault = { kind = 'dead' }";
+        assert_eq!(lamp(backwards)[0], format!("{at}.to_m"));
+
+        assert_eq!(keys("[air]\nvisibility_m = 60.0"), [""; 0]);
+        let air = "[air]\nvisibility_m = 0.0\nscattered_share = 2.0";
+        assert_eq!(keys(air), ["air.visibility_m", "air.scattered_share"]);
+
+        let camera = |rest: &str| keys(&format!("[[faults.cameras]]\n{rest}\n"));
+        for name in ["rig", "left", "right", "W1530"] {
+            let freeze = format!("camera = '{name}'\nfault = {{ kind = 'freeze' }}");
+            assert_eq!(camera(&freeze), [""; 0]);
+        }
+        let at = "faults.cameras[0]";
+        let stranger = "camera = 'W1350'\nfault = { kind = 'freeze' }";
+        assert_eq!(camera(stranger), [format!("{at}.camera")]);
+        let share = "camera = 'rig'\nfault = { kind = 'drop', share = -0.1 }\nfrom_s = -1.0";
+        let expected = ["from_s", "fault.share"].map(|key| format!("{at}.{key}"));
+        assert_eq!(camera(share), expected);
+        let late = "camera = 'rig'\nfault = { kind = 'late', by_ms = 1e9 }";
+        assert_eq!(camera(late), [format!("{at}.fault.by_ms")]);
     }
 
     /// Two trains in one place would burst apart.

@@ -5,7 +5,9 @@ use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
 use crate::track::Problem;
+use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
+use crate::twin::faults::FaultSettings;
 use crate::twin::physics::{
     CableSettings, ObstacleSettings, PhysicsSettings, TrackSettings, TrainSettings, WorkerSettings,
 };
@@ -84,6 +86,12 @@ pub struct ScenarioFile {
     /// The radio from wayside devices to the train.
     #[serde(default)]
     pub radio: RadioSettings,
+    /// What one sees through. Default: clear air.
+    #[serde(default)]
+    pub air: AirSettings,
+    /// Lamps and cameras that are out of order. Default: none.
+    #[serde(default)]
+    pub faults: FaultSettings,
     /// The stack: positioning, detection, protection.
     #[serde(default)]
     pub stack: StackSettings,

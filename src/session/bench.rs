@@ -101,6 +101,9 @@ impl<'s> Bench<'s> {
                     break;
                 }
                 self.eyes.clock.advance();
+                if self.eyes.trouble.drops(number, start) {
+                    continue;
+                }
                 self.look(number, start, head_m, &vehicle, watchers)?;
             }
             if let Some(progress) = options.progress {

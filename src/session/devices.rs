@@ -6,16 +6,18 @@
 use super::cameras::{Clock, wayside_view};
 use super::score::{Presence, WaysideScore};
 use super::watch::Stopwatch;
-use crate::bus::{Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
+use crate::bus::{CameraHealth, Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::stack::wayside::WaysideDetector;
 use crate::track::{BED_M, Tunnel};
 use crate::twin::comms::Comms;
+use crate::twin::faults::{CameraTrouble, Grabber};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
 use crate::twin::render::cpu::TunnelCaster;
 use crate::twin::sensors::{AutoExposure, Lidar, Trigger, WaysideCameraSettings};
+use image::GrayImage;
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -29,6 +31,8 @@ pub struct Device {
     stream: Stream,
     trigger: Trigger,
     clock: Clock,
+    trouble: CameraTrouble,
+    grabber: Grabber,
     lidar: Option<(Lidar, Clock)>,
     scan: Option<LidarScan>,
     detector: WaysideDetector,
@@ -52,6 +56,8 @@ impl Device {
 
     fn new(scenario: &Scenario, post: &WaysidePost, map: &Arc<Tunnel>) -> Self {
         let name = &post.calibration.name;
+        let faults = &scenario.faults.cameras;
+        let trouble = CameraTrouble::of(&[name], faults, scenario.seed);
         Self {
             calibration: post.calibration.clone(),
             outlook: Outlook::new(scenario, &post.actual),
@@ -68,6 +74,8 @@ impl Device {
                 post.camera.frame_jitter_us,
             ),
             clock: Clock::new(post.camera.frames_per_s),
+            grabber: Grabber::new(trouble.clone()),
+            trouble,
             lidar: (post.lidar.as_ref().zip(post.actual.world_from_lidar)).map(
                 |(settings, pose)| {
                     let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
@@ -92,12 +100,15 @@ impl Device {
         }
     }
 
-    /// A frame whose last row has closed by `now`: its number, start and view.
+    /// A frame whose last row has closed by `now`, and that is not lost: its number, start and view.
     pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime, View)> {
         let camera = self.outlook.device.camera;
         let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let delay_s = span_s + self.trigger.latest_s();
         let (number, start) = self.clock.due(now, delay_s)?;
+        if self.trouble.drops(number, start) {
+            return None;
+        }
         let mut view = wayside_view(
             &self.outlook.device,
             &self.camera,
@@ -121,6 +132,22 @@ impl Device {
         }
     }
 
+    /// By how much the images of a frame come late.
+    pub fn late_s(&self, start: SimTime) -> f64 {
+        self.trouble.late_s(start)
+    }
+
+    /// A frame as it is handed to the box. Exposure is set by what the sensor saw.
+    pub fn frame(&mut self, number: u32, start: SimTime, image: GrayImage) -> Frame {
+        self.exposure.on_image(number, &image);
+        let image = self.grabber.grab(number, start, image);
+        Frame {
+            number,
+            start,
+            image,
+        }
+    }
+
     /// What goes with a frame that is complete now.
     pub fn look(&self, world: &World) -> Look {
         Look {
@@ -138,7 +165,6 @@ impl Device {
         comms: &mut Comms,
         watch: &mut Stopwatch,
     ) -> WaysideReport {
-        self.exposure.on_image(frame.number, &frame.image);
         let train = comms.train_report(now);
         let detector = &mut self.detector;
         let (report, seconds) = watch.time(|| detector.on_frame(frame, look.scan.as_ref(), train));
@@ -148,6 +174,16 @@ impl Device {
             comms.send(now, &self.balise, warning);
         }
         report
+    }
+
+    /// Time passes in the box; gives how its camera does where it has fallen silent.
+    pub fn wait(&mut self, now: SimTime, comms: &mut Comms) -> Option<CameraHealth> {
+        let train = comms.train_report(now);
+        let report = self.detector.on_time(now, train)?;
+        if let Some(warning) = self.detector.message(&report) {
+            comms.send(now, &self.balise, warning);
+        }
+        Some(report.camera)
     }
 
     /// As surveyed.

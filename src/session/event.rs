@@ -1,8 +1,8 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
 use crate::bus::{
-    Delivery, DopplerSample, LedReport, OdometerSample, ProtectionReport, RigCalibration, SimTime,
-    StereoPair, WaysideCalibration, WaysideReport,
+    CameraFault, Delivery, DopplerSample, LedReport, OdometerSample, ProtectionReport,
+    RigCalibration, SimTime, StereoPair, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use crate::twin::physics::{Belonging, TrainState};
@@ -89,6 +89,9 @@ pub enum Event<'a> {
     Wayside(usize, SimTime, &'a GrayImage, &'a WaysideReport),
     /// A cycle of the protection.
     Protection(&'a ProtectionReport),
+    /// The stack says that a camera has failed, with another fault than before, or that it is well
+    /// again.
+    Camera(SimTime, &'a str, Option<CameraFault>),
     /// A message arrived at the train.
     Delivery(&'a Delivery),
     /// Anything worth a line in the log.

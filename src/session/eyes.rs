@@ -8,6 +8,7 @@ use crate::bus::{LedReport, Method, SimTime, StereoPair};
 use crate::scenario::Scenario;
 use crate::stack::positioning::LedPositioner;
 use crate::track::Tunnel;
+use crate::twin::faults::{CameraTrouble, Grabber};
 use crate::twin::render::View;
 use crate::twin::sensors::{AutoExposure, RigSettings};
 use image::GrayImage;
@@ -26,6 +27,12 @@ pub struct Eyes {
     pub positioner: LedPositioner,
     /// The positions given, held against the truth.
     pub score: PositioningScore,
+    /// Lamps that the stack says do not shine.
+    pub dark_lamps: Vec<String>,
+    /// What befalls whole pairs.
+    pub trouble: CameraTrouble,
+    /// What befalls the images of either eye.
+    grabbers: [Grabber; 2],
 }
 
 /// A pair that the stack has read.
@@ -41,13 +48,30 @@ pub struct Reading {
 impl Eyes {
     /// Before the first pair.
     pub fn new(scenario: &Scenario, rig: &RigSettings, map: &Arc<Tunnel>) -> Self {
+        let trouble =
+            |names: &[&str]| CameraTrouble::of(names, &scenario.faults.cameras, scenario.seed);
         Self {
+            dark_lamps: Vec::new(),
+            trouble: trouble(&["rig"]),
+            grabbers: ["left", "right"].map(|eye| Grabber::new(trouble(&["rig", eye]))),
             camera: StereoCamera::new(rig, scenario.seed),
             exposure: AutoExposure::of(&rig.exposure_control, rig.exposure_us, &rig.sensor),
             clock: Clock::new(rig.pairs_per_s),
             positioner: positioner(scenario, rig, map),
             score: PositioningScore::new(scenario.tunnel.clone(), &Method::ALL),
         }
+    }
+
+    /// A pair whose rows are over by `now` and that is not lost: its number and start.
+    pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime)> {
+        let (number, start) = self.clock.due(now, self.camera.delay_s())?;
+        (!self.trouble.drops(number, start)).then_some((number, start))
+    }
+
+    /// By how much the images of a pair come late: it is complete with the later eye.
+    pub fn late_s(&self, start: SimTime) -> f64 {
+        let late = self.grabbers.iter().map(|g| g.late_s(start));
+        late.fold(0.0, f64::max)
     }
 
     /// Sets exposure and gain of a pair's views.
@@ -67,15 +91,20 @@ impl Eyes {
         if let Some(left) = images.first() {
             self.exposure.on_image(number, left);
         }
-        let images = images
-            .try_into()
-            .map_err(|images: Vec<_>| SessionError::Images(2, images.len()))?;
-        let images = self.camera.pair(number, start, images);
+        let [left, right] = <[GrayImage; 2]>::try_from(images)
+            .map_err(|images| SessionError::Images(2, images.len()))?;
+        let [of_left, of_right] = &mut self.grabbers;
+        let delivered = [
+            of_left.grab(number, start, left),
+            of_right.grab(number, start, right),
+        ];
+        let images = self.camera.pair(number, start, delivered);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
         let rig = &self.camera.rig;
         let left_at = |t| Some(vehicle_at(t)? * rig.vehicle_from_left);
         let intrinsics = rig.left.intrinsics;
+        (self.dark_lamps).extend(report.dark.iter().map(|uid| uid.to_string()));
         self.score
             .report(&report, 1e3 * seconds, &intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());

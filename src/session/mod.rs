@@ -22,6 +22,7 @@ mod cameras;
 mod devices;
 mod event;
 mod eyes;
+mod health;
 mod motion;
 mod outcome;
 mod ride;
@@ -35,16 +36,17 @@ mod watch;
 pub use event::{Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
 pub use speed::{Speeds, measure};
 pub use summary::{
-    Cost, Distribution, End, ObstacleScore, Physics, Positioning, Protection, Summary,
-    TrainFigures, WallShares, Wayside,
+    CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
+    Protection, Summary, TrainFigures, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;
+use crate::twin::faults;
 use crate::twin::physics::PhysicsError;
 use crate::twin::random::Stream;
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::gpu::GpuRenderer;
-use crate::twin::render::{Air, LampLight, RenderError, Renderer, Scene};
+use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What draws the images.
@@ -140,12 +142,12 @@ pub fn renderer(
 const LAMP_CLOCK_SIGMA: f64 = 20e-6;
 
 /// What stands still in a scenario. The lamps start to send at times of their own, by clocks of
-/// their own.
+/// their own, and fail as the scenario has it.
 pub fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
     let phase = Stream::new(scenario.seed, 0, "lamp phase");
     let clock = Stream::new(scenario.seed, 0, "lamp clock");
-    let lamps = (0u64..)
+    let mut lamps: Vec<_> = (0u64..)
         .zip(&tunnel.lamps)
         .map(|(k, site)| {
             let mut lamp = LampLight::from_site(site, phase.uniform(k));
@@ -153,9 +155,10 @@ pub fn scene(scenario: &Scenario) -> Scene {
             lamp
         })
         .collect();
+    faults::age(&mut lamps, &scenario.faults.lamps, &tunnel, scenario.seed);
     Scene {
         tunnel,
         lamps,
-        air: Air::default(),
+        air: scenario.air.air(),
     }
 }

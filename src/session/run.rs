@@ -4,6 +4,7 @@
 use super::cameras::Clock;
 use super::devices::{Device, Look};
 use super::eyes::Eyes;
+use super::health::{EYES, Health};
 use super::motion::MotionSensors;
 use super::outcome::Outcome;
 use super::ride::Ride;
@@ -12,7 +13,7 @@ use super::watch::{Costs, Watchers};
 use super::{
     End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary, TrainPoint,
 };
-use crate::bus::{Frame, Method, SimTime, TrainCommand, TrainReport};
+use crate::bus::{CameraFault, CameraHealth, Frame, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
 use crate::stack::protection::Protection;
 use crate::twin::comms::Comms;
@@ -24,6 +25,8 @@ use nalgebra::Vector3;
 
 /// Cycles of the protection a second.
 const PROTECTION_HZ: f64 = 10.0;
+/// How often a second the stack looks whether a camera has fallen silent.
+const WATCH_HZ: f64 = 10.0;
 /// Samples of the truth shown to observers a second.
 const TRUTH_HZ: f64 = 50.0;
 /// Positions of everything else shown to observers a second.
@@ -47,6 +50,8 @@ pub struct Run<'s> {
     wayside_frames: u32,
     outcome: Outcome,
     ride: Ride,
+    health: Health,
+    watch_clock: Clock,
     cost: Costs,
 }
 
@@ -61,6 +66,12 @@ impl<'s> Run<'s> {
         let eyes = rig
             .filter(|_| scenario.physics.train.is_some())
             .map(|rig| Eyes::new(scenario, rig, &map));
+        let mut health = Health::default();
+        let eye_names = EYES.iter().filter(|_| eyes.is_some()).copied();
+        let devices = scenario.wayside.iter().map(|p| p.calibration.name.as_str());
+        eye_names
+            .chain(devices)
+            .for_each(|name| health.expect(name));
         Ok(Self {
             scenario,
             world,
@@ -78,6 +89,8 @@ impl<'s> Run<'s> {
             wayside_frames: 0,
             outcome: Outcome::default(),
             ride: Ride::default(),
+            health,
+            watch_clock: Clock::new(WATCH_HZ),
             cost: Costs::default(),
         })
     }
@@ -157,6 +170,7 @@ impl<'s> Run<'s> {
         while let Some((shot, images)) = self.shots.due(now, &mut self.cost)? {
             self.deliver(now, shot, images, watchers)?;
         }
+        self.watch_cameras(now, watchers)?;
         self.protect(now, watchers)?;
         self.show_truth(now, watchers)
     }
@@ -213,7 +227,7 @@ impl<'s> Run<'s> {
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
         if let Some(eyes) = &mut self.eyes
-            && let Some((number, start)) = eyes.clock.due(now, eyes.camera.delay_s())
+            && let Some((number, start)) = eyes.due(now)
         {
             let world = &self.world;
             let mut views = eyes
@@ -221,11 +235,11 @@ impl<'s> Run<'s> {
                 .views(number, start, |t| world.vehicle_at(t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
             eyes.expose(number, &mut views);
-            let what = What::Pair;
             let shot = Shot {
                 number,
                 start,
-                what,
+                what: What::Pair,
+                late_s: eyes.late_s(start),
             };
             self.submit(now, views.into(), shot, watchers)?;
         }
@@ -237,6 +251,7 @@ impl<'s> Run<'s> {
                     number,
                     start,
                     what,
+                    late_s: self.devices[k].late_s(start),
                 };
                 self.submit(now, vec![view], shot, watchers)?;
             }
@@ -295,16 +310,13 @@ impl<'s> Run<'s> {
             number,
             start,
             what,
+            ..
         } = shot;
         match what {
             What::Pair => self.judge_pair((number, start), images, watchers),
             What::Wayside(k, look) => {
                 let image = images.pop().ok_or(SessionError::Images(1, 0))?;
-                let frame = Frame {
-                    number,
-                    start,
-                    image,
-                };
+                let frame = self.devices[k].frame(number, start, image);
                 self.judge_wayside(now, k, &frame, &look, watchers)
             }
         }
@@ -323,13 +335,11 @@ impl<'s> Run<'s> {
         let (vehicle_at, head_at) = (|t| world.vehicle_at(t), |t| world.chainage_at(t));
         let read = eyes.read(frame, images, watch, vehicle_at, head_at)?;
         self.stereo_frames += 1;
-        for fix in read
-            .report
-            .fixes
-            .iter()
-            .filter(|f| f.method == Method::Paper)
-        {
+        if let Some(fix) = read.report.best_fix() {
             self.protection.on_fix(fix);
+        }
+        for (eye, health) in EYES.into_iter().zip(read.report.eyes) {
+            note(&mut self.health, watchers, eye, frame.1, health)?;
         }
         watchers.show(&Event::Pair(&read.images, &read.report, &read.truths_m))?;
         Ok(())
@@ -346,7 +356,40 @@ impl<'s> Run<'s> {
         let (comms, watch) = (&mut self.comms, &mut self.cost.stack);
         let report = self.devices[k].judge(frame, look, now, comms, watch);
         self.wayside_frames += 1;
+        let name = &self.devices[k].calibration().name;
+        note(&mut self.health, watchers, name, frame.start, report.camera)?;
         watchers.show(&Event::Wayside(k, frame.start, &frame.image, &report))?;
+        Ok(())
+    }
+
+    /// Cameras that have fallen silent have no frames to tell of it.
+    fn watch_cameras(
+        &mut self,
+        now: SimTime,
+        watchers: &mut Watchers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        if self.watch_clock.due(now, 0.0).is_none() {
+            return Ok(());
+        }
+        let silent = CameraHealth {
+            fault: Some(CameraFault::Silent),
+            lost: 0,
+        };
+        if self
+            .eyes
+            .as_ref()
+            .is_some_and(|e| e.positioner.is_silent(now))
+        {
+            for eye in EYES {
+                note(&mut self.health, watchers, eye, now, silent)?;
+            }
+        }
+        for device in &mut self.devices {
+            if let Some(health) = device.wait(now, &mut self.comms) {
+                let name = &device.calibration().name;
+                note(&mut self.health, watchers, name, now, health)?;
+            }
+        }
         Ok(())
     }
 
@@ -409,7 +452,11 @@ impl<'s> Run<'s> {
             .is_some_and(|(limit, stood)| stood >= limit)
     }
 
-    fn summary(self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
+    fn summary(mut self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
+        let eyes = self.eyes.as_mut();
+        let dark_lamps = eyes
+            .map(|e| std::mem::take(&mut e.dark_lamps))
+            .unwrap_or_default();
         let scores = self.devices.into_iter().map(Device::into_score);
         let wayside = scores.reduce(|mut a, b| {
             a.add(b);
@@ -424,11 +471,27 @@ impl<'s> Run<'s> {
         Summary {
             stereo_frames: self.stereo_frames,
             wayside_frames: self.wayside_frames,
+            dark_lamps,
             positioning: self.eyes.map(|e| e.score.finish()).unwrap_or_default(),
             wayside: wayside.map(|w| w.finish()),
+            cameras: self.health.finish(),
             protection: self.outcome.protection(&self.world),
             train: self.ride.finish(&self.world, stop_at_m),
             ..speed
         }
     }
+}
+
+/// Takes down what the stack says of a camera, and shows it where it is new.
+fn note(
+    health: &mut Health,
+    watchers: &mut Watchers<'_, '_>,
+    camera: &str,
+    time: SimTime,
+    said: CameraHealth,
+) -> Result<(), SessionError> {
+    if health.note(camera, time, said) {
+        watchers.show(&Event::Camera(time, camera, said.fault))?;
+    }
+    Ok(())
 }

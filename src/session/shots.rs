@@ -2,7 +2,8 @@
 //!
 //! An image is handed to the renderer when its last row has closed, and reaches the stack
 //! `latency_ms` later; the renderer draws in between, while the world goes on. So the order of
-//! things does not depend on how fast anything is.
+//! things does not depend on how fast anything is. A camera whose images are late holds up its own
+//! later ones only.
 
 use super::devices::Look;
 use super::watch::Costs;
@@ -19,6 +20,8 @@ pub struct Shot {
     pub start: SimTime,
     /// Whose.
     pub what: What,
+    /// By how much more than the usual latency its images are late.
+    pub late_s: f64,
 }
 
 /// Whose images they are.
@@ -29,12 +32,24 @@ pub enum What {
     Wayside(usize, Look),
 }
 
+impl What {
+    fn same_camera(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Pair, Self::Pair) => true,
+            (Self::Wayside(a, _), Self::Wayside(b, _)) => a == b,
+            _ => false,
+        }
+    }
+}
+
 /// The renderer and what waits for its images.
 pub struct Shots {
     renderer: Box<dyn Renderer>,
     latency_s: f64,
     /// With the times when they reach the stack.
     waiting: VecDeque<(SimTime, Shot)>,
+    /// Drawn, but late.
+    late: VecDeque<(SimTime, Shot, Vec<GrayImage>)>,
 }
 
 impl Shots {
@@ -44,6 +59,7 @@ impl Shots {
             renderer,
             latency_s: 1e-3 * latency_ms,
             waiting: VecDeque::new(),
+            late: VecDeque::new(),
         }
     }
 
@@ -63,17 +79,28 @@ impl Shots {
         Ok(())
     }
 
-    /// The oldest shot with its images, where it is due.
+    /// The next shot with its images that is due.
     pub fn due(
         &mut self,
         now: SimTime,
         cost: &mut Costs,
     ) -> Result<Option<(Shot, Vec<GrayImage>)>, RenderError> {
-        let Some((_, shot)) = self.waiting.pop_front_if(|(due, _)| *due <= now) else {
-            return Ok(None);
-        };
-        let renderer = &mut self.renderer;
-        let images = cost.wait.time(|| renderer.collect()).0?;
-        Ok(Some((shot, images)))
+        while let Some((due, shot)) = self.waiting.pop_front_if(|(due, _)| *due <= now) {
+            let renderer = &mut self.renderer;
+            let images = cost.wait.time(|| renderer.collect()).0?;
+            let own = due.plus(shot.late_s);
+            let mut ahead = self
+                .late
+                .iter()
+                .filter(|l| l.1.what.same_camera(&shot.what));
+            let due = ahead.next_back().map_or(own, |(due, ..)| own.max(*due));
+            if due <= now {
+                return Ok(Some((shot, images)));
+            }
+            self.late.push_back((due, shot, images));
+        }
+        let due = self.late.iter().position(|(due, ..)| *due <= now);
+        let late = due.and_then(|k| self.late.remove(k));
+        Ok(late.map(|(_, shot, images)| (shot, images)))
     }
 }

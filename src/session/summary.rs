@@ -1,7 +1,7 @@
 //! What a session comes to, as `summary.json` has it.
 
 use super::watch::{Costs, Watchers};
-use crate::bus::Method;
+use crate::bus::{CameraFault, Method};
 use crate::scenario::Scenario;
 use crate::twin::physics::{EnergyBook, Impact};
 use crate::twin::render::Backend;
@@ -37,6 +37,10 @@ pub struct Summary {
     pub positioning: BTreeMap<Method, Positioning>,
     /// Wayside detection.
     pub wayside: Option<Wayside>,
+    /// What the stack says of its cameras: `rig.left`, `rig.right`, and the wayside devices by name.
+    pub cameras: BTreeMap<String, CameraFigures>,
+    /// Lamps that the stack says do not shine, by their UIDs, in the order passed.
+    pub dark_lamps: Vec<String>,
     /// Train protection.
     pub protection: Option<Protection>,
     /// How the train ran.
@@ -76,6 +80,8 @@ impl Summary {
             },
             positioning: BTreeMap::new(),
             wayside: None,
+            cameras: BTreeMap::new(),
+            dark_lamps: Vec::new(),
             protection: None,
             train: None,
         }
@@ -188,6 +194,26 @@ fn quantile(sorted: &[f64], p: f64) -> f64 {
     let k = x.floor() as usize;
     let next = sorted[(k + 1).min(sorted.len() - 1)];
     sorted[k] + (next - sorted[k]) * (x - k as f64)
+}
+
+/// What the stack says of one camera.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct CameraFigures {
+    /// Frames that never came, by the gaps in their numbers.
+    pub lost_frames: u32,
+    /// Its faults, in order of time.
+    pub faults: Vec<FaultSpan>,
+}
+
+/// One fault of a camera, as the stack saw it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct FaultSpan {
+    /// Which.
+    pub fault: CameraFault,
+    /// Start of the first frame that showed it; where none came, when that was noticed.
+    pub from_s: f64,
+    /// Start of the first frame that did not; `null` where it lasted to the end.
+    pub to_s: Option<f64>,
 }
 
 /// Wayside detection.

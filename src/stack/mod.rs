@@ -2,6 +2,7 @@
 //! surveyed map and calibrations in; fixes, reports, messages and commands out. No clock, no
 //! randomness, no files, no knowledge of the simulated world.
 
+pub mod camera_watch;
 pub mod led;
 pub mod positioning;
 pub mod protection;

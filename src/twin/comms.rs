@@ -185,6 +185,7 @@ mod tests {
             danger: DangerLevel::High,
             from_chainage_m: 10.0,
             to_chainage_m: 11.0,
+            blind: false,
         }
     }
 

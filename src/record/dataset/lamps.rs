@@ -133,6 +133,7 @@ fn row(
     if (lamp.centre - eye(0.0)).norm() > LAMP_SIGHT_M + 1.0 {
         return None;
     }
+    let lamp = &lamp.at(job.time);
     let centre = sight.of(&lamp.centre).filter(|c| c.depth_m > NEAREST_M)?;
     let way = eye(centre.pixel.y) - lamp.centre;
     let cos = lamp.facing.dot(&way) / way.norm();

@@ -57,6 +57,7 @@
 mod naming;
 mod positioner;
 mod reckoning;
+mod roll_call;
 mod settings;
 mod stereo;
 #[cfg(test)]

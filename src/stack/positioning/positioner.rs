@@ -3,14 +3,17 @@
 use super::LedSettings;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
+use super::roll_call::RollCall;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
-    CameraModel, Identity, ImuSample, Intrinsics, LedReport, Method, OdometerSample, PositionFix,
-    RigCalibration, SimTime, StereoPair,
+    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
+    Method, OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
+use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
 use crate::track::uid::Uid;
 use crate::track::{LampSite, Tunnel};
+use image::GrayImage;
 use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -23,9 +26,12 @@ pub struct LedPositioner {
     rig: RigCalibration,
     map: Arc<Tunnel>,
     /// One an eye, left and right.
+    watches: [CameraWatch; 2],
+    /// One an eye, left and right.
     finders: [LampFinder; 2],
     reckoning: Reckoning,
     naming: Naming,
+    roll_call: RollCall,
     followed: Vec<Followed>,
     anchor: Option<Anchor>,
     epoch: Option<SimTime>,
@@ -74,7 +80,12 @@ impl LedPositioner {
     pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Tunnel>) -> Self {
         let finder = |eye: &CameraModel| LampFinder::new(settings, eye, &map.lamps);
         let finders = [finder(&rig.left), finder(&rig.right)];
+        let watch = |eye: &CameraModel| {
+            let size_px = (eye.intrinsics.width_px, eye.intrinsics.height_px);
+            CameraWatch::new(size_px, settings.allow_repeated_images)
+        };
         Self {
+            watches: [watch(&rig.left), watch(&rig.right)],
             reckoning: Reckoning::new(settings),
             naming: Naming {
                 gate_share: settings.gate_share,
@@ -85,6 +96,7 @@ impl LedPositioner {
             map,
             alone: finders[0].votes(),
             finders,
+            roll_call: RollCall::default(),
             followed: Vec::new(),
             anchor: None,
             epoch: None,
@@ -106,8 +118,62 @@ impl LedPositioner {
         self.reckoning.on_odometer(sample);
     }
 
-    /// Takes a pair of images, after the samples up to the end of its exposure.
+    /// Takes a pair of images, after the samples up to the end of its exposure. An eye that shows a
+    /// fault is left out: then the other one measures alone.
     pub fn on_pair(&mut self, pair: &StereoPair) -> LedReport {
+        let eyes = self.look_after(pair);
+        let mut report = match eyes.map(|eye| eye.is_good()) {
+            [true, true] => self.read_pair(pair),
+            [true, false] => self.read_pair(&StereoPair {
+                left: pair.left.clone(),
+                right: without_image(&pair.right),
+            }),
+            [false, true] => self.read_right(pair),
+            [false, false] => self.read_pair(&StereoPair {
+                left: without_image(&pair.left),
+                right: without_image(&pair.right),
+            }),
+        };
+        report.eyes = eyes;
+        report
+    }
+
+    /// Whether no pair has come for so long that there must be something wrong.
+    pub fn is_silent(&self, now: SimTime) -> bool {
+        let patience_s = self.settings.silent_after_s;
+        self.watches.iter().all(|w| w.silence(now, patience_s))
+    }
+
+    fn look_after(&mut self, pair: &StereoPair) -> [CameraHealth; 2] {
+        let late = self.reckoning.has_forgotten(pair.left.start);
+        let [left, right] = &mut self.watches;
+        [left.look(&pair.left), right.look(&pair.right)].map(|eye| CameraHealth {
+            fault: eye.fault.or(late.then_some(CameraFault::Late)),
+            ..eye
+        })
+    }
+
+    /// The right eye stands in for the left one.
+    fn read_right(&mut self, pair: &StereoPair) -> LedReport {
+        let rig = self.rig;
+        self.rig.left = rig.right;
+        self.rig.vehicle_from_left = rig.vehicle_from_left * rig.left_from_right;
+        self.finders.swap(0, 1);
+        let mut report = self.read_pair(&StereoPair {
+            left: pair.right.clone(),
+            right: without_image(&pair.right),
+        });
+        self.rig = rig;
+        self.finders.swap(0, 1);
+        std::mem::swap(&mut report.left, &mut report.right);
+        for fix in &mut report.fixes {
+            let lamp = rig.left_from_right * Point3::from(fix.lamp_in_camera);
+            fix.lamp_in_camera = lamp.coords;
+        }
+        report
+    }
+
+    fn read_pair(&mut self, pair: &StereoPair) -> LedReport {
         let start = pair.left.start;
         let seconds = start.since(*self.epoch.get_or_insert(start));
         let (mut left, mut right) = (
@@ -128,7 +194,10 @@ impl LedPositioner {
             keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
             keep_surer(&mut mono, self.mono_fix(&sighting, &left));
         }
-        if let Some(fix) = &paper {
+        // One eye alone has nothing better.
+        let one_eyed = pair.right.image.is_empty();
+        let best = if one_eyed { &mono } else { &paper };
+        if let Some(fix) = best {
             self.anchor = Some(Anchor {
                 time: fix.time,
                 chainage_m: fix.chainage_m,
@@ -140,12 +209,34 @@ impl LedPositioner {
         let report = LedReport {
             time: start,
             number: pair.left.number,
+            eyes: [CameraHealth::default(); 2],
+            dark: self.call_lamps(pair, &left),
             left: spots(&left),
             right: spots(&right),
             fixes,
         };
         (self.left, self.right) = (left, right);
         report
+    }
+
+    /// Lamps that have gone out of the left eye's sight without ever having been in it.
+    fn call_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
+        let camera = self.rig.left;
+        let middle = 0.5 * f64::from(camera.intrinsics.height_px);
+        let time = camera.shutter.row_mid(pair.left.start, middle);
+        let Some(chainage_m) = self
+            .chainage_m(time)
+            .filter(|_| !pair.left.image.is_empty())
+        else {
+            self.roll_call.forget();
+            return Vec::new();
+        };
+        let line = &self.map.alignment;
+        let place = Translation3::from(line.at(chainage_m).origin);
+        let attitude = self.reckoning.attitude(time, line, chainage_m);
+        let eye = Isometry3::from_parts(place, attitude) * self.rig.vehicle_from_left;
+        let spots = left.iter().map(|lamp| lamp.spot.centre);
+        (self.roll_call).call(&self.map, &camera.intrinsics, &eye, spots)
     }
 
     /// Finds the lamps of both eyes' images.
@@ -456,6 +547,15 @@ impl LedPositioner {
             s.survey_sigma_m,
         ];
         terms.iter().map(|t| t * t).sum::<f64>().sqrt()
+    }
+}
+
+/// The frame of an eye that has delivered nothing.
+fn without_image(frame: &Frame) -> Frame {
+    Frame {
+        number: frame.number,
+        start: frame.start,
+        image: GrayImage::default(),
     }
 }
 

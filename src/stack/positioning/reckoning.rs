@@ -51,6 +51,12 @@ impl<T: Copy> History<T> {
         true
     }
 
+    /// Whether samples of a time have been dropped.
+    fn has_forgotten(&self, time: SimTime) -> bool {
+        let oldest = (self.newest + 1) % KEPT;
+        self.samples.len() == KEPT && time < self.samples[oldest].0
+    }
+
     /// The samples before and after a time, and its share of the way between them; the ends are
     /// held.
     fn around(&self, time: SimTime) -> Option<(T, T, f64)> {
@@ -129,6 +135,11 @@ impl Reckoning {
         let faded = UnitQuaternion::from_scaled_axis(integrated.scaled_axis() * kept);
         self.deviation.push(sample.time, faded);
         self.map_attitude = map_attitude;
+    }
+
+    /// Whether a time is longer ago than samples are kept.
+    pub fn has_forgotten(&self, time: SimTime) -> bool {
+        self.odometer.has_forgotten(time) || self.deviation.has_forgotten(time)
     }
 
     /// Distance on the odometer at a time, run on with the last speed beyond the last sample.
@@ -252,6 +263,21 @@ mod tests {
             reckoning.on_imu(&turning(rate, 20_000 + i64::from(k)), &line, None);
         }
         assert!((off(&reckoning, 20_499, s) - left - 0.1).abs() < 0.005);
+    }
+
+    /// A time is forgotten when its samples have been overwritten, not before.
+    #[test]
+    fn times_are_forgotten_with_their_samples() {
+        let mut reckoning = Reckoning::new(&LedSettings::default());
+        let line = curve(300.0);
+        for k in 0..=1000 {
+            let known = k < KEPT as i64;
+            assert_eq!(reckoning.has_forgotten(SimTime::from_nanos(-1)), !known);
+            reckoning.on_imu(&turning(0.0, k), &line, None);
+        }
+        let kept = 1_000_000 * (1001 - KEPT as i64);
+        assert!(!reckoning.has_forgotten(SimTime::from_nanos(kept)));
+        assert!(reckoning.has_forgotten(SimTime::from_nanos(kept - 1)));
     }
 
     #[test]

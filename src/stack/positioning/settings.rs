@@ -52,6 +52,11 @@ pub struct LedSettings {
     /// Standard deviation of a surveyed lamp position along the track, metres. 0.015: total station
     /// or laser scanning from control points.
     pub survey_sigma_m: f64,
+    /// The rig is reported silent when no pair has come for this long, seconds.
+    pub silent_after_s: f64,
+    /// Take an image that repeats the one before, bit for bit, for a good one. A real sensor's noise
+    /// never does; images drawn without noise do.
+    pub allow_repeated_images: bool,
 }
 
 impl Default for LedSettings {
@@ -75,6 +80,8 @@ impl Default for LedSettings {
             rear_pivot_m: 16.1,
             max_sigma_m: 0.25,
             survey_sigma_m: 0.015,
+            silent_after_s: 1.0,
+            allow_repeated_images: false,
         }
     }
 }
@@ -124,6 +131,7 @@ impl LedSettings {
         check.within("focal_sigma_share", self.focal_sigma_share, 0.0..=0.5, "");
         check.within("front_pivot_m", self.front_pivot_m, 0.0..=30.0, "m");
         check.within("max_sigma_m", self.max_sigma_m, 0.01..=100.0, "m");
+        check.within("silent_after_s", self.silent_after_s, 0.1..=60.0, "s");
         check.within("survey_sigma_m", self.survey_sigma_m, 0.0..=5.0, "m");
         check.within(
             "rear_pivot_m",

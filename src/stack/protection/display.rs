@@ -6,8 +6,8 @@ use crate::bus::{DangerLevel, DriverDisplay, Lamp, Supervision};
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Situation {
     pub position_m: Option<f64>,
-    /// Distance to the nearest obstacle ahead, its danger, and time since its device was heard.
-    pub obstacle: Option<(f64, DangerLevel, f64)>,
+    /// The nearest obstacle ahead.
+    pub obstacle: Option<Ahead>,
     pub supervision: Supervision,
     pub permitted_mps: f64,
     pub brake_failed: bool,
@@ -15,8 +15,19 @@ pub(super) struct Situation {
     pub radio_timeout_s: f64,
 }
 
+/// What a device has warned of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ahead {
+    pub distance_m: f64,
+    pub danger: DangerLevel,
+    /// Time since the device was heard.
+    pub silent_s: f64,
+    /// It has found nothing, but cannot see.
+    pub blind: bool,
+}
+
 pub(super) fn display(s: &Situation) -> DriverDisplay {
-    let danger = s.obstacle.map_or(DangerLevel::None, |o| o.1);
+    let danger = s.obstacle.map_or(DangerLevel::None, |o| o.danger);
     let lamp = if s.brake_failed {
         Lamp::Emergency
     } else if danger == DangerLevel::High || s.supervision != Supervision::Permitted {
@@ -28,7 +39,7 @@ pub(super) fn display(s: &Situation) -> DriverDisplay {
         power: true,
         lamp,
         position_m: s.position_m,
-        distance_to_obstacle_m: s.obstacle.map(|o| o.0),
+        distance_to_obstacle_m: s.obstacle.map(|o| o.distance_m),
         text: text(s),
     }
 }
@@ -47,18 +58,18 @@ fn text(s: &Situation) -> String {
         Supervision::Permitted => "",
     };
     match s.obstacle {
-        Some((distance_m, danger, silent_s)) => {
-            let what = if danger == DangerLevel::High {
-                "Obstacle on the track"
-            } else {
-                "Object beside the track"
+        Some(ahead) => {
+            let what = match (ahead.blind, ahead.danger) {
+                (true, _) => "Track not watched",
+                (false, DangerLevel::High) => "Obstacle on the track",
+                (false, _) => "Object beside the track",
             };
-            let radio = if silent_s > s.radio_timeout_s {
-                format!(", not heard of for {silent_s:.0} s")
+            let radio = if ahead.silent_s > s.radio_timeout_s {
+                format!(", not heard of for {:.0} s", ahead.silent_s)
             } else {
                 String::new()
             };
-            format!("{what} in {distance_m:.0} m{action}{radio}")
+            format!("{what} in {:.0} m{action}{radio}", ahead.distance_m)
         }
         None if s.position_m.is_none() => format!("Position unknown{action}"),
         None => format!("Permitted {:.0} km/h{action}", s.permitted_mps * 3.6),

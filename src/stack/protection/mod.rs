@@ -23,7 +23,8 @@
 //!     received: time,
 //!     via: Via::Radio,
 //!     warning: ObstacleWarning { device: "W1".into(), number: 0, issued: time,
-//!         danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5 },
+//!         danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5,
+//!         blind: false },
 //! });
 //! assert_eq!(protection.cycle(time.plus(0.1)).command.brake, BrakeDemand::Emergency);
 //! ```
@@ -82,7 +83,7 @@ use crate::bus::{
 };
 use crate::track::Tunnel;
 use curve::Grades;
-use display::Situation;
+use display::{Ahead, Situation};
 use monitor::BrakeMonitor;
 use obstacles::Obstacles;
 use position::{Estimate, Position};
@@ -213,20 +214,16 @@ impl Protection {
     }
 
     /// The obstacle that the driver is shown: a dangerous one first.
-    fn nearest(
-        &self,
-        time: SimTime,
-        train: Option<Estimate>,
-        rearmost_m: f64,
-    ) -> Option<(f64, DangerLevel, f64)> {
+    fn nearest(&self, time: SimTime, train: Option<Estimate>, rearmost_m: f64) -> Option<Ahead> {
         let head_m = train?.chainage_m;
         let ahead = |danger| self.obstacles.ahead(rearmost_m, danger);
         let (warning, received) = ahead(DangerLevel::High).or_else(|| ahead(DangerLevel::Low))?;
-        Some((
-            warning.from_chainage_m - head_m,
-            warning.danger,
-            time.since(received),
-        ))
+        Some(Ahead {
+            distance_m: warning.from_chainage_m - head_m,
+            danger: warning.danger,
+            silent_s: time.since(received),
+            blind: warning.blind,
+        })
     }
 
     fn odometer_lost(&mut self, time: SimTime) -> bool {

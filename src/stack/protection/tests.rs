@@ -52,6 +52,7 @@ fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> De
             danger,
             from_chainage_m: from_m,
             to_chainage_m: from_m + 0.5,
+            blind: false,
         },
     }
 }

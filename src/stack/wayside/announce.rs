@@ -1,5 +1,5 @@
-//! When a device speaks: on a change of danger, again and again while it lasts, once when it is
-//! over.
+//! When a device speaks: on a change of danger, when it goes blind or sees again, again and again
+//! while either lasts, once when it is over.
 
 use super::WaysideSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime, WaysideReport};
@@ -11,6 +11,7 @@ pub(super) struct Announcer {
     refresh_s: f64,
     number: u32,
     danger: DangerLevel,
+    blind: bool,
     last: SimTime,
     extent_m: (f64, f64),
 }
@@ -22,25 +23,35 @@ impl Announcer {
             refresh_s: settings.refresh_s,
             number: 0,
             danger: DangerLevel::None,
+            blind: false,
             last: SimTime::ZERO,
             extent_m: (0.0, 0.0),
         }
     }
 
-    pub fn message(&mut self, report: &WaysideReport) -> Option<ObstacleWarning> {
-        if report.learning {
+    /// `watched_m` is the stretch that the device looks at.
+    pub fn message(
+        &mut self,
+        report: &WaysideReport,
+        watched_m: (f64, f64),
+    ) -> Option<ObstacleWarning> {
+        // What is learnt anew after a fault does not end its warning.
+        if report.learning && !report.blind {
             return None;
         }
-        let changed = report.danger != self.danger;
+        let changed = (report.danger, report.blind) != (self.danger, self.blind);
         let due = report.danger != DangerLevel::None
             && report.time.since(self.last) >= self.refresh_s - 1e-6;
         if !changed && !due {
             return None;
         }
         // A clear message names the stretch that it clears.
-        if report.danger != DangerLevel::None {
+        if report.blind {
+            self.extent_m = watched_m;
+        } else if report.danger != DangerLevel::None {
             self.extent_m = extent(report);
         }
+        self.blind = report.blind;
         self.danger = report.danger;
         self.last = report.time;
         let number = self.number;
@@ -52,6 +63,7 @@ impl Announcer {
             danger: report.danger,
             from_chainage_m: self.extent_m.0,
             to_chainage_m: self.extent_m.1,
+            blind: report.blind,
         })
     }
 }

@@ -28,7 +28,12 @@
 //!     chainage_m: 200.0,
 //!     balise_chainage_m: 0.0,
 //! };
-//! let settings = WaysideSettings { reference_frames: 2, ..Default::default() };
+//! // These images have no noise: a real camera that repeats one has got stuck.
+//! let settings = WaysideSettings {
+//!     reference_frames: 2,
+//!     allow_repeated_images: true,
+//!     ..Default::default()
+//! };
 //! let mut detector = WaysideDetector::new(&settings, calibration, map);
 //! let mut image = image::GrayImage::from_pixel(640, 360, image::Luma([90]));
 //! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
@@ -63,6 +68,7 @@
 //! | `gauge` | danger level |
 //! | `confirm` | k of n frames |
 //! | [`distance`] | distance to the train, by the paper's formulas and exact |
+//! | `vision` | is the camera alive, and what its death means |
 //! | `announce` | messages |
 //!
 //! # The train itself
@@ -95,13 +101,14 @@ mod sight;
 mod test_scene;
 #[cfg(test)]
 mod tests;
+mod vision;
 
 pub use place::lidar_point;
 pub use settings::WaysideSettings;
 
 use crate::bus::{
-    DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, TrainReport,
-    WaysideCalibration, WaysideReport,
+    CameraHealth, DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, SimTime,
+    TrainReport, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use announce::Announcer;
@@ -114,6 +121,7 @@ use reference::Reference;
 use regions::Regions;
 use sight::Sight;
 use std::sync::Arc;
+use vision::Vision;
 
 /// A train nearer than this to the device's view may light it.
 pub const HEADLIGHT_M: f64 = 200.0;
@@ -128,6 +136,7 @@ const GLARE_M: f64 = 100.0;
 pub struct WaysideDetector {
     settings: WaysideSettings,
     sight: Sight,
+    vision: Vision,
     cells: Cells,
     reference: Reference,
     difference: Difference,
@@ -136,6 +145,27 @@ pub struct WaysideDetector {
     confirmation: Confirmation,
     announcer: Announcer,
     found: Vec<DetectedObstacle>,
+    /// Of the last good frame.
+    number: u32,
+}
+
+/// What goes into a report besides what was found.
+#[derive(Clone, Copy, Debug)]
+struct Look {
+    time: SimTime,
+    number: u32,
+    camera: CameraHealth,
+    /// Where the train is at that time.
+    train: Option<TrainReport>,
+}
+
+/// The train's report carried on to a time.
+fn reckoned(train: TrainReport, time: SimTime) -> TrainReport {
+    TrainReport {
+        chainage_m: train.chainage_m + train.speed_mps * time.since(train.time).max(0.0),
+        time,
+        ..train
+    }
 }
 
 impl WaysideDetector {
@@ -151,6 +181,7 @@ impl WaysideDetector {
         let sight = Sight::new(settings, calibration, map);
         Self {
             settings: settings.clone(),
+            vision: Vision::new(settings, (intrinsics.width_px, intrinsics.height_px)),
             cells: Cells::new(&sight, width, height),
             sight,
             reference: Reference::new(settings, width * height),
@@ -160,12 +191,13 @@ impl WaysideDetector {
             confirmation: Confirmation::new(settings),
             announcer,
             found: Vec::new(),
+            number: 0,
         }
     }
 
     /// Looks at one frame; `scan` is a lidar sweep of about the same time, `train` the last
-    /// position report of the train on approach. A frame of another size than the calibration's
-    /// tells nothing.
+    /// position report of the train on approach. A frame in which the camera shows a fault tells
+    /// nothing: what was confirmed stays confirmed, and soon the device counts as blind.
     pub fn on_frame(
         &mut self,
         frame: &Frame,
@@ -173,18 +205,22 @@ impl WaysideDetector {
         train: Option<TrainReport>,
     ) -> WaysideReport {
         let intrinsics = self.sight.calibration().camera.intrinsics;
-        if frame.image.dimensions() != (intrinsics.width_px, intrinsics.height_px) {
-            return self.report(frame, train, Vec::new());
+        let camera = self.vision.look(frame);
+        let look = Look {
+            time: frame.start,
+            number: frame.number,
+            camera,
+            train: train.map(|t| reckoned(t, frame.start)),
+        };
+        if !camera.is_good() {
+            return self.report(look, Vec::new());
         }
         if !self.reference.ready() {
             self.learn(frame.image.as_raw());
-            return self.report(frame, train, Vec::new());
+            return self.report(look, Vec::new());
         }
-        let train = train.map(|t| TrainReport {
-            chainage_m: t.chainage_m + t.speed_mps * frame.start.since(t.time).max(0.0),
-            time: frame.start,
-            ..t
-        });
+        let train = look.train;
+        self.number = frame.number;
         self.cells.occupy(train.map(|t| self.occupied_m(t)));
         self.difference.run(
             frame.image.as_raw(),
@@ -210,7 +246,7 @@ impl WaysideDetector {
             self.found.extend(placed);
         }
         self.confirmation.update(&self.found, &self.cells);
-        let mut report = self.report(frame, train, blobs);
+        let mut report = self.report(look, blobs);
         if self.settings.keep_images {
             let (w, h) = frame.image.dimensions();
             report.difference = GrayImage::from_raw(w, h, self.difference.absolute.clone());
@@ -219,10 +255,24 @@ impl WaysideDetector {
         report
     }
 
-    /// The message that this report gives rise to, if any: on a change of danger, again every
-    /// `refresh_s` while it lasts, and a clear message (danger none) when it is over.
+    /// To be called at least some times a second: a camera that has fallen silent has no frames to
+    /// tell of it. Gives a report where it has.
+    pub fn on_time(&mut self, now: SimTime, train: Option<TrainReport>) -> Option<WaysideReport> {
+        let camera = self.vision.wait(now)?;
+        let look = Look {
+            time: now,
+            number: self.number,
+            camera,
+            train: train.map(|t| reckoned(t, now)),
+        };
+        Some(self.report(look, Vec::new()))
+    }
+
+    /// The message that this report gives rise to, if any: on a change of danger, and when the
+    /// device goes blind or sees again; again every `refresh_s` while either lasts; and a clear
+    /// message (danger none) when it is over.
     pub fn message(&mut self, report: &WaysideReport) -> Option<ObstacleWarning> {
-        self.announcer.message(report)
+        self.announcer.message(report, self.sight.watched_m())
     }
 
     fn learn(&mut self, grey: &[u8]) {
@@ -251,14 +301,13 @@ impl WaysideDetector {
             && train.chainage_m - self.settings.train_length_m < device + reach
     }
 
-    fn report(
-        &self,
-        frame: &Frame,
-        train: Option<TrainReport>,
-        blobs: Vec<crate::bus::Blob>,
-    ) -> WaysideReport {
+    fn report(&self, look: Look, blobs: Vec<crate::bus::Blob>) -> WaysideReport {
+        let train = look.train;
         let obstacles: Vec<DetectedObstacle> = self.confirmation.confirmed().cloned().collect();
-        let danger = obstacles.iter().map(|o| o.danger).max().unwrap_or_default();
+        let blind = self.vision.is_blind();
+        let of_blindness = blind.then_some(self.settings.blind_danger);
+        let found = obstacles.iter().map(|o| o.danger);
+        let danger = found.chain(of_blindness).max().unwrap_or_default();
         // Only what lies before the train's head concerns it; the nearest comes first.
         let distances = train.and_then(|t| {
             obstacles
@@ -271,8 +320,10 @@ impl WaysideDetector {
         });
         let learning = !self.reference.ready();
         WaysideReport {
-            time: frame.start,
-            number: frame.number,
+            time: look.time,
+            number: look.number,
+            camera: look.camera,
+            blind,
             learning,
             train_in_view: self.cells.any_blind(),
             blobs,
@@ -280,7 +331,7 @@ impl WaysideDetector {
             train_distance_exact_m: distances.map(|d| d.1),
             train_affected: danger == DangerLevel::High,
             danger,
-            passage_possible: !learning && danger != DangerLevel::High,
+            passage_possible: !learning && !blind && danger != DangerLevel::High,
             emergency_needed: danger == DangerLevel::High,
             plan: match danger {
                 DangerLevel::None => Plan::Pass,

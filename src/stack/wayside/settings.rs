@@ -1,5 +1,6 @@
 //! What a scenario may say about the detection.
 
+use crate::bus::DangerLevel;
 use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -44,6 +45,15 @@ pub struct WaysideSettings {
     pub train_length_m: f64,
     /// While an obstacle is there, its warning is sent again after this time, s.
     pub refresh_s: f64,
+    /// When no good frame has come for this long, the stretch that the camera watches counts as
+    /// occupied, s.
+    pub blind_after_s: f64,
+    /// What the trains are told then: `high` stops them before the stretch, `low` warns the driver,
+    /// who then runs on sight.
+    pub blind_danger: DangerLevel,
+    /// Take an image that repeats the one before, bit for bit, for a good one. A real sensor's noise
+    /// never does; images drawn without noise do.
+    pub allow_repeated_images: bool,
     /// Put difference and binary image into every report.
     pub keep_images: bool,
 }
@@ -68,6 +78,9 @@ impl Default for WaysideSettings {
             dangerous_height_m: 0.0,
             train_length_m: 118.0,
             refresh_s: 1.0,
+            blind_after_s: 1.0,
+            blind_danger: DangerLevel::High,
+            allow_repeated_images: false,
             keep_images: true,
         }
     }
@@ -92,6 +105,14 @@ impl WaysideSettings {
         check.within("reach_m", self.reach_m, 5.0..=500.0, "m");
         check.within("confirm_of", f64::from(self.confirm_of), 1.0..=64.0, "");
         check.within("clear_frames", f64::from(self.clear_frames), 1.0..=64.0, "");
+        if self.blind_danger == DangerLevel::None {
+            problems.push(Problem::new(
+                format!("{at}.blind_danger"),
+                "a blind device that says nothing lets trains pass",
+                "give \"high\" or \"low\"",
+            ));
+        }
+        let mut check = Checker::new(at, problems);
         check.within(
             "confirm_frames",
             f64::from(self.confirm_frames),
@@ -114,5 +135,6 @@ impl WaysideSettings {
         );
         check.within("train_length_m", self.train_length_m, 5.0..=500.0, "m");
         check.within("refresh_s", self.refresh_s, 0.05..=60.0, "s");
+        check.within("blind_after_s", self.blind_after_s, 0.1..=60.0, "s");
     }
 }

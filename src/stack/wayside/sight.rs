@@ -167,6 +167,17 @@ impl Sight {
         &self.map
     }
 
+    /// The stretch before the camera, from lower to higher chainage, as far as `reach_m`.
+    pub fn watched_m(&self) -> (f64, f64) {
+        let here_m = self.stations[self.here].s_m;
+        let ahead = self.calibration.world_from_camera * Vector3::z();
+        if self.stations[self.here].along.dot(&ahead) >= 0.0 {
+            (here_m, self.stations[2 * self.here].s_m)
+        } else {
+            (self.stations[0].s_m, here_m)
+        }
+    }
+
     /// The camera's centre, world.
     pub fn eye(&self) -> Point3<f64> {
         Point3::from(self.calibration.world_from_camera.translation.vector)

@@ -4,7 +4,7 @@
 use super::test_scene::*;
 use super::*;
 use crate::bus::lenses::EUROC;
-use crate::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
+use crate::bus::{CameraFault, Distortion, DistortionCoefficients, Intrinsics, SimTime};
 
 const STEADY: fn(u32, u32) -> f64 = |_, _| 1.0;
 
@@ -451,5 +451,92 @@ fn foot_inverts_projection() {
             assert!(span.from_m <= p.s_m + 0.5 && span.to_m >= p.s_m - 0.5);
         }
         assert!(seen > 20, "curvature {curvature}: {seen}");
+    }
+}
+
+/// A device whose camera is stuck (the image of before again and again, with new numbers), dead
+/// (one grey), or gone says for a second that something is wrong, and then that the track is not
+/// clear: silence would let the train pass. When it sees again, what fell meanwhile is found
+/// before the warning ends.
+#[test]
+fn a_blind_device_is_not_silent() {
+    let scene = Scene::new(640, 360);
+    let item = Crate::on_bed(180.0, 0.0, 0.5);
+    for fault in [CameraFault::Frozen, CameraFault::Dead, CameraFault::Silent] {
+        for falls in [false, true] {
+            let mut d = taught(&scene, &quiet());
+            let mut messages = Vec::new();
+            for n in 10..80u32 {
+                let things = [(item, 20.0)];
+                let things = if falls && n >= 30 { &things[..] } else { &[] };
+                let mut frame = scene.frame(n, STEADY, things);
+                let gone = (20..50).contains(&n);
+                match fault {
+                    CameraFault::Frozen if gone => {
+                        frame.image = scene.frame(19, STEADY, &[]).image;
+                    }
+                    CameraFault::Dead if gone => frame.image = GrayImage::new(640, 360),
+                    _ => {}
+                }
+                let report = if fault == CameraFault::Silent && gone {
+                    d.on_time(frame.start, None)
+                } else {
+                    assert!(d.on_time(frame.start, None).is_none() || n == 50);
+                    Some(d.on_frame(&frame, None, None))
+                };
+                let Some(report) = report else {
+                    assert!(n < 30, "nothing said in frame {n}");
+                    continue;
+                };
+                assert_eq!(report.camera.fault, gone.then_some(fault), "frame {n}");
+                let blind = (30..54).contains(&n);
+                assert_eq!(report.blind, blind, "{fault}: frame {n}");
+                assert_eq!(report.passage_possible, !blind && (n < 54 || !falls));
+                assert!(report.obstacles.is_empty() || (falls && n >= 52));
+                messages.extend(d.message(&report));
+            }
+            let said: Vec<_> = messages.iter().map(|m| (m.blind, m.danger)).collect();
+            let blind = messages.iter().filter(|m| m.blind).count();
+            // At once, and every second until the frame at 5.4 s.
+            assert_eq!(blind, 3, "{fault}: {said:?}");
+            assert_eq!(messages[0].issued, SimTime::from_secs(3.0));
+            let (from_m, to_m) = (messages[0].from_chainage_m, messages[0].to_chainage_m);
+            assert!(from_m < DEVICE_M - 79.0 && to_m > DEVICE_M - 1.0 && to_m < DEVICE_M + 1.0);
+            assert!(messages[..3].iter().all(|m| m.danger == DangerLevel::High));
+            let after = if falls {
+                DangerLevel::High
+            } else {
+                DangerLevel::None
+            };
+            assert_eq!(messages[3].danger, after, "{fault}: {said:?}");
+        }
+    }
+}
+
+/// Faults while the reference is learnt: a stuck image is not taken into it, a device that never
+/// sees warns although it has learnt nothing, and a lost frame or two are no fault.
+#[test]
+fn a_device_that_never_sees_warns() {
+    let scene = Scene::new(64, 36);
+    let mut d = detector(&scene, &quiet());
+    let first = scene.frame(0, STEADY, &[]);
+    let mut told = Vec::new();
+    for n in 0..20 {
+        let frame = Frame {
+            number: n,
+            start: SimTime::from_secs(f64::from(n) * FRAME_S),
+            image: first.image.clone(),
+        };
+        let report = d.on_frame(&frame, None, None);
+        assert!(report.learning && !report.passage_possible);
+        told.extend(d.message(&report));
+    }
+    assert_eq!(told.len(), 1);
+    assert!(told[0].blind);
+    let mut d = taught(&scene, &quiet());
+    for (n, lost) in [(10, 0), (13, 2), (14, 0), (22, 7)] {
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        assert_eq!(report.camera.lost, lost);
+        assert!(report.passage_possible && d.message(&report).is_none());
     }
 }

@@ -98,6 +98,7 @@ impl LampLight {
             },
             level: 1.0,
             ripple: Ripple::default(),
+            changes: Vec::new(),
         }
     }
 

@@ -15,7 +15,10 @@ pub mod sensor;
 pub mod surface;
 
 pub use hull::{Face, Hull};
-pub use scene::{Air, Body, CameraMotion, Headlight, Job, LampLight, NoiseKey, Scene, Shape, View};
+pub use scene::{
+    Air, Body, CameraMotion, Headlight, Job, LampChange, LampLight, LampsInTime, NoiseKey, Scene,
+    Shape, View,
+};
 pub use sensor::{LensSettings, Pattern, SensorSettings, upper_bits};
 
 use image::{GrayImage, ImageBuffer, Luma};

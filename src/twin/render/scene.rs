@@ -95,6 +95,67 @@ pub struct LampLight {
     pub level: f64,
     /// What the mains leave in its light.
     pub ripple: Ripple,
+    /// What level and ripple become later, in order of time.
+    pub changes: Vec<LampChange>,
+}
+
+/// A lamp fails, or recovers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LampChange {
+    /// When.
+    pub at: SimTime,
+    /// Its level from then on.
+    pub level: f64,
+    /// Its ripple from then on.
+    pub ripple: Ripple,
+}
+
+impl LampLight {
+    /// The lamp as it is at a time.
+    #[must_use]
+    pub fn at(&self, time: SimTime) -> Self {
+        let passed = self.changes.iter().take_while(|c| c.at <= time);
+        let (level, ripple) = passed
+            .last()
+            .map_or((self.level, self.ripple), |c| (c.level, c.ripple));
+        Self {
+            level,
+            ripple,
+            ..self.clone()
+        }
+    }
+}
+
+/// Follows the lamps of a scene through time. Between changes all that they light stays as it is,
+/// so a renderer may keep it; a lamp changes between two jobs, never within one.
+#[derive(Clone, Debug)]
+pub struct LampsInTime {
+    lamps: Vec<LampLight>,
+    changes: Vec<SimTime>,
+    /// Of the changes, so many were over when it was asked last.
+    passed: usize,
+}
+
+impl LampsInTime {
+    /// At time 0.
+    pub fn new(lamps: &[LampLight]) -> Self {
+        let changes = lamps.iter().flat_map(|lamp| &lamp.changes);
+        let mut changes: Vec<_> = changes.map(|change| change.at).collect();
+        changes.sort_unstable();
+        changes.dedup();
+        Self {
+            lamps: lamps.to_vec(),
+            changes,
+            passed: 0,
+        }
+    }
+
+    /// All lamps as they are at a time, if any differs from what it was when this was asked last.
+    pub fn changed(&mut self, time: SimTime) -> Option<Vec<LampLight>> {
+        let passed = self.changes.partition_point(|at| *at <= time);
+        let before = std::mem::replace(&mut self.passed, passed);
+        (before != passed).then(|| self.lamps.iter().map(|lamp| lamp.at(time)).collect())
+    }
 }
 
 /// A solid shape, centred on its body's origin.

@@ -61,7 +61,9 @@ use super::light::{LampField, headlights_lx};
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey, PixelMap};
 use super::upper_bits;
-use super::{Air, Backend, Job, LampLight, RawImage, RenderError, Renderer, Scene, View};
+use super::{
+    Air, Backend, Job, LampLight, LampsInTime, RawImage, RenderError, Renderer, Scene, View,
+};
 use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
@@ -85,6 +87,7 @@ const KEPT_VIEWS: usize = 4;
 /// Draws jobs as they are submitted.
 pub struct CpuRenderer {
     world: World,
+    lamps: LampsInTime,
     every_ray: bool,
     /// Of a row's exposure, where they are given.
     slices: Option<usize>,
@@ -196,6 +199,7 @@ impl CpuRenderer {
                 line: scene.tunnel,
                 air: scene.air,
             },
+            lamps: LampsInTime::new(&scene.lamps),
             every_ray,
             kept: VecDeque::new(),
             maps: MapCache::default(),
@@ -280,6 +284,10 @@ impl Renderer for CpuRenderer {
     }
 
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
+        if let Some(lamps) = self.lamps.changed(job.time) {
+            self.world.lamps = LampField::new(&lamps).in_air(self.world.air);
+            self.kept.clear();
+        }
         let views = job.views.iter();
         let images = views.map(|view| (self.draw_raw(job, view), view.sensor.spare_bits()));
         let images = images.collect();

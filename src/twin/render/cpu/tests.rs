@@ -119,6 +119,7 @@ fn lamp(waveform: Waveform) -> LampLight {
         waveform,
         level: 1.0,
         ripple: Ripple::default(),
+        changes: Vec::new(),
     }
 }
 

@@ -56,8 +56,9 @@ pub use pipeline::shader_source;
 use super::light::LampField;
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey};
-use super::scene::{Body, Job, Scene, View};
+use super::scene::{Body, Job, LampsInTime, Scene, View};
 use super::{Backend, RawImage, RenderError, Renderer};
+use crate::bus::SimTime;
 use adapter::Gpu;
 use chunks::Chunks;
 use glare::GlareTarget;
@@ -80,6 +81,7 @@ pub struct GpuRenderer {
     pipelines: Pipelines,
     scene: Scene,
     field: LampField,
+    lamps: LampsInTime,
     chunks: Chunks,
     paintings: Paintings,
     textures: Textures,
@@ -121,6 +123,7 @@ impl GpuRenderer {
         Ok(Self {
             pipelines,
             field: LampField::new(&scene.lamps).in_air(scene.air),
+            lamps: LampsInTime::new(&scene.lamps),
             chunks: Chunks::default(),
             textures: Textures::new(&gpu, &paintings),
             paintings,
@@ -135,6 +138,15 @@ impl GpuRenderer {
             scratch: Scratch::default(),
             gpu,
         })
+    }
+
+    /// Where a lamp has failed since the last job, what the lamps light is made anew.
+    fn follow_lamps(&mut self, time: SimTime) {
+        if let Some(lamps) = self.lamps.changed(time) {
+            self.field = LampField::new(&lamps).in_air(self.scene.air);
+            self.scene.lamps = lamps;
+            self.chunks = Chunks::default();
+        }
     }
 
     fn upload_bodies(&mut self, job: &Job) {
@@ -280,6 +292,7 @@ impl Renderer for GpuRenderer {
     }
 
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
+        self.follow_lamps(job.time);
         self.chunks.next_job();
         self.upload_bodies(job);
         let mut encoder = self

@@ -1,0 +1,50 @@
+//! What the stack says of the cameras that it looks through.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What is wrong with a camera, as one can tell from what it delivers. An image with any of these
+/// is not used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CameraFault {
+    /// Nothing comes any more.
+    Silent,
+    /// A frame came without an image, or with one of the wrong size.
+    Missing,
+    /// All pixels are equal: nothing reaches the sensor's output.
+    Dead,
+    /// The image is the one before again, bit for bit, which the noise of a real sensor never
+    /// gives.
+    Frozen,
+    /// It came so late that nobody knows any more where the train was.
+    Late,
+}
+
+impl fmt::Display for CameraFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Silent => "silent",
+            Self::Missing => "no image",
+            Self::Dead => "dead",
+            Self::Frozen => "frozen",
+            Self::Late => "too late",
+        })
+    }
+}
+
+/// How a camera does at one frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CameraHealth {
+    /// What is wrong with it.
+    pub fault: Option<CameraFault>,
+    /// Frames lost since the one before, by the gap in their numbers.
+    pub lost: u32,
+}
+
+impl CameraHealth {
+    /// The image may be used.
+    pub fn is_good(&self) -> bool {
+        self.fault.is_none()
+    }
+}

@@ -1,0 +1,92 @@
+//! What is broken: lamps that are out, dim or flicker, and cameras that freeze, lose frames, go
+//! dead or deliver late.
+//!
+//! ```
+//! use metrotwin::track::{Tunnel, read_toml};
+//! use metrotwin::twin::faults::FaultSettings;
+//!
+//! let faults: FaultSettings = read_toml(r#"
+//!     [[lamps]] # 22 % of all lamps are out
+//!     share = 0.22
+//!     fault = { kind = "dead" }
+//!
+//!     [[cameras]] # a stuck frame grabber
+//!     camera = "W1530"
+//!     fault = { kind = "freeze" }
+//!     from_s = 20.0
+//!     to_s = 26.0
+//! "#)?;
+//! let tunnel = Tunnel::from_toml("
+//!     name = 'short'
+//!     plan = [{ kind = 'straight', length_m = 1000.0 }]
+//!     lamps = { from_m = 5.0 }
+//! ")?;
+//! assert_eq!(faults.lamps[0].chosen(0, &tunnel, 1).count(), 22);
+//! # Ok::<(), metrotwin::track::FileError>(())
+//! ```
+//!
+//! Every fault has a stretch of time in which it acts; by default that is the whole run. What is
+//! drawn at random comes from the run's seed and the name of what is struck, so that nothing
+//! depends on the order of frames, and a larger share strikes all that a smaller one does.
+//!
+//! The stack is told nothing of all this: it must find out by itself.
+//!
+//! What it does not do: dirt and blocked lenses (they are the lens's: `rig.lens`), calibration
+//! errors (`rig.calibration_error`), and faults of inertial unit, odometer, radar, lidar and radio.
+
+mod camera;
+mod lamp;
+
+pub use camera::{CameraFaultSettings, CameraTrouble, Grabber, Kind};
+pub use lamp::{LampFaultSettings, LampTrouble, age};
+
+use crate::track::{Problem, Tunnel};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// All faults of a scenario.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FaultSettings {
+    /// Of the tunnel's lamps. Default: none.
+    pub lamps: Vec<LampFaultSettings>,
+    /// Of the cameras. Default: none.
+    pub cameras: Vec<CameraFaultSettings>,
+}
+
+impl FaultSettings {
+    /// Appends what is wrong by itself.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        for (k, lamp) in self.lamps.iter().enumerate() {
+            lamp.check(&format!("{at}.lamps[{k}]"), problems);
+        }
+        for (k, camera) in self.cameras.iter().enumerate() {
+            camera.check(&format!("{at}.cameras[{k}]"), problems);
+        }
+    }
+
+    /// Appends what does not fit the tunnel.
+    pub fn check_in(&self, tunnel: &Tunnel, at: &str, problems: &mut Vec<Problem>) {
+        for (k, lamp) in self.lamps.iter().enumerate() {
+            lamp.check_in(tunnel, &format!("{at}.lamps[{k}]"), problems);
+        }
+    }
+}
+
+/// A stretch of time must be one.
+fn check_times(at: &str, from_s: f64, to_s: Option<f64>, problems: &mut Vec<Problem>) {
+    Problem::unless_within(
+        problems,
+        format!("{at}.from_s"),
+        from_s,
+        0.0..=86_400.0,
+        "s",
+    );
+    if let Some(to_s) = to_s.filter(|to_s| from_s.is_finite() && !(*to_s > from_s)) {
+        problems.push(Problem::new(
+            format!("{at}.to_s"),
+            format!("it ends at {to_s} s, and begins at {from_s} s"),
+            format!("give a time after {from_s} s, or take it out: the fault then stays"),
+        ));
+    }
+}
