@@ -40,7 +40,15 @@ fn every_file_validates() {
 /// Provokes a constant that a shader spells out with a value of its own.
 #[test]
 fn constants_have_one_source() {
-    assert_eq!(constant("MAX_HEADLIGHTS"), layout::MAX_HEADLIGHTS as u32);
+    for (file, name, ours) in [
+        ("common", "MAX_HEADLIGHTS", layout::MAX_HEADLIGHTS),
+        ("shadows", "MAX_WORDS", layout::MAX_WORDS),
+        ("shadows", "MAX_SOURCES", layout::MAX_SOURCES),
+        ("shadows", "MAX_BLOCKERS", layout::MAX_BLOCKERS),
+        ("shadows", "MAX_SLABS", layout::MAX_SLABS),
+    ] {
+        assert_eq!(constant(file, name), ours as u32, "{name}");
+    }
     let from_rust = surface::wgsl();
     for name in ["GLARE_STEP_PX"] {
         assert!(from_rust.contains(&format!("const {name}")));
@@ -54,8 +62,8 @@ fn constants_have_one_source() {
     }
 }
 
-fn constant(name: &str) -> u32 {
-    let module = parse("common");
+fn constant(file: &str, name: &str) -> u32 {
+    let module = parse(file);
     let (_, c) = module
         .constants
         .iter()
@@ -172,4 +180,31 @@ fn structs_agree() {
         wide_e,
         wide_px2
     );
+    same_layout!("shadows", Corner, origin_m, time_s, ray);
+    same_layout!(
+        "shadows", Tile, low_px, high_px, shaded, plain, end, ambient_lx, corners
+    );
+    same_layout!(
+        "shadows",
+        Source,
+        position_m,
+        intensity_cd,
+        axis,
+        exponent,
+        aside_m,
+        reach_m,
+        up_m,
+        mount_m
+    );
+    same_layout!(
+        "shadows",
+        Blocker,
+        centre_m,
+        radius_m,
+        velocity_mps,
+        first_slab,
+        axis,
+        end_slab
+    );
+    same_layout!("shadows", Slab, normal, low_m, high_m);
 }

@@ -6,6 +6,15 @@ use bytemuck::{Pod, Zeroable};
 /// Headlights beyond this many do not light a view; the nearest ones do.
 pub const MAX_HEADLIGHTS: usize = 8;
 
+/// Numbers in the lists of a view's shadows.
+pub const MAX_WORDS: usize = 16384;
+/// Lights that may throw shadows in a view: the nearest.
+pub const MAX_SOURCES: usize = 128;
+/// Bodies that may throw shadows in a view: the nearest.
+pub const MAX_BLOCKERS: usize = 512;
+/// Slabs of all of them.
+pub const MAX_SLABS: usize = 1024;
+
 /// A corner of a surface.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -214,4 +223,92 @@ pub struct GlareRow {
     pub wide_e: f32,
     /// Square of that width.
     pub wide_px2: f32,
+}
+
+/// What a corner of a tile sees.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Corner {
+    /// A pixel at optical depth z is the point `origin_m` + z `ray` from the reference point.
+    pub origin_m: [f32; 3],
+    /// From the bodies' time to the middle of the row's exposure.
+    pub time_s: f32,
+    /// World axes.
+    pub ray: [f32; 3],
+    /// Fills the stride.
+    pub unused: f32,
+}
+
+/// A part of the picture in which shadows may fall.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Tile {
+    /// Upper left.
+    pub low_px: [f32; 2],
+    /// Lower right.
+    pub high_px: [f32; 2],
+    /// Where its shaded lights begin in the lists.
+    pub shaded: u32,
+    /// Where its other lights begin.
+    pub plain: u32,
+    /// After the last one.
+    pub end: u32,
+    /// Ambient light.
+    pub ambient_lx: f32,
+    /// Upper left, upper right, lower left, lower right.
+    pub corners: [Corner; 4],
+}
+
+/// A lamp or headlight as shadows need it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Source {
+    /// From the view's reference point, world axes.
+    pub position_m: [f32; 3],
+    /// Mean intensity along the axis.
+    pub intensity_cd: f32,
+    /// Unit vector, world axes.
+    pub axis: [f32; 3],
+    /// Exponent of the pattern.
+    pub exponent: f32,
+    /// A radius of its disc.
+    pub aside_m: [f32; 3],
+    /// It does not light what is farther.
+    pub reach_m: f32,
+    /// The radius of its disc across the other.
+    pub up_m: [f32; 3],
+    /// Bodies nearer to it than this carry it.
+    pub mount_m: f32,
+}
+
+/// A body that hides light: a capsule, or the part of a tube that is inside all of some slabs.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Blocker {
+    /// Centre at the bodies' time, from the view's reference point.
+    pub centre_m: [f32; 3],
+    /// Radius of capsule or tube.
+    pub radius_m: f32,
+    /// Where it goes.
+    pub velocity_mps: [f32; 3],
+    /// First of its slabs.
+    pub first_slab: u32,
+    /// Of a capsule: to an end of its straight part. Of a tube: unit vector; 0 where there is none.
+    pub axis: [f32; 3],
+    /// After the last of its slabs.
+    pub end_slab: u32,
+}
+
+/// Space between two parallel planes.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Slab {
+    /// Unit normal, world axes.
+    pub normal: [f32; 3],
+    /// From the body's centre to one plane.
+    pub low_m: f32,
+    /// To the other.
+    pub high_m: f32,
+    /// Fills the stride.
+    pub unused: [f32; 3],
 }

@@ -19,17 +19,18 @@
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
 //!    headlights are added in every pixel.
-//! 2. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
+//! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture.
+//! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
 //!    closed form along the row and is summed over a few lines across it, at each of the instants
 //!    of the row's exposure; where the disc is and how bright in each comes from double precision.
 //!    The glare is summed up in a texture of its own, a texel for every fourth pixel.
-//! 3. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
+//! 4. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
 //! # What it does not do
 //!
-//! Shadows, reflections in wet or polished surfaces, lens distortion, and the end walls where two
+//! Reflections in wet or polished surfaces, lens distortion, and the end walls where two
 //! cross-sections meet (dark). Between vertices positions run straight, so edges close to a fast
 //! camera are bent by the shutter only facet by facet (0.5 m); lamps are exact. Stains end 60 m
 //! away, the tunnel 160 m ahead of the camera; glare under 0.01 grey levels is not drawn.
@@ -42,6 +43,7 @@ pub mod layout;
 mod mesh;
 mod passes;
 mod pipeline;
+mod shadows;
 mod sight;
 mod target;
 mod textures;
@@ -66,6 +68,7 @@ use layout::Pose;
 use mesh::Mesh;
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::{Develop, Pipelines};
+use shadows::Shadows;
 use sight::{Sight, World};
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
@@ -107,6 +110,7 @@ struct Scratch {
     poses: Vec<Pose>,
     sight: Sight,
     lamps: LampTable,
+    shadows: Shadows,
 }
 
 impl GpuRenderer {
@@ -193,6 +197,7 @@ impl GpuRenderer {
             let sight = &self.scratch.sight;
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);
             let pipelines = &self.pipelines;
+            buffers.draw_shadows(gpu, pipelines, encoder, target);
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_glare(gpu, pipelines, encoder, glare);
             let map = MapKey::new(framed.view);
@@ -223,6 +228,11 @@ impl GpuRenderer {
         };
         let meshes = (&self.chunks, &self.bodies);
         scratch.sight.fill(framed, job, &world, meshes);
+        let in_sight = scratch.sight.keys().iter();
+        let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
+        scratch
+            .shadows
+            .fill(framed, job, (tunnel, &self.field), in_sight);
         let airlight_cd_m2 = self
             .field
             .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
@@ -244,6 +254,7 @@ impl GpuRenderer {
                 poses: &scratch.poses,
                 sight: &scratch.sight,
                 lamps: &scratch.lamps,
+                shadows: &scratch.shadows,
             },
         );
     }

@@ -6,6 +6,7 @@ use super::glare::GlareTarget;
 use super::lamps::LampTable;
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Pose, View};
 use super::pipeline::{Background, Pipelines, bind};
+use super::shadows::{ShadowBuffers, Shadows};
 use super::sight::Sight;
 use super::target::Target;
 use super::textures::Textures;
@@ -13,13 +14,14 @@ use std::mem::size_of;
 use std::ops::Range;
 
 /// A buffer that grows with what is written to it.
-struct Upload {
+pub struct Upload {
     buffer: wgpu::Buffer,
     usage: wgpu::BufferUsages,
 }
 
 impl Upload {
-    fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
+    /// Of at least one item's size, which may not be 0.
+    pub fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
         let usage = usage | wgpu::BufferUsages::COPY_DST;
         Self {
             buffer: allocate(gpu, usage, size as u64),
@@ -28,7 +30,7 @@ impl Upload {
     }
 
     /// Takes effect before anything submitted later, and after anything submitted before.
-    fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
+    pub fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         if bytes.is_empty() {
             return;
@@ -39,7 +41,8 @@ impl Upload {
         gpu.queue.write_buffer(&self.buffer, 0, bytes);
     }
 
-    fn binding(&self) -> wgpu::BindingResource<'_> {
+    /// All of it.
+    pub fn binding(&self) -> wgpu::BindingResource<'_> {
         self.buffer.as_entire_binding()
     }
 }
@@ -80,7 +83,7 @@ impl BodyBuffers {
 
 /// What one view of a job uploads.
 pub struct ViewBuffers {
-    view: Upload,
+    pub(super) view: Upload,
     poses: Upload,
     shares: Upload,
     placements: Upload,
@@ -91,6 +94,7 @@ pub struct ViewBuffers {
     glares: Upload,
     glare_rows: Upload,
     glare_count: u32,
+    pub(super) shadows: ShadowBuffers,
 }
 
 /// What a view uploads, made by the caller.
@@ -103,6 +107,8 @@ pub struct ViewData<'a> {
     pub sight: &'a Sight,
     /// Its lamps.
     pub lamps: &'a LampTable,
+    /// Shadows of bodies.
+    pub shadows: &'a Shadows,
 }
 
 /// Bind groups of the background's pipelines; one a texture.
@@ -139,6 +145,7 @@ impl ViewBuffers {
             glares: Upload::new(gpu, storage, size_of::<Glare>()),
             glare_rows: Upload::new(gpu, storage, size_of::<GlareRow>()),
             glare_count: 0,
+            shadows: ShadowBuffers::new(gpu),
         }
     }
 
@@ -156,6 +163,7 @@ impl ViewBuffers {
         self.glares.write(gpu, &table.glares);
         self.glare_rows.write(gpu, &table.glare_rows);
         self.glare_count = table.glares.len() as u32;
+        self.shadows.write(gpu, data.shadows);
     }
 
     /// Tunnel and bodies at every instant of the exposure.
@@ -331,7 +339,8 @@ impl ViewBuffers {
     }
 }
 
-fn begin<'a>(
+/// A pass over one colour target.
+pub fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     colour: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,

@@ -1,4 +1,4 @@
-//! Shaders and the four pipelines made of them.
+//! Shaders and the pipelines made of them.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use crate::twin::render::sensor::BLOOMING_REACH;
@@ -26,6 +26,7 @@ const FILES: [(&str, &str); 6] = [
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
     ("glare", include_str!("../../../../shaders/glare.wgsl")),
     ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
+    ("shadows", include_str!("../../../../shaders/shadows.wgsl")),
 ];
 
 /// The complete source of `shaders/<name>.wgsl`: constants, what is common, and the file.
@@ -58,6 +59,8 @@ pub struct Pipelines {
     background: wgpu::ShaderModule,
     /// Adds a share of one picture to another.
     pub blend: wgpu::RenderPipeline,
+    /// Shadows of capsules, and of any bodies, over the background.
+    pub shadows: [wgpu::RenderPipeline; 2],
     /// Lamps' discs, over the background by coverage.
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added up.
@@ -95,6 +98,7 @@ impl Pipelines {
             })
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
+        let shadows = shader("shadows");
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -111,6 +115,17 @@ impl Pipelines {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
+            shadows: [false, true].map(|others| {
+                let stage = Stage {
+                    shader: &shadows,
+                    entries: ["tile_corner", "shade"],
+                    buffers: &[],
+                    depth: None,
+                    target: target(SIGNAL, Some(FADE)),
+                    constants: &[("OTHERS", f64::from(u8::from(others)))],
+                };
+                pipeline(device, stage)
+            }),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
             glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over)),
             sensors: [const { None }; 4],
@@ -207,6 +222,19 @@ const SHARE: wgpu::BlendState = {
     wgpu::BlendState {
         color: add,
         alpha: add,
+    }
+};
+
+/// Keeps the share in the alpha of what is there, and adds the source.
+const FADE: wgpu::BlendState = {
+    let fade = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::SrcAlpha,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: fade,
+        alpha: fade,
     }
 };
 

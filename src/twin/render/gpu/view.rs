@@ -97,15 +97,23 @@ impl<'a> Framed<'a> {
         constants
     }
 
-    fn place_headlights(&self, headlights: &[Headlight], constants: &mut layout::View) {
-        let from_here =
-            |h: &Headlight| h.world_from_light.translation.vector - self.reference().coords;
+    fn to(&self, light: &Headlight) -> Vector3<f64> {
+        light.world_from_light.translation.vector - self.reference().coords
+    }
+
+    /// The headlights that light the view.
+    pub fn nearest<'h>(&self, headlights: &'h [Headlight]) -> Vec<&'h Headlight> {
         let mut nearest: Vec<&Headlight> = headlights.iter().collect();
-        nearest.sort_by(|a, b| f64::total_cmp(&from_here(a).norm(), &from_here(b).norm()));
+        nearest.sort_by(|a, b| f64::total_cmp(&self.to(a).norm(), &self.to(b).norm()));
         nearest.truncate(MAX_HEADLIGHTS);
+        nearest
+    }
+
+    fn place_headlights(&self, headlights: &[Headlight], constants: &mut layout::View) {
+        let nearest = self.nearest(headlights);
         for (slot, light) in constants.headlights.iter_mut().zip(nearest) {
             *slot = layout::Headlight {
-                position_m: single(&from_here(light)),
+                position_m: single(&self.to(light)),
                 intensity_cd: light.intensity_cd as f32,
                 axis: single(&(light.world_from_light.rotation * Vector3::x())),
                 exponent: light.exponent as f32,

@@ -1,0 +1,213 @@
+//! Which lights may throw the shadow of which body where: by balls and cones, generously.
+
+use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
+use crate::twin::render::gpu::view::Framed;
+use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, MOUNT_M};
+use crate::twin::render::scene::{Body, Headlight, Job, LampLight, Shape};
+use nalgebra::{Point3, Vector3};
+use std::ops::Range;
+
+/// Bodies and lamps farther than this from the camera throw no shadow that it sees.
+const FAR_M: f64 = 200.0;
+
+/// A lamp or headlight.
+pub struct Light {
+    pub centre: Point3<f64>,
+    pub axis: Vector3<f64>,
+    pub radius_m: f64,
+    pub intensity_cd: f64,
+    pub exponent: f64,
+    pub reach_m: f64,
+    pub mount_m: f64,
+}
+
+/// A ball around a piece of a body, wherever it is in a frame.
+pub struct Ball {
+    /// The body's number.
+    pub body: usize,
+    pub centre: Point3<f64>,
+    pub radius_m: f64,
+}
+
+/// The shadow of a ball.
+struct Cone {
+    /// From the light to the ball, length 1.
+    axis: Vector3<f64>,
+    /// Of half its angle.
+    sin: f64,
+    cos: f64,
+    nearest_m: f64,
+}
+
+/// All shadows of one body under one light.
+pub struct Cast {
+    pub light: usize,
+    pub body: usize,
+    cones: Vec<Cone>,
+}
+
+impl Light {
+    fn lamp(lamp: &LampLight) -> Self {
+        Self {
+            centre: lamp.centre,
+            axis: lamp.facing.into_inner(),
+            radius_m: lamp.radius_m,
+            intensity_cd: lamp.duty() * lamp.axial_intensity_cd(),
+            exponent: lamp.exponent,
+            reach_m: LAMP_REACH_M,
+            mount_m: 0.0,
+        }
+    }
+
+    fn headlight(light: &Headlight) -> Self {
+        Self {
+            centre: Point3::from(light.world_from_light.translation.vector),
+            axis: light.world_from_light.rotation * Vector3::x(),
+            radius_m: HEADLIGHT_RADIUS_M,
+            intensity_cd: light.intensity_cd,
+            exponent: light.exponent,
+            reach_m: 1e6,
+            mount_m: MOUNT_M,
+        }
+    }
+
+    /// Whether it may light anything in a ball, whose surface has a normal or is round.
+    pub fn may_light(
+        &self,
+        centre: &Point3<f64>,
+        radius_m: f64,
+        normal: Option<&Vector3<f64>>,
+    ) -> bool {
+        let to = centre - self.centre;
+        to.norm() - radius_m < self.reach_m
+            && self.axis.dot(&to) + radius_m > 0.0
+            && normal.is_none_or(|n| n.dot(&to) < radius_m)
+    }
+
+    fn cone(&self, ball: &Ball) -> Option<Cone> {
+        let wide_m = ball.radius_m + self.radius_m;
+        self.may_light(&ball.centre, wide_m, None).then(|| {
+            let to = ball.centre - self.centre;
+            let distance = to.norm();
+            let sin = wide_m / distance;
+            // The shadow of a ball around the light is everywhere.
+            let around = distance <= wide_m;
+            Cone {
+                axis: if around {
+                    Vector3::zeros()
+                } else {
+                    to / distance
+                },
+                sin: if around { 0.0 } else { sin },
+                cos: if around {
+                    -1.0
+                } else {
+                    (1.0 - sin * sin).sqrt()
+                },
+                nearest_m: distance - wide_m,
+            }
+        })
+    }
+}
+
+impl Cast {
+    /// Whether it may fall on anything in a ball that the light lights.
+    pub fn may_fall_on(&self, light: &Light, centre: &Point3<f64>, radius_m: f64) -> bool {
+        let to = centre - light.centre;
+        let square = to.norm_squared();
+        self.cones.iter().any(|cone| {
+            let along = to.dot(&cone.axis);
+            let aside = (square - along * along).max(0.0).sqrt();
+            along + radius_m > cone.nearest_m && aside * cone.cos - along * cone.sin < radius_m
+        })
+    }
+}
+
+/// The lights about a camera.
+pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
+    let eye = framed.reference();
+    let away_m = |lamp: &LampLight| (lamp.centre - eye).norm();
+    let lamps = field.lamps().iter();
+    let mut lamps: Vec<&LampLight> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
+    lamps.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+    lamps.truncate(MAX_SOURCES - MAX_HEADLIGHTS);
+    let headlights = framed.nearest(&job.headlights);
+    (lamps.into_iter().map(Light::lamp))
+        .chain(headlights.into_iter().map(Light::headlight))
+        .collect()
+}
+
+/// Balls around the bodies about a camera, wherever they go while the view is exposed: capsules
+/// first. Also how many of the numbers that they give to bodies are capsules'.
+pub fn balls<'j>(framed: &Framed<'_>, job: &'j Job) -> (Vec<&'j Body>, usize, Vec<Ball>) {
+    let eye = framed.reference();
+    let away_m = |body: &Body| {
+        let to = body.world_from_body.translation.vector - eye.coords;
+        to.norm() - body.shape.half_extents_m().norm()
+    };
+    let bodies = job.bodies.iter();
+    let mut bodies: Vec<&Body> = bodies.filter(|body| away_m(body) < FAR_M).collect();
+    bodies.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+    bodies.truncate(MAX_BLOCKERS);
+    let (mut bodies, others): (Vec<&Body>, Vec<&Body>) =
+        bodies.into_iter().partition(|body| is_capsule(body));
+    let capsules = bodies.len();
+    bodies.extend(others);
+    let shutter = &framed.view.camera.shutter;
+    let last_row = f64::from(framed.view.camera.intrinsics.height_px.saturating_sub(1));
+    let ends = [0.0, last_row].map(|v| shutter.row_mid(framed.view.start, v).since(job.time));
+    let mid_s = 0.5 * (ends[0] + ends[1]);
+    let half_s = 0.5 * ((ends[1] - ends[0]).abs() + shutter.exposure_s);
+    let mut balls = Vec::new();
+    for (number, body) in bodies.iter().enumerate() {
+        for (place, radius_m) in pieces(&body.shape) {
+            balls.push(Ball {
+                body: number,
+                centre: body.world_from_body * place + body.velocity_mps * mid_s,
+                radius_m: radius_m + body.velocity_mps.norm() * half_s,
+            });
+        }
+    }
+    (bodies, capsules, balls)
+}
+
+/// Whether the shader takes it for a capsule.
+pub fn is_capsule(body: &Body) -> bool {
+    matches!(body.shape, Shape::Sphere(_) | Shape::Capsule(..))
+}
+
+/// Balls that cover a shape: a long one in pieces about as long as it is wide.
+fn pieces(shape: &Shape) -> impl Iterator<Item = (Point3<f64>, f64)> {
+    let half = shape.half_extents_m();
+    let long = half.imax();
+    let mut piece = half;
+    piece[long] = 0.0;
+    let count = (half[long] / piece.max().max(1e-3)).ceil().clamp(1.0, 32.0);
+    piece[long] = half[long] / count;
+    (0..count as u32).map(move |k| {
+        let mut place = Point3::origin();
+        place[long] = half[long] * ((2.0 * f64::from(k) + 1.0) / count - 1.0);
+        (place, piece.norm())
+    })
+}
+
+/// All shadows, by light and within one light by body, and those of each light.
+pub fn casts(lights: &[Light], balls: &[Ball]) -> (Vec<Cast>, Vec<Range<usize>>) {
+    let mut casts = Vec::new();
+    let of_light = lights.iter().enumerate().map(|(k, light)| {
+        let first = casts.len();
+        for of_body in balls.chunk_by(|a, b| a.body == b.body) {
+            let cones: Vec<Cone> = of_body.iter().filter_map(|b| light.cone(b)).collect();
+            if !cones.is_empty() {
+                casts.push(Cast {
+                    light: k,
+                    body: of_body[0].body,
+                    cones,
+                });
+            }
+        }
+        first..casts.len()
+    });
+    let of_light = of_light.collect();
+    (casts, of_light)
+}

@@ -1,0 +1,228 @@
+//! Tiles of a picture, and what may matter in each: lights, and shadows of bodies.
+
+use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
+use crate::twin::render::gpu::view::Framed;
+use crate::twin::render::scene::Body;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+/// Side of a tile: over so few pixels a lens's distortion is even.
+pub const TILE_PX: u32 = 32;
+/// Cells of a tunnel's surface are no longer and wider than this.
+const CELL_M: f64 = 1.0;
+/// What is nearer than this in optical depth is not seen.
+const NEAR_M: f64 = 0.05;
+/// A border for what bends between the corners of a cell.
+const BORDER_PX: f64 = 2.0;
+/// Cells that reach behind the camera are looked at in so many points each way.
+const POINTS: i32 = 8;
+
+/// A parallelogram of a surface that may be shaded.
+pub struct Cell {
+    pub centre: Point3<f64>,
+    /// Half of its sides.
+    half: [Vector3<f64>; 2],
+    /// None where it stands for something that faces several ways.
+    pub normal: Option<Vector3<f64>>,
+}
+
+/// A rectangle of the picture.
+#[derive(Clone, Copy)]
+struct Bounds {
+    low_px: [f64; 2],
+    high_px: [f64; 2],
+}
+
+/// Where the camera is while a view is exposed: `camera_from_world`, and when after the job's time.
+pub struct Eyes(Vec<(Isometry3<f64>, f64)>);
+
+/// Sets of numbers, one a tile.
+#[derive(Default)]
+pub struct Marks {
+    columns: u32,
+    rows: u32,
+    words: usize,
+    sets: Vec<u64>,
+}
+
+impl Cell {
+    /// Radius of the ball around it.
+    pub fn radius_m(&self) -> f64 {
+        (self.half[0] + self.half[1])
+            .norm()
+            .max((self.half[0] - self.half[1]).norm())
+    }
+
+    /// The same surface in four parts.
+    pub fn quarters(&self) -> [Self; 4] {
+        [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(|(x, y)| Self {
+            centre: self.point(x, y),
+            half: self.half.map(|side| 0.5 * side),
+            normal: self.normal,
+        })
+    }
+
+    /// All of a stretch of the tunnel, rails too.
+    pub fn of(tunnel: &Tunnel, from_m: f64, length_m: f64, cells: &mut Vec<Self>) {
+        cells.clear();
+        let steps = (length_m / CELL_M).ceil().max(1.0);
+        let half_m = 0.5 * length_m / steps;
+        for k in 0..steps as u32 {
+            let s_m = from_m + (2.0 * f64::from(k) + 1.0) * half_m;
+            let Some(section) = tunnel.section_at(s_m) else {
+                continue;
+            };
+            let frame = tunnel.alignment.at(s_m);
+            Self::of_walls(section, &frame, half_m, cells);
+            for l_m in [-RAIL_OFFSET_M, RAIL_OFFSET_M] {
+                let [foot, head] = [-0.2, 0.1].map(|h_m| frame.world_from_section(l_m, h_m));
+                cells.push(Self {
+                    centre: nalgebra::center(&foot, &head),
+                    half: [frame.ahead() * half_m, 0.5 * (head - foot)],
+                    normal: None,
+                });
+            }
+        }
+    }
+
+    fn of_walls(section: &CrossSection, frame: &TrackFrame, half_m: f64, cells: &mut Vec<Self>) {
+        for edge in section.edges() {
+            let [a, b] = [edge.a, edge.b].map(|p| frame.world_from_section(p.l_m, p.h_m));
+            let count = (edge.length_m() / CELL_M).ceil().clamp(1.0, 64.0);
+            let (l, h) = edge.normal();
+            let half = 0.5 / count * (b - a);
+            cells.extend((0..count as u32).map(|k| Self {
+                centre: a + half * (2.0 * f64::from(k) + 1.0),
+                half: [frame.ahead() * half_m, half],
+                normal: Some(frame.left() * l + Vector3::z() * h),
+            }));
+        }
+    }
+
+    fn point(&self, x: f64, y: f64) -> Point3<f64> {
+        self.centre + self.half[0] * x + self.half[1] * y
+    }
+}
+
+impl Eyes {
+    /// In the first, middle and last row.
+    pub fn of(framed: &Framed<'_>, job_time: crate::bus::SimTime) -> Self {
+        let view = framed.view;
+        let last = f64::from(view.camera.intrinsics.height_px.saturating_sub(1));
+        let rows = [0.0, 0.5 * last, last];
+        Self(
+            rows.map(|v| {
+                let at = view.camera.shutter.row_mid(view.start, v);
+                (view.motion.pose_at(at).inverse(), at.since(job_time))
+            })
+            .into(),
+        )
+    }
+}
+
+impl Bounds {
+    const NONE: Self = Self {
+        low_px: [f64::INFINITY; 2],
+        high_px: [f64::NEG_INFINITY; 2],
+    };
+    const ALL: Self = Self {
+        low_px: [f64::NEG_INFINITY; 2],
+        high_px: [f64::INFINITY; 2],
+    };
+
+    fn add(&mut self, framed: &Framed<'_>, seen: &Point3<f64>) {
+        if let Some(at) = framed.view.camera.intrinsics.project(seen) {
+            for k in 0..2 {
+                self.low_px[k] = self.low_px[k].min(at[k]);
+                self.high_px[k] = self.high_px[k].max(at[k]);
+            }
+        }
+    }
+
+    fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &Cell) -> Self {
+        let mut bounds = Self::NONE;
+        for (eye, _) in &eyes.0 {
+            let corner = |x: f64, y: f64| eye * cell.point(x, y);
+            let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+            let seen = corners.map(|(x, y)| corner(x, y));
+            if seen.iter().all(|p| p.z > NEAR_M) {
+                seen.iter().for_each(|p| bounds.add(framed, p));
+            } else if seen.iter().any(|p| p.z > NEAR_M) {
+                let along = |k: i32| 2.0 * f64::from(k) / f64::from(POINTS) - 1.0;
+                (0..=POINTS)
+                    .flat_map(|i| (0..=POINTS).map(move |j| (i, j)))
+                    .map(|(i, j)| corner(along(i), along(j)))
+                    .filter(|p| p.z > NEAR_M)
+                    .for_each(|p| bounds.add(framed, &p));
+            }
+        }
+        bounds
+    }
+
+    fn of_body(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
+        let half = body.shape.half_extents_m();
+        let corner = |k: usize| {
+            let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+            let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
+            body.world_from_body * Point3::from(corner)
+        };
+        let mut bounds = Self::NONE;
+        for (eye, after_s) in &eyes.0 {
+            let seen: [Point3<f64>; 8] =
+                std::array::from_fn(|k| eye * (corner(k) + body.velocity_mps * *after_s));
+            if seen.iter().all(|p| p.z > NEAR_M) {
+                seen.iter().for_each(|p| bounds.add(framed, p));
+            } else if seen.iter().any(|p| p.z > NEAR_M) {
+                return Self::ALL;
+            }
+        }
+        bounds
+    }
+}
+
+impl Marks {
+    /// Empty sets of so many numbers for a picture.
+    pub fn reset(&mut self, (width_px, height_px): (u32, u32), numbers: usize) {
+        self.columns = width_px.div_ceil(TILE_PX);
+        self.rows = height_px.div_ceil(TILE_PX);
+        self.words = numbers.div_ceil(64);
+        self.sets.clear();
+        self.sets
+            .resize((self.columns * self.rows) as usize * self.words, 0);
+    }
+
+    /// Column, row and set of each tile.
+    pub fn tiles(&self) -> impl Iterator<Item = (u32, u32, &[u64])> {
+        let sets = self.sets.chunks_exact(self.words.max(1));
+        sets.zip(0u32..)
+            .map(|(set, k)| (k % self.columns, k / self.columns, set))
+    }
+
+    /// Adds numbers to all tiles that show a cell.
+    pub fn add_cell(&mut self, framed: &Framed<'_>, eyes: &Eyes, cell: &Cell, numbers: &[u64]) {
+        self.add(&Bounds::of_cell(framed, eyes, cell), numbers);
+    }
+
+    /// Adds numbers to all tiles that show a body.
+    pub fn add_body(&mut self, framed: &Framed<'_>, eyes: &Eyes, body: &Body, numbers: &[u64]) {
+        self.add(&Bounds::of_body(framed, eyes, body), numbers);
+    }
+
+    fn add(&mut self, bounds: &Bounds, numbers: &[u64]) {
+        let range = |k: usize, count: u32| {
+            let tile = |px: f64| (px / f64::from(TILE_PX)).floor();
+            let first = tile(bounds.low_px[k] + 0.5 - BORDER_PX).max(0.0);
+            let end = (tile(bounds.high_px[k] + 0.5 + BORDER_PX) + 1.0).min(f64::from(count));
+            // Nothing where the end comes first.
+            first as u32..end.max(0.0) as u32
+        };
+        let columns = range(0, self.columns);
+        for row in range(1, self.rows) {
+            for column in columns.clone() {
+                let at = (row * self.columns + column) as usize * self.words;
+                for (word, new) in self.sets[at..].iter_mut().zip(numbers) {
+                    *word |= new;
+                }
+            }
+        }
+    }
+}
