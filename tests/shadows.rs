@@ -9,6 +9,7 @@
 )]
 
 use image::GrayImage;
+use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
@@ -231,8 +232,10 @@ fn busy_job(scene: &Scene, s_m: f64) -> Job {
         intensity_cd: 40_000.0,
         exponent: 60.0,
     }));
-    job.views[0].sensor.noise = false;
-    job.views[0].sensor.gain_db += 20.0;
+    let view = &mut job.views[0];
+    view.camera.intrinsics = Intrinsics::centred(960, 540, 550.0);
+    view.sensor.noise = false;
+    view.sensor.gain_db += 20.0;
     job
 }
 
