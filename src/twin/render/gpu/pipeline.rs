@@ -16,7 +16,7 @@ pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 6] = [
+const FILES: [(&str, &str); 7] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
     (
         "background",
