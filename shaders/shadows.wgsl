@@ -244,6 +244,20 @@ fn irradiance_lx(p: vec3f, n: vec3f, source: Source) -> f32 {
     return select(0.0, lux, square <= source.reach_m * source.reach_m);
 }
 
+// The neighbour of a pixel one way or the other that is on its surface: depth is linear over the
+// picture of a plane, so an edge is where it jumps.
+fn side(pixel: vec2i, way: vec2i, in: Varying, origin: vec3f, ray: vec3f) -> vec3f {
+    let here = textureLoad(depth, pixel, 0);
+    let before = textureLoad(depth, max(pixel - way, vec2i(0)), 0);
+    let after = textureLoad(depth, min(pixel + way, vec2i(view.size_px) - 1), 0);
+    let first = any(pixel - way < vec2i(0));
+    let last = any(pixel + way >= vec2i(view.size_px));
+    let forth = first || (!last && abs(after - here) < abs(before - here));
+    let z = NEAR_M / max(select(before, after, forth), 1e-9);
+    let sign = select(-1.0, 1.0, forth);
+    return in.origin_m + sign * origin + z * (in.ray + sign * ray);
+}
+
 // In the alpha the share of the light that is left; before it what the air between adds to it.
 @fragment
 fn shade(in: Varying) -> @location(0) vec4f {
@@ -251,7 +265,10 @@ fn shade(in: Varying) -> @location(0) vec4f {
     let z = NEAR_M / max(textureLoad(depth, pixel, 0), 1e-9);
     let from_eye = z * in.ray;
     let p = in.origin_m + from_eye;
-    let across = cross(dpdx(p), dpdy(p));
+    let right = side(pixel, vec2i(1, 0), in, dpdx(in.origin_m), dpdx(in.ray)) - p;
+    let down = side(pixel, vec2i(0, 1), in, dpdy(in.origin_m), dpdy(in.ray)) - p;
+    // One of both may be the pixel before, so the sign is left to the view.
+    let across = cross(right, down);
     let n = normalize(select(across, -across, dot(across, in.ray) > 0.0));
     let start = p + n * OFFSET_M;
     var total_lx = in.ambient_lx;

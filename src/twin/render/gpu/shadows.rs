@@ -233,11 +233,9 @@ impl Shadows {
     /// Lights and bodies for the shader.
     fn place(&mut self, framed: &Framed<'_>, falling: &Falling<'_>) {
         let reference = framed.reference();
-        (
-            self.sources.clear(),
-            self.blockers.clear(),
-            self.slabs.clear(),
-        );
+        self.sources.clear();
+        self.blockers.clear();
+        self.slabs.clear();
         self.sources
             .extend(falling.lights.iter().map(|light| source(light, &reference)));
         for body in &falling.bodies {

@@ -137,8 +137,8 @@ pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
         .collect()
 }
 
-/// Balls around the bodies about a camera, wherever they go while the view is exposed: capsules
-/// first. Also how many of the numbers that they give to bodies are capsules'.
+/// The bodies about a camera, capsules first; how many are capsules; and balls around them, wherever
+/// they go while the view is exposed.
 pub fn balls<'j>(framed: &Framed<'_>, job: &'j Job) -> (Vec<&'j Body>, usize, Vec<Ball>) {
     let eye = framed.reference();
     let away_m = |body: &Body| {
