@@ -30,7 +30,8 @@ fn draw(renderer: &mut GpuRenderer, job: &Job) -> Vec<GrayImage> {
 
 /// A sensor without noise, glare and offset, and light enough for 200 grey levels a `luminance`.
 fn plain(view: &mut View, luminance_cd_m2: f64) {
-    view.sensor.noise = false;
+    view.sensor = view.sensor.without_flaws();
+    view.lens = view.lens.without_flaws();
     view.lens.halo_share = 0.0;
     view.sensor.black_level_grey = 0.0;
     view.lens.vignetting = 0.0;

@@ -64,7 +64,7 @@ fn steady(mut lamp: LampLight) -> LampLight {
 /// No noise, no glare, no vignetting, no offset; a lamp that gives 8000 electrons and `grey` levels.
 fn plain(view: &mut View, lamp: &mut LampLight, grey: f64) {
     lamp.luminance_cd_m2 = 8000.0 / view.electrons_per_cd_m2();
-    view.sensor.noise = false;
+    view.sensor = view.sensor.without_flaws();
     view.sensor.black_level_grey = 0.0;
     view.lens.vignetting = 0.0;
     view.lens.halo_share = 0.0;

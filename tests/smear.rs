@@ -53,7 +53,7 @@ fn small_view(exposure_s: f64, luminance_cd_m2: f64, grey: f64) -> View {
     view.camera.intrinsics = Intrinsics::centred(320, 180, 260.0);
     view.camera.shutter.exposure_s = exposure_s;
     view.camera.shutter.line_time_s = 80e-6;
-    view.sensor.noise = false;
+    view.sensor = view.sensor.without_flaws();
     // No electron is lost in a full well: that is another test's.
     view.sensor.full_well_e = 1e5;
     let electrons = view.electrons_per_cd_m2() * luminance_cd_m2;

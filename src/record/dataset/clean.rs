@@ -3,7 +3,7 @@
 //! Every row keeps its own instant, the middle of its exposure, so labels fit both pictures alike.
 //! What goes is noise, smear by motion, and glare. Focus and brightness stay.
 
-use crate::twin::render::{LensSettings, SensorSettings, View};
+use crate::twin::render::View;
 
 /// An exposure as good as an instant: at 160 km/h a wall 2 m away moves by 0.02 pixels in it.
 const INSTANT_S: f64 = 1e-6;
@@ -24,22 +24,8 @@ pub(super) fn clean(view: &View, period_s: f64) -> View {
     shutter.exposure_s = short_s;
     // As many electrons in less time.
     view.sensor.quantum_efficiency *= whole_s / short_s;
-    view.sensor = SensorSettings {
-        noise: false,
-        blooming: 0.0,
-        dark_current_e_per_s: 0.0,
-        dsnu_e: 0.0,
-        prnu: 0.0,
-        hot_pixel_share: 0.0,
-        ..view.sensor
-    };
-    view.lens = LensSettings {
-        halo_share: 0.0,
-        veil_share: 0.0,
-        dirt_share: 0.0,
-        occluded_share: 0.0,
-        ..view.lens
-    };
+    view.sensor = view.sensor.without_flaws();
+    view.lens = view.lens.without_flaws();
     view
 }
 

@@ -104,6 +104,17 @@ impl Default for LensSettings {
 }
 
 impl LensSettings {
+    /// The same glass, clean and without any glare.
+    pub fn without_flaws(self) -> Self {
+        Self {
+            halo_share: 0.0,
+            veil_share: 0.0,
+            dirt_share: 0.0,
+            occluded_share: 0.0,
+            ..self
+        }
+    }
+
     /// Illuminance of the sensor on the axis under a scene of 1 cd/m^2.
     pub fn lux_per_cd_m2(&self) -> f64 {
         0.25 * PI * self.transmission / self.f_number.powi(2)
@@ -214,6 +225,19 @@ impl Default for SensorSettings {
 }
 
 impl SensorSettings {
+    /// The same sensor without noise, fixed pattern, dark current and blooming.
+    pub fn without_flaws(self) -> Self {
+        Self {
+            noise: false,
+            blooming: 0.0,
+            dark_current_e_per_s: 0.0,
+            dsnu_e: 0.0,
+            prnu: 0.0,
+            hot_pixel_share: 0.0,
+            ..self
+        }
+    }
+
     /// Electrons that an exposure of 1 lx s makes in a pixel of that width.
     pub fn electrons_per_lux_s(&self, pixel_m: f64) -> f64 {
         self.quantum_efficiency * PHOTONS_PER_LM_S * pixel_m.powi(2)
