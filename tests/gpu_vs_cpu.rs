@@ -27,7 +27,6 @@
 
 use image::GrayImage;
 use metrotwin::bus::{Intrinsics, SimTime};
-use metrotwin::track::uid::{ChipFrame, Waveform};
 use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
@@ -434,36 +433,11 @@ fn bright_moments(image: &GrayImage, black: f64, full: f64) -> (f64, Point2<f64>
     (area, Point2::from(sum / area))
 }
 
-/// Where the polygon crosses a row, left and right.
-fn crossings(polygon: &[Point2<f64>], row: f64) -> (f64, f64) {
-    let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-    for (k, a) in polygon.iter().enumerate() {
-        let b = polygon[(k + 1) % polygon.len()];
-        if (a.y > row) != (b.y > row) {
-            let u = a.x + (b.x - a.x) * (row - a.y) / (b.y - a.y);
-            (left, right) = (left.min(u), right.max(u));
-        }
-    }
-    (left, right)
-}
-
-/// A lamp that is always on, bright as `grey`, alone in the dark.
-fn lone_lamp(view: &View, grey: f64) -> Scene {
-    let mut scene = sample::scene();
-    let mut tunnel = (*scene.tunnel).clone();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
-    scene.tunnel = tunnel.into();
-    scene.lamps.retain(|lamp| {
-        let p = view.motion.poses[0].inverse_transform_point(&lamp.centre);
-        p.z > 2.0 && p.z < 6.0
-    });
-    scene.lamps.truncate(1);
-    let lamp = &mut scene.lamps[0];
-    lamp.exponent = 1.0;
-    lamp.luminance_cd_m2 = (grey - view.sensor.black_level_grey) / view.grey_per_cd_m2();
-    lamp.waveform = Waveform::sharp(ChipFrame { bits: 1, len: 1 }, 1.0, 0.0);
-    scene
+/// Without noise, and every pixel like the others.
+fn even(view: &mut View) {
+    view.lens = view.lens.without_flaws();
+    view.lens.vignetting = 0.0;
+    view.sensor = view.sensor.without_flaws();
 }
 
 fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
@@ -477,67 +451,6 @@ fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
             Vector3::zeros(),
         )
     })
-}
-
-/// Without noise, and every pixel like the others.
-fn even(view: &mut View) {
-    view.lens = view.lens.without_flaws();
-    view.lens.vignetting = 0.0;
-    view.sensor = view.sensor.without_flaws();
-}
-
-/// Provokes a disc drawn with the wrong row's pose: at 100 km/h and 4 m a row moves it by 0.15 px,
-/// over its 60 rows by a sixth of its width. A pixel's 4 x 4 sub-rays place one row's edge to an
-/// eighth of a pixel, all rows together the disc's middle to 0.05.
-fn a_disc_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
-    let tunnel = sample::tunnel();
-    let mut view = sample::rig_view(&tunnel, 101.0, SPEED_MPS);
-    view.start = SimTime::from_secs(3.2);
-    view.motion = shaken(&tunnel, 101.0, view.start);
-    even(&mut view);
-    view.lens.halo_share = 0.0;
-    let (black, full) = (view.sensor.black_level_grey, 200.0);
-    let scene = lone_lamp(&view, full);
-    let polygon = outline(&view, rim(&scene.lamps[0]), view.start);
-    let job = Job {
-        views: vec![view],
-        ..Job::default()
-    };
-    let image = draw(&mut *make(scene), &job).remove(0);
-    let (area, middle) = moments(&polygon);
-    let (area_seen, middle_seen) = bright_moments(&image, black, full);
-    println!("disc: area {area:.1} {area_seen:.1} px, middle {middle:.3} {middle_seen:.3}");
-    assert!(area > 1000.0, "the disc is not in the image");
-    assert!((area_seen / area - 1.0).abs() < 0.005);
-    assert!((middle_seen - middle).amax() < 0.05);
-    let (mut rows, mut worst) = (0, 0.0f64);
-    for v in 0..image.height() {
-        let (left, right) = crossings(&polygon, f64::from(v));
-        // Not the cap, where an edge runs along the row.
-        if right - left > 15.0 {
-            let inner = (0.5 * (left + right)).floor() as u32;
-            let share = |u: u32| (f64::from(image.get_pixel(u, v)[0]) - black) / (full - black);
-            let from = f64::from(inner) + 0.5;
-            let left_seen = from - (0..=inner).map(share).sum::<f64>();
-            let right_seen = from + (inner + 1..image.width()).map(share).sum::<f64>();
-            worst = worst
-                .max((left_seen - left).abs())
-                .max((right_seen - right).abs());
-            rows += 1;
-        }
-    }
-    println!("disc: worst edge of {rows} rows off by {worst:.3} px");
-    assert!(rows > 20 && worst < 0.25, "{rows} rows, {worst} px");
-}
-
-#[test]
-fn a_disc_obeys_the_row_times_on_the_cpu() {
-    a_disc_obeys_the_row_times(cpu);
-}
-
-#[test]
-fn a_disc_obeys_the_row_times_on_the_gpu() {
-    a_disc_obeys_the_row_times(gpu);
 }
 
 /// Provokes bodies drawn at the job's time or with one pose a frame: a luminous board that moves,
