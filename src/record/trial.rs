@@ -132,6 +132,7 @@ fn camera(width_px: u32, height_px: u32, f_px: f64, shrink: u32) -> CameraModel 
             exposure_s: 30e-6,
             first_row: 0,
         },
+        blur_px: 0.5,
     }
 }
 

@@ -100,7 +100,7 @@ impl LampFinder {
             raw: Patch::default(),
             filtered: Patch::default(),
             median: MedianScratch::default(),
-            outline: Outline::default(),
+            outline: Outline::new(camera.blur_px),
             ideal: Vec::new(),
             grey: GreyCentroid::default(),
             wiener: Wiener::default(),
@@ -223,7 +223,8 @@ impl LampFinder {
         });
         let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
         let scale = self.ideal_scale(&centre);
-        let spill = scale * self.outline.spill_px;
+        let (spill, spill_sigma) = self.outline.spill.px();
+        let (spill, spill_sigma) = (scale * spill, scale * spill_sigma);
         Some(LampImage {
             centre,
             own_outline: ellipse
@@ -233,7 +234,7 @@ impl LampFinder {
                     semi_minor_px: e.semi_minor_px - spill,
                     ..e
                 }),
-            axis_sigma_px: sigma_px.hypot(scale * self.outline.spill_sigma_px),
+            axis_sigma_px: sigma_px.hypot(spill_sigma),
             spot: Spot {
                 bounds,
                 centre: self.lens.seen(&centre),

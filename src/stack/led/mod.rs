@@ -34,8 +34,9 @@
 //! **What it does not do.** It expects one chip time and one code on a line. Through a global shutter
 //! lamps show no stripes: they are found, but cannot be named. Two lamps whose images overlap are one spot to it. Where
 //! the sensor saturates, fitted outlines are too large (centres are not affected); what is taken
-//! off for it is good to 0.06 px (one sigma) up to tenfold saturation, while the glare beside the
-//! lamp stays under the half of its plateau.
+//! off for it is good to 0.06 px (one sigma) behind a sharp lens, and to 0.1 px behind one that blurs by
+//! half a pixel and a lamp that saturates it fourfold, while the glare beside the lamp stays under the
+//! half of its plateau.
 
 mod centroid;
 mod code;
@@ -47,6 +48,7 @@ mod outline;
 mod patch;
 mod profile;
 mod search;
+mod spill;
 mod stripes;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]

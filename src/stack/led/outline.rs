@@ -11,21 +11,14 @@
 //! An edge lies where the row crosses half of its own plateau, between two pixels by linear
 //! interpolation; so a row that caught the lamp switching, at half its brightness, gives the same
 //! edge. Where the sensor saturates the plateau is too low and the edge lies outside, left and
-//! right alike, by up to half a pixel, and more in the lamp's glare.
-//!
-//! **Spill.** Call t the share of a pixel that the lamp must cover to saturate it. From the
-//! centre of the outermost saturated pixel the lamp's own edge is then anywhere from t - 1/2 to t +
-//! 1/2 px outwards, t on average. And t shows in the next pixel outwards: with a probability of t
-//! the edge is within it, and its light above the glare (which the pixel after it has alone) is
-//! then evenly distributed up to saturation; otherwise it has glare only. So twice its share of the
-//! way to saturation is t on average, and the spill is the distance from saturation to the edge
-//! found, less that, in the mean over the rows that cross the outline steeply.
+//! right alike: [`Spill`] tells by how much.
 
 use super::patch::Patch;
+use super::spill::Spill;
 use nalgebra::Point2;
 
 /// A connected spot in a patch, row by row.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Outline {
     /// Rows of the patch that the spot covers: from the first to the last.
     pub rows: Option<(usize, usize)>,
@@ -38,11 +31,8 @@ pub struct Outline {
     pub edges: Vec<(usize, f64, f64)>,
     /// Edge points in image coordinates.
     pub points: Vec<Point2<f64>>,
-    /// How far the edges lie outside of the lamp's own because rows are saturated, along the
-    /// outline's normal: mean over all edges.
-    pub spill_px: f64,
-    /// Standard deviation of that mean.
-    pub spill_sigma_px: f64,
+    /// How far the edges lie outside of the lamp's own because rows are saturated.
+    pub spill: Spill,
     /// It touches the image's border.
     pub cut: bool,
     mask: Vec<bool>,
@@ -50,6 +40,21 @@ pub struct Outline {
 }
 
 impl Outline {
+    /// For images of a lens that spreads a point with a standard deviation of `blur_px`.
+    pub fn new(blur_px: f64) -> Self {
+        Self {
+            rows: None,
+            extents: Vec::new(),
+            area_px: 0,
+            edges: Vec::new(),
+            points: Vec::new(),
+            spill: Spill::new(blur_px),
+            cut: false,
+            mask: Vec::new(),
+            stack: Vec::new(),
+        }
+    }
+
     /// Finds the largest spot over `threshold` in the filtered patch after closing gaps of up to
     /// `gap_rows`. `false` where there is none.
     pub fn find(&mut self, filtered: &Patch, threshold: u8, gap_rows: usize) -> bool {
@@ -132,11 +137,10 @@ impl Outline {
         self.edges.clear();
         self.points.clear();
         self.cut = false;
-        (self.spill_px, self.spill_sigma_px) = (0.0, 0.0);
+        self.spill.clear();
         let Some((first, last)) = self.rows else {
             return;
         };
-        let (mut steep, mut saturated) = (0usize, 0usize);
         let at_left = raw.u0 == 0;
         let at_right = raw.u0 + raw.width == image_size.0;
         self.cut = raw.v0 + first == 0 || raw.v0 + last + 1 >= image_size.1;
@@ -160,14 +164,10 @@ impl Outline {
             };
             let off_middle = (2 * v).abs_diff(first + last) as f64;
             if off_middle < STEEP_SHARE * (last - first + 1) as f64 {
-                steep += left.iter().chain(&right).count();
-                let spills = [(left, -1), (right, 1)]
-                    .into_iter()
-                    .filter_map(|(edge, outwards)| spill_px(row, edge?, outwards))
-                    .filter(|_| top >= SATURATED_GREY);
-                for spill in spills {
-                    saturated += 1;
-                    self.spill_px += spill;
+                for (edge, outwards) in [(left, -1), (right, 1)] {
+                    if let Some(edge) = edge {
+                        self.spill.add(row, top, edge, outwards);
+                    }
                 }
             }
             self.cut |= (at_left && u0 == 0) || (at_right && u1 + 1 == raw.width);
@@ -177,9 +177,6 @@ impl Outline {
             self.edges
                 .push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
         }
-        let steep = steep.max(1) as f64;
-        self.spill_px = (self.spill_px / steep).max(0.0);
-        self.spill_sigma_px = SPILL_SIGMA_PX * saturated as f64 / steep;
     }
 }
 
@@ -214,30 +211,9 @@ fn lit_core(row: &[u8], u0: usize, u1: usize, threshold: u8) -> Option<(usize, u
     (lit >= 4 && lit * 10 >= (u1 + 1 - u0) * 6).then_some((first, last))
 }
 
-/// Over this a pixel tells no more than that it is bright.
-const SATURATED_GREY: f64 = 250.0;
-
 /// Rows this near to the middle, as a share of half the height, cross a circle's outline at more
 /// than 57 deg, so that a pixel's light hardly depends on the slope.
 const STEEP_SHARE: f64 = 0.53;
-
-/// What the spill misses: 0.05 px rms and 0.17 px at most, over 255 discs of 9 to 46 px radius that
-/// saturate 1.1 to 10 times in glare of up to 5 % of their light; so that 3 sigma hold them all.
-const SPILL_SIGMA_PX: f64 = 0.06;
-
-/// How far an edge of a saturated row lies outside of the lamp's own, right in the mean of many;
-/// `None` where the patch ends too early. `outwards` is -1 for a left edge, 1 for a right one.
-fn spill_px(row: &[u8], edge: f64, outwards: isize) -> Option<f64> {
-    let grey = |u: isize| Some(f64::from(*row.get(usize::try_from(u).ok()?)?));
-    let inside = |u: isize| grey(u).is_some_and(|g| g >= SATURATED_GREY);
-    let near = edge.round() as isize + outwards;
-    let outermost = (0..row.len() as isize)
-        .map(|k| near - k * outwards)
-        .find(|&u| inside(u))?;
-    let (next, glare) = (grey(outermost + outwards)?, grey(outermost + 2 * outwards)?);
-    let share = ((next - glare) / (SATURATED_GREY - glare)).clamp(0.0, 1.0);
-    Some((edge - outermost as f64).abs() - 2.0 * share)
-}
 
 /// Mean of the middle half of a lit row.
 fn plateau(row: &[u8], u0: usize, u1: usize) -> f64 {
@@ -266,7 +242,6 @@ mod tests {
     use super::*;
     use crate::bus::Ellipse;
     use crate::stack::led::ellipse::{chord, fit_ellipse};
-    use crate::stack::led::otsu::otsu;
 
     /// Stripes of a slanting ellipse, one on its upper end: one spot, edges on the outline.
     #[test]
@@ -291,7 +266,7 @@ mod tests {
         // A bright speck far off is another component.
         data[3 * w + 100] = 250;
         let patch = Patch::from_data(1000, 300, w, h, data);
-        let mut outline = Outline::default();
+        let mut outline = Outline::new(0.0);
         assert!(outline.find(&patch, 60, 9));
         outline.trace(&patch, 4.0, 60, (1280, 720));
         assert!(!outline.cut);
@@ -299,59 +274,6 @@ mod tests {
         let fit = fit_ellipse(&outline.points).map(|f| f.ellipse.centre);
         let miss = fit.map(|c| (c - lamp.centre - nalgebra::Vector2::new(1000.0, 300.0)).norm());
         assert!(miss.is_some_and(|m| m < 0.05), "{miss:?}");
-    }
-
-    /// A disc of light in its glare: how far its outline is found outside of it, and the spill
-    /// stated with its sigma.
-    fn spill_of(bright: f64, radius: f64, halo_share: f64, off: f64) -> (f64, f64, f64) {
-        let (w, h, centre) = (120usize, 120usize, 60.0 + off);
-        let pixel = |u: usize, v: usize| {
-            let sub = |k: usize| (k as f64 + 0.5) / 8.0 - 0.5;
-            let away = |x: f64, y: f64| (x - centre).hypot(y - centre - off) - radius;
-            let inside = (0..64)
-                .filter(|k| away(u as f64 + sub(k % 8), v as f64 + sub(k / 8)) < 0.0)
-                .count();
-            let glare = halo_share * bright * (-away(u as f64, v as f64).max(0.0) / 12.0).exp();
-            (4.0 + bright * inside as f64 / 64.0 + glare).min(255.0) as u8
-        };
-        let data = (0..w * h).map(|k| pixel(k % w, k / w)).collect();
-        let patch = Patch::from_data(0, 0, w, h, data);
-        let mut outline = Outline::default();
-        let threshold = otsu(&patch.histogram()).map_or(0, |split| split.threshold);
-        assert!(outline.find(&patch, threshold, 9));
-        outline.trace(&patch, 4.0, threshold, (1280, 720));
-        let found = fit_ellipse(&outline.points).map(|f| f.ellipse);
-        let found_px = found.map_or(f64::NAN, |e| (e.semi_major_px * e.semi_minor_px).sqrt());
-        (found_px - radius, outline.spill_px, outline.spill_sigma_px)
-    }
-
-    /// Discs of many sizes that saturate the sensor up to tenfold, in glare of up to 40 % of its
-    /// range: the edges are too far out, and the spill tells by how much, to its sigma. A dim one
-    /// does not spill.
-    #[test]
-    fn the_spill_of_a_saturated_lamp_is_known() {
-        let lamps = [270.0, 320.0, 400.0, 700.0, 1200.0, 2500.0]
-            .into_iter()
-            .flat_map(|bright| [0.0, 0.02, 0.05].map(|halo_share| (bright, halo_share)))
-            .filter(|(bright, halo_share)| bright * halo_share < 105.0);
-        let mut shares = Vec::new();
-        for (bright, halo_share) in lamps {
-            for radius in [9.4, 14.3, 21.4, 30.7, 45.9] {
-                for off in [0.0, 0.17, 0.3] {
-                    let (is, said, sigma) = spill_of(bright, radius, halo_share, off);
-                    let share = (said - is) / sigma;
-                    assert!(
-                        share.abs() < 3.0,
-                        "{bright} {halo_share} {radius} {off}: {said} for {is}, sigma {sigma}"
-                    );
-                    shares.push(share);
-                }
-            }
-        }
-        let rms = (shares.iter().map(|s| s * s).sum::<f64>() / shares.len() as f64).sqrt();
-        assert!((0.8..1.2).contains(&rms), "{rms}");
-        let (is, said, _) = spill_of(120.0, 30.7, 0.02, 0.3);
-        assert!(said < 1e-9 && is.abs() < 0.05, "{said} for {is}");
     }
 
     /// Gaps are filled up to their limit and not beyond.

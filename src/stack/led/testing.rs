@@ -56,6 +56,7 @@ pub fn rig() -> RigCalibration {
             exposure_s: 30e-6,
             first_row: 0,
         },
+        blur_px: 0.0,
     };
     let vehicle_from_left = Isometry3::from_parts(mount, camera_attitude(41.0, 26.0));
     RigCalibration::rectified(camera, 0.12, vehicle_from_left)

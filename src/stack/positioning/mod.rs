@@ -18,6 +18,7 @@
 //! let camera = CameraModel {
 //!     intrinsics: Intrinsics::centred(64, 48, 52.0),
 //!     shutter: Shutter { line_time_s: 22.2e-6, exposure_s: 30e-6, first_row: 0 },
+//!     blur_px: 0.5,
 //! };
 //! let rig = RigCalibration::rectified(camera, 0.12, nalgebra::Isometry3::identity());
 //! let mut positioner = LedPositioner::new(&LedSettings::default(), rig, Arc::new(map));

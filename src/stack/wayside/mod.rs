@@ -19,6 +19,7 @@
 //!     camera: CameraModel {
 //!         intrinsics: Intrinsics::centred(640, 360, 367.0),
 //!         shutter: Shutter { line_time_s: 14.8e-6, exposure_s: 8e-3, first_row: 0 },
+//!         blur_px: 0.5,
 //!     },
 //!     world_from_camera: Isometry3::from_parts(
 //!         Translation3::new(200.0, 2.5, 2.5),

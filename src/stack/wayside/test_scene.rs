@@ -110,6 +110,7 @@ pub fn calibration(map: &Tunnel, width: u32, height: u32) -> WaysideCalibration 
                 exposure_s: 8e-3,
                 first_row: 0,
             },
+            blur_px: 0.5,
         },
         world_from_camera: line * Isometry3::from_parts(Translation3::new(0.0, 2.4, 2.8), camera),
         world_from_lidar: Some(

@@ -134,6 +134,7 @@ pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
                 exposure_s: 30e-6,
                 first_row: 0,
             },
+            blur_px: 0.5,
         },
         start: SimTime::ZERO,
         motion: CameraMotion {
@@ -192,6 +193,7 @@ pub fn wayside_job(tunnel: &Tunnel, s_m: f64) -> Job {
                     exposure_s: 8e-3,
                     first_row: 0,
                 },
+                blur_px: 0.5,
             },
             start: SimTime::ZERO,
             motion: CameraMotion::still(pose),

@@ -74,6 +74,7 @@ pub(super) struct Optics {
     pub line_time_us: f64,
     pub exposure_us: f64,
     pub frames_per_s: f64,
+    pub blur_px: f64,
     pub rate_key: &'static str,
 }
 
@@ -96,6 +97,7 @@ impl Optics {
                     ReadOut::Up => self.height_px.saturating_sub(1),
                 },
             },
+            blur_px: self.blur_px,
         }
     }
 
@@ -448,6 +450,7 @@ impl WaysideCameraSettings {
             line_time_us: self.line_time_us,
             exposure_us: self.exposure_us,
             frames_per_s: self.frames_per_s,
+            blur_px: self.lens.blur_px,
             rate_key: "frames_per_s",
         }
     }

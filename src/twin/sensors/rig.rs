@@ -159,6 +159,8 @@ pub struct RigError {
     pub principal_v_px: f64,
     /// Distortion of r^2 of both lenses. Default 0.
     pub k1: f64,
+    /// Blur of both lenses, px (`lens.blur_px`). Default 0.
+    pub blur_px: f64,
     /// Line time, us. Default 0.
     pub line_time_us: f64,
     /// How much later the right eye is triggered than its frames say, us. Default 0.
@@ -221,6 +223,10 @@ impl RigSettings {
             distortion: DistortionCoefficients {
                 k1: self.distortion.k1 + error.k1,
                 ..self.distortion
+            },
+            lens: LensSettings {
+                blur_px: self.lens.blur_px + error.blur_px,
+                ..self.lens
             },
             line_time_us: self.line_time_us + error.line_time_us,
             trigger_offset_us: self.trigger_offset_us + error.trigger_offset_us,
@@ -318,6 +324,7 @@ impl RigSettings {
             line_time_us: self.line_time_us,
             exposure_us: self.exposure_us,
             frames_per_s: self.pairs_per_s,
+            blur_px: self.lens.blur_px,
             rate_key: "pairs_per_s",
         }
     }

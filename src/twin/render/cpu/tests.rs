@@ -86,6 +86,7 @@ fn view(intrinsics: Intrinsics) -> View {
                 exposure_s: 30e-6,
                 first_row: 0,
             },
+            blur_px: 0.5,
         },
         start: SimTime::from_secs(0.5),
         motion: CameraMotion::still(looking_left()),
