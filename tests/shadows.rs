@@ -13,6 +13,7 @@ use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
+use metrotwin::twin::render::light::Shining;
 use metrotwin::twin::render::{
     Body, CameraMotion, Headlight, Hull, Job, Renderer, Scene, Shape, View, sample,
 };
@@ -136,7 +137,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
             continue;
         }
         let p = foot * at;
-        let lamp_lx = lamp.irradiance_lx(&p, &Vector3::z());
+        let lamp_lx = Shining::new(lamp.clone()).irradiance_lx(&p, &Vector3::z());
         let ambient = scene.tunnel.ambient_lx / (scene.tunnel.ambient_lx + lamp_lx);
         let hidden = (1.0 - left / light) / (1.0 - ambient);
         // A pixel of two millimetres, and places that do not reach the rim of the disc.

@@ -43,6 +43,7 @@ use crate::track::uid::{LightCurve, Ripple, Waveform};
 use crate::track::{LampSite, TrackPoint, Tunnel};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};
+use std::ops::Deref;
 
 /// Lamps farther than this from a surface do not light it.
 pub const LAMP_REACH_M: f64 = 30.0;
@@ -107,14 +108,47 @@ impl LampLight {
         LightCurve::new(&self.waveform, self.ripple)
     }
 
-    /// Its light in the mean over time, as a share of that of a good lamp that stays on.
-    pub fn duty(&self) -> f64 {
-        self.level * self.curve().long_mean()
-    }
-
     /// Intensity along the normal of a good lamp while on.
     pub fn axial_intensity_cd(&self) -> f64 {
         self.luminance_cd_m2 * PI * self.radius_m * self.radius_m
+    }
+}
+
+/// A lamp with its light in time worked out once: that takes longer than any use of it.
+#[derive(Clone, Debug)]
+pub struct Shining {
+    lamp: LampLight,
+    curve: LightCurve,
+    duty: f64,
+}
+
+impl Deref for Shining {
+    type Target = LampLight;
+
+    fn deref(&self) -> &LampLight {
+        &self.lamp
+    }
+}
+
+impl Shining {
+    /// Of a lamp.
+    pub fn new(lamp: LampLight) -> Self {
+        let curve = lamp.curve();
+        Self {
+            duty: lamp.level * curve.long_mean(),
+            curve,
+            lamp,
+        }
+    }
+
+    /// Its light in the mean over time, as a share of that of a good lamp that stays on.
+    pub fn duty(&self) -> f64 {
+        self.duty
+    }
+
+    /// Its light in the mean from `open_s` to `close_s`, as such a share.
+    pub fn share(&self, open_s: f64, close_s: f64) -> f64 {
+        self.level * self.curve.mean(open_s, close_s)
     }
 
     /// Mean illuminance of a surface at `p` with unit normal `n`, lux; 0 out of reach.
@@ -123,7 +157,7 @@ impl LampLight {
         if d.norm_squared() > LAMP_REACH_M * LAMP_REACH_M {
             return 0.0;
         }
-        self.duty()
+        self.duty
             * point_source_lx(
                 self.axial_intensity_cd(),
                 self.exponent,
@@ -166,7 +200,7 @@ fn point_source_lx(
 /// The lamps of a scene, found by place: cells of a plan grid list the lamps that reach them.
 #[derive(Clone, Debug)]
 pub struct LampField {
-    lamps: Vec<LampLight>,
+    lamps: Vec<Shining>,
     air: Air,
     /// Cell and lamp, sorted, so that the lamps of a cell are one run.
     reach: Vec<((i32, i32), u32)>,
@@ -192,7 +226,7 @@ impl LampField {
         }
         reach.sort_unstable();
         Self {
-            lamps: lamps.to_vec(),
+            lamps: lamps.iter().cloned().map(Shining::new).collect(),
             air: Air::default(),
             reach,
         }
@@ -206,12 +240,12 @@ impl LampField {
     }
 
     /// All lamps, in the order given.
-    pub fn lamps(&self) -> &[LampLight] {
+    pub fn lamps(&self) -> &[Shining] {
         &self.lamps
     }
 
     /// Those that may reach a place, in the order given.
-    pub fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = &LampLight> {
+    pub fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = &Shining> {
         let at = (cell(p.x), cell(p.y));
         let first = self.reach.partition_point(|(c, _)| *c < at);
         self.reach[first..]
@@ -294,7 +328,11 @@ mod tests {
     use crate::track::uid::Uid;
     use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion};
 
-    fn lamp(centre: Point3<f64>, facing: Vector3<f64>) -> LampLight {
+    fn lamp(centre: Point3<f64>, facing: Vector3<f64>) -> Shining {
+        Shining::new(light(centre, facing))
+    }
+
+    fn light(centre: Point3<f64>, facing: Vector3<f64>) -> LampLight {
         LampLight::from_site(
             &LampSite {
                 uid: Uid { line: 1, lamp: 7 },

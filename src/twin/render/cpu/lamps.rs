@@ -6,7 +6,7 @@
 //! spread: a lattice of equal weights, mapped through the quantiles of both together.
 
 use super::spread::Spread;
-use crate::track::uid::LightCurve;
+use crate::twin::render::light::Shining;
 use crate::twin::render::surface::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
 use crate::twin::render::{LampLight, View};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
@@ -64,24 +64,9 @@ impl RowExposure {
     }
 
     /// Mean light of a lamp in a part of the slice.
-    fn light(&self, view: &View, lamp: &SeenLamp<'_>, from: f64, to: f64) -> f64 {
+    fn light(&self, view: &View, lamp: &Shining, from: f64, to: f64) -> f64 {
         let at = |share: f64| view.start.plus(self.open_s + share * self.span_s).secs();
-        lamp.light.level * lamp.curve.mean(at(from), at(to))
-    }
-}
-
-/// A lamp with the table of its light in time.
-pub(super) struct SeenLamp<'a> {
-    pub light: &'a LampLight,
-    curve: LightCurve,
-}
-
-impl<'a> SeenLamp<'a> {
-    pub fn new(light: &'a LampLight) -> Self {
-        Self {
-            light,
-            curve: light.curve(),
-        }
+        lamp.share(at(from), at(to))
     }
 }
 
@@ -170,7 +155,7 @@ impl Passing<'_> {
 /// Puts the disc of a lamp over the row's luminances, where nothing is nearer than it at
 /// `depth_of(u)`.
 pub(super) fn draw_disc(
-    lamp: &SeenLamp<'_>,
+    lamp: &Shining,
     view: &View,
     spread: &Spread,
     row: &RowExposure,
@@ -178,7 +163,7 @@ pub(super) fn draw_disc(
     mut depth_of: impl FnMut(usize) -> f64,
     luminances: &mut [f64],
 ) {
-    let light = lamp.light;
+    let light: &LampLight = lamp;
     let camera = &view.camera.intrinsics;
     let at = |share: f64| {
         let t = view.start.plus(row.open_s + share * row.span_s);
@@ -241,13 +226,13 @@ fn disc_reach_px(view: &View, disc: &Disc) -> f64 {
 
 /// Adds the glare of a lamp to the row's luminances.
 pub(super) fn add_glare(
-    lamp: &SeenLamp<'_>,
+    lamp: &Shining,
     view: &View,
     row: &RowExposure,
     haze: Haze,
     luminances: &mut [f64],
 ) {
-    let light = lamp.light;
+    let light: &LampLight = lamp;
     let camera = &view.camera.intrinsics;
     let Some(disc) = Disc::seen(light, &row.mid) else {
         return;

@@ -57,7 +57,7 @@ pub use sight::{Seen, Sight};
 pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
-use super::light::{LampField, headlights_lx};
+use super::light::{LampField, Shining, headlights_lx};
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey, PixelMap};
 use super::upper_bits;
@@ -68,7 +68,7 @@ use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use dim::{CELL_PX, DimView};
 use image::GrayImage;
-use lamps::{Haze, RowExposure, SeenLamp};
+use lamps::{Haze, RowExposure};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 use sensor::Sensor;
@@ -315,9 +315,9 @@ impl Renderer for CpuRenderer {
 
 impl World {
     /// Lamps that may be seen, the farthest first so that nearer ones are drawn over them.
-    fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<SeenLamp<'_>> {
+    fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<&Shining> {
         let eye = Point3::from(pose.translation.vector);
-        let away = |lamp: &LampLight| (lamp.centre - eye).norm();
+        let away = |lamp: &Shining| (lamp.centre - eye).norm();
         // Through a frame a train moves by a few metres.
         let reach = super::surface::LAMP_SIGHT_M + 20.0;
         let mut lamps: Vec<_> = self
@@ -327,7 +327,7 @@ impl World {
             .filter(|l| away(l) < reach)
             .collect();
         lamps.sort_by(|a, b| away(b).total_cmp(&away(a)));
-        lamps.into_iter().map(SeenLamp::new).collect()
+        lamps
     }
 
     fn all_ground(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> Vec<Ground> {
@@ -477,7 +477,7 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    fn draw(&self, lamps: &[SeenLamp<'_>], spread: &Spread, buffers: &mut RowBuffers) {
+    fn draw(&self, lamps: &[&Shining], spread: &Spread, buffers: &mut RowBuffers) {
         self.draw_tunnel(buffers);
         let view = self.view;
         for blocker in &self.blockers {
@@ -494,13 +494,13 @@ impl<'a> RowRays<'a> {
                 view,
                 spread,
                 self.row,
-                (self.world.line.ambient_lx, self.haze(lamp.light)),
+                (self.world.line.ambient_lx, self.haze(lamp)),
                 depth,
                 luminances,
             );
         }
         for lamp in lamps {
-            lamps::add_glare(lamp, view, self.row, self.haze(lamp.light), luminances);
+            lamps::add_glare(lamp, view, self.row, self.haze(lamp), luminances);
         }
     }
 

@@ -9,9 +9,9 @@ use super::solid::Solid;
 use super::tunnel::TunnelCaster;
 use super::{SIGHT_M, World};
 use crate::twin::render::light::{
-    HEADLIGHT_RADIUS_M, LAMP_REACH_M, MOUNT_M, OFFSET_M, disc_places,
+    HEADLIGHT_RADIUS_M, LAMP_REACH_M, MOUNT_M, OFFSET_M, Shining, disc_places,
 };
-use crate::twin::render::{Body, Headlight, Job, LampLight, View};
+use crate::twin::render::{Body, Headlight, Job, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -29,7 +29,7 @@ pub(super) struct Source<'a> {
 }
 
 enum Kind<'a> {
-    Lamp(&'a LampLight),
+    Lamp(&'a Shining),
     Headlight(&'a Headlight),
 }
 
@@ -74,7 +74,7 @@ struct Shadow {
 }
 
 impl<'a> Source<'a> {
-    pub fn lamp(lamp: &'a LampLight) -> Self {
+    pub fn lamp(lamp: &'a Shining) -> Self {
         let (axis, radius_m) = (lamp.facing.into_inner(), lamp.radius_m);
         Self::new(
             Kind::Lamp(lamp),

@@ -6,7 +6,7 @@
 
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
 use super::view::{Framed, single};
-use crate::track::uid::LightCurve;
+use crate::twin::render::light::Shining;
 use crate::twin::render::scene::{Air, LampLight, View};
 use crate::twin::render::surface::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
@@ -135,14 +135,14 @@ impl Track {
 
 impl LampTable {
     /// Makes the tables of all lamps that the view may see.
-    pub fn fill(&mut self, framed: &Framed<'_>, lamps: &[LampLight], around: &Around<'_>) {
+    pub fn fill(&mut self, framed: &Framed<'_>, lamps: &[Shining], around: &Around<'_>) {
         self.lamps.clear();
         self.rows.clear();
         self.instants.clear();
         self.glares.clear();
         self.glare_rows.clear();
         let from = framed.reference();
-        let mut near: Vec<(f64, &LampLight)> = lamps
+        let mut near: Vec<(f64, &Shining)> = lamps
             .iter()
             .map(|lamp| ((lamp.centre - from).norm(), lamp))
             .filter(|(d, _)| *d < LAMP_SIGHT_M)
@@ -367,20 +367,18 @@ impl Bounds {
 /// A lamp and the times at which rows see it.
 struct Exposed<'a> {
     view: &'a View,
-    lamp: &'a LampLight,
-    curve: LightCurve,
+    lamp: &'a Shining,
     start_s: f64,
     /// Share of its light that the air lets through.
     clear: f64,
 }
 
 impl<'a> Exposed<'a> {
-    fn new(view: &'a View, lamp: &'a LampLight, clear: f64) -> Self {
+    fn new(view: &'a View, lamp: &'a Shining, clear: f64) -> Self {
         Self {
             clear,
             view,
             lamp,
-            curve: lamp.curve(),
             start_s: view.start.secs(),
         }
     }
@@ -399,6 +397,6 @@ impl<'a> Exposed<'a> {
     /// in clear air.
     fn light(&self, from_s: f64, span_s: f64) -> f64 {
         let open_s = self.start_s + from_s;
-        self.clear * self.lamp.level * self.curve.mean(open_s, open_s + span_s)
+        self.clear * self.lamp.share(open_s, open_s + span_s)
     }
 }

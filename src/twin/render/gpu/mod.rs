@@ -144,7 +144,6 @@ impl GpuRenderer {
     fn follow_lamps(&mut self, time: SimTime) {
         if let Some(lamps) = self.lamps.changed(time) {
             self.field = LampField::new(&lamps).in_air(self.scene.air);
-            self.scene.lamps = lamps;
             self.chunks = Chunks::default();
         }
     }
@@ -222,7 +221,7 @@ impl GpuRenderer {
         let line = (&**tunnel, &self.field, &self.paintings);
         self.chunks.in_sight(gpu, line, framed, keys);
         let world = World {
-            lamps: &self.scene.lamps,
+            lamps: self.field.lamps(),
             air: &self.scene.air,
             paintings: &self.paintings,
         };
@@ -241,7 +240,7 @@ impl GpuRenderer {
             air: &self.scene.air,
             airlight_cd_m2,
         };
-        scratch.lamps.fill(framed, &self.scene.lamps, &around);
+        scratch.lamps.fill(framed, self.field.lamps(), &around);
         let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
         let constants = framed.constants(job, air, &mut scratch.poses);
         while self.views.len() <= k {

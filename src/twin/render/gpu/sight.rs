@@ -7,9 +7,9 @@ use super::passes::BodyBuffers;
 use super::textures;
 use super::tunnel::ChunkKey;
 use super::view::{Framed, single};
-use crate::twin::render::light::headlights_lx;
+use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
-use crate::twin::render::scene::{Air, Body, Job, LampLight};
+use crate::twin::render::scene::{Air, Body, Job};
 use nalgebra::Point3;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -31,7 +31,7 @@ const NEAREST_M: f64 = 0.8;
 /// What is lit and how.
 pub struct World<'a> {
     /// All lamps.
-    pub lamps: &'a [LampLight],
+    pub lamps: &'a [Shining],
     /// Between them and what they light.
     pub air: &'a Air,
     /// On the tunnel.
@@ -161,7 +161,7 @@ impl Sight {
     }
 
     /// First entry of a lamp in the table of shares, which is made at the first call.
-    fn shares_of(&mut self, framed: &Framed<'_>, lamps: &[LampLight], lamp: usize) -> u32 {
+    fn shares_of(&mut self, framed: &Framed<'_>, lamps: &[Shining], lamp: usize) -> u32 {
         let rows = framed.view.camera.intrinsics.height_px;
         let known = self.lamps.iter().position(|k| *k == lamp);
         let at = known.unwrap_or(self.lamps.len()) as u32;
@@ -169,10 +169,10 @@ impl Sight {
             self.lamps.push(lamp);
             let shutter = &framed.view.camera.shutter;
             let light = &lamps[lamp];
-            let (curve, mean) = (light.curve(), light.duty().max(1e-9));
+            let mean = light.duty().max(1e-9);
             self.shares.extend((0..rows).map(|v| {
                 let open = shutter.row_open(framed.view.start, f64::from(v)).secs();
-                (light.level * curve.mean(open, open + shutter.exposure_s) / mean) as f32
+                (light.share(open, open + shutter.exposure_s) / mean) as f32
             }));
         }
         (at + 1) * rows

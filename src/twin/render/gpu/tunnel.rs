@@ -5,8 +5,7 @@ use super::mesh::Mesh;
 use crate::track::{
     CrossSection, Edge, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel, rail_outline,
 };
-use crate::twin::render::LampLight;
-use crate::twin::render::light::LampField;
+use crate::twin::render::light::{LampField, Shining};
 use crate::twin::render::paint::{Painting, Paintings};
 use crate::twin::render::surface;
 use nalgebra::{Point3, Vector2, Vector3};
@@ -116,7 +115,7 @@ struct Facet {
 struct Site<'a> {
     tunnel: &'a Tunnel,
     field: &'a LampField,
-    lamp: Option<&'a LampLight>,
+    lamp: Option<&'a Shining>,
     near: Vec<TrackPoint>,
     key: ChunkKey,
     origin: Point3<f64>,
@@ -169,8 +168,8 @@ pub fn chunk_mesh(
 
 /// The lamp that throws most light at a place, whatever the surface there.
 fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
-    let towards = |lamp: &LampLight| (lamp.centre - p).try_normalize(1e-9);
-    let light = |lamp: &LampLight| towards(lamp).map_or(0.0, |n| lamp.irradiance_lx(p, &n));
+    let towards = |lamp: &Shining| (lamp.centre - p).try_normalize(1e-9);
+    let light = |lamp: &Shining| towards(lamp).map_or(0.0, |n| lamp.irradiance_lx(p, &n));
     let lamps = field.lamps().iter().enumerate();
     lamps
         .map(|(k, lamp)| (k, light(lamp)))

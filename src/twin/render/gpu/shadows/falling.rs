@@ -2,8 +2,8 @@
 
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
-use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, MOUNT_M};
-use crate::twin::render::scene::{Body, Headlight, Job, LampLight, Shape};
+use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, MOUNT_M, Shining};
+use crate::twin::render::scene::{Body, Headlight, Job, Shape};
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 
@@ -47,7 +47,7 @@ pub struct Cast {
 }
 
 impl Light {
-    fn lamp(lamp: &LampLight) -> Self {
+    fn lamp(lamp: &Shining) -> Self {
         Self {
             centre: lamp.centre,
             axis: lamp.facing.into_inner(),
@@ -126,9 +126,9 @@ impl Cast {
 /// The lights about a camera.
 pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
     let eye = framed.reference();
-    let away_m = |lamp: &LampLight| (lamp.centre - eye).norm();
+    let away_m = |lamp: &Shining| (lamp.centre - eye).norm();
     let lamps = field.lamps().iter();
-    let mut lamps: Vec<&LampLight> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
+    let mut lamps: Vec<&Shining> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
     lamps.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
     lamps.truncate(MAX_SOURCES - MAX_HEADLIGHTS);
     let headlights = framed.nearest(&job.headlights);
