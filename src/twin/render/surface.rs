@@ -13,7 +13,7 @@ pub const LAMP_SIGHT_M: f64 = 80.0;
 /// Reflectance of a lamp's disc while it is off.
 pub const DARK_DISC_ALBEDO: f64 = 0.3;
 /// Glare of a lamp is followed to where a part of it has fallen to this many electrons.
-pub const FAINT_E: f64 = 0.3;
+pub const FAINT_E: f64 = 1.5;
 /// From one texel of glare to the next along a row, pixels.
 pub const GLARE_STEP_PX: f64 = 4.0;
 /// Signals are followed up to this many times the full well.
