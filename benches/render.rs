@@ -12,8 +12,9 @@
     reason = "a benchmark measures time and prints its figures, and may fail by panicking"
 )]
 
+use metrotwin::track::Tunnel;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Job, Renderer, sample};
+use metrotwin::twin::render::{Headlight, Job, Renderer, sample};
 use std::time::Instant;
 
 /// Processor time that all threads of this process have used, milliseconds (Linux; 0 elsewhere).
@@ -46,6 +47,16 @@ fn report(name: &str, renderer: &mut dyn Renderer, jobs: &[Job]) {
     println!("{name:30} {wall_ms:8.2} ms, {used_ms:8.2} ms of processors");
 }
 
+/// A train's, with its head at `s_m`.
+fn headlights(tunnel: &Tunnel, s_m: f64) -> Vec<Headlight> {
+    let light = |l_m: f64| Headlight {
+        world_from_light: sample::on_bed(tunnel, s_m, l_m, 1.5),
+        intensity_cd: 40_000.0,
+        exponent: 56.0,
+    };
+    vec![light(0.9), light(-0.9)]
+}
+
 fn main() {
     let scene = sample::scene();
     let tunnel = scene.tunnel.clone();
@@ -54,6 +65,13 @@ fn main() {
         .map(|k| sample::stereo_job(&tunnel, 100.0 + f64::from(k), 60.0 / 3.6))
         .collect();
     report("stereo", &mut renderer, &stereo);
+    let lit: Vec<_> = (stereo.iter().zip(0..))
+        .map(|(job, k)| Job {
+            headlights: headlights(&tunnel, 100.5 + f64::from(k)),
+            ..job.clone()
+        })
+        .collect();
+    report("stereo, by headlights", &mut renderer, &lit);
     let wayside: Vec<_> = (0..20)
         .map(|_| sample::wayside_job(&tunnel, 100.0))
         .collect();

@@ -114,8 +114,9 @@ fn train_seconds(
 
     let mut times = Times::default();
     let (mut steps, mut stack) = (Stopwatch::default(), Stopwatch::default());
+    let mut jobs = Vec::new();
     // One pair more than is timed: the first one also builds what later ones use.
-    while times.draw_s.len() <= rounds * ROUND {
+    while jobs.len() <= rounds * ROUND {
         steps.time(|| world.step(&command)).0?;
         if steps.times == STEPS {
             times.step_s.push(steps.total_s / STEPS as f64);
@@ -132,15 +133,17 @@ fn train_seconds(
         let vehicle_at = |t| world.vehicle_at(t);
         let views = (eyes.camera.views(number, start, vehicle_at))
             .ok_or(SessionError::PoseForgotten(start.secs()))?;
-        let (images, draw_s) = draw(renderer, world, views.into())?;
+        jobs.push(job(world, views.into()));
+        let (mut images, _) = draw(renderer, &jobs[jobs.len() - 1..])?;
+        let images = images.pop().ok_or("the renderer did not draw a pair")?;
         let before_s = stack.total_s;
         let head_at = |t| world.chainage_at(t);
         eyes.read((number, start), images, &mut stack, vehicle_at, head_at)?;
-        times.draw_s.push(draw_s);
         times.stack_s.push(stack.total_s - before_s);
     }
-    times.draw_s.remove(0);
     times.stack_s.remove(0);
+    // Once more for the time that it takes, with nothing else to do.
+    times.draw_s = draw(renderer, &jobs)?.1;
     Ok(times)
 }
 
@@ -158,44 +161,57 @@ fn wayside_seconds(
     let settings = &scenario.stack.wayside;
     let map = scenario.map();
     let mut detector = WaysideDetector::new(settings, post.calibration.clone(), map);
+    let start = |k: u32| SimTime::from_secs(f64::from(k) / post.camera.frames_per_s);
+    let jobs: Vec<_> = (0..(learning + 1 + rounds * ROUND) as u32)
+        .map(|k| wayside_view(&post.calibration, &post.camera, stream, k, start(k)))
+        .map(|view| job(world, vec![view]))
+        .collect();
+    let (images, mut draw_s) = draw(renderer, &jobs)?;
     let mut times = Times::default();
-    for k in 0..(learning + 1 + rounds * ROUND) as u32 {
-        let start = SimTime::from_secs(f64::from(k) / post.camera.frames_per_s);
-        let view = wayside_view(&post.calibration, &post.camera, stream, k, start);
-        let (mut images, draw_s) = draw(renderer, world, vec![view])?;
-        let image = images.pop().ok_or("the renderer did not draw a frame")?;
+    for (number, mut images) in (0..).zip(images) {
         let frame = Frame {
-            number: k,
-            start,
-            image,
+            number,
+            start: start(number),
+            image: images.pop().ok_or("the renderer did not draw a frame")?,
         };
         let work = || detector.on_frame(&frame, None, None);
-        let (_, stack_s) = Stopwatch::default().time(work);
-        if k as usize > learning {
-            times.draw_s.push(draw_s);
-            times.stack_s.push(stack_s);
-        }
+        times.stack_s.push(Stopwatch::default().time(work).1);
     }
+    times.draw_s = draw_s.split_off(learning);
+    times.stack_s.drain(..=learning);
     Ok(times)
 }
 
+fn job(world: &World, views: Vec<View>) -> Job {
+    Job {
+        time: world.time(),
+        bodies: world.bodies(),
+        headlights: world.headlights(),
+        views,
+        ..Job::default()
+    }
+}
+
+/// The images of all jobs, and the seconds from each but the first to the one before it. As in a
+/// run, the next is asked for before the last is read back.
 fn draw(
     renderer: &mut dyn Renderer,
-    world: &World,
-    views: Vec<View>,
-) -> Result<(Vec<GrayImage>, f64), RenderError> {
-    let work = || {
-        renderer.submit(&Job {
-            time: world.time(),
-            bodies: world.bodies(),
-            headlights: world.headlights(),
-            views,
-            ..Job::default()
-        })?;
-        renderer.collect()
-    };
-    let (images, seconds) = Stopwatch::default().time(work);
-    Ok((images?, seconds))
+    jobs: &[Job],
+) -> Result<(Vec<Vec<GrayImage>>, Vec<f64>), RenderError> {
+    let (mut images, mut seconds) = (Vec::new(), Vec::new());
+    for (k, job) in jobs.iter().enumerate() {
+        let work = || {
+            renderer.submit(job)?;
+            (k > 0).then(|| renderer.collect()).transpose()
+        };
+        let (image, draw_s) = Stopwatch::default().time(work);
+        if let Some(image) = image? {
+            images.push(image);
+            seconds.push(draw_s);
+        }
+    }
+    images.push(renderer.collect()?);
+    Ok((images, seconds))
 }
 
 /// The least median of whole rounds.

@@ -404,13 +404,14 @@ mod tests {
         let lamps: Vec<_> = (0..40)
             .map(|k| {
                 let s = 10.0 * f64::from(k) - 200.0;
-                lamp(
+                light(
                     Point3::new(s * 0.8, s * 0.6, 3.0),
                     Vector3::new(1.0, -2.0, 0.1),
                 )
             })
             .collect();
         let field = LampField::new(&lamps);
+        let lamps = field.lamps();
         let n = Vector3::new(0.0, 0.6, 0.8);
         for k in 0..500 {
             let s = f64::from(k) - 250.0;
@@ -444,7 +445,7 @@ mod tests {
     /// Fails where lamps shine through mist as through clear air, or twice dimmed.
     #[test]
     fn mist_dims_lamps_by_beer_and_lambert() {
-        let lamps = [lamp(Point3::origin(), Vector3::x())];
+        let lamps = [light(Point3::origin(), Vector3::x())];
         let air = Air::of_visibility(50.0);
         let (clear, misty) = (LampField::new(&lamps), LampField::new(&lamps).in_air(air));
         for d in [1.0f64, 7.0, 20.0] {

@@ -34,9 +34,17 @@ pub struct Chunk {
     pub lamp: Option<usize>,
     /// Ranges of indices.
     pub parts: Vec<Part>,
-    /// Some of its corners and their normals, in the world.
-    pub probes: Vec<(Point3<f64>, Vector3<f64>)>,
+    /// Some of its corners.
+    pub probes: Vec<Probe>,
     seen_in: u64,
+}
+
+/// A place of a chunk's surface, in the world.
+pub struct Probe {
+    pub at: Point3<f64>,
+    pub normal: Vector3<f64>,
+    /// The most luminance that a lux makes there, cd/m^2.
+    pub reflected_per_lx: f32,
 }
 
 /// Every so many corners one is a probe.
@@ -176,7 +184,11 @@ fn upload(
         probes: (mesh.vertices.iter().step_by(PROBE_EVERY))
             .map(|v| {
                 let [p, n] = [v.position_m, v.normal].map(|x| Vector3::from(x).cast::<f64>());
-                (made.origin + p, n)
+                Probe {
+                    at: made.origin + p,
+                    normal: n,
+                    reflected_per_lx: v.brightest_per_lx(),
+                }
             })
             .collect(),
         seen_in: 0,

@@ -11,12 +11,14 @@ use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
 use crate::twin::render::scene::{Air, Body, Job};
 use nalgebra::Point3;
-use std::f64::consts::PI;
 use std::ops::Range;
 
 /// Grey levels below which paint and blinking do not show: less than the read noise, since paint
 /// changes them by half at most.
-const DIM_GREY: f64 = 0.25;
+const DIM_GREY: f64 = 0.4;
+/// Grey levels by headlights alone below which paint does not show: they do not blink, and by half of
+/// it is less than the sensor's own step.
+const FLOODLIT_GREY: f64 = 1.0;
 /// Between two instants of the exposure nothing moves by more than this in the picture.
 const INSTANT_PX: f64 = 1.5;
 /// Light that changes by less than this from row to row shows no bands.
@@ -127,8 +129,10 @@ impl Sight {
         (key, chunk): (ChunkKey, &Chunk),
         dim_cd_m2: f64,
     ) {
-        let floodlit = (chunk.probes.iter())
-            .any(|(p, n)| headlights_lx(&job.headlights, world.air, p, n) / PI > dim_cd_m2);
+        let floodlit = chunk.probes.iter().any(|probe| {
+            let lux = headlights_lx(&job.headlights, world.air, &probe.at, &probe.normal);
+            lux * f64::from(probe.reflected_per_lx) > FLOODLIT_GREY / DIM_GREY * dim_cd_m2
+        });
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {

@@ -197,12 +197,16 @@ fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
 }
 
 impl Vertex {
+    /// The most luminance that a lux makes here, cd/m^2.
+    pub fn brightest_per_lx(&self) -> f32 {
+        self.albedo * (BRIGHTEST_PAINT / PI) as f32
+    }
+
     /// The most luminance that the surface here may have.
     fn peak_cd_m2(&self) -> f32 {
         // A lamp that is on gives more than its mean over time; no code is on for less than half.
         let [steady, blinking] = self.light_lx;
-        let reflected = self.albedo * (BRIGHTEST_PAINT / PI) as f32 * (steady + 2.0 * blinking);
-        reflected + self.luminance_cd_m2
+        self.brightest_per_lx() * (steady + 2.0 * blinking) + self.luminance_cd_m2
     }
 }
 

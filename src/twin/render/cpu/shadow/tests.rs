@@ -18,11 +18,11 @@ fn headlight() -> Headlight {
 }
 
 /// A lamp of 0.25 m at (0, 0, 5) that looks down.
-fn lamp() -> LampLight {
+fn lamp() -> Shining {
     let mut lamp = sample::scene().lamps.remove(0);
     lamp.centre = Point3::new(0.0, 0.0, 5.0);
     lamp.facing = -Vector3::z_axis();
-    lamp
+    Shining::new(lamp)
 }
 
 fn body(shape: Shape, at: Point3<f64>) -> Body {
