@@ -12,9 +12,11 @@
     reason = "a benchmark measures time and prints its figures, and may fail by panicking"
 )]
 
+use metrotwin::bus::Intrinsics;
 use metrotwin::track::Tunnel;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Headlight, Job, Renderer, sample};
+use metrotwin::twin::render::{Headlight, Job, LampLight, Renderer, sample};
+use nalgebra::Vector3;
 use std::time::Instant;
 
 /// Processor time that all threads of this process have used, milliseconds (Linux; 0 elsewhere).
@@ -57,6 +59,57 @@ fn headlights(tunnel: &Tunnel, s_m: f64) -> Vec<Headlight> {
     vec![light(0.9), light(-0.9)]
 }
 
+/// Pairs a second by size of the images, lamps in view and exposure.
+fn table() {
+    println!("\npairs a second       lamps in view   30 us   500 us   2000 us");
+    for (lamps, what) in [(0, "none"), (1, "as shipped"), (3, "three times")] {
+        let mut scene = sample::scene();
+        let tunnel = scene.tunnel.clone();
+        let shipped = std::mem::take(&mut scene.lamps);
+        for k in 0..lamps {
+            let aside_m = 3.0 * f64::from(k);
+            scene.lamps.extend(shipped.iter().map(|lamp| LampLight {
+                centre: lamp.centre
+                    + Vector3::new(aside_m * 0.3f64.cos(), aside_m * 0.3f64.sin(), 0.0),
+                ..lamp.clone()
+            }));
+        }
+        let mut renderer = GpuRenderer::new(scene).unwrap();
+        for (width_px, height_px) in [(640, 360), (1280, 720), (1920, 1080)] {
+            print!("{width_px:5} x {height_px:4}   {what:>18}");
+            for exposure_s in [30e-6, 500e-6, 2e-3] {
+                let jobs: Vec<_> = (0..10)
+                    .map(|k| {
+                        sized(
+                            &tunnel,
+                            100.0 + f64::from(k),
+                            (width_px, height_px),
+                            exposure_s,
+                        )
+                    })
+                    .collect();
+                cost_ms(&mut renderer, &jobs[..1]);
+                print!("{:9.1}", 1e3 / cost_ms(&mut renderer, &jobs));
+            }
+            println!();
+        }
+    }
+}
+
+/// A pair of the sample rig at 60 km/h with images of another size and exposure; the same field of
+/// view and time from first row to last.
+fn sized(tunnel: &Tunnel, s_m: f64, (width_px, height_px): (u32, u32), exposure_s: f64) -> Job {
+    let mut job = sample::stereo_job(tunnel, s_m, 60.0 / 3.6);
+    for view in &mut job.views {
+        let (lens, shutter) = (&mut view.camera.intrinsics, &mut view.camera.shutter);
+        let scale = f64::from(width_px) / f64::from(lens.width_px);
+        *lens = Intrinsics::centred(width_px, height_px, scale * lens.fx_px);
+        shutter.line_time_s /= scale;
+        shutter.exposure_s = exposure_s;
+    }
+    job
+}
+
 fn main() {
     let scene = sample::scene();
     let tunnel = scene.tunnel.clone();
@@ -64,6 +117,7 @@ fn main() {
     let stereo: Vec<_> = (0..20)
         .map(|k| sample::stereo_job(&tunnel, 100.0 + f64::from(k), 60.0 / 3.6))
         .collect();
+    println!("{:?}", renderer.backend());
     report("stereo", &mut renderer, &stereo);
     let lit: Vec<_> = (stereo.iter().zip(0..))
         .map(|(job, k)| Job {
@@ -76,4 +130,5 @@ fn main() {
         .map(|_| sample::wayside_job(&tunnel, 100.0))
         .collect();
     report("wayside", &mut renderer, &wayside);
+    table();
 }

@@ -77,11 +77,10 @@ fn converted(texel: vec2i) -> vec4f {
     if BLOOMING_REACH > 0 {
         charge += spilled_e(texel, charge);
     }
-    var n = vec4f(0.0);
-    if view.noise != 0u {
-        let per_row = (u32(view.size_px.x) + 3u) / 4u;
-        n = normals(u32(texel.y) * per_row + u32(texel.x));
-    }
+    // No branch, for the reason given in lamps.wgsl.
+    let per_row = (u32(view.size_px.x) + 3u) / 4u;
+    let noise = normals(u32(texel.y) * per_row + u32(texel.x));
+    let n = select(vec4f(0.0), noise, view.noise != 0u);
     let read_e = view.read_noise_e;
     let deviation = sqrt(max(charge + read_e * read_e, vec4f(0.0)));
     // A full pixel has no shot noise, but still read noise.

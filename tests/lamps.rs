@@ -18,6 +18,7 @@ use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
+use metrotwin::twin::render::surface::FAINT_E;
 use metrotwin::twin::render::{Air, CameraMotion, Job, LampLight, Renderer, Scene, View, sample};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
@@ -393,7 +394,7 @@ fn glare_carries_the_stripes() {
                 if off > 1.7 * apparent && right < 240.0 {
                     let found = f64::from(image.get_pixel(u, v)[0]);
                     // Texels of four pixels, half precision, and the end of a faint part.
-                    let faint = 2.0 * 0.3 * view.sensor.grey_per_e();
+                    let faint = 2.0 * FAINT_E * view.sensor.grey_per_e();
                     worst = worst.max((found - right).abs() - 0.01 * right - faint - 0.5);
                     bright += u32::from(right > 60.0);
                     dark += u32::from(on < 0.01 && found < 1.0 && off < 3.0 * apparent);

@@ -36,7 +36,7 @@ pub struct Chunk {
     pub parts: Vec<Part>,
     /// Some of its corners.
     pub probes: Vec<Probe>,
-    seen_in: u64,
+    near_in: u64,
 }
 
 /// A place of a chunk's surface, in the world.
@@ -59,12 +59,12 @@ pub struct Chunks {
 }
 
 impl Chunks {
-    /// Begins a job; what has not been seen for long goes.
+    /// Begins a job; what no camera has been near for long goes.
     pub fn next_job(&mut self) {
         self.job += 1;
         let job = self.job;
         self.made
-            .retain(|_, c| c.as_ref().is_none_or(|c| job - c.seen_in < KEEP_JOBS));
+            .retain(|_, c| c.as_ref().is_none_or(|c| job - c.near_in < KEEP_JOBS));
     }
 
     /// Puts the keys of the chunks in sight into `keys`, near ones first, and makes them.
@@ -102,11 +102,12 @@ impl Chunks {
                 .made
                 .entry(key)
                 .or_insert_with(|| upload(gpu, world, key));
-            if let Some(chunk) = chunk
-                && framed.may_see(&chunk.origin, chunk.radius_m, slack_m)
-            {
-                chunk.seen_in = job;
-                keys.push(key);
+            if let Some(chunk) = chunk {
+                // Kept whether it is in the picture or beside it: the next view may turn there.
+                chunk.near_in = job;
+                if framed.may_see(&chunk.origin, chunk.radius_m, slack_m) {
+                    keys.push(key);
+                }
             }
         }
         keys.sort_by(|a, b| f64::total_cmp(&middle_away_m(*a, s_m), &middle_away_m(*b, s_m)));
@@ -191,6 +192,6 @@ fn upload(
                 }
             })
             .collect(),
-        seen_in: 0,
+        near_in: 0,
     })
 }

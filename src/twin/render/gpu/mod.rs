@@ -18,7 +18,8 @@
 //!    exposes every row at a time of its own, so a vertex lands on the row v for which
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
-//!    headlights are added in every pixel.
+//!    that of headlights is added there. Where all is too dark for paint and blinking to show, a
+//!    cheaper pipeline draws. What moves by pixels within the exposure is drawn at several instants.
 //! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture.
 //! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
 //!    closed form along the row and is summed over a few lines across it, at each of the instants
@@ -30,10 +31,10 @@
 //!
 //! # What it does not do
 //!
-//! Reflections in wet or polished surfaces, lens distortion, and the end walls where two
-//! cross-sections meet (dark). Between vertices positions run straight, so edges close to a fast
-//! camera are bent by the shutter only facet by facet (0.5 m); lamps are exact. Stains end 60 m
-//! away, the tunnel 160 m ahead of the camera; glare under 0.01 grey levels is not drawn.
+//! Reflections in wet or polished surfaces, and the end walls where two cross-sections meet (dark).
+//! Between vertices positions run straight, so edges close to a fast camera are bent by the shutter
+//! only facet by facet (0.5 m); lamps are exact. Stains end 60 m away, the tunnel 160 m ahead of the
+//! camera; glare of a lamp under a quarter of the usual read noise is not drawn.
 
 mod adapter;
 mod chunks;
