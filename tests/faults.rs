@@ -39,6 +39,9 @@ const SMALL: &str = r#"
     camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
 "#;
 
+/// Number and start of a pair, hashes of its images, faults of its eyes.
+type SeenPair = (u32, SimTime, [u64; 2], [Option<CameraFault>; 2]);
+
 /// Everything that a run delivers and says.
 #[derive(Default)]
 struct Seen {
@@ -47,7 +50,7 @@ struct Seen {
     /// When each pair was delivered.
     delivered: Vec<SimTime>,
     /// Number, start, hashes of both eyes' images, faults.
-    pairs: Vec<(u32, SimTime, [u64; 2], [Option<CameraFault>; 2])>,
+    pairs: Vec<SeenPair>,
     /// Number, start, hash of the image, fault, blind.
     frames: Vec<(u32, SimTime, u64, Option<CameraFault>, bool)>,
     /// Camera events and warnings, as text.

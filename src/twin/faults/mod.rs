@@ -82,7 +82,8 @@ fn check_times(at: &str, from_s: f64, to_s: Option<f64>, problems: &mut Vec<Prob
         0.0..=86_400.0,
         "s",
     );
-    if let Some(to_s) = to_s.filter(|to_s| from_s.is_finite() && !(*to_s > from_s)) {
+    if let Some(to_s) = to_s.filter(|to_s| from_s.is_finite() && (to_s.is_nan() || *to_s <= from_s))
+    {
         problems.push(Problem::new(
             format!("{at}.to_s"),
             format!("it ends at {to_s} s, and begins at {from_s} s"),

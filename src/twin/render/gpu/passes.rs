@@ -208,12 +208,12 @@ impl ViewBuffers {
         let instant = target.instant(&gpu.device);
         let resources = [
             self.view.binding(),
-            wgpu::BindingResource::TextureView(&instant),
+            wgpu::BindingResource::TextureView(instant),
         ];
         let blend = bind(&gpu.device, &pipelines.blend, &resources);
         for k in 0..sight.instants {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-            let mut pass = begin(encoder, &instant, clear, Some(&target.depth));
+            let mut pass = begin(encoder, instant, clear, Some(&target.depth));
             self.draw_instant(&mut pass, background, &groups, sight, stock, k);
             drop(pass);
             let load = if k == 0 { clear } else { wgpu::LoadOp::Load };

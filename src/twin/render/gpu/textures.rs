@@ -63,7 +63,7 @@ fn upload(gpu: &Gpu, painting: &Painting, slant: u32) -> wgpu::TextureView {
     let mut levels = Vec::with_capacity(painting.levels.len());
     for (k, level) in painting.levels.iter().enumerate() {
         let width = painting.width >> k;
-        if width % (1 << slant) != 0 {
+        if !width.is_multiple_of(1 << slant) {
             break;
         }
         let mean = |run: &[u8]| {
