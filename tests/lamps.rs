@@ -182,6 +182,9 @@ const BENT: DistortionCoefficients = DistortionCoefficients {
     p2: -3e-4,
 };
 
+/// Its name, speeds in km/h, and what it changes.
+type Case<'a> = (&'a str, &'a [f64], fn(&mut View));
+
 /// Provokes a disc drawn with the wrong row's pose, at the wrong time of the exposure, or with an
 /// edge that the pixel grid or the blur shifts: at any speed, on the straight and at R 300 m, read
 /// downwards and upwards, through a lens that bends, and sharp or soft.
@@ -189,7 +192,7 @@ const BENT: DistortionCoefficients = DistortionCoefficients {
 fn outlines_are_where_the_row_time_equation_has_them() {
     let bend: fn(&mut View) = |view| view.camera.intrinsics.distortion = Distortion::new(BENT);
     let plain: fn(&mut View) = |_| ();
-    let cases: [(&str, &[f64], fn(&mut View)); 6] = [
+    let cases: [Case<'_>; 6] = [
         ("plain", &[0.0, 40.0, 80.0, 120.0, 160.0], plain),
         ("bent", &[0.0, 160.0], bend),
         ("upwards", &[120.0], |view| {
