@@ -128,9 +128,9 @@ use vision::Vision;
 pub const HEADLIGHT_M: f64 = 200.0;
 /// A train's place is known to this; its halo reaches as far.
 const TRAIN_MARGIN_M: f64 = 10.0;
-/// So far ahead of its head a train's headlights (two of 40,000 cd) change the light on what stands on
-/// the bed more steeply than a local gain can follow: 3.6 lx at 150 m, where lamps give it 5 to 20.
-const GLARE_M: f64 = 150.0;
+/// So far ahead of its head a train's headlights (40,000 cd) light bed, rails and walkway edge
+/// more than the lamps do, and more steeply than a local gain can follow: 4 lx at 100 m.
+const GLARE_M: f64 = 100.0;
 
 /// One wayside device.
 #[derive(Clone, Debug)]
