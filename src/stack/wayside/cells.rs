@@ -6,6 +6,8 @@ use crate::bus::PixelBox;
 
 /// Side of a cell.
 pub(super) const CELL_PX: usize = 8;
+/// The noise filter takes so much off a region along a cut.
+const CUT_PX: u32 = 2;
 
 /// One span and one flag a cell.
 #[derive(Clone, Debug)]
@@ -52,19 +54,19 @@ impl Cells {
         self.any_blind
     }
 
-    /// Whether more than half of a box's cells are blind.
-    pub fn is_blind(&self, bounds: PixelBox) -> bool {
-        if !self.any_blind {
-            return false;
-        }
-        let (mut blind, mut all) = (0, 0);
-        for y in bounds.v0 as usize / CELL_PX..=bounds.v1 as usize / CELL_PX {
-            for x in bounds.u0 as usize / CELL_PX..=bounds.u1 as usize / CELL_PX {
-                all += 1;
-                blind += usize::from(self.blind.get(y * self.wide + x) == Some(&true));
-            }
-        }
-        2 * blind > all
+    /// Whether a region, or a neighbour of it, is blind: a region that blind cells cut off ends
+    /// beside them.
+    pub fn touches_blind(&self, bounds: PixelBox) -> bool {
+        let cell = |px: u32| px as usize / CELL_PX;
+        let columns = cell(bounds.u0.saturating_sub(CUT_PX))..=cell(bounds.u1 + CUT_PX);
+        let rows = cell(bounds.v0.saturating_sub(CUT_PX))..=cell(bounds.v1 + CUT_PX);
+        self.any_blind
+            && rows.into_iter().any(|y| {
+                let row = self.blind.get(y * self.wide..(y + 1) * self.wide);
+                let last = (*columns.end()).min(self.wide.saturating_sub(1));
+                row.and_then(|row| row.get(*columns.start()..=last))
+                    .is_some_and(|cells| cells.contains(&true))
+            })
     }
 
     /// Sets the pixels of blind cells to 0.

@@ -38,17 +38,19 @@ impl Confirmation {
         }
     }
 
-    /// Takes what one frame shows. What a train hides keeps its state until it passed.
+    /// Takes what one frame shows. What a train hides or dazzles, if only in part, stays as it was
+    /// seen whole until it passed: the part that is left says nothing of the rest.
     pub fn update(&mut self, found: &[DetectedObstacle], cells: &Cells) {
         self.taken.clear();
         self.taken.resize(found.len(), false);
         for candidate in &mut self.candidates {
-            let best = best_match(&candidate.obstacle.blob.bounds, found, &self.taken);
-            if best.is_none() && cells.is_blind(candidate.obstacle.blob.bounds) {
+            let bounds = candidate.obstacle.blob.bounds;
+            if cells.touches_blind(bounds) {
+                take_parts(&bounds, found, &mut self.taken);
                 continue;
             }
             candidate.history <<= 1;
-            if let Some(k) = best {
+            if let Some(k) = best_match(&bounds, found, &self.taken) {
                 self.taken[k] = true;
                 candidate.history |= 1;
                 candidate.obstacle = found[k].clone();
@@ -86,6 +88,13 @@ fn best_match(bounds: &PixelBox, found: &[DetectedObstacle], taken: &[bool]) -> 
         }
     }
     best.map(|b| b.1)
+}
+
+/// Marks every region that overlaps `bounds`.
+fn take_parts(bounds: &PixelBox, found: &[DetectedObstacle], taken: &mut [bool]) {
+    for (obstacle, taken) in found.iter().zip(taken) {
+        *taken |= overlap(bounds, &obstacle.blob.bounds) > 0.0;
+    }
 }
 
 /// Intersection over union of two boxes.

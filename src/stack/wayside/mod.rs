@@ -63,6 +63,7 @@
 //! |---|---|
 //! | `reference` | the reference image, learnt from the first frames and held |
 //! | `difference` | difference, threshold, 3x3 median; compensation of headlights |
+//! | `shadows` | shadows told from bodies by the texture that shows in them |
 //! | `regions` | connected regions |
 //! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
 //! | `place` | region to obstacle: place, width, height; fused with lidar echoes |
@@ -97,6 +98,7 @@ mod place;
 mod reference;
 mod regions;
 mod settings;
+mod shadows;
 mod sight;
 #[cfg(test)]
 mod test_scene;
@@ -120,6 +122,7 @@ use image::GrayImage;
 use place::Placer;
 use reference::Reference;
 use regions::Regions;
+use shadows::Shadows;
 use sight::Sight;
 use std::sync::Arc;
 use vision::Vision;
@@ -141,6 +144,7 @@ pub struct WaysideDetector {
     cells: Cells,
     reference: Reference,
     difference: Difference,
+    shadows: Shadows,
     regions: Regions,
     placer: Placer,
     confirmation: Confirmation,
@@ -187,6 +191,7 @@ impl WaysideDetector {
             sight,
             reference: Reference::new(settings, width * height),
             difference: Difference::new(settings, width, height),
+            shadows: Shadows::default(),
             regions: Regions::default(),
             placer: Placer::default(),
             confirmation: Confirmation::new(settings),
@@ -230,11 +235,18 @@ impl WaysideDetector {
             &self.cells,
             train.is_some_and(|t| self.may_light(t)),
         );
-        let blobs = self.regions.find(
-            &self.difference.binary,
-            intrinsics.width_px as usize,
-            self.settings.min_area_px,
-        );
+        let width_px = intrinsics.width_px as usize;
+        if self.settings.dismiss_shadows {
+            self.shadows.dismiss(
+                &mut self.difference.binary,
+                width_px,
+                (frame.image.as_raw(), &self.reference.mean),
+                &self.reference.noise,
+            );
+        }
+        let blobs = self
+            .regions
+            .find(&self.difference.binary, width_px, self.settings.min_area_px);
         self.found.clear();
         for blob in &blobs {
             let placed = self.placer.place(

@@ -1,37 +1,92 @@
 //! Connected regions of a binary image, by runs and union-find, 8-connected.
 
 use crate::bus::{Blob, PixelBox};
+use std::ops::Range;
 
 /// Regions nearer to each other than this are one: an obstacle falls apart where a part of it
 /// has the colour of what is behind.
 const GAP_PX: u32 = 6;
 
+/// Set pixels of one row, side by side.
 #[derive(Clone, Copy, Debug)]
-struct Run {
-    u0: u32,
-    u1: u32,
-    region: usize,
+pub(super) struct Run {
+    /// Row.
+    pub v: u32,
+    /// First and last column.
+    pub u: (u32, u32),
+}
+
+/// The runs of a binary image from the top, and which of them belong together.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Runs {
+    pub all: Vec<Run>,
+    parent: Vec<usize>,
+}
+
+impl Runs {
+    /// Of the set pixels for whose index `keep` is true.
+    pub fn label(&mut self, binary: &[u8], width: usize, keep: impl Fn(usize) -> bool) {
+        self.all.clear();
+        self.parent.clear();
+        let width = width.max(1);
+        let mut above = 0..0;
+        for (v, row) in binary.chunks_exact(width).enumerate() {
+            let first = self.all.len();
+            let kept = |u: usize| row[u] != 0 && keep(v * width + u);
+            let mut u = 0;
+            while let Some(start) = next_set(row, u) {
+                u = start + 1;
+                if !kept(start) {
+                    continue;
+                }
+                while u < width && kept(u) {
+                    u += 1;
+                }
+                let run = Run {
+                    v: v as u32,
+                    u: (start as u32, (u - 1) as u32),
+                };
+                self.add(run, above.clone());
+            }
+            above = first..self.all.len();
+        }
+    }
+
+    fn add(&mut self, run: Run, above: Range<usize>) {
+        let here = self.all.len();
+        self.all.push(run);
+        self.parent.push(here);
+        for k in above {
+            let other = self.all[k].u;
+            if other.0 <= run.u.1 + 1 && other.1 + 1 >= run.u.0 {
+                let (a, b) = (self.region(k), self.region(here));
+                self.parent[a.max(b)] = a.min(b);
+            }
+        }
+    }
+
+    /// Number of the region of a run: that of its first run.
+    pub fn region(&mut self, mut run: usize) -> usize {
+        while self.parent[run] != run {
+            self.parent[run] = self.parent[self.parent[run]];
+            run = self.parent[run];
+        }
+        run
+    }
 }
 
 /// Finds regions, with buffers of its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Regions {
-    parent: Vec<usize>,
+    runs: Runs,
+    /// One a run; what belongs together is gathered in the first.
     blobs: Vec<Blob>,
-    above: Vec<Run>,
-    here: Vec<Run>,
 }
 
 impl Regions {
     /// Regions of at least `min_area` pixels, in order of their first pixel.
     pub fn find(&mut self, binary: &[u8], width: usize, min_area: u32) -> Vec<Blob> {
-        self.label(binary, width);
-        let mut found: Vec<Blob> = Vec::new();
-        for k in 0..self.blobs.len() {
-            if self.parent[k] == k {
-                found.push(self.blobs[k].clone());
-            }
-        }
+        let mut found = self.connected(binary, width);
         // A bound on the work of joining: more pieces than this are noise, not obstacles.
         if found.len() > 500 {
             found.retain(|b| b.area_px >= min_area);
@@ -42,57 +97,30 @@ impl Regions {
         found
     }
 
-    fn label(&mut self, binary: &[u8], width: usize) {
-        self.parent.clear();
+    fn connected(&mut self, binary: &[u8], width: usize) -> Vec<Blob> {
+        self.runs.label(binary, width, |_| true);
         self.blobs.clear();
-        self.above.clear();
-        for (v, row) in binary.chunks_exact(width.max(1)).enumerate() {
-            self.here.clear();
-            let mut u = 0;
-            while let Some(start) = next_set(row, u) {
-                let len = row[start..].iter().take_while(|&&p| p != 0).count();
-                u = start + len;
-                self.add_run(v as u32, start as u32, (u - 1) as u32);
+        self.blobs.extend(self.runs.all.iter().map(Blob::from));
+        for k in 0..self.blobs.len() {
+            let region = self.runs.region(k);
+            if region != k {
+                self.blobs[region] = joined(&self.blobs[region], &self.blobs[k]);
             }
-            std::mem::swap(&mut self.above, &mut self.here);
         }
+        (0..self.blobs.len())
+            .filter(|&k| self.runs.region(k) == k)
+            .map(|k| self.blobs[k].clone())
+            .collect()
     }
+}
 
-    fn add_run(&mut self, v: u32, u0: u32, u1: u32) {
-        let region = self.parent.len();
-        self.parent.push(region);
-        self.blobs.push(Blob {
-            bounds: PixelBox {
-                u0,
-                v0: v,
-                u1,
-                v1: v,
-            },
+impl From<&Run> for Blob {
+    fn from(run: &Run) -> Self {
+        let (u0, u1) = run.u;
+        let (v0, v1) = (run.v, run.v);
+        Self {
+            bounds: PixelBox { u0, v0, u1, v1 },
             area_px: u1 - u0 + 1,
-        });
-        for k in 0..self.above.len() {
-            let other = self.above[k];
-            if other.u0 <= u1 + 1 && other.u1 + 1 >= u0 {
-                self.unite(other.region, region);
-            }
-        }
-        self.here.push(Run { u0, u1, region });
-    }
-
-    fn root(&mut self, mut k: usize) -> usize {
-        while self.parent[k] != k {
-            self.parent[k] = self.parent[self.parent[k]];
-            k = self.parent[k];
-        }
-        k
-    }
-
-    fn unite(&mut self, a: usize, b: usize) {
-        let (a, b) = (self.root(a), self.root(b));
-        let (kept, gone) = (a.min(b), a.max(b));
-        if kept != gone {
-            self.parent[gone] = kept;
-            self.blobs[kept] = joined(&self.blobs[kept], &self.blobs[gone]);
         }
     }
 }
@@ -201,10 +229,8 @@ mod tests {
                 let binary: Vec<u8> = (0..width * 40)
                     .map(|k| 255 * u8::from(words(n, density, k as u32)[0] % 100 < density))
                     .collect();
-                regions.label(&binary, width);
-                let mut fast: Vec<_> = (0..regions.blobs.len())
-                    .filter(|&k| regions.parent[k] == k)
-                    .map(|k| (regions.blobs[k].bounds, regions.blobs[k].area_px))
+                let mut fast: Vec<_> = (regions.connected(&binary, width).iter())
+                    .map(|b| (b.bounds, b.area_px))
                     .collect();
                 let mut slow = slow(&binary, width);
                 let key = |x: &(PixelBox, u32)| (x.0.v0, x.0.u0, x.0.v1, x.0.u1, x.1);

@@ -20,6 +20,8 @@ pub struct WaysideSettings {
     /// How much the threshold rises with a change of illumination: share of the change of grey
     /// level that is not trusted.
     pub gain_distrust: f64,
+    /// Leave out what only dims the floor: regions in which its texture still shows.
+    pub dismiss_shadows: bool,
     /// Smallest region, pixels.
     pub min_area_px: u32,
     /// Smallest extent of an obstacle, the larger of width and height, m.
@@ -66,6 +68,7 @@ impl Default for WaysideSettings {
             saturated_grey: 250.0,
             unstable_grey: 40.0,
             gain_distrust: 0.35,
+            dismiss_shadows: true,
             min_area_px: 24,
             min_size_m: 0.1,
             reach_m: 80.0,

@@ -32,7 +32,7 @@ pub fn words(a: u32, b: u32, c: u32) -> [u32; 3] {
 const NOISE: usize = 99_991;
 
 /// About normal: the sum of six uniform bytes.
-fn normal(k: u32) -> f64 {
+pub fn normal(k: u32) -> f64 {
     let w = words(k, 3, 9);
     let bytes = [w[0], w[0] >> 8, w[1], w[1] >> 8, w[2], w[2] >> 8].map(|x| f64::from(x & 0xff));
     (bytes.iter().sum::<f64>() - 765.0) / (6.0f64 * (256.0 * 256.0 - 1.0) / 12.0).sqrt()

@@ -383,6 +383,60 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
     }
 }
 
+/// The border of the blind zone passes over an obstacle, as it does before every train that comes:
+/// what is left of it in the picture is lower and lies elsewhere. The obstacle keeps its danger and
+/// its place until the train has gone by, frame by frame.
+#[test]
+fn the_border_of_the_blind_zone_changes_no_obstacle() {
+    let scene = Scene::new(1280, 720);
+    let mut d = taught(&scene, &quiet());
+    let item = [(Crate::on_bed(170.0, 0.0, 0.4), 200.0)];
+    let mut whole = None;
+    for n in 10..110u32 {
+        let frame = scene.frame(n, STEADY, &item);
+        let train = TrainReport {
+            chainage_m: 40.0 + 0.5 * f64::from(n),
+            speed_mps: 0.0,
+            time: frame.start,
+        };
+        let report = d.on_frame(&frame, None, Some(train));
+        if n < 14 {
+            continue;
+        }
+        assert_eq!(report.obstacles.len(), 1, "train at {} m", train.chainage_m);
+        let o = &report.obstacles[0];
+        let whole = whole.get_or_insert_with(|| o.clone());
+        assert_eq!(o.danger, DangerLevel::High, "{} m", train.chainage_m);
+        assert!((o.to_chainage_m - whole.to_chainage_m).abs() < 0.5);
+        assert!((o.height_m - whole.height_m).abs() < 0.1);
+    }
+}
+
+/// A shadow walks over the track: no obstacle; the crate that lies in it is found.
+#[test]
+fn a_shadow_is_no_obstacle() {
+    let scene = Scene::new(640, 360);
+    let item = Crate::on_bed(182.0, 0.0, 0.6);
+    for with_crate in [false, true] {
+        let mut d = taught(&scene, &quiet());
+        let things = [(item, 170.0)];
+        let things = if with_crate { &things[..] } else { &[] };
+        for n in 10..60u32 {
+            let edge = 150 + 4 * (n - 10);
+            let light = |u: u32, v: u32| {
+                if (edge..edge + 60).contains(&u) && (180..300).contains(&v) {
+                    0.55
+                } else {
+                    1.0
+                }
+            };
+            let report = d.on_frame(&scene.frame(n, light, things), None, None);
+            let expected = usize::from(with_crate && n >= 12);
+            assert_eq!(report.obstacles.len(), expected, "frame {n}");
+        }
+    }
+}
+
 /// Frames of another size, empty calibrations: no panic, nothing claimed.
 #[test]
 fn odd_input_is_survived() {

@@ -1,0 +1,349 @@
+//! Shadows told from bodies. A shadow takes one of several lamps away: the picture under it gets
+//! darker, but what is painted on the floor still shows in it. A body hides it.
+//!
+//! So in a region that is darker than the reference, the steps from pixel to pixel of the frame are
+//! compared with those of the reference,
+//!
+//! ```text
+//! slope = sum(df db) / sum(db db),    standard error = sqrt(var / sum(db db)),
+//! ```
+//!
+//! var the variance of a step, by noise and by what does not fit. Under a body the slope is 0; in a shadow it is about what it leaves
+//! of the light, a = sum(f) / sum(b) (less, where noise and the sharp edges of other shadows blur
+//! it). Soft borders do not matter: their own steps have nothing to do with those of the floor.
+//! The texture test is that of Jacques, Jung and Musse, "Background Subtraction and Shadow
+//! Detection in Grayscale Video Sequences", SIBGRAPI 2005, in the form of a regression, which says
+//! how sure it is.
+//!
+//! The doubt is for the obstacle: a region counts as shadow only where the slope is well over 0,
+//! and parts of it whose own texture is gone stay. On a floor without texture every dark patch
+//! stays an obstacle.
+
+use super::reference::Noise;
+use super::regions::Runs;
+
+/// The texture of a shadow is at least this share of what light is left.
+const LEAST_SHARE: f64 = 1.0 / 3.0;
+/// A region is a shadow when its slope is over 0 by so many standard errors. These are as of
+/// independent steps; those of stains repeat from row to row, which makes chance some twice as
+/// large.
+const SURE: f64 = 5.0;
+/// A part of it is none when its slope is so many under that of a shadow.
+const SURE_OF_PART: f64 = 2.0;
+/// Side of a part: half the least obstacle at 20 m, the whole of it at 40 m.
+const PART_PX: u32 = 16;
+
+/// Sums over pixels and steps.
+#[derive(Clone, Copy, Debug, Default)]
+struct Sums {
+    pixels: f64,
+    frame: f64,
+    reference: f64,
+    /// Of df db, db db and df df.
+    both: f64,
+    square: f64,
+    frame_square: f64,
+    steps: f64,
+}
+
+impl Sums {
+    fn add(&mut self, other: &Self) {
+        self.pixels += other.pixels;
+        self.frame += other.frame;
+        self.reference += other.reference;
+        self.both += other.both;
+        self.square += other.square;
+        self.frame_square += other.frame_square;
+        self.steps += other.steps;
+    }
+
+    fn step(&mut self, df: f64, db: f64) {
+        self.both += df * db;
+        self.square += db * db;
+        self.frame_square += df * df;
+        self.steps += 1.0;
+    }
+
+    fn slope(&self) -> f64 {
+        self.both / self.square
+    }
+
+    /// Variance of a step, by the noise of its two pixels.
+    fn noise_variance(&self, noise: &Noise) -> f64 {
+        2.0 * noise.variance(self.frame / self.pixels)
+    }
+
+    /// Variance of a step, by how far the frame is from the reference times the slope.
+    fn residual_variance(&self) -> f64 {
+        let residual = self.frame_square - self.both * self.slope();
+        residual / (self.steps - 1.0).max(1.0)
+    }
+
+    fn error(&self, variance: f64) -> f64 {
+        (variance / self.square).sqrt()
+    }
+
+    /// Least slope of a shadow that leaves as much light.
+    fn least(&self) -> f64 {
+        LEAST_SHARE * self.frame / self.reference
+    }
+
+    /// Whether the texture shows for sure, be what does not fit noise or a texture of its own.
+    fn is_shadow(&self, noise: &Noise) -> bool {
+        let variance = self.noise_variance(noise).max(self.residual_variance());
+        self.square > 0.0 && self.slope() > self.least().max(SURE * self.error(variance))
+    }
+
+    /// Whether less of the texture shows than `least`.
+    fn is_covered(&self, least: f64, noise: &Noise) -> bool {
+        let error = self.error(self.noise_variance(noise));
+        self.square > 0.0 && self.slope() + SURE_OF_PART * error < least
+    }
+}
+
+/// A part of a region: what it has in one square of the image.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    region: usize,
+    /// Column and row of its square.
+    square: (u32, u32),
+    sums: Sums,
+}
+
+/// Finds shadows, with buffers of its own.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Shadows {
+    runs: Runs,
+    parts: Vec<Part>,
+    /// Those that are shadow, in order.
+    dark: Vec<(usize, (u32, u32))>,
+}
+
+impl Shadows {
+    /// Takes the shadows out of a binary image of what differs from the reference.
+    pub fn dismiss(
+        &mut self,
+        binary: &mut [u8],
+        width: usize,
+        (frame, reference): (&[u8], &[u8]),
+        noise: &Noise,
+    ) {
+        self.runs.label(binary, width, |k| frame[k] < reference[k]);
+        self.measure(binary, width, (frame, reference));
+        self.judge(noise);
+        if !self.dark.is_empty() {
+            self.clear(binary, width);
+        }
+    }
+
+    /// The parts of all regions and their sums.
+    fn measure(&mut self, binary: &[u8], width: usize, (frame, reference): (&[u8], &[u8])) {
+        self.parts.clear();
+        let grey = |image: &[u8], k: usize| f64::from(image[k]);
+        for k in 0..self.runs.all.len() {
+            let region = self.runs.region(k);
+            let run = self.runs.all[k];
+            for (square, from, to) in pieces(run.v, run.u) {
+                let mut sums = Sums::default();
+                for u in from..=to {
+                    let here = run.v as usize * width + u as usize;
+                    let (f, b) = (grey(frame, here), grey(reference, here));
+                    sums.pixels += 1.0;
+                    sums.frame += f;
+                    sums.reference += b;
+                    // Neighbours to the right and below that are as dark are of the same region.
+                    let right = (u < run.u.1).then_some(here + 1);
+                    let below = here + width;
+                    let below = (binary.get(below).is_some_and(|&set| set != 0)
+                        && frame[below] < reference[below])
+                        .then_some(below);
+                    for next in [right, below].into_iter().flatten() {
+                        sums.step(grey(frame, next) - f, grey(reference, next) - b);
+                    }
+                }
+                self.parts.push(Part {
+                    region,
+                    square,
+                    sums,
+                });
+            }
+        }
+        let key = |part: &Part| (part.region, part.square);
+        self.parts.sort_unstable_by_key(key);
+        self.parts.dedup_by(|next, part| {
+            let same = key(next) == key(part);
+            if same {
+                part.sums.add(&next.sums);
+            }
+            same
+        });
+    }
+
+    fn judge(&mut self, noise: &Noise) {
+        self.dark.clear();
+        for region in self.parts.chunk_by(|a, b| a.region == b.region) {
+            let mut whole = Sums::default();
+            region.iter().for_each(|part| whole.add(&part.sums));
+            if !whole.is_shadow(noise) {
+                continue;
+            }
+            let least = whole.least();
+            let shadows = region
+                .iter()
+                .filter(|part| !part.sums.is_covered(least, noise));
+            self.dark
+                .extend(shadows.map(|part| (part.region, part.square)));
+        }
+    }
+
+    fn clear(&mut self, binary: &mut [u8], width: usize) {
+        for k in 0..self.runs.all.len() {
+            let region = self.runs.region(k);
+            let run = self.runs.all[k];
+            for (square, from, to) in pieces(run.v, run.u) {
+                if self.dark.binary_search(&(region, square)).is_ok() {
+                    let row = run.v as usize * width;
+                    binary[row + from as usize..=row + to as usize].fill(0);
+                }
+            }
+        }
+    }
+}
+
+/// A run cut at the borders of the squares: square, first and last column.
+fn pieces(v: u32, (u0, u1): (u32, u32)) -> impl Iterator<Item = ((u32, u32), u32, u32)> {
+    (u0 / PART_PX..=u1 / PART_PX).map(move |x| {
+        let last = x * PART_PX + PART_PX - 1;
+        ((x, v / PART_PX), u0.max(x * PART_PX), u1.min(last))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::test_scene::{normal, words};
+    use super::*;
+
+    const WIDTH: usize = 160;
+    const HEIGHT: usize = 120;
+    const NOISE: Noise = Noise {
+        dark: 0.4,
+        per_grey: 0.068,
+    };
+
+    type Ellipse = ((f64, f64), (f64, f64));
+
+    /// How far within an ellipse (centre, half axes) a pixel is: over 0 inside.
+    fn within(u: f64, v: f64, (centre, half): Ellipse) -> f64 {
+        1.0 - ((u - centre.0) / half.0).hypot((v - centre.1) / half.1)
+    }
+
+    /// A floor with texture of so many grey levels.
+    fn floor(texture: u32) -> Vec<f64> {
+        (0..WIDTH * HEIGHT)
+            .map(|k| {
+                let (u, v) = ((k % WIDTH) as u32, (k / WIDTH) as u32);
+                let stain = f64::from(words(u / 5, v / 5, 3)[0] % (texture + 1));
+                80.0 - f64::from(texture) / 2.0 + stain
+            })
+            .collect()
+    }
+
+    fn seen(light: &[f64], seed: u32) -> Vec<u8> {
+        let noisy = |(k, grey): (usize, &f64)| {
+            let noise = NOISE.variance(*grey).sqrt() * normal(seed * 100_000 + k as u32);
+            (grey + noise).round().clamp(0.0, 255.0) as u8
+        };
+        light.iter().enumerate().map(noisy).collect()
+    }
+
+    /// Share of the pixels over the threshold that are dismissed, over all pictures of 20 seeds.
+    fn dismissed(floor: &[f64], picture: &[f64], place: Ellipse) -> f64 {
+        let reference: Vec<u8> = floor.iter().map(|grey| grey.round() as u8).collect();
+        let (mut all, mut left) = (0, 0);
+        for seed in 0..20 {
+            let frame = seen(picture, seed);
+            let over = |k: usize| frame[k].abs_diff(reference[k]) >= 15;
+            let mut binary: Vec<u8> = (0..frame.len()).map(|k| 255 * u8::from(over(k))).collect();
+            let count = |binary: &[u8]| {
+                let inside = |k: usize| within((k % WIDTH) as f64, (k / WIDTH) as f64, place) > 0.0;
+                (0..binary.len())
+                    .filter(|&k| binary[k] != 0 && inside(k))
+                    .count()
+            };
+            all += count(&binary);
+            Shadows::default().dismiss(&mut binary, WIDTH, (&frame, &reference), &NOISE);
+            left += count(&binary);
+        }
+        1.0 - left as f64 / all as f64
+    }
+
+    const PATCH: Ellipse = ((80.0, 60.0), (40.0, 18.0));
+
+    /// The floor with a shadow on it that leaves `left` of the light and has soft borders.
+    fn shaded(floor: &[f64], left: f64) -> Vec<f64> {
+        let pixels = floor.iter().enumerate();
+        pixels
+            .map(|(k, grey)| {
+                let depth = within((k % WIDTH) as f64, (k / WIDTH) as f64, PATCH);
+                grey * (1.0 - (1.0 - left) * (10.0 * depth).clamp(0.0, 1.0))
+            })
+            .collect()
+    }
+
+    fn covered(picture: &mut [f64], place: Ellipse, grey: impl Fn(usize) -> f64) {
+        for (k, pixel) in picture.iter_mut().enumerate() {
+            if within((k % WIDTH) as f64, (k / WIDTH) as f64, place) > 0.0 {
+                *pixel = grey(k);
+            }
+        }
+    }
+
+    /// Shadows from faint to deep on floors of weak and strong texture.
+    #[test]
+    fn shadows_go() {
+        for (texture, left) in [(20, 0.7), (20, 0.5), (40, 0.7), (40, 0.45), (40, 0.3)] {
+            let floor = floor(texture);
+            let share = dismissed(&floor, &shaded(&floor, left), PATCH);
+            assert!(share > 0.95, "{texture}, {left}: {share}");
+        }
+    }
+
+    /// Bodies of the same darkness stay: plain ones, ones with a texture of their own, on floors
+    /// with and without texture. Provokes a test of darkness alone, or doubt that counts for shadow.
+    #[test]
+    fn bodies_stay() {
+        for texture in [0, 3, 20, 40] {
+            let floor = floor(texture);
+            for (grey, own) in [(20.0, 0), (40.0, 0), (56.0, 0), (40.0, 30)] {
+                let mut picture = floor.clone();
+                let pattern = |k: usize| {
+                    let stain = words((k % WIDTH) as u32 / 4, (k / WIDTH) as u32 / 4, 17)[0];
+                    grey + f64::from(stain % (own + 1)) - f64::from(own) / 2.0
+                };
+                covered(&mut picture, PATCH, pattern);
+                let share = dismissed(&floor, &picture, PATCH);
+                assert!(share < 0.02, "{texture}, {grey}, {own}: {share}");
+            }
+        }
+    }
+
+    /// A floor without texture cannot tell: the doubt is for the obstacle.
+    #[test]
+    fn what_cannot_be_told_stays() {
+        let floor = floor(0);
+        assert!(dismissed(&floor, &shaded(&floor, 0.5), PATCH) < 0.02);
+    }
+
+    /// A dark body in the middle of a shadow stays when the shadow goes: as dark as it, and so one
+    /// region with it.
+    #[test]
+    fn a_body_in_a_shadow_stays() {
+        let floor = floor(40);
+        let body = ((85.0, 60.0), (14.0, 12.0));
+        let mut picture = shaded(&floor, 0.5);
+        covered(&mut picture, body, |_| 40.0);
+        let share = dismissed(&floor, &picture, body);
+        assert!(share < 0.35, "{share}");
+        assert!(dismissed(&floor, &picture, ((52.0, 60.0), (12.0, 9.0))) > 0.95);
+    }
+}
