@@ -33,8 +33,6 @@ struct Source {
     aside_m: vec3f,
     reach_m: f32,
     up_m: vec3f,
-    // Bodies nearer to it than this carry it.
-    mount_m: f32,
 }
 
 // A capsule, or the part of a tube that is inside all of some slabs.
@@ -190,19 +188,18 @@ fn word(at: u32) -> u32 {
 fn behind_capsules(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
     let radius_m = length(source.aside_m);
     let to = source.position_m - at;
-    let carried = 1.0 - source.mount_m * inverseSqrt(max(dot(to, to), 1e-6));
     var mask = 0u;
     for (var j = begin; j < end; j++) {
         let body = blockers[word(j)];
         let a = at - body.centre_m - body.velocity_mps * time_s;
         // A line that starts inside meets nothing.
         let outside = gap_m(a, vec3f(0.0), body.axis) >= body.radius_m;
-        let off_m = gap_m(a, to * carried, body.axis) - body.radius_m;
+        let off_m = gap_m(a, to, body.axis) - body.radius_m;
         mask |= select(0u, ALL, outside && off_m < -radius_m);
         let edge = outside && abs(off_m) <= radius_m && mask != ALL;
         var turn = vec2f(1.0, 0.0);
         for (var k = select(PLACES, 0u, edge); k < PLACES; k++) {
-            let way = (to + place(source, k, turn)) * carried;
+            let way = to + place(source, k, turn);
             mask |= select(0u, 1u << k, gap_m(a, way, body.axis) < body.radius_m);
             turn = turned(turn);
         }
@@ -214,18 +211,17 @@ fn behind_capsules(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32)
 fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
     let radius_m = length(source.aside_m);
     let to = source.position_m - at;
-    let carried = 1.0 - source.mount_m * inverseSqrt(max(dot(to, to), 1e-6));
     var mask = 0u;
     for (var j = begin; j < end; j++) {
         let body = blockers[word(j)];
         let a = at - body.centre_m - body.velocity_mps * time_s;
         let spans = spans_in(a, to, body, radius_m);
-        mask |= select(0u, ALL, enters(spans.zw, carried));
-        let some = spans.y >= max(spans.x, 0.0) && spans.x < carried && mask != ALL;
+        mask |= select(0u, ALL, enters(spans.zw, 1.0));
+        let some = spans.y >= max(spans.x, 0.0) && spans.x < 1.0 && mask != ALL;
         var turn = vec2f(1.0, 0.0);
         for (var k = select(PLACES, 0u, some); k < PLACES; k++) {
             let span = span_in(a, to + place(source, k, turn), body);
-            mask |= select(0u, 1u << k, enters(span, carried));
+            mask |= select(0u, 1u << k, enters(span, 1.0));
             turn = turned(turn);
         }
     }

@@ -20,8 +20,8 @@
 //! where E0 is the illuminance without bodies and `hidden` counts those of 16 places on the disc,
 //! spread evenly over its area ([`disc_places`]), to which a straight line from the surface is cut
 //! by a body. So an edge throws a penumbra as wide as the disc seen through it, in 16 steps. Lines
-//! start [`OFFSET_M`] off the surface; within [`MOUNT_M`] of a headlight nothing cuts them: what
-//! is there carries it. Only bodies hide light, the tunnel and the rails do not.
+//! start [`OFFSET_M`] off the surface. A body carries a headlight ([`Headlight::is_carried_by`]) or
+//! hides it. Only bodies hide light, the tunnel and the rails do not.
 //!
 //! # Air
 //!
@@ -38,7 +38,7 @@
 //! point from all sides, see [`LampField::airlight_cd_m2`]. Headlights' own beams in the mist, and
 //! the halo of lamps through it, are left out.
 
-use super::scene::{Air, Headlight, LampLight};
+use super::scene::{Air, Body, Headlight, LampLight};
 use crate::track::uid::{LightCurve, Ripple, Waveform};
 use crate::track::{LampSite, TrackPoint, Tunnel};
 use nalgebra::{Point3, Vector3};
@@ -50,8 +50,8 @@ pub const LAMP_REACH_M: f64 = 30.0;
 
 /// Radius of a headlight's luminous disc.
 pub const HEADLIGHT_RADIUS_M: f64 = 0.09;
-/// What is nearer to a headlight than this carries it and does not shade it.
-pub const MOUNT_M: f64 = 0.3;
+/// What is nearer to a headlight than this carries it.
+const MOUNT_M: f64 = 0.3;
 /// Lines to lights start this far off their surface, along its normal.
 pub const OFFSET_M: f64 = 1e-3;
 /// Airlight is the mean along the line to this distance before and behind the camera, a few
@@ -174,6 +174,15 @@ impl Headlight {
         let d = p - Point3::from(self.world_from_light.translation.vector);
         let axis = self.world_from_light.rotation * Vector3::x();
         point_source_lx(self.intensity_cd, self.exponent, &axis, &d, n)
+    }
+
+    /// Whether a body, taken as the box around it, has the headlight in it or next to it. It moves
+    /// with the light and is behind it, so it never shades it.
+    pub fn is_carried_by(&self, body: &Body) -> bool {
+        let light = Point3::from(self.world_from_light.translation.vector);
+        let place = body.world_from_body.inverse_transform_point(&light).coords;
+        let outside = (place.abs() - body.shape.half_extents_m()).sup(&Vector3::zeros());
+        outside.norm() < MOUNT_M
     }
 }
 
@@ -326,6 +335,7 @@ pub fn headlights_lx(
 mod tests {
     use super::*;
     use crate::track::uid::Uid;
+    use crate::twin::render::scene::Shape;
     use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion};
 
     fn lamp(centre: Point3<f64>, facing: Vector3<f64>) -> Shining {
@@ -492,5 +502,34 @@ mod tests {
             &-Vector3::y(),
         );
         assert!((e - 200.0).abs() < 1e-9);
+    }
+
+    /// Fails where a train stands in its own light: the headlight is just inside of its front, or
+    /// just before it, behind a lens. A board half a metre ahead is not part of the train.
+    #[test]
+    fn a_train_carries_its_headlights() {
+        let light = Headlight {
+            world_from_light: Isometry3::translation(100.0, 0.9, 1.0),
+            intensity_cd: 900.0,
+            exponent: 30.0,
+        };
+        let carries = |shape: Shape, x: f64, y: f64| {
+            light.is_carried_by(&Body {
+                shape,
+                world_from_body: Isometry3::translation(x, y, 1.5),
+                velocity_mps: Vector3::zeros(),
+                albedo: 0.5,
+                luminance_cd_m2: 0.0,
+            })
+        };
+        let car = || Shape::Box(Vector3::new(10.0, 1.4, 1.4));
+        assert!(carries(car(), 90.1, 0.0) && carries(car(), 89.9, 0.0));
+        assert!(!carries(car(), 68.0, 0.0) && !carries(car(), 90.1, 2.8));
+        assert!(carries(Shape::Sphere(0.3), 100.0, 0.9));
+        assert!(!carries(
+            Shape::Box(Vector3::new(0.01, 1.0, 1.0)),
+            100.5,
+            0.9
+        ));
     }
 }

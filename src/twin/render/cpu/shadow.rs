@@ -9,7 +9,7 @@ use super::solid::Solid;
 use super::tunnel::TunnelCaster;
 use super::{SIGHT_M, World};
 use crate::twin::render::light::{
-    HEADLIGHT_RADIUS_M, LAMP_REACH_M, MOUNT_M, OFFSET_M, Shining, disc_places,
+    HEADLIGHT_RADIUS_M, LAMP_REACH_M, OFFSET_M, Shining, disc_places,
 };
 use crate::twin::render::{Body, Headlight, Job, View};
 use nalgebra::{Point3, Vector3};
@@ -23,8 +23,6 @@ pub(super) struct Source<'a> {
     axis: Vector3<f64>,
     radius_m: f64,
     reach_m: f64,
-    /// Bodies closer to it than this carry it.
-    mount_m: f64,
     places: [Point3<f64>; 16],
 }
 
@@ -76,28 +74,15 @@ struct Shadow {
 impl<'a> Source<'a> {
     pub fn lamp(lamp: &'a Shining) -> Self {
         let (axis, radius_m) = (lamp.facing.into_inner(), lamp.radius_m);
-        Self::new(
-            Kind::Lamp(lamp),
-            lamp.centre,
-            axis,
-            radius_m,
-            LAMP_REACH_M,
-            0.0,
-        )
+        let kind = Kind::Lamp(lamp);
+        Self::new(kind, lamp.centre, axis, radius_m, LAMP_REACH_M)
     }
 
     pub fn headlight(light: &'a Headlight) -> Self {
         let centre = Point3::from(light.world_from_light.translation.vector);
         let axis = light.world_from_light.rotation * Vector3::x();
         let kind = Kind::Headlight(light);
-        Self::new(
-            kind,
-            centre,
-            axis,
-            HEADLIGHT_RADIUS_M,
-            f64::INFINITY,
-            MOUNT_M,
-        )
+        Self::new(kind, centre, axis, HEADLIGHT_RADIUS_M, f64::INFINITY)
     }
 
     fn new(
@@ -106,7 +91,6 @@ impl<'a> Source<'a> {
         axis: Vector3<f64>,
         radius_m: f64,
         reach_m: f64,
-        mount_m: f64,
     ) -> Self {
         Self {
             kind,
@@ -114,7 +98,6 @@ impl<'a> Source<'a> {
             axis,
             radius_m,
             reach_m,
-            mount_m,
             places: disc_places(&centre, &axis, radius_m),
         }
     }
@@ -124,6 +107,10 @@ impl<'a> Source<'a> {
             Kind::Lamp(lamp) => lamp.irradiance_lx(p, n),
             Kind::Headlight(light) => light.irradiance_lx(p, n),
         }
+    }
+
+    fn is_carried_by(&self, body: &Body) -> bool {
+        matches!(self.kind, Kind::Headlight(light) if light.is_carried_by(body))
     }
 
     /// Share of the disc that bodies hide from a point of a surface with unit normal `n`.
@@ -140,9 +127,7 @@ impl<'a> Source<'a> {
         }
         let hidden = self.places.iter().filter(|place| {
             let to = *place - from;
-            // Up to where a body would carry the light.
-            let end = 1.0 - self.mount_m / to.norm();
-            let hides = |b: &Blocker<'_>| (b.solid.cast(&from, &to)).is_some_and(|(t, _)| t < end);
+            let hides = |b: &Blocker<'_>| (b.solid.cast(&from, &to)).is_some_and(|(t, _)| t < 1.0);
             between.clone().any(hides)
         });
         hidden.count() as f64 / self.places.len() as f64
@@ -310,6 +295,9 @@ fn shadows(sources: &[Source<'_>], bodies: &[(&Body, f64)], job: &Job, view: &Vi
     let mut all = Vec::new();
     for (source, light) in sources.iter().enumerate() {
         for (body, (solid, radius_m)) in bodies.iter().enumerate() {
+            if light.is_carried_by(solid) {
+                continue;
+            }
             let ball = Blocker::at(solid, *radius_m, mid_s);
             let wide_m = radius_m + solid.velocity_mps.norm() * half_s;
             if let Some((towards, half_rad, nearest_m)) = light.shadow(&ball.centre, wide_m) {

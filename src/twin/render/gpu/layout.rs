@@ -277,8 +277,8 @@ pub struct Source {
     pub reach_m: f32,
     /// The radius of its disc across the other.
     pub up_m: [f32; 3],
-    /// Bodies nearer to it than this carry it.
-    pub mount_m: f32,
+    /// Fills the last vector up.
+    pub unused: f32,
 }
 
 /// A body that hides light: a capsule, or the part of a tube that is inside all of some slabs.

@@ -69,7 +69,7 @@ struct List {
 
 /// Who may shade what.
 struct Falling<'j> {
-    lights: Vec<Light>,
+    lights: Vec<Light<'j>>,
     bodies: Vec<&'j Body>,
     /// The first so many of them are capsules.
     capsules: usize,
@@ -96,7 +96,7 @@ impl Shadows {
         }
         let (bodies, capsules, balls) = falling::balls(framed, job);
         let lights = falling::lights(framed, job, field);
-        let (casts, of_light) = falling::casts(&lights, &balls);
+        let (casts, of_light) = falling::casts(&lights, &bodies, &balls);
         if casts.is_empty() {
             return;
         }
@@ -356,7 +356,7 @@ fn tile(framed: &Framed<'_>, job: &Job, column: u32, row: u32) -> Tile {
     }
 }
 
-fn source(light: &Light, reference: &Point3<f64>) -> Source {
+fn source(light: &Light<'_>, reference: &Point3<f64>) -> Source {
     // The first place on the disc tells which way the others are counted from.
     let first = disc_places(&light.centre, &light.axis, light.radius_m)[0] - light.centre;
     let aside = first * 32f64.sqrt();
@@ -368,7 +368,7 @@ fn source(light: &Light, reference: &Point3<f64>) -> Source {
         aside_m: single(&aside),
         reach_m: light.reach_m as f32,
         up_m: single(&aside.cross(&light.axis)),
-        mount_m: light.mount_m as f32,
+        unused: 0.0,
     }
 }
 

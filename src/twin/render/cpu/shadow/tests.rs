@@ -147,32 +147,6 @@ fn bodies_do_not_shade_their_own_lit_side() {
     }
 }
 
-/// Fails where a train stands in its own light: its headlight is just inside of its front, behind
-/// a lens. A board farther in front does shade.
-#[test]
-fn what_carries_a_headlight_does_not_shade_it() {
-    let light = headlight();
-    let source = Source::headlight(&light);
-    let train = [
-        body(
-            Shape::Box(Vector3::new(1.4, 1.4, 10.0)),
-            Point3::new(0.0, 0.0, 14.97),
-        ),
-        body(
-            Shape::Sphere(HEADLIGHT_RADIUS_M),
-            Point3::new(0.0, 0.0, 5.0),
-        ),
-    ];
-    for x_m in [0.0, 0.5, 2.0] {
-        assert!(share_at(&source, x_m, &train).abs() < 1e-12);
-    }
-    let board = [body(
-        Shape::Box(Vector3::new(0.5, 0.5, 0.01)),
-        Point3::new(0.0, 0.0, 4.0),
-    )];
-    assert!((share_at(&source, 0.0, &board) - 1.0).abs() < 1e-12);
-}
-
 /// Fails where the lists of slabs forget a shadow, or where a body is taken where it was at the
 /// job's time: the same light taken as by all lamps and all bodies together.
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
-use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, MOUNT_M, Shining};
+use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, Shining};
 use crate::twin::render::scene::{Body, Headlight, Job, Shape};
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -11,14 +11,14 @@ use std::ops::Range;
 const FAR_M: f64 = 200.0;
 
 /// A lamp or headlight.
-pub struct Light {
+pub struct Light<'j> {
     pub centre: Point3<f64>,
     pub axis: Vector3<f64>,
     pub radius_m: f64,
     pub intensity_cd: f64,
     pub exponent: f64,
     pub reach_m: f64,
-    pub mount_m: f64,
+    headlight: Option<&'j Headlight>,
 }
 
 /// A ball around a piece of a body, wherever it is in a frame.
@@ -46,7 +46,7 @@ pub struct Cast {
     cones: Vec<Cone>,
 }
 
-impl Light {
+impl<'j> Light<'j> {
     fn lamp(lamp: &Shining) -> Self {
         Self {
             centre: lamp.centre,
@@ -55,11 +55,11 @@ impl Light {
             intensity_cd: lamp.duty() * lamp.axial_intensity_cd(),
             exponent: lamp.exponent,
             reach_m: LAMP_REACH_M,
-            mount_m: 0.0,
+            headlight: None,
         }
     }
 
-    fn headlight(light: &Headlight) -> Self {
+    fn headlight(light: &'j Headlight) -> Self {
         Self {
             centre: Point3::from(light.world_from_light.translation.vector),
             axis: light.world_from_light.rotation * Vector3::x(),
@@ -67,7 +67,7 @@ impl Light {
             intensity_cd: light.intensity_cd,
             exponent: light.exponent,
             reach_m: 1e6,
-            mount_m: MOUNT_M,
+            headlight: Some(light),
         }
     }
 
@@ -112,7 +112,7 @@ impl Light {
 
 impl Cast {
     /// Whether it may fall on anything in a ball that the light lights.
-    pub fn may_fall_on(&self, light: &Light, centre: &Point3<f64>, radius_m: f64) -> bool {
+    pub fn may_fall_on(&self, light: &Light<'_>, centre: &Point3<f64>, radius_m: f64) -> bool {
         let to = centre - light.centre;
         let square = to.norm_squared();
         self.cones.iter().any(|cone| {
@@ -124,7 +124,7 @@ impl Cast {
 }
 
 /// The lights about a camera.
-pub fn lights(framed: &Framed<'_>, job: &Job, field: &LampField) -> Vec<Light> {
+pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &LampField) -> Vec<Light<'j>> {
     let eye = framed.reference();
     let away_m = |lamp: &Shining| (lamp.centre - eye).norm();
     let lamps = field.lamps().iter();
@@ -192,11 +192,19 @@ fn pieces(shape: &Shape) -> impl Iterator<Item = (Point3<f64>, f64)> {
 }
 
 /// All shadows, by light and within one light by body, and those of each light.
-pub fn casts(lights: &[Light], balls: &[Ball]) -> (Vec<Cast>, Vec<Range<usize>>) {
+pub fn casts(
+    lights: &[Light<'_>],
+    bodies: &[&Body],
+    balls: &[Ball],
+) -> (Vec<Cast>, Vec<Range<usize>>) {
     let mut casts = Vec::new();
     let of_light = lights.iter().enumerate().map(|(k, light)| {
         let first = casts.len();
         for of_body in balls.chunk_by(|a, b| a.body == b.body) {
+            let body = bodies[of_body[0].body];
+            if light.headlight.is_some_and(|l| l.is_carried_by(body)) {
+                continue;
+            }
             let cones: Vec<Cone> = of_body.iter().filter_map(|b| light.cone(b)).collect();
             if !cones.is_empty() {
                 casts.push(Cast {
