@@ -15,8 +15,9 @@
 //! Detection in Grayscale Video Sequences", SIBGRAPI 2005, in the form of a regression, which says
 //! how sure it is.
 //!
-//! The doubt is for the obstacle: a region counts as shadow only where the slope is well over 0,
-//! and parts of it whose own texture is gone stay. On a floor without texture every dark patch
+//! The doubt is for the obstacle: a region counts as shadow only where the slope is well over 0, or
+//! as a piece of a shadow beside it that leaves as much of the light; and parts of it whose own
+//! texture is gone stay. On a floor without texture every dark patch
 //! stays an obstacle.
 
 use super::reference::Noise;
@@ -27,9 +28,11 @@ const LEAST_SHARE: f64 = 1.0 / 3.0;
 /// A region is a shadow when its slope is over 0 by so many standard errors. These are as of
 /// independent steps; those of stains repeat from row to row, which makes chance some twice as
 /// large.
-const SURE: f64 = 5.0;
+const SURE: f64 = 4.0;
 /// A part of it is none when its slope is so many under that of a shadow.
 const SURE_OF_PART: f64 = 2.0;
+/// Shadows of the same lamps leave shares of the light that differ by less than this.
+const ALIKE: f64 = 0.1;
 /// Side of a part: half the least obstacle at 20 m, the whole of it at 40 m.
 const PART_PX: u32 = 16;
 
@@ -83,15 +86,16 @@ impl Sums {
         (variance / self.square).sqrt()
     }
 
-    /// Least slope of a shadow that leaves as much light.
-    fn least(&self) -> f64 {
-        LEAST_SHARE * self.frame / self.reference
+    /// Share of the light that is left.
+    fn left(&self) -> f64 {
+        self.frame / self.reference
     }
 
     /// Whether the texture shows for sure, be what does not fit noise or a texture of its own.
     fn is_shadow(&self, noise: &Noise) -> bool {
         let variance = self.noise_variance(noise).max(self.residual_variance());
-        self.square > 0.0 && self.slope() > self.least().max(SURE * self.error(variance))
+        self.square > 0.0
+            && self.slope() > (LEAST_SHARE * self.left()).max(SURE * self.error(variance))
     }
 
     /// Whether less of the texture shows than `least`.
@@ -110,11 +114,55 @@ struct Part {
     sums: Sums,
 }
 
+/// A region as a whole.
+#[derive(Clone, Copy, Debug)]
+struct Region {
+    parts: usize,
+    /// First and last column and row of its squares.
+    columns: (u32, u32),
+    rows: (u32, u32),
+    sums: Sums,
+    /// For sure.
+    is_shadow: bool,
+}
+
+impl Region {
+    fn of(parts: &[Part], noise: &Noise) -> Self {
+        let mut region = Self {
+            parts: parts.len(),
+            columns: (u32::MAX, 0),
+            rows: (u32::MAX, 0),
+            sums: Sums::default(),
+            is_shadow: false,
+        };
+        for part in parts {
+            let (column, row) = part.square;
+            region.columns = (region.columns.0.min(column), region.columns.1.max(column));
+            region.rows = (region.rows.0.min(row), region.rows.1.max(row));
+            region.sums.add(&part.sums);
+        }
+        region.is_shadow = region.sums.is_shadow(noise);
+        region
+    }
+
+    /// Whether their squares meet.
+    fn is_near(&self, other: &Self) -> bool {
+        let meet = |a: (u32, u32), b: (u32, u32)| a.0 <= b.1 + 1 && b.0 <= a.1 + 1;
+        meet(self.columns, other.columns) && meet(self.rows, other.rows)
+    }
+
+    fn is_as_dark(&self, other: &Self) -> bool {
+        (self.sums.left() - other.sums.left()).abs() < ALIKE
+    }
+}
+
 /// Finds shadows, with buffers of its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shadows {
     runs: Runs,
+    /// In order of region and square.
     parts: Vec<Part>,
+    regions: Vec<Region>,
     /// Those that are shadow, in order.
     dark: Vec<(usize, (u32, u32))>,
 }
@@ -179,20 +227,25 @@ impl Shadows {
         });
     }
 
+    /// Which parts are shadow: those of regions that are shadow for sure, then those of undecided
+    /// pieces beside them that are as dark.
     fn judge(&mut self, noise: &Noise) {
         self.dark.clear();
-        for region in self.parts.chunk_by(|a, b| a.region == b.region) {
-            let mut whole = Sums::default();
-            region.iter().for_each(|part| whole.add(&part.sums));
-            if !whole.is_shadow(noise) {
-                continue;
+        self.regions.clear();
+        let regions = self.parts.chunk_by(|a, b| a.region == b.region);
+        self.regions
+            .extend(regions.map(|parts| Region::of(parts, noise)));
+        let mut at = 0;
+        for k in 0..self.regions.len() {
+            let region = &self.regions[k];
+            let parts = &self.parts[at..at + region.parts];
+            at += region.parts;
+            let least = LEAST_SHARE * region.sums.left();
+            let piece_of = |r: &Region| r.is_shadow && r.is_near(region) && r.is_as_dark(region);
+            if region.is_shadow || self.regions.iter().any(piece_of) {
+                let shadows = parts.iter().filter(|p| !p.sums.is_covered(least, noise));
+                self.dark.extend(shadows.map(|p| (p.region, p.square)));
             }
-            let least = whole.least();
-            let shadows = region
-                .iter()
-                .filter(|part| !part.sums.is_covered(least, noise));
-            self.dark
-                .extend(shadows.map(|part| (part.region, part.square)));
         }
     }
 
