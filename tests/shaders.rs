@@ -194,8 +194,7 @@ fn structs_agree() {
         exponent,
         aside_m,
         reach_m,
-        up_m,
-        mount_m
+        up_m
     );
     same_layout!(
         "shadows",
