@@ -3,7 +3,7 @@
 //! [`DataSet`] watches a session. It sees every frame as it is taken, with the scene and the views
 //! that the renderer is given ([`Event::Exposure`]), and the images as they reach the stack. Beside
 //! each image it puts what is true: every pixel's depth, owner and flow by rays
-//! ([`Labeller`](crate::twin::render::cpu::Labeller)), the row-time equation solved for every lamp
+//! ([`Labeller`]), the row-time equation solved for every lamp
 //! ([`Sight`](crate::twin::render::cpu::Sight)), boxes, times, poses; and the picture that a better
 //! camera would have taken, for which it has a renderer of its own. So the run is the same, image
 //! by image, as without a data set.
