@@ -189,10 +189,8 @@ impl GpuRenderer {
                 bodies: &self.bodies,
                 textures: &self.textures,
             };
-            let background = self
-                .pipelines
-                .background(&gpu.device, job.headlights.len())
-                .clone();
+            let background = [0, job.headlights.len()]
+                .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
             let background = (&self.pipelines, &background);
             let sight = &self.scratch.sight;
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);

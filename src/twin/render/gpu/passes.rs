@@ -111,12 +111,13 @@ pub struct ViewData<'a> {
     pub shadows: &'a Shadows,
 }
 
-/// Bind groups of the background's pipelines; one a texture.
-struct Groups<'a> {
-    /// Draws what is lit.
-    pipeline: &'a wgpu::RenderPipeline,
-    lit: Vec<wgpu::BindGroup>,
-    dim: wgpu::BindGroup,
+/// The background's pipelines that a view uses, with their bind groups.
+struct Brushes<'a> {
+    lit: &'a wgpu::RenderPipeline,
+    /// One a texture.
+    paintings: Vec<wgpu::BindGroup>,
+    dim: &'a wgpu::RenderPipeline,
+    constants: wgpu::BindGroup,
 }
 
 /// What stands behind the draws of a view.
@@ -166,22 +167,19 @@ impl ViewBuffers {
         self.shadows.write(gpu, data.shadows);
     }
 
-    /// Tunnel and bodies at every instant of the exposure.
-    pub fn draw_background(
+    fn brushes<'a>(
         &self,
         gpu: &Gpu,
-        (pipelines, background): (&Pipelines, &Background),
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
+        background: &'a Background,
         sight: &Sight,
         stock: &Stock<'_>,
-    ) {
-        let pipeline = if sight.banded {
+    ) -> Brushes<'a> {
+        let lit = if sight.banded {
             &background.banded
         } else {
             &background.lit
         };
-        let lit = (stock.textures.views.iter())
+        let paintings = (stock.textures.views.iter())
             .map(|painting| {
                 let resources = [
                     self.view.binding(),
@@ -190,19 +188,34 @@ impl ViewBuffers {
                     wgpu::BindingResource::TextureView(painting),
                     wgpu::BindingResource::Sampler(&stock.textures.sampler),
                 ];
-                bind(&gpu.device, pipeline, &resources)
+                bind(&gpu.device, lit, &resources)
             })
             .collect();
-        let dim = [self.view.binding(), self.poses.binding()];
-        let groups = Groups {
-            pipeline,
+        let constants = [self.view.binding(), self.poses.binding()];
+        Brushes {
             lit,
-            dim: bind(&gpu.device, &background.dim, &dim),
-        };
+            paintings,
+            dim: &background.dim,
+            constants: bind(&gpu.device, &background.dim, &constants),
+        }
+    }
+
+    /// Tunnel and bodies at every instant of the exposure; with the pipelines for what no headlight
+    /// lights and for what they light.
+    pub fn draw_background(
+        &self,
+        gpu: &Gpu,
+        (pipelines, backgrounds): (&Pipelines, &[Background; 2]),
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        sight: &Sight,
+        stock: &Stock<'_>,
+    ) {
+        let brushes = (backgrounds.each_ref()).map(|b| self.brushes(gpu, b, sight, stock));
         if sight.instants == 1 {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
             let mut pass = begin(encoder, &target.signal, clear, Some(&target.depth));
-            self.draw_instant(&mut pass, background, &groups, sight, stock, 0);
+            self.draw_instant(&mut pass, &brushes, sight, stock, 0);
             return;
         }
         let instant = target.instant(&gpu.device);
@@ -214,7 +227,7 @@ impl ViewBuffers {
         for k in 0..sight.instants {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
             let mut pass = begin(encoder, instant, clear, Some(&target.depth));
-            self.draw_instant(&mut pass, background, &groups, sight, stock, k);
+            self.draw_instant(&mut pass, &brushes, sight, stock, k);
             drop(pass);
             let load = if k == 0 { clear } else { wgpu::LoadOp::Load };
             let mut pass = begin(encoder, &target.signal, load, None);
@@ -234,8 +247,7 @@ impl ViewBuffers {
     fn draw_instant(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        background: &Background,
-        groups: &Groups<'_>,
+        brushes: &[Brushes<'_>; 2],
         sight: &Sight,
         stock: &Stock<'_>,
         instant: u32,
@@ -250,14 +262,15 @@ impl ViewBuffers {
             pass.set_vertex_buffer(0, vertices.slice(..));
             pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
             let at = instant * sight.meshes + draw.mesh;
+            let brushes = &brushes[usize::from(draw.headlit)];
             if !draw.lit.is_empty() {
-                pass.set_pipeline(groups.pipeline);
-                pass.set_bind_group(0, &groups.lit[draw.texture], &[]);
+                pass.set_pipeline(brushes.lit);
+                pass.set_bind_group(0, &brushes.paintings[draw.texture], &[]);
                 pass.draw_indexed(draw.lit.clone(), 0, at..at + 1);
             }
             if !draw.dim.is_empty() {
-                pass.set_pipeline(&background.dim);
-                pass.set_bind_group(0, &groups.dim, &[]);
+                pass.set_pipeline(brushes.dim);
+                pass.set_bind_group(0, &brushes.constants, &[]);
                 pass.draw_indexed(draw.dim.clone(), 0, at..at + 1);
             }
         }

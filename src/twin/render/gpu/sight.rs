@@ -19,6 +19,8 @@ const DIM_GREY: f64 = 0.4;
 /// Grey levels by headlights alone below which paint does not show: they do not blink, and by half of
 /// it is less than the sensor's own step.
 const FLOODLIT_GREY: f64 = 1.0;
+/// Grey levels by headlights below which they are left out.
+const UNLIT_GREY: f64 = 0.1;
 /// Between two instants of the exposure nothing moves by more than this in the picture.
 const INSTANT_PX: f64 = 1.5;
 /// Light that changes by less than this from row to row shows no bands.
@@ -48,6 +50,8 @@ pub struct Draw {
     pub texture: usize,
     /// Number of their placement.
     pub mesh: u32,
+    /// Whether headlights light them.
+    pub headlit: bool,
     /// Indices of those that are drawn in full.
     pub lit: Range<u32>,
     /// Indices of those that are too dark for that.
@@ -107,6 +111,7 @@ impl Sight {
                 chunk: None,
                 texture: 0,
                 mesh: self.placements.len() as u32,
+                headlit: !job.headlights.is_empty(),
                 lit: range.clone(),
                 dim: 0..0,
             });
@@ -129,10 +134,14 @@ impl Sight {
         (key, chunk): (ChunkKey, &Chunk),
         dim_cd_m2: f64,
     ) {
-        let floodlit = chunk.probes.iter().any(|probe| {
-            let lux = headlights_lx(&job.headlights, world.air, &probe.at, &probe.normal);
-            lux * f64::from(probe.reflected_per_lx) > FLOODLIT_GREY / DIM_GREY * dim_cd_m2
-        });
+        let headlit_cd_m2 = (chunk.probes.iter())
+            .map(|probe| {
+                let lux = headlights_lx(&job.headlights, world.air, &probe.at, &probe.normal);
+                lux * f64::from(probe.reflected_per_lx)
+            })
+            .fold(0.0, f64::max);
+        let headlit_grey = headlit_cd_m2 * DIM_GREY / dim_cd_m2;
+        let floodlit = headlit_grey > FLOODLIT_GREY;
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {
@@ -147,6 +156,7 @@ impl Sight {
                 chunk: Some(key),
                 texture: textures::slanted(painting, away_m),
                 mesh: self.placements.len() as u32,
+                headlit: headlit_grey > UNLIT_GREY,
                 lit: part.indices.start..border,
                 dim: border..part.indices.end,
             });
