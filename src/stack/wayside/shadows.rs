@@ -8,20 +8,23 @@
 //! slope = sum(df db) / sum(db db),    standard error = sqrt(var / sum(db db)),
 //! ```
 //!
-//! var the variance of a step, by noise and by what does not fit. Under a body the slope is 0; in a shadow it is about what it leaves
-//! of the light, a = sum(f) / sum(b) (less, where noise and the sharp edges of other shadows blur
-//! it). Soft borders do not matter: their own steps have nothing to do with those of the floor.
+//! var the variance of a step, by noise and by what does not fit. Under a body the slope is 0; in a
+//! shadow it is about what it leaves of the light, a = sum(f) / sum(b) (less, where noise and the
+//! sharp edges of other shadows blur it). Soft borders do not matter: their own steps have nothing to
+//! do with those of the floor.
 //! The texture test is that of Jacques, Jung and Musse, "Background Subtraction and Shadow
 //! Detection in Grayscale Video Sequences", SIBGRAPI 2005, in the form of a regression, which says
 //! how sure it is.
 //!
 //! The doubt is for the obstacle: a region counts as shadow only where the slope is well over 0, or
 //! as a piece of a shadow beside it that leaves as much of the light; and parts of it whose own
-//! texture is gone stay. On a floor without texture every dark patch
-//! stays an obstacle.
+//! texture is gone stay. What has too little texture to tell is believed for [`PATIENCE`] frames and
+//! no longer: a shadow that does not move is that of a body that does not. On a floor without
+//! texture every dark patch is an obstacle.
 
 use super::reference::Noise;
 use super::regions::Runs;
+use std::collections::BTreeMap;
 
 /// The texture of a shadow is at least this share of what light is left.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
@@ -33,6 +36,10 @@ const SURE: f64 = 4.0;
 const SURE_OF_PART: f64 = 2.0;
 /// Shadows of the same lamps leave shares of the light that differ by less than this.
 const ALIKE: f64 = 0.1;
+/// So many frames a part goes with the rest of its shadow without a texture of its own.
+const PATIENCE: u32 = 30;
+/// Frames in which a part that was there may be missing.
+const GAP: u32 = 3;
 /// Side of a part: half the least obstacle at 20 m, the whole of it at 40 m.
 const PART_PX: u32 = 16;
 
@@ -156,6 +163,13 @@ impl Region {
     }
 }
 
+/// How long a square has had parts that go with a shadow: first and last frame.
+#[derive(Clone, Copy, Debug, Default)]
+struct Stay {
+    first: u32,
+    last: u32,
+}
+
 /// Finds shadows, with buffers of its own.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Shadows {
@@ -165,6 +179,9 @@ pub(super) struct Shadows {
     regions: Vec<Region>,
     /// Those that are shadow, in order.
     dark: Vec<(usize, (u32, u32))>,
+    /// Of frames looked at.
+    number: u32,
+    stays: BTreeMap<(u32, u32), Stay>,
 }
 
 impl Shadows {
@@ -179,6 +196,7 @@ impl Shadows {
         self.runs.label(binary, width, |k| frame[k] < reference[k]);
         self.measure(binary, width, (frame, reference));
         self.judge(noise);
+        self.lose_patience(noise);
         if !self.dark.is_empty() {
             self.clear(binary, width);
         }
@@ -247,6 +265,24 @@ impl Shadows {
                 self.dark.extend(shadows.map(|p| (p.region, p.square)));
             }
         }
+    }
+
+    /// Takes parts that could not be told back, in squares that have had any for long.
+    fn lose_patience(&mut self, noise: &Noise) {
+        let number = self.number;
+        self.number += 1;
+        self.stays.retain(|_, stay| stay.last + GAP >= number);
+        let (parts, stays) = (&self.parts, &mut self.stays);
+        self.dark.retain(|dark| {
+            let at = parts.partition_point(|part| (part.region, part.square) < *dark);
+            if parts[at].sums.is_shadow(noise) {
+                return true;
+            }
+            let first = number;
+            let stay = stays.entry(dark.1).or_insert(Stay { first, last: first });
+            stay.last = number;
+            number - stay.first < PATIENCE
+        });
     }
 
     fn clear(&mut self, binary: &mut [u8], width: usize) {
@@ -398,5 +434,37 @@ mod tests {
         let share = dismissed(&floor, &picture, body);
         assert!(share < 0.35, "{share}");
         assert!(dismissed(&floor, &picture, ((52.0, 60.0), (12.0, 9.0))) > 0.95);
+    }
+
+    /// A body as dark as the shadow that it throws, on a smooth floor: the shadow crosses a floor with
+    /// texture, so both together pass for a shadow, but not for ever.
+    #[test]
+    fn a_body_does_not_hide_in_its_own_shadow() {
+        let rough = floor(40);
+        let smooth = |k: usize| k % WIDTH > 70;
+        let floor: Vec<f64> = (0..rough.len())
+            .map(|k| if smooth(k) { 80.0 } else { rough[k] })
+            .collect();
+        let body = ((100.0, 60.0), (18.0, 12.0));
+        let mut picture = shaded(&floor, 0.5);
+        covered(&mut picture, body, |_| 40.0);
+        let reference: Vec<u8> = floor.iter().map(|grey| grey.round() as u8).collect();
+        let mut shadows = Shadows::default();
+        let left: Vec<usize> = (0..2 * PATIENCE)
+            .map(|n| {
+                let frame = seen(&picture, n);
+                let over = |k: usize| frame[k].abs_diff(reference[k]) >= 15;
+                let mut binary: Vec<u8> =
+                    (0..frame.len()).map(|k| 255 * u8::from(over(k))).collect();
+                shadows.dismiss(&mut binary, WIDTH, (&frame, &reference), &NOISE);
+                let inside = |k: usize| within((k % WIDTH) as f64, (k / WIDTH) as f64, body) > 0.0;
+                (0..binary.len())
+                    .filter(|&k| binary[k] != 0 && inside(k))
+                    .count()
+            })
+            .collect();
+        assert!(left[0] < 50, "{left:?}");
+        let patience = PATIENCE as usize;
+        assert!(left[patience + 1..].iter().all(|n| *n > 500), "{left:?}");
     }
 }
