@@ -86,7 +86,8 @@
 //! It finds nothing whose grey is within T of what is behind, nor anything smaller than the noise
 //! filter lets through; it needs a clear track at the start; it takes a region's lowest edge for
 //! its foot, so that something above the bed is placed too far away. What falls on the line less
-//! than 100 m ahead of a train, in the light of its headlights, it does not see.
+//! than 100 m ahead of a train, in the light of its headlights, it does not see. Something dark on a
+//! smooth floor, in or beside a shadow as dark, it finds three seconds late.
 
 mod announce;
 mod cells;
