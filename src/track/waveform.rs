@@ -1,9 +1,8 @@
 //! The light of a blinking lamp in time, and its exact integral over any exposure.
 //!
 //! The driver switches between chips; the light follows with a first-order lag, one time constant
-//! up and one down. That is the usual model of an LED and its driver (an RC low-pass; Grubor et
-//! al., J. Lightwave Technol. 26(24), 2008), and unlike a linear ramp it leaves the mean brightness
-//! of a code alone when both times are equal. Rise and fall times are those of data sheets, from
+//! up and one down. That is a usual model of an LED and its driver (an RC low-pass); it leaves the
+//! mean brightness of a code alone when both times are equal, also where edges outlast a chip. Rise and fall times are those of data sheets, from
 //! 10 to 90 %, so a time constant is the time over ln 9. On top comes the ripple that the mains
 //! leave in the driver's current, a sine at twice their frequency.
 //!

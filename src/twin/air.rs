@@ -1,8 +1,7 @@
 //! The tunnel's air as a user describes it: clear, or full of mist, dust or smoke.
 //!
 //! People tell air by how far they see. Meteorological visibility V is the distance at which the
-//! contrast of a black body has fallen to 2 %, e^(-k V) = 0.02, so k = 3.912 / V (Koschmieder; WMO
-//! No. 8). What the air then does to light is the renderers' business ([`Air`]).
+//! contrast of a black body has fallen to 2 %, e^(-k V) = 0.02, so k = 3.912 / V (Koschmieder 1924). What the air then does to light is the renderers' business ([`Air`]).
 
 use super::render::Air;
 use crate::track::{Checker, Problem};
@@ -16,8 +15,8 @@ pub struct AirSettings {
     /// Distance at which contrast has fallen to 2 %, m: under 1000 m is fog, 5000 m haze. Default:
     /// none, the air is clear.
     pub visibility_m: Option<f64>,
-    /// Share of the light lost that is scattered and not absorbed, 0 to 1: mist 1, mineral dust 0.6 to
-    /// 0.9, smoke 0.3. Default 1.
+    /// Share of the light lost that is scattered and not absorbed, 0 to 1: mist 1, mineral dust some 0.6
+    /// to 0.9, smoke some 0.3. Default 1.
     pub scattered_share: f64,
 }
 

@@ -5,10 +5,10 @@
 //! - *near*, from reflections between glass and sensor: level over the disc, then an exponential of
 //!   the distance from its rim;
 //! - *wide*, the veil that scattering on glass, dust and rims makes. Point spreads measured for the
-//!   veiling glare of cameras fall with a power of the distance (Bitlis, Jansson, Allebach, SPIE
-//!   6498, 2007; for the eye, whose cornea scatters alike, with the third power: Vos, CIE Journal
-//!   3(2), 1984, and CIE 146:2002). Here w / (2 pi) (w^2 + r^2)^(-3/2), which is 1 in the integral.
-//!   A disc of radius a widens w to (w^2 + a^2)^(1/2).
+//!   veiling glare of cameras fall with some power of the distance (Bitlis, Jansson, Allebach, SPIE
+//!   6498, 2007; for the eye with the third within some 2 degrees and the second beyond: CIE
+//!   146:2002). The third power is our choice: w / (2 pi) (w^2 + r^2)^(-3/2), which is 1 in the
+//!   integral. A disc of radius a widens w to (w^2 + a^2)^(1/2).
 //!
 //! Nothing that stands before the lamp hides its glare's neighbourhood: it arises in the lens. It
 //! blinks with the row that it falls on, so it carries the lamp's stripes far beyond the disc.

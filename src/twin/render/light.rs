@@ -1,7 +1,8 @@
 //! Photometry: what light lamps and headlights throw on a surface, in double precision.
 //!
 //! A lamp is a disc whose intensity falls as I = I0 cos(a)^m with the angle a from its normal
-//! (the generalised Lambert source of IES practice; m = 1 is a Lambert disc). Its flux is the
+//! (the generalised Lambert source of optical wireless: Gfeller and Bapst, Proc. IEEE 67(11), 1979;
+//! m = 1 is a Lambert disc). Its flux is the
 //! integral over the hemisphere, 2 pi I0 / (m + 1). Its luminance is the intensity over the
 //! disc's apparent area, so it falls as cos(a)^(m - 1).
 //!
@@ -72,7 +73,7 @@ pub fn disc_places(centre: &Point3<f64>, axis: &Vector3<f64>, radius_m: f64) -> 
     })
 }
 /// Rise and fall time of a lamp's light, from 10 to 90 %: that of an LED driver that switches a
-/// lamp of some ten watts by a transistor; the phosphor's own is a tenth of it.
+/// lamp of some ten watts by a transistor; the phosphor's own is a seventh of it or so.
 const EDGE_S: f64 = 1e-6;
 
 /// Exponent m for which the intensity has fallen to half at half the full beam angle.

@@ -27,8 +27,10 @@
 //!
 //! # Defaults
 //!
-//! Those of a rolling-shutter CMOS sensor of 1/3 inch, 1.2 million pixels of 3.75 um and converters
-//! of 12 bits, of the class of onsemi's AR0130, in a housing at 40 degrees.
+//! The format is that of a rolling-shutter CMOS sensor of 1/3 inch (1.2 million pixels of 3.75 um,
+//! converters of 12 bits: onsemi's AR0130 is one). Quantum efficiency, full well, noises, dark
+//! current and fixed pattern are of usual size for such a one at 40 degrees; they are assumed, not
+//! from a data sheet.
 //!
 //! # What it does not do
 //!
@@ -42,7 +44,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
-/// Photons in a lumen of a white LED for a second: its light makes 320 lm a watt, at 560 nm in the
+/// Photons in a lumen of a white LED for a second: its light makes about 320 lm a watt, at 560 nm in the
 /// mean (a photon of 3.55e-19 J).
 pub const PHOTONS_PER_LM_S: f64 = 1.0 / (320.0 * 3.55e-19);
 

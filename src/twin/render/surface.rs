@@ -19,8 +19,8 @@ pub const GLARE_STEP_PX: f64 = 4.0;
 /// Signals are followed up to this many times the full well.
 pub const SATURATION: f64 = 4.0;
 
-/// Share of light that a material reflects in the mean: old concrete, ballastless track and worn
-/// steel as lighting handbooks table them (CIE 88:2004 takes 0.2 to 0.6 for tunnel walls).
+/// Share of light that a material reflects in the mean. Concrete as lighting handbooks table it (0.2
+/// to 0.4); the others are assumed.
 pub const fn mean_albedo(material: Material) -> f64 {
     match material {
         Material::Lining => 0.30,

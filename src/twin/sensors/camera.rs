@@ -2,7 +2,7 @@
 //! to calibrations.
 //!
 //! A mount turns by yaw about the vertical (left positive) and then by pitch about its own right
-//! hand axis (up positive). The papers measure psi from the lateral direction: psi = 90 deg - yaw.
+//! hand axis (up positive). Zhang et al. 2023 measure psi from the lateral direction: psi = 90 deg - yaw.
 
 use super::ExposureSettings;
 use crate::bus::{
@@ -252,7 +252,7 @@ impl Optics {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct WaysideCameraSettings {
-    /// Focal length, mm. Default 4.1 (1093 px: 82 deg across).
+    /// Focal length, mm. Default 4.1 (1093 px: 83 deg across).
     pub focal_length_mm: f64,
     /// Width and height of a pixel, um. Default 3.75.
     pub pixel_um: f64,

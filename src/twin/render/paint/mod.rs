@@ -33,13 +33,13 @@
 //!
 //! | thing | measures | after |
 //! |---|---|---|
-//! | rings of a round lining | 1.5 m, 6 segments: key 21.5 deg, 2 x 68, 3 x 67.5, key alternating 18 deg off the crown | usual for 6 m shield-driven Chinese metros; terms of the ITA guidelines for shield tunnel lining (2000) |
+//! | rings of a round lining | 1.5 m, 6 segments: key 21.5 deg, 2 x 68, 3 x 67.5, key alternating 18 deg off the crown | usual for shield-driven Chinese metros of some 6 m; terms of the ITA guidelines for shield tunnel lining (2000) |
 //! | bolts | ring to ring every 36 deg, 2 at each segment joint | the same linings (10 and 12 bolts) |
 //! | other linings | cast in 12 m blocks, formwork panels of 1.5 m x 1.2 m with tie holes | usual formwork |
 //! | sleepers | every 0.6 m, 0.26 m x 2.5 m | as the track everywhere here |
-//! | slab joints | every 6 m | ballastless track in tunnels, 5 to 6.5 m |
-//! | cables | on brackets every 1 m, on the wall without walkway | GB 50157: power and signal cables apart |
-//! | handrail, stripes | 1.05 m above the walkway, 45 deg stripes on its edge | safety signs, ISO 3864 |
+//! | slab joints | every 6 m | own choice, about as long as prefabricated track slabs |
+//! | cables | on brackets every 1 m, on the wall without walkway | own choice: power and signal cables apart |
+//! | handrail, stripes | 1.05 m above the walkway, 45 deg stripes on its edge | own choice; stripes as safety markings of ISO 3864-1 |
 //! | plates, light boxes | every 30 m, every 15 m | own choice |
 //!
 //! Everything accidental is a hash of what it is about (ring, segment, ...), see

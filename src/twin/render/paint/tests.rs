@@ -48,7 +48,7 @@ fn the_image_repeats_without_a_seam() {
     }
 }
 
-/// Fails where furniture or dirt make a material darker or paler than what a handbook says of it.
+/// Fails where furniture or dirt make a material darker or paler in the mean than `surface` says.
 #[test]
 fn materials_keep_their_mean_albedo() {
     for (section, materials) in [
