@@ -1,4 +1,5 @@
-// Adds the picture of one instant of the exposure to the others, times the blend constant.
+// Mixes the picture of one instant of the exposure into the mean of others; the blend constant is
+// its share.
 
 @group(0) @binding(1) var instant: texture_2d<f32>;
 

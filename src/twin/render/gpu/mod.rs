@@ -46,6 +46,7 @@ mod passes;
 mod pipeline;
 mod shadows;
 mod sight;
+mod smear;
 mod target;
 mod textures;
 mod tunnel;

@@ -200,7 +200,7 @@ impl ViewBuffers {
         }
     }
 
-    /// Tunnel and bodies at every instant of the exposure; with the pipelines for what no headlight
+    /// Tunnel and bodies in the mean over the exposure; with the pipelines for what no headlight
     /// lights and for what they light.
     pub fn draw_background(
         &self,
@@ -212,28 +212,47 @@ impl ViewBuffers {
         stock: &Stock<'_>,
     ) {
         let brushes = (backgrounds.each_ref()).map(|b| self.brushes(gpu, b, sight, stock));
-        if sight.instants == 1 {
-            let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-            let mut pass = begin(encoder, &target.signal, clear, Some(&target.depth));
-            self.draw_instant(&mut pass, &brushes, sight, stock, 0);
-            return;
+        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+        let mut pass = begin(encoder, &target.signal, clear, Some(&target.depth));
+        self.draw_instant(&mut pass, &brushes, sight, stock, 0);
+        drop(pass);
+        if sight.instants > 1 {
+            let draw = |pass: &mut wgpu::RenderPass<'_>, k| {
+                self.draw_instant(pass, &brushes, sight, stock, k)
+            };
+            self.blend_instants(gpu, pipelines, encoder, target, sight, draw);
         }
+    }
+
+    /// Takes the mean of the signal, which shows the first instant, and the others.
+    fn blend_instants(
+        &self,
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        sight: &Sight,
+        draw: impl Fn(&mut wgpu::RenderPass<'_>, u32),
+    ) {
         let instant = target.instant(&gpu.device);
         let resources = [
             self.view.binding(),
-            wgpu::BindingResource::TextureView(instant),
+            wgpu::BindingResource::TextureView(&instant.signal),
         ];
         let blend = bind(&gpu.device, &pipelines.blend, &resources);
-        for k in 0..sight.instants {
+        let ([x, y], [width, height]) = (sight.moving.at, sight.moving.size);
+        for k in 1..sight.instants {
             let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-            let mut pass = begin(encoder, instant, clear, Some(&target.depth));
-            self.draw_instant(&mut pass, &brushes, sight, stock, k);
+            let mut pass = begin(encoder, &instant.signal, clear, Some(&instant.depth));
+            pass.set_scissor_rect(x, y, width, height);
+            draw(&mut pass, k);
             drop(pass);
-            let load = if k == 0 { clear } else { wgpu::LoadOp::Load };
-            let mut pass = begin(encoder, &target.signal, load, None);
+            let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
             pass.set_pipeline(&pipelines.blend);
             pass.set_bind_group(0, &blend, &[]);
-            let share = 1.0 / f64::from(sight.instants);
+            pass.set_scissor_rect(x, y, width, height);
+            // A running mean: rounding to half precision does not add up.
+            let share = 1.0 / f64::from(k + 1);
             pass.set_blend_constant(wgpu::Color {
                 r: share,
                 g: share,

@@ -57,7 +57,7 @@ pub struct Pipelines {
     /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
     backgrounds: Vec<Option<Background>>,
     background: wgpu::ShaderModule,
-    /// Adds a share of one picture to another.
+    /// Mixes a share of one picture into another.
     pub blend: wgpu::RenderPipeline,
     /// Shadows of capsules, and of any bodies, over the background.
     pub shadows: [wgpu::RenderPipeline; 2],
@@ -212,16 +212,16 @@ fn background(
     pipeline(device, stage)
 }
 
-/// Adds the source, times the blend constant.
+/// The source's share is the blend constant, the rest is what was there.
 const SHARE: wgpu::BlendState = {
-    let add = wgpu::BlendComponent {
+    let mix = wgpu::BlendComponent {
         src_factor: wgpu::BlendFactor::Constant,
-        dst_factor: wgpu::BlendFactor::One,
+        dst_factor: wgpu::BlendFactor::OneMinusConstant,
         operation: wgpu::BlendOperation::Add,
     };
     wgpu::BlendState {
-        color: add,
-        alpha: add,
+        color: mix,
+        alpha: mix,
     }
 };
 

@@ -4,12 +4,13 @@
 use super::chunks::{Chunk, Chunks};
 use super::layout::Placement;
 use super::passes::BodyBuffers;
+use super::smear::{Rectangle, Smear};
 use super::textures;
 use super::tunnel::ChunkKey;
 use super::view::{Framed, single};
 use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
-use crate::twin::render::scene::{Air, Body, Job};
+use crate::twin::render::scene::{Air, Job};
 use nalgebra::Point3;
 use std::ops::Range;
 
@@ -21,16 +22,8 @@ const DIM_GREY: f64 = 0.4;
 const FLOODLIT_GREY: f64 = 1.0;
 /// Grey levels by headlights below which they are left out.
 const UNLIT_GREY: f64 = 0.1;
-/// Between two instants of the exposure nothing moves by more than this in the picture.
-const INSTANT_PX: f64 = 1.5;
 /// Light that changes by less than this from row to row shows no bands.
 const BAND: f32 = 0.004;
-/// Bodies have less to show inside their outline.
-const BODY_INSTANT_PX: f64 = 3.0;
-/// Most instants.
-const MAX_INSTANTS: f64 = 64.0;
-/// No surface is taken to be nearer to a camera than this.
-const NEAREST_M: f64 = 0.8;
 
 /// What is lit and how.
 pub struct World<'a> {
@@ -68,8 +61,10 @@ pub struct Sight {
     pub placements: Vec<Placement>,
     /// Number of meshes.
     pub meshes: u32,
-    /// Number of instants.
+    /// Number of instants; the first is the middle of the exposure.
     pub instants: u32,
+    /// Part of the picture in which they differ.
+    pub moving: Rectangle,
     /// Light of lamps over their mean, row by row; the first lot is 1.
     pub shares: Vec<f32>,
     /// Whether any of it differs from 1 so that one can see it.
@@ -123,7 +118,7 @@ impl Sight {
             });
         }
         self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
-        self.repeat(framed, job);
+        self.repeat(framed, job, chunks);
     }
 
     fn add_chunk(
@@ -193,19 +188,25 @@ impl Sight {
     }
 
     /// Copies the placements for every instant of the exposure.
-    fn repeat(&mut self, framed: &Framed<'_>, job: &Job) {
+    fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &Chunks) {
         self.meshes = self.placements.len() as u32;
+        let smear = Smear::of(framed, job.time);
         let anything = self.draws.iter().any(|d| !d.lit.is_empty());
+        let chunks = self.keys.iter().filter_map(|key| chunks.get(*key));
         self.instants = if anything {
-            instants(framed, &job.bodies)
+            smear.instants(&job.bodies, chunks)
         } else {
             1
         };
+        self.moving = smear.moving(&job.bodies);
+        if self.moving.is_empty() {
+            self.instants = 1;
+        }
         let exposure_s = framed.view.camera.shutter.exposure_s;
         let count = f64::from(self.instants);
         for k in 0..self.instants {
-            // The middle comes last: its depths decide what hides the lamps.
-            let k = (k + self.instants / 2 + 1) % self.instants;
+            // The middle comes first: its depths decide what hides the lamps.
+            let k = (k + self.instants / 2) % self.instants;
             let late_s = ((f64::from(k) + 0.5) / count - 0.5) * exposure_s;
             for mesh in 0..self.meshes as usize {
                 self.placements.push(Placement {
@@ -216,26 +217,4 @@ impl Sight {
         }
         self.placements.drain(..self.meshes as usize);
     }
-}
-
-/// How many instants of a row's exposure show all motion in it.
-fn instants(framed: &Framed<'_>, bodies: &[Body]) -> u32 {
-    let (view, shutter) = (framed.view, &framed.view.camera.shutter);
-    let f_px = view.camera.intrinsics.fx_px;
-    let rows = f64::from(view.camera.intrinsics.height_px);
-    let middle = shutter.row_open(view.start, 0.5 * rows);
-    let [a, b] = [middle, middle.plus(shutter.exposure_s)].map(|t| view.motion.pose_at(t));
-    let travel = b.translation.vector - a.translation.vector;
-    let turned_px = f_px * a.rotation.angle_to(&b.rotation);
-    let smear_px = turned_px + f_px * travel.norm() / NEAREST_M;
-    let bodies_px = bodies.iter().map(|body| {
-        let to = body.world_from_body.translation.vector - framed.middle.translation.vector;
-        let away_m = (to.norm() - body.shape.half_extents_m().norm()).max(NEAREST_M);
-        let moved = body.velocity_mps * shutter.exposure_s - travel;
-        turned_px + f_px * moved.norm() / away_m
-    });
-    let wanted = bodies_px
-        .map(|px| px / BODY_INSTANT_PX)
-        .fold(smear_px / INSTANT_PX, f64::max);
-    wanted.ceil().clamp(1.0, MAX_INSTANTS) as u32
 }

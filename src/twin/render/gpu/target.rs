@@ -19,9 +19,17 @@ pub struct Target {
     pub signal_words: wgpu::Buffer,
     /// Reversed depth.
     pub depth: wgpu::TextureView,
-    instant: OnceCell<wgpu::TextureView>,
+    instant: OnceCell<Instant>,
     /// The finished image, of eight bits and raw.
     finished: [Finished; 2],
+}
+
+/// One instant of an exposure that shows motion.
+pub struct Instant {
+    /// Signal in electrons.
+    pub signal: wgpu::TextureView,
+    /// Reversed depth.
+    pub depth: wgpu::TextureView,
 }
 
 /// A finished image, four pixels a texel.
@@ -65,13 +73,18 @@ impl Target {
         }
     }
 
-    /// The signal at one instant of an exposure that shows motion; made when first needed.
-    pub fn instant(&self, device: &wgpu::Device) -> &wgpu::TextureView {
+    /// Made when first needed.
+    pub fn instant(&self, device: &wgpu::Device) -> &Instant {
         self.instant.get_or_init(|| {
-            let usage =
-                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-            texture(device, self.size_px, SIGNAL, usage)
-                .create_view(&wgpu::TextureViewDescriptor::default())
+            let view = |format, extra| {
+                let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | extra;
+                texture(device, self.size_px, format, usage)
+                    .create_view(&wgpu::TextureViewDescriptor::default())
+            };
+            Instant {
+                signal: view(SIGNAL, wgpu::TextureUsages::TEXTURE_BINDING),
+                depth: view(DEPTH, wgpu::TextureUsages::empty()),
+            }
         })
     }
 
