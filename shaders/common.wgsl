@@ -58,10 +58,12 @@ struct View {
 // Where a point in the camera's frame is seen at depth 1, times its depth: bus/camera.rs.
 fn distort(c: vec3f) -> vec2f {
     let p = c.xy / max(c.z, NEAR_M);
-    let r2 = min(dot(p, p), view.radial.w);
+    let free = dot(p, p);
+    let r2 = min(free, view.radial.w);
     let radial = 1.0 + r2 * (view.radial.x + r2 * (view.radial.y + r2 * view.radial.z));
-    let t = view.tangential;
-    let aside = 2.0 * p.x * p.y * t + t.yx * (r2 + 2.0 * p * p);
+    // Beyond the reach the tangential part grows with the radius, like the rest.
+    let t = view.tangential * min(1.0, sqrt(view.radial.w / max(free, 1e-9)));
+    let aside = 2.0 * p.x * p.y * t + t.yx * (free + 2.0 * p * p);
     return c.xy * radial + c.z * aside;
 }
 

@@ -26,7 +26,7 @@
 )]
 
 use image::GrayImage;
-use metrotwin::bus::{Intrinsics, SimTime};
+use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
@@ -276,6 +276,50 @@ fn the_wayside_view() {
             let lit = wayside_job(&tunnel, s_m, gain);
             let name = format!("way_{s_m}_gain_{gain}");
             compare(&name, &sample::scene(), &lit);
+        }
+    }
+}
+
+/// Left camera of the EuRoC MAV data set (M. Burri et al., Int. J. Robotics Research 2016).
+const WIDE: DistortionCoefficients = DistortionCoefficients {
+    k1: -0.283_408_11,
+    k2: 0.073_959_07,
+    k3: 0.0,
+    p1: 0.000_193_59,
+    p2: 1.761_871_14e-5,
+};
+
+/// Provokes a tunnel that stays straight before a lens that bends it, or rows that open in another
+/// order or together: with the coefficients of a real wide lens.
+#[test]
+fn through_a_real_lens_read_upwards_and_at_once() {
+    let tunnel = sample::tunnel();
+    let rig = |s_m, gain| ("rig", rig_job(&tunnel, s_m, gain));
+    let way = |s_m, gain| ("way", wayside_job(&tunnel, s_m, gain));
+    let lit = [rig(100.0, 1.0), rig(300.5, 1.0), way(100.0, 1.0)];
+    let flooded = [rig(101.6, 2.0), rig(401.5, 2.0), way(270.0, 0.01)];
+    let all = (lit.into_iter().map(|job| (sample::scene(), "bent", job))).chain(
+        flooded
+            .into_iter()
+            .map(|job| (floodlit(), "flood_bent", job)),
+    );
+    for (scene, light, (camera, mut job)) in all {
+        let view = &mut job.views[0];
+        let (lens, shutter) = (&mut view.camera.intrinsics, &mut view.camera.shutter);
+        lens.distortion = Distortion::new(WIDE);
+        for (order, line_time_s, first_row) in [
+            ("down", shutter.line_time_s, 0),
+            ("up", shutter.line_time_s, lens.height_px - 1),
+            ("at_once", 0.0, 0),
+        ] {
+            let mut job = job.clone();
+            let shutter = &mut job.views[0].camera.shutter;
+            if line_time_s <= 0.0 {
+                // A bit of every lamp's name, or none would shine by chance.
+                shutter.exposure_s = shutter.exposure_s.max(140e-6);
+            }
+            (shutter.line_time_s, shutter.first_row) = (line_time_s, first_row);
+            compare(&format!("{light}_{camera}_{order}"), &scene, &job);
         }
     }
 }

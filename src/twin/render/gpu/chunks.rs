@@ -1,6 +1,7 @@
 //! Chunks of the tunnel on the adapter: meshed when first seen, dropped when long unseen.
 
 use super::adapter::Gpu;
+use super::bend::Bend;
 use super::tunnel::{CHUNK_M, ChunkKey, Detail, Part, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
@@ -90,12 +91,16 @@ impl Chunks {
         let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
         let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
         let slack_m = framed.slack_m();
+        let moves = framed.view.motion.poses.len() > 1;
+        let place = tunnel.alignment.track_from_world(&eye, s_m);
+        let bend = Bend::of(&framed.view.camera.intrinsics, &place);
         for index in first..=last {
             let from_m = index as f64 * CHUNK_M;
             let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
             let key = ChunkKey {
                 index,
-                detail: Detail::at(away_m, framed.view.motion.poses.len() > 1),
+                detail: Detail::at(away_m, moves || bend.is_some()),
+                bend,
             };
             let job = self.job;
             let chunk = self

@@ -1,9 +1,10 @@
 //! Triangles, and the triangles of the bodies' shapes.
 
+use super::bend;
 use super::layout::Vertex;
 use crate::twin::render::hull::Hull;
 use crate::twin::render::light::LampField;
-use crate::twin::render::scene::{Body, Shape};
+use crate::twin::render::scene::{Body, Shape, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -14,6 +15,40 @@ const MAX_CELLS: f64 = 48.0;
 /// picture, but no more than these.
 const OUTLINE_PX: f64 = 0.04;
 const MAX_SECTORS: usize = 32;
+
+/// How finely a body is cut.
+#[derive(Clone, Copy, Debug)]
+pub struct Fineness {
+    /// A metre of its near side takes so many pixels at most.
+    pub px_per_m: f64,
+    /// Largest cell.
+    pub cell_m: f64,
+}
+
+impl Fineness {
+    /// For the views of a job.
+    pub fn of(body: &Body, views: &[View]) -> Self {
+        let coarse = Self {
+            px_per_m: 0.0,
+            cell_m: CELL_M,
+        };
+        views.iter().fold(coarse, |all, view| {
+            let lens = &view.camera.intrinsics;
+            let eye = view.motion.pose_at(view.start).translation.vector;
+            let away_m = (body.world_from_body.translation.vector - eye).norm();
+            let near_m = (away_m - body.shape.half_extents_m().norm()).max(0.1);
+            Self {
+                px_per_m: all.px_per_m.max(lens.fx_px / near_m),
+                cell_m: bend::cell_share(lens).map_or(all.cell_m, |q| all.cell_m.min(q * near_m)),
+            }
+        })
+    }
+
+    /// Cells along a length.
+    fn cells(&self, length_m: f64) -> usize {
+        (length_m / self.cell_m).ceil().clamp(1.0, MAX_CELLS) as usize
+    }
+}
 
 /// Vertices, and triangles as triples of them.
 #[derive(Clone, Debug, Default)]
@@ -72,9 +107,14 @@ impl Mesh {
             .into()
     }
 
-    /// Appends a body, lit where it stands, for views in which a metre of it takes so many pixels
-    /// at most.
-    pub fn add_body(&mut self, body: &Body, lamps: &LampField, ambient_lx: f64, px_per_m: f64) {
+    /// Appends a body, lit where it stands.
+    pub fn add_body(
+        &mut self,
+        body: &Body,
+        lamps: &LampField,
+        ambient_lx: f64,
+        fineness: Fineness,
+    ) {
         let from = self.vertices.len() as u32;
         let mut corner = |p: Vector3<f64>, n: Vector3<f64>| {
             let at = body.world_from_body * Point3::from(p);
@@ -90,18 +130,24 @@ impl Mesh {
                 ..Vertex::default()
             });
         };
-        let round = |r: f64| sectors(r * px_per_m);
+        let round = |r: f64| sectors(r * fineness.px_per_m);
         let grids = match &body.shape {
-            Shape::Box(half) => box_grids(half, &mut corner),
-            Shape::Cylinder(r, h) => turned(&cylinder_profile(*r, *h), round(*r), &mut corner),
-            Shape::Sphere(r) => {
-                turned(&capsule_profile(*r, 0.0, round(*r)), round(*r), &mut corner)
+            Shape::Box(half) => box_grids(half, fineness, &mut corner),
+            Shape::Cylinder(r, h) => {
+                turned(&cylinder_profile(*r, *h, fineness), round(*r), &mut corner)
             }
-            Shape::Capsule(r, h) => {
-                turned(&capsule_profile(*r, *h, round(*r)), round(*r), &mut corner)
-            }
+            Shape::Sphere(r) => turned(
+                &capsule_profile(*r, 0.0, round(*r), fineness),
+                round(*r),
+                &mut corner,
+            ),
+            Shape::Capsule(r, h) => turned(
+                &capsule_profile(*r, *h, round(*r), fineness),
+                round(*r),
+                &mut corner,
+            ),
             Shape::Hull(hull) => {
-                let corners = hull_triangles(hull, &mut corner);
+                let corners = hull_triangles(hull, fineness, &mut corner);
                 self.indices.extend(corners.iter().map(|k| from + k));
                 return;
             }
@@ -128,18 +174,15 @@ fn sectors(radius_px: f64) -> usize {
 /// Rows and columns of a grid of vertices.
 type Grid = (usize, usize);
 
-fn cells(length_m: f64) -> usize {
-    (length_m / CELL_M).ceil().clamp(1.0, MAX_CELLS) as usize
-}
-
 fn box_grids(
     half: &Vector3<f64>,
+    fineness: Fineness,
     corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>),
 ) -> Vec<Grid> {
     let mut grids = Vec::with_capacity(6);
     for axis in 0..3 {
         let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
-        let (rows, columns) = (cells(2.0 * half[i]), cells(2.0 * half[j]));
+        let (rows, columns) = (fineness.cells(2.0 * half[i]), fineness.cells(2.0 * half[j]));
         for side in [-1.0, 1.0] {
             let mut normal = Vector3::zeros();
             normal[axis] = side;
@@ -158,7 +201,11 @@ fn box_grids(
 }
 
 /// Faces as fans of triangles, cut into equal smaller ones; yields their corners.
-fn hull_triangles(hull: &Hull, corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>)) -> Vec<u32> {
+fn hull_triangles(
+    hull: &Hull,
+    fineness: Fineness,
+    corner: &mut impl FnMut(Vector3<f64>, Vector3<f64>),
+) -> Vec<u32> {
     let mut indices = Vec::new();
     let mut first = 0;
     for face in hull.faces() {
@@ -170,7 +217,7 @@ fn hull_triangles(hull: &Hull, corner: &mut impl FnMut(Vector3<f64>, Vector3<f64
         for k in 2..ring.len() {
             let [a, b, c] = [ring[0], ring[k - 1], ring[k]];
             let longest = (b - a).norm().max((c - b).norm()).max((a - c).norm());
-            let n = cells(longest) as u32;
+            let n = fineness.cells(longest) as u32;
             // Row r from the corner a on has r + 1 vertices.
             let row = |r: u32| first + r * (r + 1) / 2;
             for r in 0..=n {
@@ -199,13 +246,13 @@ struct ProfilePoint {
 }
 
 /// Bottom to top: one line for every smooth piece.
-fn cylinder_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
+fn cylinder_profile(radius_m: f64, half_m: f64, fineness: Fineness) -> Vec<Vec<ProfilePoint>> {
     let point = |radius_m, z_m, normal| ProfilePoint {
         radius_m,
         z_m,
         normal,
     };
-    let steps = cells(2.0 * half_m);
+    let steps = fineness.cells(2.0 * half_m);
     let cap = |side: f64| {
         [0.0, radius_m]
             .map(|r| point(r, side * half_m, [0.0, side]))
@@ -218,7 +265,12 @@ fn cylinder_profile(radius_m: f64, half_m: f64) -> Vec<Vec<ProfilePoint>> {
     vec![cap(-1.0), side, cap(1.0)]
 }
 
-fn capsule_profile(radius_m: f64, half_m: f64, sectors: usize) -> Vec<Vec<ProfilePoint>> {
+fn capsule_profile(
+    radius_m: f64,
+    half_m: f64,
+    sectors: usize,
+    fineness: Fineness,
+) -> Vec<Vec<ProfilePoint>> {
     let rings = sectors / 4;
     let dome = |side: f64| {
         (0..=rings).map(move |k| {
@@ -231,7 +283,7 @@ fn capsule_profile(radius_m: f64, half_m: f64, sectors: usize) -> Vec<Vec<Profil
             }
         })
     };
-    let steps = cells(2.0 * half_m);
+    let steps = fineness.cells(2.0 * half_m);
     let side = (1..steps).map(|k| ProfilePoint {
         radius_m,
         z_m: half_m * (2.0 * k as f64 / steps as f64 - 1.0),
@@ -274,7 +326,11 @@ mod tests {
             luminance_cd_m2: 0.0,
         };
         let mut mesh = Mesh::default();
-        mesh.add_body(&body, &LampField::new(&[]), 1.0, 1e4);
+        let fineness = Fineness {
+            px_per_m: 1e4,
+            cell_m: CELL_M,
+        };
+        mesh.add_body(&body, &LampField::new(&[]), 1.0, fineness);
         mesh
     }
 

@@ -33,10 +33,11 @@
 //!
 //! Reflections in wet or polished surfaces, and the end walls where two cross-sections meet (dark).
 //! Between vertices positions run straight, so edges close to a fast camera are bent by the shutter
-//! only facet by facet (0.5 m); lamps are exact. Stains end 60 m away, the tunnel 160 m ahead of the
+//! only facet by facet (0.5 m), and by the lens cell by cell (0.25 px, `bend.rs`); lamps are exact. Stains end 60 m away, the tunnel 160 m ahead of the
 //! camera; glare of a lamp under a quarter of the usual read noise is not drawn.
 
 mod adapter;
+mod bend;
 mod chunks;
 mod glare;
 mod lamps;
@@ -58,7 +59,7 @@ pub use pipeline::shader_source;
 use super::light::LampField;
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey};
-use super::scene::{Body, Job, LampsInTime, Scene, View};
+use super::scene::{Job, LampsInTime, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::SimTime;
 use adapter::Gpu;
@@ -67,7 +68,7 @@ use glare::GlareTarget;
 use image::GrayImage;
 use lamps::{Around, LampTable};
 use layout::Pose;
-use mesh::Mesh;
+use mesh::{Fineness, Mesh};
 use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::{Develop, Pipelines};
 use shadows::Shadows;
@@ -157,10 +158,8 @@ impl GpuRenderer {
         self.bodies.ranges.clear();
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
-            let px_per_m = (job.views.iter())
-                .map(|view| px_per_m(view, body))
-                .fold(0.0, f64::max);
-            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx, px_per_m);
+            let fineness = Fineness::of(body, &job.views);
+            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx, fineness);
             self.bodies.ranges.push(first..mesh.indices.len() as u32);
         }
         self.bodies.write(&self.gpu, mesh);
@@ -257,14 +256,6 @@ impl GpuRenderer {
             },
         );
     }
-}
-
-/// Pixels that a metre takes on the near side of a body.
-fn px_per_m(view: &View, body: &Body) -> f64 {
-    let eye = view.motion.pose_at(view.start).translation.vector;
-    let away_m = (body.world_from_body.translation.vector - eye).norm();
-    let near_m = (away_m - body.shape.half_extents_m().norm()).max(0.1);
-    view.camera.intrinsics.fx_px / near_m
 }
 
 impl GpuRenderer {

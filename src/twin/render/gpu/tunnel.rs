@@ -1,5 +1,6 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
+use super::bend::Bend;
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{
@@ -18,10 +19,15 @@ pub const CHUNK_M: f64 = 5.0;
 /// A painted surface is at most this many times as bright as its material in the mean.
 const BRIGHTEST_PAINT: f64 = 2.0;
 
+/// Ends of the ranges of detail.
+const NEAR_M: f64 = 6.0;
+const CLOSE_M: f64 = 20.0;
+const MIDDLE_M: f64 = 60.0;
+
 /// How finely a chunk is meshed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Detail {
-    /// Every ring halved: where the rolling shutter bends what is straight.
+    /// Every ring halved: where the rolling shutter or the lens bends what is straight.
     Near,
     /// Ring by ring.
     Close,
@@ -32,13 +38,24 @@ pub enum Detail {
 }
 
 impl Detail {
-    /// How fine a chunk is drawn whose nearest end is so far from a camera that moves or not.
-    pub fn at(away_m: f64, moves: bool) -> Self {
+    /// How fine a chunk is drawn whose nearest end is so far from a camera that bends what is
+    /// straight, by its motion or its lens, or does not.
+    pub fn at(away_m: f64, bent: bool) -> Self {
         match away_m {
-            ..6.0 if moves => Self::Near,
-            ..20.0 => Self::Close,
-            ..60.0 => Self::Middle,
+            ..NEAR_M if bent => Self::Near,
+            ..CLOSE_M => Self::Close,
+            ..MIDDLE_M => Self::Middle,
             _ => Self::Far,
+        }
+    }
+
+    /// A chunk is at least so far from the camera along the line.
+    fn nearest_m(self) -> f64 {
+        match self {
+            Self::Near => 0.0,
+            Self::Close => NEAR_M,
+            Self::Middle => CLOSE_M,
+            Self::Far => MIDDLE_M,
         }
     }
 
@@ -71,9 +88,19 @@ pub struct ChunkKey {
     pub index: i64,
     /// How fine.
     pub detail: Detail,
+    /// Finer still before a lens that bends lines.
+    pub bend: Option<Bend>,
 }
 
 impl ChunkKey {
+    /// Whether a cell is short enough for the camera's lens, which is so far across the line from it.
+    fn is_fine(&self, cell_m: f64, across_m: impl Fn(&TrackPoint) -> f64) -> bool {
+        self.bend.is_none_or(|bend| {
+            let across_m = across_m(&bend.eye());
+            cell_m <= bend.cell_m(self.detail.nearest_m().hypot(across_m))
+        })
+    }
+
     /// Chainage of its origin.
     pub fn start_m(self) -> f64 {
         self.index as f64 * CHUNK_M
@@ -215,7 +242,7 @@ impl Site<'_> {
         let first = mesh.vertices.len() as u32;
         let sides = facet
             .ends
-            .map(|end| finer_stations(stations, end, &self.near, self.key.detail));
+            .map(|end| finer_stations(stations, end, &self.near, self.key));
         for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
             for &s_m in side {
                 mesh.vertices.push(self.vertex(facet, *end, q_m, s_m));
@@ -268,16 +295,17 @@ fn finer_stations(
     stations: &[f64],
     at: OutlinePoint,
     near: &[TrackPoint],
-    detail: Detail,
+    key: ChunkKey,
 ) -> Vec<f64> {
     let mut finer = vec![stations[0]];
+    let across_m = |from: &TrackPoint| (at.l_m - from.l_m).hypot(at.h_m - from.h_m);
     for pair in stations.windows(2) {
         let fits = |from_m: f64, to_m: f64| {
-            near.iter().all(|lamp| {
+            let lit_evenly = near.iter().all(|lamp| {
                 let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-                let across_m = (at.l_m - lamp.l_m).hypot(at.h_m - lamp.h_m);
-                is_fine(to_m - from_m, along_m.hypot(across_m), detail)
-            })
+                is_fine(to_m - from_m, along_m.hypot(across_m(lamp)), key.detail)
+            });
+            lit_evenly && key.is_fine(to_m - from_m, across_m)
         };
         halve(pair[0], pair[1], &fits, &mut finer);
     }
@@ -325,7 +353,7 @@ fn add_outline(
     }
 }
 
-/// Cuts an edge into facets where it passes lamps.
+/// Cuts an edge into facets where it passes lamps, or a camera with a lens that bends it.
 fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint], key: ChunkKey) {
     let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
     let at = |t: f64| OutlinePoint {
@@ -334,12 +362,13 @@ fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint],
     };
     let fits = |from: f64, to: f64| {
         let ends = [at(from), at(to)];
-        near.iter().all(|lamp| {
+        let cell_m = (to - from) * length_m;
+        let lit_evenly = near.iter().all(|lamp| {
             let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
             let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-            let away_m = along_m.hypot(across_m(ends, lamp));
-            is_fine((to - from) * length_m, away_m, key.detail)
-        })
+            is_fine(cell_m, along_m.hypot(across_m(ends, lamp)), key.detail)
+        });
+        lit_evenly && key.is_fine(cell_m, |eye| across_m(ends, eye))
     };
     let mut cuts = vec![0.0];
     halve(0.0, 1.0, &fits, &mut cuts);
@@ -406,7 +435,11 @@ mod tests {
             &scene.tunnel,
             &lamps,
             &paintings,
-            ChunkKey { index, detail },
+            ChunkKey {
+                index,
+                detail,
+                bend: None,
+            },
         )
     }
 
