@@ -50,6 +50,8 @@ struct View {
     airlight_e: f32,
     // Standard deviation of the point spread.
     blur_px: f32,
+    // Lamps that glossy surfaces mirror.
+    mirrored: u32,
     headlights: array<Headlight, MAX_HEADLIGHTS>,
 }
 

@@ -13,7 +13,7 @@ use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Air, Body, Job, LampLight, Renderer, Scene, SensorSettings, Shape, View, sample,
+    Air, Body, Job, LampLight, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -56,6 +56,7 @@ fn dark_scene(lamps: Vec<LampLight>) -> Scene {
         tunnel: tunnel.into(),
         lamps,
         air: Air::default(),
+        wet: gloss::Wet::default(),
     }
 }
 

@@ -8,6 +8,7 @@
 //! | silhouettes, facet edges | one sample a pixel, f32 against f64, coarse rings far away | pixels off by more than 2 grey levels: 1 % |
 //! | paint in floodlight or at ten times the gain | one texel of a mip or rip map against the mean over the pixel's slanted footprint: softer edges | off by more than 2: 20 %, by more than 20: 2 %; and no shift by a pixel fits as well |
 //! | the same, where both sides differ much | no more than silhouettes have pixels | off by more than 20: 0.3 % |
+//! | silhouettes before wet ground | it is as bright as the lamps that it mirrors | off by more than 2: 1.5 % |
 //! | everywhere else | f32, light interpolated over facets | 2 grey levels |
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
 //! | walls beside a lamp | light falls with a power of the distance; cells are cut to a quarter of it | within the same bounds |
@@ -29,6 +30,7 @@ use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::render::cpu::CpuRenderer;
+use metrotwin::twin::render::gloss::Wet;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
     Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
@@ -182,6 +184,8 @@ fn share_off(a: &GrayImage, b: &GrayImage, levels: u8) -> f64 {
 
 /// Shares of pixels that may be off by more than 2 and by more than 20 grey levels.
 const OVER_2: f64 = 0.01;
+/// The same before wet ground.
+const WET_OVER_2: f64 = 0.015;
 /// The same where every bolt shows.
 const PAINT_OVER_2: f64 = 0.2;
 const PAINT_OVER_20: f64 = 0.02;
@@ -208,6 +212,8 @@ fn compare(name: &str, scene: &Scene, job: &Job) {
         println!("{name}: shifted by a pixel {shifted:.2} times as far off");
         assert!(shifted > 1.5, "{name}: fits {shifted} when shifted");
         (PAINT_OVER_2, PAINT_OVER_20)
+    } else if name.starts_with("wet") {
+        (WET_OVER_2, OVER_20)
     } else {
         (OVER_2, OVER_20)
     };
@@ -277,6 +283,25 @@ fn the_wayside_view() {
             let name = format!("way_{s_m}_gain_{gain}");
             compare(&name, &sample::scene(), &lit);
         }
+    }
+}
+
+/// Provokes reflections that are elsewhere, of another size or light, or blink with another row: a wet
+/// bed and rails, by lamps and by headlights that come.
+#[test]
+fn wet_ground_mirrors() {
+    let tunnel = sample::tunnel();
+    let mut scene = sample::scene();
+    scene.wet = Wet {
+        ranges: vec![(0.0..130.0, true)],
+    };
+    for (s_m, exposure_s, gain) in [(100.0, 16e-3, 1.0), (100.0, 1e-3, 15.0), (60.0, 2e-4, 60.0)] {
+        let mut job = wayside_job(&tunnel, s_m, gain);
+        let view = &mut job.views[0];
+        view.camera.shutter.exposure_s = exposure_s;
+        view.camera.intrinsics.cy_px -= 0.25 * f64::from(view.camera.intrinsics.height_px);
+        let name = format!("wet_{s_m}_{:.0}_us", 1e6 * exposure_s);
+        compare(&name, &scene, &job);
     }
 }
 

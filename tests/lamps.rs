@@ -19,7 +19,9 @@ use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::surface::FAINT_E;
-use metrotwin::twin::render::{Air, CameraMotion, Job, LampLight, Renderer, Scene, View, sample};
+use metrotwin::twin::render::{
+    Air, CameraMotion, Job, LampLight, Renderer, Scene, View, gloss, sample,
+};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
@@ -46,6 +48,7 @@ fn draw(make: Make, lamp: &LampLight, view: &View) -> GrayImage {
         tunnel: tunnel.into(),
         lamps: vec![lamp.clone()],
         air: Air::default(),
+        wet: gloss::Wet::default(),
     });
     let job = Job {
         views: vec![view.clone()],

@@ -17,7 +17,7 @@ use metrotwin::twin::random::Stream;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Air, Body, Job, Pattern, RawImage, Renderer, Scene, SensorSettings, Shape, View, sample,
+    Air, Body, Job, Pattern, RawImage, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
     upper_bits,
 };
 use nalgebra::{Point3, Vector3};
@@ -34,6 +34,7 @@ fn nothing() -> Scene {
         tunnel: tunnel.into(),
         lamps: Vec::new(),
         air: Air::default(),
+        wet: gloss::Wet::default(),
     }
 }
 

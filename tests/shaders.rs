@@ -145,6 +145,7 @@ fn structs_agree() {
         extinction_per_m,
         airlight_e,
         blur_px,
+        mirrored,
         headlights
     );
     same_layout!(
@@ -155,7 +156,17 @@ fn structs_agree() {
         axis,
         exponent
     );
-    same_layout!("background", Pose, x, y, z);
+    same_layout!("rows", Pose, x, y, z);
+    same_layout!(
+        "gloss",
+        Mirrored,
+        position_m,
+        intensity_cd,
+        axis,
+        exponent,
+        radius_m,
+        shares
+    );
     same_layout!(
         "lamps",
         Lamp,

@@ -43,8 +43,10 @@ pub use summary::{
 use crate::scenario::Scenario;
 use crate::twin::faults;
 use crate::twin::physics::PhysicsError;
+use crate::twin::physics::RailState;
 use crate::twin::random::Stream;
 use crate::twin::render::cpu::CpuRenderer;
+use crate::twin::render::gloss::Wet;
 use crate::twin::render::gpu::GpuRenderer;
 use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -156,9 +158,18 @@ pub fn scene(scenario: &Scenario) -> Scene {
         })
         .collect();
     faults::age(&mut lamps, &scenario.faults.lamps, &tunnel, scenario.seed);
+    let everywhere = f64::NEG_INFINITY..f64::INFINITY;
+    let zones = scenario.physics.track.rail_zones.iter();
+    let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));
+    let rails = std::iter::once((everywhere, scenario.physics.track.rail)).chain(zones);
     Scene {
         tunnel,
         lamps,
         air: scenario.air.air(),
+        wet: Wet {
+            ranges: rails
+                .map(|(range, rail)| (range, rail == RailState::Wet))
+                .collect(),
+        },
     }
 }

@@ -7,7 +7,9 @@
 //! disc's apparent area, so it falls as cos(a)^(m - 1).
 //!
 //! A surface far from the disc compared with its radius gets E = I cos(a_in) / d^2. A lamp is off
-//! half of the time (Manchester code), far too fast for surfaces to show it; they get the mean.
+//! half of the time (Manchester code), far too fast for
+//! an eye, so its light in the mean over time is what is stored; what a row's exposure sees of the
+//! blinking comes on top ([`LampField::flickering_lx`]).
 //!
 //! # Shadows
 //!
@@ -256,12 +258,29 @@ impl LampField {
 
     /// Those that may reach a place, in the order given.
     pub fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = &Shining> {
+        self.indices_near(p).map(|k| &self.lamps[k])
+    }
+
+    fn indices_near(&self, p: &Point3<f64>) -> impl Iterator<Item = usize> {
         let at = (cell(p.x), cell(p.y));
         let first = self.reach.partition_point(|(c, _)| *c < at);
         self.reach[first..]
             .iter()
             .take_while(move |(c, _)| *c == at)
-            .map(|(_, k)| &self.lamps[*k as usize])
+            .map(|(_, k)| *k as usize)
+    }
+
+    /// What the blinking of lamps adds to their mean illuminance of a surface in an exposure, lux;
+    /// `flicker` is the light of each lamp in it over its mean, less 1.
+    pub fn flickering_lx(&self, p: &Point3<f64>, n: &Vector3<f64>, flicker: &[f64]) -> f64 {
+        self.indices_near(p)
+            .filter(|k| flicker[*k] != 0.0)
+            .map(|k| {
+                let lamp = &self.lamps[k];
+                let clear = self.air.transmission((p - lamp.centre).norm());
+                flicker[k] * clear * lamp.irradiance_lx(p, n)
+            })
+            .sum()
     }
 
     /// Mean illuminance by all lamps of a surface at `p` with unit normal `n`, lux.

@@ -4,6 +4,7 @@
 pub mod cpu;
 pub mod glare;
 mod glass;
+pub mod gloss;
 pub mod gpu;
 mod hull;
 pub mod light;

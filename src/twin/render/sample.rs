@@ -10,7 +10,7 @@
 
 use super::{
     Air, Body, CameraMotion, Job, LampLight, LensSettings, NoiseKey, Scene, SensorSettings, Shape,
-    View,
+    View, gloss,
 };
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use crate::track::uid::{LineCode, Uid};
@@ -86,6 +86,7 @@ pub fn scene() -> Scene {
         tunnel: Arc::new(tunnel),
         lamps,
         air: Air::default(),
+        wet: gloss::Wet::default(),
     }
 }
 

@@ -1,5 +1,6 @@
 //! What there is to see, and through which camera.
 
+use super::gloss::Wet;
 use super::hull::Hull;
 use super::sensor::{LensSettings, SensorSettings};
 use super::surface::SATURATION;
@@ -19,6 +20,8 @@ pub struct Scene {
     pub lamps: Vec<LampLight>,
     /// What there is to see through.
     pub air: Air,
+    /// Where bed and rails mirror.
+    pub wet: Wet,
 }
 
 /// The tunnel's air: clear, or full of mist or dust. What it does to light is told in

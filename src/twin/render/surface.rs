@@ -1,6 +1,8 @@
 //! Constants of the image model that both renderers hold to, and the one place where the shaders
 //! get theirs from: [`wgsl`]. What surfaces look like is painted, see [`paint`](super::paint).
 
+use super::gloss::MIRROR_REACH_M;
+use super::light::HEADLIGHT_RADIUS_M;
 use crate::track::Material;
 use std::fmt::Write;
 
@@ -35,6 +37,12 @@ pub const fn mean_albedo(material: Material) -> f64 {
 pub fn wgsl() -> String {
     let mut text = String::from("// Written by twin/render/surface.rs.\n");
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "const GLARE_STEP_PX: f32 = {GLARE_STEP_PX:?};");
+    for (name, value) in [
+        ("GLARE_STEP_PX", GLARE_STEP_PX),
+        ("MIRROR_REACH_M", MIRROR_REACH_M),
+        ("HEADLIGHT_RADIUS_M", HEADLIGHT_RADIUS_M),
+    ] {
+        let _ = writeln!(text, "const {name}: f32 = {value:?};");
+    }
     text
 }

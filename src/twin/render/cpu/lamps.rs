@@ -64,7 +64,7 @@ impl RowExposure {
     }
 
     /// Mean light of a lamp in a part of the slice.
-    fn light(&self, view: &View, lamp: &Shining, from: f64, to: f64) -> f64 {
+    pub fn light(&self, view: &View, lamp: &Shining, from: f64, to: f64) -> f64 {
         let at = |share: f64| view.start.plus(self.open_s + share * self.span_s).secs();
         lamp.share(at(from), at(to))
     }

@@ -21,8 +21,8 @@
 //! 1. the surface that the pixel's centre ray meets first: tunnel ([`TunnelCaster`]) or body
 //!    ([`Solid`]);
 //! 2. its reflected luminance, albedo * E / pi, the albedo from its [painting](super::paint) over
-//!    the pixel's footprint, E less what bodies shade ([`light`](super::light)), seen through the
-//!    air;
+//!    the pixel's footprint, E less what bodies shade ([`light`](super::light)), by lamps that blink,
+//!    and what it mirrors ([`gloss`](super::gloss)), seen through the air;
 //! 3. lamp discs, by rays spread over the pixel and the lens's point spread in many instants;
 //! 4. the glare of each lamp;
 //! 5. the sensor: fixed pattern, noise, bits ([`sensor`](super::sensor)).
@@ -34,9 +34,10 @@
 //! Rows are independent of each other, so any number of threads gives the same bytes. What a
 //! camera that stands still sees of the tunnel is kept from frame to frame.
 //!
-//! Not here: reflections, and the point spread of anything but lamps. Beyond [`SIGHT_M`]
+//! Not here: the point spread of anything but lamps. Beyond [`SIGHT_M`]
 //! the tunnel is dark.
 
+mod blinking;
 mod dim;
 mod extent;
 pub mod labels;
@@ -57,6 +58,7 @@ pub use sight::{Seen, Sight};
 pub use solid::Solid;
 pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
+use super::gloss::{Facing, Gloss, MIRROR_REACH_M, Source, Wet};
 use super::light::{LampField, Shining, headlights_lx};
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey, PixelMap};
@@ -66,6 +68,7 @@ use super::{
 };
 use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
+use blinking::Blinking;
 use dim::{CELL_PX, DimView};
 use image::GrayImage;
 use lamps::{Haze, RowExposure};
@@ -110,6 +113,7 @@ struct World {
     line: Arc<Tunnel>,
     lamps: LampField,
     air: Air,
+    wet: Wet,
 }
 
 /// The tunnel through one pixel.
@@ -136,6 +140,8 @@ struct Scenery<'a> {
     airlight_cd_m2: f64,
     /// Slab of the first pose.
     slab: usize,
+    /// Indices of the lamps whose blinking may show.
+    lamps: Vec<usize>,
 }
 
 /// What is known about the tunnel behind a view before its rows are drawn.
@@ -168,6 +174,7 @@ struct RowRays<'a> {
     slab: usize,
     /// The job's bodies as they are by now.
     blockers: Vec<Blocker<'a>>,
+    blinking: Blinking,
     /// Patterns are averaged over squares of so many pixels.
     side_px: f64,
 }
@@ -198,6 +205,7 @@ impl CpuRenderer {
                 lamps: LampField::new(&scene.lamps).in_air(scene.air),
                 line: scene.tunnel,
                 air: scene.air,
+                wet: scene.wet,
             },
             lamps: LampsInTime::new(&scene.lamps),
             every_ray,
@@ -314,6 +322,20 @@ impl Renderer for CpuRenderer {
 }
 
 impl World {
+    /// Indices of the lamps whose light a view shows on surfaces.
+    fn lamps_about(&self, view: &View) -> Vec<usize> {
+        let Some(pose) = view.motion.poses.first() else {
+            return Vec::new();
+        };
+        let reach_m = SIGHT_M + MIRROR_REACH_M;
+        let away_m = |lamp: &Shining| (lamp.centre.coords - pose.translation.vector).norm();
+        let lamps = self.lamps.lamps().iter().enumerate();
+        lamps
+            .filter(|(_, lamp)| away_m(lamp) < reach_m)
+            .map(|(k, _)| k)
+            .collect()
+    }
+
     /// Lamps that may be seen, the farthest first so that nearer ones are drawn over them.
     fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<&Shining> {
         let eye = Point3::from(pose.translation.vector);
@@ -355,7 +377,8 @@ impl World {
             };
         };
         let at = self.tunnel.surface_at(eye, ray, &strike);
-        let albedo = look::albedo(&self.paintings, &at, ray, strike.t, pencil.aside);
+        let albedo = look::albedo(&self.paintings, &at, ray, strike.t, pencil.aside)
+            * self.wet.albedo_factor(at.material, at.s_m);
         let lux = self.line.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
             strike: Some(strike),
@@ -400,6 +423,7 @@ impl<'a> Scenery<'a> {
             shades: Shades::new(world, job, view, slab),
             airlight_cd_m2: world.lamps.airlight_cd_m2(&world.line, s_m),
             slab,
+            lamps: world.lamps_about(view),
         }
     }
 }
@@ -421,6 +445,7 @@ impl<'a> RowRays<'a> {
             row,
             slab: world.tunnel.slab_of(&eye, Some(scenery.slab)),
             blockers: scenery.shades.blockers(mid.since(scenery.job.time)),
+            blinking: Blinking::new(world.lamps.lamps(), &scenery.lamps, view, row),
             eye,
             behind,
             side_px: 1.0,
@@ -449,20 +474,50 @@ impl<'a> RowRays<'a> {
         };
         let Scenery { job, shades, .. } = self.scenery;
         let (mut luminance, slab) = (ground.luminance, strike.slab as usize);
-        if !job.headlights.is_empty() || !shades.leave_alone(slab) {
-            let ray = self.ray(u);
-            let at = self.world.tunnel.surface_at(&self.eye, &ray, strike);
+        let lit_by_job = !job.headlights.is_empty() || !shades.leave_alone(slab);
+        let level = self.world.tunnel.is_level(strike);
+        if lit_by_job || level || self.blinking.shows {
+            let at = (self.world.tunnel).surface_at(&self.eye, &self.ray(u), strike);
             let lux = self.by_job_lx(slab, &at.position, &at.normal);
-            luminance += ground.albedo * lux / PI;
+            luminance += ground.albedo * lux / PI + self.mirrored_cd_m2(&at);
         }
         (luminance, strike.t)
     }
 
-    /// What a job's headlights and bodies change in the illuminance of a surface.
+    /// What a job's headlights and bodies change in the illuminance of a surface, and the blinking of
+    /// lamps.
     fn by_job_lx(&self, slab: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-        let Scenery { job, shades, .. } = self.scenery;
-        headlights_lx(&job.headlights, &self.world.air, p, n)
-            - shades.hidden_lx(slab, p, n, &self.blockers, self.world)
+        let (world, Scenery { job, shades, .. }) = (self.world, self.scenery);
+        let blinking_lx = if self.blinking.shows {
+            (world.lamps).flickering_lx(p, n, &self.blinking.flicker)
+        } else {
+            0.0
+        };
+        blinking_lx + headlights_lx(&job.headlights, &world.air, p, n)
+            - shades.hidden_lx(slab, p, n, &self.blockers, world)
+    }
+
+    /// Luminance of what the tunnel's surface mirrors.
+    fn mirrored_cd_m2(&self, at: &SurfacePoint) -> f64 {
+        let (world, air) = (self.world, &self.world.air);
+        let wet = world.wet.at(at.s_m);
+        let Some(gloss) = Gloss::of(at.material, wet, &at.normal) else {
+            return 0.0;
+        };
+        let facing = Facing::new(at.normal, &at.along());
+        let (place, to_eye) = (&at.position, self.eye - at.position);
+        let lamps = self.scenery.lamps.iter().filter_map(|k| {
+            let lamp = &world.lamps.lamps()[*k];
+            let near = (lamp.centre - place).norm_squared() < MIRROR_REACH_M * MIRROR_REACH_M;
+            let share = lamp.duty() * (1.0 + self.blinking.flicker[*k]);
+            near.then(|| Source::lamp(lamp, share, air, place))
+        });
+        let headlights = self.scenery.job.headlights.iter();
+        let headlights = headlights.map(|light| Source::headlight(light, air, place));
+        lamps
+            .chain(headlights)
+            .map(|source| gloss.luminance_cd_m2(&facing, &to_eye, &source))
+            .sum()
     }
 
     /// Depth of what is seen in pixel `u` so far; followed up now where the tunnel was too dark

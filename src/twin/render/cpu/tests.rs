@@ -61,6 +61,7 @@ fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
         tunnel: Arc::new(hall()),
         lamps,
         air: Air::default(),
+        wet: Wet::default(),
     })
 }
 
@@ -178,6 +179,7 @@ fn val_mist_keeps_koschmieders_contrast() {
         tunnel: Arc::new(hall()),
         lamps: Vec::new(),
         air,
+        wet: Wet::default(),
     };
     let mut view = view(Intrinsics::centred(301, 101, 150.0));
     view.motion =

@@ -70,6 +70,13 @@ pub struct SurfacePoint {
     pub(super) gradients: [Vector3<f64>; 2],
 }
 
+impl SurfacePoint {
+    /// Up the line.
+    pub(super) fn along(&self) -> Vector3<f64> {
+        self.gradients[0]
+    }
+}
+
 /// A slab begins this much early, so that rounding opens no crack between two of them.
 const OVERLAP_M: f64 = 0.05;
 
@@ -119,6 +126,15 @@ impl TunnelCaster {
                 .map(|r| Outline::new(&r.section))
                 .collect(),
         }
+    }
+
+    /// Whether the surface at a strike lies level and may mirror: bed, or top of a rail.
+    pub(super) fn is_level(&self, strike: &Strike) -> bool {
+        let outline = self.slabs[strike.slab as usize].outline;
+        outline.is_some_and(|range| {
+            let edge = &self.outlines[range].edges[strike.edge as usize];
+            edge.normal.y > 0.5 && matches!(edge.material, Material::Bed | Material::Rail)
+        })
     }
 
     /// How many slabs there are.

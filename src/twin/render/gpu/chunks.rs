@@ -5,6 +5,7 @@ use super::bend::Bend;
 use super::tunnel::{CHUNK_M, ChunkKey, Detail, Part, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
+use crate::twin::render::gloss::Wet;
 use crate::twin::render::light::LampField;
 use crate::twin::render::paint::Paintings;
 use nalgebra::{Point3, Vector3};
@@ -37,6 +38,10 @@ pub struct Chunk {
     pub parts: Vec<Part>,
     /// Some of its corners.
     pub probes: Vec<Probe>,
+    /// Some of the corners that mirror, in the world.
+    pub glossy: Vec<Point3<f64>>,
+    /// Up the track at its origin.
+    pub along: Vector3<f64>,
     near_in: u64,
 }
 
@@ -50,6 +55,21 @@ pub struct Probe {
 
 /// Every so many corners one is a probe.
 const PROBE_EVERY: usize = 16;
+
+/// The same of those that mirror.
+const GLOSSY_EVERY: usize = 4;
+
+/// What chunks are made of.
+pub struct Line<'a> {
+    /// With its cross-sections.
+    pub tunnel: &'a Tunnel,
+    /// Where it is.
+    pub wet: &'a Wet,
+    /// That light it.
+    pub lamps: &'a LampField,
+    /// On it.
+    pub paintings: &'a Paintings,
+}
 
 /// All chunks in use.
 #[derive(Default)]
@@ -72,12 +92,12 @@ impl Chunks {
     pub fn in_sight(
         &mut self,
         gpu: &Gpu,
-        world: (&Tunnel, &LampField, &Paintings),
+        world: &Line<'_>,
         framed: &Framed<'_>,
         keys: &mut Vec<ChunkKey>,
     ) {
         keys.clear();
-        let (tunnel, ..) = world;
+        let tunnel = world.tunnel;
         let eye = framed.reference();
         let s_m = self.locate(tunnel, &eye);
         let frame = tunnel.alignment.at(s_m);
@@ -159,12 +179,14 @@ fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
         .map_or(from_m, |(_, s_m)| s_m)
 }
 
-fn upload(
-    gpu: &Gpu,
-    (tunnel, lamps, paintings): (&Tunnel, &LampField, &Paintings),
-    key: ChunkKey,
-) -> Option<Chunk> {
-    let made = chunk_mesh(tunnel, lamps, paintings, key);
+fn upload(gpu: &Gpu, line: &Line<'_>, key: ChunkKey) -> Option<Chunk> {
+    let made = chunk_mesh((line.tunnel, line.wet), line.lamps, line.paintings, key);
+    let (sin, cos) = line
+        .tunnel
+        .alignment
+        .at(key.start_m())
+        .heading_rad
+        .sin_cos();
     let mesh = made.mesh;
     let buffer = |contents: &[u8], usage| {
         gpu.device
@@ -197,6 +219,12 @@ fn upload(
                 }
             })
             .collect(),
+        glossy: (mesh.vertices.iter())
+            .filter(|v| v.gloss[0] > 0.0)
+            .step_by(GLOSSY_EVERY)
+            .map(|v| made.origin + Vector3::from(v.position_m).cast())
+            .collect(),
+        along: Vector3::new(cos, sin, 0.0),
         near_in: 0,
     })
 }

@@ -36,6 +36,8 @@ pub struct Vertex {
     pub albedo: f32,
     /// Own luminance.
     pub luminance_cd_m2: f32,
+    /// Reflectance head on, roughness along the track and across; 0 where it is dull.
+    pub gloss: [f32; 3],
 }
 
 /// Where one mesh is drawn.
@@ -54,6 +56,8 @@ pub struct Placement {
     pub shares: u32,
     /// Share of the painting that a metre takes, each way.
     pub paint_per_m: [f32; 2],
+    /// Up the track at the mesh's origin, world axes.
+    pub along: [f32; 3],
 }
 
 /// `camera_from_world` at one time, relative to the view's reference point: rows of the matrix,
@@ -145,6 +149,10 @@ pub struct View {
     pub airlight_e: f32,
     /// Standard deviation of the point spread.
     pub blur_px: f32,
+    /// Lamps that glossy surfaces mirror.
+    pub mirrored: u32,
+    /// Fills the stride.
+    pub unused: [u32; 3],
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }
@@ -223,6 +231,26 @@ pub struct GlareRow {
     pub wide_e: f32,
     /// Square of that width.
     pub wide_px2: f32,
+}
+
+/// A lamp that glossy surfaces mirror.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct Mirrored {
+    /// From the view's reference point, world axes.
+    pub position_m: [f32; 3],
+    /// Mean intensity along the axis.
+    pub intensity_cd: f32,
+    /// Unit vector, world axes.
+    pub axis: [f32; 3],
+    /// Exponent of the pattern.
+    pub exponent: f32,
+    /// Radius of its disc.
+    pub radius_m: f32,
+    /// Where its rows begin in the table of light shares.
+    pub shares: u32,
+    /// Fills the stride.
+    pub unused: [u32; 2],
 }
 
 /// What a corner of a tile sees.

@@ -20,7 +20,8 @@
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
 //!    that of headlights is added there. Where all is too dark for paint and blinking to show, a
 //!    cheaper pipeline draws. What moves by pixels within the exposure is drawn at several instants.
-//! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture.
+//! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture. Then rail
+//!    heads and a wet bed are drawn once more, for what they mirror ([`gloss`](super::gloss)).
 //! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
 //!    closed form along the row and is summed over a few lines across it, at each of the instants
 //!    of the row's exposure; where the disc is and how bright in each comes from double precision.
@@ -31,7 +32,7 @@
 //!
 //! # What it does not do
 //!
-//! Reflections in wet or polished surfaces, and the end walls where two cross-sections meet (dark).
+//! The end walls where two cross-sections meet (dark).
 //! Between vertices positions run straight, so edges close to a fast camera are bent by the shutter
 //! only facet by facet (0.5 m), and by the lens cell by cell (0.25 px, `bend.rs`); lamps are exact. Stains end 60 m away, the tunnel 160 m ahead of the
 //! camera; glare of a lamp under a quarter of the usual read noise is not drawn.
@@ -63,7 +64,7 @@ use super::scene::{Job, LampsInTime, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::SimTime;
 use adapter::Gpu;
-use chunks::Chunks;
+use chunks::{Chunks, Line};
 use glare::GlareTarget;
 use image::GrayImage;
 use lamps::{Around, LampTable};
@@ -189,13 +190,14 @@ impl GpuRenderer {
                 bodies: &self.bodies,
                 textures: &self.textures,
             };
-            let background = [0, job.headlights.len()]
+            let backgrounds = [0, job.headlights.len()]
                 .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
-            let background = (&self.pipelines, &background);
-            let sight = &self.scratch.sight;
+            let (pipelines, sight) = (&self.pipelines, &self.scratch.sight);
+            let background = (pipelines, &backgrounds);
             buffers.draw_background(gpu, background, encoder, target, sight, &stock);
-            let pipelines = &self.pipelines;
             buffers.draw_shadows(gpu, pipelines, encoder, target);
+            let gloss = &backgrounds[1].gloss;
+            buffers.draw_gloss(gpu, gloss, encoder, target, (sight, &stock));
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_glare(gpu, pipelines, encoder, glare);
             let map = MapKey::new(framed.view);
@@ -217,8 +219,13 @@ impl GpuRenderer {
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
         let (gpu, tunnel, scratch) = (&self.gpu, &self.scene.tunnel, &mut self.scratch);
         let keys = scratch.sight.keys();
-        let line = (&**tunnel, &self.field, &self.paintings);
-        self.chunks.in_sight(gpu, line, framed, keys);
+        let line = Line {
+            tunnel,
+            wet: &self.scene.wet,
+            lamps: &self.field,
+            paintings: &self.paintings,
+        };
+        self.chunks.in_sight(gpu, &line, framed, keys);
         let world = World {
             lamps: self.field.lamps(),
             air: &self.scene.air,
@@ -241,7 +248,8 @@ impl GpuRenderer {
         };
         scratch.lamps.fill(framed, self.field.lamps(), &around);
         let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
-        let constants = framed.constants(job, air, &mut scratch.poses);
+        let mut constants = framed.constants(job, air, &mut scratch.poses);
+        constants.mirrored = scratch.sight.mirrored.len() as u32;
         while self.views.len() <= k {
             self.views.push(ViewBuffers::new(gpu));
         }

@@ -4,10 +4,10 @@ use super::adapter::Gpu;
 use super::chunks::Chunks;
 use super::glare::GlareTarget;
 use super::lamps::LampTable;
-use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Pose, View};
+use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Mirrored, Pose, View};
 use super::pipeline::{Background, Pipelines, bind};
 use super::shadows::{ShadowBuffers, Shadows};
-use super::sight::Sight;
+use super::sight::{Draw, Sight};
 use super::target::Target;
 use super::textures::Textures;
 use std::mem::size_of;
@@ -87,6 +87,7 @@ pub struct ViewBuffers {
     poses: Upload,
     shares: Upload,
     placements: Upload,
+    mirrored: Upload,
     lamps: Upload,
     rows: Upload,
     instants: Upload,
@@ -130,6 +131,20 @@ pub struct Stock<'a> {
     pub textures: &'a Textures,
 }
 
+impl Stock<'_> {
+    /// Chooses what a draw's triangles are made of, if it is there.
+    fn set_buffers(&self, pass: &mut wgpu::RenderPass<'_>, draw: &Draw) -> bool {
+        let (vertices, indices) = match draw.chunk.map(|key| self.chunks.get(key)) {
+            Some(None) => return false,
+            Some(Some(chunk)) => (&chunk.vertices, &chunk.indices),
+            None => (&self.bodies.vertices.buffer, &self.bodies.indices.buffer),
+        };
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+        true
+    }
+}
+
 impl ViewBuffers {
     /// Empty.
     pub fn new(gpu: &Gpu) -> Self {
@@ -139,6 +154,7 @@ impl ViewBuffers {
             poses: Upload::new(gpu, storage, 2 * size_of::<Pose>()),
             shares: Upload::new(gpu, storage, 1 << 12),
             placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 10),
+            mirrored: Upload::new(gpu, storage, size_of::<Mirrored>()),
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
             rows: Upload::new(gpu, storage, size_of::<LampRow>()),
             instants: Upload::new(gpu, storage, size_of::<Instant>()),
@@ -156,6 +172,7 @@ impl ViewBuffers {
         self.poses.write(gpu, data.poses);
         self.shares.write(gpu, &data.sight.shares);
         self.placements.write(gpu, &data.sight.placements);
+        self.mirrored.write(gpu, &data.sight.mirrored);
         let table = data.lamps;
         self.lamps.write(gpu, &table.lamps);
         self.rows.write(gpu, &table.rows);
@@ -252,13 +269,7 @@ impl ViewBuffers {
             pass.set_bind_group(0, &blend, &[]);
             pass.set_scissor_rect(x, y, width, height);
             // A running mean: rounding to half precision does not add up.
-            let share = 1.0 / f64::from(k + 1);
-            pass.set_blend_constant(wgpu::Color {
-                r: share,
-                g: share,
-                b: share,
-                a: share,
-            });
+            pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
             pass.draw(0..6, 0..1);
         }
     }
@@ -273,13 +284,9 @@ impl ViewBuffers {
     ) {
         pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
         for draw in &sight.draws {
-            let (vertices, indices) = match draw.chunk.map(|key| stock.chunks.get(key)) {
-                Some(None) => continue,
-                Some(Some(chunk)) => (&chunk.vertices, &chunk.indices),
-                None => (&stock.bodies.vertices.buffer, &stock.bodies.indices.buffer),
-            };
-            pass.set_vertex_buffer(0, vertices.slice(..));
-            pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+            if !stock.set_buffers(pass, draw) {
+                continue;
+            }
             let at = instant * sight.meshes + draw.mesh;
             let brushes = &brushes[usize::from(draw.headlit)];
             if !draw.lit.is_empty() {
@@ -291,6 +298,43 @@ impl ViewBuffers {
                 pass.set_pipeline(brushes.dim);
                 pass.set_bind_group(0, &brushes.constants, &[]);
                 pass.draw_indexed(draw.dim.clone(), 0, at..at + 1);
+            }
+        }
+    }
+
+    /// What rail heads and a wet bed mirror, at every instant of the exposure.
+    pub fn draw_gloss(
+        &self,
+        gpu: &Gpu,
+        pipeline: &wgpu::RenderPipeline,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        (sight, stock): (&Sight, &Stock<'_>),
+    ) {
+        let mut glossy = (sight.draws.iter())
+            .filter(|draw| !draw.glossy.is_empty())
+            .peekable();
+        if glossy.peek().is_none() {
+            return;
+        }
+        let resources = [
+            self.view.binding(),
+            self.poses.binding(),
+            self.shares.binding(),
+            self.mirrored.binding(),
+        ];
+        let group = bind(&gpu.device, pipeline, &resources);
+        let mut pass = resume(encoder, &target.signal, &target.depth);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_blend_constant(grey(1.0 / f64::from(sight.instants)));
+        pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
+        for draw in glossy {
+            if stock.set_buffers(&mut pass, draw) {
+                for instant in 0..sight.instants {
+                    let at = instant * sight.meshes + draw.mesh;
+                    pass.draw_indexed(draw.glossy.clone(), 0, at..at + 1);
+                }
             }
         }
     }
@@ -371,12 +415,41 @@ impl ViewBuffers {
     }
 }
 
-/// A pass over one colour target.
+fn grey(share: f64) -> wgpu::Color {
+    wgpu::Color {
+        r: share,
+        g: share,
+        b: share,
+        a: share,
+    }
+}
+
+/// A pass over one colour target, whose depths are cleared.
 pub fn begin<'a>(
     encoder: &'a mut wgpu::CommandEncoder,
     colour: &wgpu::TextureView,
     load: wgpu::LoadOp<wgpu::Color>,
     depth: Option<&wgpu::TextureView>,
+) -> wgpu::RenderPass<'a> {
+    let depth = depth.map(|view| (view, wgpu::LoadOp::Clear(0.0)));
+    pass(encoder, colour, load, depth)
+}
+
+/// A pass that adds to what is there.
+fn resume<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    colour: &wgpu::TextureView,
+    depth: &wgpu::TextureView,
+) -> wgpu::RenderPass<'a> {
+    let load = wgpu::LoadOp::Load;
+    pass(encoder, colour, wgpu::LoadOp::Load, Some((depth, load)))
+}
+
+fn pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    colour: &wgpu::TextureView,
+    load: wgpu::LoadOp<wgpu::Color>,
+    depth: Option<(&wgpu::TextureView, wgpu::LoadOp<f32>)>,
 ) -> wgpu::RenderPass<'a> {
     encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
         color_attachments: &[Some(wgpu::RenderPassColorAttachment {
@@ -388,13 +461,15 @@ pub fn begin<'a>(
                 store: wgpu::StoreOp::Store,
             },
         })],
-        depth_stencil_attachment: depth.map(|view| wgpu::RenderPassDepthStencilAttachment {
-            view,
-            depth_ops: Some(wgpu::Operations {
-                load: wgpu::LoadOp::Clear(0.0),
-                store: wgpu::StoreOp::Store,
-            }),
-            stencil_ops: None,
+        depth_stencil_attachment: depth.map(|(view, load)| {
+            wgpu::RenderPassDepthStencilAttachment {
+                view,
+                depth_ops: Some(wgpu::Operations {
+                    load,
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }
         }),
         ..Default::default()
     })

@@ -16,12 +16,14 @@ pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 7] = [
+const FILES: [(&str, &str); 9] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
+    ("rows", include_str!("../../../../shaders/rows.wgsl")),
     (
         "background",
         include_str!("../../../../shaders/background.wgsl"),
     ),
+    ("gloss", include_str!("../../../../shaders/gloss.wgsl")),
     ("blend", include_str!("../../../../shaders/blend.wgsl")),
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
     ("glare", include_str!("../../../../shaders/glare.wgsl")),
@@ -29,15 +31,24 @@ const FILES: [(&str, &str); 7] = [
     ("shadows", include_str!("../../../../shaders/shadows.wgsl")),
 ];
 
-/// The complete source of `shaders/<name>.wgsl`: constants, what is common, and the file.
+/// The complete source of `shaders/<name>.wgsl`: constants, what it shares with others, and the file.
 pub fn shader_source(name: &str) -> Option<String> {
-    let (_, text) = FILES.iter().find(|(n, _)| *n == name)?;
-    let mut source = surface::wgsl();
-    source.push_str(&pixel_map::wgsl());
-    if name != FILES[0].0 {
-        source.push_str(FILES[0].1);
+    let text = |name: &str| {
+        FILES
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map(|(_, text)| *text)
+    };
+    let before: &[&str] = match name {
+        "common" => &[],
+        "background" | "gloss" => &["common", "rows"],
+        _ => &["common"],
+    };
+    let mut source = surface::wgsl() + &pixel_map::wgsl();
+    for shared in before {
+        source.push_str(text(shared)?);
     }
-    source.push_str(text);
+    source.push_str(text(name)?);
     Some(source)
 }
 
@@ -50,6 +61,8 @@ pub struct Background {
     pub lit: wgpu::RenderPipeline,
     /// Where it is too dark for either.
     pub dim: wgpu::RenderPipeline,
+    /// What glossy surfaces mirror, times the blend constant and added.
+    pub gloss: wgpu::RenderPipeline,
 }
 
 /// One pipeline a pass.
@@ -57,6 +70,7 @@ pub struct Pipelines {
     /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
     backgrounds: Vec<Option<Background>>,
     background: wgpu::ShaderModule,
+    gloss: wgpu::ShaderModule,
     /// Mixes a share of one picture into another.
     pub blend: wgpu::RenderPipeline,
     /// Shadows of capsules, and of any bodies, over the background.
@@ -114,6 +128,7 @@ impl Pipelines {
         Self {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
+            gloss: shader("gloss"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
             shadows: [false, true].map(|others| {
                 let stage = Stage {
@@ -137,12 +152,19 @@ impl Pipelines {
     pub fn background(&mut self, device: &wgpu::Device, headlights: usize) -> &Background {
         let headlights = headlights.min(MAX_HEADLIGHTS);
         self.backgrounds[headlights].get_or_insert_with(|| {
-            let make =
-                |kind, banded| background(device, &self.background, kind, headlights, banded);
+            let make = |kind, banded| {
+                let constants = [
+                    ("HEADLIGHTS", headlights as f64),
+                    ("BANDED", f64::from(u8::from(banded))),
+                ];
+                surface(device, &self.background, kind, &constants, false)
+            };
+            let headlights = [("HEADLIGHTS", headlights as f64)];
             Background {
                 banded: make("lit", true),
                 lit: make("lit", false),
                 dim: make("dim", false),
+                gloss: surface(device, &self.gloss, "gloss", &headlights, true),
             }
         })
     }
@@ -170,12 +192,13 @@ impl Pipelines {
     }
 }
 
-fn background(
+/// Draws surfaces into the depth buffer, or adds to those that are there.
+fn surface(
     device: &wgpu::Device,
     shader: &wgpu::ShaderModule,
     kind: &str,
-    headlights: usize,
-    banded: bool,
+    constants: &[(&str, f64)],
+    adds: bool,
 ) -> wgpu::RenderPipeline {
     let entries = [format!("project_{kind}"), format!("shade_{kind}")];
     let layout = |stride, step_mode, attributes| {
@@ -198,16 +221,18 @@ fn background(
         ],
         depth: Some(wgpu::DepthStencilState {
             format: DEPTH,
-            depth_write_enabled: Some(true),
+            depth_write_enabled: Some(!adds),
             depth_compare: Some(wgpu::CompareFunction::Greater),
             stencil: wgpu::StencilState::default(),
-            bias: wgpu::DepthBiasState::default(),
+            // The same surface again must not be behind itself by a rounding.
+            bias: wgpu::DepthBiasState {
+                constant: if adds { 16 } else { 0 },
+                slope_scale: if adds { 0.01 } else { 0.0 },
+                clamp: 0.0,
+            },
         }),
-        target: target(SIGNAL, None),
-        constants: &[
-            ("HEADLIGHTS", headlights as f64),
-            ("BANDED", f64::from(u8::from(banded))),
-        ],
+        target: target(SIGNAL, adds.then_some(ADD)),
+        constants,
     };
     pipeline(device, stage)
 }
@@ -222,6 +247,19 @@ const SHARE: wgpu::BlendState = {
     wgpu::BlendState {
         color: mix,
         alpha: mix,
+    }
+};
+
+/// Adds the source times the blend constant.
+const ADD: wgpu::BlendState = {
+    let add = wgpu::BlendComponent {
+        src_factor: wgpu::BlendFactor::Constant,
+        dst_factor: wgpu::BlendFactor::One,
+        operation: wgpu::BlendOperation::Add,
+    };
+    wgpu::BlendState {
+        color: add,
+        alpha: add,
     }
 };
 
@@ -271,7 +309,7 @@ const fn attribute(
     }
 }
 
-const VERTEX: [wgpu::VertexAttribute; 7] = {
+const VERTEX: [wgpu::VertexAttribute; 8] = {
     use wgpu::VertexFormat::{Float32, Float32x2, Float32x3};
     [
         attribute(Float32x3, offset_of!(Vertex, position_m), 0),
@@ -281,10 +319,11 @@ const VERTEX: [wgpu::VertexAttribute; 7] = {
         attribute(Float32x2, offset_of!(Vertex, paint), 4),
         attribute(Float32, offset_of!(Vertex, albedo), 5),
         attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 6),
+        attribute(Float32x3, offset_of!(Vertex, gloss), 13),
     ]
 };
 
-const PLACEMENT: [wgpu::VertexAttribute; 6] = {
+const PLACEMENT: [wgpu::VertexAttribute; 7] = {
     use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32};
     [
         attribute(Float32x3, offset_of!(Placement, offset_m), 7),
@@ -293,6 +332,7 @@ const PLACEMENT: [wgpu::VertexAttribute; 6] = {
         attribute(Float32, offset_of!(Placement, late_s), 10),
         attribute(Uint32, offset_of!(Placement, shares), 11),
         attribute(Float32x2, offset_of!(Placement, paint_per_m), 12),
+        attribute(Float32x3, offset_of!(Placement, along), 14),
     ]
 };
 

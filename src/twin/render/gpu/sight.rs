@@ -2,7 +2,7 @@
 //! under which lamps' blinking.
 
 use super::chunks::{Chunk, Chunks};
-use super::layout::Placement;
+use super::layout::{Mirrored, Placement};
 use super::passes::BodyBuffers;
 use super::smear::{Rectangle, Smear};
 use super::textures;
@@ -22,6 +22,8 @@ const DIM_GREY: f64 = 0.4;
 const FLOODLIT_GREY: f64 = 1.0;
 /// Grey levels by headlights below which they are left out.
 const UNLIT_GREY: f64 = 0.1;
+/// Lamps farther than this from a camera are not mirrored in what it sees.
+const MIRRORED_M: f64 = 100.0;
 /// Light that changes by less than this from row to row shows no bands.
 const BAND: f32 = 0.004;
 
@@ -49,6 +51,8 @@ pub struct Draw {
     pub lit: Range<u32>,
     /// Indices of those that are too dark for that.
     pub dim: Range<u32>,
+    /// Indices of those that mirror.
+    pub glossy: Range<u32>,
 }
 
 /// All that a view draws of tunnel and bodies, and the buffers to find it in.
@@ -69,6 +73,8 @@ pub struct Sight {
     pub shares: Vec<f32>,
     /// Whether any of it differs from 1 so that one can see it.
     pub banded: bool,
+    /// Lamps that glossy surfaces mirror.
+    pub mirrored: Vec<Mirrored>,
     lamps: Vec<usize>,
 }
 
@@ -109,6 +115,7 @@ impl Sight {
                 headlit: !job.headlights.is_empty(),
                 lit: range.clone(),
                 dim: 0..0,
+                glossy: 0..0,
             });
             let place = Point3::from(body.world_from_body.translation.vector);
             self.placements.push(Placement {
@@ -117,6 +124,7 @@ impl Sight {
                 ..Placement::default()
             });
         }
+        self.mirror(framed, world.lamps);
         self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
         self.repeat(framed, job, chunks);
     }
@@ -137,6 +145,7 @@ impl Sight {
             .fold(0.0, f64::max);
         let headlit_grey = headlit_cd_m2 * DIM_GREY / dim_cd_m2;
         let floodlit = headlit_grey > FLOODLIT_GREY;
+        let mirrors = chunk.glossy.iter().any(|place| framed.shows(place));
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {
@@ -154,6 +163,7 @@ impl Sight {
                 headlit: headlit_grey > UNLIT_GREY,
                 lit: part.indices.start..border,
                 dim: border..part.indices.end,
+                glossy: if mirrors { part.glossy.clone() } else { 0..0 },
             });
             let shares = match chunk.lamp.filter(|_| bright > 0) {
                 Some(lamp) => self.shares_of(framed, world.lamps, lamp),
@@ -164,7 +174,33 @@ impl Sight {
                 period_share: (period - period.floor()) as f32,
                 shares,
                 paint_per_m: textures::per_m(&world.paintings.all[painting]),
+                along: single(&chunk.along),
                 ..Placement::default()
+            });
+        }
+    }
+
+    /// Lists the lamps that what mirrors may show, where anything does.
+    fn mirror(&mut self, framed: &Framed<'_>, lamps: &[Shining]) {
+        self.mirrored.clear();
+        if self.draws.iter().all(|draw| draw.glossy.is_empty()) {
+            return;
+        }
+        let reference = framed.reference();
+        for (k, lamp) in lamps.iter().enumerate() {
+            let away = lamp.centre - reference;
+            if away.norm() > MIRRORED_M || lamp.duty() <= 0.0 {
+                continue;
+            }
+            let shares = self.shares_of(framed, lamps, k);
+            self.mirrored.push(Mirrored {
+                position_m: single(&away),
+                intensity_cd: (lamp.duty() * lamp.axial_intensity_cd()) as f32,
+                axis: single(&lamp.facing),
+                exponent: lamp.exponent as f32,
+                radius_m: lamp.radius_m as f32,
+                shares,
+                ..Mirrored::default()
             });
         }
     }

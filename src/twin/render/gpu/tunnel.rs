@@ -4,8 +4,10 @@ use super::bend::Bend;
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{
-    CrossSection, Edge, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel, rail_outline,
+    CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel,
+    rail_outline,
 };
+use crate::twin::render::gloss::{Gloss, Wet};
 use crate::twin::render::light::{LampField, Shining};
 use crate::twin::render::paint::{Painting, Paintings};
 use crate::twin::render::surface;
@@ -129,18 +131,21 @@ pub struct Part {
     pub indices: Range<u32>,
     /// Of each triangle, the most luminance that any of it may have, cd/m^2; falling.
     pub peaks: Vec<f32>,
+    /// Indices of the triangles among them that mirror, once more.
+    pub glossy: Range<u32>,
 }
 
 /// A strip along the line between two corners of an outline.
 struct Facet {
     ends: [OutlinePoint; 2],
     q_m: [f64; 2],
-    albedo: f64,
+    material: Material,
 }
 
 /// What all strips of a chunk share.
 struct Site<'a> {
     tunnel: &'a Tunnel,
+    wet: &'a Wet,
     field: &'a LampField,
     lamp: Option<&'a Shining>,
     near: Vec<TrackPoint>,
@@ -150,7 +155,7 @@ struct Site<'a> {
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
 pub fn chunk_mesh(
-    tunnel: &Tunnel,
+    (tunnel, wet): (&Tunnel, &Wet),
     field: &LampField,
     paintings: &Paintings,
     key: ChunkKey,
@@ -161,6 +166,7 @@ pub fn chunk_mesh(
     let lamp = strongest(field, &middle);
     let site = Site {
         tunnel,
+        wet,
         field,
         lamp: lamp.map(|k| &field.lamps()[k]),
         near: (field.near(&middle))
@@ -212,14 +218,20 @@ fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
         peaks.into_iter().fold(0.0, f32::max)
     };
     let (triangles, _) = mesh.indices[first..].as_chunks::<3>();
+    let mirrors = |k: u32| mesh.vertices[k as usize].gloss[0] > 0.0;
+    let glossy = triangles.iter().filter(|t| t.iter().all(|k| mirrors(*k)));
+    let glossy: Vec<u32> = glossy.flatten().copied().collect();
     let mut sorted: Vec<_> = triangles.iter().map(|t| (peak(t), *t)).collect();
     sorted.sort_by(|a, b| f32::total_cmp(&b.0, &a.0));
     mesh.indices.truncate(first);
     mesh.indices.extend(sorted.iter().flat_map(|(_, t)| *t));
+    let border = mesh.indices.len() as u32;
+    mesh.indices.extend(glossy);
     Part {
         section,
-        indices: first as u32..mesh.indices.len() as u32,
+        indices: first as u32..border,
         peaks: sorted.iter().map(|(peak, _)| *peak).collect(),
+        glossy: border..mesh.indices.len() as u32,
     }
 }
 
@@ -258,15 +270,23 @@ impl Site<'_> {
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
         let all = self.field.irradiance_lx(&p, &normal) + self.tunnel.ambient_lx;
+        // What begins or ends with the chunk does so for all of it.
+        let inside_m = s_m - self.key.start_m();
+        let within_m = self.key.start_m() + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
+        let gloss = Gloss::of(facet.material, self.wet.at(within_m), &normal);
+        let paint = self.wet.albedo_factor(facet.material, within_m);
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
-            paint: 1.0,
+            paint: paint as f32,
             bare: 0.0,
-            albedo: facet.albedo as f32,
+            albedo: (paint * surface::mean_albedo(facet.material)) as f32,
             luminance_cd_m2: 0.0,
+            gloss: gloss.map_or([0.0; 3], |g| {
+                [g.head_on, g.along, g.across].map(|x| x as f32)
+            }),
         }
     }
 }
@@ -376,7 +396,7 @@ fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint],
         facets.push(Facet {
             ends: [at(pair[0]), at(pair[1])],
             q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
-            albedo: surface::mean_albedo(material),
+            material,
         });
     }
 }
@@ -432,7 +452,7 @@ mod tests {
             of_range: Vec::new(),
         };
         chunk_mesh(
-            &scene.tunnel,
+            (&scene.tunnel, &scene.wet),
             &lamps,
             &paintings,
             ChunkKey {

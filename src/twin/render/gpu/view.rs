@@ -9,6 +9,8 @@ use nalgebra::{Isometry3, Point3, Vector3};
 /// Poses in the table lie this close in time, far closer than any motion of a train bends.
 const POSE_STEP_S: f64 = 50e-6;
 const MAX_POSES: f64 = 1024.0;
+/// A place counts as in the picture up to this share of its size beside it.
+const BESIDE: f64 = 0.1;
 
 /// A view with its reference point.
 pub struct Framed<'a> {
@@ -144,6 +146,17 @@ impl<'a> Framed<'a> {
             && planes
                 .iter()
                 .all(|n| n.dot(&c.coords) > -radius_m * n.norm())
+    }
+
+    /// Whether a place is in the picture in mid-frame, or so near to it that it may be in another row's.
+    pub fn shows(&self, place: &Point3<f64>) -> bool {
+        let lens = &self.view.camera.intrinsics;
+        let size = [lens.width_px, lens.height_px].map(f64::from);
+        let seen = self.middle.inverse_transform_point(place);
+        let pixel = (seen.z > 0.1).then(|| lens.project(&seen)).flatten();
+        pixel.is_some_and(|p| {
+            (0..2).all(|k| (-BESIDE * size[k]..(1.0 + BESIDE) * size[k]).contains(&p[k]))
+        })
     }
 
     /// How far the camera gets in half a frame.
