@@ -198,8 +198,7 @@ impl Optics {
             return;
         }
         self.check_reach(at, problems);
-        let span_us = 1e6 * self.camera().shutter.frame_span_s(self.height_px);
-        let frame_us = 1e6 / self.frames_per_s;
+        let (span_us, frame_us) = (self.span_us(), 1e6 / self.frames_per_s);
         if span_us > frame_us {
             problems.push(Problem::new(
                 format!("{at}.line_time_us"),
@@ -211,6 +210,51 @@ impl Optics {
                 "give a smaller error",
             ));
         }
+    }
+
+    /// These, with the longest exposure that a control may choose.
+    pub fn exposed_longest(&self, control: &ExposureSettings) -> Self {
+        Self {
+            exposure_us: control.longest_us(self.exposure_us),
+            ..*self
+        }
+    }
+
+    /// A control may lengthen the exposure, its settings being under the key `at`: what holds for
+    /// the written one holds for the longest.
+    pub fn check_control(&self, control: &ExposureSettings, at: &str, problems: &mut Vec<Problem>) {
+        control.check(at, self.exposure_us, problems);
+        let longest = self.exposed_longest(control);
+        let (span_us, frame_us) = (longest.span_us(), 1e6 / self.frames_per_s);
+        // Of a written one that is too long, the camera's own check tells.
+        if self.span_us() <= frame_us && span_us > frame_us {
+            problems.push(Problem::new(
+                format!("{at}.max_exposure_us"),
+                format!(
+                    "exposed for {} us, {} rows of {} us take {span_us:.0} us, but a frame lasts \
+                     {frame_us:.0} us at {} {}",
+                    longest.exposure_us,
+                    self.height_px,
+                    self.line_time_us,
+                    self.frames_per_s,
+                    self.rate_key
+                ),
+                format!(
+                    "give at most {:.0} us, or lower height_px, line_time_us or {}",
+                    (frame_us - span_us + longest.exposure_us).floor(),
+                    self.rate_key
+                ),
+            ));
+        }
+    }
+
+    /// From the opening of the first row to the closing of the last.
+    pub fn span_s(&self) -> f64 {
+        self.camera().shutter.frame_span_s(self.height_px)
+    }
+
+    fn span_us(&self) -> f64 {
+        1e6 * self.span_s()
     }
 
     /// The last row must close before the next frame's first one opens.
@@ -233,7 +277,7 @@ impl Optics {
             ));
             return;
         }
-        let span_us = self.camera().shutter.frame_span_s(self.height_px) * 1e6;
+        let span_us = self.span_us();
         if span_us > frame_us {
             let fits = ((frame_us - self.exposure_us) / self.line_time_us).floor() + 1.0;
             problems.push(Problem::new(
@@ -413,9 +457,8 @@ impl WaysideCameraSettings {
         check_jitter(at, self.frame_jitter_us, self.frames_per_s, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         self.lens.check(&format!("{at}.lens"), problems);
-        let frame_us = 1e6 / self.frames_per_s;
         let control = format!("{at}.exposure_control");
-        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
+        (self.optics()).check_control(&self.exposure_control, &control, problems);
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let mut check = Checker::new(&at, problems);
@@ -434,8 +477,16 @@ impl WaysideCameraSettings {
         within("chainage_m", error.chainage_m, "m", 1.0);
         within("lateral_m", error.lateral_m, "m", 0.5);
         within("height_m", error.height_m, "m", 0.5);
+        let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
+        let actual = longest(self.actual_camera().optics());
+        actual.check_actual(&longest(self.optics()), &at, problems);
+    }
+
+    /// From the start of a frame to the closing of its last row, with the longest exposure that it
+    /// may have.
+    pub fn longest_span_s(&self) -> f64 {
         let actual = self.actual_camera().optics();
-        actual.check_actual(&self.optics(), &at, problems);
+        actual.exposed_longest(&self.exposure_control).span_s()
     }
 
     fn optics(&self) -> Optics {
@@ -580,6 +631,11 @@ mod tests {
                  calibration_error = { line_time_us = 1.0 }",
                 "calibration_error.line_time_us",
                 "the line time is really 81 us, in which 1080 rows take 100399 us",
+            ),
+            (
+                "exposure_control = { mode = 'auto', max_exposure_us = 90000.0 }",
+                "exposure_control.max_exposure_us",
+                "exposed for 90000 us, 1080 rows of 14.8 us take 105969 us",
             ),
             (
                 "frame_jitter_us = 2e4",

@@ -205,10 +205,16 @@ impl RigSettings {
         1e-6 * self.trigger_offset_us
     }
 
+    /// From the start of an eye's frame to the closing of its last row, with the longest exposure
+    /// that it may have.
+    pub fn longest_span_s(&self) -> f64 {
+        let longest = self.optics().exposed_longest(&self.exposure_control);
+        longest.span_s()
+    }
+
     /// From the start that a pair says to the closing of its last row, at the latest.
     pub fn pair_span_s(&self) -> f64 {
-        let camera = self.optics().camera();
-        camera.shutter.frame_span_s(self.height_px)
+        self.longest_span_s()
             + self.trigger_offset_s().max(0.0)
             + most_jitter_s(self.frame_jitter_us)
     }
@@ -264,9 +270,8 @@ impl RigSettings {
         self.right
             .check(&format!("{at}.right"), &self.optics(), problems);
         self.lens.check(&format!("{at}.lens"), problems);
-        let frame_us = 1e6 / self.pairs_per_s;
         let control = format!("{at}.exposure_control");
-        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
+        (self.optics()).check_control(&self.exposure_control, &control, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
@@ -303,9 +308,9 @@ impl RigSettings {
         within("vergence_deg", error.vergence_deg, "deg", 5.0);
         within("right_pitch_deg", error.right_pitch_deg, "deg", 5.0);
         within("right_roll_deg", error.right_roll_deg, "deg", 5.0);
-        let actual = self.as_built();
-        let left = actual.optics();
-        left.check_actual(&self.optics(), at, problems);
+        let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
+        let actual = longest(self.as_built().optics());
+        actual.check_actual(&longest(self.optics()), at, problems);
     }
 
     fn right_optics(&self) -> Optics {
@@ -655,6 +660,22 @@ mod tests {
                 "it turns back",
             ),
             (
+                "exposure_control = { mode = 'auto', max_exposure_us = 20000.0 }",
+                "exposure_control.max_exposure_us",
+                "exposed for 20000 us, 720 rows of 22.2 us take 35962 us, but a frame lasts 33333 us",
+            ),
+            (
+                "exposure_control = { mode = 'auto', max_exposure_us = 17300.0 }\n\
+                 calibration_error = { line_time_us = 0.3 }",
+                "calibration_error.line_time_us",
+                "the line time is really 22.5 us, in which 720 rows take 33477 us",
+            ),
+            (
+                "exposure_us = 5.0\nexposure_control = { mode = 'auto' }",
+                "exposure_control.min_exposure_us",
+                "10 us is more than the most, 5 us",
+            ),
+            (
                 "height_px = 1490\ncalibration_error = { line_time_us = 1.0 }",
                 "calibration_error.line_time_us",
                 "the line time is really 23.2 us, in which 1490 rows take 34575 us",
@@ -669,6 +690,8 @@ mod tests {
         for fine in [
             "",
             "line_time_us = 0.0",
+            "exposure_us = 5.0\nexposure_control = { max_exposure_us = 20000.0 }",
+            "exposure_control = { mode = 'auto', max_exposure_us = 17300.0 }",
             "read_out = \"up\"\ntrigger_offset_us = -500.0\nframe_jitter_us = 20.0",
             "focal_length_mm = 2.93\ndistortion = { k1 = -0.283, k2 = 0.074, p1 = 2e-4 }",
             "right = { roll_deg = -0.5, principal_v_px = 12.0, distortion = { k1 = 0.01 } }",
