@@ -64,8 +64,9 @@ pub struct ExposureSettings {
     pub target_grey: f64,
     /// Shortest exposure, us. Default 10.
     pub min_exposure_us: f64,
-    /// Longest exposure, us. A rig that reads blinking lamps needs less than their chip time.
-    /// Default: the exposure that the camera begins with.
+    /// Longest exposure, us; so exposed, all rows must close within a frame, and images are delivered
+    /// when such a frame would be over. A rig that reads blinking lamps needs less than their chip
+    /// time. Default: the exposure that the camera begins with.
     pub max_exposure_us: Option<f64>,
     /// Least gain, dB. Default 0.
     pub min_gain_db: f64,
