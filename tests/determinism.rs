@@ -31,8 +31,9 @@ impl Observer for Digest {
                 format!("{report:?}{truths_m:?}").hash(&mut self.hasher);
                 self.images += 2;
             }
-            Event::Wayside(_, time, image, report) => {
-                image.as_raw().hash(&mut self.hasher);
+            Event::Wayside(_, frame, report) => {
+                frame.image.as_raw().hash(&mut self.hasher);
+                let time = frame.start;
                 format!("{time:?}{:?}{:?}", report.blobs, report.obstacles).hash(&mut self.hasher);
                 self.images += 1;
             }

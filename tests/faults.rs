@@ -79,10 +79,11 @@ impl Observer for Seen {
                 (self.pairs).push((pair.left.number, pair.left.start, images, faults));
                 format!("{report:?}{images:?}").hash(&mut self.hasher);
             }
-            Event::Wayside(_, time, image, report) => {
+            Event::Wayside(_, frame, report) => {
                 let fault = report.camera.fault;
-                (self.frames).push((report.number, *time, hash(image), fault, report.blind));
-                hash(image).hash(&mut self.hasher);
+                let (start, image) = (frame.start, hash(&frame.image));
+                (self.frames).push((report.number, start, image, fault, report.blind));
+                image.hash(&mut self.hasher);
             }
             Event::Camera(time, camera, fault) => {
                 self.said.push(format!("{time} {camera} {fault:?}"));

@@ -78,7 +78,7 @@ impl Observer for Delivered {
                 keep("left", pair.left.number, &pair.left.image);
                 keep("right", pair.right.number, &pair.right.image);
             }
-            Event::Wayside(_, _, image, report) => keep("W1530", report.number, image),
+            Event::Wayside(_, frame, _) => keep("W1530", frame.number, &frame.image),
             _ => {}
         }
         Ok(())

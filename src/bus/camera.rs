@@ -197,6 +197,10 @@ pub struct Frame {
     pub number: u32,
     /// When its first row opened, as the camera says.
     pub start: SimTime,
+    /// How long every row collected light, as the camera says.
+    pub exposure_s: f64,
+    /// Gain before the converter, as the camera says.
+    pub gain_db: f64,
     /// 8-bit grey; 0 x 0 where the camera has delivered none.
     pub image: GrayImage,
 }

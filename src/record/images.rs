@@ -8,7 +8,7 @@ use super::scene::ui;
 use super::slug;
 use super::stream::{Stream, failed};
 use crate::bus::{
-    DangerLevel, DetectedObstacle, Ellipse, Intrinsics, LedReport, PixelBox, SimTime, Spot,
+    DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
     StereoPair, WaysideReport,
 };
 use crate::scenario::RecordSettings;
@@ -153,10 +153,10 @@ impl Images {
         &mut self,
         stream: &Stream,
         device: (usize, &str),
-        start: SimTime,
-        frame: &GrayImage,
+        frame: &Frame,
         report: &WaysideReport,
     ) -> Result<(), ObserverError> {
+        let (start, image) = (frame.start, &frame.image);
         let keep = self.wayside.get_mut(device.0).is_some_and(|r| r.due(start));
         if !keep && !self.every_frame {
             return Ok(());
@@ -164,7 +164,7 @@ impl Images {
         let paths = WaysidePaths::new(device.1);
         stream.at_frame(start, report.number);
         if keep {
-            self.jpeg(stream, &format!("{}/image", paths.camera), frame)?;
+            self.jpeg(stream, &format!("{}/image", paths.camera), image)?;
             if let Some(difference) = &report.difference {
                 self.brighten(difference);
                 self.jpeg(stream, &paths.difference, &self.scaled)?;
@@ -173,7 +173,7 @@ impl Images {
                 png(stream, &paths.binary, binary)?;
             }
         }
-        draw_obstacles(stream, &paths.camera, report, frame.height())
+        draw_obstacles(stream, &paths.camera, report, image.height())
     }
 
     fn brighten(&mut self, difference: &GrayImage) {

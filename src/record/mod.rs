@@ -47,7 +47,7 @@ use crate::session::{Event, Observer, ObserverError, Opening};
 use images::Images;
 use moving::Moving;
 use nalgebra::Isometry3;
-use plots::Plots;
+use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
 use scene::Scene;
 use std::path::Path;
@@ -152,6 +152,13 @@ struct Contents {
 }
 
 impl Contents {
+    /// Names of all cameras, the rig's first.
+    fn cameras(&self) -> impl Iterator<Item = &str> {
+        let rig = self.rig.then_some(RIG_CAMERA);
+        rig.into_iter()
+            .chain(self.devices.iter().map(String::as_str))
+    }
+
     /// Something has the head's pose: a train, or a rig on a bench.
     fn head(&self) -> bool {
         self.train || self.rig
@@ -228,19 +235,22 @@ impl Open {
             Event::Exposure(_) => return Ok(()),
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
+                self.plots.taken(RIG_CAMERA, &pair.left);
                 Texts::dark_lamps(stream, report)?;
                 self.images.pair(stream, pair, report)?;
                 self.moving.fixes(stream, scene, report)?;
                 report.time
             }
-            Event::Wayside(index, time, frame, report) => {
+            Event::Wayside(index, frame, report) => {
                 let Some(name) = self.contents.devices.get(index) else {
                     return Ok(());
                 };
                 let device = (index, name.as_str());
+                let time = frame.start;
                 self.plots.wayside(index, report);
+                self.plots.taken(name, frame);
                 self.texts.wayside(stream, device, report)?;
-                self.images.wayside(stream, device, time, frame, report)?;
+                self.images.wayside(stream, device, frame, report)?;
                 stream.at(time);
                 self.moving
                     .obstacles(stream, scene, device, &report.obstacles)?;

@@ -3,7 +3,8 @@
 use super::stream::{Stream, failed};
 use super::{Contents, palette, slug};
 use crate::bus::{
-    DopplerSample, LedReport, Method, OdometerSample, ProtectionReport, SimTime, WaysideReport,
+    DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,
+    WaysideReport,
 };
 use crate::session::ObserverError;
 use crate::twin::physics::TrainState;
@@ -13,6 +14,7 @@ use std::collections::BTreeMap;
 
 const KMH: f64 = 3.6;
 const MM: f64 = 1000.0;
+const US: f64 = 1e6;
 const KN: f64 = 1000.0;
 
 /// Series that share a pane.
@@ -136,7 +138,7 @@ const DISTANCE: Group = Group {
     lines: &[DISPLAY],
 };
 
-/// Of wayside devices, in turn.
+/// Of wayside devices or cameras, in turn.
 const DEVICE_RGB: [(u8, u8, u8); 4] = [
     (90, 200, 255),
     (255, 170, 60),
@@ -151,6 +153,23 @@ const ERROR: Group = Group {
     lines: &[],
 };
 
+const EXPOSURE: Group = Group {
+    title: "Exposure, µs",
+    origin: "plots/exposure",
+    legend: Corner2D::RightTop,
+    lines: &[],
+};
+
+const GAIN: Group = Group {
+    title: "Gain, dB",
+    origin: "plots/gain",
+    legend: Corner2D::RightTop,
+    lines: &[],
+};
+
+/// What the rig is called among cameras; both eyes are exposed alike.
+pub(super) const RIG_CAMERA: &str = "rig";
+
 /// The plots of a run by panes; plots of one pane are its tabs.
 pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
     let mut panes = Vec::new();
@@ -162,6 +181,9 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
     }
     if !contents.devices.is_empty() {
         panes.push(vec![DISTANCE]);
+    }
+    if let Some(last) = panes.last_mut().filter(|_| contents.cameras().count() > 0) {
+        last.extend([EXPOSURE, GAIN]);
     }
     if contents.train {
         let cameras = contents.rig || !contents.devices.is_empty();
@@ -232,6 +254,12 @@ impl Plots {
             let faint = Color::from_rgb(r / 2, g / 2, b / 2);
             style(stream, line, name, Color::from_rgb(r, g, b), 1.5)?;
             style(stream, formula, &format!("{name}, formula"), faint, 1.5)?;
+        }
+        for (k, camera) in contents.cameras().enumerate() {
+            let (r, g, b) = DEVICE_RGB[k % DEVICE_RGB.len()];
+            for path in taken_paths(camera) {
+                style(stream, &path, camera, Color::from_rgb(r, g, b), 1.5)?;
+            }
         }
         Ok(Self {
             series: BTreeMap::new(),
@@ -323,6 +351,14 @@ impl Plots {
         push_or_gap(&mut self.series, formula, t, report.train_distance_m);
     }
 
+    /// What a camera says it took a frame with.
+    pub(super) fn taken(&mut self, camera: &str, frame: &Frame) {
+        let values = [frame.exposure_s * US, frame.gain_db];
+        for (path, value) in taken_paths(camera).into_iter().zip(values) {
+            push_or_gap(&mut self.series, &path, frame.start, Some(value));
+        }
+    }
+
     /// Sends the values kept.
     pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
         for (path, series) in &mut self.series {
@@ -365,6 +401,11 @@ fn push_or_gap(all: &mut BTreeMap<String, Series>, path: &str, time: SimTime, va
 
 fn distance_paths(device: &str) -> [String; 2] {
     ["line", "formula"].map(|what| format!("plots/distance/{}/{what}", slug(device)))
+}
+
+/// Exposure and gain of a camera.
+fn taken_paths(camera: &str) -> [String; 2] {
+    ["exposure", "gain"].map(|what| format!("plots/{what}/{}", slug(camera)))
 }
 
 fn style(

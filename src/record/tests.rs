@@ -103,6 +103,8 @@ fn a_session_is_recorded_whole() {
         "/plots/speed/permitted",
         "/plots/position_error/mono/upper",
         "/plots/distance/W_205/line",
+        "/plots/exposure/W_205",
+        "/plots/gain/rig",
         "/events",
         "/display",
     ] {
@@ -192,7 +194,13 @@ fn the_layout_leaves_out_what_is_missing() {
     };
     let (full, bench) = (names(SMALL, "full.rrd"), names(bench, "bench.rrd"));
     let has = |panes: &[String], name: &str| panes.iter().any(|pane| pane.contains(name));
-    for pane in ["Left camera", "Position error", "Events"] {
+    for pane in [
+        "Left camera",
+        "Position error",
+        "Exposure",
+        "Gain",
+        "Events",
+    ] {
         assert!(has(&full, pane) && has(&bench, pane), "{pane}");
     }
     for pane in ["Difference", "Binary", "Speed", "display", "obstacle"] {

@@ -375,6 +375,8 @@ impl Session<'_> {
             Frame {
                 number,
                 start,
+                exposure_s: 30e-6,
+                gain_db: 0.0,
                 image,
             }
         });
@@ -518,7 +520,14 @@ impl Session<'_> {
         }
         report.difference = Some(difference);
         report.binary = Some(binary);
-        self.tell(&Event::Wayside(0, report.time, &frame, &report));
+        let frame = Frame {
+            number,
+            start: report.time,
+            exposure_s: 16e-3,
+            gain_db: 9.4,
+            image: frame,
+        };
+        self.tell(&Event::Wayside(0, &frame, &report));
         if number == 35 {
             let warning = ObstacleWarning {
                 device: device.name.clone(),

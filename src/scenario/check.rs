@@ -501,6 +501,7 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
 mod tests {
     use super::*;
     use crate::track::read_toml;
+    use crate::twin::render::gpu::layout::MAX_HEADLIGHTS;
 
     fn keys(rest: &str) -> Vec<String> {
         let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
@@ -567,6 +568,17 @@ mod tests {
         assert_eq!(camera(share), expected);
         let late = "camera = 'rig'\nfault = { kind = 'late', by_ms = 1e9 }";
         assert_eq!(camera(late), [format!("{at}.fault.by_ms")]);
+    }
+
+    /// With more trains the same line would be lit by one renderer and not by another.
+    #[test]
+    fn all_headlights_light_a_picture() {
+        let keys =
+            |others: usize| keys(&format!("[train]\n{}", "[[other_trains]]\n".repeat(others)));
+        assert_eq!(keys(3), [""; 0]);
+        assert_eq!(keys(4), ["other_trains"]);
+        let (trains, headlights) = (1 + 3, 2);
+        assert_eq!(trains * headlights, MAX_HEADLIGHTS);
     }
 
     /// Two trains in one place would burst apart.

@@ -3,7 +3,7 @@
 use crate::bus::{CameraModel, Frame, RigCalibration, SimTime, StereoPair, WaysideCalibration};
 use crate::twin::random::Stream;
 use crate::twin::render::{CameraMotion, NoiseKey, View};
-use crate::twin::sensors::{RigSettings, Trigger, WaysideCameraSettings};
+use crate::twin::sensors::{Exposed, RigSettings, Trigger, WaysideCameraSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 
@@ -46,10 +46,28 @@ impl Clock {
     }
 }
 
-/// How many poses, [`POSE_STEP_S`] apart, cover a frame.
-fn poses_of(camera: &CameraModel) -> usize {
-    let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
-    (span_s / POSE_STEP_S).ceil() as usize + 1
+/// A frame that a camera has taken: what it says of it, and so all of it but the image.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// Number of the frame.
+    pub number: u32,
+    /// When it started, by the camera's clock.
+    pub start: SimTime,
+    /// What it was taken with.
+    pub with: Exposed,
+}
+
+impl Taken {
+    /// With its image.
+    pub fn frame(&self, image: GrayImage) -> Frame {
+        Frame {
+            number: self.number,
+            start: self.start,
+            exposure_s: self.with.exposure_s,
+            gain_db: self.with.gain_db,
+            image,
+        }
+    }
 }
 
 /// The stereo camera as it is built: it may differ from the calibration.
@@ -62,6 +80,8 @@ pub struct StereoCamera {
     trigger: Trigger,
     /// How much later than the left eye the right one is really triggered.
     right_later_s: f64,
+    /// How many poses, [`POSE_STEP_S`] apart, cover a frame of the longest exposure that it may have.
+    poses: usize,
     /// Noise of the left and right eye.
     streams: [Stream; 2],
 }
@@ -75,16 +95,15 @@ impl StereoCamera {
             settings: rig.clone(),
             trigger: Trigger::new(trigger, rig.frame_jitter_us),
             right_later_s: rig.as_built().trigger_offset_s(),
+            poses: (rig.as_built().longest_span_s() / POSE_STEP_S).ceil() as usize + 1,
             streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
         }
     }
 
     /// From the start of a pair to the last pose that drawing it needs.
     pub fn delay_s(&self) -> f64 {
-        let poses_s = |eye: &CameraModel| (poses_of(eye) - 1) as f64 * POSE_STEP_S;
-        let left_s = poses_s(&self.rig.left);
-        let right_s = poses_s(&self.rig.right) + self.right_later_s;
-        left_s.max(right_s) + self.trigger.latest_s()
+        let poses_s = (self.poses - 1) as f64 * POSE_STEP_S;
+        poses_s + self.right_later_s.max(0.0) + self.trigger.latest_s()
     }
 
     /// The views of a pair, left then right, for a vehicle that moves as `vehicle_at` says.
@@ -114,7 +133,7 @@ impl StereoCamera {
         start: SimTime,
         eye_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
     ) -> Option<View> {
-        let poses = (0..poses_of(eye)).map(|k| eye_at(start.plus(k as f64 * POSE_STEP_S)));
+        let poses = (0..self.poses).map(|k| eye_at(start.plus(k as f64 * POSE_STEP_S)));
         Some(View {
             camera: *eye,
             start,
@@ -134,16 +153,14 @@ impl StereoCamera {
     }
 
     /// Puts two images together as the camera delivers them, with the times that its sheet has.
-    pub fn pair(&self, number: u32, start: SimTime, images: [GrayImage; 2]) -> StereoPair {
-        let frame = |start, image| Frame {
-            number,
-            start,
-            image,
+    pub fn pair(&self, taken: &Taken, [left, right]: [GrayImage; 2]) -> StereoPair {
+        let right_taken = Taken {
+            start: taken.start.plus(self.settings.trigger_offset_s()),
+            ..*taken
         };
-        let [left, right] = images;
         StereoPair {
-            left: frame(start, left),
-            right: frame(start.plus(self.settings.trigger_offset_s()), right),
+            left: taken.frame(left),
+            right: right_taken.frame(right),
         }
     }
 }
@@ -174,7 +191,7 @@ pub fn wayside_view(
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::twin::sensors::{ReadOut, RigError};
+    use crate::twin::sensors::{ExposureMode, ExposureSettings, ReadOut, RigError};
 
     /// A train that runs along x at 30 m/s from time zero on.
     fn running(time: SimTime) -> Option<Isometry3<f64>> {
@@ -217,10 +234,46 @@ mod tests {
             (apart_m - eyes_m - 0.036).abs() < 1e-9,
             "{apart_m} {eyes_m}"
         );
-        let pair = camera.pair(3, start, [GrayImage::new(1, 1), GrayImage::new(1, 1)]);
+        let taken = Taken {
+            number: 3,
+            start,
+            with: Exposed {
+                exposure_s: 20e-6,
+                gain_db: 6.0,
+            },
+        };
+        let pair = camera.pair(&taken, [GrayImage::new(1, 1), GrayImage::new(1, 1)]);
+        for eye in [&pair.left, &pair.right] {
+            assert!((eye.exposure_s - 20e-6).abs() < 1e-12 && (eye.gain_db - 6.0).abs() < 1e-12);
+        }
         assert_eq!(pair.left.start, start);
         assert_eq!(pair.right.start, start.plus(1e-3));
         assert!(rig.calibration().left.intrinsics.distortion.is_none());
+    }
+
+    /// An exposure that a control may lengthen is drawn from the train's own poses to its end, which
+    /// the session waits for.
+    #[test]
+    fn poses_cover_the_longest_exposure() {
+        let rig = RigSettings {
+            exposure_control: ExposureSettings {
+                mode: ExposureMode::Auto,
+                max_exposure_us: Some(12_000.0),
+                ..ExposureSettings::default()
+            },
+            ..RigSettings::default()
+        };
+        let camera = StereoCamera::new(&rig, 1);
+        let span_s = 719.0 * 22.2e-6 + 12e-3;
+        assert!((camera.delay_s() - span_s).abs() < POSE_STEP_S);
+        let [left, right] = camera.views(0, SimTime::ZERO, running).unwrap();
+        for view in [left, right] {
+            let [start, end] = [0.0, span_s].map(|s| {
+                let pose = view.motion.pose_at(view.start.plus(s));
+                pose.translation.x
+            });
+            assert!((end - start - 30.0 * span_s).abs() < 1e-9);
+        }
     }
 
     /// Frames start about the time that they say, with the spread that was asked for, never before

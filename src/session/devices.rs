@@ -3,7 +3,7 @@
 //! The world is drawn and scanned through each device as it really hangs; the detector is given its
 //! calibration.
 
-use super::cameras::{Clock, wayside_view};
+use super::cameras::{Clock, Taken, wayside_view};
 use super::score::{Presence, WaysideScore};
 use super::watch::Stopwatch;
 use crate::bus::{CameraHealth, Frame, LidarScan, SimTime, WaysideCalibration, WaysideReport};
@@ -60,7 +60,7 @@ impl Device {
         let trouble = CameraTrouble::of(&[name], faults, scenario.seed);
         Self {
             calibration: post.calibration.clone(),
-            outlook: Outlook::new(scenario, &post.actual),
+            outlook: Outlook::new(scenario, post),
             balise: post.balise.clone(),
             camera: post.camera.clone(),
             exposure: AutoExposure::of(
@@ -100,11 +100,10 @@ impl Device {
         }
     }
 
-    /// A frame whose last row has closed by `now`, and that is not lost: its number, start and view.
-    pub fn due(&mut self, now: SimTime) -> Option<(u32, SimTime, View)> {
-        let camera = self.outlook.device.camera;
-        let span_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
-        let delay_s = span_s + self.trigger.latest_s();
+    /// A frame whose last row has closed by `now`, however long it was exposed, and that is not lost,
+    /// with its view.
+    pub fn due(&mut self, now: SimTime) -> Option<(Taken, View)> {
+        let delay_s = self.outlook.span_s + self.trigger.latest_s();
         let (number, start) = self.clock.due(now, delay_s)?;
         if self.trouble.drops(number, start) {
             return None;
@@ -116,8 +115,13 @@ impl Device {
             number,
             self.trigger.really(number, start),
         );
-        (self.exposure).expose(number, std::slice::from_mut(&mut view));
-        Some((number, start, view))
+        let with = self.exposure.expose(std::slice::from_mut(&mut view));
+        let taken = Taken {
+            number,
+            start,
+            with,
+        };
+        Some((taken, view))
     }
 
     /// The lidar's head turns at its own rate: takes the scan that is complete by now, if any.
@@ -138,14 +142,9 @@ impl Device {
     }
 
     /// A frame as it is handed to the box. Exposure is set by what the sensor saw.
-    pub fn frame(&mut self, number: u32, start: SimTime, image: GrayImage) -> Frame {
-        self.exposure.on_image(number, &image);
-        let image = self.grabber.grab(number, start, image);
-        Frame {
-            number,
-            start,
-            image,
-        }
+    pub fn frame(&mut self, taken: &Taken, image: GrayImage) -> Frame {
+        self.exposure.on_image(&taken.with, &image);
+        taken.frame(self.grabber.grab(taken.number, taken.start, image))
     }
 
     /// What goes with a frame that is complete now.
@@ -200,17 +199,21 @@ impl Device {
 /// What a device can have in view: where it really hangs and looks, and the walls around it.
 struct Outlook {
     device: WaysideCalibration,
+    /// From the opening of a frame's first row to the closing of its last, at the longest.
+    span_s: f64,
     reach_m: f64,
     walls: TunnelCaster,
     slab: usize,
 }
 
 impl Outlook {
-    fn new(scenario: &Scenario, device: &WaysideCalibration) -> Self {
+    fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
+        let device = &post.actual;
         let walls = TunnelCaster::new(&scenario.tunnel);
         Self {
             slab: walls.slab_of(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
+            span_s: post.camera.longest_span_s(),
             reach_m: scenario.stack.wayside.reach_m,
             walls,
         }
@@ -232,8 +235,6 @@ impl Outlook {
 
     /// Everything that the device may rightly report.
     fn present(&self, world: &World) -> Vec<Presence> {
-        let camera = &self.device.camera;
-        let frame_s = camera.shutter.frame_span_s(camera.intrinsics.height_px);
         let obstacles = world.obstacles().map(|o| Presence {
             name: o.name.to_owned(),
             size_m: o.size_m.max(),
@@ -242,7 +243,7 @@ impl Outlook {
             half_length_m: o.half_extents_m.x,
             half_width_m: o.half_extents_m.y,
             foot_m: o.height_m - o.half_extents_m.z - BED_M
-                + (-o.velocity_mps.z * frame_s).max(0.0),
+                + (-o.velocity_mps.z * self.span_s).max(0.0),
             lies_in_view_since: o.resting_since.filter(|_| {
                 self.has_in_view(&o.world_from_body.translation.vector.into(), o.chainage_m)
             }),
@@ -286,6 +287,7 @@ mod tests {
     use super::*;
     use crate::bus::TrainCommand;
     use crate::track::read_toml;
+    use crate::twin::sensors::ExposureMode;
 
     const TUNNEL: &str = include_str!("../../tunnels/chengdu_line1.toml");
     const SCENARIO: &str = r#"
@@ -339,6 +341,22 @@ mod tests {
         // A sweep of 120 deg at 4 turns a second takes 83 ms: that begun at 0 is not complete when
         // the first frame closes, that begun at 0.75 s is when the last one does.
         assert_eq!(begun, [0.0, 0.25, 0.5, 0.75]);
+    }
+
+    /// Fails where a lengthened exposure is delivered before it is over.
+    #[test]
+    fn a_frame_is_due_when_its_longest_exposure_is_over() {
+        let (mut scenario, ..) = post();
+        let camera = &mut scenario.wayside[0].camera;
+        camera.exposure_us = 1000.0;
+        camera.exposure_control.mode = ExposureMode::Auto;
+        camera.exposure_control.max_exposure_us = Some(50_000.0);
+        let mut device = Device::all(&scenario, &scenario.map()).pop().unwrap();
+        let span_s = 1079.0 * 14.8e-6 + 0.05;
+        assert!(device.due(SimTime::from_secs(span_s - 1e-6)).is_none());
+        let (taken, view) = device.due(SimTime::from_secs(span_s + 1e-6)).unwrap();
+        assert!((taken.with.exposure_s - 1e-3).abs() < 1e-12);
+        assert!((view.camera.shutter.exposure_s - 1e-3).abs() < 1e-12);
     }
 
     /// Fails where a device answers for what it cannot see, or the world is drawn through the

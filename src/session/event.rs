@@ -1,13 +1,12 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
 use crate::bus::{
-    CameraFault, Delivery, DopplerSample, LedReport, OdometerSample, ProtectionReport,
+    CameraFault, Delivery, DopplerSample, Frame, LedReport, OdometerSample, ProtectionReport,
     RigCalibration, SimTime, StereoPair, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use crate::twin::physics::{Belonging, TrainState};
 use crate::twin::render::{Body, Job};
-use image::GrayImage;
 use nalgebra::{Isometry3, Vector3};
 
 /// What is known before the first step.
@@ -86,7 +85,7 @@ pub enum Event<'a> {
     /// A pair of images, what the stack said of it, and the true chainage at each fix's time.
     Pair(&'a StereoPair, &'a LedReport, &'a [f64]),
     /// A wayside frame and its report; the index is into [`Opening::wayside`].
-    Wayside(usize, SimTime, &'a GrayImage, &'a WaysideReport),
+    Wayside(usize, &'a Frame, &'a WaysideReport),
     /// A cycle of the protection.
     Protection(&'a ProtectionReport),
     /// The stack says that a camera has failed, with another fault than before, or that it is well

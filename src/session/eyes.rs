@@ -1,7 +1,7 @@
 //! The eyes of a train: its stereo camera, the stack that reads it, and how well it does.
 
 use super::SessionError;
-use super::cameras::{Clock, StereoCamera};
+use super::cameras::{Clock, StereoCamera, Taken};
 use super::score::PositioningScore;
 use super::watch::Stopwatch;
 use crate::bus::{LedReport, Method, SimTime, StereoPair};
@@ -10,7 +10,7 @@ use crate::stack::positioning::LedPositioner;
 use crate::track::Tunnel;
 use crate::twin::faults::{CameraTrouble, Grabber};
 use crate::twin::render::View;
-use crate::twin::sensors::{AutoExposure, RigSettings};
+use crate::twin::sensors::{AutoExposure, Exposed, RigSettings};
 use image::GrayImage;
 use nalgebra::Isometry3;
 use std::sync::Arc;
@@ -74,31 +74,32 @@ impl Eyes {
         late.fold(0.0, f64::max)
     }
 
-    /// Sets exposure and gain of a pair's views.
-    pub fn expose(&mut self, number: u32, views: &mut [View]) {
-        self.exposure.expose(number, views);
+    /// Sets exposure and gain of a pair's views, and gives them.
+    pub fn expose(&self, views: &mut [View]) -> Exposed {
+        self.exposure.expose(views)
     }
 
     /// The stack reads a pair and is scored against where vehicle and head really were.
     pub fn read(
         &mut self,
-        (number, start): (u32, SimTime),
+        taken: &Taken,
         images: Vec<GrayImage>,
         watch: &mut Stopwatch,
         vehicle_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
         head_at: impl Fn(SimTime) -> Option<f64>,
     ) -> Result<Reading, SessionError> {
         if let Some(left) = images.first() {
-            self.exposure.on_image(number, left);
+            self.exposure.on_image(&taken.with, left);
         }
         let [left, right] = <[GrayImage; 2]>::try_from(images)
             .map_err(|images| SessionError::Images(2, images.len()))?;
+        let (number, start) = (taken.number, taken.start);
         let [of_left, of_right] = &mut self.grabbers;
         let delivered = [
             of_left.grab(number, start, left),
             of_right.grab(number, start, right),
         ];
-        let images = self.camera.pair(number, start, delivered);
+        let images = self.camera.pair(taken, delivered);
         let positioner = &mut self.positioner;
         let (report, seconds) = watch.time(|| positioner.on_pair(&images));
         let rig = &self.camera.rig;

@@ -1,7 +1,7 @@
 //! A run with a train: every step the world moves, sensors sample, cameras trigger, images that
 //! are due reach the stack, and what the stack decides acts on the train.
 
-use super::cameras::Clock;
+use super::cameras::{Clock, Taken};
 use super::devices::{Device, Look};
 use super::eyes::Eyes;
 use super::health::{EYES, Health};
@@ -234,10 +234,13 @@ impl<'s> Run<'s> {
                 .camera
                 .views(number, start, |t| world.vehicle_at(t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
-            eyes.expose(number, &mut views);
+            let with = eyes.expose(&mut views);
             let shot = Shot {
-                number,
-                start,
+                taken: Taken {
+                    number,
+                    start,
+                    with,
+                },
                 what: What::Pair,
                 late_s: eyes.late_s(start),
             };
@@ -245,13 +248,12 @@ impl<'s> Run<'s> {
         }
         for k in 0..self.devices.len() {
             self.devices[k].sweep(&self.world);
-            if let Some((number, start, view)) = self.devices[k].due(now) {
+            if let Some((taken, view)) = self.devices[k].due(now) {
                 let what = What::Wayside(k, self.devices[k].look(&self.world));
                 let shot = Shot {
-                    number,
-                    start,
+                    taken,
                     what,
-                    late_s: self.devices[k].late_s(start),
+                    late_s: self.devices[k].late_s(taken.start),
                 };
                 self.submit(now, vec![view], shot, watchers)?;
             }
@@ -281,7 +283,7 @@ impl<'s> Run<'s> {
         };
         watchers.show(&Event::Exposure(&Exposure {
             source,
-            number: shot.number,
+            number: shot.taken.number,
             job: &job,
             owners: &owners,
             train,
@@ -306,17 +308,12 @@ impl<'s> Run<'s> {
         mut images: Vec<GrayImage>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        let Shot {
-            number,
-            start,
-            what,
-            ..
-        } = shot;
+        let Shot { taken, what, .. } = shot;
         match what {
-            What::Pair => self.judge_pair((number, start), images, watchers),
+            What::Pair => self.judge_pair(&taken, images, watchers),
             What::Wayside(k, look) => {
                 let image = images.pop().ok_or(SessionError::Images(1, 0))?;
-                let frame = self.devices[k].frame(number, start, image);
+                let frame = self.devices[k].frame(&taken, image);
                 self.judge_wayside(now, k, &frame, &look, watchers)
             }
         }
@@ -324,7 +321,7 @@ impl<'s> Run<'s> {
 
     fn judge_pair(
         &mut self,
-        frame: (u32, SimTime),
+        taken: &Taken,
         images: Vec<GrayImage>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
@@ -333,13 +330,13 @@ impl<'s> Run<'s> {
         };
         let watch = &mut self.cost.stack;
         let (vehicle_at, head_at) = (|t| world.vehicle_at(t), |t| world.chainage_at(t));
-        let read = eyes.read(frame, images, watch, vehicle_at, head_at)?;
+        let read = eyes.read(taken, images, watch, vehicle_at, head_at)?;
         self.stereo_frames += 1;
         if let Some(fix) = read.report.best_fix() {
             self.protection.on_fix(fix);
         }
         for (eye, health) in EYES.into_iter().zip(read.report.eyes) {
-            note(&mut self.health, watchers, eye, frame.1, health)?;
+            note(&mut self.health, watchers, eye, taken.start, health)?;
         }
         watchers.show(&Event::Pair(&read.images, &read.report, &read.truths_m))?;
         Ok(())
@@ -358,7 +355,7 @@ impl<'s> Run<'s> {
         self.wayside_frames += 1;
         let name = &self.devices[k].calibration().name;
         note(&mut self.health, watchers, name, frame.start, report.camera)?;
-        watchers.show(&Event::Wayside(k, frame.start, &frame.image, &report))?;
+        watchers.show(&Event::Wayside(k, frame, &report))?;
         Ok(())
     }
 

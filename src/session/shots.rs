@@ -5,6 +5,7 @@
 //! things does not depend on how fast anything is. A camera whose images are late holds up its own
 //! later ones only.
 
+use super::cameras::Taken;
 use super::devices::Look;
 use super::watch::Costs;
 use crate::bus::SimTime;
@@ -14,10 +15,8 @@ use std::collections::VecDeque;
 
 /// One exposure.
 pub struct Shot {
-    /// Number of the frame.
-    pub number: u32,
-    /// Its first row opened.
-    pub start: SimTime,
+    /// The frame.
+    pub taken: Taken,
     /// Whose.
     pub what: What,
     /// By how much more than the usual latency its images are late.

@@ -4,7 +4,7 @@
 //! 60 km/h on `chengdu_line1`, its stereo pairs (1280 x 720 an eye), and the frames of wayside
 //! device W1530 (1920 x 1080). The tunnel is part of the program, so it works anywhere.
 
-use super::cameras::wayside_view;
+use super::cameras::{Taken, wayside_view};
 use super::eyes::Eyes;
 use super::motion::MotionSensors;
 use super::summary::Cost;
@@ -131,14 +131,19 @@ fn train_seconds(
             continue;
         };
         let vehicle_at = |t| world.vehicle_at(t);
-        let views = (eyes.camera.views(number, start, vehicle_at))
+        let mut views = (eyes.camera.views(number, start, vehicle_at))
             .ok_or(SessionError::PoseForgotten(start.secs()))?;
+        let taken = Taken {
+            number,
+            start,
+            with: eyes.expose(&mut views),
+        };
         jobs.push(job(world, views.into()));
         let (mut images, _) = draw(renderer, &jobs[jobs.len() - 1..])?;
         let images = images.pop().ok_or("the renderer did not draw a pair")?;
         let before_s = stack.total_s;
         let head_at = |t| world.chainage_at(t);
-        eyes.read((number, start), images, &mut stack, vehicle_at, head_at)?;
+        eyes.read(&taken, images, &mut stack, vehicle_at, head_at)?;
         times.stack_s.push(stack.total_s - before_s);
     }
     times.stack_s.remove(0);
@@ -172,6 +177,8 @@ fn wayside_seconds(
         let frame = Frame {
             number,
             start: start(number),
+            exposure_s: post.calibration.camera.shutter.exposure_s,
+            gain_db: post.camera.sensor.gain_db,
             image: images.pop().ok_or("the renderer did not draw a frame")?,
         };
         let work = || detector.on_frame(&frame, None, None);

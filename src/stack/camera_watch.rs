@@ -130,6 +130,8 @@ mod tests {
         Frame {
             number,
             start,
+            exposure_s: 30e-6,
+            gain_db: 0.0,
             image,
         }
     }

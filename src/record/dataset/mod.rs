@@ -356,8 +356,8 @@ impl Observer for DataSet<'_> {
                 let images = [&pair.left.image, &pair.right.image];
                 self.images(Source::Rig, pair.left.number, &images)?;
             }
-            Event::Wayside(k, _, image, report) => {
-                self.images(Source::Wayside(k), report.number, &[image])?;
+            Event::Wayside(k, frame, _) => {
+                self.images(Source::Wayside(k), frame.number, &[&frame.image])?;
             }
             _ => return Ok(()),
         }

@@ -109,6 +109,11 @@ impl LampFinder {
         }
     }
 
+    /// What comes next was exposed for so long.
+    pub fn expose(&mut self, exposure_s: f64) {
+        self.reader.expose(exposure_s);
+    }
+
     /// Empty votes for these lamps' code.
     pub fn votes(&self) -> ChipVotes {
         ChipVotes::new(self.code, self.chip_s)

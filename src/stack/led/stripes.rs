@@ -103,6 +103,11 @@ impl StripeReader {
         }
     }
 
+    /// What comes next was exposed for so long.
+    pub fn expose(&mut self, exposure_s: f64) {
+        self.shutter.exposure_s = exposure_s;
+    }
+
     /// Reads the chips of a profile into `out`. `false` where there is no code in it.
     pub fn read(&mut self, profile: &Profile, black: f64, out: &mut StripeReading) -> bool {
         out.chips.clear();
@@ -307,6 +312,27 @@ mod tests {
             let share = f64::from(right) / f64::from(all);
             assert!(share >= least, "{share} at {grey}");
         }
+    }
+
+    /// Short and long exposures of one lamp tell of one clock, so that their chips can be joined: with
+    /// the exposure of another frame they would be 17 us apart.
+    #[test]
+    fn the_clock_does_not_depend_on_the_exposure() {
+        let uid = Uid { line: 1, lamp: 77 };
+        let wave = Waveform::sharp(uid.manchester(), 45e-6, 1e-3);
+        let mut reader = StripeReader::new(45e-6, SHUTTER);
+        let mut reading = StripeReading::default();
+        let phases = [8e-6, 42e-6].map(|exposure_s| {
+            let shutter = Shutter {
+                exposure_s,
+                ..SHUTTER
+            };
+            reader.expose(exposure_s);
+            assert!(reader.read(&profile(&wave, 80.0, &shutter), 4.0, &mut reading));
+            reading.phase_s
+        });
+        let turns = (phases[1] - phases[0]) / 45e-6;
+        assert!((turns - turns.round()).abs() < 0.05, "{turns}");
     }
 
     /// Steady light, darkness, light that blinks in another clock, and any light through a global

@@ -152,6 +152,8 @@ impl World {
         let eye = |start_s: f64, eye: Eye, seed: u64| Frame {
             number,
             start: SimTime::from_secs(start_s),
+            exposure_s: eye.camera.shutter.exposure_s,
+            gain_db: 0.0,
             image: self.draw(&eye, &mut Noise::new(2 * u64::from(number) + seed)),
         };
         let left = Eye {

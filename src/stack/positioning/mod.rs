@@ -22,7 +22,13 @@
 //! };
 //! let rig = RigCalibration::rectified(camera, 0.12, nalgebra::Isometry3::identity());
 //! let mut positioner = LedPositioner::new(&LedSettings::default(), rig, Arc::new(map));
-//! let dark = Frame { number: 0, start: SimTime::ZERO, image: image::GrayImage::new(64, 48) };
+//! let dark = Frame {
+//!     number: 0,
+//!     start: SimTime::ZERO,
+//!     exposure_s: 30e-6,
+//!     gain_db: 0.0,
+//!     image: image::GrayImage::new(64, 48),
+//! };
 //! let report = positioner.on_pair(&StereoPair { left: dark.clone(), right: dark });
 //! assert!(report.fixes.is_empty(), "nothing shines, nothing is claimed");
 //! ```
@@ -32,7 +38,8 @@
 //! R (lamp in camera). The points are rectified, not the images (`stereo`).
 //! R is the track's attitude at the expected chainage, from the map, turned by
 //! what the gyro says of the car's swings. A fix belongs to the mid-exposure of the row of the
-//! lamp's centre, not to the start of the image (16 ms apart, 0.27 m at 60 km/h).
+//! lamp's centre, not to the start of the image (16 ms apart, 0.27 m at 60 km/h); for how long rows
+//! were exposed, each frame says.
 //!
 //! A curve needs care: the car's length axis is the chord between its pivots, not the tangent at
 //! the head.

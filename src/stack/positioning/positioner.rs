@@ -41,6 +41,9 @@ pub struct LedPositioner {
     alone: ChipVotes,
 }
 
+/// No camera on a train exposes for as long as this.
+const MOST_EXPOSURE_S: f64 = 1.0;
+
 /// The last fix, to reckon on from.
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
@@ -121,6 +124,7 @@ impl LedPositioner {
     /// Takes a pair of images, after the samples up to the end of its exposure. An eye that shows a
     /// fault is left out: then the other one measures alone.
     pub fn on_pair(&mut self, pair: &StereoPair) -> LedReport {
+        self.expose(pair);
         let eyes = self.look_after(pair);
         let mut report = match eyes.map(|eye| eye.is_good()) {
             [true, true] => self.read_pair(pair),
@@ -142,6 +146,19 @@ impl LedPositioner {
     pub fn is_silent(&self, now: SimTime) -> bool {
         let patience_s = self.settings.silent_after_s;
         self.watches.iter().all(|w| w.silence(now, patience_s))
+    }
+
+    /// Rows are timed by the exposure that each eye says it had, which may differ from the sheet's. A
+    /// frame that says none is taken to have the one before.
+    fn expose(&mut self, pair: &StereoPair) {
+        let eyes = [&mut self.rig.left, &mut self.rig.right];
+        let frames = [&pair.left, &pair.right];
+        for ((eye, finder), frame) in eyes.into_iter().zip(&mut self.finders).zip(frames) {
+            if frame.exposure_s > 0.0 && frame.exposure_s < MOST_EXPOSURE_S {
+                eye.shutter.exposure_s = frame.exposure_s;
+                finder.expose(frame.exposure_s);
+            }
+        }
     }
 
     fn look_after(&mut self, pair: &StereoPair) -> [CameraHealth; 2] {
@@ -555,6 +572,8 @@ fn without_image(frame: &Frame) -> Frame {
     Frame {
         number: frame.number,
         start: frame.start,
+        exposure_s: frame.exposure_s,
+        gain_db: frame.gain_db,
         image: GrayImage::default(),
     }
 }

@@ -238,6 +238,49 @@ fn val_a_real_rig_is_as_good_as_a_straight_one_where_its_sheet_is_right() {
     }
 }
 
+/// Exposures that alternate, as a control sets them, and differ from the sheet's: a fix belongs to the
+/// middle of the exposure that its frame says, also where the right eye alone is left to measure. A
+/// frame that says none has the one before.
+#[test]
+fn rows_are_timed_by_the_exposure_that_each_frame_says() {
+    let map = Arc::new(tunnel("manchester"));
+    let mut world = World::new(&map, map.lamps[30].chainage_m - 1.1, 0.0);
+    let settings = LedSettings {
+        agreeing_reads: 1,
+        ..LedSettings::default()
+    };
+    let mut positioner = LedPositioner::new(&settings, rig(), map.clone());
+    for number in 0..8 {
+        let exposure_s = [8e-6, 44e-6][number as usize % 2];
+        for eye in [&mut world.rig.left, &mut world.rig.right] {
+            eye.shutter.exposure_s = exposure_s;
+        }
+        let mut pair = world.pair(number, f64::from(number) / 30.0);
+        let one_eyed = number > 5;
+        if one_eyed {
+            pair.left.image = GrayImage::default();
+        }
+        if number == 4 {
+            pair.left.exposure_s = f64::INFINITY;
+        }
+        let says_s = if number == 4 { 44e-6 } else { exposure_s };
+        let report = positioner.on_pair(&pair);
+        assert!(!report.fixes.is_empty(), "{number}");
+        let spots = if one_eyed {
+            &report.right
+        } else {
+            &report.left
+        };
+        for fix in &report.fixes {
+            let spot = spots.iter().find(|s| s.uid.map(|u| u.0) == Some(fix.uid));
+            let open_s = 22.2e-6 * spot.unwrap().centre.y;
+            let after_s = fix.time.since(pair.left.start);
+            let off_s = after_s - open_s - 0.5 * says_s;
+            assert!(off_s.abs() < 2e-9, "{number}: {off_s}");
+        }
+    }
+}
+
 /// A global shutter shows no stripes: lamps are found in either eye, none is named, nothing is
 /// claimed.
 #[test]

@@ -39,7 +39,8 @@
 //! let mut image = image::GrayImage::from_pixel(640, 360, image::Luma([90]));
 //! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
 //!     let start = SimTime::from_secs(f64::from(number) * 0.1);
-//!     detector.on_frame(&Frame { number, start, image: image.clone() }, None, None)
+//!     let (exposure_s, gain_db) = (8e-3, 0.0);
+//!     detector.on_frame(&Frame { number, start, exposure_s, gain_db, image: image.clone() }, None, None)
 //! };
 //! assert!(report(&mut detector, 0, &image).learning);
 //! assert!(report(&mut detector, 1, &image).passage_possible);

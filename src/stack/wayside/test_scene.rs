@@ -222,6 +222,8 @@ impl Scene {
         Frame {
             number,
             start: SimTime::from_secs(f64::from(number) * FRAME_S),
+            exposure_s: 8e-3,
+            gain_db: 0.0,
             image,
         }
     }

@@ -455,6 +455,8 @@ fn odd_input_is_survived() {
                 &Frame {
                     number,
                     start,
+                    exposure_s: 8e-3,
+                    gain_db: 0.0,
                     image,
                 },
                 None,
@@ -580,6 +582,7 @@ fn a_device_that_never_sees_warns() {
             number: n,
             start: SimTime::from_secs(f64::from(n) * FRAME_S),
             image: first.image.clone(),
+            ..first
         };
         let report = d.on_frame(&frame, None, None);
         assert!(report.learning && !report.passage_possible);

@@ -63,6 +63,8 @@ impl PhysicsSettings {
             train.check(&key_below(at, "train"), problems);
         }
         let others = self.other_trains.len() as f64;
+        // With the own train they carry eight headlights, and more would not light a picture that is
+        // drawn on a graphics adapter.
         Checker::new(at, problems).within("other_trains", others, 0.0..=3.0, "trains");
         for (k, train) in self.other_trains.iter().enumerate() {
             train.check(&key_below(at, &format!("other_trains[{k}]")), problems);

@@ -20,7 +20,7 @@ pub use scene::{
     Air, Body, CameraMotion, Headlight, Job, LampChange, LampLight, LampsInTime, NoiseKey, Scene,
     Shape, View,
 };
-pub use sensor::{LensSettings, Pattern, SensorSettings, upper_bits};
+pub use sensor::{BLUR_PX, LensSettings, Pattern, SensorSettings, upper_bits};
 
 use image::{GrayImage, ImageBuffer, Luma};
 

@@ -60,6 +60,9 @@ pub const PHOTONS_PER_LM_S: f64 = 1.0 / (320.0 * 3.55e-19);
 /// So charge is kept where nothing spills farther than that, or over the picture's border.
 pub const BLOOMING_REACH: usize = 32;
 
+/// How far a lens may blur: the standard deviation of its point spread, pixels.
+pub const BLUR_PX: std::ops::RangeInclusive<f64> = 0.0..=50.0;
+
 /// The glass in front of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -127,7 +130,7 @@ impl LensSettings {
         let mut check = Checker::new(at, problems);
         check.within("f_number", self.f_number, 0.5..=64.0, "");
         check.within("transmission", self.transmission, 1e-3..=1.0, "");
-        check.within("blur_px", self.blur_px, 0.0..=50.0, "px");
+        check.within("blur_px", self.blur_px, BLUR_PX, "px");
         check.within("halo_share", self.halo_share, 0.0..=1.0, "");
         check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
         check.within("veil_share", self.veil_share, 0.0..=1.0, "");

@@ -24,9 +24,9 @@
 //!     ..ExposureSettings::default()
 //! };
 //! let mut control = AutoExposure::new(&settings, Exposed { exposure_s: 20e-6, gain_db: 0.0 }, 4.0);
-//! let first = control.take(0);
-//! control.on_image(0, &image::GrayImage::new(64, 48));
-//! assert!(control.take(1).exposure_s > first.exposure_s);
+//! let first = control.now();
+//! control.on_image(&first, &image::GrayImage::new(64, 48));
+//! assert!(control.now().exposure_s > first.exposure_s);
 //! ```
 
 use crate::track::{Checker, Problem};
@@ -34,14 +34,11 @@ use crate::twin::render::{SensorSettings, View};
 use image::GrayImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::VecDeque;
 
 /// Most that one frame changes exposure times gain by, up or down.
 pub const MAX_STEP: f64 = 4.0;
 /// Relative error of the measured level that is left alone.
 pub const DEAD_BAND: f64 = 0.05;
-/// Frames whose exposure is remembered until they arrive.
-const REMEMBERED: usize = 32;
 
 /// Who sets exposure and gain.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -67,8 +64,9 @@ pub struct ExposureSettings {
     pub target_grey: f64,
     /// Shortest exposure, us. Default 10.
     pub min_exposure_us: f64,
-    /// Longest exposure, us. A rig that reads blinking lamps needs less than their chip time.
-    /// Default: the exposure that the camera begins with.
+    /// Longest exposure, us; so exposed, all rows must close within a frame, and images are delivered
+    /// when such a frame would be over. A rig that reads blinking lamps needs less than their chip
+    /// time. Default: the exposure that the camera begins with.
     pub max_exposure_us: Option<f64>,
     /// Least gain, dB. Default 0.
     pub min_gain_db: f64,
@@ -94,20 +92,36 @@ impl Default for ExposureSettings {
 }
 
 impl ExposureSettings {
+    /// The longest exposure of a camera that begins with `exposure_us`, us.
+    pub fn longest_us(&self, exposure_us: f64) -> f64 {
+        match self.mode {
+            ExposureMode::Fixed => exposure_us,
+            ExposureMode::Auto => exposure_us.max(self.max_exposure_us.unwrap_or(exposure_us)),
+        }
+    }
+
     /// Appends what is wrong, with keys below `at`, for a camera that begins with an exposure of
-    /// `exposure_us` and takes a frame every `frame_us`.
-    pub fn check(&self, at: &str, exposure_us: f64, frame_us: f64, problems: &mut Vec<Problem>) {
-        let max_exposure_us = self.max_exposure_us.unwrap_or(exposure_us);
+    /// `exposure_us`. Whether the longest one fits into a frame, the camera knows.
+    pub fn check(&self, at: &str, exposure_us: f64, problems: &mut Vec<Problem>) {
         let mut check = Checker::new(at, problems);
         check.within("percentile", self.percentile, 0.0..=1.0, "");
         check.within("target_grey", self.target_grey, 1.0..=250.0, "");
         check.within("min_exposure_us", self.min_exposure_us, 0.1..=1e7, "us");
-        check.within("max_exposure_us", max_exposure_us, 0.1..=1e7, "us");
+        if let Some(longest_us) = self.max_exposure_us {
+            check.within("max_exposure_us", longest_us, 0.1..=1e7, "us");
+        }
         check.within("min_gain_db", self.min_gain_db, -20.0..=60.0, "dB");
         check.within("max_gain_db", self.max_gain_db, -20.0..=60.0, "dB");
         check.within("damping", self.damping, 0.0..=0.95, "");
+        if self.mode == ExposureMode::Auto {
+            self.check_limits(at, exposure_us, problems);
+        }
+    }
+
+    fn check_limits(&self, at: &str, exposure_us: f64, problems: &mut Vec<Problem>) {
+        let most_us = self.max_exposure_us.unwrap_or(exposure_us);
         let limits = [
-            ("exposure_us", self.min_exposure_us, max_exposure_us, "us"),
+            ("exposure_us", self.min_exposure_us, most_us, "us"),
             ("gain_db", self.min_gain_db, self.max_gain_db, "dB"),
         ];
         for (key, low, high, unit) in limits {
@@ -118,15 +132,6 @@ impl ExposureSettings {
                     format!("give {high} {unit} or less, or raise max_{key}"),
                 ));
             }
-        }
-        if max_exposure_us > frame_us {
-            problems.push(Problem::new(
-                format!("{at}.max_exposure_us"),
-                format!(
-                    "an exposure of {max_exposure_us} us is longer than the frame, {frame_us:.0} us"
-                ),
-                format!("expose for less than {frame_us:.0} us, or take fewer frames a second"),
-            ));
         }
     }
 }
@@ -154,8 +159,6 @@ pub struct AutoExposure {
     max_exposure_s: f64,
     black_grey: f64,
     now: Exposed,
-    /// Frames on their way, with what they were taken with.
-    taken: VecDeque<(u32, Exposed)>,
 }
 
 impl AutoExposure {
@@ -168,7 +171,6 @@ impl AutoExposure {
                 .map_or(start.exposure_s, |us| 1e-6 * us),
             black_grey,
             now: start,
-            taken: VecDeque::new(),
         }
     }
 
@@ -181,36 +183,25 @@ impl AutoExposure {
         Self::new(settings, start, sensor.black_level_grey)
     }
 
-    /// What frame `number` is taken with.
-    pub fn take(&mut self, number: u32) -> Exposed {
-        if self.settings.mode == ExposureMode::Auto {
-            if self.taken.len() >= REMEMBERED {
-                self.taken.pop_front();
-            }
-            self.taken.push_back((number, self.now));
+    /// What the next frame is taken with.
+    pub fn now(&self) -> Exposed {
+        self.now
+    }
+
+    /// Takes a frame with it: all views that the camera has of it.
+    pub fn expose(&self, views: &mut [View]) -> Exposed {
+        for view in views {
+            view.camera.shutter.exposure_s = self.now.exposure_s;
+            view.sensor.gain_db = self.now.gain_db;
         }
         self.now
     }
 
-    /// Takes frame `number` with it: all views that the camera has of it.
-    pub fn expose(&mut self, number: u32, views: &mut [View]) {
-        if self.settings.mode == ExposureMode::Auto {
-            let with = self.take(number);
-            for view in views {
-                view.camera.shutter.exposure_s = with.exposure_s;
-                view.sensor.gain_db = with.gain_db;
-            }
+    /// An image is delivered that was taken with `taken`.
+    pub fn on_image(&mut self, taken: &Exposed, image: &GrayImage) {
+        if self.settings.mode == ExposureMode::Fixed {
+            return;
         }
-    }
-
-    /// An image is delivered.
-    pub fn on_image(&mut self, number: u32, image: &GrayImage) {
-        let Some(at) = self.taken.iter().position(|(n, _)| *n == number) else {
-            return;
-        };
-        let Some((_, taken)) = self.taken.drain(..=at).next_back() else {
-            return;
-        };
         let over_black = self.level(image) - self.black_grey;
         let wanted = self.settings.target_grey / over_black.max(0.5);
         if (wanted - 1.0).abs() < DEAD_BAND {
@@ -263,6 +254,7 @@ impl AutoExposure {
 mod tests {
     use super::*;
     use crate::twin::random::Stream;
+    use std::collections::VecDeque;
 
     const BLACK: f64 = 4.0;
 
@@ -302,12 +294,12 @@ mod tests {
         let mut on_the_way = VecDeque::new();
         (0..80)
             .map(|number| {
-                let with = control.take(number);
-                on_the_way.push_back((number, image(light(number), &with, number)));
+                let with = control.now();
+                on_the_way.push_back((with, image(light(number), &with, number)));
                 if on_the_way.len() > latency
-                    && let Some((number, image)) = on_the_way.pop_front()
+                    && let Some((taken, image)) = on_the_way.pop_front()
                 {
-                    control.on_image(number, &image);
+                    control.on_image(&taken, &image);
                 }
                 with
             })
@@ -384,27 +376,39 @@ mod tests {
         assert!(fixed.iter().all(|with| *with == start()));
     }
 
-    /// Fails where limits that exclude each other, or an exposure over the frame, get through.
+    /// Fails where limits that exclude each other get through, or bind a camera that nobody controls.
     #[test]
     fn bad_limits_are_refused() {
-        let mut problems = Vec::new();
-        auto().check("exposure", 30.0, 33_333.0, &mut problems);
-        ExposureSettings::default().check("exposure", 30.0, 33_333.0, &mut problems);
-        assert!(problems.is_empty());
-        let settings = ExposureSettings {
+        let keys = |settings: ExposureSettings, exposure_us: f64| {
+            let mut problems = Vec::new();
+            settings.check("exposure", exposure_us, &mut problems);
+            problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+        };
+        assert_eq!(keys(auto(), 30.0), [""; 0]);
+        assert_eq!(keys(ExposureSettings::default(), 5.0), [""; 0]);
+        let crossed = ExposureSettings {
             min_exposure_us: 60.0,
+            min_gain_db: 30.0,
             ..auto()
         };
-        settings.check("exposure", 30.0, 33_333.0, &mut problems);
-        let settings = ExposureSettings {
-            max_exposure_us: Some(1e5),
+        let expected = ["exposure.min_exposure_us", "exposure.min_gain_db"];
+        assert_eq!(keys(crossed, 30.0), expected);
+        let never = ExposureSettings {
+            max_exposure_us: Some(f64::NAN),
             ..auto()
         };
-        settings.check("exposure", 30.0, 33_333.0, &mut problems);
-        let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
-        assert_eq!(
-            keys,
-            ["exposure.min_exposure_us", "exposure.max_exposure_us"]
-        );
+        assert_eq!(keys(never, 30.0), ["exposure.max_exposure_us"]);
+    }
+
+    /// Fails where a written exposure over the limit is forgotten, which the first frames have.
+    #[test]
+    fn the_longest_exposure_is_the_written_one_or_the_limit() {
+        assert!((auto().longest_us(30.0) - 50.0).abs() < 1e-12);
+        assert!((auto().longest_us(70.0) - 70.0).abs() < 1e-12);
+        let fixed = ExposureSettings {
+            mode: ExposureMode::Fixed,
+            ..auto()
+        };
+        assert!((fixed.longest_us(30.0) - 30.0).abs() < 1e-12);
     }
 }

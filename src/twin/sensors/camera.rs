@@ -33,6 +33,12 @@ pub struct Trigger {
     jitter_us: f64,
 }
 
+/// Widest texture that every graphics adapter has.
+const MOST_SIDE_PX: u32 = 8192;
+/// The pixel map holds four bytes a pixel, rows filled up to four pixels, and every graphics adapter
+/// binds a storage buffer of 128 MiB.
+const MOST_PIXELS: u64 = 32_000_000;
+
 /// Draws farther off than this many standard deviations are held there.
 const MOST_SIGMAS: f64 = 4.0;
 
@@ -115,7 +121,7 @@ impl Optics {
         positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
         let mut check = Checker::new(at, problems);
         for (key, value) in [("width_px", self.width_px), ("height_px", self.height_px)] {
-            check.within(key, f64::from(value), 16.0..=8192.0, "px");
+            check.within(key, f64::from(value), 16.0..=f64::from(MOST_SIDE_PX), "px");
         }
         if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
             problems.push(Problem::new(
@@ -127,8 +133,30 @@ impl Optics {
                 "give the time from row to row in us, 0 for a global shutter",
             ));
         }
+        self.check_pixels(at, problems);
         self.check_frame_time(at, problems);
         self.check_lens(at, problems);
+    }
+
+    /// The picture must fit where it is drawn; sides that are out of range are problems of their own.
+    fn check_pixels(&self, at: &str, problems: &mut Vec<Problem>) {
+        let (width, height) = (self.width_px, self.height_px);
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > MOST_PIXELS && width.max(height) <= MOST_SIDE_PX {
+            problems.push(Problem::new(
+                format!("{at}.height_px"),
+                format!(
+                    "{width} x {height} px are {:.1} million; a graphics adapter binds 128 MiB at \
+                     once, which is room for the figures of {} million",
+                    1e-6 * pixels as f64,
+                    MOST_PIXELS / 1_000_000
+                ),
+                format!(
+                    "read at most {} rows, or fewer columns",
+                    MOST_PIXELS / u64::from(width)
+                ),
+            ));
+        }
     }
 
     /// Principal point and distortion.
@@ -198,8 +226,7 @@ impl Optics {
             return;
         }
         self.check_reach(at, problems);
-        let span_us = 1e6 * self.camera().shutter.frame_span_s(self.height_px);
-        let frame_us = 1e6 / self.frames_per_s;
+        let (span_us, frame_us) = (self.span_us(), 1e6 / self.frames_per_s);
         if span_us > frame_us {
             problems.push(Problem::new(
                 format!("{at}.line_time_us"),
@@ -211,6 +238,51 @@ impl Optics {
                 "give a smaller error",
             ));
         }
+    }
+
+    /// These, with the longest exposure that a control may choose.
+    pub fn exposed_longest(&self, control: &ExposureSettings) -> Self {
+        Self {
+            exposure_us: control.longest_us(self.exposure_us),
+            ..*self
+        }
+    }
+
+    /// A control may lengthen the exposure, its settings being under the key `at`: what holds for
+    /// the written one holds for the longest.
+    pub fn check_control(&self, control: &ExposureSettings, at: &str, problems: &mut Vec<Problem>) {
+        control.check(at, self.exposure_us, problems);
+        let longest = self.exposed_longest(control);
+        let (span_us, frame_us) = (longest.span_us(), 1e6 / self.frames_per_s);
+        // Of a written one that is too long, the camera's own check tells.
+        if self.span_us() <= frame_us && span_us > frame_us {
+            problems.push(Problem::new(
+                format!("{at}.max_exposure_us"),
+                format!(
+                    "exposed for {} us, {} rows of {} us take {span_us:.0} us, but a frame lasts \
+                     {frame_us:.0} us at {} {}",
+                    longest.exposure_us,
+                    self.height_px,
+                    self.line_time_us,
+                    self.frames_per_s,
+                    self.rate_key
+                ),
+                format!(
+                    "give at most {:.0} us, or lower height_px, line_time_us or {}",
+                    (frame_us - span_us + longest.exposure_us).floor(),
+                    self.rate_key
+                ),
+            ));
+        }
+    }
+
+    /// From the opening of the first row to the closing of the last.
+    pub fn span_s(&self) -> f64 {
+        self.camera().shutter.frame_span_s(self.height_px)
+    }
+
+    fn span_us(&self) -> f64 {
+        1e6 * self.span_s()
     }
 
     /// The last row must close before the next frame's first one opens.
@@ -233,7 +305,7 @@ impl Optics {
             ));
             return;
         }
-        let span_us = self.camera().shutter.frame_span_s(self.height_px) * 1e6;
+        let span_us = self.span_us();
         if span_us > frame_us {
             let fits = ((frame_us - self.exposure_us) / self.line_time_us).floor() + 1.0;
             problems.push(Problem::new(
@@ -258,7 +330,7 @@ pub struct WaysideCameraSettings {
     pub pixel_um: f64,
     /// Columns. Default 1920.
     pub width_px: u32,
-    /// Rows. Default 1080.
+    /// Rows; 32 million pixels at most. Default 1080.
     pub height_px: u32,
     /// Principal point right of the picture's middle, px. Default 0.
     pub principal_u_px: f64,
@@ -413,9 +485,8 @@ impl WaysideCameraSettings {
         check_jitter(at, self.frame_jitter_us, self.frames_per_s, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         self.lens.check(&format!("{at}.lens"), problems);
-        let frame_us = 1e6 / self.frames_per_s;
         let control = format!("{at}.exposure_control");
-        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
+        (self.optics()).check_control(&self.exposure_control, &control, problems);
         let error = self.calibration_error;
         let at = format!("{at}.calibration_error");
         let mut check = Checker::new(&at, problems);
@@ -434,8 +505,16 @@ impl WaysideCameraSettings {
         within("chainage_m", error.chainage_m, "m", 1.0);
         within("lateral_m", error.lateral_m, "m", 0.5);
         within("height_m", error.height_m, "m", 0.5);
+        let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
+        let actual = longest(self.actual_camera().optics());
+        actual.check_actual(&longest(self.optics()), &at, problems);
+    }
+
+    /// From the start of a frame to the closing of its last row, with the longest exposure that it
+    /// may have.
+    pub fn longest_span_s(&self) -> f64 {
         let actual = self.actual_camera().optics();
-        actual.check_actual(&self.optics(), &at, problems);
+        actual.exposed_longest(&self.exposure_control).span_s()
     }
 
     fn optics(&self) -> Optics {
@@ -580,6 +659,16 @@ mod tests {
                  calibration_error = { line_time_us = 1.0 }",
                 "calibration_error.line_time_us",
                 "the line time is really 81 us, in which 1080 rows take 100399 us",
+            ),
+            (
+                "width_px = 8192\nheight_px = 4096",
+                "height_px",
+                "8192 x 4096 px are 33.6 million",
+            ),
+            (
+                "exposure_control = { mode = 'auto', max_exposure_us = 90000.0 }",
+                "exposure_control.max_exposure_us",
+                "exposed for 90000 us, 1080 rows of 14.8 us take 105969 us",
             ),
             (
                 "frame_jitter_us = 2e4",

@@ -28,7 +28,7 @@ use super::ExposureSettings;
 use super::camera::{Optics, ReadOut, check_jitter, most_jitter_s, mounted, positive};
 use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration};
 use crate::track::{Checker, LampSite, Problem, Tunnel};
-use crate::twin::render::{LensSettings, SensorSettings};
+use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,7 +43,7 @@ pub struct RigSettings {
     pub pixel_um: f64,
     /// Columns of either eye's image. Default 1280.
     pub width_px: u32,
-    /// Rows of either eye's image. Default 720.
+    /// Rows of either eye's image; 32 million pixels at most. Default 720.
     pub height_px: u32,
     /// Left eye's principal point right of the picture's middle, px. Default 0.
     pub principal_u_px: f64,
@@ -159,7 +159,7 @@ pub struct RigError {
     pub principal_v_px: f64,
     /// Distortion of r^2 of both lenses. Default 0.
     pub k1: f64,
-    /// Blur of both lenses, px (`lens.blur_px`). Default 0.
+    /// Blur of both lenses, px (`lens.blur_px`); the sum is 0 to 50. Default 0.
     pub blur_px: f64,
     /// Line time, us. Default 0.
     pub line_time_us: f64,
@@ -205,10 +205,16 @@ impl RigSettings {
         1e-6 * self.trigger_offset_us
     }
 
+    /// From the start of an eye's frame to the closing of its last row, with the longest exposure
+    /// that it may have.
+    pub fn longest_span_s(&self) -> f64 {
+        let longest = self.optics().exposed_longest(&self.exposure_control);
+        longest.span_s()
+    }
+
     /// From the start that a pair says to the closing of its last row, at the latest.
     pub fn pair_span_s(&self) -> f64 {
-        let camera = self.optics().camera();
-        camera.shutter.frame_span_s(self.height_px)
+        self.longest_span_s()
             + self.trigger_offset_s().max(0.0)
             + most_jitter_s(self.frame_jitter_us)
     }
@@ -264,9 +270,8 @@ impl RigSettings {
         self.right
             .check(&format!("{at}.right"), &self.optics(), problems);
         self.lens.check(&format!("{at}.lens"), problems);
-        let frame_us = 1e6 / self.pairs_per_s;
         let control = format!("{at}.exposure_control");
-        (self.exposure_control).check(&control, self.exposure_us, frame_us, problems);
+        (self.optics()).check_control(&self.exposure_control, &control, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
         positive(problems, at, "height_m", self.height_m, "m", 1.7);
@@ -303,9 +308,33 @@ impl RigSettings {
         within("vergence_deg", error.vergence_deg, "deg", 5.0);
         within("right_pitch_deg", error.right_pitch_deg, "deg", 5.0);
         within("right_roll_deg", error.right_roll_deg, "deg", 5.0);
-        let actual = self.as_built();
-        let left = actual.optics();
-        left.check_actual(&self.optics(), at, problems);
+        self.check_blur(at, problems);
+        self.check_built(at, problems);
+    }
+
+    /// The lens with its error must blur as a lens can.
+    fn check_blur(&self, at: &str, problems: &mut Vec<Problem>) {
+        let (sheet_px, error_px) = (self.lens.blur_px, self.calibration_error.blur_px);
+        let (least_px, most_px) = BLUR_PX.into_inner();
+        if BLUR_PX.contains(&sheet_px) {
+            let range_px = least_px - sheet_px..=most_px - sheet_px;
+            Checker::new(at, problems).within("blur_px", error_px, range_px, "px");
+        }
+    }
+
+    /// Both eyes as they really are. What holds for both is said once.
+    fn check_built(&self, at: &str, problems: &mut Vec<Problem>) {
+        let built = self.as_built();
+        let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
+        let found = problems.len();
+        for (actual, sheet) in [
+            (built.optics(), self.optics()),
+            (built.right_optics(), self.right_optics()),
+        ] {
+            if problems.len() == found {
+                longest(actual).check_actual(&longest(sheet), at, problems);
+            }
+        }
     }
 
     fn right_optics(&self) -> Optics {
@@ -655,6 +684,47 @@ mod tests {
                 "it turns back",
             ),
             (
+                "calibration_error = { blur_px = -0.6 }",
+                "calibration_error.blur_px",
+                "-0.6 px is out of range",
+            ),
+            (
+                "lens = { blur_px = 2.0 }\ncalibration_error = { blur_px = 48.5 }",
+                "calibration_error.blur_px",
+                "48.5 px is out of range",
+            ),
+            (
+                "calibration_error = { blur_px = nan }",
+                "calibration_error.blur_px",
+                "NaN px is out of range",
+            ),
+            (
+                "right = { distortion = { k1 = -0.2 } }\ncalibration_error = { k1 = -0.2 }",
+                "calibration_error",
+                "it turns back at r = 0.866",
+            ),
+            (
+                "width_px = 8192\nheight_px = 8192\nline_time_us = 0.0",
+                "height_px",
+                "8192 x 8192 px are 67.1 million",
+            ),
+            (
+                "exposure_control = { mode = 'auto', max_exposure_us = 20000.0 }",
+                "exposure_control.max_exposure_us",
+                "exposed for 20000 us, 720 rows of 22.2 us take 35962 us, but a frame lasts 33333 us",
+            ),
+            (
+                "exposure_control = { mode = 'auto', max_exposure_us = 17300.0 }\n\
+                 calibration_error = { line_time_us = 0.3 }",
+                "calibration_error.line_time_us",
+                "the line time is really 22.5 us, in which 720 rows take 33477 us",
+            ),
+            (
+                "exposure_us = 5.0\nexposure_control = { mode = 'auto' }",
+                "exposure_control.min_exposure_us",
+                "10 us is more than the most, 5 us",
+            ),
+            (
                 "height_px = 1490\ncalibration_error = { line_time_us = 1.0 }",
                 "calibration_error.line_time_us",
                 "the line time is really 23.2 us, in which 1490 rows take 34575 us",
@@ -669,6 +739,10 @@ mod tests {
         for fine in [
             "",
             "line_time_us = 0.0",
+            "width_px = 8192\nheight_px = 3906\nline_time_us = 0.0",
+            "calibration_error = { blur_px = -0.5 }",
+            "exposure_us = 5.0\nexposure_control = { max_exposure_us = 20000.0 }",
+            "exposure_control = { mode = 'auto', max_exposure_us = 17300.0 }",
             "read_out = \"up\"\ntrigger_offset_us = -500.0\nframe_jitter_us = 20.0",
             "focal_length_mm = 2.93\ndistortion = { k1 = -0.283, k2 = 0.074, p1 = 2e-4 }",
             "right = { roll_deg = -0.5, principal_v_px = 12.0, distortion = { k1 = 0.01 } }",
