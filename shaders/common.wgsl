@@ -48,8 +48,11 @@ struct View {
     // Share of light that the air takes on a metre, and the signal of endless air.
     extinction_per_m: f32,
     airlight_e: f32,
-    // Standard deviation of the point spread.
-    blur_px: f32,
+    // Circle of confusion of a point at depth 1, were infinity in focus; one over the distance in
+    // focus; how far away blur looks.
+    confusion_px_m: f32,
+    focus_per_m: f32,
+    reach_px: i32,
     // Lamps that glossy surfaces mirror.
     mirrored: u32,
     headlights: array<Headlight, MAX_HEADLIGHTS>,

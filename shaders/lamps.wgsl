@@ -21,6 +21,10 @@ struct Lamp {
     exponent: f32,
     // Signal of the disc while off.
     dark_e: f32,
+    // Of its spread, see Spread.
+    sharp: f32,
+    flat: f32,
+    ends_px: f32,
 }
 
 struct LampRow {
@@ -43,8 +47,6 @@ struct Instant {
 
 // Lines of constant v across a pixel and its blur.
 const LINES: u32 = 8u;
-// The spread ends this many standard deviations away.
-const BLUR_ENDS: f32 = 3.2;
 
 struct Corner {
     @builtin(position) clip: vec4f,
@@ -92,22 +94,15 @@ fn rays_of(pixel: vec2f) -> Rays {
     return Rays(vec3f(p, 1.0), right, down);
 }
 
-// A pixel's square and the Gaussian of the lens together, along either axis: of variance
-// blur^2 + 1/12 and fourth cumulant -1/120, which Edgeworth's series keeps. To 0.4 % of full light
-// from a blur of 0.25 px up, to 2 % with none; errors lie evenly about an edge and do not shift it.
+// A pixel's square, the Gaussian of the lens and its disc of confusion together, along either axis:
+// variance and fourth cumulant, which Edgeworth's series keeps; see twin/render/gpu/spread.rs.
 struct Spread {
     // One over the standard deviation.
     sharp: f32,
-    // A 24th of the cumulant, less its sign.
+    // A 24th of the cumulant over the square of the variance, less its sign.
     flat: f32,
     // The spread ends this far away.
     ends_px: f32,
-}
-
-fn spread() -> Spread {
-    let variance = view.blur_px * view.blur_px + 1.0 / 12.0;
-    let sigma = sqrt(variance);
-    return Spread(1.0 / sigma, 1.0 / (2880.0 * variance * variance), BLUR_ENDS * sigma);
 }
 
 // Share of the spread below x, for two x (error function by Abramowitz and Stegun 7.1.25).
@@ -128,7 +123,7 @@ fn density(x: f32, s: Spread) -> f32 {
 }
 
 // Share of a pixel that the disc covers.
-fn coverage(rays: Rays, centre: vec3f, normal: vec3f, radius_m: f32) -> f32 {
+fn coverage(rays: Rays, centre: vec3f, normal: vec3f, radius_m: f32, s: Spread) -> f32 {
     let r2 = radius_m * radius_m;
     let plane = dot(normal, centre);
     // Towards the disc's plane, and in it from the centre: both times the slope of the ray.
@@ -139,7 +134,6 @@ fn coverage(rays: Rays, centre: vec3f, normal: vec3f, radius_m: f32) -> f32 {
 
     // Most pixels lie well inside or outside: from pixel to pixel the distance from the centre
     // changes by no more than the greatest gain in the pixel, give or take a tenth.
-    let s = spread();
     let ends_px = s.ends_px;
     let from_m = length(off) / abs(m.x);
     let gain_u = (off_u - off * (m.y / m.x)) / m.x;
@@ -198,12 +192,13 @@ fn disc(in: Corner) -> @location(0) vec4f {
     let rays = rays_of(pixel);
     let first = lamp.instants_at + r * lamp.instants;
 
+    let spread = Spread(lamp.sharp, lamp.flat, lamp.ends_px);
     var cover = 0.0;
     var signal = 0.0;
     // Counted, not compared with the last: lanes beyond the rectangle have no sensible row.
     for (var k = 0u; k < lamp.instants; k++) {
         let instant = instants[first + k];
-        let c = coverage(rays, instant.centre, row.normal, lamp.radius_m);
+        let c = coverage(rays, instant.centre, row.normal, lamp.radius_m, spread);
         cover += c;
         signal += c * instant.signal_e;
     }

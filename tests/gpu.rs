@@ -183,6 +183,7 @@ fn balls_are_in_place(mut view: View, centre: Point3<f64>, velocity_mps: Vector3
         u += (found.0 - right.0) / 9.0;
         v += (found.1 - right.1) / 9.0;
     }
+    println!("{what}: off by {u:.3}, {v:.3} px");
     assert!(u.hypot(v) < 0.05, "{what}: off by {u:.3}, {v:.3} px");
 }
 
@@ -207,7 +208,9 @@ fn bodies_at_100_kmh_are_where_they_belong() {
 #[test]
 fn moving_bodies_are_where_they_belong() {
     let tunnel = sample::tunnel();
-    let view = sample::wayside_job(&tunnel, 80.0).views.remove(0);
+    let mut view = sample::wayside_job(&tunnel, 80.0).views.remove(0);
+    // In a long one the ball's picture grows: its middle is not that of the exposure's middle.
+    view.camera.shutter.exposure_s = 1e-3;
     let centre = tunnel.alignment.world_from_track(TrackPoint {
         s_m: 90.0,
         l_m: 0.0,

@@ -1,7 +1,8 @@
 //! The renderers against each other and against geometry.
 //!
-//! Two programs that share only the scene, the surface constants and the light of lamps draw the
-//! same jobs. Where they may differ, and by how much:
+//! Two programs draw the same jobs. They share the scene, the constants of surfaces, the light of lamps
+//! in time and of their glare, airlight, paintings, the fixed pattern and the pose at a time; all else,
+//! from rays and triangles to noise, each does in its own way. Where they may differ, and by how much:
 //!
 //! | where | why | bound |
 //! |---|---|---|
@@ -9,10 +10,11 @@
 //! | paint in floodlight or at ten times the gain | one texel of a mip or rip map against the mean over the pixel's slanted footprint: softer edges | off by more than 2: 20 %, by more than 20: 2 %; and no shift by a pixel fits as well |
 //! | the same, where both sides differ much | no more than silhouettes have pixels | off by more than 20: 0.3 % |
 //! | silhouettes before wet ground | it is as bright as the lamps that it mirrors | off by more than 2: 1.5 % |
+//! | edges out of focus | a Gaussian for a disc, and light of what is hidden from the middle of the pupil | off by more than 2: 3 % |
 //! | everywhere else | f32, light interpolated over facets | 2 grey levels |
 //! | edges and joints close to the camera | the rasteriser moves corners row by row and draws straight between them: 0.2 px | within the same bounds |
 //! | walls beside a lamp | light falls with a power of the distance; cells are cut to a quarter of it | within the same bounds |
-//! | a lamp's bounding box, full size | an f32 sub-ray of the disc's rim falls on the other side: 1/16 of the disc's signal | 2 % over 2 |
+//! | a lamp's bounding box, full size | a closed form against rays spread over the pixel | 2 % over 2 |
 //! | noise | none: the same streams (`tests/sensor.rs`) | equal mean and variance in every grey band |
 //!
 //! A machine without a graphics adapter fails here: `apt-get install mesa-vulkan-drivers` gives a
@@ -184,6 +186,8 @@ fn share_off(a: &GrayImage, b: &GrayImage, levels: u8) -> f64 {
 
 /// Shares of pixels that may be off by more than 2 and by more than 20 grey levels.
 const OVER_2: f64 = 0.01;
+/// The same out of focus.
+const BLUR_OVER_2: f64 = 0.03;
 /// The same before wet ground.
 const WET_OVER_2: f64 = 0.015;
 /// The same where every bolt shows.
@@ -212,6 +216,8 @@ fn compare(name: &str, scene: &Scene, job: &Job) {
         println!("{name}: shifted by a pixel {shifted:.2} times as far off");
         assert!(shifted > 1.5, "{name}: fits {shifted} when shifted");
         (PAINT_OVER_2, PAINT_OVER_20)
+    } else if name.starts_with("blur") {
+        (BLUR_OVER_2, OVER_20)
     } else if name.starts_with("wet") {
         (WET_OVER_2, OVER_20)
     } else {
@@ -295,7 +301,7 @@ fn wet_ground_mirrors() {
     scene.wet = Wet {
         ranges: vec![(0.0..130.0, true)],
     };
-    for (s_m, exposure_s, gain) in [(100.0, 16e-3, 1.0), (100.0, 1e-3, 15.0), (60.0, 2e-4, 60.0)] {
+    for (s_m, exposure_s, gain) in [(100.0, 16e-3, 1.0), (100.0, 1e-3, 15.0), (60.0, 2e-4, 40.0)] {
         let mut job = wayside_job(&tunnel, s_m, gain);
         let view = &mut job.views[0];
         view.camera.shutter.exposure_s = exposure_s;
@@ -303,6 +309,87 @@ fn wet_ground_mirrors() {
         let name = format!("wet_{s_m}_{:.0}_us", 1e6 * exposure_s);
         compare(&name, &scene, &job);
     }
+}
+
+/// Provokes blur that grows with another power of depth, or that is another on one renderer: lamps, walls
+/// and bodies before lenses that look at what is near. One follows rays through 200 points of the pupil,
+/// the other has formulas for lamps and blurs the rest by its depth.
+#[test]
+fn out_of_focus() {
+    let tunnel = sample::tunnel();
+    for (camera, focus_m, mut job) in [
+        ("rig", 0.3, rig_job(&tunnel, 100.0, 1.0)),
+        ("way", 0.5, wayside_job(&tunnel, 100.0, 1.0)),
+    ] {
+        let view = &mut job.views[0];
+        view.pixel_m *= 2.0;
+        view.lens.focus_m = Some(focus_m);
+        println!(
+            "circle of confusion at infinity {:.2} px",
+            view.confusion_px(f64::INFINITY)
+        );
+        compare(&format!("blur_{camera}"), &sample::scene(), &job);
+    }
+}
+
+/// Provokes a pupil or a circle of confusion of another size: the edge of a board at 4 m, of which a
+/// lens in focus at 1 m makes a ramp whose slope has the variance of a disc along a line, c^2 / 16.
+fn an_edge_is_a_ramp(name: &str, make: fn(Scene) -> Box<dyn Renderer>) {
+    let mut view = sample::wayside_job(&sample::tunnel(), 100.0)
+        .views
+        .remove(0);
+    even(&mut view);
+    view.camera.intrinsics = Intrinsics::centred(480, 120, 1100.0);
+    view.lens.focus_m = Some(1.0);
+    view.lens.f_number = 0.5;
+    let board = Body {
+        shape: Shape::Box(Vector3::new(1.0, 1.0, 1e-3)),
+        world_from_body: view.motion.poses[0] * Isometry3::translation(1.0, 0.0, 4.0),
+        velocity_mps: Vector3::zeros(),
+        albedo: 0.0,
+        luminance_cd_m2: 100.0,
+    };
+    view.set_gain_for(100.0, 200.0);
+    let confusion_px = view.confusion_px(4.0);
+    let mut scene = sample::scene();
+    scene.lamps.clear();
+    let mut tunnel = (*scene.tunnel).clone();
+    (tunnel.ambient_lx, tunnel.sections) = (0.0, Vec::new());
+    scene.tunnel = tunnel.into();
+    let job = Job {
+        bodies: vec![board],
+        views: vec![view],
+        ..Job::default()
+    };
+    let image = draw(&mut *make(scene), &job).remove(0);
+    let column = |u: u32| {
+        (40..80)
+            .map(|v| f64::from(image.get_pixel(u, v)[0]))
+            .sum::<f64>()
+    };
+    let slopes: Vec<_> = (200..280)
+        .map(|u| (f64::from(u) + 0.5, column(u + 1) - column(u)))
+        .collect();
+    let sum: f64 = slopes.iter().map(|(_, slope)| slope).sum();
+    let mean = slopes.iter().map(|(u, slope)| u * slope).sum::<f64>() / sum;
+    let square = |(u, slope): &(f64, f64)| (u - mean).powi(2) * slope;
+    let variance = slopes.iter().map(square).sum::<f64>() / sum;
+    let right = confusion_px.powi(2) / 16.0;
+    println!(
+        "{name}: circle of {confusion_px:.2} px, edge at {mean:.3}, {variance:.3} of {right:.3} px^2"
+    );
+    assert!(confusion_px > 6.0 && (mean - 239.5).abs() < 0.1, "{mean}");
+    assert!((variance / right - 1.0).abs() < 0.05, "{variance} {right}");
+}
+
+#[test]
+fn an_edge_is_a_ramp_on_the_cpu() {
+    an_edge_is_a_ramp("cpu", cpu);
+}
+
+#[test]
+fn an_edge_is_a_ramp_on_the_gpu() {
+    an_edge_is_a_ramp("gpu", gpu);
 }
 
 /// Left camera of the EuRoC MAV data set (M. Burri et al., Int. J. Robotics Research 2016).

@@ -144,7 +144,9 @@ fn structs_agree() {
         pose_middle,
         extinction_per_m,
         airlight_e,
-        blur_px,
+        confusion_px_m,
+        focus_per_m,
+        reach_px,
         mirrored,
         headlights
     );
@@ -178,7 +180,10 @@ fn structs_agree() {
         instants,
         radius_m,
         exponent,
-        dark_e
+        dark_e,
+        sharp,
+        flat,
+        ends_px
     );
     same_layout!("lamps", LampRow, normal, unused);
     same_layout!("lamps", Instant, centre, signal_e);

@@ -61,19 +61,37 @@ pub const OFFSET_M: f64 = 1e-3;
 /// lamps.
 pub const AIRLIGHT_REACH_M: f64 = 20.0;
 
-/// 16 places on a disc, each for a sixteenth of its area: on a spiral of the golden angle (Vogel,
-/// "A better way to construct the sunflower head", Mathematical Biosciences 44, 1979).
+/// 16 places on a disc, each for a sixteenth of its area.
 pub fn disc_places(centre: &Point3<f64>, axis: &Vector3<f64>, radius_m: f64) -> [Point3<f64>; 16] {
+    let mut places = [*centre; 16];
+    for (place, point) in places
+        .iter_mut()
+        .zip(disc_points(centre, axis, radius_m, 16))
+    {
+        *place = point;
+    }
+    places
+}
+
+/// Places on a disc, each for the same share of its area: on a spiral of the golden angle (after
+/// Vogel, "A better way to construct the sunflower head", Mathematical Biosciences 44, 1979).
+pub fn disc_points(
+    centre: &Point3<f64>,
+    axis: &Vector3<f64>,
+    radius_m: f64,
+    count: usize,
+) -> impl Iterator<Item = Point3<f64>> {
     let golden_rad = PI * (3.0 - 5f64.sqrt());
     let aside = axis.cross(&Vector3::z());
     let aside = aside.try_normalize(1e-6).unwrap_or_else(Vector3::x);
-    let up = aside.cross(axis);
-    std::array::from_fn(|k| {
+    let (centre, up) = (*centre, aside.cross(axis));
+    (0..count).map(move |k| {
         let (sin, cos) = (k as f64 * golden_rad).sin_cos();
-        let r = radius_m * ((k as f64 + 0.5) / 16.0).sqrt();
+        let r = radius_m * ((k as f64 + 0.5) / count as f64).sqrt();
         centre + (aside * cos + up * sin) * r
     })
 }
+
 /// Rise and fall time of a lamp's light, from 10 to 90 %: that of an LED driver that switches a
 /// lamp of some ten watts by a transistor; the phosphor's own is a seventh of it or so.
 const EDGE_S: f64 = 1e-6;

@@ -297,6 +297,20 @@ impl View {
         self.camera.shutter.row_mid(self.start, row)
     }
 
+    /// Width of the entrance pupil.
+    pub fn pupil_m(&self) -> f64 {
+        self.camera.intrinsics.fx_px * self.pixel_m / self.lens.f_number
+    }
+
+    /// Diameter of the disc that the lens makes of a point at a depth: the circle of confusion of a
+    /// thin lens, `pupil f |1 / focus - 1 / depth|` with the focal length in pixels as calibrated.
+    pub fn confusion_px(&self, depth_m: f64) -> f64 {
+        let f_px = self.camera.intrinsics.fx_px;
+        self.lens.focus_m.map_or(0.0, |focus_m| {
+            self.pupil_m() * f_px * (1.0 / focus_m - 1.0 / depth_m).abs()
+        })
+    }
+
     /// Photo-electrons that a luminance of 1 cd/m^2 on the axis gives in a row's exposure.
     pub fn electrons_per_cd_m2(&self) -> f64 {
         let lux_s = self.lens.lux_per_cd_m2() * self.camera.shutter.exposure_s;

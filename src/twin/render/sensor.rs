@@ -71,8 +71,11 @@ pub struct LensSettings {
     pub f_number: f64,
     /// Share of the light that passes. Default 0.9.
     pub transmission: f64,
-    /// Standard deviation of the point spread in focus, pixels. Default 0.5.
+    /// Standard deviation of the point spread in focus, with which lamps are seen, pixels. Default 0.5.
     pub blur_px: f64,
+    /// Distance in focus, m; nearer and farther things are blurred by the pupil's width, focal length
+    /// over f number. Default: none, all is in focus.
+    pub focus_m: Option<f64>,
     /// Share of a lamp's light that near glare spreads around it. Default 0.02.
     pub halo_share: f64,
     /// Distance in which the near glare falls to 1/e, pixels. Default 12.
@@ -97,6 +100,7 @@ impl Default for LensSettings {
             f_number: 1.4,
             transmission: 0.9,
             blur_px: 0.5,
+            focus_m: None,
             halo_share: 0.02,
             halo_px: 12.0,
             veil_share: 0.02,
@@ -120,6 +124,11 @@ impl LensSettings {
         }
     }
 
+    /// Share of a lamp's light that is not glare.
+    pub fn direct_share(&self) -> f64 {
+        1.0 - self.halo_share - self.veil_share
+    }
+
     /// Illuminance of the sensor on the axis under a scene of 1 cd/m^2.
     pub fn lux_per_cd_m2(&self) -> f64 {
         0.25 * PI * self.transmission / self.f_number.powi(2)
@@ -131,9 +140,12 @@ impl LensSettings {
         check.within("f_number", self.f_number, 0.5..=64.0, "");
         check.within("transmission", self.transmission, 1e-3..=1.0, "");
         check.within("blur_px", self.blur_px, BLUR_PX, "px");
-        check.within("halo_share", self.halo_share, 0.0..=1.0, "");
+        if let Some(focus_m) = self.focus_m {
+            check.within("focus_m", focus_m, 0.2..=1e6, "m");
+        }
+        check.within("halo_share", self.halo_share, 0.0..=0.5, "");
         check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
-        check.within("veil_share", self.veil_share, 0.0..=1.0, "");
+        check.within("veil_share", self.veil_share, 0.0..=0.5, "");
         check.within("veil_px", self.veil_px, 0.1..=1e4, "px");
         check.within("vignetting", self.vignetting, 0.0..=1.0, "");
         check.within("dirt_share", self.dirt_share, 0.0..=1.0, "");

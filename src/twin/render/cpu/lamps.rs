@@ -206,7 +206,8 @@ pub(super) fn draw_disc(
             continue;
         }
         let cosine = (-middle.normal.dot(&ray) / ray.norm()).max(0.0);
-        let lit = haze.clear * light.luminance_cd_m2 * cosine.powf(light.exponent - 1.0);
+        let direct = haze.clear * view.lens.direct_share();
+        let lit = direct * light.luminance_cd_m2 * cosine.powf(light.exponent - 1.0);
         luminances[u] =
             luminances[u] * (1.0 - share.covered) + dark * share.covered + lit * share.light;
     }

@@ -27,6 +27,8 @@
 //! 4. the glare of each lamp;
 //! 5. the sensor: fixed pattern, noise, bits ([`sensor`](super::sensor)).
 //!
+//! A lens with a distance in focus is looked through at many points of its pupil (`pupil.rs`).
+//!
 //! Where something moves in the picture by more than a pixel while a row is exposed, the exposure
 //! is cut into slices in which nothing does, and all this is done in each of them;
 //! [`CpuRenderer::sliced`] cuts it into as many as one likes.
@@ -34,7 +36,7 @@
 //! Rows are independent of each other, so any number of threads gives the same bytes. What a
 //! camera that stands still sees of the tunnel is kept from frame to frame.
 //!
-//! Not here: the point spread of anything but lamps. Beyond [`SIGHT_M`]
+//! Not here: the point spread in focus of anything but lamps. Beyond [`SIGHT_M`]
 //! the tunnel is dark.
 
 mod blinking;
@@ -44,6 +46,7 @@ pub mod labels;
 mod lamps;
 mod look;
 mod outline;
+mod pupil;
 mod sensor;
 mod shadow;
 mod sight;
@@ -226,12 +229,14 @@ impl CpuRenderer {
         let Some(&pose) = view.motion.poses.first() else {
             return RawImage::new(camera.width_px, camera.height_px);
         };
-        let still = view.motion.poses.len() == 1;
+        // Through a wide pupil every point looks from a place of its own.
+        let still = view.motion.poses.len() == 1 && pupil::is_small(view);
         let kept = still.then(|| self.keep(&view.camera, pose));
         let lamps = self.world.lamps_by_distance(&pose);
         let slab = (self.world.tunnel).slab_of(&Point3::from(pose.translation.vector), None);
         let scenery = Scenery::new(&self.world, job, view, slab);
-        let dim = (!still && !self.every_ray).then(|| DimView::new(&self.world, &scenery, view));
+        let dim = (!still && !self.every_ray && pupil::is_small(view))
+            .then(|| DimView::new(&self.world, &scenery, view));
         let behind = match (kept.and_then(|k| self.kept.get(k)), &dim) {
             (Some(kept), _) => Behind::Kept(&kept.ground),
             (None, Some(dim)) => Behind::Dim(dim),
@@ -241,13 +246,17 @@ impl CpuRenderer {
         let spread = Spread::new(view.lens.blur_px);
         let pixels = camera.width_px as usize * camera.height_px as usize;
         let mut signals_e = vec![0.0; pixels];
-        let electrons = view.electrons_per_cd_m2() / slices as f64;
+        let looks = pupil::looks(view);
+        let electrons = view.electrons_per_cd_m2() / (slices * looks.len()) as f64;
         // An image without pixels has no rows.
         signals_e
             .par_chunks_mut((camera.width_px as usize).max(1))
             .enumerate()
             .for_each_init(RowBuffers::default, |buffers, (v, signals_e)| {
-                for k in 0..slices {
+                for (view, k) in looks
+                    .iter()
+                    .flat_map(|look| (0..slices).map(move |k| (look, k)))
+                {
                     let row = RowExposure::slice(view, v, k, slices);
                     let rays = RowRays::new(&self.world, &scenery, view, &row, behind);
                     rays.draw(&lamps, &spread, buffers);
@@ -494,7 +503,7 @@ impl<'a> RowRays<'a> {
             0.0
         };
         blinking_lx + headlights_lx(&job.headlights, &world.air, p, n)
-            - shades.hidden_lx(slab, p, n, &self.blockers, world)
+            - shades.hidden_lx(slab, (p, n), (&self.blockers, &self.blinking), world)
     }
 
     /// Luminance of what the tunnel's surface mirrors.

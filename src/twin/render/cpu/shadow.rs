@@ -5,6 +5,7 @@
 //! is known beforehand which bodies may throw a shadow of which light into which slab of the
 //! tunnel: where the ball around the slab meets the shadow of the ball around the body.
 
+use super::blinking::Blinking;
 use super::solid::Solid;
 use super::tunnel::TunnelCaster;
 use super::{SIGHT_M, World};
@@ -231,9 +232,8 @@ impl<'a> Shades<'a> {
     pub fn hidden_lx(
         &self,
         slab: usize,
-        p: &Point3<f64>,
-        n: &Vector3<f64>,
-        blockers: &[Blocker<'_>],
+        (p, n): (&Point3<f64>, &Vector3<f64>),
+        (blockers, blinking): (&[Blocker<'_>], &Blinking),
         world: &World,
     ) -> f64 {
         let lights = self.falling_on(slab).iter();
@@ -253,7 +253,10 @@ impl<'a> Shades<'a> {
                 if share <= 0.0 {
                     return 0.0;
                 }
-                share * source.irradiance_lx(p, n) * world.air.transmission(distance)
+                // Lamps come first, and headlights do not blink.
+                let flicker = blinking.flicker.get(falling.source).unwrap_or(&0.0);
+                let lux = source.irradiance_lx(p, n) * (1.0 + flicker);
+                share * lux * world.air.transmission(distance)
             })
             .sum()
     }

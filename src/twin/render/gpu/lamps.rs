@@ -5,6 +5,7 @@
 //! straight between them: at 20 m/s^2 it strays from that by less than a micrometre.
 
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
+use super::spread::Spread;
 use super::view::{Framed, single};
 use crate::twin::render::light::Shining;
 use crate::twin::render::scene::{Air, LampLight, View};
@@ -23,8 +24,6 @@ const MAX_INSTANTS: f64 = 64.0;
 /// Points of a rim that its bounds are taken from, and what they may miss.
 const RIM_POINTS: u32 = 32;
 const RIM_SLACK: f64 = 1.05;
-/// The spread of a pixel's light ends this many standard deviations away.
-const BLUR_ENDS: f64 = 3.2;
 
 /// Lamps of the view at hand, and the buffers to make them in.
 #[derive(Default)]
@@ -220,14 +219,16 @@ impl LampTable {
         let Some(extent_px) = self.extent_px(exposed) else {
             return;
         };
-        let ends_px = 1.1 * BLUR_ENDS * (view.lens.blur_px.powi(2) + 1.0 / 12.0).sqrt();
+        let spread = self.spread(exposed);
+        let ends_px = 1.1 * spread.ends_px;
         let smear = self.smear_px(exposed);
         let reach_px = extent_px * RIM_SLACK + smear.add_scalar(ends_px + 0.5);
         let Some(bounds) = self.bounds(exposed, reach_px) else {
             return;
         };
         let count = (smear.norm() / STEP_PX).ceil().clamp(1.0, MAX_INSTANTS) as u32;
-        let axial_e = lamp.luminance_cd_m2 * view.electrons_per_cd_m2();
+        let direct_cd_m2 = view.lens.direct_share() * lamp.luminance_cd_m2;
+        let axial_e = direct_cd_m2 * view.electrons_per_cd_m2();
         let dark_cd_m2 = exposed.clear * DARK_DISC_ALBEDO * around.ambient_lx / PI
             + (1.0 - exposed.clear) * around.airlight_cd_m2;
         let dark_e = dark_cd_m2 * view.electrons_per_cd_m2();
@@ -242,7 +243,9 @@ impl LampTable {
             radius_m: lamp.radius_m as f32,
             exponent: (lamp.exponent - 1.0) as f32,
             dark_e: dark_e as f32,
-            unused: 0,
+            sharp: (1.0 / spread.sigma_px) as f32,
+            flat: spread.flat as f32,
+            ends_px: spread.ends_px as f32,
         });
         let step_s = view.camera.shutter.exposure_s / f64::from(count);
         for v in bounds.rows.0..=bounds.rows.1 {
@@ -265,6 +268,14 @@ impl LampTable {
                 unused: 0.0,
             });
         }
+    }
+
+    /// The spread of the lamp's light, at the depth that it has in the middle of the picture.
+    fn spread(&self, exposed: &Exposed<'_>) -> Spread {
+        let view = exposed.view;
+        let middle = exposed.mid_s(view.camera.intrinsics.height_px / 2);
+        let depth_m = self.track.at(middle).map_or(f64::INFINITY, |s| s.centre.z);
+        Spread::new(view.lens.blur_px, view.confusion_px(depth_m.max(0.1)))
     }
 
     /// How far the rim reaches from the centre in the image, in the row that sees the centre.

@@ -147,12 +147,16 @@ pub struct View {
     pub extinction_per_m: f32,
     /// Signal of endless air.
     pub airlight_e: f32,
-    /// Standard deviation of the point spread.
-    pub blur_px: f32,
+    /// Circle of confusion of a point at depth 1 m, were infinity in focus.
+    pub confusion_px_m: f32,
+    /// One over the distance in focus.
+    pub focus_per_m: f32,
+    /// What is out of focus is blurred by what is up to this far away.
+    pub reach_px: i32,
     /// Lamps that glossy surfaces mirror.
     pub mirrored: u32,
     /// Fills the stride.
-    pub unused: [u32; 3],
+    pub unused: u32,
     /// Headlights.
     pub headlights: [Headlight; MAX_HEADLIGHTS],
 }
@@ -179,8 +183,12 @@ pub struct Lamp {
     pub exponent: f32,
     /// Signal of the disc while off.
     pub dark_e: f32,
-    /// Fills the stride.
-    pub unused: u32,
+    /// One over the standard deviation of its spread.
+    pub sharp: f32,
+    /// A 24th of the spread's fourth cumulant over the square of its variance, less its sign.
+    pub flat: f32,
+    /// The spread ends this far away.
+    pub ends_px: f32,
 }
 
 /// A disc while one row is exposed.

@@ -38,6 +38,7 @@
 //! camera; glare of a lamp under a quarter of the usual read noise is not drawn.
 
 mod adapter;
+mod backdrop;
 mod bend;
 mod chunks;
 mod glare;
@@ -49,6 +50,7 @@ mod pipeline;
 mod shadows;
 mod sight;
 mod smear;
+mod spread;
 mod target;
 mod textures;
 mod tunnel;
@@ -64,6 +66,7 @@ use super::scene::{Job, LampsInTime, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::SimTime;
 use adapter::Gpu;
+use backdrop::{Backdrops, Key};
 use chunks::{Chunks, Line};
 use glare::GlareTarget;
 use image::GrayImage;
@@ -93,6 +96,7 @@ pub struct GpuRenderer {
     maps: MapCache<wgpu::Buffer>,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
+    backdrops: Backdrops,
     glares: Vec<GlareTarget>,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
@@ -136,6 +140,7 @@ impl GpuRenderer {
             maps: MapCache::default(),
             views: Vec::new(),
             targets: Vec::new(),
+            backdrops: Backdrops::default(),
             glares: Vec::new(),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
@@ -149,6 +154,7 @@ impl GpuRenderer {
         if let Some(lamps) = self.lamps.changed(time) {
             self.field = LampField::new(&lamps).in_air(self.scene.air);
             self.chunks = Chunks::default();
+            self.backdrops.clear();
         }
     }
 
@@ -194,10 +200,15 @@ impl GpuRenderer {
                 .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
             let (pipelines, sight) = (&self.pipelines, &self.scratch.sight);
             let background = (pipelines, &backgrounds);
-            buffers.draw_background(gpu, background, encoder, target, sight, &stock);
+            let key = Key::of(&framed, sight);
+            let onto = (target, &mut self.backdrops);
+            buffers.draw_background(gpu, background, encoder, onto, (sight, key), &stock);
             buffers.draw_shadows(gpu, pipelines, encoder, target);
             let gloss = &backgrounds[1].gloss;
             buffers.draw_gloss(gpu, gloss, encoder, target, (sight, &stock));
+            if framed.defocus_reach_px() > 0 {
+                buffers.blur(gpu, pipelines, encoder, target);
+            }
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_glare(gpu, pipelines, encoder, glare);
             let map = MapKey::new(framed.view);

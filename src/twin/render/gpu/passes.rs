@@ -1,6 +1,7 @@
 //! The buffers of one view and the passes that draw it.
 
 use super::adapter::Gpu;
+use super::backdrop::{Backdrops, Key};
 use super::chunks::Chunks;
 use super::glare::GlareTarget;
 use super::lamps::LampTable;
@@ -8,10 +9,12 @@ use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Mirrored, Pose, Vie
 use super::pipeline::{Background, Pipelines, bind};
 use super::shadows::{ShadowBuffers, Shadows};
 use super::sight::{Draw, Sight};
-use super::target::Target;
+use super::target::{Layers, Target};
 use super::textures::Textures;
 use std::mem::size_of;
 use std::ops::Range;
+
+const BLACK: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
 
 /// A buffer that grows with what is written to it.
 pub struct Upload {
@@ -218,56 +221,48 @@ impl ViewBuffers {
     }
 
     /// Tunnel and bodies in the mean over the exposure; with the pipelines for what no headlight
-    /// lights and for what they light.
+    /// lights and for what they light. A tunnel with a key is kept for the next frame.
     pub fn draw_background(
         &self,
         gpu: &Gpu,
         (pipelines, backgrounds): (&Pipelines, &[Background; 2]),
         encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        sight: &Sight,
+        (target, backdrops): (&Target, &mut Backdrops),
+        (sight, key): (&Sight, Option<Key>),
         stock: &Stock<'_>,
     ) {
         let brushes = (backgrounds.each_ref()).map(|b| self.brushes(gpu, b, sight, stock));
-        let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin(encoder, &target.signal, clear, Some(&target.depth));
-        self.draw_instant(&mut pass, &brushes, sight, stock, 0);
-        drop(pass);
-        if sight.instants > 1 {
-            let draw = |pass: &mut wgpu::RenderPass<'_>, k| {
-                self.draw_instant(pass, &brushes, sight, stock, k)
+        let (tunnel, bodies) = sight.draws.split_at(sight.tunnel().count());
+        let mut draw = |encoder: &mut _, layers: &Layers, k| {
+            let Some(key) = &key else {
+                let mut pass = begin(encoder, &layers.signal, BLACK, Some(&layers.depth));
+                sight.moving.clip(&mut pass, k > 0);
+                self.draw_instant(&mut pass, &brushes, (sight, &sight.draws), stock, k);
+                return;
             };
-            self.blend_instants(gpu, pipelines, encoder, target, sight, draw);
-        }
-    }
-
-    /// Takes the mean of the signal, which shows the first instant, and the others.
-    fn blend_instants(
-        &self,
-        gpu: &Gpu,
-        pipelines: &Pipelines,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        sight: &Sight,
-        draw: impl Fn(&mut wgpu::RenderPass<'_>, u32),
-    ) {
-        let instant = target.instant(&gpu.device);
-        let resources = [
-            self.view.binding(),
-            wgpu::BindingResource::TextureView(&instant.signal),
-        ];
-        let blend = bind(&gpu.device, &pipelines.blend, &resources);
-        let ([x, y], [width, height]) = (sight.moving.at, sight.moving.size);
+            if !backdrops.show(key, layers, encoder) {
+                let mut pass = begin(encoder, &layers.signal, BLACK, Some(&layers.depth));
+                self.draw_instant(&mut pass, &brushes, (sight, tunnel), stock, k);
+                drop(pass);
+                backdrops.keep(gpu, key.clone(), layers, encoder);
+            }
+            let mut pass = resume(encoder, &layers.signal, &layers.depth);
+            sight.moving.clip(&mut pass, k > 0);
+            self.draw_instant(&mut pass, &brushes, (sight, bodies), stock, k);
+        };
+        draw(encoder, &target.layers, 0);
         for k in 1..sight.instants {
-            let clear = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-            let mut pass = begin(encoder, &instant.signal, clear, Some(&instant.depth));
-            pass.set_scissor_rect(x, y, width, height);
-            draw(&mut pass, k);
-            drop(pass);
-            let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
+            let instant = target.instant(&gpu.device);
+            draw(encoder, instant, k);
+            let resources = [
+                self.view.binding(),
+                wgpu::BindingResource::TextureView(&instant.signal),
+            ];
+            let group = bind(&gpu.device, &pipelines.blend, &resources);
+            let mut pass = begin(encoder, &target.layers.signal, wgpu::LoadOp::Load, None);
             pass.set_pipeline(&pipelines.blend);
-            pass.set_bind_group(0, &blend, &[]);
-            pass.set_scissor_rect(x, y, width, height);
+            pass.set_bind_group(0, &group, &[]);
+            sight.moving.clip(&mut pass, true);
             // A running mean: rounding to half precision does not add up.
             pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
             pass.draw(0..6, 0..1);
@@ -278,12 +273,12 @@ impl ViewBuffers {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         brushes: &[Brushes<'_>; 2],
-        sight: &Sight,
+        (sight, draws): (&Sight, &[Draw]),
         stock: &Stock<'_>,
         instant: u32,
     ) {
         pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
-        for draw in &sight.draws {
+        for draw in draws {
             if !stock.set_buffers(pass, draw) {
                 continue;
             }
@@ -324,7 +319,7 @@ impl ViewBuffers {
             self.mirrored.binding(),
         ];
         let group = bind(&gpu.device, pipeline, &resources);
-        let mut pass = resume(encoder, &target.signal, &target.depth);
+        let mut pass = resume(encoder, &target.layers.signal, &target.layers.depth);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / f64::from(sight.instants)));
@@ -336,6 +331,33 @@ impl ViewBuffers {
                     pass.draw_indexed(draw.glossy.clone(), 0, at..at + 1);
                 }
             }
+        }
+    }
+
+    /// Blurs what is out of focus.
+    pub fn blur(
+        &self,
+        gpu: &Gpu,
+        pipelines: &Pipelines,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+    ) {
+        let (sharp, blurred) = (&target.layers, target.instant(&gpu.device));
+        let ways = [
+            (&sharp.signal, &blurred.signal),
+            (&blurred.signal, &sharp.signal),
+        ];
+        for (pipeline, (from, to)) in pipelines.focus.iter().zip(ways) {
+            let resources = [
+                self.view.binding(),
+                wgpu::BindingResource::TextureView(from),
+                wgpu::BindingResource::TextureView(&sharp.depth),
+            ];
+            let group = bind(&gpu.device, pipeline, &resources);
+            let mut pass = begin(encoder, to, BLACK, None);
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..6, 0..1);
         }
     }
 
@@ -355,10 +377,10 @@ impl ViewBuffers {
             self.lamps.binding(),
             self.rows.binding(),
             self.instants.binding(),
-            wgpu::BindingResource::TextureView(&target.depth),
+            wgpu::BindingResource::TextureView(&target.layers.depth),
         ];
         let group = bind(&gpu.device, &pipelines.discs, &resources);
-        let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
+        let mut pass = begin(encoder, &target.layers.signal, wgpu::LoadOp::Load, None);
         pass.set_pipeline(&pipelines.discs);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..self.lamp_count);

@@ -16,7 +16,7 @@ pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 9] = [
+const FILES: [(&str, &str); 10] = [
     ("common", include_str!("../../../../shaders/common.wgsl")),
     ("rows", include_str!("../../../../shaders/rows.wgsl")),
     (
@@ -25,6 +25,7 @@ const FILES: [(&str, &str); 9] = [
     ),
     ("gloss", include_str!("../../../../shaders/gloss.wgsl")),
     ("blend", include_str!("../../../../shaders/blend.wgsl")),
+    ("focus", include_str!("../../../../shaders/focus.wgsl")),
     ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
     ("glare", include_str!("../../../../shaders/glare.wgsl")),
     ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
@@ -73,6 +74,8 @@ pub struct Pipelines {
     gloss: wgpu::ShaderModule,
     /// Mixes a share of one picture into another.
     pub blend: wgpu::RenderPipeline,
+    /// Blurs along rows, and along columns.
+    pub focus: [wgpu::RenderPipeline; 2],
     /// Shadows of capsules, and of any bodies, over the background.
     pub shadows: [wgpu::RenderPipeline; 2],
     /// Lamps' discs, over the background by coverage.
@@ -112,7 +115,7 @@ impl Pipelines {
             })
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
-        let shadows = shader("shadows");
+        let (focus, shadows) = (shader("focus"), shader("shadows"));
         let flat = |shader, entries, target| {
             let stage = Stage {
                 shader,
@@ -130,6 +133,17 @@ impl Pipelines {
             background: shader("background"),
             gloss: shader("gloss"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
+            focus: [false, true].map(|down| {
+                let stage = Stage {
+                    shader: &focus,
+                    entries: ["whole", "focus"],
+                    buffers: &[],
+                    depth: None,
+                    target: target(SIGNAL, None),
+                    constants: &[("DOWN", f64::from(u8::from(down)))],
+                };
+                pipeline(device, stage)
+            }),
             shadows: [false, true].map(|others| {
                 let stage = Stage {
                     shader: &shadows,

@@ -471,14 +471,14 @@ impl ViewBuffers {
         }
         let resources = [
             self.view.binding(),
-            wgpu::BindingResource::TextureView(&target.depth),
+            wgpu::BindingResource::TextureView(&target.layers.depth),
             shadows.tiles.binding(),
             shadows.lists.binding(),
             shadows.sources.binding(),
             shadows.blockers.binding(),
             shadows.slabs.binding(),
         ];
-        let mut pass = begin(encoder, &target.signal, wgpu::LoadOp::Load, None);
+        let mut pass = begin(encoder, &target.layers.signal, wgpu::LoadOp::Load, None);
         for (pipeline, tiles) in pipelines.shadows.iter().zip([0..capsules, capsules..all]) {
             if !tiles.is_empty() {
                 pass.set_pipeline(pipeline);

@@ -11,7 +11,7 @@ use super::view::{Framed, single};
 use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
 use crate::twin::render::scene::{Air, Job};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 
 /// Grey levels below which paint and blinking do not show: less than the read noise, since paint
@@ -23,9 +23,12 @@ const FLOODLIT_GREY: f64 = 1.0;
 /// Grey levels by headlights below which they are left out.
 const UNLIT_GREY: f64 = 0.1;
 /// Lamps farther than this from a camera are not mirrored in what it sees.
-const MIRRORED_M: f64 = 100.0;
+const MIRRORED_M: f64 = 80.0;
+/// Nor are those farther behind it: surfaces would have to lean towards it.
+const MIRRORED_BEHIND_M: f64 = 5.0;
 /// Light that changes by less than this from row to row shows no bands.
-const BAND: f32 = 0.004;
+/// It is the shot noise of a full pixel of 10,000 electrons.
+const BAND: f32 = 0.01;
 
 /// What is lit and how.
 pub struct World<'a> {
@@ -59,7 +62,7 @@ pub struct Draw {
 #[derive(Default)]
 pub struct Sight {
     keys: Vec<ChunkKey>,
-    /// Near ones first.
+    /// Of the tunnel, near ones first; then of the bodies.
     pub draws: Vec<Draw>,
     /// Of every mesh at the first instant, then of every mesh at the second, and so on.
     pub placements: Vec<Placement>,
@@ -82,6 +85,11 @@ impl Sight {
     /// The buffer of the chunks in sight, for [`Chunks::in_sight`] to fill first.
     pub fn keys(&mut self) -> &mut Vec<ChunkKey> {
         &mut self.keys
+    }
+
+    /// What it draws of the tunnel: the first of all that it draws.
+    pub fn tunnel(&self) -> impl Iterator<Item = &Draw> {
+        self.draws.iter().take_while(|draw| draw.chunk.is_some())
     }
 
     /// Finds what to draw of the chunks whose keys were given, and of the bodies.
@@ -186,10 +194,11 @@ impl Sight {
         if self.draws.iter().all(|draw| draw.glossy.is_empty()) {
             return;
         }
-        let reference = framed.reference();
+        let (reference, ahead) = (framed.reference(), framed.middle * Vector3::z());
         for (k, lamp) in lamps.iter().enumerate() {
             let away = lamp.centre - reference;
-            if away.norm() > MIRRORED_M || lamp.duty() <= 0.0 {
+            let ahead_m = ahead.dot(&away);
+            if away.norm() > MIRRORED_M || ahead_m < -MIRRORED_BEHIND_M || lamp.duty() <= 0.0 {
                 continue;
             }
             let shares = self.shares_of(framed, lamps, k);

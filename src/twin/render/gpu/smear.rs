@@ -40,6 +40,14 @@ impl Rectangle {
         self.size.contains(&0)
     }
 
+    /// Lets a pass draw nothing else, if that is wanted.
+    pub fn clip(&self, pass: &mut wgpu::RenderPass<'_>, wanted: bool) {
+        if wanted {
+            let ([x, y], [width, height]) = (self.at, self.size);
+            pass.set_scissor_rect(x, y, width, height);
+        }
+    }
+
     /// The pixels of a picture between two corners.
     fn between(low: Point2<f64>, high: Point2<f64>, size_px: [u32; 2]) -> Self {
         let ends = [0, 1].map(|k| {

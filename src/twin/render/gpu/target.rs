@@ -11,25 +11,59 @@ use std::cell::OnceCell;
 pub struct Target {
     /// Size of the image.
     pub size_px: (u32, u32),
-    /// Signal in electrons.
-    pub signal: wgpu::TextureView,
-    signal_texture: wgpu::Texture,
+    /// Signal and depth.
+    pub layers: Layers,
     /// The signal as the sensor's pass reads it, two pixels a word: four fetches from a texture
     /// cost a software adapter more than the copy.
     pub signal_words: wgpu::Buffer,
-    /// Reversed depth.
-    pub depth: wgpu::TextureView,
-    instant: OnceCell<Instant>,
+    instant: OnceCell<Layers>,
     /// The finished image, of eight bits and raw.
     finished: [Finished; 2],
 }
 
-/// One instant of an exposure that shows motion.
-pub struct Instant {
+/// A picture while it is drawn.
+pub struct Layers {
     /// Signal in electrons.
     pub signal: wgpu::TextureView,
+    signal_texture: wgpu::Texture,
     /// Reversed depth.
     pub depth: wgpu::TextureView,
+    depth_texture: wgpu::Texture,
+}
+
+impl Layers {
+    /// Of a size.
+    pub fn new(device: &wgpu::Device, size_px: (u32, u32)) -> Self {
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC
+            | wgpu::TextureUsages::COPY_DST;
+        let [signal_texture, depth_texture] =
+            [SIGNAL, DEPTH].map(|format| texture(device, size_px, format, usage));
+        let [signal, depth] = [&signal_texture, &depth_texture]
+            .map(|t| t.create_view(&wgpu::TextureViewDescriptor::default()));
+        Self {
+            signal,
+            signal_texture,
+            depth,
+            depth_texture,
+        }
+    }
+
+    /// Width and height.
+    pub fn size_px(&self) -> (u32, u32) {
+        (self.signal_texture.width(), self.signal_texture.height())
+    }
+
+    /// Copies both to others of the same size.
+    pub fn copy_to(&self, other: &Self, encoder: &mut wgpu::CommandEncoder) {
+        for (from, to) in [
+            (&self.signal_texture, &other.signal_texture),
+            (&self.depth_texture, &other.depth_texture),
+        ] {
+            encoder.copy_texture_to_texture(from.as_image_copy(), to.as_image_copy(), from.size());
+        }
+    }
 }
 
 /// A finished image, four pixels a texel.
@@ -46,7 +80,6 @@ impl Target {
             texture(device, (width, size_px.1), format, usage)
         };
         let view = |t: &wgpu::Texture| t.create_view(&wgpu::TextureViewDescriptor::default());
-        let read = wgpu::TextureUsages::TEXTURE_BINDING;
         let finished = |format| {
             let texture = texture(packed_width(size_px), format, wgpu::TextureUsages::COPY_SRC);
             Finished {
@@ -54,8 +87,6 @@ impl Target {
                 texture,
             }
         };
-        let signal_usage = read | wgpu::TextureUsages::COPY_SRC;
-        let signal_texture = texture(size_px.0, SIGNAL, signal_usage);
         let signal_words = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("signal"),
             size: u64::from(signal_stride(size_px)) * u64::from(size_px.1),
@@ -64,28 +95,17 @@ impl Target {
         });
         Self {
             size_px,
-            signal: view(&signal_texture),
-            signal_texture,
+            layers: Layers::new(device, size_px),
             signal_words,
-            depth: view(&texture(size_px.0, DEPTH, read)),
             instant: OnceCell::new(),
             finished: [finished(PACKED), finished(RAW)],
         }
     }
 
-    /// Made when first needed.
-    pub fn instant(&self, device: &wgpu::Device) -> &Instant {
-        self.instant.get_or_init(|| {
-            let view = |format, extra| {
-                let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | extra;
-                texture(device, self.size_px, format, usage)
-                    .create_view(&wgpu::TextureViewDescriptor::default())
-            };
-            Instant {
-                signal: view(SIGNAL, wgpu::TextureUsages::TEXTURE_BINDING),
-                depth: view(DEPTH, wgpu::TextureUsages::empty()),
-            }
-        })
+    /// One instant of an exposure that shows motion; made when first needed.
+    pub fn instant(&self, device: &wgpu::Device) -> &Layers {
+        self.instant
+            .get_or_init(|| Layers::new(device, self.size_px))
     }
 
     /// The finished image, raw or not.
@@ -96,7 +116,7 @@ impl Target {
     /// Copies the signal to where the sensor's pass reads it.
     pub fn copy_signal(&self, encoder: &mut wgpu::CommandEncoder) {
         encoder.copy_texture_to_buffer(
-            self.signal_texture.as_image_copy(),
+            self.layers.signal_texture.as_image_copy(),
             wgpu::TexelCopyBufferInfo {
                 buffer: &self.signal_words,
                 layout: wgpu::TexelCopyBufferLayout {
@@ -105,7 +125,7 @@ impl Target {
                     rows_per_image: None,
                 },
             },
-            self.signal_texture.size(),
+            self.layers.signal_texture.size(),
         );
     }
 

@@ -11,6 +11,12 @@ const POSE_STEP_S: f64 = 50e-6;
 const MAX_POSES: f64 = 1024.0;
 /// A place counts as in the picture up to this share of its size beside it.
 const BESIDE: f64 = 0.1;
+/// Surfaces nearer than this are not blurred as far as they should be.
+const NEAREST_M: f64 = 1.0;
+/// A circle of confusion smaller than this is that of a sharp picture.
+const SHARP_PX: f64 = 1.0;
+/// Nothing is blurred by what is farther away.
+const MOST_REACH_PX: f64 = 24.0;
 
 /// A view with its reference point.
 pub struct Framed<'a> {
@@ -90,7 +96,9 @@ impl<'a> Framed<'a> {
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
             extinction_per_m: extinction_per_m as f32,
             airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,
-            blur_px: self.view.lens.blur_px as f32,
+            confusion_px_m: (self.view.pupil_m() * lens.fx_px) as f32,
+            focus_per_m: self.view.lens.focus_m.map_or(0.0, |m| 1.0 / m) as f32,
+            reach_px: self.defocus_reach_px(),
             halo_px: self.view.lens.halo_px as f32,
             saturation_e: self.view.saturation_e() as f32,
             ..layout::View::default()
@@ -157,6 +165,16 @@ impl<'a> Framed<'a> {
         pixel.is_some_and(|p| {
             (0..2).all(|k| (-BESIDE * size[k]..(1.0 + BESIDE) * size[k]).contains(&p[k]))
         })
+    }
+
+    /// How far around a pixel light comes from that is out of focus; 0 where nothing is.
+    pub fn defocus_reach_px(&self) -> i32 {
+        let [near_px, far_px] = [NEAREST_M, f64::INFINITY].map(|m| self.view.confusion_px(m));
+        let widest_px = near_px.max(far_px);
+        if widest_px < SHARP_PX {
+            return 0;
+        }
+        (0.5 * widest_px + 1.0).ceil().min(MOST_REACH_PX) as i32
     }
 
     /// How far the camera gets in half a frame.

@@ -147,6 +147,31 @@ fn bodies_do_not_shade_their_own_lit_side() {
     }
 }
 
+/// Fails where a running train, or the lens before its headlight, throws a shadow by its own light, or a
+/// board ahead of it does not.
+#[test]
+fn a_train_throws_no_shadow_by_its_own_light() {
+    let job = sample::wayside_job(&sample::tunnel(), 300.0);
+    let moving = |shape, at: Point3<f64>| Body {
+        velocity_mps: Vector3::new(0.0, 0.0, -20.0),
+        ..body(shape, at)
+    };
+    let headlight = headlight();
+    let sources = [Source::headlight(&headlight)];
+    let thrown =
+        |body: &Body| shadows(&sources, &[(body, ball_m(body))], &job, &job.views[0]).len();
+    let car = moving(
+        Shape::Box(Vector3::new(1.4, 1.4, 10.0)),
+        Point3::new(0.0, 0.5, 15.05),
+    );
+    let lens = moving(Shape::Sphere(0.1), Point3::new(0.0, 0.0, 4.95));
+    let board = body(
+        Shape::Box(Vector3::new(0.5, 0.5, 0.01)),
+        Point3::new(0.0, 0.0, 4.0),
+    );
+    assert_eq!([&car, &lens, &board].map(thrown), [0, 0, 1]);
+}
+
 /// Fails where the lists of slabs forget a shadow, or where a body is taken where it was at the
 /// job's time: the same light taken as by all lamps and all bodies together.
 #[test]
@@ -180,9 +205,8 @@ fn slabs_know_every_shadow_that_falls_on_them() {
         let blockers = shades.blockers(after_s);
         let seen = shades.hidden_lx(
             strike.slab as usize,
-            &at.position,
-            &at.normal,
-            &blockers,
+            (&at.position, &at.normal),
+            (&blockers, &Blinking::default()),
             &renderer.world,
         );
         let all = shades.sources.iter().map(|source| {

@@ -1,0 +1,71 @@
+//! What cameras that stand still see of the tunnel, kept from frame to frame: bodies are drawn over a
+//! copy.
+
+use super::adapter::Gpu;
+use super::sight::Sight;
+use super::target::Layers;
+use super::view::Framed;
+use crate::bus::Intrinsics;
+use nalgebra::Isometry3;
+use std::collections::VecDeque;
+
+/// Cameras whose tunnel is kept.
+const KEPT: usize = 4;
+
+/// What the picture of a tunnel in steady light depends on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Key {
+    lens: Intrinsics,
+    pose: Isometry3<f64>,
+    electrons_per_cd_m2: f64,
+    grey_per_cd_m2: f64,
+    saturation_e: f64,
+}
+
+impl Key {
+    /// Of a view; none where the camera moves, or the light on the tunnel.
+    pub fn of(framed: &Framed<'_>, sight: &Sight) -> Option<Self> {
+        let view = framed.view;
+        let still = view.motion.poses.len() == 1;
+        let steady = !sight.banded && sight.tunnel().all(|draw| !draw.headlit);
+        (still && steady).then(|| Self {
+            lens: view.camera.intrinsics,
+            pose: framed.middle,
+            electrons_per_cd_m2: view.electrons_per_cd_m2(),
+            grey_per_cd_m2: view.grey_per_cd_m2(),
+            saturation_e: view.saturation_e(),
+        })
+    }
+}
+
+/// Tunnels as seen, the latest last.
+#[derive(Default)]
+pub struct Backdrops {
+    kept: VecDeque<(Key, Layers)>,
+}
+
+impl Backdrops {
+    /// Where the light has changed, nothing holds any more.
+    pub fn clear(&mut self) {
+        self.kept.clear();
+    }
+
+    /// Copies a tunnel that was kept; whether there was one.
+    pub fn show(&self, key: &Key, onto: &Layers, encoder: &mut wgpu::CommandEncoder) -> bool {
+        let kept = self.kept.iter().find(|(k, _)| k == key);
+        if let Some((_, layers)) = kept {
+            layers.copy_to(onto, encoder);
+        }
+        kept.is_some()
+    }
+
+    /// Keeps a tunnel.
+    pub fn keep(&mut self, gpu: &Gpu, key: Key, of: &Layers, encoder: &mut wgpu::CommandEncoder) {
+        if self.kept.len() >= KEPT {
+            self.kept.pop_front();
+        }
+        let layers = Layers::new(&gpu.device, of.size_px());
+        of.copy_to(&layers, encoder);
+        self.kept.push_back((key, layers));
+    }
+}
