@@ -10,6 +10,7 @@
 
 use super::WaysideSettings;
 use super::cells::{CELL_PX, Cells};
+use super::rails::Rails;
 
 /// Side of a gain tile.
 const TILE_PX: usize = 48;
@@ -86,7 +87,7 @@ impl Difference {
         frame: &[u8],
         reference: &[u8],
         valid: &[u8],
-        cells: &Cells,
+        (cells, rails): (&Cells, &Rails),
         train_near: bool,
     ) {
         let changed = self.measure_gain(frame, valid);
@@ -99,6 +100,7 @@ impl Difference {
             self.compare(frame, reference, valid);
         }
         cells.clear_blind(&mut self.raw, self.width);
+        rails.forgive(frame, reference, &mut self.raw);
         self.vote();
     }
 
@@ -303,7 +305,13 @@ mod tests {
                 let mut fast = Difference::new(&settings, w, h);
                 fast.set_reference(&reference, &valid);
                 let compensated = train_near || fast.measure_gain(&frame, &valid);
-                fast.run(&frame, &reference, &valid, &cells, train_near);
+                fast.run(
+                    &frame,
+                    &reference,
+                    &valid,
+                    (&cells, &Rails::default()),
+                    train_near,
+                );
                 let mut raw = vec![0u8; w * h];
                 for k in 0..w * h {
                     let (u, v) = (k % w / CELL_PX * CELL_PX, k / w / CELL_PX * CELL_PX);

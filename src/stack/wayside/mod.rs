@@ -64,6 +64,7 @@
 //! |---|---|
 //! | `reference` | the reference image, learnt from the first frames and held |
 //! | `difference` | difference, threshold, 3x3 median; compensation of headlights |
+//! | `rails` | rail heads, which mirror any light |
 //! | `shadows` | shadows told from bodies by the texture that shows in them |
 //! | `regions` | connected regions |
 //! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
@@ -97,6 +98,7 @@ mod difference;
 pub mod distance;
 mod gauge;
 mod place;
+mod rails;
 mod reference;
 mod regions;
 mod settings;
@@ -122,6 +124,7 @@ use confirm::Confirmation;
 use difference::Difference;
 use image::GrayImage;
 use place::Placer;
+use rails::Rails;
 use reference::Reference;
 use regions::Regions;
 use shadows::Shadows;
@@ -144,6 +147,7 @@ pub struct WaysideDetector {
     sight: Sight,
     vision: Vision,
     cells: Cells,
+    rails: Rails,
     reference: Reference,
     difference: Difference,
     shadows: Shadows,
@@ -190,6 +194,7 @@ impl WaysideDetector {
             settings: settings.clone(),
             vision: Vision::new(settings, (intrinsics.width_px, intrinsics.height_px)),
             cells: Cells::new(&sight, width, height),
+            rails: Rails::new(&sight, width, height),
             sight,
             reference: Reference::new(settings, width * height),
             difference: Difference::new(settings, width, height),
@@ -234,7 +239,7 @@ impl WaysideDetector {
             frame.image.as_raw(),
             &self.reference.mean,
             &self.reference.valid,
-            &self.cells,
+            (&self.cells, &self.rails),
             train.is_some_and(|t| self.may_light(t)),
         );
         let width_px = intrinsics.width_px as usize;

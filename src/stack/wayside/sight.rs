@@ -8,7 +8,7 @@
 use super::WaysideSettings;
 use crate::bus::WaysideCalibration;
 use crate::track::{CrossSection, TrackPoint, Tunnel};
-use nalgebra::{Point3, Vector3};
+use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
 
 /// Distance between stations.
@@ -186,6 +186,14 @@ impl Sight {
     /// Direction of a pixel, world.
     pub fn direction(&self, u: f64, v: f64) -> Vector3<f64> {
         self.calibration.world_from_camera * self.calibration.camera.intrinsics.ray(u, v)
+    }
+
+    /// Where a place on the line is seen; none behind the camera.
+    pub fn pixel_of(&self, place: TrackPoint) -> Option<Point2<f64>> {
+        let calibration = self.calibration();
+        let world = self.map.alignment.world_from_track(place);
+        let seen = (calibration.world_from_camera).inverse_transform_point(&world);
+        (seen.z > 0.1).then(|| calibration.camera.intrinsics.project(&seen))?
     }
 
     /// A world point on the line, where it is within the device's surroundings.

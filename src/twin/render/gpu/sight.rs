@@ -7,7 +7,7 @@ use super::passes::BodyBuffers;
 use super::smear::{Rectangle, Smear};
 use super::textures;
 use super::tunnel::ChunkKey;
-use super::view::{Framed, single};
+use super::view::{BESIDE, Framed, single};
 use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
 use crate::twin::render::scene::{Air, Job};
@@ -24,6 +24,8 @@ const FLOODLIT_GREY: f64 = 1.0;
 const UNLIT_GREY: f64 = 0.1;
 /// Lamps farther than this from a camera are not mirrored in what it sees.
 const MIRRORED_M: f64 = 80.0;
+/// Chunks nearer than this may mirror in any row.
+const MIRRORS_ALL_OVER_M: f64 = 15.0;
 /// Nor are those farther behind it: surfaces would have to lean towards it.
 const MIRRORED_BEHIND_M: f64 = 5.0;
 /// Light that changes by less than this from row to row shows no bands.
@@ -78,6 +80,8 @@ pub struct Sight {
     pub banded: bool,
     /// Lamps that glossy surfaces mirror.
     pub mirrored: Vec<Mirrored>,
+    /// Rows in which they may be.
+    mirror_rows: Range<u32>,
     lamps: Vec<usize>,
 }
 
@@ -103,6 +107,7 @@ impl Sight {
         self.draws.clear();
         self.placements.clear();
         self.lamps.clear();
+        self.mirror_rows = 0..0;
         let rows = framed.view.camera.intrinsics.height_px;
         self.shares.clear();
         self.shares.resize(rows as usize, 1.0);
@@ -153,7 +158,7 @@ impl Sight {
             .fold(0.0, f64::max);
         let headlit_grey = headlit_cd_m2 * DIM_GREY / dim_cd_m2;
         let floodlit = headlit_grey > FLOODLIT_GREY;
-        let mirrors = chunk.glossy.iter().any(|place| framed.shows(place));
+        let mirrors = self.find_mirrors(framed, chunk);
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {
@@ -173,8 +178,9 @@ impl Sight {
                 dim: border..part.indices.end,
                 glossy: if mirrors { part.glossy.clone() } else { 0..0 },
             });
+            let rows = framed.view.camera.intrinsics.height_px;
             let shares = match chunk.lamp.filter(|_| bright > 0) {
-                Some(lamp) => self.shares_of(framed, world.lamps, lamp),
+                Some(lamp) => self.shares_of(framed, world.lamps, lamp, 0..rows),
                 None => 0,
             };
             self.placements.push(Placement {
@@ -186,6 +192,29 @@ impl Sight {
                 ..Placement::default()
             });
         }
+    }
+
+    /// Whether a chunk mirrors anything in the picture; notes the rows.
+    fn find_mirrors(&mut self, framed: &Framed<'_>, chunk: &Chunk) -> bool {
+        let rows = f64::from(framed.view.camera.intrinsics.height_px);
+        let near = (chunk.origin - framed.reference()).norm() < MIRRORS_ALL_OVER_M;
+        let mut mirrors = false;
+        for v in chunk.glossy.iter().filter_map(|place| framed.row_of(place)) {
+            let [first, last] = if near {
+                [0.0, rows]
+            } else {
+                [v - BESIDE * rows, v + BESIDE * rows]
+            };
+            let (first, last) = (first.max(0.0) as u32, last.clamp(0.0, rows) as u32);
+            let noted = &mut self.mirror_rows;
+            *noted = if noted.start >= noted.end {
+                first..last
+            } else {
+                noted.start.min(first)..noted.end.max(last)
+            };
+            mirrors = true;
+        }
+        mirrors
     }
 
     /// Lists the lamps that what mirrors may show, where anything does.
@@ -201,7 +230,8 @@ impl Sight {
             if away.norm() > MIRRORED_M || ahead_m < -MIRRORED_BEHIND_M || lamp.duty() <= 0.0 {
                 continue;
             }
-            let shares = self.shares_of(framed, lamps, k);
+            let rows = self.mirror_rows.clone();
+            let shares = self.shares_of(framed, lamps, k, rows);
             self.mirrored.push(Mirrored {
                 position_m: single(&away),
                 intensity_cd: (lamp.duty() * lamp.axial_intensity_cd()) as f32,
@@ -214,8 +244,15 @@ impl Sight {
         }
     }
 
-    /// First entry of a lamp in the table of shares, which is made at the first call.
-    fn shares_of(&mut self, framed: &Framed<'_>, lamps: &[Shining], lamp: usize) -> u32 {
+    /// First entry of a lamp in the table of shares, which is made at the first call, for some of the
+    /// rows; in the others it is 1.
+    fn shares_of(
+        &mut self,
+        framed: &Framed<'_>,
+        lamps: &[Shining],
+        lamp: usize,
+        asked: Range<u32>,
+    ) -> u32 {
         let rows = framed.view.camera.intrinsics.height_px;
         let known = self.lamps.iter().position(|k| *k == lamp);
         let at = known.unwrap_or(self.lamps.len()) as u32;
@@ -225,6 +262,9 @@ impl Sight {
             let light = &lamps[lamp];
             let mean = light.duty().max(1e-9);
             self.shares.extend((0..rows).map(|v| {
+                if !asked.contains(&v) {
+                    return 1.0;
+                }
                 let open = shutter.row_open(framed.view.start, f64::from(v)).secs();
                 (light.share(open, open + shutter.exposure_s) / mean) as f32
             }));

@@ -4,13 +4,13 @@
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
 use crate::twin::render::pixel_map::Dark;
 use crate::twin::render::scene::{Headlight, Job, View};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 /// Poses in the table lie this close in time, far closer than any motion of a train bends.
 const POSE_STEP_S: f64 = 50e-6;
 const MAX_POSES: f64 = 1024.0;
-/// A place counts as in the picture up to this share of its size beside it.
-const BESIDE: f64 = 0.1;
+/// A place may be seen by another row than in mid-frame, up to this share of the picture's size away.
+pub const BESIDE: f64 = 0.1;
 /// Surfaces nearer than this are not blurred as far as they should be.
 const NEAREST_M: f64 = 1.0;
 /// A circle of confusion smaller than this is that of a sharp picture.
@@ -156,15 +156,17 @@ impl<'a> Framed<'a> {
                 .all(|n| n.dot(&c.coords) > -radius_m * n.norm())
     }
 
-    /// Whether a place is in the picture in mid-frame, or so near to it that it may be in another row's.
-    pub fn shows(&self, place: &Point3<f64>) -> bool {
+    /// Row of a place in mid-frame, where it is in the picture or so near to it that another row may see
+    /// it.
+    pub fn row_of(&self, place: &Point3<f64>) -> Option<f64> {
         let lens = &self.view.camera.intrinsics;
         let size = [lens.width_px, lens.height_px].map(f64::from);
         let seen = self.middle.inverse_transform_point(place);
-        let pixel = (seen.z > 0.1).then(|| lens.project(&seen)).flatten();
-        pixel.is_some_and(|p| {
+        let pixel = (seen.z > 0.1).then(|| lens.project(&seen))?;
+        let near = |p: &Point2<f64>| {
             (0..2).all(|k| (-BESIDE * size[k]..(1.0 + BESIDE) * size[k]).contains(&p[k]))
-        })
+        };
+        pixel.filter(near).map(|p| p.y)
     }
 
     /// How far around a pixel light comes from that is out of focus; 0 where nothing is.
