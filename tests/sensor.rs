@@ -79,6 +79,31 @@ fn all_over(view: &View, electrons: f64) -> Body {
     }
 }
 
+/// Provokes a wrong factor anywhere between luminance and electrons, which all other tests would divide
+/// out again. Worked by hand: 100 cd/m^2 through f/2 and a transmission of 0.9 give the sensor
+/// 0.7854 x 0.9 x 100 / 4 = 17.671 lx; in 1 ms a pixel of 3.75 um gets 2.4850e-13 lm s, at 320 lm/W
+/// 7.7658e-16 J, at 3.55e-19 J a photon 2187.5 photons, with a quantum efficiency of 0.6 1312.5
+/// electrons.
+#[test]
+fn a_known_scene_gives_the_electrons_worked_by_hand() {
+    let mut view = sample::wayside_job(&sample::tunnel(), 100.0)
+        .views
+        .remove(0);
+    view.pixel_m = 3.75e-6;
+    view.camera.shutter.exposure_s = 1e-3;
+    (view.lens.f_number, view.lens.transmission) = (2.0, 0.9);
+    view.sensor.quantum_efficiency = 0.6;
+    let electrons = 100.0 * view.electrons_per_cd_m2();
+    println!("{electrons:.2} electrons");
+    assert!((electrons - 1312.5).abs() < 0.1, "{electrons}");
+    // One stop is a factor of two, and twice the pixel a factor of four.
+    view.lens.f_number *= 2f64.sqrt();
+    view.pixel_m *= 2.0;
+    view.camera.shutter.exposure_s *= 3.0;
+    let more = 100.0 * view.electrons_per_cd_m2();
+    assert!((more / electrons - 6.0).abs() < 1e-9, "{more}");
+}
+
 /// Raw frames, number `first` and on.
 fn frames(
     renderer: &mut dyn Renderer,

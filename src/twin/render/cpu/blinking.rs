@@ -17,8 +17,16 @@ pub(super) struct Blinking {
 }
 
 impl Blinking {
+    /// All lamps give their mean.
+    pub fn steady(lamps: &[Shining]) -> Self {
+        Self {
+            flicker: vec![0.0; lamps.len()],
+            shows: false,
+        }
+    }
+
     pub fn new(lamps: &[Shining], asked: &[usize], view: &View, row: &RowExposure) -> Self {
-        let mut flicker = vec![0.0; lamps.len()];
+        let Self { mut flicker, .. } = Self::steady(lamps);
         for k in asked {
             let lamp = &lamps[*k];
             if lamp.duty() > 0.0 {

@@ -3,9 +3,10 @@
 //! Rays are followed through the corners of cells of 8 x 8 pixels, each with the pose of its own
 //! row. Where none of a cell's four corners gives a tenth of a grey level, no pixel between them
 //! can be told from another, whatever is painted on the wall: paint changes its light by two times
-//! at most, and light itself changes
-//! little over 8 pixels but close to a lamp, where it is bright. Such cells are filled linearly.
+//! at most, and light itself changes little over 8 pixels but close to a lamp, where it is bright. Such
+//! cells are filled linearly. Bed and rails are never dark: they may mirror a lamp in any place.
 
+use super::blinking::Blinking;
 use super::{Behind, RowRays, Scenery, World};
 use crate::twin::render::View;
 use crate::twin::render::cpu::lamps::RowExposure;
@@ -36,8 +37,14 @@ impl DimView {
                 let row = RowExposure::new(view, i * CELL_PX);
                 let mut rays = RowRays::new(world, scenery, view, &row, Behind::Unknown);
                 rays.side_px = CELL_PX as f64;
+                // A lamp that is off in this row may be on in the next.
+                rays.blinking = Blinking::steady(world.lamps.lamps());
                 for (j, corner) in corners.iter_mut().enumerate() {
-                    *corner = rays.tunnel(j * CELL_PX).0;
+                    *corner = if rays.may_mirror(j * CELL_PX) {
+                        f64::INFINITY
+                    } else {
+                        rays.tunnel(j * CELL_PX).0
+                    };
                 }
             });
         let grey_per_luminance = view.grey_per_cd_m2();

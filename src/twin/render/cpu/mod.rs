@@ -467,6 +467,13 @@ impl<'a> RowRays<'a> {
         self.row.mid * camera.ray(u as f64, self.row.v as f64)
     }
 
+    /// Whether pixel `u` sees a surface that may mirror a lamp.
+    fn may_mirror(&self, u: usize) -> bool {
+        let (tunnel, ray) = (&self.world.tunnel, self.ray(u));
+        let strike = tunnel.cast(self.slab, &self.eye, &ray, SIGHT_M / ray.norm());
+        strike.is_some_and(|strike| tunnel.is_level(&strike))
+    }
+
     /// Luminance and depth of the tunnel in pixel `u`.
     fn tunnel(&self, u: usize) -> (f64, f64) {
         let camera = &self.view.camera.intrinsics;

@@ -275,7 +275,7 @@ fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
     let mut light = lamp(waveform);
     light.luminance_cd_m2 = 7000.0;
     let mut view = view(Intrinsics::centred(200, 300, 700.0));
-    view.lens.halo_share = 0.0;
+    view.lens = view.lens.without_flaws();
     let image = renderer(vec![light]).draw(&Job::default(), &view);
     let (mut low, mut high) = (255.0f64, 0.0f64);
     for v in 0..300 {

@@ -2,8 +2,8 @@
 //! only and draws straight between them.
 //!
 //! A lens that sees radius r at d(r), in focal lengths, bends a straight of length l by up to
-//! f l^2 |d''| / 8 pixels. A cell that is a share q of its distance away from the camera appears
-//! under that angle, so at radius r it is up to q (1 + r^2) long. [`Bend::of`] takes the greatest q
+//! f l^2 |d''| / 8 pixels. Of a surface parallel to the picture, a cell that is a share q of its distance
+//! from the camera is q (1 + r^2)^(1/2) long at radius r; those along a tunnel are shorter. [`Bend::of`] takes the greatest q
 //! for which no cell is bent by more than [`BENT_PX`] in the picture.
 
 use crate::bus::Intrinsics;
@@ -64,7 +64,7 @@ pub fn cell_share(lens: &Intrinsics) -> Option<f64> {
     let worst = (1..=PROBES)
         .map(|k| {
             let r = reach * f64::from(k) / f64::from(PROBES);
-            bending(lens, r) * (1.0 + r * r).powi(2)
+            bending(lens, r) * (1.0 + r * r)
         })
         .fold(0.0, f64::max);
     (worst > 0.0).then(|| (8.0 * BENT_PX / (lens.fx_px.max(lens.fy_px) * worst)).sqrt())
