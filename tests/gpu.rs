@@ -183,7 +183,6 @@ fn balls_are_in_place(mut view: View, centre: Point3<f64>, velocity_mps: Vector3
         u += (found.0 - right.0) / 9.0;
         v += (found.1 - right.1) / 9.0;
     }
-    println!("{what}: off by {u:.3}, {v:.3} px");
     assert!(u.hypot(v) < 0.05, "{what}: off by {u:.3}, {v:.3} px");
 }
 

@@ -234,6 +234,7 @@ impl Wet {
 
 #[cfg(test)]
 mod tests {
+    #![allow(clippy::print_stdout, reason = "a test prints its figures")]
     use super::*;
 
     const LEVEL: fn() -> Facing = || Facing::new(Vector3::z(), &Vector3::x());
