@@ -39,6 +39,13 @@ fn unhidden(widths: vec2f, to: vec3f) -> f32 {
     return select(seen, 1.0, a >= 1.6);
 }
 
+// Intensity of a source that is `away`, towards here.
+fn towards_cd(axial_cd: f32, axis: vec3f, exponent: f32, away: vec3f) -> f32 {
+    let distance_m = length(away);
+    let cos = max(-dot(axis, away) / distance_m, 0.0);
+    return axial_cd * pow(cos, exponent) * exp(-view.extinction_per_m * distance_m);
+}
+
 // Luminance mirrored of a source of 1 cd that is `away` along, across and above, towards `out`.
 fn luminance(gloss: vec3f, away: vec3f, out: vec3f, radius_m: f32) -> f32 {
     let inverse = inverseSqrt(max(dot(away, away), 1e-6));
@@ -81,21 +88,15 @@ fn shade_gloss(in: Glossy) -> @location(0) vec4f {
     for (var k = 0u; k < view.mirrored; k++) {
         let source = mirrored[k];
         let away = source.position_m - in.at_m;
-        let distance_m = length(away);
-        let cos = max(-dot(source.axis, away) / distance_m, 0.0);
-        let clear = exp(-view.extinction_per_m * distance_m);
-        let near = select(0.0, 1.0, distance_m < MIRROR_REACH_M);
-        let light = near * clear * source.intensity_cd * pow(cos, source.exponent);
+        let near = select(0.0, 1.0, length(away) < MIRROR_REACH_M);
+        let light = near * towards_cd(source.intensity_cd, source.axis, source.exponent, away);
         let l = luminance(in.gloss, to_surface * away, out, source.radius_m);
         sum += light * l * shares[source.shares + row];
     }
     for (var k = 0u; k < HEADLIGHTS; k++) {
         let source = view.headlights[k];
         let away = source.position_m - in.at_m;
-        let distance_m = length(away);
-        let cos = max(-dot(source.axis, away) / distance_m, 0.0);
-        let clear = exp(-view.extinction_per_m * distance_m);
-        let light = clear * source.intensity_cd * pow(cos, source.exponent);
+        let light = towards_cd(source.intensity_cd, source.axis, source.exponent, away);
         sum += light * luminance(in.gloss, to_surface * away, out, HEADLIGHT_RADIUS_M);
     }
     let clear = exp(-view.extinction_per_m * length(sight));

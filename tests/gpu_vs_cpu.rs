@@ -312,8 +312,8 @@ fn wet_ground_mirrors() {
 }
 
 /// Provokes blur that grows with another power of depth, or that is another on one renderer: lamps, walls
-/// and bodies before lenses that look at what is near. One follows rays through 200 points of the pupil,
-/// the other has formulas for lamps and blurs the rest by its depth.
+/// and bodies before lenses that look at what is near. One follows rays through many points of the
+/// pupil, the other has formulas for lamps and blurs the rest by its depth.
 #[test]
 fn out_of_focus() {
     let tunnel = sample::tunnel();

@@ -89,7 +89,8 @@
 //! filter lets through; it needs a clear track at the start; it takes a region's lowest edge for
 //! its foot, so that something above the bed is placed too far away. What falls on the line less
 //! than 100 m ahead of a train, in the light of its headlights, it does not see. Something dark on a
-//! smooth floor, in or beside a shadow as dark, it finds three seconds late.
+//! smooth floor, in or beside a shadow as dark, it finds three seconds late. What is brighter than a
+//! rail's head and no wider it takes for a reflection; one in a wet bed it takes for an obstacle.
 
 mod announce;
 mod cells;

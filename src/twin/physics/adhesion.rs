@@ -32,7 +32,7 @@ pub enum RailState {
     /// Friction up to 0.55.
     #[default]
     Dry,
-    /// Friction up to 0.30.
+    /// Friction up to 0.30. In images the bed about them is wet too, and mirrors lamps.
     Wet,
     /// A film of crushed leaves: friction up to 0.05.
     LeafFilm,

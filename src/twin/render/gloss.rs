@@ -16,8 +16,8 @@
 //! A lamp is a disc. Seen from the surface under the angle rho (radius over distance) it asks for
 //! slopes that scatter by rho / 4 in the plane of source and eye and by rho / (4 cos_in) across; that
 //! widens D, and keeps what the whole reflection adds up to. So the mirror image of a lamp is a
-//! soft spot of the right place, light and size, not a disc with a rim: films smoother than
-//! [`LEAST_ROUGHNESS`] do not occur.
+//! soft spot of the right place, light and size, not a disc with a rim; a film much smoother than those
+//! here would show the rim.
 //!
 //! # What it does not do
 //!
@@ -34,8 +34,6 @@ use std::ops::Range;
 
 /// Lamps farther than this from a surface are not mirrored in it.
 pub const MIRROR_REACH_M: f64 = 60.0;
-/// Smallest width of slopes.
-pub const LEAST_ROUGHNESS: f64 = 0.03;
 /// Concrete under a film of water is darker by this: light is caught between the two (Lekner and
 /// Dorf, "Why some things are darker when wet", Applied Optics 27(7), 1988).
 const WET_ALBEDO: f64 = 0.6;
@@ -108,7 +106,7 @@ impl Gloss {
         let level = Vector2::new(facing.along.dot(to), facing.across().dot(to));
         let towards = level.try_normalize(1e-9).unwrap_or_else(Vector2::x);
         let aside = Vector2::new(-towards.y, towards.x);
-        let [a, b] = [self.along, self.across].map(|width| width.max(LEAST_ROUGHNESS).powi(2));
+        let [a, b] = [self.along, self.across].map(|width| width * width);
         Matrix2::new(a, 0.0, 0.0, b)
             + towards * towards.transpose() * (rho * rho / 8.0)
             + aside * aside.transpose() * ((rho / into).powi(2) / 8.0)
@@ -236,6 +234,7 @@ impl Wet {
 mod tests {
     #![allow(clippy::print_stdout, reason = "a test prints its figures")]
     use super::*;
+    use crate::twin::render::light::disc_points;
 
     const LEVEL: fn() -> Facing = || Facing::new(Vector3::z(), &Vector3::x());
 
@@ -243,17 +242,11 @@ mod tests {
     /// size adds: 4,000 small sources.
     fn by_points(gloss: &Gloss, to_eye: &Vector3<f64>, source: &Source) -> f64 {
         let axis = source.away.normalize();
-        let aside = axis.cross(&Vector3::z()).normalize();
-        let up = aside.cross(&axis);
-        let count = 4000;
-        let golden = PI * (3.0 - 5f64.sqrt());
-        (0..count)
-            .map(|k| {
-                let (sin, cos) = (golden * f64::from(k)).sin_cos();
-                let r = source.radius_m * ((f64::from(k) + 0.5) / f64::from(count)).sqrt();
+        disc_points(&source.away.into(), &axis, source.radius_m, 4000)
+            .map(|place| {
                 let point = Source {
-                    away: source.away + (aside * cos + up * sin) * r,
-                    intensity_cd: source.intensity_cd / f64::from(count),
+                    away: place.coords,
+                    intensity_cd: source.intensity_cd / 4000.0,
                     radius_m: 0.0,
                 };
                 gloss.luminance_cd_m2(&LEVEL(), to_eye, &point)
@@ -304,8 +297,8 @@ mod tests {
         let (eye, lamp) = (Point3::new(0.0, 0.0, 1.5), Point3::new(7.0, 0.0, 2.0));
         let gloss = Gloss {
             head_on: 0.02,
-            along: LEAST_ROUGHNESS,
-            across: LEAST_ROUGHNESS,
+            along: 0.03,
+            across: 0.03,
         };
         let (radius_m, luminance) = (0.1, 5000.0);
         let intensity_cd = luminance * PI * radius_m * radius_m;
@@ -335,6 +328,7 @@ mod tests {
             light / expected
         );
         let middle = centre / sum;
+        println!("{:.3} m from where a mirror has it", middle.x - 3.0);
         assert!(
             (middle.x - 3.0).abs() < 0.12 && middle.y.abs() < 1e-9,
             "{middle}"

@@ -61,10 +61,15 @@ impl Backdrops {
 
     /// Keeps a tunnel.
     pub fn keep(&mut self, gpu: &Gpu, key: Key, of: &Layers, encoder: &mut wgpu::CommandEncoder) {
-        if self.kept.len() >= KEPT {
-            self.kept.pop_front();
-        }
-        let layers = Layers::new(&gpu.device, of.size_px());
+        let oldest = if self.kept.len() >= KEPT {
+            self.kept.pop_front()
+        } else {
+            None
+        };
+        let layers = oldest
+            .map(|(_, layers)| layers)
+            .filter(|layers| layers.size_px() == of.size_px())
+            .unwrap_or_else(|| Layers::new(&gpu.device, of.size_px()));
         of.copy_to(&layers, encoder);
         self.kept.push_back((key, layers));
     }

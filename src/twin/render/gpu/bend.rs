@@ -3,8 +3,8 @@
 //!
 //! A lens that sees radius r at d(r), in focal lengths, bends a straight of length l by up to
 //! f l^2 |d''| / 8 pixels. Of a surface parallel to the picture, a cell that is a share q of its distance
-//! from the camera is q (1 + r^2)^(1/2) long at radius r; those along a tunnel are shorter. [`Bend::of`] takes the greatest q
-//! for which no cell is bent by more than [`BENT_PX`] in the picture.
+//! from the camera is q (1 + r^2)^(1/2) long at radius r; those along a tunnel are shorter. [`Bend::of`]
+//! takes the greatest q for which no cell is bent by more than [`BENT_PX`] in the picture.
 
 use crate::bus::Intrinsics;
 use crate::track::TrackPoint;

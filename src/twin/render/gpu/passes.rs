@@ -231,7 +231,11 @@ impl ViewBuffers {
         (sight, key): (&Sight, Option<Key>),
         stock: &Stock<'_>,
     ) {
-        let brushes = (backgrounds.each_ref()).map(|b| self.brushes(gpu, b, sight, stock));
+        let headlit = sight.draws.iter().any(|draw| draw.headlit);
+        let used = &backgrounds[..=usize::from(headlit)];
+        let brushes: Vec<_> = (used.iter())
+            .map(|b| self.brushes(gpu, b, sight, stock))
+            .collect();
         let (tunnel, bodies) = sight.draws.split_at(sight.tunnel().count());
         let mut draw = |encoder: &mut _, layers: &Layers, k| {
             let Some(key) = &key else {
@@ -272,7 +276,7 @@ impl ViewBuffers {
     fn draw_instant(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        brushes: &[Brushes<'_>; 2],
+        brushes: &[Brushes<'_>],
         (sight, draws): (&Sight, &[Draw]),
         stock: &Stock<'_>,
         instant: u32,

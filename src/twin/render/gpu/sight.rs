@@ -137,8 +137,9 @@ impl Sight {
                 ..Placement::default()
             });
         }
-        self.mirror(framed, world.lamps);
+        // Before those are added that are mirrored alone.
         self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
+        self.mirror(framed, world.lamps);
         self.repeat(framed, job, chunks);
     }
 
