@@ -131,8 +131,8 @@ pub fn renderer(
         Ok(renderer) => Ok(Box::new(renderer)),
         Err(RenderError::NoAdapter(why)) if choice == RendererChoice::Auto => {
             tracing::warn!(
-                "no graphics driver: drawing with the plain CPU renderer, right but about half as \
-                 fast as a software driver. {why}"
+                "no graphics driver: drawing with the plain CPU renderer, right but several times \
+                 slower than a software driver. {why}"
             );
             Ok(Box::new(CpuRenderer::quick(scene)))
         }
