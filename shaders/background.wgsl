@@ -39,7 +39,7 @@ fn project_dim(in: Vertex) -> Dim {
 
 @fragment
 fn shade_dim(in: Dim) -> @location(0) vec4f {
-    return vec4f(min(in.signal_e, view.saturation_e), 0.0, 0.0, 1.0);
+    return vec4f(min(in.signal_e, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }
 
 struct Lit {
@@ -73,8 +73,8 @@ fn shade_lit(in: Lit) -> @location(0) vec4f {
     let albedo = textureSample(painting, texels, in.place).r * in.paint.x + in.paint.y;
     var light_e = in.light_e.x + in.light_e.y;
     if BANDED {
-        light_e = in.light_e.x + in.light_e.y * shares[in.shares + u32(in.clip.y)];
+        light_e = in.light_e.x + in.light_e.y * share_of(in.shares, u32(in.clip.y));
     }
     let signal = albedo * light_e + in.own_e;
-    return vec4f(min(signal, view.saturation_e), 0.0, 0.0, 1.0);
+    return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }

@@ -4,6 +4,8 @@
 const PI: f32 = 3.14159265;
 // Depth is reversed: 1 at this optical depth, 0 at infinity.
 const NEAR_M: f32 = 0.05;
+// The largest number of half precision, in which signals are kept.
+const BRIGHTEST_E: f32 = 65504.0;
 const MAX_HEADLIGHTS: u32 = 8u;
 
 struct Headlight {

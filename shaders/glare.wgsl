@@ -51,5 +51,5 @@ fn glare(in: Corner) -> @location(0) vec4f {
     let outside = max(sqrt(r2) - row.apparent_px, 0.0) / view.halo_px;
     let narrow = inverseSqrt(row.wide_px2 + r2);
     let wide = row.wide_e * narrow * narrow * narrow;
-    return vec4f(min(row.near_e * exp(-outside) + wide, view.saturation_e), 0.0, 0.0, 0.0);
+    return vec4f(min(row.near_e * exp(-outside) + wide, BRIGHTEST_E), 0.0, 0.0, 0.0);
 }

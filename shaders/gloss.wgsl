@@ -9,7 +9,7 @@ struct Mirrored {
     axis: vec3f,
     exponent: f32,
     radius_m: f32,
-    // Where its rows begin in the table of shares.
+    // Its row in `shares`.
     shares: u32,
 }
 
@@ -91,7 +91,7 @@ fn shade_gloss(in: Glossy) -> @location(0) vec4f {
         let near = select(0.0, 1.0, length(away) < MIRROR_REACH_M);
         let light = near * towards_cd(source.intensity_cd, source.axis, source.exponent, away);
         let l = luminance(in.gloss, to_surface * away, out, source.radius_m);
-        sum += light * l * shares[source.shares + row];
+        sum += light * l * share_of(source.shares, row);
     }
     for (var k = 0u; k < HEADLIGHTS; k++) {
         let source = view.headlights[k];
@@ -101,5 +101,5 @@ fn shade_gloss(in: Glossy) -> @location(0) vec4f {
     }
     let clear = exp(-view.extinction_per_m * length(sight));
     let signal = select(0.0, sum * clear * view.electrons_per_cd_m2, out.z > 0.0);
-    return vec4f(min(signal, view.saturation_e), 0.0, 0.0, 1.0);
+    return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }

@@ -215,5 +215,5 @@ fn disc(in: Corner) -> @location(0) vec4f {
     let disc_m = dot(row.normal, instants[first + lamp.instants / 2u].centre) / towards;
     let solid_m = NEAR_M / max(textureLoad(depth, vec2i(pixel), 0), 1e-9);
     let seen = select(0.0, 1.0, solid_m > disc_m - 0.01);
-    return vec4f(min(signal, view.saturation_e), 0.0, 0.0, cover) * seen;
+    return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, cover) * seen;
 }

@@ -12,8 +12,9 @@ struct Pose {
 override HEADLIGHTS: u32 = 0u;
 
 @group(0) @binding(1) var<storage, read> poses: array<Pose>;
-// For each lamp whose blinking shows on walls, row by row: its light in the exposure over its mean.
-@group(0) @binding(2) var<storage, read> shares: array<f32>;
+// For each lamp whose blinking shows on walls a row, with a number for each row of the picture: its
+// light in the exposure over its mean.
+@group(0) @binding(2) var shares: texture_2d<f32>;
 
 struct Vertex {
     @location(0) position_m: vec3f,
@@ -27,7 +28,7 @@ struct Vertex {
     @location(5) albedo: f32,
     @location(6) luminance_cd_m2: f32,
     // Of the mesh: its origin from the reference point, its velocity, where the painting starts,
-    // the instant drawn after the middle of a row's exposure, the first entry in `shares`, and
+    // the instant drawn after the middle of a row's exposure, its lamp's row in `shares`, and
     // the share of the painting that a metre takes, each way.
     @location(7) offset_m: vec3f,
     @location(8) period_share: f32,
@@ -92,4 +93,9 @@ fn eye_in(v: f32, late_s: f32) -> vec3f {
 
 fn eye_of(pose: Pose) -> vec3f {
     return -(pose.x.xyz * pose.x.w + pose.y.xyz * pose.y.w + pose.z.xyz * pose.z.w);
+}
+
+// Light of a lamp over its mean, in row `v` of the picture.
+fn share_of(lamp: u32, v: u32) -> f32 {
+    return textureLoad(shares, vec2u(v, lamp), 0).r;
 }

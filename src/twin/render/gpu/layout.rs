@@ -52,7 +52,7 @@ pub struct Placement {
     pub velocity_mps: [f32; 3],
     /// Of the instant drawn, after the middle of a row's exposure.
     pub late_s: f32,
-    /// First entry of the table of light shares that its lamp has, one a row.
+    /// Row of its lamp in the table of light shares.
     pub shares: u32,
     /// Share of the painting that a metre takes, each way.
     pub paint_per_m: [f32; 2],
@@ -255,7 +255,7 @@ pub struct Mirrored {
     pub exponent: f32,
     /// Radius of its disc.
     pub radius_m: f32,
-    /// Where its rows begin in the table of light shares.
+    /// Its row in the table of light shares.
     pub shares: u32,
     /// Fills the stride.
     pub unused: [u32; 2],

@@ -56,6 +56,7 @@ mod spread;
 mod target;
 mod textures;
 mod tunnel;
+mod upload;
 mod view;
 
 pub use adapter::adapters;
@@ -95,7 +96,7 @@ pub struct GpuRenderer {
     paintings: Paintings,
     textures: Textures,
     bodies: BodyBuffers,
-    maps: MapCache<wgpu::Buffer>,
+    maps: MapCache<wgpu::TextureView>,
     views: Vec<ViewBuffers>,
     targets: Vec<Target>,
     backdrops: Backdrops,
@@ -214,16 +215,16 @@ impl GpuRenderer {
             buffers.draw_lamps(gpu, pipelines, encoder, target);
             buffers.draw_glare(gpu, pipelines, encoder, glare);
             let map = MapKey::new(framed.view);
-            let map = (self.maps).get(map, |map| target::map_buffer(gpu, &map));
+            let map = (self.maps).get(map, |map| target::map_texture(gpu, &map));
             let develop = Develop {
                 raw: job.raw,
                 blooming: framed.view.sensor.blooming > 0.0,
             };
             let sensor = self.pipelines.sensor(&gpu.device, develop);
             target.copy_signal(encoder);
-            let read = [&target.signal_words, &map];
             let finished = target.finished(job.raw);
-            buffers.draw_sensor(gpu, sensor, encoder, (&glare.texture, read), finished);
+            let fixed = [&glare.texture, &map];
+            buffers.draw_sensor(gpu, sensor, encoder, fixed, &target.signal_words, finished);
             target.copy_to(encoder, &back);
         }
         back

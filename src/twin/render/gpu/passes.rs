@@ -11,53 +11,11 @@ use super::shadows::{ShadowBuffers, Shadows};
 use super::sight::{Draw, Sight};
 use super::target::{Layers, Target};
 use super::textures::Textures;
+use super::upload::{Table, Upload};
 use std::mem::size_of;
 use std::ops::Range;
 
 const BLACK: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-
-/// A buffer that grows with what is written to it.
-pub struct Upload {
-    buffer: wgpu::Buffer,
-    usage: wgpu::BufferUsages,
-}
-
-impl Upload {
-    /// Of at least one item's size, which may not be 0.
-    pub fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
-        let usage = usage | wgpu::BufferUsages::COPY_DST;
-        Self {
-            buffer: allocate(gpu, usage, size as u64),
-            usage,
-        }
-    }
-
-    /// Takes effect before anything submitted later, and after anything submitted before.
-    pub fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(items);
-        if bytes.is_empty() {
-            return;
-        }
-        if (bytes.len() as u64) > self.buffer.size() {
-            self.buffer = allocate(gpu, self.usage, (bytes.len() as u64).next_power_of_two());
-        }
-        gpu.queue.write_buffer(&self.buffer, 0, bytes);
-    }
-
-    /// All of it.
-    pub fn binding(&self) -> wgpu::BindingResource<'_> {
-        self.buffer.as_entire_binding()
-    }
-}
-
-fn allocate(gpu: &Gpu, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: None,
-        size,
-        usage,
-        mapped_at_creation: false,
-    })
-}
 
 /// The triangles of all bodies of a job.
 pub struct BodyBuffers {
@@ -88,7 +46,7 @@ impl BodyBuffers {
 pub struct ViewBuffers {
     pub(super) view: Upload,
     poses: Upload,
-    shares: Upload,
+    shares: Table,
     placements: Upload,
     mirrored: Upload,
     lamps: Upload,
@@ -155,7 +113,7 @@ impl ViewBuffers {
         Self {
             view: Upload::new(gpu, wgpu::BufferUsages::UNIFORM, size_of::<View>()),
             poses: Upload::new(gpu, storage, 2 * size_of::<Pose>()),
-            shares: Upload::new(gpu, storage, 1 << 12),
+            shares: Table::new(gpu),
             placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 10),
             mirrored: Upload::new(gpu, storage, size_of::<Mirrored>()),
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
@@ -173,7 +131,8 @@ impl ViewBuffers {
     pub fn write(&mut self, gpu: &Gpu, data: &ViewData<'_>) {
         self.view.write(gpu, &[data.constants]);
         self.poses.write(gpu, data.poses);
-        self.shares.write(gpu, &data.sight.shares);
+        let rows = data.constants.size_px[1] as u32;
+        self.shares.write(gpu, &data.sight.shares, rows);
         self.placements.write(gpu, &data.sight.placements);
         self.mirrored.write(gpu, &data.sight.mirrored);
         let table = data.lamps;
@@ -420,7 +379,8 @@ impl ViewBuffers {
         gpu: &Gpu,
         pipeline: &wgpu::RenderPipeline,
         encoder: &mut wgpu::CommandEncoder,
-        (glare, [signal, map]): (&wgpu::TextureView, [&wgpu::Buffer; 2]),
+        [glare, map]: [&wgpu::TextureView; 2],
+        signal: &wgpu::Buffer,
         finished: &wgpu::TextureView,
     ) {
         let group = bind(
@@ -430,7 +390,7 @@ impl ViewBuffers {
                 self.view.binding(),
                 wgpu::BindingResource::TextureView(glare),
                 signal.as_entire_binding(),
-                map.as_entire_binding(),
+                wgpu::BindingResource::TextureView(map),
             ],
         );
         // Every pixel is written, so nothing needs clearing.

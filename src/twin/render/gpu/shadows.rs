@@ -17,7 +17,8 @@ use super::chunks::Chunk;
 use super::layout::{
     Blocker, Corner, MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS, Slab, Source, Tile,
 };
-use super::passes::{Upload, ViewBuffers, begin};
+use super::passes::{ViewBuffers, begin};
+use super::upload::Upload;
 use super::pipeline::{Pipelines, bind};
 use super::target::Target;
 use super::tunnel::{CHUNK_M, ChunkKey};

@@ -74,7 +74,8 @@ pub struct Sight {
     pub instants: u32,
     /// Part of the picture in which they differ.
     pub moving: Rectangle,
-    /// Light of lamps over their mean, row by row; the first lot is 1.
+    /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
+    /// number; the first row is 1.
     pub shares: Vec<f32>,
     /// Whether any of it differs from 1 so that one can see it.
     pub banded: bool,
@@ -245,7 +246,7 @@ impl Sight {
         }
     }
 
-    /// First entry of a lamp in the table of shares, which is made at the first call, for some of the
+    /// Row of a lamp in the table of shares, which is made at the first call, for some of the
     /// rows; in the others it is 1.
     fn shares_of(
         &mut self,
@@ -270,7 +271,7 @@ impl Sight {
                 (light.share(open, open + shutter.exposure_s) / mean) as f32
             }));
         }
-        (at + 1) * rows
+        at + 1
     }
 
     /// Copies the placements for every instant of the exposure.

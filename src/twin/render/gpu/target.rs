@@ -245,16 +245,23 @@ fn too_short() -> RenderError {
 }
 
 /// The words of a camera's pixels, four a texel.
-pub fn map_buffer(gpu: &Gpu, map: &PixelMap) -> wgpu::Buffer {
-    let words: &[u8] = bytemuck::cast_slice(map.words());
-    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some("pixel map"),
-        size: (words.len() as u64).max(16),
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-        mapped_at_creation: false,
-    });
-    gpu.queue.write_buffer(&buffer, 0, words);
-    buffer
+pub fn map_texture(gpu: &Gpu, map: &PixelMap) -> wgpu::TextureView {
+    let width = map.row(0).len() as u32 / 4;
+    let height = (map.words().len() / map.row(0).len().max(1)) as u32;
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let size_px = (width.max(1), height.max(1));
+    let texture = texture(&gpu.device, size_px, wgpu::TextureFormat::Rgba32Uint, usage);
+    gpu.queue.write_texture(
+        texture.as_image_copy(),
+        bytemuck::cast_slice(map.words()),
+        wgpu::TexelCopyBufferLayout {
+            offset: 0,
+            bytes_per_row: Some(16 * width),
+            rows_per_image: None,
+        },
+        texture.size(),
+    );
+    texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
 /// Bytes from row to row of the signal.
