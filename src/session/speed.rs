@@ -16,7 +16,7 @@ use crate::stack::wayside::WaysideDetector;
 use crate::track::{Tunnel, read_toml};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
-use crate::twin::render::{Backend, Job, RenderError, Renderer, View, gpu};
+use crate::twin::render::{Backend, Job, Renderer, View, gpu};
 use image::GrayImage;
 use serde::Serialize;
 
@@ -139,16 +139,16 @@ fn train_seconds(
             with: eyes.expose(&mut views),
         };
         jobs.push(job(world, views.into()));
-        let (mut images, _) = draw(renderer, &jobs[jobs.len() - 1..])?;
-        let images = images.pop().ok_or("the renderer did not draw a pair")?;
         let before_s = stack.total_s;
         let head_at = |t| world.chainage_at(t);
-        eyes.read(&taken, images, &mut stack, vehicle_at, head_at)?;
+        draw(renderer, &jobs[jobs.len() - 1..], |images| {
+            Ok(eyes.read(&taken, images, &mut stack, vehicle_at, head_at).map(drop)?)
+        })?;
         times.stack_s.push(stack.total_s - before_s);
     }
     times.stack_s.remove(0);
     // Once more for the time that it takes, with nothing else to do.
-    times.draw_s = draw(renderer, &jobs)?.1;
+    times.draw_s = draw(renderer, &jobs, |_| Ok(()))?;
     Ok(times)
 }
 
@@ -171,9 +171,9 @@ fn wayside_seconds(
         .map(|k| wayside_view(&post.calibration, &post.camera, stream, k, start(k)))
         .map(|view| job(world, vec![view]))
         .collect();
-    let (images, mut draw_s) = draw(renderer, &jobs)?;
     let mut times = Times::default();
-    for (number, mut images) in (0..).zip(images) {
+    draw(renderer, &jobs, |mut images| {
+        let number = times.stack_s.len() as u32;
         let frame = Frame {
             number,
             start: start(number),
@@ -183,8 +183,10 @@ fn wayside_seconds(
         };
         let work = || detector.on_frame(&frame, None, None);
         times.stack_s.push(Stopwatch::default().time(work).1);
-    }
-    times.draw_s = draw_s.split_off(learning);
+        Ok(())
+    })?;
+    // Once more for the time that it takes, with nothing else to do.
+    times.draw_s = draw(renderer, &jobs[learning..], |_| Ok(()))?;
     times.stack_s.drain(..=learning);
     Ok(times)
 }
@@ -199,26 +201,27 @@ fn job(world: &World, views: Vec<View>) -> Job {
     }
 }
 
-/// The images of all jobs, and the seconds from each but the first to the one before it. As in a
-/// run, the next is asked for before the last is read back.
+/// Draws all jobs and hands their images on; the seconds from each to the one before it. As in a run,
+/// the next is asked for before the last is read back, and an image does not outlive its use.
 fn draw(
     renderer: &mut dyn Renderer,
     jobs: &[Job],
-) -> Result<(Vec<Vec<GrayImage>>, Vec<f64>), RenderError> {
-    let (mut images, mut seconds) = (Vec::new(), Vec::new());
+    mut take: impl FnMut(Vec<GrayImage>) -> Result<(), Error>,
+) -> Result<Vec<f64>, Error> {
+    let mut seconds = Vec::new();
     for (k, job) in jobs.iter().enumerate() {
         let work = || {
             renderer.submit(job)?;
             (k > 0).then(|| renderer.collect()).transpose()
         };
-        let (image, draw_s) = Stopwatch::default().time(work);
-        if let Some(image) = image? {
-            images.push(image);
+        let (images, draw_s) = Stopwatch::default().time(work);
+        if let Some(images) = images? {
             seconds.push(draw_s);
+            take(images)?;
         }
     }
-    images.push(renderer.collect()?);
-    Ok((images, seconds))
+    take(renderer.collect()?)?;
+    Ok(seconds)
 }
 
 /// The least median of whole rounds.

@@ -43,7 +43,6 @@ mod adapter;
 mod backdrop;
 mod bend;
 mod chunks;
-mod glare;
 mod lamps;
 pub mod layout;
 mod mesh;
@@ -71,7 +70,6 @@ use crate::bus::SimTime;
 use adapter::Gpu;
 use backdrop::{Backdrops, Key};
 use chunks::{Chunks, Line};
-use glare::GlareTarget;
 use image::GrayImage;
 use lamps::{Around, LampTable};
 use layout::Pose;
@@ -97,13 +95,13 @@ pub struct GpuRenderer {
     textures: Textures,
     bodies: BodyBuffers,
     maps: MapCache<wgpu::TextureView>,
-    views: Vec<ViewBuffers>,
+    views: Vec<Prepared>,
     targets: Vec<Target>,
     backdrops: Backdrops,
-    glares: Vec<GlareTarget>,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
-    scratch: Scratch,
+    /// Of the bodies, used again for every job.
+    mesh: Mesh,
 }
 
 struct InFlight {
@@ -114,14 +112,15 @@ struct InFlight {
     submission: wgpu::SubmissionIndex,
 }
 
-/// Buffers used again for every view.
-#[derive(Default)]
-struct Scratch {
-    mesh: Mesh,
+/// What is found out about a view before it is drawn, and its buffers, used again in every job.
+struct Prepared {
+    buffers: ViewBuffers,
     poses: Vec<Pose>,
     sight: Sight,
     lamps: LampTable,
     shadows: Shadows,
+    /// Number of its target.
+    target: usize,
 }
 
 impl GpuRenderer {
@@ -144,10 +143,9 @@ impl GpuRenderer {
             views: Vec::new(),
             targets: Vec::new(),
             backdrops: Backdrops::default(),
-            glares: Vec::new(),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
-            scratch: Scratch::default(),
+            mesh: Mesh::default(),
             gpu,
         })
     }
@@ -162,7 +160,7 @@ impl GpuRenderer {
     }
 
     fn upload_bodies(&mut self, job: &Job) {
-        let mesh = &mut self.scratch.mesh;
+        let mesh = &mut self.mesh;
         mesh.vertices.clear();
         mesh.indices.clear();
         self.bodies.ranges.clear();
@@ -175,83 +173,114 @@ impl GpuRenderer {
         self.bodies.write(&self.gpu, mesh);
     }
 
-    /// Records all passes of view `k` and the copy of its image.
-    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job, k: usize) -> ReadBack {
-        let framed = Framed::new(&job.views[k]);
-        self.upload_view(&framed, job, k);
-        let lens = &framed.view.camera.intrinsics;
-        let size_px = (lens.width_px, lens.height_px);
-        let gpu = &self.gpu;
-        if !self.targets.iter().any(|t| t.size_px == size_px) {
-            self.targets.push(Target::new(&gpu.device, size_px));
-            self.glares.push(GlareTarget::new(&gpu.device, size_px));
-        }
-        let glare = self.glares.iter().find(|g| g.size_px == size_px);
-        let back = match self.spare.iter().position(|b| b.fits(size_px, job.raw)) {
-            Some(at) => self.spare.swap_remove(at),
-            None => ReadBack::new(&gpu.device, size_px, job.raw),
-        };
-        let target = self.targets.iter().find(|t| t.size_px == size_px);
-        if let (Some(target), Some(glare)) = (target, glare) {
-            let buffers = &self.views[k];
-            let stock = Stock {
-                chunks: &self.chunks,
-                bodies: &self.bodies,
-                textures: &self.textures,
-            };
-            let backgrounds = [0, job.headlights.len()]
-                .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
-            let (pipelines, sight) = (&self.pipelines, &self.scratch.sight);
-            let background = (pipelines, &backgrounds);
-            let key = Key::of(&framed, sight);
-            let onto = (target, &mut self.backdrops);
-            buffers.draw_background(gpu, background, encoder, onto, (sight, key), &stock);
-            buffers.draw_shadows(gpu, pipelines, encoder, target);
-            let gloss = &backgrounds[1].gloss;
-            buffers.draw_gloss(gpu, gloss, encoder, target, (sight, &stock));
-            if framed.defocus_reach_px() > 0 {
-                buffers.blur(gpu, pipelines, encoder, target);
+    /// Gives every view a target of its own.
+    fn assign_targets(&mut self, job: &Job) {
+        let mut free: Vec<_> = (0..self.targets.len()).collect();
+        for (view, prepared) in job.views.iter().zip(&mut self.views) {
+            let lens = &view.camera.intrinsics;
+            let size_px = (lens.width_px, lens.height_px);
+            let fits = free.iter().position(|t| self.targets[*t].size_px == size_px);
+            prepared.target = fits.map_or(self.targets.len(), |at| free.swap_remove(at));
+            if fits.is_none() {
+                (self.targets).push(Target::new(&self.gpu.device, size_px));
             }
-            buffers.draw_lamps(gpu, pipelines, encoder, target);
-            buffers.draw_glare(gpu, pipelines, encoder, glare);
-            let map = MapKey::new(framed.view);
-            let map = (self.maps).get(map, |map| target::map_texture(gpu, &map));
+        }
+    }
+
+    /// Records all passes. One kind of pass after the other, each for all views: a software adapter
+    /// prepares the second view's while it fills in the first one's.
+    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job) {
+        let framed: Vec<_> = job.views.iter().map(Framed::new).collect();
+        for (k, framed) in framed.iter().enumerate() {
+            self.upload_view(framed, job, k);
+        }
+        self.assign_targets(job);
+        let gpu = &self.gpu;
+        let backgrounds = [0, job.headlights.len()]
+            .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
+        let stock = Stock {
+            chunks: &self.chunks,
+            bodies: &self.bodies,
+            textures: &self.textures,
+        };
+        let pipelines = &mut self.pipelines;
+        let views = || {
+            let prepared = framed.iter().zip(&self.views);
+            prepared.map(|(framed, p)| (framed, p, &self.targets[p.target]))
+        };
+        for (framed, p, target) in views() {
+            let key = Key::of(framed, &p.sight);
+            let background = (&*pipelines, &backgrounds);
+            let onto = (target, &mut self.backdrops);
+            (p.buffers).draw_background(gpu, background, encoder, onto, (&p.sight, key), &stock);
+        }
+        for (_, p, target) in views() {
+            p.buffers.draw_shadows(gpu, pipelines, encoder, target);
+        }
+        for (_, p, target) in views() {
+            let gloss = &backgrounds[1].gloss;
+            (p.buffers).draw_gloss(gpu, gloss, encoder, target, (&p.sight, &stock));
+        }
+        for (framed, p, target) in views() {
+            if framed.defocus_reach_px() > 0 {
+                p.buffers.blur(gpu, pipelines, encoder, target);
+            }
+        }
+        for (_, p, target) in views() {
+            p.buffers.draw_lamps(gpu, pipelines, encoder, target);
+            p.buffers.draw_glare(gpu, pipelines, encoder, target);
+        }
+        for (framed, p, target) in views() {
+            let map = (self.maps).get(MapKey::new(framed.view), |map| target::map_texture(gpu, &map));
             let develop = Develop {
                 raw: job.raw,
                 blooming: framed.view.sensor.blooming > 0.0,
             };
-            let sensor = self.pipelines.sensor(&gpu.device, develop);
+            let sensor = pipelines.sensor(&gpu.device, develop);
             target.copy_signal(encoder);
-            let finished = target.finished(job.raw);
-            let fixed = [&glare.texture, &map];
-            buffers.draw_sensor(gpu, sensor, encoder, fixed, &target.signal_words, finished);
-            target.copy_to(encoder, &back);
+            (p.buffers).draw_sensor(gpu, sensor, encoder, (target, &map), job.raw);
         }
-        back
+    }
+
+    /// Records the way back of the finished images.
+    fn copy_back(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job) -> Vec<ReadBack> {
+        let mut backs = Vec::with_capacity(job.views.len());
+        for prepared in &self.views[..job.views.len()] {
+            let target = &self.targets[prepared.target];
+            let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
+            let back = spare.map_or_else(
+                || ReadBack::new(&self.gpu.device, target.size_px, job.raw),
+                |at| self.spare.swap_remove(at),
+            );
+            target.copy_to(encoder, &back);
+            backs.push(back);
+        }
+        backs
     }
 
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
-        let (gpu, tunnel, scratch) = (&self.gpu, &self.scene.tunnel, &mut self.scratch);
-        let keys = scratch.sight.keys();
+        let (gpu, tunnel) = (&self.gpu, &self.scene.tunnel);
+        while self.views.len() <= k {
+            self.views.push(Prepared::new(gpu));
+        }
+        let view = &mut self.views[k];
         let line = Line {
             tunnel,
             wet: &self.scene.wet,
             lamps: &self.field,
             paintings: &self.paintings,
         };
-        self.chunks.in_sight(gpu, &line, framed, keys);
+        self.chunks.in_sight(gpu, &line, framed, view.sight.keys());
         let world = World {
             lamps: self.field.lamps(),
             air: &self.scene.air,
             paintings: &self.paintings,
         };
         let meshes = (&self.chunks, &self.bodies);
-        scratch.sight.fill(framed, job, &world, meshes);
-        let in_sight = scratch.sight.keys().iter();
+        view.sight.fill(framed, job, &world, meshes);
+        let in_sight = view.sight.keys().iter();
         let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
-        scratch
-            .shadows
-            .fill(framed, job, (tunnel, &self.field), in_sight);
+        (view.shadows).fill(framed, job, (tunnel, &self.field), in_sight);
         let airlight_cd_m2 = self
             .field
             .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
@@ -260,23 +289,31 @@ impl GpuRenderer {
             air: &self.scene.air,
             airlight_cd_m2,
         };
-        scratch.lamps.fill(framed, self.field.lamps(), &around);
+        view.lamps.fill(framed, self.field.lamps(), &around);
         let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
-        let mut constants = framed.constants(job, air, &mut scratch.poses);
-        constants.mirrored = scratch.sight.mirrored.len() as u32;
-        while self.views.len() <= k {
-            self.views.push(ViewBuffers::new(gpu));
+        let mut constants = framed.constants(job, air, &mut view.poses);
+        constants.mirrored = view.sight.mirrored.len() as u32;
+        let data = ViewData {
+            constants,
+            poses: &view.poses,
+            sight: &view.sight,
+            lamps: &view.lamps,
+            shadows: &view.shadows,
+        };
+        view.buffers.write(gpu, &data);
+    }
+}
+
+impl Prepared {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            buffers: ViewBuffers::new(gpu),
+            poses: Vec::new(),
+            sight: Sight::default(),
+            lamps: LampTable::default(),
+            shadows: Shadows::default(),
+            target: 0,
         }
-        self.views[k].write(
-            gpu,
-            &ViewData {
-                constants,
-                poses: &scratch.poses,
-                sight: &scratch.sight,
-                lamps: &scratch.lamps,
-                shadows: &scratch.shadows,
-            },
-        );
     }
 }
 
@@ -311,9 +348,8 @@ impl Renderer for GpuRenderer {
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let images: Vec<_> = (0..job.views.len())
-            .map(|k| self.record(&mut encoder, job, k))
-            .collect();
+        self.record(&mut encoder, job);
+        let images = self.copy_back(&mut encoder, job);
         let submission = self.gpu.queue.submit([encoder.finish()]);
         for image in &images {
             image.request();

@@ -3,7 +3,6 @@
 use super::adapter::Gpu;
 use super::backdrop::{Backdrops, Key};
 use super::chunks::Chunks;
-use super::glare::GlareTarget;
 use super::lamps::LampTable;
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow, Mirrored, Pose, View};
 use super::pipeline::{Background, Pipelines, bind};
@@ -355,10 +354,9 @@ impl ViewBuffers {
         gpu: &Gpu,
         pipelines: &Pipelines,
         encoder: &mut wgpu::CommandEncoder,
-        target: &GlareTarget,
+        target: &Target,
     ) {
-        let load = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
-        let mut pass = begin(encoder, &target.texture, load, None);
+        let mut pass = begin(encoder, &target.glare, BLACK, None);
         if self.glare_count == 0 {
             return;
         }
@@ -379,21 +377,21 @@ impl ViewBuffers {
         gpu: &Gpu,
         pipeline: &wgpu::RenderPipeline,
         encoder: &mut wgpu::CommandEncoder,
-        [glare, map]: [&wgpu::TextureView; 2],
-        signal: &wgpu::Buffer,
-        finished: &wgpu::TextureView,
+        (target, map): (&Target, &wgpu::TextureView),
+        raw: bool,
     ) {
         let group = bind(
             &gpu.device,
             pipeline,
             &[
                 self.view.binding(),
-                wgpu::BindingResource::TextureView(glare),
-                signal.as_entire_binding(),
+                wgpu::BindingResource::TextureView(&target.glare),
+                target.signal_words.as_entire_binding(),
                 wgpu::BindingResource::TextureView(map),
             ],
         );
         // Every pixel is written, so nothing needs clearing.
+        let finished = target.finished(raw);
         let mut pass = begin(encoder, finished, wgpu::LoadOp::Load, None);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &group, &[]);

@@ -3,6 +3,7 @@
 use super::adapter::Gpu;
 use super::pipeline::{DEPTH, PACKED, RAW, SIGNAL};
 use crate::twin::render::pixel_map::PixelMap;
+use crate::twin::render::surface::GLARE_STEP_PX;
 use crate::twin::render::{RawImage, RenderError, upper_bits};
 use image::GrayImage;
 use std::cell::OnceCell;
@@ -13,6 +14,9 @@ pub struct Target {
     pub size_px: (u32, u32),
     /// Signal and depth.
     pub layers: Layers,
+    /// Where the glare is summed up, electrons: a texel for every fourth pixel of a row, and one more,
+    /// so that every pixel lies between two.
+    pub glare: wgpu::TextureView,
     /// The signal as the sensor's pass reads it, two pixels a word: four fetches from a texture
     /// cost a software adapter more than the copy.
     pub signal_words: wgpu::Buffer,
@@ -87,6 +91,11 @@ impl Target {
                 texture,
             }
         };
+        let glare = texture(
+            size_px.0.div_ceil(GLARE_STEP_PX as u32) + 1,
+            SIGNAL,
+            wgpu::TextureUsages::TEXTURE_BINDING,
+        );
         let signal_words = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("signal"),
             size: u64::from(signal_stride(size_px)) * u64::from(size_px.1),
@@ -96,6 +105,7 @@ impl Target {
         Self {
             size_px,
             layers: Layers::new(device, size_px),
+            glare: view(&glare),
             signal_words,
             instant: OnceCell::new(),
             finished: [finished(PACKED), finished(RAW)],
