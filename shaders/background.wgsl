@@ -44,12 +44,12 @@ fn shade_dim(in: Dim) -> @location(0) vec4f {
 
 struct Lit {
     @invariant @builtin(position) clip: vec4f,
-    @location(0) light_e: vec2f,
+    // What white paint sends in steady light, and in that of the blinking lamp.
+    @location(0) white_e: vec2f,
     @location(1) place: vec2f,
-    @location(2) @interpolate(flat, either) paint: vec2f,
     // Its own light, and that of the air before it.
-    @location(3) own_e: f32,
-    @location(4) @interpolate(flat, either) shares: u32,
+    @location(2) own_e: f32,
+    @location(3) @interpolate(flat, either) shares: u32,
 }
 
 @vertex
@@ -58,11 +58,10 @@ fn project_lit(in: Vertex) -> Lit {
     let c = seen_vertex(in);
     let clear = exp(-view.extinction_per_m * length(c));
     out.clip = clip_of(c);
-    let electrons_per_lx = clear * view.electrons_per_cd_m2 / PI;
+    let electrons_per_lx = in.paint * clear * view.electrons_per_cd_m2 / PI;
     let steady = in.light_lx.x + headlights_lx(in.position_m + in.offset_m, in.normal);
-    out.light_e = vec2f(steady, in.light_lx.y) * electrons_per_lx;
+    out.white_e = vec2f(steady, in.light_lx.y) * electrons_per_lx;
     out.place = in.place_m * in.paint_per_m + vec2f(in.period_share, 0.0);
-    out.paint = in.paint;
     out.own_e = mix(view.airlight_e, in.luminance_cd_m2 * view.electrons_per_cd_m2, clear);
     out.shares = in.shares;
     return out;
@@ -70,11 +69,11 @@ fn project_lit(in: Vertex) -> Lit {
 
 @fragment
 fn shade_lit(in: Lit) -> @location(0) vec4f {
-    let albedo = textureSample(painting, texels, in.place).r * in.paint.x + in.paint.y;
-    var light_e = in.light_e.x + in.light_e.y;
+    let albedo = textureSample(painting, texels, in.place).r;
+    var white_e = in.white_e.x + in.white_e.y;
     if BANDED {
-        light_e = in.light_e.x + in.light_e.y * share_of(in.shares, u32(in.clip.y));
+        white_e = in.white_e.x + in.white_e.y * share_of(in.shares, u32(in.clip.y));
     }
-    let signal = albedo * light_e + in.own_e;
+    let signal = albedo * white_e + in.own_e;
     return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }

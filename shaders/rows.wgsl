@@ -23,8 +23,8 @@ struct Vertex {
     @location(2) light_lx: vec2f,
     // Chainage from the mesh's origin, and metres along the outline.
     @location(3) place_m: vec2f,
-    // Albedo is the painting's times x, plus y.
-    @location(4) paint: vec2f,
+    // Albedo is the painting's times this.
+    @location(4) paint: f32,
     @location(5) albedo: f32,
     @location(6) luminance_cd_m2: f32,
     // Of the mesh: its origin from the reference point, its velocity, where the painting starts,

@@ -28,10 +28,8 @@ pub struct Vertex {
     pub light_lx: [f32; 2],
     /// Chainage from the mesh's origin, and metres along the outline.
     pub place_m: [f32; 2],
-    /// Albedo is the painting's times `paint`, plus `bare`.
+    /// Albedo is the painting's times this.
     pub paint: f32,
-    /// See `paint`.
-    pub bare: f32,
     /// Share of light reflected in the mean.
     pub albedo: f32,
     /// Own luminance.

@@ -124,7 +124,7 @@ impl Mesh {
                 position_m: out.map(|x| x as f32).into(),
                 light_lx: [(lamps.irradiance_lx(&at, &normal) + ambient_lx) as f32, 0.0],
                 normal: normal.map(|x| x as f32).into(),
-                bare: body.albedo as f32,
+                paint: body.albedo as f32,
                 albedo: body.albedo as f32,
                 luminance_cd_m2: body.luminance_cd_m2 as f32,
                 ..Vertex::default()

@@ -330,7 +330,7 @@ const VERTEX: [wgpu::VertexAttribute; 8] = {
         attribute(Float32x3, offset_of!(Vertex, normal), 1),
         attribute(Float32x2, offset_of!(Vertex, light_lx), 2),
         attribute(Float32x2, offset_of!(Vertex, place_m), 3),
-        attribute(Float32x2, offset_of!(Vertex, paint), 4),
+        attribute(Float32, offset_of!(Vertex, paint), 4),
         attribute(Float32, offset_of!(Vertex, albedo), 5),
         attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 6),
         attribute(Float32x3, offset_of!(Vertex, gloss), 13),

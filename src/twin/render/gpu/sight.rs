@@ -124,7 +124,7 @@ impl Sight {
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
             self.draws.push(Draw {
                 chunk: None,
-                texture: 0,
+                texture: textures::BLANK,
                 mesh: self.placements.len() as u32,
                 headlit: !job.headlights.is_empty(),
                 lit: range.clone(),

@@ -11,13 +11,14 @@ use crate::twin::render::paint::{PERIOD_M, Painting, Paintings, TEXELS_PER_M};
 
 /// Every painting is there with texels of this many lengths.
 const SLANTS: u32 = 4;
+/// Number of the texture of what has no painting.
+pub const BLANK: usize = 0;
 /// Walls are about this far aside of the line of sight.
 const ASIDE_M: f64 = 5.0;
 
 /// Textures for every painting, and how to read them.
 pub struct Textures {
-    /// All slants of the first painting, then of the second, and so on; where there are none, one
-    /// blank texel for the bodies to bind.
+    /// A white texel for the bodies, all slants of the first painting, then of the second, and so on.
     pub views: Vec<wgpu::TextureView>,
     /// Repeats along the line, clamps at the outline's ends.
     pub sampler: wgpu::Sampler,
@@ -27,10 +28,8 @@ impl Textures {
     /// Uploads the paintings.
     pub fn new(gpu: &Gpu, paintings: &Paintings) -> Self {
         let slants = |p| (0..SLANTS).map(move |slant| upload(gpu, p, slant));
-        let mut views: Vec<_> = paintings.all.iter().flat_map(slants).collect();
-        if views.is_empty() {
-            views.push(texture(gpu, (1, 1), &[vec![0]]));
-        }
+        let mut views = vec![texture(gpu, (1, 1), &[vec![u8::MAX]])];
+        views.extend(paintings.all.iter().flat_map(slants));
         let sampler = gpu.device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("painting"),
             address_mode_u: wgpu::AddressMode::Repeat,
@@ -52,7 +51,7 @@ pub fn per_m(painting: &Painting) -> [f32; 2] {
 /// Number of the texture in which to see a painting from so far along the tunnel.
 pub fn slanted(painting: usize, away_m: f64) -> usize {
     let slant = (away_m / ASIDE_M).max(1.0).log2().round() as u32;
-    painting * SLANTS as usize + slant.min(SLANTS - 1) as usize
+    BLANK + 1 + painting * SLANTS as usize + slant.min(SLANTS - 1) as usize
 }
 
 /// A painting with texels `2^slant` times as long as wide, and its pyramid.

@@ -281,7 +281,6 @@ impl Site<'_> {
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
             paint: paint as f32,
-            bare: 0.0,
             albedo: (paint * surface::mean_albedo(facet.material)) as f32,
             luminance_cd_m2: 0.0,
             gloss: gloss.map_or([0.0; 3], |g| {
