@@ -21,6 +21,9 @@ pub const CHUNK_M: f64 = 5.0;
 /// A painted surface is at most this many times as bright as its material in the mean.
 const BRIGHTEST_PAINT: f64 = 2.0;
 
+/// Of brightness, in the order of a chunk's triangles.
+const STEPS_PER_OCTAVE: f32 = 2.0;
+
 /// Ends of the ranges of detail.
 const NEAR_M: f64 = 6.0;
 const CLOSE_M: f64 = 20.0;
@@ -129,7 +132,7 @@ pub struct Part {
     pub section: usize,
     /// Its indices in the mesh.
     pub indices: Range<u32>,
-    /// Of each triangle, the most luminance that any of it may have, cd/m^2; falling.
+    /// Of each triangle, more luminance than any of it may have, cd/m^2; falling.
     pub peaks: Vec<f32>,
     /// Indices of the triangles among them that mirror, once more.
     pub glossy: Range<u32>,
@@ -211,7 +214,7 @@ fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
         .map(|(k, _)| k)
 }
 
-/// Sorts the triangles of a mesh from index `first` on by their brightest corner.
+/// Sorts the triangles of a mesh from index `first` on by their brightest corner, step by step.
 fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
     let peak = |triangle: &[u32; 3]| {
         let peaks = triangle.map(|k| mesh.vertices[k as usize].peak_cd_m2());
@@ -221,7 +224,8 @@ fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
     let mirrors = |k: u32| mesh.vertices[k as usize].gloss[0] > 0.0;
     let glossy = triangles.iter().filter(|t| t.iter().all(|k| mirrors(*k)));
     let glossy: Vec<u32> = glossy.flatten().copied().collect();
-    let mut sorted: Vec<_> = triangles.iter().map(|t| (peak(t), *t)).collect();
+    let mut sorted: Vec<_> = triangles.iter().map(|t| (step_over(peak(t)), *t)).collect();
+    // A stable sort: within a step neighbours stay together, and their corners are worked out once.
     sorted.sort_by(|a, b| f32::total_cmp(&b.0, &a.0));
     mesh.indices.truncate(first);
     mesh.indices.extend(sorted.iter().flat_map(|(_, t)| *t));
@@ -233,6 +237,13 @@ fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
         peaks: sorted.iter().map(|(peak, _)| *peak).collect(),
         glossy: border..mesh.indices.len() as u32,
     }
+}
+
+/// The next of the steps by which triangles are told apart, [`STEPS_PER_OCTAVE`] to twice the
+/// luminance.
+fn step_over(cd_m2: f32) -> f32 {
+    let step = (STEPS_PER_OCTAVE * cd_m2.max(1e-6).log2()).ceil();
+    (step / STEPS_PER_OCTAVE).exp2()
 }
 
 impl Vertex {
