@@ -163,7 +163,12 @@ impl Sight {
         let mirrors = self.find_mirrors(framed, chunk);
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
+        let slack_m = framed.slack_m();
         for part in &chunk.parts {
+            let around = part.around.map(|p| chunk.origin + p.cast());
+            if !framed.may_see_between(&around, slack_m) {
+                continue;
+            }
             let bright = if floodlit {
                 part.peaks.len()
             } else {

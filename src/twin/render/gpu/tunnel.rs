@@ -11,7 +11,7 @@ use crate::twin::render::gloss::{Gloss, Wet};
 use crate::twin::render::light::{LampField, Shining};
 use crate::twin::render::paint::{Painting, Paintings};
 use crate::twin::render::surface;
-use nalgebra::{Point3, Vector2, Vector3};
+use nalgebra::{Point3, Rotation3, Vector2, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
 
@@ -121,13 +121,15 @@ pub struct ChunkMesh {
     pub mesh: Mesh,
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
-    /// One a cross-section in it.
+    /// For every cross-section in it one a [`Side`].
     pub parts: Vec<Part>,
 }
 
-/// The triangles of one cross-section in a chunk.
+/// The triangles of one side of one cross-section in a chunk.
 #[derive(Clone, Debug)]
 pub struct Part {
+    /// The corners of a box around them, from the chunk's origin.
+    pub around: [Vector3<f32>; 8],
     /// Which of the tunnel's ranges of cross-sections.
     pub section: usize,
     /// Its indices in the mesh.
@@ -143,6 +145,34 @@ struct Facet {
     ends: [OutlinePoint; 2],
     q_m: [f64; 2],
     material: Material,
+}
+
+/// Where a facet is, seen from the middle of the cross-section: a camera beside a wall does not see the
+/// other one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Side {
+    Left,
+    Above,
+    Right,
+    Below,
+}
+
+impl Side {
+    const ALL: [Self; 4] = [Self::Left, Self::Above, Self::Right, Self::Below];
+
+    fn of(facet: &Facet, range: &SectionRange) -> Self {
+        let points = &range.section.points;
+        let heights = points.iter().map(|p| p.h_m);
+        let middle_m = heights.sum::<f64>() / points.len().max(1) as f64;
+        let [a, b] = facet.ends;
+        let (l_m, h_m) = (0.5 * (a.l_m + b.l_m), 0.5 * (a.h_m + b.h_m) - middle_m);
+        match (l_m.abs() > h_m.abs(), l_m > 0.0, h_m > 0.0) {
+            (true, true, _) => Self::Left,
+            (true, false, _) => Self::Right,
+            (false, _, true) => Self::Above,
+            (false, _, false) => Self::Below,
+        }
+    }
 }
 
 /// What all strips of a chunk share.
@@ -185,14 +215,20 @@ pub fn chunk_mesh(
         if stations.len() < 2 {
             continue;
         }
-        let first = mesh.indices.len();
         let rail_q_m = (paintings.of_range.get(section))
             .and_then(|k| paintings.all.get(*k))
             .map_or(0.0, Painting::rail_q_m);
-        for facet in facets_of(range, rail_q_m, &site.near, key) {
-            site.add_strip(&mut mesh, &facet, &stations);
+        let facets = facets_of(range, rail_q_m, &site.near, key);
+        for side in Side::ALL {
+            let first = mesh.indices.len();
+            for facet in facets.iter().filter(|f| Side::of(f, range) == side) {
+                site.add_strip(&mut mesh, facet, &stations);
+            }
+            if mesh.indices.len() > first {
+                let around = box_around(&mesh, first, tunnel.alignment.at(middle_m).heading_rad);
+                parts.push(brightest_first(&mut mesh, first, section, around));
+            }
         }
-        parts.push(brightest_first(&mut mesh, first, section));
     }
     ChunkMesh {
         origin: site.origin,
@@ -215,7 +251,12 @@ fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
 }
 
 /// Sorts the triangles of a mesh from index `first` on by their brightest corner, step by step.
-fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
+fn brightest_first(
+    mesh: &mut Mesh,
+    first: usize,
+    section: usize,
+    around: [Vector3<f32>; 8],
+) -> Part {
     let peak = |triangle: &[u32; 3]| {
         let peaks = triangle.map(|k| mesh.vertices[k as usize].peak_cd_m2());
         peaks.into_iter().fold(0.0, f32::max)
@@ -232,11 +273,27 @@ fn brightest_first(mesh: &mut Mesh, first: usize, section: usize) -> Part {
     let border = mesh.indices.len() as u32;
     mesh.indices.extend(glossy);
     Part {
+        around,
         section,
         indices: first as u32..border,
         peaks: sorted.iter().map(|(peak, _)| *peak).collect(),
         glossy: border..mesh.indices.len() as u32,
     }
+}
+
+/// Corners of the upright box along the line that holds the triangles from index `first` on.
+fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] {
+    let to_line = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad as f32);
+    let corners = mesh.indices[first..].iter();
+    let corners = corners.map(|k| to_line * Vector3::from(mesh.vertices[*k as usize].position_m));
+    let (low, high) = corners.fold(
+        (Vector3::repeat(f32::MAX), Vector3::repeat(f32::MIN)),
+        |(low, high), p| (low.inf(&p), high.sup(&p)),
+    );
+    std::array::from_fn(|k| {
+        let side = |axis: usize| if k >> axis & 1 == 0 { low } else { high }[axis];
+        to_line.inverse() * Vector3::new(side(0), side(1), side(2))
+    })
 }
 
 /// The next of the steps by which triangles are told apart, [`STEPS_PER_OCTAVE`] to twice the

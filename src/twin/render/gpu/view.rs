@@ -2,6 +2,7 @@
 //! the camera's place in mid-frame so that f32 suffices.
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
+use crate::bus::Intrinsics;
 use crate::twin::render::pixel_map::Dark;
 use crate::twin::render::scene::{Headlight, Job, View};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
@@ -24,6 +25,9 @@ pub struct Framed<'a> {
     pub view: &'a View,
     /// `world_from_camera` in mid-frame.
     pub middle: Isometry3<f64>,
+    /// Inside unit normals, in the camera's frame, of four planes through its centre that hold all of the
+    /// picture between them.
+    borders: [Vector3<f64>; 4],
 }
 
 impl<'a> Framed<'a> {
@@ -34,6 +38,7 @@ impl<'a> Framed<'a> {
         Self {
             view,
             middle: view.motion.pose_at(at),
+            borders: borders(&view.camera.intrinsics),
         }
     }
 
@@ -133,27 +138,19 @@ impl<'a> Framed<'a> {
 
     /// Whether a ball may be in the picture at all; `slack_m` covers the camera's way in the frame.
     pub fn may_see(&self, centre: &Point3<f64>, radius_m: f64, slack_m: f64) -> bool {
-        let c = self.middle.inverse_transform_point(centre);
-        let lens = &self.view.camera.intrinsics;
-        let radius_m = radius_m + slack_m;
-        let corner = [
-            lens.ray(-0.5, -0.5),
-            lens.ray(
-                f64::from(lens.width_px) - 0.5,
-                f64::from(lens.height_px) - 0.5,
-            ),
-        ];
-        // Inside normals of the four planes through the image's borders.
-        let planes = [
-            Vector3::new(1.0, 0.0, -corner[0].x),
-            Vector3::new(-1.0, 0.0, corner[1].x),
-            Vector3::new(0.0, 1.0, -corner[0].y),
-            Vector3::new(0.0, -1.0, corner[1].y),
-        ];
-        c.z > -radius_m
-            && planes
-                .iter()
-                .all(|n| n.dot(&c.coords) > -radius_m * n.norm())
+        let c = self.middle.inverse_transform_point(centre).coords;
+        let reach_m = radius_m + slack_m;
+        c.z > -reach_m && self.borders.iter().all(|n| n.dot(&c) > -reach_m)
+    }
+
+    /// The same of what lies between some places.
+    pub fn may_see_between(&self, places: &[Point3<f64>], slack_m: f64) -> bool {
+        let inside = |n: &Vector3<f64>| {
+            let n = self.middle * n;
+            let above = |p: &Point3<f64>| n.dot(&(p - self.reference())) > -slack_m;
+            places.iter().any(above)
+        };
+        inside(&Vector3::z()) && self.borders.iter().all(inside)
     }
 
     /// Row of a place in mid-frame, where it is in the picture or so near to it that another row may see
@@ -194,6 +191,24 @@ impl<'a> Framed<'a> {
             .into_iter()
             .fold(0.1, f64::max)
     }
+}
+
+/// See [`Framed`]. A lens that bends lines bows the borders, so their middles count too.
+fn borders(lens: &Intrinsics) -> [Vector3<f64>; 4] {
+    let far = [lens.width_px, lens.height_px].map(|n| f64::from(n) - 0.5);
+    let along = |k: usize| [-0.5, 0.5 * (far[k] - 0.5), far[k]];
+    let (us, vs) = (along(0), along(1));
+    let column = |u: f64| vs.map(|v| lens.ray(u, v).x);
+    let row = |v: f64| us.map(|u| lens.ray(u, v).y);
+    let least = |x: [f64; 3]| x.into_iter().fold(f64::INFINITY, f64::min);
+    let most = |x: [f64; 3]| x.into_iter().fold(f64::NEG_INFINITY, f64::max);
+    [
+        Vector3::new(1.0, 0.0, -least(column(-0.5))),
+        Vector3::new(-1.0, 0.0, most(column(far[0]))),
+        Vector3::new(0.0, 1.0, -least(row(-0.5))),
+        Vector3::new(0.0, -1.0, most(row(far[1]))),
+    ]
+    .map(|n| n.normalize())
 }
 
 /// To f32.
