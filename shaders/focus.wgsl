@@ -31,7 +31,8 @@ fn focus(@builtin(position) clip: vec4f) -> @location(0) vec4f {
         let theirs = variance(other);
         let spread = select(min(own, theirs), theirs, other > near);
         let weight = exp(-0.5 * f32(k * k) / spread) * inverseSqrt(spread);
-        light += weight * textureLoad(picture, at, 0).r;
+        // A sum may have become infinite.
+        light += weight * min(textureLoad(picture, at, 0).r, BRIGHTEST_E);
         sum += weight;
     }
     return vec4f(light / sum, 0.0, 0.0, 1.0);

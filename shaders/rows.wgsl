@@ -12,8 +12,8 @@ struct Pose {
 override HEADLIGHTS: u32 = 0u;
 
 @group(0) @binding(1) var<storage, read> poses: array<Pose>;
-// For each lamp whose blinking shows on walls a row, with a number for each row of the picture: its
-// light in the exposure over its mean.
+// For each lamp whose blinking shows, on walls or mirrored, a row, with a number for each row of the
+// picture: its light in the exposure over its mean. Row 0 is that of steady light.
 @group(0) @binding(2) var shares: texture_2d<f32>;
 
 struct Vertex {

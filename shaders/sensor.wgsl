@@ -13,8 +13,9 @@ override BLOOMING_REACH: i32 = 0;
 
 // Glare in four pixels of a row, which lie between two texels of it.
 fn glare_in(at: vec2i) -> vec4f {
-    let here = textureLoad(glare, at, 0).r;
-    let next = textureLoad(glare, at + vec2i(1, 0), 0).r;
+    // A sum may have become infinite.
+    let here = min(textureLoad(glare, at, 0).r, BRIGHTEST_E);
+    let next = min(textureLoad(glare, at + vec2i(1, 0), 0).r, BRIGHTEST_E);
     return here + (next - here) * vec4f(0.0, 0.25, 0.5, 0.75);
 }
 
@@ -73,7 +74,7 @@ fn unit(word: vec2u) -> vec2f {
 // Four standard normal numbers by Box and Muller's transform.
 fn normals(key: vec3u, counter: u32) -> vec4f {
     let word = pcg4d(vec4u(key, counter));
-    let radius = sqrt(-2.0 * log(unit(word.xz)));
+    let radius = sqrt(max(-2.0 * log(unit(word.xz)), vec2f(0.0)));
     let turn = 2.0 * PI * unit(word.yw);
     return vec4f(radius * cos(turn), radius * sin(turn));
 }
@@ -87,7 +88,9 @@ fn charge_e(in: Texel, at: vec2i) -> vec4f {
     let level = vec4f(bitcast<vec4i>(word) >> vec4u(LEVEL_SHIFT));
     let hot = (word & vec4u(HOT)) != vec4u(0u);
     let step_e = select(vec4f(in.level_step_e), vec4f(in.hot_step_e), hot);
-    return min(s, vec4f(in.saturation_e)) * gain + (level * step_e + in.dark_e);
+    // What half precision ends at may be any amount more.
+    let held = select(min(s, vec4f(in.saturation_e)), vec4f(in.saturation_e), s >= vec4f(BRIGHTEST_E));
+    return held * gain + (level * step_e + in.dark_e);
 }
 
 // What comes into four pixels with `charge` from above and below; see BLOOMING_REACH in

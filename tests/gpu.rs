@@ -11,9 +11,10 @@ use image::GrayImage;
 use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
+use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Air, Body, Job, LampLight, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
+    Air, Body, Job, LampLight, Pattern, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
 };
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -275,6 +276,54 @@ fn same_job_same_bytes() {
         assert!(renderer.collect().unwrap() == other);
     }
     assert!(first[0] != first[1]);
+}
+
+/// Provokes views of one job that get into each other's way: in another order, and without bodies (which
+/// are cut as finely as the nearest view needs) alone, each is the same.
+#[test]
+fn views_do_not_touch_each_other() {
+    let scene = sample::scene();
+    let mut all = sample::wayside_job(&scene.tunnel, 300.0);
+    let pair = sample::stereo_job(&scene.tunnel, 290.0, SPEED_MPS);
+    all.views.splice(0..0, pair.views);
+    let mut renderer = renderer(&scene);
+    let together = draw(&mut renderer, &all);
+    all.views.reverse();
+    let mut reversed = draw(&mut renderer, &all);
+    reversed.reverse();
+    assert!(together.len() == 3 && together == reversed);
+
+    all.bodies.clear();
+    for (image, view) in draw(&mut renderer, &all).iter().zip(&all.views) {
+        let alone = Job {
+            views: vec![view.clone()],
+            ..all.clone()
+        };
+        assert!(draw(&mut renderer, &alone)[0] == *image);
+    }
+}
+
+/// Provokes a signal that ends at what half precision holds: a lamp that floods a deep well is as white
+/// behind dim glass, and in blue pixels, as the plain renderer has it.
+#[test]
+fn a_flooded_deep_well_is_white() {
+    let scene = sample::scene();
+    let mut view = sample::rig_view(&scene.tunnel, 102.0, 0.0);
+    view.sensor.full_well_e = 6e4;
+    view.sensor.pattern = Pattern::Rggb;
+    view.lens.transmission = 1.0;
+    view.camera.shutter.exposure_s = 2e-3;
+    let job = Job {
+        views: vec![view],
+        ..Job::default()
+    };
+    let image = &draw(&mut renderer(&scene), &job)[0];
+    let right = CpuRenderer::oracle(scene).draw(&job, &job.views[0]);
+    let white = right.pixels().filter(|p| p[0] == 255).count();
+    let grey = (image.pixels().zip(right.pixels())).filter(|(p, q)| q[0] == 255 && p[0] < 250);
+    let grey = grey.count();
+    println!("{grey} of {white} white pixels are grey");
+    assert!(white > 1000 && 100 * grey < white, "{grey} of {white}");
 }
 
 /// Provokes noise of the wrong size, a pattern in it, and the same noise in every frame.

@@ -374,7 +374,8 @@ fn an_edge_is_a_ramp(name: &str, make: fn(Scene) -> Box<dyn Renderer>) {
     let mean = slopes.iter().map(|(u, slope)| u * slope).sum::<f64>() / sum;
     let square = |(u, slope): &(f64, f64)| (u - mean).powi(2) * slope;
     let variance = slopes.iter().map(square).sum::<f64>() / sum;
-    let right = confusion_px.powi(2) / 16.0;
+    // Of a thin lens's disc, and of a pixel.
+    let right = confusion_px.powi(2) / 16.0 + 1.0 / 12.0;
     println!(
         "{name}: circle of {confusion_px:.2} px, edge at {mean:.3}, {variance:.3} of {right:.3} px^2"
     );

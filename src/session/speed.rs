@@ -142,7 +142,9 @@ fn train_seconds(
         let before_s = stack.total_s;
         let head_at = |t| world.chainage_at(t);
         draw(renderer, &jobs[jobs.len() - 1..], |images| {
-            Ok(eyes.read(&taken, images, &mut stack, vehicle_at, head_at).map(drop)?)
+            Ok(eyes
+                .read(&taken, images, &mut stack, vehicle_at, head_at)
+                .map(drop)?)
         })?;
         times.stack_s.push(stack.total_s - before_s);
     }
@@ -172,19 +174,20 @@ fn wayside_seconds(
         .map(|view| job(world, vec![view]))
         .collect();
     let mut times = Times::default();
-    draw(renderer, &jobs, |mut images| {
-        let number = times.stack_s.len() as u32;
-        let frame = Frame {
-            number,
-            start: start(number),
-            exposure_s: post.calibration.camera.shutter.exposure_s,
-            gain_db: post.camera.sensor.gain_db,
-            image: images.pop().ok_or("the renderer did not draw a frame")?,
-        };
-        let work = || detector.on_frame(&frame, None, None);
-        times.stack_s.push(Stopwatch::default().time(work).1);
-        Ok(())
-    })?;
+    for (number, job) in (0..).zip(&jobs) {
+        draw(renderer, std::slice::from_ref(job), |mut images| {
+            let frame = Frame {
+                number,
+                start: start(number),
+                exposure_s: post.calibration.camera.shutter.exposure_s,
+                gain_db: post.camera.sensor.gain_db,
+                image: images.pop().ok_or("the renderer did not draw a frame")?,
+            };
+            let work = || detector.on_frame(&frame, None, None);
+            times.stack_s.push(Stopwatch::default().time(work).1);
+            Ok(())
+        })?;
+    }
     // Once more for the time that it takes, with nothing else to do.
     times.draw_s = draw(renderer, &jobs[learning..], |_| Ok(()))?;
     times.stack_s.drain(..=learning);

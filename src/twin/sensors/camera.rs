@@ -35,9 +35,6 @@ pub struct Trigger {
 
 /// Widest texture that every graphics adapter has.
 const MOST_SIDE_PX: u32 = 8192;
-/// The pixel map holds four bytes a pixel, rows filled up to four pixels, and every graphics adapter
-/// binds a storage buffer of 128 MiB.
-const MOST_PIXELS: u64 = 32_000_000;
 
 /// Draws farther off than this many standard deviations are held there.
 const MOST_SIGMAS: f64 = 4.0;
@@ -133,30 +130,8 @@ impl Optics {
                 "give the time from row to row in us, 0 for a global shutter",
             ));
         }
-        self.check_pixels(at, problems);
         self.check_frame_time(at, problems);
         self.check_lens(at, problems);
-    }
-
-    /// The picture must fit where it is drawn; sides that are out of range are problems of their own.
-    fn check_pixels(&self, at: &str, problems: &mut Vec<Problem>) {
-        let (width, height) = (self.width_px, self.height_px);
-        let pixels = u64::from(width) * u64::from(height);
-        if pixels > MOST_PIXELS && width.max(height) <= MOST_SIDE_PX {
-            problems.push(Problem::new(
-                format!("{at}.height_px"),
-                format!(
-                    "{width} x {height} px are {:.1} million; a graphics adapter binds 128 MiB at \
-                     once, which is room for the figures of {} million",
-                    1e-6 * pixels as f64,
-                    MOST_PIXELS / 1_000_000
-                ),
-                format!(
-                    "read at most {} rows, or fewer columns",
-                    MOST_PIXELS / u64::from(width)
-                ),
-            ));
-        }
     }
 
     /// Principal point and distortion.
@@ -330,7 +305,7 @@ pub struct WaysideCameraSettings {
     pub pixel_um: f64,
     /// Columns. Default 1920.
     pub width_px: u32,
-    /// Rows; 32 million pixels at most. Default 1080.
+    /// Rows. Default 1080.
     pub height_px: u32,
     /// Principal point right of the picture's middle, px. Default 0.
     pub principal_u_px: f64,
@@ -659,11 +634,6 @@ mod tests {
                  calibration_error = { line_time_us = 1.0 }",
                 "calibration_error.line_time_us",
                 "the line time is really 81 us, in which 1080 rows take 100399 us",
-            ),
-            (
-                "width_px = 8192\nheight_px = 4096",
-                "height_px",
-                "8192 x 4096 px are 33.6 million",
             ),
             (
                 "exposure_control = { mode = 'auto', max_exposure_us = 90000.0 }",

@@ -10,7 +10,7 @@ use std::ops::Range;
 /// Parts nearer to the camera's plane than this have no outline in the image.
 const NEAREST_M: f64 = 0.01;
 /// A lens bends the edges of a box out of the rectangle around its corners by less than this
-/// share of the rectangle.
+/// share of the rectangle's longer side.
 const BEND: f64 = 0.1;
 /// Pixels looked at for an extent; of larger ones every second, third, ... is looked at.
 const WHOLE_PX: f64 = 250_000.0;
@@ -108,7 +108,7 @@ impl Outline {
             };
             (low, high) = (low.inf(&p), high.sup(&p));
         }
-        let margin = (high - low) * BEND + Vector2::repeat(1.0);
+        let margin = Vector2::repeat((high - low).max() * BEND + 1.0);
         Self::Around(low - margin, high + margin)
     }
 

@@ -73,6 +73,7 @@ use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
 use blinking::Blinking;
 use dim::{CELL_PX, DimView};
+use extent::Outline;
 use image::GrayImage;
 use lamps::{Haze, RowExposure};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -602,8 +603,9 @@ impl<'a> RowRays<'a> {
     }
 
     fn draw_solid(&self, solid: &Solid<'_>, buffers: &mut RowBuffers) {
-        let world = self.world;
-        for u in columns_of(solid, &self.view.camera.intrinsics, self.row) {
+        let (world, camera) = (self.world, &self.view.camera.intrinsics);
+        let outline = Outline::of(solid.corners(), camera, &self.row.mid);
+        for u in outline.columns(self.row.v, camera.width_px as usize) {
             let ray = self.ray(u);
             let Some((t, normal)) = solid.cast(&self.eye, &ray) else {
                 continue;
@@ -643,33 +645,6 @@ impl<'a> RowRays<'a> {
             light_cd_m2: self.scenery.airlight_cd_m2 * (1.0 - clear),
         }
     }
-}
-
-/// Pixels of a row that a body may cover: none where the rectangle around its corners misses the
-/// row, all where some corner is not in front of the camera.
-fn columns_of(solid: &Solid<'_>, camera: &Intrinsics, row: &RowExposure) -> std::ops::Range<usize> {
-    let width = camera.width_px as usize;
-    let corners = solid.corners().map(|c| row.mid.inverse_transform_point(&c));
-    if corners.iter().all(|c| c.z <= 0.0) {
-        return 0..0;
-    }
-    let (mut low, mut high) = (
-        Vector3::repeat(f64::INFINITY),
-        Vector3::repeat(f64::NEG_INFINITY),
-    );
-    for corner in &corners {
-        let Some(p) = camera.project(corner).filter(|_| corner.z > 0.01) else {
-            return 0..width;
-        };
-        let p = Vector3::new(p.x, p.y, 0.0);
-        (low, high) = (low.inf(&p), high.sup(&p));
-    }
-    let v = row.v as f64;
-    if v < low.y - 1.0 || v > high.y + 1.0 {
-        return 0..0;
-    }
-    let begin = (low.x.max(0.0) as usize).min(width);
-    begin..((high.x + 2.0).max(0.0) as usize).clamp(begin, width)
 }
 
 #[cfg(test)]

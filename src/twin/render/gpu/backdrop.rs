@@ -19,7 +19,6 @@ pub struct Key {
     pose: Isometry3<f64>,
     electrons_per_cd_m2: f64,
     grey_per_cd_m2: f64,
-    saturation_e: f64,
 }
 
 impl Key {
@@ -33,7 +32,6 @@ impl Key {
             pose: framed.middle,
             electrons_per_cd_m2: view.electrons_per_cd_m2(),
             grey_per_cd_m2: view.grey_per_cd_m2(),
-            saturation_e: view.saturation_e(),
         })
     }
 }

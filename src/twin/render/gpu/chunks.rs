@@ -2,7 +2,8 @@
 
 use super::adapter::Gpu;
 use super::bend::Bend;
-use super::tunnel::{CHUNK_M, ChunkKey, Detail, Part, chunk_mesh};
+use super::detail::{CHUNK_M, ChunkKey, Detail};
+use super::tunnel::{Part, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::render::gloss::Wet;
@@ -110,7 +111,6 @@ impl Chunks {
         };
         let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
         let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
-        let slack_m = framed.slack_m();
         let moves = framed.view.motion.poses.len() > 1;
         let place = tunnel.alignment.track_from_world(&eye, s_m);
         let bend = Bend::of(&framed.view.camera.intrinsics, &place);
@@ -130,7 +130,7 @@ impl Chunks {
             if let Some(chunk) = chunk {
                 // Kept whether it is in the picture or beside it: the next view may turn there.
                 chunk.near_in = job;
-                if framed.may_see(&chunk.origin, chunk.radius_m, slack_m) {
+                if framed.may_see(&chunk.origin, chunk.radius_m) {
                     keys.push(key);
                 }
             }

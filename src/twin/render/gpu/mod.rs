@@ -43,6 +43,8 @@ mod adapter;
 mod backdrop;
 mod bend;
 mod chunks;
+mod detail;
+mod facets;
 mod lamps;
 pub mod layout;
 mod mesh;
@@ -179,7 +181,9 @@ impl GpuRenderer {
         for (view, prepared) in job.views.iter().zip(&mut self.views) {
             let lens = &view.camera.intrinsics;
             let size_px = (lens.width_px, lens.height_px);
-            let fits = free.iter().position(|t| self.targets[*t].size_px == size_px);
+            let fits = free
+                .iter()
+                .position(|t| self.targets[*t].size_px == size_px);
             prepared.target = fits.map_or(self.targets.len(), |at| free.swap_remove(at));
             if fits.is_none() {
                 (self.targets).push(Target::new(&self.gpu.device, size_px));
@@ -231,7 +235,9 @@ impl GpuRenderer {
             p.buffers.draw_glare(gpu, pipelines, encoder, target);
         }
         for (framed, p, target) in views() {
-            let map = (self.maps).get(MapKey::new(framed.view), |map| target::map_texture(gpu, &map));
+            let map = (self.maps).get(MapKey::new(framed.view), |map| {
+                target::map_texture(gpu, &map, target.size_px)
+            });
             let develop = Develop {
                 raw: job.raw,
                 blooming: framed.view.sensor.blooming > 0.0,

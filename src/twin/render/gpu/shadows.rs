@@ -14,14 +14,14 @@ mod tiles;
 
 use super::adapter::Gpu;
 use super::chunks::Chunk;
+use super::detail::{CHUNK_M, ChunkKey};
 use super::layout::{
     Blocker, Corner, MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS, Slab, Source, Tile,
 };
 use super::passes::{ViewBuffers, begin};
-use super::upload::Upload;
 use super::pipeline::{Pipelines, bind};
 use super::target::Target;
-use super::tunnel::{CHUNK_M, ChunkKey};
+use super::upload::Upload;
 use super::view::{Framed, single};
 use crate::track::Tunnel;
 use crate::twin::render::light::{LampField, disc_places};
@@ -78,8 +78,6 @@ struct Falling<'j> {
     casts: Vec<Cast>,
     of_light: Vec<Range<usize>>,
     eyes: Eyes,
-    /// How far the camera gets meanwhile.
-    slack_m: f64,
 }
 
 impl Shadows {
@@ -109,7 +107,6 @@ impl Shadows {
             casts,
             of_light,
             eyes: Eyes::of(framed, job.time),
-            slack_m: framed.slack_m(),
         };
         let lens = &framed.view.camera.intrinsics;
         let numbers = falling.lights.len() + falling.casts.len();
@@ -155,7 +152,7 @@ impl Shadows {
         first: usize,
     ) {
         let radius_m = cell.radius_m();
-        if !framed.may_see(&cell.centre, radius_m, falling.slack_m) {
+        if !framed.may_see(&cell.centre, radius_m) {
             return;
         }
         let ball = (&cell.centre, radius_m, cell.normal.as_ref());

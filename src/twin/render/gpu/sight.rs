@@ -2,11 +2,11 @@
 //! under which lamps' blinking.
 
 use super::chunks::{Chunk, Chunks};
+use super::detail::ChunkKey;
 use super::layout::{Mirrored, Placement};
 use super::passes::BodyBuffers;
 use super::smear::{Rectangle, Smear};
 use super::textures;
-use super::tunnel::ChunkKey;
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::light::{Shining, headlights_lx};
 use crate::twin::render::paint::{self, Paintings};
@@ -22,10 +22,10 @@ const DIM_GREY: f64 = 0.4;
 const FLOODLIT_GREY: f64 = 1.0;
 /// Grey levels by headlights below which they are left out.
 const UNLIT_GREY: f64 = 0.1;
-/// Lamps farther than this from a camera are not mirrored in what it sees.
-const MIRRORED_M: f64 = 80.0;
 /// Chunks nearer than this may mirror in any row.
 const MIRRORS_ALL_OVER_M: f64 = 15.0;
+/// Lamps farther than this from a camera are not mirrored in what it sees.
+const MIRRORED_M: f64 = 80.0;
 /// Nor are those farther behind it: surfaces would have to lean towards it.
 const MIRRORED_BEHIND_M: f64 = 5.0;
 /// Light that changes by less than this from row to row shows no bands.
@@ -158,15 +158,14 @@ impl Sight {
                 lux * f64::from(probe.reflected_per_lx)
             })
             .fold(0.0, f64::max);
-        let headlit_grey = headlit_cd_m2 * DIM_GREY / dim_cd_m2;
+        let headlit_grey = headlit_cd_m2 * framed.view.grey_per_cd_m2();
         let floodlit = headlit_grey > FLOODLIT_GREY;
         let mirrors = self.find_mirrors(framed, chunk);
         let period = key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
-        let slack_m = framed.slack_m();
         for part in &chunk.parts {
             let around = part.around.map(|p| chunk.origin + p.cast());
-            if !framed.may_see_between(&around, slack_m) {
+            if !framed.may_see_between(around) {
                 continue;
             }
             let bright = if floodlit {

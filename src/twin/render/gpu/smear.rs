@@ -167,10 +167,7 @@ impl<'a> Smear<'a> {
     fn body_px(&self, body: &Body) -> f64 {
         let half = body.shape.half_extents_m();
         let centre = Point3::from(body.world_from_body.translation.vector);
-        if !self
-            .framed
-            .may_see(&centre, half.norm(), self.framed.slack_m())
-        {
+        if !self.framed.may_see(&centre, half.norm()) {
             return 0.0;
         }
         let eye = body

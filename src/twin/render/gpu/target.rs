@@ -8,7 +8,7 @@ use crate::twin::render::{RawImage, RenderError, upper_bits};
 use image::GrayImage;
 use std::cell::OnceCell;
 
-/// Textures of one image size, used again for every view of that size.
+/// Textures of one image size, used again in every job that has a view of that size.
 pub struct Target {
     /// Size of the image.
     pub size_px: (u32, u32),
@@ -255,12 +255,13 @@ fn too_short() -> RenderError {
 }
 
 /// The words of a camera's pixels, four a texel.
-pub fn map_texture(gpu: &Gpu, map: &PixelMap) -> wgpu::TextureView {
-    let width = map.row(0).len() as u32 / 4;
-    let height = (map.words().len() / map.row(0).len().max(1)) as u32;
-    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-    let size_px = (width.max(1), height.max(1));
-    let texture = texture(&gpu.device, size_px, wgpu::TextureFormat::Rgba32Uint, usage);
+pub fn map_texture(gpu: &Gpu, map: &PixelMap, size_px: (u32, u32)) -> wgpu::TextureView {
+    let (width, usage) = (
+        packed_width(size_px),
+        wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+    );
+    let size = (width, size_px.1);
+    let texture = texture(&gpu.device, size, wgpu::TextureFormat::Rgba32Uint, usage);
     gpu.queue.write_texture(
         texture.as_image_copy(),
         bytemuck::cast_slice(map.words()),

@@ -1,116 +1,23 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
-use super::bend::Bend;
+use super::detail::{CHUNK_M, ChunkKey, Detail, finer_stations, stations};
+use super::facets::{Facet, Side, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
-use crate::track::{
-    CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint, Tunnel,
-    rail_outline,
-};
+use crate::track::{OutlinePoint, TrackPoint, Tunnel};
 use crate::twin::render::gloss::{Gloss, Wet};
 use crate::twin::render::light::{LampField, Shining};
 use crate::twin::render::paint::{Painting, Paintings};
 use crate::twin::render::surface;
-use nalgebra::{Point3, Rotation3, Vector2, Vector3};
+use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
-
-/// Length of a chunk: a whole number of rings, and a whole part of a painting's period.
-pub const CHUNK_M: f64 = 5.0;
 
 /// A painted surface is at most this many times as bright as its material in the mean.
 const BRIGHTEST_PAINT: f64 = 2.0;
 
 /// Of brightness, in the order of a chunk's triangles.
 const STEPS_PER_OCTAVE: f32 = 2.0;
-
-/// Ends of the ranges of detail.
-const NEAR_M: f64 = 6.0;
-const CLOSE_M: f64 = 20.0;
-const MIDDLE_M: f64 = 60.0;
-
-/// How finely a chunk is meshed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Detail {
-    /// Every ring halved: where the rolling shutter or the lens bends what is straight.
-    Near,
-    /// Ring by ring.
-    Close,
-    /// Half a chunk at a time: a chord that long is under 3 mm off a curve of 300 m.
-    Middle,
-    /// From end to end.
-    Far,
-}
-
-impl Detail {
-    /// How fine a chunk is drawn whose nearest end is so far from a camera that bends what is
-    /// straight, by its motion or its lens, or does not.
-    pub fn at(away_m: f64, bent: bool) -> Self {
-        match away_m {
-            ..NEAR_M if bent => Self::Near,
-            ..CLOSE_M => Self::Close,
-            ..MIDDLE_M => Self::Middle,
-            _ => Self::Far,
-        }
-    }
-
-    /// A chunk is at least so far from the camera along the line.
-    fn nearest_m(self) -> f64 {
-        match self {
-            Self::Near => 0.0,
-            Self::Close => NEAR_M,
-            Self::Middle => CLOSE_M,
-            Self::Far => MIDDLE_M,
-        }
-    }
-
-    fn step_m(self) -> f64 {
-        match self {
-            Self::Near => 0.5 * surface::RING_M,
-            Self::Close => surface::RING_M,
-            Self::Middle => 0.5 * CHUNK_M,
-            Self::Far => CHUNK_M,
-        }
-    }
-
-    /// A cell of the mesh is halved until it is smaller than this share of its distance from the
-    /// nearest lamp, since light falls with a power of that distance and is interpolated over the
-    /// cell; but it never gets smaller than this, which is 6 to 12 pixels of the usual cameras.
-    fn finest(self) -> (f64, f64) {
-        match self {
-            Self::Near => (0.25, 0.06),
-            Self::Close => (0.3, 0.15),
-            Self::Middle => (0.5, 0.4),
-            Self::Far => (1.0, CHUNK_M),
-        }
-    }
-}
-
-/// Which mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct ChunkKey {
-    /// Covers chainage from `index * CHUNK_M` over `CHUNK_M`.
-    pub index: i64,
-    /// How fine.
-    pub detail: Detail,
-    /// Finer still before a lens that bends lines.
-    pub bend: Option<Bend>,
-}
-
-impl ChunkKey {
-    /// Whether a cell is short enough for the camera's lens, which is so far across the line from it.
-    fn is_fine(&self, cell_m: f64, across_m: impl Fn(&TrackPoint) -> f64) -> bool {
-        self.bend.is_none_or(|bend| {
-            let across_m = across_m(&bend.eye());
-            cell_m <= bend.cell_m(self.detail.nearest_m().hypot(across_m))
-        })
-    }
-
-    /// Chainage of its origin.
-    pub fn start_m(self) -> f64 {
-        self.index as f64 * CHUNK_M
-    }
-}
 
 /// A chunk as meshed.
 #[derive(Clone, Debug)]
@@ -138,41 +45,6 @@ pub struct Part {
     pub peaks: Vec<f32>,
     /// Indices of the triangles among them that mirror, once more.
     pub glossy: Range<u32>,
-}
-
-/// A strip along the line between two corners of an outline.
-struct Facet {
-    ends: [OutlinePoint; 2],
-    q_m: [f64; 2],
-    material: Material,
-}
-
-/// Where a facet is, seen from the middle of the cross-section: a camera beside a wall does not see the
-/// other one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Side {
-    Left,
-    Above,
-    Right,
-    Below,
-}
-
-impl Side {
-    const ALL: [Self; 4] = [Self::Left, Self::Above, Self::Right, Self::Below];
-
-    fn of(facet: &Facet, range: &SectionRange) -> Self {
-        let points = &range.section.points;
-        let heights = points.iter().map(|p| p.h_m);
-        let middle_m = heights.sum::<f64>() / points.len().max(1) as f64;
-        let [a, b] = facet.ends;
-        let (l_m, h_m) = (0.5 * (a.l_m + b.l_m), 0.5 * (a.h_m + b.h_m) - middle_m);
-        match (l_m.abs() > h_m.abs(), l_m > 0.0, h_m > 0.0) {
-            (true, true, _) => Self::Left,
-            (true, false, _) => Self::Right,
-            (false, _, true) => Self::Above,
-            (false, _, false) => Self::Below,
-        }
-    }
 }
 
 /// What all strips of a chunk share.
@@ -356,124 +228,6 @@ impl Site<'_> {
             }),
         }
     }
-}
-
-/// Halves the interval `[from, to]` until every piece `fits`; puts the ends of the pieces into
-/// `cuts`, all but the first. Cuts of coarser pieces are among those of finer ones.
-fn halve(from: f64, to: f64, fits: &impl Fn(f64, f64) -> bool, cuts: &mut Vec<f64>) {
-    if fits(from, to) {
-        cuts.push(to);
-        return;
-    }
-    let middle = 0.5 * (from + to);
-    halve(from, middle, fits, cuts);
-    halve(middle, to, fits, cuts);
-}
-
-/// Whether light varies little over a cell this long, this far from a lamp.
-fn is_fine(cell_m: f64, away_m: f64, detail: Detail) -> bool {
-    let (share, least_m) = detail.finest();
-    cell_m <= share * away_m || cell_m < 2.0 * least_m
-}
-
-/// The stations, with more of them where the line through `at` passes lamps. What shares the line
-/// shares its stations, so that no gap opens between strips of different fineness.
-fn finer_stations(
-    stations: &[f64],
-    at: OutlinePoint,
-    near: &[TrackPoint],
-    key: ChunkKey,
-) -> Vec<f64> {
-    let mut finer = vec![stations[0]];
-    let across_m = |from: &TrackPoint| (at.l_m - from.l_m).hypot(at.h_m - from.h_m);
-    for pair in stations.windows(2) {
-        let fits = |from_m: f64, to_m: f64| {
-            let lit_evenly = near.iter().all(|lamp| {
-                let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-                is_fine(to_m - from_m, along_m.hypot(across_m(lamp)), key.detail)
-            });
-            lit_evenly && key.is_fine(to_m - from_m, across_m)
-        };
-        halve(pair[0], pair[1], &fits, &mut finer);
-    }
-    finer
-}
-
-/// Ends of the range inside the chunk, and all multiples of `step_m` between them.
-fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Vec<f64> {
-    let (from, to) = (from_m.max(range.from_m), to_m.min(range.to_m));
-    if to <= from {
-        return Vec::new();
-    }
-    let first = (from / step_m).floor() as i64 + 1;
-    let last = (to / step_m).ceil() as i64;
-    let inside = (first..last).map(|k| k as f64 * step_m);
-    std::iter::once(from).chain(inside).chain([to]).collect()
-}
-
-fn facets_of(
-    range: &SectionRange,
-    rail_q_m: f64,
-    near: &[TrackPoint],
-    key: ChunkKey,
-) -> Vec<Facet> {
-    let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section, 0.0, near, key);
-    for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
-        add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, near, key);
-    }
-    facets
-}
-
-fn add_outline(
-    facets: &mut Vec<Facet>,
-    section: &CrossSection,
-    mut q_m: f64,
-    near: &[TrackPoint],
-    key: ChunkKey,
-) {
-    for edge in section.edges() {
-        if edge.length_m() > 0.0 {
-            cut_edge(facets, &edge, q_m, near, key);
-        }
-        q_m += edge.length_m();
-    }
-}
-
-/// Cuts an edge into facets where it passes lamps, or a camera with a lens that bends it.
-fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint], key: ChunkKey) {
-    let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
-    let at = |t: f64| OutlinePoint {
-        l_m: a.l_m + t * (b.l_m - a.l_m),
-        h_m: a.h_m + t * (b.h_m - a.h_m),
-    };
-    let fits = |from: f64, to: f64| {
-        let ends = [at(from), at(to)];
-        let cell_m = (to - from) * length_m;
-        let lit_evenly = near.iter().all(|lamp| {
-            let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
-            let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-            is_fine(cell_m, along_m.hypot(across_m(ends, lamp)), key.detail)
-        });
-        lit_evenly && key.is_fine(cell_m, |eye| across_m(ends, eye))
-    };
-    let mut cuts = vec![0.0];
-    halve(0.0, 1.0, &fits, &mut cuts);
-    for pair in cuts.windows(2) {
-        facets.push(Facet {
-            ends: [at(pair[0]), at(pair[1])],
-            q_m: [q_m + pair[0] * length_m, q_m + pair[1] * length_m],
-            material,
-        });
-    }
-}
-
-/// Distance of a lamp from the straight between two points of an outline.
-fn across_m([a, b]: [OutlinePoint; 2], lamp: &TrackPoint) -> f64 {
-    let edge = Vector2::new(b.l_m - a.l_m, b.h_m - a.h_m);
-    let to_lamp = Vector2::new(lamp.l_m - a.l_m, lamp.h_m - a.h_m);
-    let share = (edge.dot(&to_lamp) / edge.norm_squared().max(1e-12)).clamp(0.0, 1.0);
-    (to_lamp - edge * share).norm()
 }
 
 /// A point of the surface, which runs straight from ring to ring.

@@ -83,8 +83,12 @@ impl Table {
         if height == 0 {
             return;
         }
-        if self.texture.width() != width || self.texture.height() < height {
-            *self = Self::sized(gpu, (width, height.next_power_of_two()));
+        let has = (self.texture.width(), self.texture.height());
+        if has.0 < width || has.1 < height {
+            *self = Self::sized(
+                gpu,
+                (has.0.max(width), has.1.max(height.next_power_of_two())),
+            );
         }
         gpu.queue.write_texture(
             self.texture.as_image_copy(),
