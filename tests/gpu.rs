@@ -7,27 +7,17 @@
 )]
 #![cfg(feature = "twin")]
 
-use image::GrayImage;
+mod common;
+
+use common::{dark_scene, draw, gpu};
 use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{
-    Air, Body, Job, LampLight, Pattern, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
-};
+use metrotwin::twin::render::{Body, Job, LampLight, Pattern, SensorSettings, Shape, View, sample};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
-
-fn renderer(scene: &Scene) -> GpuRenderer {
-    GpuRenderer::new(scene.clone()).unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn draw(renderer: &mut GpuRenderer, job: &Job) -> Vec<GrayImage> {
-    renderer.submit(job).unwrap();
-    renderer.collect().unwrap()
-}
 
 /// A sensor without noise, glare and offset, and light enough for 200 grey levels a `luminance`.
 fn plain(view: &mut View, luminance_cd_m2: f64) {
@@ -46,19 +36,6 @@ fn even(sensor: &mut SensorSettings) {
     sensor.dsnu_e = 0.0;
     sensor.dark_current_e_per_s = 0.0;
     sensor.hot_pixel_share = 0.0;
-}
-
-/// Nothing shines but the lamps given.
-fn dark_scene(lamps: Vec<LampLight>) -> Scene {
-    let mut tunnel = sample::tunnel();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
-    Scene {
-        tunnel: tunnel.into(),
-        lamps,
-        air: Air::default(),
-        wet: gloss::Wet::default(),
-    }
 }
 
 /// Centre of gravity of grey levels: u, v.
@@ -136,7 +113,7 @@ fn lamps_at_100_kmh_are_where_they_belong() {
             views: vec![view],
             ..Job::default()
         };
-        let image = &draw(&mut renderer(&dark_scene(vec![lamp])), &job)[0];
+        let image = &draw(&mut *gpu(dark_scene(vec![lamp])), &job)[0];
         let found = centroid(
             |x, y| f64::from(image.get_pixel(x, y)[0]),
             image.dimensions(),
@@ -160,7 +137,7 @@ fn ball(centre: Point3<f64>, velocity_mps: Vector3<f64>) -> Body {
 fn balls_are_in_place(mut view: View, centre: Point3<f64>, velocity_mps: Vector3<f64>, what: &str) {
     plain(&mut view, 1.0);
     let time = view.start.plus(0.004);
-    let mut renderer = renderer(&dark_scene(Vec::new()));
+    let mut renderer = gpu(dark_scene(Vec::new()));
     let (mut u, mut v) = (0.0, 0.0);
     for k in 0..9 {
         let shift = Vector3::new(f64::from(k % 3), f64::from(k), f64::from(k / 3)) * 1.3e-3;
@@ -176,7 +153,7 @@ fn balls_are_in_place(mut view: View, centre: Point3<f64>, velocity_mps: Vector3
             views: vec![view.clone()],
             ..Job::default()
         };
-        let image = &draw(&mut renderer, &job)[0];
+        let image = &draw(&mut *renderer, &job)[0];
         let found = centroid(
             |x, y| f64::from(image.get_pixel(x, y)[0]),
             image.dimensions(),
@@ -241,7 +218,7 @@ fn stripes_are_the_waveform() {
             views: vec![view.clone()],
             ..Job::default()
         };
-        let image = &draw(&mut renderer(&dark_scene(vec![lamp])), &job)[0];
+        let image = &draw(&mut *gpu(dark_scene(vec![lamp])), &job)[0];
         let (column, middle) = (pixel.x.round() as u32, pixel.y.round() as u32);
         let mut levels = (0, 0);
         for row in middle - 20..=middle + 20 {
@@ -264,11 +241,11 @@ fn same_job_same_bytes() {
     let scene = sample::scene();
     let a = sample::stereo_job(&scene.tunnel, 40.0, SPEED_MPS);
     let b = sample::wayside_job(&scene.tunnel, 300.0);
-    let mut one = renderer(&scene);
-    let first = draw(&mut one, &a);
-    let other = draw(&mut one, &b);
+    let mut one = gpu(scene.clone());
+    let first = draw(&mut *one, &a);
+    let other = draw(&mut *one, &b);
     // Both in flight at once, in the same and in a new renderer.
-    let mut two = renderer(&scene);
+    let mut two = gpu(scene);
     for renderer in [&mut one, &mut two] {
         renderer.submit(&a).unwrap();
         renderer.submit(&b).unwrap();
@@ -286,20 +263,20 @@ fn views_do_not_touch_each_other() {
     let mut all = sample::wayside_job(&scene.tunnel, 300.0);
     let pair = sample::stereo_job(&scene.tunnel, 290.0, SPEED_MPS);
     all.views.splice(0..0, pair.views);
-    let mut renderer = renderer(&scene);
-    let together = draw(&mut renderer, &all);
+    let mut renderer = gpu(scene);
+    let together = draw(&mut *renderer, &all);
     all.views.reverse();
-    let mut reversed = draw(&mut renderer, &all);
+    let mut reversed = draw(&mut *renderer, &all);
     reversed.reverse();
     assert!(together.len() == 3 && together == reversed);
 
     all.bodies.clear();
-    for (image, view) in draw(&mut renderer, &all).iter().zip(&all.views) {
+    for (image, view) in draw(&mut *renderer, &all).iter().zip(&all.views) {
         let alone = Job {
             views: vec![view.clone()],
             ..all.clone()
         };
-        assert!(draw(&mut renderer, &alone)[0] == *image);
+        assert!(draw(&mut *renderer, &alone)[0] == *image);
     }
 }
 
@@ -317,12 +294,11 @@ fn a_flooded_deep_well_is_white() {
         views: vec![view],
         ..Job::default()
     };
-    let image = &draw(&mut renderer(&scene), &job)[0];
+    let image = &draw(&mut *gpu(scene.clone()), &job)[0];
     let right = CpuRenderer::oracle(scene).draw(&job, &job.views[0]);
     let white = right.pixels().filter(|p| p[0] == 255).count();
     let grey = (image.pixels().zip(right.pixels())).filter(|(p, q)| q[0] == 255 && p[0] < 250);
     let grey = grey.count();
-    println!("{grey} of {white} white pixels are grey");
     assert!(white > 1000 && 100 * grey < white, "{grey} of {white}");
 }
 
@@ -347,7 +323,7 @@ fn noise_is_that_of_the_sensor() {
     };
     let mut job = job;
     job.views[1].noise.frame = 1;
-    let images = draw(&mut renderer(&dark_scene(Vec::new())), &job);
+    let images = draw(&mut *gpu(dark_scene(Vec::new())), &job);
     let sensor = view.sensor;
     let mean = sensor.black_level_grey + 100.0;
     let gain = sensor.grey_per_e();
@@ -380,5 +356,5 @@ fn noise_is_that_of_the_sensor() {
 /// Provokes a panic instead of an error.
 #[test]
 fn collecting_nothing_is_an_error() {
-    assert!(renderer(&dark_scene(Vec::new())).collect().is_err());
+    assert!(gpu(dark_scene(Vec::new())).collect().is_err());
 }

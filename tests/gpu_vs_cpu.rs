@@ -28,12 +28,13 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
+mod common;
+
+use common::{Make, cpu, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{TrackPoint, Tunnel};
-use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gloss::Wet;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
     Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
 };
@@ -41,22 +42,6 @@ use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
-
-fn gpu(scene: Scene) -> Box<dyn Renderer> {
-    match GpuRenderer::new(scene) {
-        Ok(renderer) => Box::new(renderer),
-        Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
-    }
-}
-
-fn cpu(scene: Scene) -> Box<dyn Renderer> {
-    Box::new(CpuRenderer::oracle(scene))
-}
-
-fn draw(renderer: &mut dyn Renderer, job: &Job) -> Vec<GrayImage> {
-    renderer.submit(job).unwrap();
-    renderer.collect().unwrap()
-}
 
 fn quiet(job: &Job) -> Job {
     let mut job = job.clone();
@@ -334,7 +319,7 @@ fn out_of_focus() {
 
 /// Provokes a pupil or a circle of confusion of another size: the edge of a board at 4 m, of which a
 /// lens in focus at 1 m makes a ramp whose slope has the variance of a disc along a line, c^2 / 16.
-fn an_edge_is_a_ramp(name: &str, make: fn(Scene) -> Box<dyn Renderer>) {
+fn an_edge_is_a_ramp(name: &str, make: Make) {
     let mut view = sample::wayside_job(&sample::tunnel(), 100.0)
         .views
         .remove(0);
@@ -613,7 +598,7 @@ fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
 /// Provokes bodies drawn at the job's time or with one pose a frame: a luminous board that moves,
 /// seen from the running train. (The rasteriser moves corners only: it draws the sides straight,
 /// which over 100 rows is good to 0.01 px.)
-fn a_board_obeys_the_row_times(make: fn(Scene) -> Box<dyn Renderer>) {
+fn a_board_obeys_the_row_times(make: Make) {
     let tunnel = sample::tunnel();
     let mut view = sample::rig_view(&tunnel, 150.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);

@@ -12,50 +12,24 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
+mod common;
+
+use common::{Make, RENDERERS, dark_scene, draw};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, SimTime};
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
-use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::surface::FAINT_E;
-use metrotwin::twin::render::{
-    Air, CameraMotion, Job, LampLight, Renderer, Scene, View, gloss, sample,
-};
+use metrotwin::twin::render::{CameraMotion, Job, LampLight, View, sample};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 
-type Make = fn(Scene) -> Box<dyn Renderer>;
-
-fn gpu(scene: Scene) -> Box<dyn Renderer> {
-    match GpuRenderer::new(scene) {
-        Ok(renderer) => Box::new(renderer),
-        Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
-    }
-}
-
-fn cpu(scene: Scene) -> Box<dyn Renderer> {
-    Box::new(CpuRenderer::oracle(scene))
-}
-
-const RENDERERS: [(&str, Make); 2] = [("cpu", cpu), ("gpu", gpu)];
-
-fn draw(make: Make, lamp: &LampLight, view: &View) -> GrayImage {
-    let mut tunnel = sample::tunnel();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
-    let mut renderer = make(Scene {
-        tunnel: tunnel.into(),
-        lamps: vec![lamp.clone()],
-        air: Air::default(),
-        wet: gloss::Wet::default(),
-    });
+fn draw_lamp(make: Make, lamp: &LampLight, view: &View) -> GrayImage {
     let job = Job {
         views: vec![view.clone()],
         ..Job::default()
     };
-    renderer.submit(&job).unwrap();
-    renderer.collect().unwrap().remove(0)
+    draw(&mut *make(dark_scene(vec![lamp.clone()])), &job).remove(0)
 }
 
 /// A lamp that is always on and as bright from every side.
@@ -172,7 +146,7 @@ fn outline_errors(make: Make, view: &View, lamp: &LampLight) -> Vec<f64> {
     let (mut view, mut lamp) = (view.clone(), lamp.clone());
     plain(&mut view, &mut lamp, 200.0);
     let polygon = outline(&view, &rim(&lamp, 360));
-    let image = draw(make, &lamp, &view);
+    let image = draw_lamp(make, &lamp, &view);
     edge_errors(&image, 200.0, view.lens.blur_px, &polygon)
 }
 
@@ -300,7 +274,7 @@ fn rows_in_a_lamp_are_the_waveform() {
                     view.camera.shutter.first_row = first_row;
                     plain(&mut view, &mut lamp, full);
                     let polygon = outline(&view, &rim(&lamp, 360));
-                    let rows = rows_inside(&draw(make, &lamp, &view), &polygon);
+                    let rows = rows_inside(&draw_lamp(make, &lamp, &view), &polygon);
                     assert!(rows.len() > 20);
                     let curve = lamp.curve();
                     let right = |v: f64| {
@@ -357,7 +331,7 @@ fn far_lamps_keep_their_light() {
                     .map(|k| polygon[k].coords.perp(&polygon[(k + 1) % 360].coords))
                     .sum::<f64>()
                     .abs();
-            let image = draw(make, &lamp, &view);
+            let image = draw_lamp(make, &lamp, &view);
             let light: f64 = image.iter().map(|p| f64::from(*p) / 200.0).sum();
             println!("{name}: {area:.2} px of lamp give {light:.2}");
             assert!((light / area - 1.0).abs() < 0.01, "{name}: {area} {light}");
@@ -378,7 +352,7 @@ fn glare_carries_the_stripes() {
         view.lens.veil_share = 0.05;
         // So that glare has some hundred grey levels.
         view.sensor.gain_db += 40.0;
-        let image = draw(make, &lamp, &view);
+        let image = draw_lamp(make, &lamp, &view);
         let (curve, shutter) = (lamp.curve(), view.camera.shutter);
         let (mut worst, mut bright, mut dark) = (0.0f64, 0, 0);
         for v in 0..image.height() {

@@ -12,13 +12,13 @@
     reason = "a test fails by panicking, and prints its figures"
 )]
 
+mod common;
+
+use common::{RENDERERS, dark_scene};
 use metrotwin::bus::Intrinsics;
 use metrotwin::twin::random::Stream;
-use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{
-    Air, Body, Job, Pattern, RawImage, Renderer, Scene, SensorSettings, Shape, View, gloss, sample,
-    upper_bits,
+    Body, Job, Pattern, RawImage, Renderer, SensorSettings, Shape, View, sample, upper_bits,
 };
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
@@ -26,24 +26,11 @@ use std::f64::consts::TAU;
 const SIZE_PX: (u32, u32) = (320, 240);
 const PIXELS: f64 = 320.0 * 240.0;
 
-fn nothing() -> Scene {
-    let mut tunnel = sample::tunnel();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
-    Scene {
-        tunnel: tunnel.into(),
-        lamps: Vec::new(),
-        air: Air::default(),
-        wet: gloss::Wet::default(),
-    }
-}
-
 /// The same test with either renderer.
 fn both(test: impl Fn(&mut dyn Renderer, &str)) {
-    let mut gpu = GpuRenderer::new(nothing())
-        .unwrap_or_else(|e| panic!("{e}; install a driver: apt-get install mesa-vulkan-drivers"));
-    test(&mut gpu, "gpu");
-    test(&mut CpuRenderer::oracle(nothing()), "cpu");
+    for (name, make) in RENDERERS {
+        test(&mut *make(dark_scene(Vec::new())), name);
+    }
 }
 
 /// A still camera of twelve bits without any fixed pattern.
@@ -432,8 +419,7 @@ fn noise_is_white_and_independent() {
 /// all that may differ, at most 2^-11 of 10,000 e, a fifth of a grey level here.
 #[test]
 fn noise_is_equal_for_gpu_and_cpu_streams() {
-    let mut gpu = GpuRenderer::new(nothing()).unwrap_or_else(|e| panic!("{e}"));
-    let mut cpu = CpuRenderer::oracle(nothing());
+    let [mut cpu, mut gpu] = RENDERERS.map(|(_, make)| make(dark_scene(Vec::new())));
     let mut view = camera();
     view.sensor = SensorSettings {
         bits: 8,
@@ -448,8 +434,8 @@ fn noise_is_equal_for_gpu_and_cpu_streams() {
     for pattern in [Pattern::Grey, Pattern::Rggb] {
         view.sensor.pattern = pattern;
         for electrons in [0.0, 5.0, 100.0, 3000.0, 7000.0, 12_000.0] {
-            let one = flats(&mut gpu, &view, electrons, 1).remove(0);
-            let other = flats(&mut cpu, &view, electrons, 1).remove(0);
+            let one = flats(&mut *gpu, &view, electrons, 1).remove(0);
+            let other = flats(&mut *cpu, &view, electrons, 1).remove(0);
             let apart = one.iter().zip(other.iter()).map(|(a, b)| a.abs_diff(*b));
             let (worst, off) = apart.fold((0, 0), |(worst, off), d| {
                 (worst.max(d), off + u32::from(d > 0))

@@ -8,11 +8,12 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
+mod common;
+
+use common::{cpu, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
-use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::light::Shining;
 use metrotwin::twin::render::{
     Body, CameraMotion, Headlight, Hull, Job, Renderer, Scene, Shape, View, sample,
@@ -68,11 +69,6 @@ fn view(scene: &Scene) -> View {
     view
 }
 
-fn draw(renderer: &mut dyn Renderer, job: &Job) -> GrayImage {
-    renderer.submit(job).unwrap();
-    renderer.collect().unwrap().remove(0)
-}
-
 /// From the place below the lamp to where a line from `aside_m` beside the lamp's centre, that
 /// touches the ball on its far side, meets the bed: at x the line passes the ball's centre at
 /// (a z / H + x (H - z) / H) H / sqrt(H^2 + (x - a)^2).
@@ -115,9 +111,9 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
         views: vec![view.clone()],
         ..Job::default()
     };
-    let free = draw(renderer, &job);
+    let free = draw(renderer, &job).remove(0);
     job.bodies.push(ball(&scene));
-    let shaded = draw(renderer, &job);
+    let shaded = draw(renderer, &job).remove(0);
     let [umbra_m, middle_m, penumbra_m] = [lamp.radius_m, 0.0, -lamp.radius_m].map(edge_m);
     println!("umbra {umbra_m:.3} m, middle {middle_m:.3} m, penumbra {penumbra_m:.3} m");
     let foot = sample::on_bed(&scene.tunnel, S_M, 0.0, 0.0);
@@ -172,19 +168,12 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
 
 #[test]
 fn a_ball_has_umbra_and_penumbra_on_the_cpu() {
-    a_ball_has_umbra_and_penumbra(&mut CpuRenderer::oracle(scene()));
+    a_ball_has_umbra_and_penumbra(&mut *cpu(scene()));
 }
 
 #[test]
 fn a_ball_has_umbra_and_penumbra_on_the_gpu() {
-    a_ball_has_umbra_and_penumbra(&mut gpu(scene()));
-}
-
-fn gpu(scene: Scene) -> GpuRenderer {
-    match GpuRenderer::new(scene) {
-        Ok(renderer) => renderer,
-        Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
-    }
+    a_ball_has_umbra_and_penumbra(&mut *gpu(scene()));
 }
 
 /// A worker, a box, a cylinder, a boulder, and a train that comes with its headlights on.
@@ -245,7 +234,7 @@ fn busy_job(scene: &Scene, s_m: f64) -> Job {
 #[test]
 fn both_renderers_hide_the_same_light() {
     let scene = sample::scene();
-    let (mut gpu, mut cpu) = (gpu(scene.clone()), CpuRenderer::oracle(scene.clone()));
+    let (mut gpu, mut cpu) = (gpu(scene.clone()), cpu(scene.clone()));
     for s_m in [100.0, 270.0, 420.0] {
         let shaded = busy_job(&scene, s_m);
         let free = Job {
@@ -256,9 +245,9 @@ fn both_renderers_hide_the_same_light() {
         for body in &mut bright.bodies {
             body.luminance_cd_m2 = 1e6;
         }
-        let bodies = draw(&mut gpu, &bright);
-        let [g, g_free] = [&shaded, &free].map(|job| draw(&mut gpu, job));
-        let [c, c_free] = [&shaded, &free].map(|job| draw(&mut cpu, job));
+        let bodies = draw(&mut *gpu, &bright).remove(0);
+        let [g, g_free] = [&shaded, &free].map(|job| draw(&mut *gpu, job).remove(0));
+        let [c, c_free] = [&shaded, &free].map(|job| draw(&mut *cpu, job).remove(0));
         let (mut off, mut fell, mut all) = (0, 0, 0);
         for (u, v, pixel) in bodies.enumerate_pixels() {
             let at = |image: &GrayImage| f64::from(image.get_pixel(u, v)[0]);

@@ -11,37 +11,20 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
+mod common;
+
+use common::{Make, RENDERERS, cpu, dark_scene, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{Body, CameraMotion, Job, Renderer, Scene, Shape, View, sample};
 use nalgebra::Vector3;
-
-type Make = fn(Scene) -> Box<dyn Renderer>;
-
-fn gpu(scene: Scene) -> Box<dyn Renderer> {
-    match GpuRenderer::new(scene) {
-        Ok(renderer) => Box::new(renderer),
-        Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
-    }
-}
-
-fn cpu(scene: Scene) -> Box<dyn Renderer> {
-    Box::new(CpuRenderer::oracle(scene))
-}
 
 fn brute_force(scene: Scene) -> Box<dyn Renderer> {
     Box::new(CpuRenderer::oracle(scene).sliced(256))
 }
 
-fn draw(make: Make, scene: &Scene, job: &Job) -> GrayImage {
-    let mut renderer = make(scene.clone());
-    renderer.submit(job).unwrap();
-    renderer.collect().unwrap().remove(0)
-}
-
-/// Root of the mean square of the difference, and the share of pixels that a picture has over 10.
+/// Root of the mean square of the difference.
 fn apart(a: &GrayImage, b: &GrayImage) -> f64 {
     let square = |(a, b): (&u8, &u8)| f64::from(a.abs_diff(*b)).powi(2);
     (a.iter().zip(b.iter()).map(square).sum::<f64>() / a.len() as f64).sqrt()
@@ -62,20 +45,11 @@ fn small_view(exposure_s: f64, luminance_cd_m2: f64, grey: f64) -> View {
     view
 }
 
-fn lamps_alone() -> Scene {
-    let mut scene = sample::scene();
-    let mut tunnel = (*scene.tunnel).clone();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
-    scene.tunnel = tunnel.into();
-    scene
-}
-
 /// Provokes discs drawn at too few instants of a long exposure, or with their light at the wrong
 /// ones: under one grey level RMS, over the picture and over what lamps light of it.
 #[test]
 fn lamps_smear_as_in_brute_force() {
-    let scene = lamps_alone();
+    let scene = dark_scene(sample::scene().lamps);
     for exposure_s in [30e-6, 300e-6, 2e-3] {
         let mut view = small_view(exposure_s, 4e4, 200.0);
         view.lens.f_number = view.lens.f_number.min(64.0);
@@ -83,11 +57,11 @@ fn lamps_smear_as_in_brute_force() {
             views: vec![view],
             ..Job::default()
         };
-        let right = draw(brute_force, &scene, &job);
+        let right = draw(&mut *brute_force(scene.clone()), &job).remove(0);
         let lit = right.iter().filter(|p| **p > 10).count() as f64;
         assert!(lit > 100.0, "{lit}");
-        for (name, make) in [("cpu", cpu as Make), ("gpu", gpu)] {
-            let off = apart(&draw(make, &scene, &job), &right);
+        for (name, make) in RENDERERS {
+            let off = apart(&draw(&mut *make(scene.clone()), &job).remove(0), &right);
             let off_lit = off * (right.len() as f64 / lit).sqrt();
             println!("{name} {exposure_s}: {off:.3} RMS, {off_lit:.3} where lit");
             assert!(off < 1.0 && off_lit < 1.0, "{name}: {off} {off_lit}");
@@ -114,7 +88,7 @@ fn apart_from_parts(make: Make, scene: &Scene, job: &Job) -> f64 {
             *sum += f64::from(*pixel) / f64::from(PARTS);
         }
     }
-    let whole = draw(make, scene, job);
+    let whole = draw(&mut *make(scene.clone()), job).remove(0);
     let square = |(mean, pixel): (&f64, &u8)| (mean - f64::from(*pixel)).powi(2);
     (sum.iter().zip(whole.iter()).map(square).sum::<f64>() / sum.len() as f64).sqrt()
 }

@@ -4,7 +4,7 @@ use super::lamps::RowExposure;
 use crate::twin::render::View;
 use crate::twin::render::light::Shining;
 
-/// Light that changes by less than this from row to row shows no bands.
+/// Light that changes by less than a level of 255 shows no bands.
 const BAND: f64 = 0.004;
 
 /// Every lamp of the scene.

@@ -35,7 +35,7 @@
 //! The end walls where two cross-sections meet (dark). Between vertices positions run straight, so edges
 //! close to a fast camera are bent by the shutter only facet by facet (0.5 m), and by the lens cell by
 //! cell (0.25 px, `bend.rs`); lamps are exact. Of every 5 m of tunnel one lamp blinks, the others give
-//! their mean. Stains end 60 m away, the tunnel 160 m ahead of the camera; glare of a lamp under a
+//! their mean, and on bodies all do. The tunnel ends 160 m ahead of the camera; glare of a lamp under a
 //! quarter of the usual read noise is not drawn. Out of focus, light of what the middle of the pupil does
 //! not see is missing.
 

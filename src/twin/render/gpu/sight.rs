@@ -28,8 +28,7 @@ const MIRRORS_ALL_OVER_M: f64 = 15.0;
 const MIRRORED_M: f64 = 80.0;
 /// Nor are those farther behind it: surfaces would have to lean towards it.
 const MIRRORED_BEHIND_M: f64 = 5.0;
-/// Light that changes by less than this from row to row shows no bands.
-/// It is the shot noise of a full pixel of 10,000 electrons.
+/// Light that changes by less than the shot noise of a full pixel of 10,000 electrons shows no bands.
 const BAND: f32 = 0.01;
 
 /// What is lit and how.

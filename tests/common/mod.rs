@@ -1,0 +1,51 @@
+//! What the tests of the renderers share.
+
+#![allow(
+    dead_code,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "no test uses all of it, and a test fails by panicking"
+)]
+
+use image::GrayImage;
+use metrotwin::twin::render::cpu::CpuRenderer;
+use metrotwin::twin::render::gpu::GpuRenderer;
+use metrotwin::twin::render::{Air, Job, LampLight, Renderer, Scene, gloss, sample};
+
+/// Makes a renderer.
+pub type Make = fn(Scene) -> Box<dyn Renderer>;
+
+/// For tests that both renderers must pass.
+pub const RENDERERS: [(&str, Make); 2] = [("cpu", cpu), ("gpu", gpu)];
+
+/// The plain renderer with a ray through every pixel.
+pub fn cpu(scene: Scene) -> Box<dyn Renderer> {
+    Box::new(CpuRenderer::oracle(scene))
+}
+
+/// The renderer on the graphics adapter, which must be there.
+pub fn gpu(scene: Scene) -> Box<dyn Renderer> {
+    match GpuRenderer::new(scene) {
+        Ok(renderer) => Box::new(renderer),
+        Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
+    }
+}
+
+/// All images of a job.
+pub fn draw(renderer: &mut dyn Renderer, job: &Job) -> Vec<GrayImage> {
+    renderer.submit(job).unwrap();
+    renderer.collect().unwrap()
+}
+
+/// Nothing but lamps, and nothing else shines.
+pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
+    let mut tunnel = sample::tunnel();
+    tunnel.ambient_lx = 0.0;
+    tunnel.sections.clear();
+    Scene {
+        tunnel: tunnel.into(),
+        lamps,
+        air: Air::default(),
+        wet: gloss::Wet::default(),
+    }
+}
