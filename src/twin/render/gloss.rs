@@ -179,8 +179,7 @@ impl Source {
 
     /// A headlight from a place.
     pub fn headlight(light: &Headlight, air: &Air, place: &Point3<f64>) -> Self {
-        let away = light.world_from_light.translation.vector - place.coords;
-        let axis = light.world_from_light.rotation * Vector3::x();
+        let (away, axis) = (light.place() - place, light.axis());
         Self {
             away,
             intensity_cd: towards(light.intensity_cd, light.exponent, &axis, air, &away),

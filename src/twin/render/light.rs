@@ -190,18 +190,29 @@ impl Shining {
 }
 
 impl Headlight {
+    /// Where it is.
+    pub fn place(&self) -> Point3<f64> {
+        Point3::from(self.world_from_light.translation.vector)
+    }
+
+    /// Where it shines brightest, a unit vector.
+    pub fn axis(&self) -> Vector3<f64> {
+        self.world_from_light.rotation * Vector3::x()
+    }
+
     /// Illuminance of a surface at `p` with unit normal `n`, lux.
     pub fn irradiance_lx(&self, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-        let d = p - Point3::from(self.world_from_light.translation.vector);
-        let axis = self.world_from_light.rotation * Vector3::x();
-        point_source_lx(self.intensity_cd, self.exponent, &axis, &d, n)
+        let d = p - self.place();
+        point_source_lx(self.intensity_cd, self.exponent, &self.axis(), &d, n)
     }
 
     /// Whether a body, taken as the box around it, has the headlight in it or next to it. It moves
     /// with the light and is behind it, so it never shades it.
     pub fn is_carried_by(&self, body: &Body) -> bool {
-        let light = Point3::from(self.world_from_light.translation.vector);
-        let place = body.world_from_body.inverse_transform_point(&light).coords;
+        let place = body
+            .world_from_body
+            .inverse_transform_point(&self.place())
+            .coords;
         let outside = (place.abs() - body.shape.half_extents_m()).sup(&Vector3::zeros());
         outside.norm() < MOUNT_M
     }
@@ -362,10 +373,7 @@ pub fn headlights_lx(
 ) -> f64 {
     headlights
         .iter()
-        .map(|light| {
-            let away = p.coords - light.world_from_light.translation.vector;
-            light.irradiance_lx(p, n) * air.transmission(away.norm())
-        })
+        .map(|light| light.irradiance_lx(p, n) * air.transmission((p - light.place()).norm()))
         .sum()
 }
 

@@ -80,8 +80,7 @@ impl<'a> Source<'a> {
     }
 
     pub fn headlight(light: &'a Headlight) -> Self {
-        let centre = Point3::from(light.world_from_light.translation.vector);
-        let axis = light.world_from_light.rotation * Vector3::x();
+        let (centre, axis) = (light.place(), light.axis());
         let kind = Kind::Headlight(light);
         Self::new(kind, centre, axis, HEADLIGHT_RADIUS_M, f64::INFINITY)
     }

@@ -89,14 +89,15 @@ impl Chunks {
             .retain(|_, c| c.as_ref().is_none_or(|c| job - c.near_in < KEEP_JOBS));
     }
 
-    /// Puts the keys of the chunks in sight into `keys`, near ones first, and makes them.
+    /// Puts the keys of the chunks in sight into `keys`, near ones first, and makes them; gives the
+    /// camera's chainage.
     pub fn in_sight(
         &mut self,
         gpu: &Gpu,
         world: &Line<'_>,
         framed: &Framed<'_>,
         keys: &mut Vec<ChunkKey>,
-    ) {
+    ) -> f64 {
         keys.clear();
         let tunnel = world.tunnel;
         let eye = framed.reference();
@@ -136,16 +137,12 @@ impl Chunks {
             }
         }
         keys.sort_by(|a, b| f64::total_cmp(&middle_away_m(*a, s_m), &middle_away_m(*b, s_m)));
+        s_m
     }
 
     /// A chunk that [`Self::in_sight`] has named.
     pub fn get(&self, key: ChunkKey) -> Option<&Chunk> {
         self.made.get(&key).and_then(Option::as_ref)
-    }
-
-    /// Chainage of the camera that looked last.
-    pub fn last_seen_s_m(&self) -> f64 {
-        self.last_seen_s_m
     }
 
     /// Chainage of a camera: by Newton's method from where the last one was, else by search.

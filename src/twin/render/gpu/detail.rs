@@ -56,15 +56,24 @@ impl Detail {
         }
     }
 
-    /// A cell of the mesh is halved until it is smaller than this share of its distance from the
-    /// nearest lamp, since light falls with a power of that distance and is interpolated over the
-    /// cell; but it never gets smaller than this, which is 6 to 12 pixels of the usual cameras.
-    fn finest(self) -> (f64, f64) {
+    /// Share of its distance from the nearest lamp that a cell of the mesh may be long, since light falls
+    /// with a power of that distance and is interpolated over the cell.
+    fn share_of_distance(self) -> f64 {
         match self {
-            Self::Near => (0.25, 0.06),
-            Self::Close => (0.3, 0.15),
-            Self::Middle => (0.5, 0.4),
-            Self::Far => (1.0, CHUNK_M),
+            Self::Near => 0.25,
+            Self::Close => 0.3,
+            Self::Middle => 0.5,
+            Self::Far => 1.0,
+        }
+    }
+
+    /// No cell gets smaller than this, which is 6 to 12 pixels of the usual cameras.
+    fn least_m(self) -> f64 {
+        match self {
+            Self::Near => 0.06,
+            Self::Close => 0.15,
+            Self::Middle => 0.4,
+            Self::Far => CHUNK_M,
         }
     }
 }
@@ -81,24 +90,42 @@ pub struct ChunkKey {
 }
 
 impl ChunkKey {
-    /// Whether a cell is short enough for the camera's lens, which is so far across the line from it.
-    pub fn is_fine(&self, cell_m: f64, across_m: impl Fn(&TrackPoint) -> f64) -> bool {
-        self.bend.is_none_or(|bend| {
-            let across_m = across_m(&bend.eye());
-            cell_m <= bend.cell_m(self.detail.nearest_m().hypot(across_m))
-        })
-    }
-
     /// Chainage of its origin.
     pub fn start_m(self) -> f64 {
         self.index as f64 * CHUNK_M
     }
 }
 
-/// Whether light varies little over a cell this long, this far from a lamp.
-pub fn is_fine(cell_m: f64, away_m: f64, detail: Detail) -> bool {
-    let (share, least_m) = detail.finest();
-    cell_m <= share * away_m || cell_m < 2.0 * least_m
+/// What decides how finely a chunk is cut.
+#[derive(Clone, Copy)]
+pub struct Cutting<'a> {
+    /// Of the chunk.
+    pub key: ChunkKey,
+    /// Lamps that may light it.
+    pub lamps: &'a [TrackPoint],
+}
+
+impl Cutting<'_> {
+    /// Whether a cell of that length, somewhere in a stretch of chainage, is lit evenly, and straight
+    /// before the camera's lens; `across_m` says how far from it things are across the line.
+    pub fn suffices(
+        &self,
+        cell_m: f64,
+        [from_m, to_m]: [f64; 2],
+        across_m: impl Fn(&TrackPoint) -> f64,
+    ) -> bool {
+        let detail = self.key.detail;
+        let lit_evenly = |lamp: &TrackPoint| {
+            let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
+            let away_m = along_m.hypot(across_m(lamp));
+            cell_m <= detail.share_of_distance() * away_m || cell_m < 2.0 * detail.least_m()
+        };
+        let straight = |bend: Bend| {
+            let away_m = detail.nearest_m().hypot(across_m(&bend.eye()));
+            cell_m <= bend.cell_m(away_m)
+        };
+        self.lamps.iter().all(lit_evenly) && self.key.bend.is_none_or(straight)
+    }
 }
 
 /// Halves the interval `[from, to]` until every piece `fits`; puts the ends of the pieces into
@@ -127,22 +154,12 @@ pub fn stations(range: &SectionRange, from_m: f64, to_m: f64, step_m: f64) -> Ve
 
 /// The stations, with more of them where the line through `at` passes lamps. What shares the line
 /// shares its stations, so that no gap opens between strips of different fineness.
-pub fn finer_stations(
-    stations: &[f64],
-    at: OutlinePoint,
-    near: &[TrackPoint],
-    key: ChunkKey,
-) -> Vec<f64> {
+pub fn finer_stations(stations: &[f64], at: OutlinePoint, cutting: Cutting<'_>) -> Vec<f64> {
     let mut finer = vec![stations[0]];
     let across_m = |from: &TrackPoint| (at.l_m - from.l_m).hypot(at.h_m - from.h_m);
     for pair in stations.windows(2) {
-        let fits = |from_m: f64, to_m: f64| {
-            let lit_evenly = near.iter().all(|lamp| {
-                let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-                is_fine(to_m - from_m, along_m.hypot(across_m(lamp)), key.detail)
-            });
-            lit_evenly && key.is_fine(to_m - from_m, across_m)
-        };
+        let fits =
+            |from_m: f64, to_m: f64| cutting.suffices(to_m - from_m, [from_m, to_m], across_m);
         halve(pair[0], pair[1], &fits, &mut finer);
     }
     finer

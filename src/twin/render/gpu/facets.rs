@@ -1,6 +1,6 @@
 //! The strips along the line that a cross-section is made of.
 
-use super::detail::{CHUNK_M, ChunkKey, halve, is_fine};
+use super::detail::{CHUNK_M, Cutting, halve};
 use crate::track::{
     CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint,
     rail_outline,
@@ -48,16 +48,11 @@ impl Side {
 }
 
 /// Of a cross-section and its rails, whose paint begins at `rail_q_m`, as fine as they must be near lamps.
-pub fn facets_of(
-    range: &SectionRange,
-    rail_q_m: f64,
-    near: &[TrackPoint],
-    key: ChunkKey,
-) -> Vec<Facet> {
+pub fn facets_of(range: &SectionRange, rail_q_m: f64, cutting: Cutting<'_>) -> Vec<Facet> {
     let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section, 0.0, near, key);
+    add_outline(&mut facets, &range.section, 0.0, cutting);
     for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
-        add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, near, key);
+        add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, cutting);
     }
     facets
 }
@@ -66,19 +61,18 @@ fn add_outline(
     facets: &mut Vec<Facet>,
     section: &CrossSection,
     mut q_m: f64,
-    near: &[TrackPoint],
-    key: ChunkKey,
+    cutting: Cutting<'_>,
 ) {
     for edge in section.edges() {
         if edge.length_m() > 0.0 {
-            cut_edge(facets, &edge, q_m, near, key);
+            cut_edge(facets, &edge, q_m, cutting);
         }
         q_m += edge.length_m();
     }
 }
 
 /// Cuts an edge into facets where it passes lamps, or a camera with a lens that bends it.
-fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint], key: ChunkKey) {
+fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, cutting: Cutting<'_>) {
     let (Edge { a, b, material }, length_m) = (*edge, edge.length_m());
     let at = |t: f64| OutlinePoint {
         l_m: a.l_m + t * (b.l_m - a.l_m),
@@ -86,13 +80,11 @@ fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint],
     };
     let fits = |from: f64, to: f64| {
         let ends = [at(from), at(to)];
-        let cell_m = (to - from) * length_m;
-        let lit_evenly = near.iter().all(|lamp| {
-            let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
-            let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
-            is_fine(cell_m, along_m.hypot(across_m(ends, lamp)), key.detail)
-        });
-        lit_evenly && key.is_fine(cell_m, |eye| across_m(ends, eye))
+        let start_m = cutting.key.start_m();
+        let stretch_m = [start_m, start_m + CHUNK_M];
+        cutting.suffices((to - from) * length_m, stretch_m, |from| {
+            across_m(ends, from)
+        })
     };
     let mut cuts = vec![0.0];
     halve(0.0, 1.0, &fits, &mut cuts);
@@ -105,10 +97,10 @@ fn cut_edge(facets: &mut Vec<Facet>, edge: &Edge, q_m: f64, near: &[TrackPoint],
     }
 }
 
-/// Distance of a lamp from the straight between two points of an outline.
-fn across_m([a, b]: [OutlinePoint; 2], lamp: &TrackPoint) -> f64 {
+/// Distance of a place from the straight between two points of an outline.
+fn across_m([a, b]: [OutlinePoint; 2], place: &TrackPoint) -> f64 {
     let edge = Vector2::new(b.l_m - a.l_m, b.h_m - a.h_m);
-    let to_lamp = Vector2::new(lamp.l_m - a.l_m, lamp.h_m - a.h_m);
-    let share = (edge.dot(&to_lamp) / edge.norm_squared().max(1e-12)).clamp(0.0, 1.0);
-    (to_lamp - edge * share).norm()
+    let to_place = Vector2::new(place.l_m - a.l_m, place.h_m - a.h_m);
+    let share = (edge.dot(&to_place) / edge.norm_squared().max(1e-12)).clamp(0.0, 1.0);
+    (to_place - edge * share).norm()
 }

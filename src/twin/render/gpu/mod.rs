@@ -276,7 +276,7 @@ impl GpuRenderer {
             lamps: &self.field,
             paintings: &self.paintings,
         };
-        self.chunks.in_sight(gpu, &line, framed, view.sight.keys());
+        let s_m = (self.chunks).in_sight(gpu, &line, framed, view.sight.keys());
         let world = World {
             lamps: self.field.lamps(),
             air: &self.scene.air,
@@ -287,9 +287,7 @@ impl GpuRenderer {
         let in_sight = view.sight.keys().iter();
         let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
         (view.shadows).fill(framed, job, (tunnel, &self.field), in_sight);
-        let airlight_cd_m2 = self
-            .field
-            .airlight_cd_m2(tunnel, self.chunks.last_seen_s_m());
+        let airlight_cd_m2 = self.field.airlight_cd_m2(tunnel, s_m);
         let around = Around {
             ambient_lx: tunnel.ambient_lx,
             air: &self.scene.air,
@@ -308,22 +306,7 @@ impl GpuRenderer {
         };
         view.buffers.write(gpu, &data);
     }
-}
 
-impl Prepared {
-    fn new(gpu: &Gpu) -> Self {
-        Self {
-            buffers: ViewBuffers::new(gpu),
-            poses: Vec::new(),
-            sight: Sight::default(),
-            lamps: LampTable::default(),
-            shadows: Shadows::default(),
-            target: 0,
-        }
-    }
-}
-
-impl GpuRenderer {
     fn finish_oldest(&mut self) -> Result<InFlight, RenderError> {
         let job = self
             .in_flight
@@ -338,6 +321,19 @@ impl GpuRenderer {
             .map_err(|e| RenderError::Device(e.to_string()))?;
         self.gpu.check()?;
         Ok(job)
+    }
+}
+
+impl Prepared {
+    fn new(gpu: &Gpu) -> Self {
+        Self {
+            buffers: ViewBuffers::new(gpu),
+            poses: Vec::new(),
+            sight: Sight::default(),
+            lamps: LampTable::default(),
+            shadows: Shadows::default(),
+            target: 0,
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
-use super::detail::{CHUNK_M, ChunkKey, Detail, finer_stations, stations};
+use super::detail::{CHUNK_M, ChunkKey, Cutting, Detail, finer_stations, stations};
 use super::facets::{Facet, Side, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
@@ -90,7 +90,7 @@ pub fn chunk_mesh(
         let rail_q_m = (paintings.of_range.get(section))
             .and_then(|k| paintings.all.get(*k))
             .map_or(0.0, Painting::rail_q_m);
-        let facets = facets_of(range, rail_q_m, &site.near, key);
+        let facets = facets_of(range, rail_q_m, site.cutting());
         for side in Side::ALL {
             let first = mesh.indices.len();
             for facet in facets.iter().filter(|f| Side::of(f, range) == side) {
@@ -190,11 +190,18 @@ impl Vertex {
 }
 
 impl Site<'_> {
+    fn cutting(&self) -> Cutting<'_> {
+        Cutting {
+            key: self.key,
+            lamps: &self.near,
+        }
+    }
+
     fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
         let first = mesh.vertices.len() as u32;
         let sides = facet
             .ends
-            .map(|end| finer_stations(stations, end, &self.near, self.key));
+            .map(|end| finer_stations(stations, end, self.cutting()));
         for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
             for &s_m in side {
                 mesh.vertices.push(self.vertex(facet, *end, q_m, s_m));

@@ -127,7 +127,7 @@ impl<'a> Framed<'a> {
     }
 
     fn to(&self, light: &Headlight) -> Vector3<f64> {
-        light.world_from_light.translation.vector - self.reference().coords
+        light.place() - self.reference()
     }
 
     /// The headlights that light the view.
@@ -144,7 +144,7 @@ impl<'a> Framed<'a> {
             *slot = layout::Headlight {
                 position_m: single(&self.to(light)),
                 intensity_cd: light.intensity_cd as f32,
-                axis: single(&(light.world_from_light.rotation * Vector3::x())),
+                axis: single(&light.axis()),
                 exponent: light.exponent as f32,
             };
         }

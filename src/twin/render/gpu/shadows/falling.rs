@@ -61,8 +61,8 @@ impl<'j> Light<'j> {
 
     fn headlight(light: &'j Headlight) -> Self {
         Self {
-            centre: Point3::from(light.world_from_light.translation.vector),
-            axis: light.world_from_light.rotation * Vector3::x(),
+            centre: light.place(),
+            axis: light.axis(),
             radius_m: HEADLIGHT_RADIUS_M,
             intensity_cd: light.intensity_cd,
             exponent: light.exponent,
