@@ -47,6 +47,7 @@ impl Detail {
         }
     }
 
+    /// From one station of a chunk to the next.
     pub fn step_m(self) -> f64 {
         match self {
             Self::Near => 0.5 * surface::RING_M,

@@ -68,7 +68,7 @@ use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey};
 use super::scene::{Job, LampsInTime, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
-use crate::bus::SimTime;
+use crate::bus::{Intrinsics, SimTime};
 use adapter::Gpu;
 use backdrop::{Backdrops, Key};
 use chunks::{Chunks, Line};
@@ -121,8 +121,6 @@ struct Prepared {
     sight: Sight,
     lamps: LampTable,
     shadows: Shadows,
-    /// Number of its target.
-    target: usize,
 }
 
 impl GpuRenderer {
@@ -175,93 +173,60 @@ impl GpuRenderer {
         self.bodies.write(&self.gpu, mesh);
     }
 
-    /// Gives every view a target of its own.
-    fn assign_targets(&mut self, job: &Job) {
-        let mut free: Vec<_> = (0..self.targets.len()).collect();
-        for (view, prepared) in job.views.iter().zip(&mut self.views) {
-            let lens = &view.camera.intrinsics;
-            let size_px = (lens.width_px, lens.height_px);
-            let fits = free
-                .iter()
-                .position(|t| self.targets[*t].size_px == size_px);
-            prepared.target = fits.map_or(self.targets.len(), |at| free.swap_remove(at));
-            if fits.is_none() {
-                (self.targets).push(Target::new(&self.gpu.device, size_px));
-            }
-        }
-    }
-
-    /// Records all passes. One kind of pass after the other, each for all views: a software adapter
-    /// prepares the second view's while it fills in the first one's.
-    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job) {
-        let framed: Vec<_> = job.views.iter().map(Framed::new).collect();
-        for (k, framed) in framed.iter().enumerate() {
-            self.upload_view(framed, job, k);
-        }
-        self.assign_targets(job);
-        let gpu = &self.gpu;
-        let backgrounds = [0, job.headlights.len()]
-            .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
+    /// Records all passes of view `k` and the way back of its image.
+    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job, k: usize) -> ReadBack {
+        let framed = Framed::new(&job.views[k]);
+        self.upload_view(&framed, job, k);
+        let target = self.target_for(&framed.view.camera.intrinsics);
+        let (gpu, target) = (&self.gpu, &self.targets[target]);
+        let Prepared { buffers, sight, .. } = &self.views[k];
         let stock = Stock {
             chunks: &self.chunks,
             bodies: &self.bodies,
             textures: &self.textures,
         };
+        let backgrounds = [0, job.headlights.len()]
+            .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
         let pipelines = &mut self.pipelines;
-        let views = || {
-            let prepared = framed.iter().zip(&self.views);
-            prepared.map(|(framed, p)| (framed, p, &self.targets[p.target]))
+        let key = Key::of(&framed, sight);
+        let background = (&*pipelines, &backgrounds);
+        let onto = (target, &mut self.backdrops);
+        buffers.draw_background(gpu, background, encoder, onto, (sight, key), &stock);
+        buffers.draw_shadows(gpu, pipelines, encoder, target);
+        let gloss = &backgrounds[1].gloss;
+        buffers.draw_gloss(gpu, gloss, encoder, target, (sight, &stock));
+        if framed.defocus_reach_px() > 0 {
+            buffers.blur(gpu, pipelines, encoder, target);
+        }
+        buffers.draw_lamps(gpu, pipelines, encoder, target);
+        buffers.draw_glare(gpu, pipelines, encoder, target);
+        let map = (self.maps).get(MapKey::new(framed.view), |map| {
+            target::map_texture(gpu, &map, target.size_px)
+        });
+        let develop = Develop {
+            raw: job.raw,
+            blooming: framed.view.sensor.blooming > 0.0,
         };
-        for (framed, p, target) in views() {
-            let key = Key::of(framed, &p.sight);
-            let background = (&*pipelines, &backgrounds);
-            let onto = (target, &mut self.backdrops);
-            (p.buffers).draw_background(gpu, background, encoder, onto, (&p.sight, key), &stock);
-        }
-        for (_, p, target) in views() {
-            p.buffers.draw_shadows(gpu, pipelines, encoder, target);
-        }
-        for (_, p, target) in views() {
-            let gloss = &backgrounds[1].gloss;
-            (p.buffers).draw_gloss(gpu, gloss, encoder, target, (&p.sight, &stock));
-        }
-        for (framed, p, target) in views() {
-            if framed.defocus_reach_px() > 0 {
-                p.buffers.blur(gpu, pipelines, encoder, target);
-            }
-        }
-        for (_, p, target) in views() {
-            p.buffers.draw_lamps(gpu, pipelines, encoder, target);
-            p.buffers.draw_glare(gpu, pipelines, encoder, target);
-        }
-        for (framed, p, target) in views() {
-            let map = (self.maps).get(MapKey::new(framed.view), |map| {
-                target::map_texture(gpu, &map, target.size_px)
-            });
-            let develop = Develop {
-                raw: job.raw,
-                blooming: framed.view.sensor.blooming > 0.0,
-            };
-            let sensor = pipelines.sensor(&gpu.device, develop);
-            target.copy_signal(encoder);
-            (p.buffers).draw_sensor(gpu, sensor, encoder, (target, &map), job.raw);
-        }
+        let sensor = pipelines.sensor(&gpu.device, develop);
+        target.copy_signal(encoder);
+        buffers.draw_sensor(gpu, sensor, encoder, (target, &map), job.raw);
+        let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
+        let back = spare.map_or_else(
+            || ReadBack::new(&gpu.device, target.size_px, job.raw),
+            |at| self.spare.swap_remove(at),
+        );
+        target.copy_to(encoder, &back);
+        back
     }
 
-    /// Records the way back of the finished images.
-    fn copy_back(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job) -> Vec<ReadBack> {
-        let mut backs = Vec::with_capacity(job.views.len());
-        for prepared in &self.views[..job.views.len()] {
-            let target = &self.targets[prepared.target];
-            let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
-            let back = spare.map_or_else(
-                || ReadBack::new(&self.gpu.device, target.size_px, job.raw),
-                |at| self.spare.swap_remove(at),
-            );
-            target.copy_to(encoder, &back);
-            backs.push(back);
-        }
-        backs
+    /// Number of the target for pictures of a lens.
+    fn target_for(&mut self, lens: &Intrinsics) -> usize {
+        let size_px = (lens.width_px, lens.height_px);
+        let fits = self.targets.iter().position(|t| t.size_px == size_px);
+        fits.unwrap_or_else(|| {
+            (self.targets).push(Target::new(&self.gpu.device, size_px));
+            self.targets.len() - 1
+        })
     }
 
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
@@ -332,7 +297,6 @@ impl Prepared {
             sight: Sight::default(),
             lamps: LampTable::default(),
             shadows: Shadows::default(),
-            target: 0,
         }
     }
 }
@@ -350,8 +314,9 @@ impl Renderer for GpuRenderer {
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        self.record(&mut encoder, job);
-        let images = self.copy_back(&mut encoder, job);
+        let images: Vec<_> = (0..job.views.len())
+            .map(|k| self.record(&mut encoder, job, k))
+            .collect();
         let submission = self.gpu.queue.submit([encoder.finish()]);
         for image in &images {
             image.request();

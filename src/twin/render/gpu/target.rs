@@ -8,7 +8,7 @@ use crate::twin::render::{RawImage, RenderError, upper_bits};
 use image::GrayImage;
 use std::cell::OnceCell;
 
-/// Textures of one image size, used again in every job that has a view of that size.
+/// Textures of one image size, used again for every view of that size.
 pub struct Target {
     /// Size of the image.
     pub size_px: (u32, u32),
@@ -157,7 +157,8 @@ impl Target {
     }
 }
 
-fn texture(
+/// Empty, for numbers and pictures.
+pub fn texture(
     device: &wgpu::Device,
     (width, height): (u32, u32),
     format: wgpu::TextureFormat,
@@ -256,12 +257,10 @@ fn too_short() -> RenderError {
 
 /// The words of a camera's pixels, four a texel.
 pub fn map_texture(gpu: &Gpu, map: &PixelMap, size_px: (u32, u32)) -> wgpu::TextureView {
-    let (width, usage) = (
-        packed_width(size_px),
-        wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-    );
-    let size = (width, size_px.1);
-    let texture = texture(&gpu.device, size, wgpu::TextureFormat::Rgba32Uint, usage);
+    let width = packed_width(size_px);
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    let format = wgpu::TextureFormat::Rgba32Uint;
+    let texture = texture(&gpu.device, (width, size_px.1), format, usage);
     gpu.queue.write_texture(
         texture.as_image_copy(),
         bytemuck::cast_slice(map.words()),

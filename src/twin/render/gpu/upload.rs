@@ -1,6 +1,7 @@
 //! What goes to the adapter anew for every view.
 
 use super::adapter::Gpu;
+use super::target::texture;
 
 /// A buffer that grows with what is written to it.
 pub struct Upload {
@@ -58,21 +59,9 @@ impl Table {
         Self::sized(gpu, (1, 1))
     }
 
-    fn sized(gpu: &Gpu, (width, height): (u32, u32)) -> Self {
-        let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
-            label: None,
-            size: wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: wgpu::TextureFormat::R32Float,
-            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-            view_formats: &[],
-        });
+    fn sized(gpu: &Gpu, size: (u32, u32)) -> Self {
+        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+        let texture = texture(&gpu.device, size, wgpu::TextureFormat::R32Float, usage);
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         Self { texture, view }
     }
