@@ -16,6 +16,7 @@
 //! | `scenario` | the files a user writes |
 //! | `session` | one run, step by step, scored against the truth |
 //! | `record` | what a session shows in a rerun recording |
+//! | `study` | many sessions: draws, workers, rows, statistics, report |
 //! | `cli` | one file a subcommand |
 //!
 //! `track`, `bus` and `stack` build alone (`--no-default-features`): that is what would run on a
@@ -33,5 +34,7 @@ pub mod record;
 pub mod scenario;
 #[cfg(feature = "twin")]
 pub mod session;
+#[cfg(feature = "twin")]
+pub mod study;
 #[cfg(feature = "twin")]
 pub mod twin;

@@ -6,6 +6,8 @@
 //! ```text
 //! metrotwin run SCENARIO      one run: recording.rrd, summary.json, fixes.csv
 //! metrotwin frames SCENARIO   images + labels as a data set
+//! metrotwin generate SCENARIO concrete scenarios drawn from a template
+//! metrotwin study run STUDY   many runs, and what they come to
 //! metrotwin check FILE...     tunnels and scenarios: errors and a short report
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
@@ -14,9 +16,11 @@ mod check;
 mod doctor;
 mod fault;
 mod frames;
+mod generate;
 mod report;
 mod run;
 mod running;
+mod study;
 mod table;
 
 use clap::{ArgAction, Parser, Subcommand};
@@ -55,6 +59,8 @@ struct Cli {
 enum Command {
     Run(run::RunArgs),
     Frames(frames::FramesArgs),
+    Generate(generate::GenerateArgs),
+    Study(study::StudyArgs),
     Check(check::CheckArgs),
     Doctor(doctor::DoctorArgs),
 }
@@ -66,6 +72,8 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Run(args) => run::run(&args),
         Command::Frames(args) => frames::frames(&args),
+        Command::Generate(args) => generate::generate(&args),
+        Command::Study(args) => study::study(&args),
         Command::Check(args) => check::check(&args),
         Command::Doctor(args) => doctor::doctor(&args),
     };

@@ -4,8 +4,10 @@ use super::fault::Failure;
 use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
 use crate::record::{FixTable, Recording};
+use crate::scenario::draw::Draw;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RunOptions, Summary};
+use crate::study::{self, Fixes, Row, StudyError};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -23,6 +25,7 @@ Examples:
   metrotwin run scenarios/line_run.toml --set track.irregularity.class=german_high --seed 7
   metrotwin run scenarios/forgotten_toolbox.toml --view
   metrotwin run scenarios/static_bench.toml --no-recording --json | jq .positioning
+  metrotwin run --from-study out/led_accuracy --index 17
 
 Ctrl-C ends a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at once.
 Exit code 0 for a whole run, 1 for one that failed or was broken off, 2 for wrong input.";
@@ -32,8 +35,15 @@ Exit code 0 for a whole run, 1 for one that failed or was broken off, 2 for wron
 #[command(after_help = AFTER)]
 pub(super) struct RunArgs {
     /// Scenario file
-    scenario: PathBuf,
-    /// Folder for the results [default: out/<scenario name>]
+    #[arg(required_unless_present = "from_study")]
+    scenario: Option<PathBuf>,
+    /// One run of a study again, with everything: the study's folder
+    #[arg(long, value_name = "DIR", requires = "index", conflicts_with_all = ["scenario", "seed", "overrides"])]
+    from_study: Option<PathBuf>,
+    /// Which run of the study
+    #[arg(long, value_name = "K", requires = "from_study")]
+    index: Option<u64>,
+    /// Folder for the results [default: out/<scenario name>, of a study's run <study>/run-<index>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Everything random follows from it [default: the scenario's]
@@ -60,18 +70,16 @@ pub(super) struct RunArgs {
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
-    let mut scenario = Scenario::load(&args.scenario, &args.overrides)?;
-    scenario.seed = args.seed.unwrap_or(scenario.seed);
-    let live = live(args, &scenario)?;
-    let out = args
-        .out
-        .clone()
-        .unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    let source = source(args)?;
+    let scenario = &source.scenario;
+    let live = live(args, scenario)?;
+    let out = args.out.clone().unwrap_or_else(|| source.out.clone());
     prepare(&out)?;
 
     stop_on_ctrl_c();
-    let summary = observed(args, &scenario, live, &out)?;
-    remove_stale(args, &scenario, &out).map_err(|e| {
+    let mut fixes = Fixes::default();
+    let summary = observed(args, scenario, live, &out, &mut fixes)?;
+    remove_stale(args, scenario, &out).map_err(|e| {
         Failure::run(anyhow::Error::new(e).context("cannot remove results of an earlier run"))
     })?;
     let text = serde_json::to_string_pretty(&summary).map_err(Failure::run)?;
@@ -81,6 +89,9 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         print(&text)?;
     } else {
         print(&table::of(&summary, &out))?;
+    }
+    if let Some((draw, row)) = &source.of_study {
+        compare(draw, row, &summary, &fixes)?;
     }
     match &summary.end {
         End::Complete => Ok(()),
@@ -96,12 +107,70 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     }
 }
 
+/// What is to be run.
+struct Source {
+    scenario: Scenario,
+    /// Where its results go.
+    out: PathBuf,
+    /// A study's draw, and its row.
+    of_study: Option<(Draw, Row)>,
+}
+
+fn source(args: &RunArgs) -> Result<Source, Failure> {
+    if let (Some(folder), Some(index)) = (&args.from_study, args.index) {
+        return from_study(folder, index);
+    }
+    let path = args.scenario.as_deref().unwrap_or(Path::new(""));
+    let mut scenario = Scenario::load(path, &args.overrides)?;
+    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    Ok(Source {
+        out: Path::new("out").join(&scenario.name),
+        scenario,
+        of_study: None,
+    })
+}
+
+/// From the copies of the inputs that the study keeps.
+fn from_study(folder: &Path, index: u64) -> Result<Source, Failure> {
+    let (_, template) = study::template_of(folder)?;
+    let rows = study::read_rows(folder)?;
+    let row = rows
+        .into_iter()
+        .find(|row| row.index == index)
+        .ok_or_else(|| {
+            Failure::input(
+                format!("{} has no row of a run {index}", folder.display()),
+                "give the index of one of its rows",
+            )
+        })?;
+    let draw = template.draw(index).map_err(StudyError::from)?;
+    Ok(Source {
+        scenario: template.scenario(&draw)?,
+        out: folder.join(format!("run-{index:06}")),
+        of_study: Some((draw, row)),
+    })
+}
+
+/// Says whether a run came out as it did in its study.
+fn compare(draw: &Draw, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
+    match row.difference(&Row::of(draw, summary, fixes)) {
+        None => {
+            eprintln!("equal to its row in the study, in every figure");
+            Ok(())
+        }
+        Some(what) => Err(Failure::Run(anyhow::anyhow!(
+            "not what the study had: {what}; another version, or another graphics driver?"
+        ))),
+    }
+}
+
 /// Runs the session with everything that watches it.
 fn observed(
     args: &RunArgs,
     scenario: &Scenario,
     mut live: Option<Recording>,
     out: &Path,
+    errors: &mut Fixes,
 ) -> Result<Summary, Failure> {
     let mut file = (!args.no_recording)
         .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.record));
@@ -109,7 +178,7 @@ fn observed(
         .rig
         .as_ref()
         .map(|_| FixTable::to_file(&out.join("fixes.csv")));
-    let mut observers: Vec<&mut dyn Observer> = Vec::new();
+    let mut observers: Vec<&mut dyn Observer> = vec![errors];
     observers.extend(file.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));

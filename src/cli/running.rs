@@ -20,6 +20,17 @@ pub(super) enum RendererArg {
     Cpu,
 }
 
+impl RendererArg {
+    /// As it is given.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Gpu => "gpu",
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
 impl From<RendererArg> for RendererChoice {
     fn from(arg: RendererArg) -> Self {
         match arg {

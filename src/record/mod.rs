@@ -32,9 +32,9 @@ pub mod dataset;
 mod images;
 mod moving;
 mod palette;
+pub mod parquet;
 mod plots;
 mod scene;
-
 mod stream;
 mod tables;
 mod texts;

@@ -277,7 +277,8 @@ pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
     })
 }
 
-fn overridden(
+/// A file with some of its keys set anew.
+pub(super) fn overridden(
     path: &Path,
     text: &str,
     overrides: &[Override],

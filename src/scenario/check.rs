@@ -25,6 +25,9 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     file.radio.check("radio", problems);
     file.stack.check("stack", problems);
     file.record.check("record", problems);
+    if let Some(study) = &file.study {
+        study.check("study", problems);
+    }
     if let Some(bench) = &file.bench {
         bench.check("bench", problems);
     }

@@ -1,6 +1,7 @@
 //! A scenario as written.
 
 use super::RecordSettings;
+use super::draw::StudySettings;
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
@@ -9,7 +10,8 @@ use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::physics::{
-    CableSettings, ObstacleSettings, PhysicsSettings, TrackSettings, TrainSettings, WorkerSettings,
+    CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, TrackSettings, TrainSettings,
+    WorkerSettings,
 };
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -18,6 +20,7 @@ use crate::twin::sensors::{
 use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
 
 /// A metrotwin scenario: one run, said in full.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -98,6 +101,9 @@ pub struct ScenarioFile {
     /// What goes into the recording.
     #[serde(default)]
     pub record: RecordSettings,
+    /// What varies from run to run, for `generate` and `study`. Default: nothing.
+    #[serde(default)]
+    pub study: Option<StudySettings>,
 }
 
 fn default_seed() -> u64 {
@@ -226,6 +232,23 @@ impl BenchSettings {
 }
 
 impl ScenarioFile {
+    /// Paths of the files that it names, as written.
+    pub fn files_mut(&mut self) -> Vec<&mut String> {
+        let trains = self.train.iter_mut().chain(&mut self.other_trains);
+        let vehicles = trains
+            .map(|train| &mut train.vehicle)
+            .filter(|vehicle| Path::new(vehicle).extension().is_some());
+        let loads = self.workers.iter_mut().filter_map(|w| w.carries.as_mut());
+        let bodies = self.obstacles.iter_mut().map(|o| &mut o.body);
+        let bodies = bodies.chain(loads.map(|load| &mut load.body));
+        let meshes = bodies.filter_map(|body| match body {
+            ObstacleShape::Mesh { file, .. } => Some(file),
+            _ => None,
+        });
+        let tunnel = std::iter::once(&mut self.tunnel);
+        tunnel.chain(vehicles).chain(meshes).collect()
+    }
+
     /// What the physics is made from.
     pub(super) fn physics(&self) -> PhysicsSettings {
         PhysicsSettings {

@@ -29,11 +29,13 @@
 //! `--set key=value` overrides are applied to the document before it is parsed ([`Override`]), so
 //! that they meet the same checks as the file.
 //!
-//! What it does not do: distributions and many runs (studies), and anything that needs a clock
-//! or a renderer.
+//! Distributions over any of its keys stand in the file too: [`draw`].
+//!
+//! What it does not do: many runs (studies), and anything that needs a clock or a renderer.
 
 mod build;
 mod check;
+pub mod draw;
 mod file;
 mod meshes;
 mod overrides;

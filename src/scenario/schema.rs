@@ -6,6 +6,11 @@ use crate::track::tunnel_schema;
 use crate::twin::physics::VehicleFile;
 use schemars::schema_for;
 
+/// The schema of a scenario.
+pub fn scenario() -> serde_json::Value {
+    schema_for!(ScenarioFile).to_value()
+}
+
 /// Where each schema is kept, relative to the repository, and its text.
 pub fn all() -> Result<[(&'static str, String); 3], serde_json::Error> {
     let pretty = |schema| serde_json::to_string_pretty(&schema).map(|text| text + "\n");

@@ -30,7 +30,7 @@ pub struct Bench<'s> {
     /// As the stack is given it.
     map: Arc<Tunnel>,
     eyes: Eyes,
-    renderer: Box<dyn Renderer>,
+    renderer: &'s mut dyn Renderer,
     cost: Costs,
 }
 
@@ -40,7 +40,7 @@ impl<'s> Bench<'s> {
         scenario: &'s Scenario,
         settings: BenchSettings,
         rig: &'s RigSettings,
-        renderer: Box<dyn Renderer>,
+        renderer: &'s mut dyn Renderer,
     ) -> Self {
         let map = scenario.map();
         Self {

@@ -109,7 +109,21 @@ pub fn run(
     options: &RunOptions<'_>,
     observers: &mut [&mut dyn Observer],
 ) -> Result<Summary, SessionError> {
-    let renderer = renderer(scenario, options.renderer)?;
+    run_on(
+        scenario,
+        renderer(scenario, options.renderer)?.as_mut(),
+        options,
+        observers,
+    )
+}
+
+/// As [`run`], with a renderer that has the scenario's [`scene`]; the choice of the options is not used.
+pub fn run_on(
+    scenario: &Scenario,
+    renderer: &mut dyn Renderer,
+    options: &RunOptions<'_>,
+    observers: &mut [&mut dyn Observer],
+) -> Result<Summary, SessionError> {
     match (&scenario.bench, &scenario.rig) {
         (Some(bench), Some(rig)) => {
             bench::Bench::new(scenario, *bench, rig, renderer).run(options, observers)

@@ -36,7 +36,7 @@ const BODIES_HZ: f64 = 10.0;
 pub struct Run<'s> {
     scenario: &'s Scenario,
     world: World,
-    shots: Shots,
+    shots: Shots<'s>,
     motion: MotionSensors,
     eyes: Option<Eyes>,
     devices: Vec<Device>,
@@ -57,7 +57,10 @@ pub struct Run<'s> {
 
 impl<'s> Run<'s> {
     /// At time zero.
-    pub fn new(scenario: &'s Scenario, renderer: Box<dyn Renderer>) -> Result<Self, SessionError> {
+    pub fn new(
+        scenario: &'s Scenario,
+        renderer: &'s mut dyn Renderer,
+    ) -> Result<Self, SessionError> {
         let seed = scenario.seed;
         let (tunnel, map) = (&scenario.tunnel, scenario.map());
         let world = World::new(tunnel.clone(), &scenario.physics, seed, 0)?;

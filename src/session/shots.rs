@@ -42,8 +42,8 @@ impl What {
 }
 
 /// The renderer and what waits for its images.
-pub struct Shots {
-    renderer: Box<dyn Renderer>,
+pub struct Shots<'s> {
+    renderer: &'s mut dyn Renderer,
     latency_s: f64,
     /// With the times when they reach the stack.
     waiting: VecDeque<(SimTime, Shot)>,
@@ -51,9 +51,9 @@ pub struct Shots {
     late: VecDeque<(SimTime, Shot, Vec<GrayImage>)>,
 }
 
-impl Shots {
+impl<'s> Shots<'s> {
     /// None on the way.
-    pub fn new(renderer: Box<dyn Renderer>, latency_ms: f64) -> Self {
+    pub fn new(renderer: &'s mut dyn Renderer, latency_ms: f64) -> Self {
         Self {
             renderer,
             latency_s: 1e-3 * latency_ms,

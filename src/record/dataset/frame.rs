@@ -1,8 +1,8 @@
 //! What a frame's row says of its camera: when, from where, through which lens; and its rows, each
 //! with its own time and pose.
 
-use super::tables::Kind::{Int, Real, Reals, Text};
-use super::tables::{Column, Value, column};
+use crate::record::parquet::Kind::{Int, Real, Reals, Text};
+use crate::record::parquet::{Column, Value, column};
 use crate::session::TrainPoint;
 use crate::twin::render::View;
 use crate::twin::render::cpu::Sight;

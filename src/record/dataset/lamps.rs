@@ -1,8 +1,8 @@
 //! Lamps as the world has them and a camera sees them: outline, light row by row, phase of the
 //! code. Nothing here comes from the stack.
 
-use super::tables::Kind::{Int, Real, Reals, Text};
-use super::tables::{Column, Value, column};
+use crate::record::parquet::Kind::{Int, Real, Reals, Text};
+use crate::record::parquet::{Column, Value, column};
 use crate::track::LampSite;
 use crate::twin::render::cpu::{Labeller, Seen, Sight};
 use crate::twin::render::surface::LAMP_SIGHT_M;

@@ -45,14 +45,15 @@ mod lamps;
 mod obstacles;
 mod plan;
 mod readme;
-mod tables;
 mod take;
 
 pub use files::{clear, is_empty};
 pub use plan::{NoSuchPart, Part, Parts, Plan};
 
 use super::stream::failed;
+use crate::record::parquet::{Column, Table, Value};
 use crate::scenario::Scenario;
+use crate::scenario::draw::sha256;
 use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
 use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;
@@ -61,12 +62,10 @@ use crate::twin::render::{Job, Renderer};
 use files::{FOLDERS, write};
 use image::GrayImage;
 use serde_json::json;
-use sha2::{Digest, Sha256};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use tables::{Table, Value};
 use take::Taken;
 
 /// Where a data set comes from, to be written down with it.
@@ -163,7 +162,7 @@ impl<'a> DataSet<'a> {
                 scenario: scenario.name.clone(),
                 description: scenario.description.clone(),
                 seed: scenario.seed,
-                inputs_sha256: sha256(&format!("{scenario:?}")),
+                inputs_sha256: sha256(format!("{scenario:?}").as_bytes()),
                 inputs,
             },
             tunnel: scenario.tunnel.clone(),
@@ -205,7 +204,7 @@ impl<'a> DataSet<'a> {
         &self,
         part: Part,
         name: &str,
-        columns: &'static [tables::Column],
+        columns: &[Column],
     ) -> Result<Option<Table>, ObserverError> {
         let wanted = self.plan.has(part);
         wanted
@@ -306,12 +305,6 @@ impl<'a> DataSet<'a> {
 }
 
 const EYES: [&str; 2] = ["left", "right"];
-
-/// Hexadecimal.
-fn sha256(text: &str) -> String {
-    let digest = Sha256::digest(text);
-    digest.iter().map(|byte| format!("{byte:02x}")).collect()
-}
 
 impl Observer for DataSet<'_> {
     fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {

@@ -2,8 +2,8 @@
 //! space, what is hidden.
 
 use super::coco::Mask;
-use super::tables::Kind::{Flag, Int, Real, Text};
-use super::tables::{Column, Value, column};
+use crate::record::parquet::Kind::{Flag, Int, Real, Text};
+use crate::record::parquet::{Column, Value, column};
 use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{Belonging, BodyOwner};
 use crate::twin::render::cpu::{Labels, SIGHT_M, Sight, Surface, Whole, whole};

@@ -1,7 +1,7 @@
 //! The description that lies beside every data set.
 
-use super::tables::describe;
 use super::{Part, Plan, frame, lamps, obstacles};
+use crate::record::parquet::describe;
 
 const TEMPLATE: &str = include_str!("readme.md");
 

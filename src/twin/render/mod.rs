@@ -58,6 +58,9 @@ pub enum RenderError {
 pub trait Renderer: Send {
     /// What draws.
     fn backend(&self) -> Backend;
+    /// Takes another scene, as a new renderer of it would, but keeps what is dear and hangs on no scene:
+    /// the adapter and its compiled shaders. Jobs in flight are forgotten.
+    fn set_scene(&mut self, scene: Scene);
     /// Starts to draw all views of a job.
     fn submit(&mut self, job: &Job) -> Result<(), RenderError>;
     /// Waits for the oldest submitted job; one image a view, in order.

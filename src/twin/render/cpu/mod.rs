@@ -301,6 +301,14 @@ impl Renderer for CpuRenderer {
         }
     }
 
+    fn set_scene(&mut self, scene: Scene) {
+        *self = Self {
+            slices: self.slices,
+            maps: std::mem::take(&mut self.maps),
+            ..Self::new(scene, self.every_ray)
+        };
+    }
+
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
         if let Some(lamps) = self.lamps.changed(job.time) {
             self.world.lamps = LampField::new(&lamps).in_air(self.world.air);

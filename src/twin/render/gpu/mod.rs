@@ -306,6 +306,20 @@ impl Renderer for GpuRenderer {
         self.gpu.backend.clone()
     }
 
+    fn set_scene(&mut self, scene: Scene) {
+        if self.scene.tunnel.sections != scene.tunnel.sections {
+            self.paintings = Paintings::of(&scene.tunnel);
+            self.textures = Textures::new(&self.gpu, &self.paintings);
+        }
+        self.field = LampField::new(&scene.lamps).in_air(scene.air);
+        self.lamps = LampsInTime::new(&scene.lamps);
+        self.chunks = Chunks::default();
+        self.backdrops.clear();
+        self.views.clear();
+        self.in_flight.clear();
+        self.scene = scene;
+    }
+
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
         self.follow_lamps(job.time);
         self.chunks.next_job();

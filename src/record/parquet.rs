@@ -1,7 +1,7 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
 //! description.
 
-use super::files::{broken, finish, part};
+use super::stream::{failed, part_name};
 use crate::session::ObserverError;
 use arrow::array::{
     ArrayRef, BooleanBuilder, Float64Builder, Int64Builder, ListBuilder, RecordBatch, StringBuilder,
@@ -10,8 +10,10 @@ use arrow::datatypes::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::properties::WriterProperties;
-use std::fs::File;
-use std::path::PathBuf;
+use std::borrow::Cow;
+use std::error::Error;
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Rows that are kept in memory before they are written.
@@ -19,7 +21,8 @@ const BATCH_ROWS: usize = 16_384;
 
 /// What a column holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Kind {
     Int,
     Real,
     Text,
@@ -51,30 +54,35 @@ impl Kind {
 }
 
 /// One column.
-pub(super) struct Column {
-    pub name: &'static str,
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Its name.
+    pub name: Cow<'static, str>,
+    /// What its cells hold.
     pub kind: Kind,
-    pub unit: &'static str,
-    pub meaning: &'static str,
+    /// Their unit, 1 of ratios and counts.
+    pub unit: Cow<'static, str>,
+    /// What they say.
+    pub meaning: Cow<'static, str>,
 }
 
 /// A column in one line.
-pub(super) const fn column(
+pub const fn column(
     name: &'static str,
     kind: Kind,
     unit: &'static str,
     meaning: &'static str,
 ) -> Column {
     Column {
-        name,
+        name: Cow::Borrowed(name),
         kind,
-        unit,
-        meaning,
+        unit: Cow::Borrowed(unit),
+        meaning: Cow::Borrowed(meaning),
     }
 }
 
 /// Columns as a table in Markdown.
-pub(super) fn describe(columns: &[Column]) -> String {
+pub fn describe(columns: &[Column]) -> String {
     let mut text = String::from("| column | type | unit | meaning |\n|---|---|---|---|\n");
     for c in columns {
         let kind = c.kind.name();
@@ -85,7 +93,8 @@ pub(super) fn describe(columns: &[Column]) -> String {
 
 /// What stands in one cell.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Value {
+#[allow(missing_docs, reason = "the names say it")]
+pub enum Value {
     Int(i64),
     Real(f64),
     Text(String),
@@ -172,9 +181,9 @@ impl Cells {
 }
 
 /// A table on its way into a file.
-pub(super) struct Table {
+pub struct Table {
     path: PathBuf,
-    columns: &'static [Column],
+    columns: Vec<Column>,
     schema: Arc<Schema>,
     writer: ArrowWriter<File>,
     cells: Vec<Cells>,
@@ -183,22 +192,23 @@ pub(super) struct Table {
 
 impl Table {
     /// Begins a file; it gets its name in [`Self::close`].
-    pub fn create(path: PathBuf, columns: &'static [Column]) -> Result<Self, ObserverError> {
+    pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self, ObserverError> {
         let fields = columns.iter().map(|c| {
-            let unit = [("unit".to_owned(), c.unit.to_owned())];
-            Field::new(c.name, c.kind.data_type(), true).with_metadata(unit.into())
+            let about = [("unit", &c.unit), ("meaning", &c.meaning)];
+            let about = about.map(|(key, text)| (key.to_owned(), text.clone().into_owned()));
+            Field::new(c.name.clone(), c.kind.data_type(), true).with_metadata(about.into())
         });
         let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
         let settings = WriterProperties::builder()
             .set_compression(Compression::LZ4_RAW)
             .set_created_by(format!("metrotwin {}", env!("CARGO_PKG_VERSION")))
             .build();
-        let file = File::create(part(&path)).map_err(broken(&path))?;
+        let file = File::create(part_name(&path)).map_err(broken(&path))?;
         let writer = ArrowWriter::try_new(file, schema.clone(), Some(settings));
         Ok(Self {
             writer: writer.map_err(broken(&path))?,
+            columns: columns.to_vec(),
             path,
-            columns,
             schema,
             cells: columns.iter().map(|c| Cells::new(c.kind)).collect(),
             rows: 0,
@@ -212,7 +222,7 @@ impl Table {
             let text = format!("{} values for {} columns", row.len(), self.columns.len());
             return Err(broken(path)(text));
         }
-        for ((cells, column), value) in self.cells.iter_mut().zip(self.columns).zip(row) {
+        for ((cells, column), value) in self.cells.iter_mut().zip(&self.columns).zip(row) {
             if !cells.push(value) {
                 return Err(broken(path)(format!("a wrong value for `{}`", column.name)));
             }
@@ -236,6 +246,12 @@ impl Table {
     pub fn close(mut self) -> Result<(), ObserverError> {
         self.flush()?;
         self.writer.close().map_err(broken(&self.path))?;
-        finish(&self.path)
+        fs::rename(part_name(&self.path), &self.path).map_err(broken(&self.path))
     }
+}
+
+fn broken<E: Into<Box<dyn Error + Send + Sync>>>(
+    path: &Path,
+) -> impl FnOnce(E) -> ObserverError + use<E> {
+    failed(format!("writing {}", path.display()))
 }

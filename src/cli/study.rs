@@ -1,0 +1,362 @@
+//! `metrotwin study`: many runs, and what they come to.
+
+use super::fault::Failure;
+use super::print;
+use super::running::{RendererArg, STOP, prepare, stop_on_ctrl_c};
+use crate::scenario::draw::Template;
+use crate::study::{self, Digest, Options, Progress, Row, Shard, StudyError, Submission, show};
+use clap::Subcommand;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::cell::Cell;
+use std::path::{Path, PathBuf};
+
+const AFTER: &str = "\
+A study is a scenario file with a table [study]: which keys vary and how, conditions between them, how
+many runs, when to stop. scenarios/studies has examples.
+
+  metrotwin study run scenarios/studies/led_accuracy.toml --runs 100
+  metrotwin study report out/led_accuracy
+  metrotwin run --from-study out/led_accuracy --index 17     one of its runs again, recorded
+
+On several machines that share a folder:
+  metrotwin study run scenarios/studies/led_accuracy.toml --shard 1/4      and so on to 4/4
+  metrotwin study merge out/led_accuracy";
+
+/// Run a study: many runs, rows, statistics, report
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(super) struct StudyArgs {
+    #[command(subcommand)]
+    command: StudyCommand,
+}
+
+#[derive(Subcommand)]
+enum StudyCommand {
+    Run(RunArgs),
+    Merge(MergeArgs),
+    Report(ReportArgs),
+    Compare(CompareArgs),
+    Submit(SubmitArgs),
+    #[command(hide = true)]
+    Worker(WorkerArgs),
+}
+
+const AFTER_RUN: &str = "\
+Into the output folder go:
+  rows.parquet   a row a run: what was drawn, what came out, with units and meanings in the schema
+  rows.jsonl     the same as they came, appended and synced: a kill loses the runs in flight at most
+  study.json     hashes of all inputs, version, renderer; a study goes on only while they are the same
+  inputs/        copies of all inputs, from which any run can be made again
+
+Ctrl-C begins no more runs and waits for those in flight; --resume goes on later.";
+
+/// Run what a folder lacks of a study
+#[derive(clap::Args)]
+#[command(after_help = AFTER_RUN)]
+struct RunArgs {
+    /// Scenario file with a [study]
+    study: PathBuf,
+    /// Folder for the results [default: out/<name>, of a shard out/<name>/shard-I-of-N]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Number of runs, of a sweep for each combination [default: the study's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    runs: Option<u32>,
+    /// Workers, each a process and a core's work [default: one a core]
+    #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
+    jobs: Option<u16>,
+    /// Go on with what the folder holds
+    #[arg(long)]
+    resume: bool,
+    /// Only the I-th of N parts, e.g. 2/4
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// What draws the images
+    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
+    renderer: RendererArg,
+}
+
+/// Make one study of all shards below its folder
+#[derive(clap::Args)]
+struct MergeArgs {
+    /// Folder that holds shard-1-of-N to shard-N-of-N
+    folder: PathBuf,
+}
+
+/// Write a study's figures and plots as one page
+#[derive(clap::Args)]
+struct ReportArgs {
+    /// Folder of the study
+    folder: PathBuf,
+}
+
+/// Hold two studies against each other, run by run
+#[derive(clap::Args)]
+struct CompareArgs {
+    /// Folder of a study
+    a: PathBuf,
+    /// Folder of another one, with the same seed and variables
+    b: PathBuf,
+    /// Fail unless both are the same, value by value (wall times aside)
+    #[arg(long)]
+    same: bool,
+}
+
+const AFTER_SUBMIT: &str = "\
+Writes two scripts into <out>/slurm, an array with a task a shard and a job that merges them, and hands
+them to sbatch. The folder must be on a file system that all machines share.
+
+  metrotwin study submit scenarios/studies/led_accuracy.toml --shards 16 --cores 8 \\
+      --sbatch=--partition=short --sbatch=--time=01:00:00";
+
+/// Run a study as a Slurm job array, and merge it at the end
+#[derive(clap::Args)]
+#[command(after_help = AFTER_SUBMIT)]
+struct SubmitArgs {
+    /// Scenario file with a [study]
+    study: PathBuf,
+    /// Tasks of the array
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    shards: u64,
+    /// Cores of each task
+    #[arg(long, value_name = "C", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]
+    cores: u64,
+    /// Folder for the results [default: out/<name>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Number of runs, of a sweep for each combination [default: the study's]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    runs: Option<u32>,
+    /// What draws the images
+    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
+    renderer: RendererArg,
+    /// One more argument for sbatch; may be given again
+    #[arg(long, value_name = "ARG", allow_hyphen_values = true)]
+    sbatch: Vec<String>,
+    /// Only write the scripts
+    #[arg(long)]
+    dry_run: bool,
+    /// Come back when the merge has ended
+    #[arg(long)]
+    wait: bool,
+}
+
+/// Answer indexes on standard input with rows on standard output
+#[derive(clap::Args)]
+struct WorkerArgs {
+    folder: PathBuf,
+    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
+    renderer: RendererArg,
+}
+
+pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
+    match &args.command {
+        StudyCommand::Run(args) => run(args),
+        StudyCommand::Merge(args) => {
+            let rows = study::merge(&args.folder)?;
+            conclude(&args.folder, &study::template_of(&args.folder)?.1, &rows)
+        }
+        StudyCommand::Report(args) => {
+            let (page, digest) = study::report(&args.folder)?;
+            print(&digest_text(&digest))?;
+            print(&format!("report: {}", page.display()))
+        }
+        StudyCommand::Compare(args) => compare(args),
+        StudyCommand::Submit(args) => submit(args),
+        StudyCommand::Worker(args) => {
+            // The study's own process is the one that decides when to stop.
+            ctrlc::set_handler(|| {}).ok();
+            let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+            Ok(study::serve(
+                &args.folder,
+                args.renderer.into(),
+                input,
+                output,
+            )?)
+        }
+    }
+}
+
+fn run(args: &RunArgs) -> Result<(), Failure> {
+    let template = Template::load(&args.study)?.with(None, args.runs);
+    let out = args.out.clone().unwrap_or_else(|| {
+        let out = Path::new("out").join(&template.file.name);
+        args.shard
+            .map_or(out.clone(), |shard| out.join(shard.folder()))
+    });
+    prepare(&out)?;
+    stop_on_ctrl_c();
+    let bar = Bar::new();
+    let show = |progress: &Progress| bar.show(progress);
+    let options = Options {
+        jobs: args.jobs.map_or(0, usize::from),
+        resume: args.resume,
+        shard: args.shard,
+        renderer: args.renderer.into(),
+        stop: Some(&STOP),
+        progress: Some(&show),
+        program: None,
+    };
+    let rows = study::run(&template, &out, &options);
+    bar.finish();
+    conclude(&out, &template, &rows?)
+}
+
+fn compare(args: &CompareArgs) -> Result<(), Failure> {
+    let found = study::compare(&args.a, &args.b)?;
+    if args.same {
+        return match found.first_difference {
+            None => print(&format!("{} rows, the same value by value", found.pairs)),
+            Some(what) => Err(Failure::Run(anyhow::anyhow!("not the same: {what}"))),
+        };
+    }
+    let mut text = format!(
+        "{} pairs of runs; second less first, intervals of 95 %\n",
+        found.pairs
+    );
+    if found.drawn_otherwise > 0 {
+        text += &format!(
+            "{} of them were not drawn alike: their differences scatter as if there were no pairs\n",
+            found.drawn_otherwise
+        );
+    }
+    for (name, unit, difference) in &found.differences {
+        text += &format!("  {name:<28} {} {unit}\n", show(difference));
+    }
+    print(&text)
+}
+
+fn submit(args: &SubmitArgs) -> Result<(), Failure> {
+    let template = Template::load(&args.study)?.with(None, args.runs);
+    template.draw(0).map_err(StudyError::from)?;
+    let name = template.file.name.clone();
+    let out = args
+        .out
+        .clone()
+        .unwrap_or_else(|| Path::new("out").join(&name));
+    prepare(&out)?;
+    let whole = |path: &Path| std::path::absolute(path).map_err(Failure::run);
+    let runs = args
+        .runs
+        .iter()
+        .flat_map(|n| ["--runs".to_owned(), n.to_string()]);
+    let renderer = ["--renderer".to_owned(), args.renderer.name().to_owned()];
+    let submission = Submission {
+        name,
+        program: std::env::current_exe().map_err(Failure::run)?,
+        study: whole(&args.study)?,
+        folder: whole(&out)?,
+        shards: args.shards,
+        cores: args.cores,
+        arguments: runs.chain(renderer).collect(),
+        sbatch: args.sbatch.clone(),
+    };
+    if args.dry_run {
+        let [array, merge] = submission.write()?;
+        return print(&format!("{}\n{}", array.display(), merge.display()));
+    }
+    let jobs = submission.submit(args.wait)?;
+    print(&format!(
+        "array {}, merge {}; logs in {}",
+        jobs.array,
+        jobs.merge,
+        submission.scripts().display()
+    ))
+}
+
+/// Prints what there is now.
+fn conclude(out: &Path, template: &Template, rows: &[Row]) -> Result<(), Failure> {
+    print(&digest_text(&Digest::of(template, rows)?))?;
+    print(&format!("rows: {}", out.join("rows.parquet").display()))
+}
+
+fn digest_text(digest: &Digest) -> String {
+    let mut text = format!("{} runs, {} complete", digest.runs, digest.complete);
+    if digest.rejected > 0 {
+        text += &format!("; {} draws did not meet the conditions", digest.rejected);
+    }
+    if let Some(n) = digest.effective_runs {
+        text += &format!("; worth {n:.1} unweighed ones");
+    }
+    text += "\nintervals of 95 %\n";
+    for event in &digest.events {
+        let said = match (&event.weighted, &event.rate) {
+            (Some(w), _) => format!(
+                "{}, from {} runs worth {:.1}",
+                show(&w.rate),
+                w.events,
+                w.effective_events
+            ),
+            (None, Some(r)) => format!("{}, {} of {}", show(&r.wilson), r.events, r.wilson.n),
+            (None, None) => "never told".into(),
+        };
+        text += &format!("  {:<28} rate {said}\n", event.name);
+    }
+    for figure in &digest.figures {
+        let unit = figure.measure.unit;
+        let mean = figure.mean.as_ref().map_or("-".into(), show);
+        let p95 = figure.quantiles[2].as_ref().map_or("-".into(), show);
+        text += &format!(
+            "  {:<28} mean {mean}, 95 % below {p95} {unit}\n",
+            figure.measure.name
+        );
+    }
+    text
+}
+
+/// How far a study is: a bar on a terminal, else a line for every tenth.
+struct Bar {
+    bar: ProgressBar,
+    tenths: Cell<u64>,
+}
+
+impl Bar {
+    fn new() -> Self {
+        let template = "{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go";
+        let bar = ProgressBar::new(0);
+        Self {
+            bar: match ProgressStyle::with_template(template) {
+                Ok(style) => bar.with_style(style),
+                Err(_) => bar,
+            },
+            tenths: Cell::new(0),
+        }
+    }
+
+    fn show(&self, progress: &Progress) {
+        let Progress {
+            done,
+            of,
+            failed,
+            per_minute,
+            ..
+        } = *progress;
+        let said = format!("; {per_minute:.1} a minute, {failed} failed");
+        self.bar.set_length(of);
+        self.bar.set_position(done);
+        self.bar.set_message(said.clone());
+        let reached = 10 * done / of.max(1);
+        if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
+            eprintln!("{done} of {of} runs{said}");
+        }
+    }
+
+    fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl From<StudyError> for Failure {
+    fn from(error: StudyError) -> Self {
+        match error {
+            StudyError::Scenario(error) => error.into(),
+            StudyError::File { .. } | StudyError::Table(_) | StudyError::Worker(_) => {
+                Self::run(error)
+            }
+            other => Self::input(
+                other,
+                "nothing was begun, and nothing that was there is lost",
+            ),
+        }
+    }
+}

@@ -1,0 +1,172 @@
+//! Conditions between named values: `gap_m > 2.0 * size_m && !(dark || wet)`.
+
+use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator, ops_factory};
+
+fn yes(holds: bool) -> f64 {
+    f64::from(u8::from(holds))
+}
+
+/// One operator between two numbers; a larger `prio` binds tighter.
+macro_rules! between {
+    ($sign:literal, $prio:literal, $apply:expr) => {
+        Operator::make_bin(
+            $sign,
+            BinOp {
+                apply: $apply,
+                prio: $prio,
+                is_commutative: false,
+            },
+        )
+    };
+}
+
+// Numbers throughout: true is 1, false is 0. Priorities are those of most languages.
+ops_factory!(
+    Operators,
+    f64,
+    between!("||", 0, |a, b| yes(a > 0.5 || b > 0.5)),
+    between!("&&", 1, |a, b| yes(a > 0.5 && b > 0.5)),
+    between!("<", 2, |a, b| yes(a < b)),
+    between!("<=", 2, |a, b| yes(a <= b)),
+    between!(">", 2, |a, b| yes(a > b)),
+    between!(">=", 2, |a, b| yes(a >= b)),
+    between!("==", 2, |a: f64, b| yes(
+        a.to_bits() == f64::to_bits(b) || a - b == 0.0
+    )),
+    between!("!=", 2, |a: f64, b| yes(a - b != 0.0)),
+    Operator::make_bin_unary(
+        "+",
+        BinOp {
+            apply: |a, b| a + b,
+            prio: 3,
+            is_commutative: true,
+        },
+        |a| a,
+    ),
+    Operator::make_bin_unary(
+        "-",
+        BinOp {
+            apply: |a, b| a - b,
+            prio: 3,
+            is_commutative: false,
+        },
+        |a: f64| -a,
+    ),
+    between!("*", 4, |a, b| a * b),
+    between!("/", 4, |a, b| a / b),
+    between!("^", 5, f64::powf),
+    between!("min", 6, f64::min),
+    between!("max", 6, f64::max),
+    Operator::make_unary("!", |a| yes(a < 0.5)),
+    Operator::make_unary("abs", f64::abs),
+    Operator::make_unary("sqrt", f64::sqrt),
+    Operator::make_unary("ln", f64::ln),
+    Operator::make_unary("exp", f64::exp),
+    Operator::make_unary("floor", f64::floor)
+);
+
+/// A condition, parsed.
+#[derive(Clone, Debug)]
+pub struct Condition {
+    text: String,
+    expression: FlatEx<f64, Operators>,
+}
+
+/// Why a condition cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConditionError {
+    /// It is no expression.
+    #[error("`{0}` is no condition: {1}")]
+    Form(String, String),
+    /// It names something that is not there, or is no number.
+    #[error("`{0}` names `{1}`, which is not known here, or is no number")]
+    Unknown(String, String),
+    /// Its value is not yes or no.
+    #[error("`{0}` is neither true nor false: {1}")]
+    NoCondition(String, String),
+}
+
+impl Condition {
+    /// Parses one of `+ - * / ^`, `< <= > >= == !=`, `&& || !`, `abs(x)`, `sqrt(x)`, `ln(x)`, `exp(x)`,
+    /// `floor(x)`, `min(x, y)`, `max(x, y)`, numbers and names; names in braces may hold anything.
+    pub fn parse(text: &str) -> Result<Self, ConditionError> {
+        let form = |e: exmex::ExError| ConditionError::Form(text.to_owned(), e.to_string());
+        Ok(Self {
+            text: text.to_owned(),
+            expression: FlatEx::parse(text).map_err(form)?,
+        })
+    }
+
+    /// The condition as written.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// Names in it, without braces.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.expression.var_names().iter().map(|name| {
+            let inner = name.strip_prefix('{').and_then(|n| n.strip_suffix('}'));
+            inner.unwrap_or(name)
+        })
+    }
+
+    /// Whether it holds for these values; `None` of a name where its value is not there (a figure that
+    /// this run does not have), and then nothing holds.
+    pub fn holds(
+        &self,
+        value_of: impl Fn(&str) -> Result<Option<f64>, ()>,
+    ) -> Result<Option<bool>, ConditionError> {
+        let mut values = Vec::new();
+        for name in self.names() {
+            let unknown = |()| ConditionError::Unknown(self.text.clone(), name.to_owned());
+            match value_of(name).map_err(unknown)? {
+                Some(value) => values.push(value),
+                None => return Ok(None),
+            }
+        }
+        let wrong = |why: String| ConditionError::NoCondition(self.text.clone(), why);
+        let value = self.expression.eval(&values);
+        match value.map_err(|e| wrong(e.to_string()))? {
+            // A flag of a run is a number too: `collision` alone is a condition.
+            0.0 => Ok(Some(false)),
+            1.0 => Ok(Some(true)),
+            x => Err(wrong(format!(
+                "it gives {x}; compare it with something, as in `x > 0`"
+            ))),
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    fn holds(text: &str) -> Result<Option<bool>, ConditionError> {
+        Condition::parse(text)?.holds(|name| match name {
+            "a" => Ok(Some(2.0)),
+            "train.speed[0]" => Ok(Some(5.0)),
+            "flag" => Ok(Some(1.0)),
+            "gone" => Ok(None),
+            _ => Err(()),
+        })
+    }
+
+    /// Precedence, names in braces, values that are not there, names that nobody knows, expressions
+    /// that are no condition.
+    #[test]
+    fn conditions_hold_or_say_why_not() {
+        assert_eq!(holds("a + 1.5 * 2 <= {train.speed[0]}"), Ok(Some(true)));
+        assert_eq!(holds("a > 3 || (a < 3 && a != 2)"), Ok(Some(false)));
+        assert_eq!(holds("flag && a == 2"), Ok(Some(true)));
+        assert_eq!(holds("flag"), Ok(Some(true)));
+        assert_eq!(holds("!flag"), Ok(Some(false)));
+        assert_eq!(holds("gone > 1 && a > 0"), Ok(None));
+        assert!(matches!(holds("b > 1"), Err(ConditionError::Unknown(_, name)) if name == "b"));
+        assert!(matches!(
+            holds("a + 1"),
+            Err(ConditionError::NoCondition(..))
+        ));
+        assert!(matches!(holds("a > "), Err(ConditionError::Form(..))));
+    }
+}

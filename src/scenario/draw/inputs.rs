@@ -1,0 +1,95 @@
+//! The files that a study is made of, kept together so that any of its runs can be made again.
+
+use super::Template;
+use sha2::{Digest, Sha256};
+use std::collections::BTreeMap;
+use std::fs;
+use std::io;
+use std::path::{Component, Path, PathBuf};
+
+/// A study's own file and all that it reads, below the folder that holds them all: so copies of
+/// them find each other as the originals do.
+#[derive(Clone, Debug)]
+pub struct Inputs {
+    root: PathBuf,
+    /// The study's own file, below the root.
+    pub study: PathBuf,
+    /// All files, below the root.
+    pub files: Vec<PathBuf>,
+}
+
+impl Inputs {
+    /// Of a study. Files that are named by absolute paths stay where they are.
+    pub fn of(template: &Template) -> io::Result<Self> {
+        let study = plain(&std::path::absolute(&template.path)?);
+        let folder = study.parent().unwrap_or(Path::new("/")).to_owned();
+        let named = template.files().into_iter().filter(|f| f.is_relative());
+        let mut files: Vec<_> = named.map(|f| plain(&folder.join(f))).collect();
+        files.push(study.clone());
+        let root = files.iter().fold(folder, |root, file| common(&root, file));
+        let below = |file: &PathBuf| file.strip_prefix(&root).unwrap_or(file).to_owned();
+        let mut below_root: Vec<_> = files.iter().map(below).collect();
+        below_root.sort();
+        below_root.dedup();
+        Ok(Self {
+            study: below(&study),
+            files: below_root,
+            root,
+        })
+    }
+
+    /// Hash of each file, as `sha256sum` prints it, by its path below the root.
+    pub fn hashes(&self) -> io::Result<BTreeMap<String, String>> {
+        let hash = |file: &PathBuf| {
+            let bytes = fs::read(self.root.join(file))?;
+            Ok((file.to_string_lossy().into_owned(), sha256(&bytes)))
+        };
+        self.files.iter().map(hash).collect()
+    }
+
+    /// Copies all files below a folder.
+    pub fn copy_to(&self, folder: &Path) -> io::Result<()> {
+        for file in &self.files {
+            let to = folder.join(file);
+            if let Some(parent) = to.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            fs::write(to, fs::read(self.root.join(file))?)?;
+        }
+        Ok(())
+    }
+
+    /// Where a file that the study's scenario names lies below the root; `None` of absolute paths.
+    pub fn place_of(&self, name: &str) -> Option<PathBuf> {
+        if Path::new(name).is_absolute() {
+            return None;
+        }
+        let folder = self.study.parent().unwrap_or(Path::new(""));
+        Some(plain(&folder.join(name)))
+    }
+}
+
+/// Hash of bytes, in hexadecimal digits.
+pub fn sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Without `.` and `..`.
+fn plain(path: &Path) -> PathBuf {
+    let mut plain = PathBuf::new();
+    for part in path.components() {
+        match part {
+            Component::CurDir => {}
+            Component::ParentDir => _ = plain.pop(),
+            other => plain.push(other),
+        }
+    }
+    plain
+}
+
+/// The folder that holds both.
+fn common(folder: &Path, file: &Path) -> PathBuf {
+    let parts = folder.components().zip(file.components());
+    parts.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}

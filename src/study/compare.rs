@@ -1,0 +1,63 @@
+//! Two studies held against each other, run by run: with the same seed and variables, run k of both
+//! met the same chances, and the differences of pairs scatter far less than the runs do.
+
+use super::stats::{Estimate, paired_difference};
+use super::worker::template_of;
+use super::{MEASURES, Row, StudyError, report, table};
+use crate::record::parquet::Kind;
+use std::path::Path;
+
+/// What differs between two studies, b less a.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    /// Runs that both have, by their indexes.
+    pub pairs: usize,
+    /// Of these, how many were not drawn alike: then pairs are no pairs.
+    pub drawn_otherwise: usize,
+    /// Name, unit, and mean difference of each figure and event that differs in some run.
+    pub differences: Vec<(String, String, Estimate)>,
+    /// The first thing in which they are not the same, value by value, wall times aside.
+    pub first_difference: Option<String>,
+}
+
+/// Compares the studies of two folders.
+pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
+    let (rows_a, rows_b) = (report::rows(a)?, report::rows(b)?);
+    let of_b = |row: &Row| rows_b.binary_search_by_key(&row.index, |r| r.index).ok();
+    let pairs = rows_a
+        .iter()
+        .filter_map(|row| Some((row, &rows_b[of_b(row)?])));
+    let pairs: Vec<(&Row, &Row)> = pairs.collect();
+    let named = |row: &Row| (row.seed, row.values.clone());
+    let drawn_otherwise = pairs.iter().filter(|(a, b)| named(a) != named(b)).count();
+
+    let events = table::events(&template_of(a)?.1)?;
+    let mut differences = Vec::new();
+    let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
+        let both = pairs.iter().filter_map(|(a, b)| Some((of(a)?, of(b)?)));
+        let both: Vec<(f64, f64)> = both.collect();
+        let differs = both.iter().any(|(a, b)| a.to_bits() != b.to_bits());
+        let estimate = paired_difference(&both).filter(|_| differs);
+        differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
+    };
+    for (name, condition) in &events {
+        let happened = |row: &Row| row.happened(condition).map(|h| f64::from(u8::from(h)));
+        add(&format!("rate of {name}"), "1", &happened);
+    }
+    for m in MEASURES
+        .iter()
+        .filter(|m| m.kind != Kind::Reals && !m.is_wall_time())
+    {
+        add(m.name, m.unit, &|row: &Row| row.number(m.name));
+    }
+    let lengths = (rows_a.len() != rows_b.len())
+        .then(|| format!("{} rows and {}", rows_a.len(), rows_b.len()));
+    let mut together = rows_a.iter().zip(&rows_b);
+    let row = |(a, b): (&Row, &Row)| Some(format!("run {}: {}", a.index, a.difference(b)?));
+    Ok(Comparison {
+        pairs: pairs.len(),
+        drawn_otherwise,
+        differences,
+        first_difference: lengths.or_else(|| together.find_map(row)),
+    })
+}

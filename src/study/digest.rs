@@ -1,0 +1,172 @@
+//! What the rows of a study come to.
+
+use super::stats::{
+    Estimate, Rate, Weighted, effective_runs, first_order, mean, quantile, rank_correlation, rate,
+    weighted_rate,
+};
+use super::{MEASURES, Measure, Row, Status, StudyError, table};
+use crate::record::parquet::Kind;
+use crate::scenario::draw::Template;
+
+/// Quantiles that are shown.
+pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
+
+/// All figures of a study.
+#[derive(Clone, Debug)]
+pub struct Digest {
+    /// Rows there are.
+    pub runs: usize,
+    /// Of these, complete ones; the rest gives its reasons in the table.
+    pub complete: usize,
+    /// Draws that did not meet the conditions.
+    pub rejected: u64,
+    /// Kish's effective number of runs, where they are weighed.
+    pub effective_runs: Option<f64>,
+    /// Events, in the order of their names.
+    pub events: Vec<EventDigest>,
+    /// Figures that vary, in the order of columns.
+    pub figures: Vec<FigureDigest>,
+}
+
+/// An event.
+#[derive(Clone, Debug)]
+pub struct EventDigest {
+    /// Its name.
+    pub name: String,
+    /// Its condition.
+    pub condition: String,
+    /// Runs in which it could be told whether it happened, counted.
+    pub rate: Option<Rate>,
+    /// The rate of the distributions that were asked for, where runs are weighed.
+    pub weighted: Option<Weighted>,
+}
+
+/// A figure.
+#[derive(Clone, Debug)]
+pub struct FigureDigest {
+    /// Which.
+    pub measure: &'static Measure,
+    /// Its mean.
+    pub mean: Option<Estimate>,
+    /// Its [`QUANTILES`].
+    pub quantiles: [Option<Estimate>; QUANTILES.len()],
+    /// What drives it: each variable of numbers with its rank correlation and first-order share.
+    pub drivers: Vec<Driver>,
+}
+
+/// A variable as the cause of a figure.
+#[derive(Clone, Debug)]
+pub struct Driver {
+    /// The variable.
+    pub variable: String,
+    /// Spearman's rank correlation.
+    pub correlation: Option<Estimate>,
+    /// First-order Sobol index; `None` where inputs are not independent.
+    pub first_order: Option<f64>,
+}
+
+impl Digest {
+    /// Of rows in order.
+    pub fn of(template: &Template, rows: &[Row]) -> Result<Self, StudyError> {
+        let weighed = is_weighed(template);
+        let complete: Vec<&Row> = rows
+            .iter()
+            .filter(|r| r.status == Status::Complete)
+            .collect();
+        let ln_weights: Vec<f64> = complete.iter().map(|r| r.ln_weight).collect();
+        let normalise = !template.settings.require.is_empty();
+        let events = table::events(template)?
+            .into_iter()
+            .map(|(name, condition)| {
+                let told = complete
+                    .iter()
+                    .filter_map(|r| Some((r.ln_weight, r.happened(&condition)?)));
+                let told: Vec<(f64, bool)> = told.collect();
+                let happened = told.iter().filter(|t| t.1).count() as u64;
+                EventDigest {
+                    name,
+                    condition: condition.text().to_owned(),
+                    rate: rate(happened, told.len() as u64),
+                    weighted: weighed.then(|| weighted_rate(&told, normalise)).flatten(),
+                }
+            });
+        let shown = MEASURES.iter().filter(|m| is_shown(m));
+        Ok(Self {
+            runs: rows.len(),
+            complete: complete.len(),
+            rejected: rows.iter().map(|r| u64::from(r.rejected)).sum(),
+            effective_runs: weighed.then(|| effective_runs(&ln_weights)),
+            events: events.collect(),
+            figures: shown
+                .filter_map(|m| FigureDigest::of(template, m, &complete))
+                .collect(),
+        })
+    }
+}
+
+/// Whether runs carry weights.
+pub fn is_weighed(template: &Template) -> bool {
+    template
+        .settings
+        .variables
+        .values()
+        .any(|v| v.propose.is_some())
+}
+
+fn is_shown(measure: &Measure) -> bool {
+    matches!(measure.kind, Kind::Real | Kind::Int | Kind::Flag) && !measure.is_wall_time()
+}
+
+impl FigureDigest {
+    /// `None` of a figure that no run has, or that is the same in all. Weighed runs have no plain means:
+    /// they are not those of the distributions that were asked for.
+    fn of(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Option<Self> {
+        let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
+        let first = sample.first()?.to_bits();
+        if sample.iter().all(|x| x.to_bits() == first) || is_weighed(template) {
+            return None;
+        }
+        let mean = mean(&sample);
+        sample.sort_by(f64::total_cmp);
+        let settings = &template.settings;
+        let variables = settings
+            .variables
+            .keys()
+            .filter(|name| rows.iter().any(|r| r.number(name).is_some()));
+        let drivers = variables.map(|name| {
+            let pair = |r: &&Row| Some((r.number(name)?, r.number(measure.name)?));
+            let pairs: Vec<(f64, f64)> = rows.iter().filter_map(pair).collect();
+            let independent = settings.correlated.is_empty() && settings.require.is_empty();
+            Driver {
+                variable: name.clone(),
+                correlation: rank_correlation(&pairs),
+                first_order: independent.then(|| first_order(&pairs)).flatten(),
+            }
+        });
+        Some(Self {
+            measure,
+            mean,
+            quantiles: QUANTILES.map(|p| quantile(&sample, p)),
+            drivers: drivers.collect(),
+        })
+    }
+}
+
+/// A figure with its interval, to the digits that it tells.
+pub fn show(e: &Estimate) -> String {
+    let width = 0.5 * (e.high - e.low);
+    let digits = |x: f64| (1.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
+    let digits = if width.is_finite() && width > 0.0 {
+        digits(width)
+    } else {
+        digits(e.value.abs().max(1e-9))
+    };
+    let end = |x: f64| {
+        if x.is_infinite() {
+            if x > 0.0 { "inf".into() } else { "-inf".into() }
+        } else {
+            format!("{x:.digits$}")
+        }
+    };
+    format!("{:.digits$} ({} to {})", e.value, end(e.low), end(e.high))
+}

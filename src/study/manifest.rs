@@ -1,0 +1,182 @@
+//! What a study's folder holds: of which inputs, by which version, on which adapter.
+
+use super::StudyError;
+use crate::scenario::draw::{Inputs, Template};
+use crate::session::RendererChoice;
+use crate::twin::render::Backend;
+use crate::twin::render::gpu;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// Name of the file in a study's folder.
+pub const MANIFEST: &str = "study.json";
+/// Folder for copies of all inputs.
+pub const INPUTS: &str = "inputs";
+
+/// One of several parts of a study, each run by itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Shard {
+    /// Which, counted from 1.
+    pub number: u64,
+    /// Of how many.
+    pub of: u64,
+}
+
+impl Shard {
+    /// Whether a run is a part of it.
+    pub fn holds(self, index: u64) -> bool {
+        index % self.of == self.number - 1
+    }
+
+    /// Name of its folder below the study's.
+    pub fn folder(self) -> String {
+        format!("shard-{}-of-{}", self.number, self.of)
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{text}` is no shard: give I/N with 1 <= I <= N, as in 2/4");
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let parse = |t: &str| t.trim().parse::<u64>().map_err(|_| wrong());
+        let shard = Self {
+            number: parse(number)?,
+            of: parse(of)?,
+        };
+        if (1..=shard.of).contains(&shard.number) {
+            Ok(shard)
+        } else {
+            Err(wrong())
+        }
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// Everything that a row hangs on. A study goes on only while all of it is the same.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Manifest {
+    /// Version of the program.
+    pub metrotwin: String,
+    /// The study's file, below [`INPUTS`].
+    pub study: PathBuf,
+    /// SHA-256 of every input file, by its path below [`INPUTS`].
+    pub inputs: BTreeMap<String, String>,
+    /// Number of runs, all shards together.
+    pub runs: u64,
+    /// What draws.
+    pub renderer: Drawn,
+    /// The part of the study that this folder holds; all of it where there is none.
+    pub shard: Option<Shard>,
+}
+
+/// What draws the images.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Drawn {
+    /// `vulkan`, `metal`, `dx12` or `cpu`.
+    pub backend: String,
+    /// Name of the adapter.
+    pub adapter: String,
+}
+
+impl Drawn {
+    /// What a choice comes to on this machine.
+    pub fn by(choice: RendererChoice) -> Result<Self, StudyError> {
+        let plain = || Backend {
+            backend: "cpu".into(),
+            adapter: "plain renderer".into(),
+        };
+        let found = match choice {
+            RendererChoice::Cpu => plain(),
+            RendererChoice::Gpu => gpu::adapters()
+                .into_iter()
+                .next()
+                .ok_or(StudyError::NoAdapter)?,
+            RendererChoice::Auto => gpu::adapters().into_iter().next().unwrap_or_else(plain),
+        };
+        Ok(Self {
+            backend: found.backend,
+            adapter: found.adapter,
+        })
+    }
+}
+
+impl Manifest {
+    /// Of a study about to be run here.
+    pub fn of(
+        template: &Template,
+        choice: RendererChoice,
+        shard: Option<Shard>,
+    ) -> Result<Self, StudyError> {
+        let unreadable = |source| StudyError::file(&template.path, source);
+        let inputs = Inputs::of(template).map_err(unreadable)?;
+        Ok(Self {
+            metrotwin: env!("CARGO_PKG_VERSION").into(),
+            study: inputs.study.clone(),
+            inputs: inputs.hashes().map_err(unreadable)?,
+            runs: template.runs(),
+            renderer: Drawn::by(choice)?,
+            shard,
+        })
+    }
+
+    /// Reads that of a folder; `None` where there is none.
+    pub fn read(folder: &Path) -> Result<Option<Self>, StudyError> {
+        let path = folder.join(MANIFEST);
+        let text = match fs::read(&path) {
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            other => other.map_err(|source| StudyError::file(&path, source))?,
+        };
+        let manifest = serde_json::from_slice(&text);
+        manifest
+            .map(Some)
+            .map_err(|e| StudyError::file(&path, e.into()))
+    }
+
+    /// Writes it into a folder, whole or not at all.
+    pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
+        let path = folder.join(MANIFEST);
+        let part = folder.join(format!("{MANIFEST}.part"));
+        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
+        let written = fs::write(&part, text).and_then(|()| fs::rename(&part, &path));
+        written.map_err(|source| StudyError::file(&path, source))
+    }
+
+    /// What differs between two of them, in words; shard and number of runs aside: a study may go on
+    /// to more runs.
+    pub fn difference(&self, now: &Self) -> Option<String> {
+        let said = |what: &str, a: &dyn fmt::Display, b: &dyn fmt::Display| {
+            Some(format!("{what}: {a} then, {b} now"))
+        };
+        for (file, hash) in &self.inputs {
+            match now.inputs.get(file) {
+                None => return Some(format!("{file} is no input any more")),
+                Some(other) if other != hash => return Some(format!("{file} has changed")),
+                Some(_) => {}
+            }
+        }
+        if let Some(file) = now.inputs.keys().find(|f| !self.inputs.contains_key(*f)) {
+            return Some(format!("{file} is a new input"));
+        }
+        if self.study != now.study {
+            return said("file", &self.study.display(), &now.study.display());
+        }
+        if self.metrotwin != now.metrotwin {
+            return said("version of metrotwin", &self.metrotwin, &now.metrotwin);
+        }
+        if self.renderer != now.renderer {
+            return said("renderer", &self.renderer.adapter, &now.renderer.adapter);
+        }
+        None
+    }
+}

@@ -1,0 +1,121 @@
+//! Shards put together.
+
+use super::journal::{self, JOURNAL};
+use super::worker::template_of;
+use super::{INPUTS, Manifest, Row, Shard, StudyError, table};
+use crate::scenario::draw::Inputs;
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// Makes one study of all shards below a folder, in that folder, and gives its rows. Nothing is written
+/// unless every shard is there, whole, and of the same study.
+pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
+    let shards = shards(folder)?;
+    let Some((first_path, first)) = shards.first() else {
+        let what = format!("{} has no folder shard-I-of-N", folder.display());
+        return Err(StudyError::Shards(what));
+    };
+    let mut found = BTreeMap::new();
+    let mut rows = Vec::new();
+    for (path, manifest) in &shards {
+        let runs = (first.runs != manifest.runs).then(|| "its number of runs differs".to_owned());
+        if let Some(what) = first.difference(manifest).or(runs) {
+            let (a, b) = (first_path.display(), path.display());
+            let what = format!("{a} and {b} are not of one study: {what}");
+            return Err(StudyError::Shards(what));
+        }
+        let shard = manifest.shard.ok_or_else(|| {
+            StudyError::Shards(format!("{} is a whole study, not a shard", path.display()))
+        })?;
+        let of_shard = journal::read(path)?;
+        check_whole(path, shard, manifest.runs, &of_shard)?;
+        found.insert(shard.number, shard.of);
+        rows.extend(of_shard);
+    }
+    let of = found.values().next().copied().unwrap_or(0);
+    if found.values().any(|n| *n != of) {
+        let what = format!("{} holds shards of different numbers", folder.display());
+        return Err(StudyError::Shards(what));
+    }
+    let missing: Vec<String> = (1..=of)
+        .filter(|k| !found.contains_key(k))
+        .map(|k| format!("{k}/{of}"))
+        .collect();
+    if !missing.is_empty() {
+        let what = format!(
+            "{}: shards {} are missing; run them with --shard",
+            folder.display(),
+            missing.join(", ")
+        );
+        return Err(StudyError::Shards(what));
+    }
+    write(folder, first_path, first, rows)
+}
+
+/// Folders of shards, with their manifests.
+fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
+    let failed = |e| StudyError::file(folder, e);
+    let mut shards = Vec::new();
+    for entry in fs::read_dir(folder).map_err(failed)? {
+        let path = entry.map_err(failed)?.path();
+        let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
+        if name.is_some_and(|n| n.starts_with("shard-")) {
+            let manifest = Manifest::read(&path)?;
+            let manifest = manifest.ok_or_else(|| StudyError::NoStudy(path.clone()))?;
+            shards.push((path, manifest));
+        }
+    }
+    shards.sort_by(|a, b| a.0.cmp(&b.0));
+    Ok(shards)
+}
+
+fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result<(), StudyError> {
+    let wanted = (0..runs).filter(|k| shard.holds(*k)).count();
+    if let Some(row) = rows.iter().find(|row| !shard.holds(row.index)) {
+        let what = format!(
+            "{}: run {} is not of shard {shard}",
+            path.display(),
+            row.index
+        );
+        return Err(StudyError::Shards(what));
+    }
+    if rows.len() < wanted {
+        let what = format!(
+            "{} has {} of {wanted} rows; finish it with --shard {shard} --resume",
+            path.display(),
+            rows.len()
+        );
+        return Err(StudyError::Shards(what));
+    }
+    Ok(())
+}
+
+fn write(
+    folder: &Path,
+    shard: &Path,
+    manifest: &Manifest,
+    mut rows: Vec<Row>,
+) -> Result<Vec<Row>, StudyError> {
+    journal::sort(&mut rows);
+    let (_, template) = template_of(shard)?;
+    let failed = |e| StudyError::file(folder, e);
+    let inputs = Inputs::of(&template).map_err(failed)?;
+    inputs.copy_to(&folder.join(INPUTS)).map_err(failed)?;
+    let mut text = Vec::new();
+    for row in &rows {
+        serde_json::to_writer(&mut text, row).map_err(|e| failed(e.into()))?;
+        text.push(b'\n');
+    }
+    let (part, path) = (folder.join(format!("{JOURNAL}.part")), folder.join(JOURNAL));
+    fs::write(&part, text)
+        .and_then(|()| fs::rename(&part, &path))
+        .map_err(failed)?;
+    table::write(folder, &template, &rows)?;
+    let whole = Manifest {
+        shard: None,
+        ..manifest.clone()
+    };
+    whole.write(folder)?;
+    Ok(rows)
+}

@@ -1,0 +1,149 @@
+//! Many sessions: a study draws scenarios, runs them on all cores, keeps a row of each, and says what
+//! they come to, with how sure that is.
+//!
+//! ```no_run
+//! use metrotwin::scenario::draw::Template;
+//! use metrotwin::study::{Options, run};
+//!
+//! let template = Template::load("scenarios/studies/led_accuracy.toml".as_ref())?;
+//! let rows = run(&template, "out/led_accuracy".as_ref(), &Options::default())?;
+//! println!("{} runs", rows.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! # How it goes
+//!
+//! Run k hangs on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
+//! the same for one worker and many, for shards on other machines, and for a study that was killed and
+//! resumed. Workers are processes of their own, one a core: a software graphics driver starts threads
+//! of its own, and two processes with a thread each do more than one with two; and a driver that
+//! crashes costs one run. Each row is appended to a journal and synced; a table in Parquet is made
+//! of it. A run that fails is a row with its reason.
+//!
+//! # What it does not do
+//!
+//! Schedule over machines: `submit` hands the shards to Slurm as a job array.
+
+mod compare;
+mod digest;
+mod journal;
+mod manifest;
+mod measures;
+mod merge;
+mod pool;
+mod report;
+mod row;
+mod runner;
+mod slurm;
+pub mod stats;
+mod stop;
+mod table;
+mod worker;
+
+pub use compare::{Comparison, compare};
+pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES, show};
+pub use journal::read as read_rows;
+pub use manifest::{Drawn, INPUTS, MANIFEST, Manifest, Shard};
+pub use measures::{Fixes, MEASURES, Measure, measure};
+pub use merge::merge;
+pub use report::{REPORT, report, rows};
+pub use row::{Row, Status};
+pub use runner::{Options, Progress, run};
+pub use slurm::{Submission, Submitted};
+pub use worker::{Desk, serve, template_of};
+
+use crate::scenario::ScenarioError;
+use crate::scenario::draw::{ConditionError, DrawError};
+use crate::session::ObserverError;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Why a study cannot begin or go on. Rows written before are kept.
+#[derive(Debug, thiserror::Error)]
+pub enum StudyError {
+    /// A file of the study's folder.
+    #[error("{}: {source}{}", path.display(), advice(source))]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// A row that is none.
+    #[error(
+        "{}, line {line}: {why}; it was written by another program or version: choose another folder",
+        path.display()
+    )]
+    Journal {
+        /// The journal.
+        path: PathBuf,
+        /// Line, counted from 1.
+        line: usize,
+        /// What the parser says.
+        why: String,
+    },
+    /// The folder holds a study already.
+    #[error("{} holds {rows} rows of this study already; give --resume to go on, or another --out", path.display())]
+    Exists {
+        /// The folder.
+        path: PathBuf,
+        /// How many rows.
+        rows: usize,
+    },
+    /// The folder holds another study.
+    #[error("{} holds another study: {what}; give another --out", path.display())]
+    Other {
+        /// The folder.
+        path: PathBuf,
+        /// What differs.
+        what: String,
+    },
+    /// There is no study in a folder.
+    #[error("{} holds no study (no {MANIFEST}); give the --out of a `study run`", .0.display())]
+    NoStudy(PathBuf),
+    /// Shards that are not a whole.
+    #[error("{0}")]
+    Shards(String),
+    /// What Slurm says.
+    #[error("{0}")]
+    Slurm(String),
+    /// No run can be drawn.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// An event that cannot be worked out.
+    #[error("study.events: {0}")]
+    Event(#[from] ConditionError),
+    /// A name that is no column.
+    #[error("`{0}` is no variable, figure or event of this study")]
+    NoColumn(String),
+    /// A copy of the inputs is wrong.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The table of rows.
+    #[error(transparent)]
+    Table(#[from] ObserverError),
+    /// No worker could be started.
+    #[error("cannot start a worker: {0}")]
+    Worker(io::Error),
+    /// There is nothing to draw with.
+    #[error("no graphics adapter found; install a driver, or give --renderer auto or cpu")]
+    NoAdapter,
+}
+
+impl StudyError {
+    pub(crate) fn file(path: &Path, source: io::Error) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            source,
+        }
+    }
+}
+
+fn advice(source: &io::Error) -> &'static str {
+    match source.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded | io::ErrorKind::FileTooLarge => {
+            "; make room and give --resume: all rows before are kept"
+        }
+        _ => "",
+    }
+}

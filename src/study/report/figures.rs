@@ -1,0 +1,351 @@
+//! Which plots a study gets, and what is in them.
+
+use super::plot::{Axis, Bar, Layers, plot};
+use crate::record::parquet::Kind;
+use crate::scenario::draw::{Condition, Distribution, Template};
+use crate::study::stats::{mean, quantile, rate};
+use crate::study::table::{events, unit_of};
+use crate::study::{Digest, FigureDigest, Measure, Row};
+use serde_json::Value;
+
+/// More values than that of a variable are put into bins.
+const MOST_GROUPS: usize = 12;
+/// Bins of about as many runs each.
+const BINS: usize = 8;
+/// Variables that a figure is plotted against: those that drive it most.
+const MOST_DRIVERS: usize = 4;
+
+/// A plot with its file name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plot {
+    /// For its file: small letters, digits, `_`.
+    pub name: String,
+    /// The picture.
+    pub svg: String,
+}
+
+/// A variable as the x axis of plots.
+struct Input<'a> {
+    name: &'a str,
+    axis: Axis,
+}
+
+impl<'a> Input<'a> {
+    fn of(template: &'a Template, name: &'a str, rows: &[&Row]) -> Self {
+        let variable = template.settings.variables.get(name);
+        let label = variable.map(|v| v.label.as_str()).filter(|l| !l.is_empty());
+        let unit = variable
+            .and_then(|v| v.keys.first())
+            .map_or("1", |key| unit_of(key));
+        let with_unit = if unit == "1" {
+            name.to_owned()
+        } else {
+            format!("{name} [{unit}]")
+        };
+        let mut axis = Axis::new(label.map_or(with_unit, str::to_owned));
+        axis.log = matches!(
+            variable.map(|v| &v.from),
+            Some(Distribution::LogUniform { .. } | Distribution::LogNormal { .. })
+        );
+        let is_text = rows
+            .iter()
+            .any(|r| r.values.get(name).is_some_and(Value::is_string));
+        if is_text {
+            axis.names = rows
+                .iter()
+                .filter_map(|r| Some(r.values.get(name)?.as_str()?.to_owned()))
+                .collect();
+            axis.names.sort();
+            axis.names.dedup();
+        }
+        Self { name, axis }
+    }
+
+    /// Of a run: a number, or which of the names.
+    fn value(&self, row: &Row) -> Option<f64> {
+        if self.axis.names.is_empty() {
+            return row.number(self.name);
+        }
+        let text = row.values.get(self.name)?.as_str()?;
+        Some(self.axis.names.iter().position(|n| n == text)? as f64)
+    }
+
+    /// Pairs of the value and of what `of` says of a run.
+    fn pairs(&self, rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> Vec<(f64, f64)> {
+        let pairs = rows.iter().filter_map(|r| Some((self.value(r)?, of(r)?)));
+        let mut pairs: Vec<_> = pairs.collect();
+        pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+        pairs
+    }
+}
+
+/// Pairs sorted by x in groups: of one value each, or of about as many runs each.
+fn groups(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
+    let same = |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).is_eq();
+    if pairs.chunk_by(same).count() <= MOST_GROUPS {
+        pairs.chunk_by(same).collect()
+    } else {
+        pairs.chunks(pairs.len().div_ceil(BINS)).collect()
+    }
+}
+
+fn middle(group: &[(f64, f64)]) -> f64 {
+    group.iter().map(|p| p.0).sum::<f64>() / group.len() as f64
+}
+
+/// All plots of a study.
+pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
+    let complete: Vec<&Row> = rows.iter().filter(|r| !r.figures.is_empty()).collect();
+    let names = template.settings.variables.keys();
+    let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
+    let mut plots = Vec::new();
+    for (name, condition) in events(template).unwrap_or_default() {
+        plots.extend(
+            inputs
+                .iter()
+                .filter_map(|i| event_plot(i, &name, &condition, &complete)),
+        );
+        plots.extend(event_map(&inputs, &name, &condition, &complete));
+    }
+    for figure in digest
+        .figures
+        .iter()
+        .filter(|f| is_worth_plotting(f.measure))
+    {
+        plots.extend(distribution(figure.measure, &complete));
+        plots.extend(convergence(figure.measure, &complete));
+        let strongest = strongest(figure);
+        let shown = inputs
+            .iter()
+            .filter(|i| strongest.contains(&i.name) || !i.axis.names.is_empty());
+        plots.extend(shown.filter_map(|i| figure_plot(i, figure.measure, &complete)));
+    }
+    for method in ["paper", "mono"] {
+        plots.extend(error_by_range(method, &complete));
+    }
+    plots
+}
+
+/// Figures that users ask for; the rest stand in the tables.
+fn is_worth_plotting(measure: &Measure) -> bool {
+    const ASKED: [&str; 8] = [
+        "paper_error_mean_m",
+        "paper_error_max_m",
+        "paper_availability",
+        "mono_error_mean_m",
+        "detection_latency_s",
+        "detection_distance_error_m",
+        "stop_margin_m",
+        "stop_error_m",
+    ];
+    measure.kind == Kind::Real && ASKED.contains(&measure.name)
+}
+
+fn strongest(figure: &FigureDigest) -> Vec<&str> {
+    let strength = |k: usize| {
+        let driver = &figure.drivers[k];
+        let rank = driver.correlation.map_or(0.0, |c| c.value.abs());
+        rank.max(driver.first_order.unwrap_or(0.0))
+    };
+    let mut order: Vec<usize> = (0..figure.drivers.len()).collect();
+    order.sort_by(|a, b| strength(*b).total_cmp(&strength(*a)));
+    let names = order
+        .iter()
+        .take(MOST_DRIVERS)
+        .map(|k| figure.drivers[*k].variable.as_str());
+    names.collect()
+}
+
+fn label(measure: &Measure) -> String {
+    match measure.unit {
+        "1" => measure.name.to_owned(),
+        unit => format!("{} [{unit}]", measure.name),
+    }
+}
+
+/// How often an event happens at each value of a variable.
+fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
+    let pairs = input.pairs(rows, |r| r.happened(event).map(|h| f64::from(u8::from(h))));
+    let bars = groups(&pairs).into_iter().filter_map(|group| {
+        let happened = group.iter().filter(|p| p.1 > 0.5).count() as u64;
+        let e = rate(happened, group.len() as u64)?.wilson;
+        Some(Bar {
+            x: middle(group),
+            y: e.value,
+            low: e.low,
+            high: e.high,
+        })
+    });
+    let layers = Layers {
+        bars: bars.collect(),
+        ..Layers::default()
+    };
+    let y = Axis::new(format!("rate of {name}, with 95 % interval"));
+    Some(Plot {
+        svg: plot(
+            &format!("{name} against {}", input.name),
+            [&input.axis, &y],
+            &layers,
+        )?,
+        name: format!("event_{name}_{}", input.name),
+    })
+}
+
+/// Where in the plane of two variables an event happened: of the two that most tell.
+fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
+    let strength = |input: &&Input<'_>| {
+        let pairs = input.pairs(rows, |r| r.happened(event).map(|h| f64::from(u8::from(h))));
+        crate::study::stats::rank_correlation(&pairs).map_or(0.0, |c| c.value.abs())
+    };
+    let mut order: Vec<_> = inputs.iter().filter(|i| i.axis.names.is_empty()).collect();
+    order.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
+    let [x, y] = [order.first()?, order.get(1)?];
+    let of = |wanted: bool| {
+        let told = rows.iter().filter(|r| r.happened(event) == Some(wanted));
+        told.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
+            .collect::<Vec<_>>()
+    };
+    let layers = Layers {
+        points: of(false),
+        marked: of(true),
+        ..Layers::default()
+    };
+    if layers.marked.is_empty() {
+        return None;
+    }
+    Some(Plot {
+        svg: plot(
+            &format!("{name}: red where it happened"),
+            [&x.axis, &y.axis],
+            &layers,
+        )?,
+        name: format!("map_{name}"),
+    })
+}
+
+/// A figure of every run against a variable, with the mean of each group.
+fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+    let pairs = input.pairs(rows, |r| r.number(measure.name));
+    let bars = groups(&pairs).into_iter().filter_map(|group| {
+        let e = mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
+        Some(Bar {
+            x: middle(group),
+            y: e.value,
+            low: e.low,
+            high: e.high,
+        })
+    });
+    let layers = Layers {
+        bars: bars.collect(),
+        points: pairs.clone(),
+        ..Layers::default()
+    };
+    let y = Axis::new(label(measure));
+    Some(Plot {
+        svg: plot(
+            &format!("{} against {}", measure.name, input.name),
+            [&input.axis, &y],
+            &layers,
+        )?,
+        name: format!("{}_{}", measure.name, input.name),
+    })
+}
+
+/// Share of runs that lie below each value.
+fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+    let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
+    sample.sort_by(f64::total_cmp);
+    let n = sample.len() as f64;
+    let share = |k: usize| k as f64 / n;
+    let steps = sample
+        .iter()
+        .enumerate()
+        .flat_map(|(k, x)| [(*x, share(k)), (*x, share(k + 1))]);
+    // Dvoretzky, Kiefer, Wolfowitz with Massart's constant: the band holds the whole curve.
+    let half = ((2f64 / 0.05).ln() / (2.0 * n)).sqrt();
+    let band = sample.iter().enumerate().map(|(k, x)| {
+        let middle = share(k) + 0.5 / n;
+        (*x, (middle - half).max(0.0), (middle + half).min(1.0))
+    });
+    let layers = Layers {
+        line: steps.collect(),
+        band: band.collect(),
+        ..Layers::default()
+    };
+    let axes = [
+        Axis::new(label(measure)),
+        Axis::new("share of runs below, with 95 % band"),
+    ];
+    Some(Plot {
+        svg: plot(
+            &format!("Distribution of {}", measure.name),
+            [&axes[0], &axes[1]],
+            &layers,
+        )?,
+        name: format!("{}_cdf", measure.name),
+    })
+}
+
+/// The mean after each run, with its interval.
+fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+    let sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
+    let looks = (4..=sample.len()).step_by((sample.len() / 200).max(1));
+    let after = looks.filter_map(|n| Some((n as f64, mean(&sample[..n])?)));
+    let after: Vec<_> = after.collect();
+    let layers = Layers {
+        line: after.iter().map(|(n, e)| (*n, e.value)).collect(),
+        band: after.iter().map(|(n, e)| (*n, e.low, e.high)).collect(),
+        ..Layers::default()
+    };
+    let axes = [
+        Axis::new("runs"),
+        Axis::new(format!("mean of {}", label(measure))),
+    ];
+    Some(Plot {
+        svg: plot(
+            &format!("Convergence of {}", measure.name),
+            [&axes[0], &axes[1]],
+            &layers,
+        )?,
+        name: format!("{}_convergence", measure.name),
+    })
+}
+
+/// Errors of all positions of all runs against the distance of the lamp.
+fn error_by_range(method: &str, rows: &[&Row]) -> Option<Plot> {
+    let list = |row: &Row, what: &str| row.numbers(&format!("{method}_fix_{what}_m"));
+    let fixes = rows
+        .iter()
+        .flat_map(|r| list(r, "range").into_iter().zip(list(r, "error")));
+    let mut fixes: Vec<(f64, f64)> = fixes.map(|(range, error)| (range, error.abs())).collect();
+    if fixes.is_empty() {
+        return None;
+    }
+    fixes.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut line = Vec::new();
+    let mut band = Vec::new();
+    for group in fixes.chunks(fixes.len().div_ceil(20)) {
+        let mut errors: Vec<f64> = group.iter().map(|p| p.1).collect();
+        errors.sort_by(f64::total_cmp);
+        let at = |p| quantile(&errors, p).map_or(f64::NAN, |e| e.value);
+        line.push((middle(group), at(0.5)));
+        band.push((middle(group), at(0.05), at(0.95)));
+    }
+    let layers = Layers {
+        line,
+        band,
+        ..Layers::default()
+    };
+    let axes = [
+        Axis::new("distance of the lamp [m]"),
+        Axis::new("error along the track [m]"),
+    ];
+    Some(Plot {
+        svg: plot(
+            &format!("{method}: median error of a position, band 5 to 95 %"),
+            [&axes[0], &axes[1]],
+            &layers,
+        )?,
+        name: format!("{method}_error_by_range"),
+    })
+}

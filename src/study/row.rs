@@ -1,0 +1,124 @@
+//! One run of a study, as a row of its results.
+
+use super::measures::{Fixes, MEASURES};
+use crate::scenario::draw::Draw;
+use crate::session::{End, Summary};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+/// How a run came out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Status {
+    /// To its end.
+    Complete,
+    /// It began and failed: its figures are those up to there.
+    Failed,
+    /// What was drawn is no scenario that can be run.
+    Invalid,
+    /// The process that ran it ended.
+    Crashed,
+}
+
+impl Status {
+    /// As in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Complete => "complete",
+            Self::Failed => "failed",
+            Self::Invalid => "invalid",
+            Self::Crashed => "crashed",
+        }
+    }
+}
+
+/// A run's inputs and figures. Names of values are those of the study's variables, names of figures
+/// those of [`MEASURES`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Row {
+    /// Which run.
+    pub index: u64,
+    /// Seed of its scenario.
+    pub seed: u64,
+    /// How it came out.
+    pub status: Status,
+    /// Why, where it is not complete.
+    pub reason: Option<String>,
+    /// Draws before this one that did not meet the conditions.
+    pub rejected: u32,
+    /// Logarithm of its weight: 0 but with importance sampling.
+    pub ln_weight: f64,
+    /// What was drawn.
+    pub values: Map<String, Value>,
+    /// What came out: numbers, flags, lists of numbers; those that the run has not are left out.
+    pub figures: Map<String, Value>,
+}
+
+impl Row {
+    /// Of a run that has no figures.
+    pub fn without_figures(draw: &Draw, status: Status, reason: String) -> Self {
+        let json = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
+        let values = draw.values.iter().map(|(name, v)| (name.clone(), json(v)));
+        Self {
+            index: draw.index,
+            seed: draw.seed,
+            status,
+            reason: Some(reason),
+            rejected: draw.rejected,
+            ln_weight: draw.ln_weight,
+            values: values.collect(),
+            figures: Map::new(),
+        }
+    }
+
+    /// Of a run that has come to an end.
+    pub fn of(draw: &Draw, summary: &Summary, fixes: &Fixes) -> Self {
+        let (status, reason) = match &summary.end {
+            End::Complete => (Status::Complete, None),
+            End::Interrupted => (Status::Failed, Some("broken off".to_owned())),
+            End::Failed(why) => (Status::Failed, Some(why.clone())),
+        };
+        let figures = MEASURES.iter().filter_map(|m| {
+            let value = (m.of)(summary, fixes);
+            (!value.is_null()).then(|| (m.name.to_owned(), value))
+        });
+        Self {
+            reason,
+            figures: figures.collect(),
+            ..Self::without_figures(draw, status, String::new())
+        }
+    }
+
+    /// A variable or a figure as a number: flags are 0 and 1.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let value = self.values.get(name).or_else(|| self.figures.get(name))?;
+        value
+            .as_f64()
+            .or_else(|| value.as_bool().map(|b| f64::from(u8::from(b))))
+    }
+
+    /// A list of numbers.
+    pub fn numbers(&self, name: &str) -> Vec<f64> {
+        let list = self.figures.get(name).and_then(Value::as_array);
+        list.iter()
+            .flat_map(|l| l.iter())
+            .filter_map(Value::as_f64)
+            .collect()
+    }
+
+    /// The first thing in which two rows of one run differ; wall times may.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let bare = |row: &Self| Self {
+            figures: Map::new(),
+            ..row.clone()
+        };
+        if bare(self) != bare(other) {
+            return Some(format!("{:?} and {:?}", bare(self), bare(other)));
+        }
+        let compared = MEASURES.iter().filter(|m| !m.is_wall_time());
+        let differs = |name: &&str| self.figures.get(*name) != other.figures.get(*name);
+        let name = compared.map(|m| m.name).find(differs)?;
+        let [a, b] = [self, other].map(|row| row.figures.get(name));
+        Some(format!("{name}: {a:?} and {b:?}"))
+    }
+}

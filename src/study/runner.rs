@@ -1,0 +1,264 @@
+//! Runs what a study still lacks.
+
+use super::journal::{self, Journal};
+use super::pool::{Pool, Watch};
+use super::stop::Precision;
+use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table};
+use crate::scenario::draw::{Inputs, Template};
+use crate::session::RendererChoice;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::available_parallelism;
+use std::time::{Duration, Instant};
+
+/// How to run a study, apart from what its file says.
+#[derive(Default)]
+pub struct Options<'a> {
+    /// Workers; 0 is one a core.
+    pub jobs: usize,
+    /// Go on with what the folder holds.
+    pub resume: bool,
+    /// Only a part of it.
+    pub shard: Option<Shard>,
+    /// Which renderer.
+    pub renderer: RendererChoice,
+    /// Set from elsewhere to begin no more runs.
+    pub stop: Option<&'a AtomicBool>,
+    /// Told how far it is, now and then.
+    pub progress: Option<&'a dyn Fn(&Progress)>,
+    /// The program that works; this one by default.
+    pub program: Option<PathBuf>,
+}
+
+/// How far a study is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Progress {
+    /// Rows there are.
+    pub done: u64,
+    /// Rows there were before.
+    pub before: u64,
+    /// Rows there are to be.
+    pub of: u64,
+    /// Of the rows, how many are not complete.
+    pub failed: u64,
+    /// Runs a minute, since the start.
+    pub per_minute: f64,
+}
+
+/// How often the table is written while runs go on.
+const TABLE_EVERY: Duration = Duration::from_secs(60);
+
+/// Runs what a folder lacks of a study, and gives all its rows in the order of their indexes. The
+/// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
+pub fn run(
+    template: &Template,
+    folder: &Path,
+    options: &Options<'_>,
+) -> Result<Vec<Row>, StudyError> {
+    // What can be wrong with all runs is said before the first.
+    template.draw(0)?;
+    table::events(template)?;
+    let precision = Precision::of(template)?;
+    if precision.is_some() && options.shard.is_some() {
+        return Err(StudyError::Shards(
+            "study.stop.when looks at all runs, and a shard does not see the others': run the study \
+             whole, or without it"
+                .into(),
+        ));
+    }
+    let manifest = Manifest::of(template, options.renderer, options.shard)?;
+    fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
+    let kept = Manifest::read(folder)?;
+    check_same(folder, kept.as_ref(), &manifest)?;
+    let (journal, rows) = Journal::open(folder)?;
+    if kept.is_none() && !rows.is_empty() {
+        let what = "rows without a manifest".to_owned();
+        return Err(StudyError::Other {
+            path: folder.to_owned(),
+            what,
+        });
+    }
+    if !options.resume && !rows.is_empty() {
+        return Err(StudyError::Exists {
+            path: folder.to_owned(),
+            rows: rows.len(),
+        });
+    }
+    if kept.is_none() {
+        let unreadable = |e| StudyError::file(folder, e);
+        let inputs = Inputs::of(template).map_err(unreadable)?;
+        inputs.copy_to(&folder.join(INPUTS)).map_err(unreadable)?;
+    }
+    manifest.write(folder)?;
+
+    let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
+    let wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k));
+    let lacking: Vec<u64> = (0..template.runs())
+        .filter(wanted)
+        .filter(|k| !done.contains(k))
+        .collect();
+    let mut office = Office::new(
+        template,
+        folder,
+        options,
+        journal,
+        rows,
+        precision,
+        lacking.len(),
+    );
+    if !office.is_known_well_enough() {
+        pool(folder, options)?.work(template, lacking, &mut office)?;
+    }
+    let rows = office.rows();
+    table::write(folder, template, &rows)?;
+    Ok(rows)
+}
+
+fn check_same(folder: &Path, kept: Option<&Manifest>, now: &Manifest) -> Result<(), StudyError> {
+    let Some(kept) = kept else {
+        return Ok(());
+    };
+    let what = kept.difference(now).or_else(|| {
+        let part = |m: &Manifest| m.shard.map_or("the whole".into(), |s| format!("shard {s}"));
+        (kept.shard != now.shard).then(|| format!("{} of it, not {}", part(kept), part(now)))
+    });
+    match what {
+        None => Ok(()),
+        Some(what) => Err(StudyError::Other {
+            path: folder.to_owned(),
+            what,
+        }),
+    }
+}
+
+fn pool<'a>(folder: &'a Path, options: &Options<'_>) -> Result<Pool<'a>, StudyError> {
+    let cores = available_parallelism().map_or(1, usize::from);
+    let jobs = if options.jobs == 0 {
+        cores
+    } else {
+        options.jobs
+    };
+    let program = match &options.program {
+        Some(program) => program.clone(),
+        None => std::env::current_exe().map_err(StudyError::Worker)?,
+    };
+    Ok(Pool {
+        program,
+        folder,
+        renderer: match options.renderer {
+            RendererChoice::Auto => "auto",
+            RendererChoice::Gpu => "gpu",
+            RendererChoice::Cpu => "cpu",
+        },
+        jobs,
+        // A worker is a core's work. Two threads of a software driver in one process do less than one
+        // thread in each of two.
+        threads: 1,
+    })
+}
+
+/// The wall clock: for rates, and for the budget of time that the user gives.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "how long a study takes is shown and may be limited; no row hangs on it"
+)]
+fn clock() -> Instant {
+    Instant::now()
+}
+
+/// Takes in the rows.
+struct Office<'a> {
+    template: &'a Template,
+    folder: &'a Path,
+    options: &'a Options<'a>,
+    journal: Journal,
+    rows: Vec<Row>,
+    precision: Option<Precision>,
+    begin: Instant,
+    tabled: Instant,
+    before: u64,
+    of: u64,
+}
+
+impl<'a> Office<'a> {
+    fn new(
+        template: &'a Template,
+        folder: &'a Path,
+        options: &'a Options<'a>,
+        journal: Journal,
+        rows: Vec<Row>,
+        precision: Option<Precision>,
+        lacking: usize,
+    ) -> Self {
+        Self {
+            before: rows.len() as u64,
+            of: (rows.len() + lacking) as u64,
+            template,
+            folder,
+            options,
+            journal,
+            rows,
+            precision,
+            begin: clock(),
+            tabled: clock(),
+        }
+    }
+
+    fn is_known_well_enough(&mut self) -> bool {
+        journal::sort(&mut self.rows);
+        (self.precision.as_ref()).is_some_and(|p| p.enough(&self.rows).is_some())
+    }
+
+    /// In order, up to where the study stops.
+    fn rows(mut self) -> Vec<Row> {
+        journal::sort(&mut self.rows);
+        if let Some(precision) = &self.precision {
+            precision.truncate(&mut self.rows);
+        }
+        self.rows
+    }
+
+    fn progress(&self) {
+        let Some(show) = self.options.progress else {
+            return;
+        };
+        let done = self.rows.len() as u64;
+        let minutes = self.begin.elapsed().as_secs_f64() / 60.0;
+        let failed = self
+            .rows
+            .iter()
+            .filter(|r| r.status != Status::Complete)
+            .count();
+        show(&Progress {
+            done,
+            before: self.before,
+            of: self.of,
+            failed: failed as u64,
+            per_minute: (done - self.before) as f64 / minutes.max(1e-9),
+        });
+    }
+}
+
+impl Watch for Office<'_> {
+    fn row(&mut self, row: Row) -> Result<bool, StudyError> {
+        self.journal.add(&row)?;
+        self.rows.push(row);
+        self.progress();
+        if self.tabled.elapsed() > TABLE_EVERY {
+            journal::sort(&mut self.rows);
+            table::write(self.folder, self.template, &self.rows)?;
+            self.tabled = clock();
+        }
+        Ok(!self.is_known_well_enough())
+    }
+
+    fn go_on(&mut self) -> bool {
+        self.progress();
+        let after_s = self.template.settings.stop.after_s;
+        let late = after_s.is_some_and(|limit| self.begin.elapsed().as_secs_f64() > limit);
+        let stopped = self.options.stop.is_some_and(|s| s.load(Ordering::Relaxed));
+        !late && !stopped
+    }
+}

@@ -1,0 +1,67 @@
+//! Which input drives a figure, by ranks.
+
+use super::{Estimate, TAIL};
+use statrs::distribution::{ContinuousCDF, Normal};
+
+/// Spearman's rank correlation; equal values share their mean rank. `None` where one of both does not
+/// vary, or of fewer than five pairs.
+pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Estimate> {
+    let n = pairs.len();
+    if n < 5 {
+        return None;
+    }
+    let x = ranks(pairs.iter().map(|p| p.0));
+    let y = ranks(pairs.iter().map(|p| p.1));
+    let mean = (n as f64 + 1.0) / 2.0;
+    let sum = |a: &[f64], b: &[f64]| -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - mean) * (b - mean)).sum()
+    };
+    let scatter = (sum(&x, &x) * sum(&y, &y)).sqrt();
+    if scatter <= 0.0 {
+        return None;
+    }
+    let r = (sum(&x, &y) / scatter).clamp(-1.0, 1.0);
+    let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    let half = z * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
+    // Of a perfect order, atanh is infinite, and so the ends stay there.
+    let end = |shift: f64| (r.atanh() + shift).tanh();
+    Some(Estimate {
+        value: r,
+        low: end(-half),
+        high: end(half),
+        n,
+    })
+}
+
+fn ranks(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let values: Vec<f64> = values.collect();
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut before = 0;
+    for group in order.chunk_by(|a, b| values[*a].total_cmp(&values[*b]).is_eq()) {
+        let rank = before as f64 + (group.len() as f64 + 1.0) / 2.0;
+        for k in group {
+            ranks[*k] = rank;
+        }
+        before += group.len();
+    }
+    ranks
+}
+
+/// First-order Sobol index: the share of the variance of y that x alone explains. The estimator
+/// of Gamboa, Gremaud, Klein and Lagnoux puts the runs in the order of x and looks how alike the y of
+/// neighbours are. `None` where y does not vary, or of fewer than ten pairs.
+pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
+    let n = pairs.len();
+    if n < 10 {
+        return None;
+    }
+    let mut sorted = pairs.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mean = sorted.iter().map(|p| p.1).sum::<f64>() / n as f64;
+    let y = |k: usize| sorted[k % n].1 - mean;
+    let variance: f64 = (0..n).map(|k| y(k) * y(k)).sum();
+    let alike: f64 = (0..n).map(|k| y(k) * y(k + 1)).sum();
+    (variance > 0.0).then(|| alike / variance)
+}

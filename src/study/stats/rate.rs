@@ -1,0 +1,56 @@
+//! How often something happens.
+
+use super::{Estimate, TAIL};
+use statrs::distribution::{Beta, ContinuousCDF, Normal};
+
+/// A rate with both intervals.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rate {
+    /// Times that it happened.
+    pub events: u64,
+    /// Wilson's score interval: right on average, short.
+    pub wilson: Estimate,
+    /// Clopper and Pearson's: right at least, for proofs.
+    pub exact: Estimate,
+}
+
+/// Of `events` in `n` runs; `None` of no runs.
+pub fn rate(events: u64, n: u64) -> Option<Rate> {
+    if n == 0 || events > n {
+        return None;
+    }
+    let (k, m) = (events as f64, n as f64);
+    let p = k / m;
+    let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    let middle = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
+    let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
+    let estimate = |low: f64, high: f64| Estimate {
+        value: p,
+        low,
+        high,
+        n: n as usize,
+    };
+    let beta = |a, b, u| Beta::new(a, b).map(|beta| beta.inverse_cdf(u)).ok();
+    // At both ends the interval reaches the end itself, which rounding would miss.
+    let exact = estimate(
+        if events == 0 {
+            0.0
+        } else {
+            beta(k, m - k + 1.0, TAIL)?
+        },
+        if events == n {
+            1.0
+        } else {
+            beta(k + 1.0, m - k, 1.0 - TAIL)?
+        },
+    );
+    let wilson = estimate(
+        if events == 0 { 0.0 } else { middle - half },
+        if events == n { 1.0 } else { middle + half },
+    );
+    Some(Rate {
+        events,
+        wilson,
+        exact,
+    })
+}

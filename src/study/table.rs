@@ -1,0 +1,179 @@
+//! Rows as a table in Parquet.
+
+use super::{MEASURES, Row, StudyError};
+use crate::record::parquet::{Column, Kind, Table, Value, column};
+use crate::scenario::draw::{Condition, ConditionError, Template};
+use serde_json::Value as Json;
+use std::path::Path;
+
+/// Name of the file in a study's folder.
+pub const TABLE: &str = "rows.parquet";
+
+/// Events of a study, parsed, by name.
+pub fn events(template: &Template) -> Result<Vec<(String, Condition)>, ConditionError> {
+    let known = |name: &str| {
+        template.settings.variables.contains_key(name) || MEASURES.iter().any(|m| m.name == name)
+    };
+    let events = template.settings.events.iter();
+    let parse = |(name, text): (&String, &String)| {
+        let condition = Condition::parse(text)?;
+        let unknown = condition.names().find(|n| !known(n)).map(str::to_owned);
+        match unknown {
+            Some(unknown) => Err(ConditionError::Unknown(text.clone(), unknown)),
+            None => Ok((name.clone(), condition)),
+        }
+    };
+    events.map(parse).collect()
+}
+
+impl Row {
+    /// Whether an event happened in this run; `None` where it lacks a figure for it.
+    pub fn happened(&self, event: &Condition) -> Option<bool> {
+        event.holds(|name| Ok(self.number(name))).ok().flatten()
+    }
+}
+
+/// Writes all rows, in order.
+pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result<(), StudyError> {
+    let events = events(template)?;
+    let mut columns = vec![
+        column("index", Kind::Int, "1", "which run"),
+        column("seed", Kind::Int, "1", "seed of its scenario"),
+        column(
+            "status",
+            Kind::Text,
+            "",
+            "complete, failed, invalid or crashed",
+        ),
+        column("reason", Kind::Text, "", "why, where it is not complete"),
+        column(
+            "rejected",
+            Kind::Int,
+            "1",
+            "draws before it that did not meet the conditions",
+        ),
+        column(
+            "weight",
+            Kind::Real,
+            "1",
+            "of importance sampling, 1 without",
+        ),
+    ];
+    let variables = template.settings.variables.iter().map(|(name, variable)| {
+        let keys = variable.keys.join(", ");
+        let unit = unit_of(variable.keys.first().unwrap_or(name));
+        let meaning = format!("drawn: {}", if keys.is_empty() { name } else { &keys });
+        Column {
+            name: name.clone().into(),
+            kind: kind(rows.iter().filter_map(|r| r.values.get(name))),
+            unit: unit.into(),
+            meaning: meaning.into(),
+        }
+    });
+    columns.extend(variables);
+    let named = events.iter().map(|(name, condition)| Column {
+        name: name.clone().into(),
+        kind: Kind::Flag,
+        unit: "1".into(),
+        meaning: format!("event: {}", condition.text()).into(),
+    });
+    columns.extend(named);
+    let measures = MEASURES
+        .iter()
+        .map(|m| column(m.name, m.kind, m.unit, m.meaning));
+    let own = 6;
+    let drawn = own + template.settings.variables.len();
+    columns.extend(measures);
+
+    let mut table = Table::create(folder.join(TABLE), &columns)?;
+    for row in rows {
+        let mut cells = vec![
+            (row.index as i64).into(),
+            (row.seed as i64).into(),
+            row.status.name().into(),
+            row.reason.clone().into(),
+            row.rejected.into(),
+            row.ln_weight.exp().into(),
+        ];
+        let variables = columns[own..drawn].iter();
+        cells.extend(variables.map(|c| cell(c.kind, row.values.get(&*c.name))));
+        cells.extend(events.iter().map(|(_, event)| row.happened(event).into()));
+        cells.extend(
+            MEASURES
+                .iter()
+                .map(|m| cell(m.kind, row.figures.get(m.name))),
+        );
+        table.push(cells)?;
+    }
+    table.close()?;
+    Ok(())
+}
+
+/// The kind that holds all values.
+fn kind<'a>(values: impl Iterator<Item = &'a Json> + Clone) -> Kind {
+    let all = |is: fn(&Json) -> bool| values.clone().all(is);
+    if values.clone().next().is_none() {
+        Kind::Real
+    } else if all(Json::is_i64) {
+        Kind::Int
+    } else if all(Json::is_number) {
+        Kind::Real
+    } else if all(Json::is_boolean) {
+        Kind::Flag
+    } else {
+        Kind::Text
+    }
+}
+
+fn cell(kind: Kind, value: Option<&Json>) -> Value {
+    let Some(value) = value else {
+        return Value::Null;
+    };
+    match kind {
+        Kind::Int => value.as_i64().into(),
+        Kind::Real => value.as_f64().into(),
+        Kind::Flag => value.as_bool().into(),
+        Kind::Text => value
+            .as_str()
+            .map_or_else(|| value.to_string(), str::to_owned)
+            .into(),
+        Kind::Reals => {
+            let list = value.as_array();
+            list.map(|l| l.iter().filter_map(Json::as_f64).collect::<Vec<_>>())
+                .into()
+        }
+    }
+}
+
+/// The unit that the end of a key tells.
+pub fn unit_of(key: &str) -> &'static str {
+    let last = key.rsplit('.').next().unwrap_or(key);
+    let last = last.split('[').next().unwrap_or(last);
+    UNITS
+        .iter()
+        .find(|(end, _)| last.ends_with(end))
+        .map_or("1", |(_, unit)| unit)
+}
+
+/// Longer ends first.
+const UNITS: &[(&str, &str)] = &[
+    ("_mps2", "m/s^2"),
+    ("_mps", "m/s"),
+    ("_kmh", "km/h"),
+    ("_permille", "permille"),
+    ("_deg", "deg"),
+    ("_rad", "rad"),
+    ("_grey", "grey"),
+    ("_kg", "kg"),
+    ("_hz", "Hz"),
+    ("_db", "dB"),
+    ("_px", "px"),
+    ("_um", "um"),
+    ("_mm", "mm"),
+    ("_us", "us"),
+    ("_ms", "ms"),
+    ("_m", "m"),
+    ("_s", "s"),
+    ("_n", "N"),
+    ("_e", "e"),
+];

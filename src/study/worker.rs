@@ -1,0 +1,107 @@
+//! The process that runs scenarios for a study: indexes in, rows out.
+
+use super::manifest::{INPUTS, Manifest};
+use super::measures::Fixes;
+use super::{Row, Status, StudyError};
+use crate::scenario::Scenario;
+use crate::scenario::draw::{Draw, Template};
+use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
+use crate::twin::render::Renderer;
+use std::io::{self, BufRead, Write};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
+
+/// The study that a folder holds, from the copies of its inputs.
+pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
+    let manifest = Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
+    let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
+    template.settings.runs = (manifest.runs / template.cells()) as u32;
+    Ok((manifest, template))
+}
+
+/// Answers every index with a row, a line each, until the input ends.
+pub fn serve(
+    folder: &Path,
+    renderer: RendererChoice,
+    input: impl BufRead,
+    mut output: impl Write,
+) -> Result<(), StudyError> {
+    let (_, template) = template_of(folder)?;
+    let mut desk = Desk::new(renderer);
+    let failed = |source| StudyError::file(Path::new("the worker's pipe"), source);
+    for line in input.lines() {
+        let line = line.map_err(failed)?;
+        let index = line
+            .trim()
+            .parse()
+            .map_err(|e| failed(io::Error::other(e)))?;
+        let row = serde_json::to_string(&desk.run(&template, index)?);
+        let row = row.map_err(|e| failed(e.into()))?;
+        writeln!(output, "{row}")
+            .and_then(|()| output.flush())
+            .map_err(failed)?;
+    }
+    Ok(())
+}
+
+/// Runs one scenario after the other, with one renderer.
+pub struct Desk {
+    choice: RendererChoice,
+    renderer: Option<Box<dyn Renderer>>,
+}
+
+impl Desk {
+    /// Before the first run.
+    pub fn new(choice: RendererChoice) -> Self {
+        Self {
+            choice,
+            renderer: None,
+        }
+    }
+
+    /// Runs one run of a study, without a recording.
+    pub fn run(&mut self, template: &Template, index: u64) -> Result<Row, StudyError> {
+        let draw = template.draw(index)?;
+        let run = AssertUnwindSafe(|| self.run_drawn(template, &draw));
+        Ok(catch_unwind(run).unwrap_or_else(|panic| {
+            // Who knows what state it is in.
+            self.renderer = None;
+            let said = panic.downcast_ref::<String>().map(String::as_str);
+            let said = said.or_else(|| panic.downcast_ref::<&str>().copied());
+            let reason = format!("panic: {}", said.unwrap_or("without a word"));
+            Row::without_figures(&draw, Status::Failed, reason)
+        }))
+    }
+
+    fn run_drawn(&mut self, template: &Template, draw: &Draw) -> Row {
+        let without = |status, reason| Row::without_figures(draw, status, reason);
+        let scenario = match template.scenario(draw) {
+            Ok(scenario) => scenario,
+            Err(error) => return without(Status::Invalid, error.to_string()),
+        };
+        let mut fixes = Fixes::default();
+        match self.session(&scenario, &mut fixes) {
+            Ok(summary) => Row::of(draw, &summary, &fixes),
+            Err(error) => {
+                self.renderer = None;
+                without(Status::Failed, error.to_string())
+            }
+        }
+    }
+
+    fn session(&mut self, scenario: &Scenario, fixes: &mut Fixes) -> Result<Summary, SessionError> {
+        let renderer = match &mut self.renderer {
+            Some(renderer) => {
+                renderer.set_scene(session::scene(scenario));
+                renderer
+            }
+            none => none.insert(session::renderer(scenario, self.choice)?),
+        };
+        session::run_on(
+            scenario,
+            renderer.as_mut(),
+            &RunOptions::default(),
+            &mut [fixes],
+        )
+    }
+}

@@ -1,0 +1,356 @@
+//! Studies from end to end, by the program: the same rows for any number of workers, for shards, and
+//! for a study that was killed; replays; and what is said of wrong input.
+#![cfg(feature = "twin")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use metrotwin::study::{MANIFEST, read_rows};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+const SMALL: &str = "tests/studies/small.toml";
+
+/// A folder of a test, empty.
+fn folder(name: &str) -> PathBuf {
+    let path = std::env::temp_dir().join(format!("metrotwin-{}-{name}", std::process::id()));
+    fs::remove_dir_all(&path).ok();
+    fs::create_dir_all(&path).unwrap();
+    path
+}
+
+fn metrotwin(args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
+    command.args(args);
+    command
+}
+
+fn study(out: &Path, more: &[&str]) -> Output {
+    let out = out.to_str().unwrap();
+    let args = ["study", "run", SMALL, "--renderer", "cpu", "--out", out];
+    metrotwin(&[&args, more].concat()).output().unwrap()
+}
+
+fn said(output: &Output) -> String {
+    let streams = [&output.stdout, &output.stderr];
+    streams
+        .map(|s| String::from_utf8_lossy(s).into_owned())
+        .join("\n")
+}
+
+fn succeeds(output: &Output) {
+    assert!(output.status.success(), "{}", said(output));
+}
+
+fn same(a: &Path, b: &Path) {
+    let [a, b] = [a, b].map(|p| p.to_str().unwrap());
+    succeeds(
+        &metrotwin(&["study", "compare", a, b, "--same"])
+            .output()
+            .unwrap(),
+    );
+}
+
+/// Order of workers that reaches a row, a shard that draws otherwise, rows lost or doubled by a kill, a
+/// replay that is another run.
+#[test]
+fn rows_are_the_same_however_they_came() {
+    let base = folder("however");
+    let one = base.join("one");
+    succeeds(&study(&one, &["--jobs", "1"]));
+    let rows = read_rows(&one).unwrap();
+    assert_eq!(rows.len(), 12);
+    assert!(rows.iter().all(|row| row.reason.is_none()), "{:?}", rows[0]);
+    assert!(
+        rows.iter().any(|row| row.rejected > 0),
+        "the conditions turn nothing down"
+    );
+
+    let two = base.join("two");
+    succeeds(&study(&two, &["--jobs", "2"]));
+    same(&one, &two);
+
+    let shards = base.join("shards");
+    for k in 1..=4 {
+        let folder = shards.join(format!("shard-{k}-of-4"));
+        succeeds(&study(&folder, &["--shard", &format!("{k}/4")]));
+    }
+    let folder = shards.to_str().unwrap();
+    succeeds(&metrotwin(&["study", "merge", folder]).output().unwrap());
+    same(&one, &shards);
+
+    let killed = base.join("killed");
+    for _ in 0..3 {
+        let out = killed.to_str().unwrap();
+        let args = [
+            "study",
+            "run",
+            SMALL,
+            "--renderer",
+            "cpu",
+            "--out",
+            out,
+            "--resume",
+        ];
+        let mut child = metrotwin(&args)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        let before = read_rows(&killed).map_or(0, |rows| rows.len());
+        // Until it has done something new, or is done.
+        while read_rows(&killed).map_or(0, |rows| rows.len()) < before + 2 {
+            if child.try_wait().unwrap().is_some() {
+                break;
+            }
+            sleep(Duration::from_millis(5));
+        }
+        child.kill().unwrap(); // SIGKILL
+        child.wait().unwrap();
+    }
+    assert!(read_rows(&killed).unwrap().len() >= 2);
+    succeeds(&study(&killed, &["--resume"]));
+    same(&one, &killed);
+
+    let folder = one.to_str().unwrap();
+    let args = [
+        "run",
+        "--from-study",
+        folder,
+        "--index",
+        "5",
+        "--renderer",
+        "cpu",
+    ];
+    let replay = metrotwin(&args).output().unwrap();
+    succeeds(&replay);
+    assert!(
+        said(&replay).contains("equal to its row in the study"),
+        "{}",
+        said(&replay)
+    );
+    assert!(one.join("run-000005/recording.rrd").exists());
+    fs::remove_dir_all(base).ok();
+}
+
+/// A study goes on to more runs, and its first ones stay what they were.
+#[test]
+fn a_study_can_be_extended() {
+    let base = folder("extended");
+    succeeds(&study(&base, &["--runs", "2"]));
+    let few = read_rows(&base).unwrap();
+    succeeds(&study(&base, &["--runs", "3", "--resume"]));
+    let more = read_rows(&base).unwrap();
+    assert_eq!((few.len(), more.len()), (4, 6));
+    assert!(few.iter().zip(&more).all(|(a, b)| a == b));
+    fs::remove_dir_all(base).ok();
+}
+
+/// What is wrong is said before anything is begun, and nothing that is there is lost.
+#[test]
+fn wrong_studies_are_refused() {
+    let base = folder("refused");
+    let done = base.join("done");
+    succeeds(&study(&done, &["--runs", "1"]));
+    let journal = fs::read(done.join("rows.jsonl")).unwrap();
+    let refused = |output: Output, what: &str| {
+        assert_eq!(output.status.code(), Some(2), "{what}: {}", said(&output));
+        assert!(
+            said(&output).contains(what),
+            "no word of `{what}`: {}",
+            said(&output)
+        );
+        assert_eq!(fs::read(done.join("rows.jsonl")).unwrap(), journal);
+    };
+    refused(study(&done, &["--runs", "1"]), "--resume");
+    refused(
+        study(&done, &["--shard", "1/2", "--resume"]),
+        "the whole of it, not shard 1/2",
+    );
+
+    // A copy of the study with something changed, at the same depth.
+    let changed = |name: &str, from: &str, to: &str| {
+        let text = fs::read_to_string(SMALL).unwrap();
+        assert!(text.contains(from));
+        let folder = base.join(name).join("tests/studies");
+        fs::create_dir_all(&folder).unwrap();
+        let tunnels = base.join(name).join("tunnels");
+        fs::create_dir_all(&tunnels).unwrap();
+        let line = "chengdu_line1.toml";
+        fs::copy(Path::new("tunnels").join(line), tunnels.join(line)).unwrap();
+        fs::copy("tests/studies/steps.csv", folder.join("steps.csv")).unwrap();
+        let path = folder.join("small.toml");
+        fs::write(&path, text.replace(from, to)).unwrap();
+        path
+    };
+    let run = |path: &Path, out: &Path| {
+        let [path, out] = [path, out].map(|p| p.to_str().unwrap());
+        metrotwin(&[
+            "study",
+            "run",
+            path,
+            "--renderer",
+            "cpu",
+            "--out",
+            out,
+            "--resume",
+        ])
+        .output()
+        .unwrap()
+    };
+    let other = changed("other", "median = 60.0", "median = 61.0");
+    refused(run(&other, &done), "small.toml has changed");
+    for (name, from, to, what) in [
+        (
+            "nothing",
+            "speed_kmh < 75",
+            "speed_kmh < 5 && cars > 9",
+            "of 10000 draws none",
+        ),
+        (
+            "order",
+            "min = 30.0, max = 80.0",
+            "min = 80.0, max = 30.0",
+            "not below",
+        ),
+        ("key", "train.cars", "train.carz", "carz"),
+        (
+            "kind",
+            "integer = { min = 2, max = 5 }",
+            "uniform = { min = 2.0, max = 5.0 }",
+            "train.cars",
+        ),
+        (
+            "table",
+            "column = \"step_s\"",
+            "column = \"steps\"",
+            "its columns are",
+        ),
+        (
+            "matrix",
+            "[0.7, 1.0]]",
+            "[0.6, 1.0]]",
+            "matrix of correlations",
+        ),
+        ("event", "most_slip_mps >", "most_slip >", "most_slip"),
+        ("condition", "speed_kmh < 75", "speed_kmh <", "no condition"),
+    ] {
+        let out = base.join("never");
+        refused(run(&changed(name, from, to), &out), what);
+        assert!(!out.join(MANIFEST).exists(), "{name} was begun");
+    }
+    fs::remove_dir_all(base).ok();
+}
+
+/// Shards that are missing, half done, or of another study.
+#[test]
+fn shards_that_are_no_whole_are_not_merged() {
+    let base = folder("shards");
+    let shard = |k: u32, more: &[&str]| {
+        let folder = base.join(format!("shard-{k}-of-2"));
+        succeeds(&study(
+            &folder,
+            &[&["--shard", &format!("{k}/2")], more].concat(),
+        ));
+        folder
+    };
+    let merge = |what: &str| {
+        let output = metrotwin(&["study", "merge", base.to_str().unwrap()])
+            .output()
+            .unwrap();
+        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
+        assert!(
+            said(&output).contains(what),
+            "no word of `{what}`: {}",
+            said(&output)
+        );
+        assert!(!base.join(MANIFEST).exists());
+    };
+    merge("no folder shard-I-of-N");
+    shard(1, &["--runs", "2"]);
+    merge("shards 2/2 are missing");
+    let second = shard(2, &["--runs", "3"]);
+    merge("its number of runs differs");
+    fs::remove_dir_all(&second).unwrap();
+    let second = shard(2, &["--runs", "2"]);
+    let rows = fs::read_to_string(second.join("rows.jsonl")).unwrap();
+    let first = rows.lines().next().unwrap();
+    fs::write(second.join("rows.jsonl"), format!("{first}\n")).unwrap();
+    merge("1 of 2 rows");
+    let manifest = fs::read_to_string(second.join(MANIFEST)).unwrap();
+    let of_another = manifest.replacen("\": \"", "\": \"0", 1);
+    assert_ne!(of_another, manifest);
+    fs::write(second.join(MANIFEST), of_another).unwrap();
+    merge("are not of one study");
+    fs::remove_dir_all(base).ok();
+}
+
+/// A disk that is full: the study stops with a clear word, and goes on when there is room.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_loses_nothing() {
+    let base = folder("full");
+    let out = base.join("out");
+    let program = env!("CARGO_BIN_EXE_metrotwin");
+    // No file over 8 kB (16 blocks of 512 bytes): so full is the disk for the journal.
+    let line = format!(
+        "trap '' XFSZ; ulimit -f 16; exec '{program}' study run {SMALL} --renderer cpu --jobs 1 --out '{}'",
+        out.display()
+    );
+    // The copies of the inputs are larger: they are there already.
+    succeeds(&study(&out, &["--runs", "1"]));
+    let line = line + " --resume";
+    let output = Command::new("bash").args(["-c", &line]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
+    assert!(
+        said(&output).contains("make room and give --resume"),
+        "{}",
+        said(&output)
+    );
+    let kept = read_rows(&out).unwrap().len();
+    assert!((2..12).contains(&kept), "{kept} rows");
+    succeeds(&study(&out, &["--resume"]));
+    let whole = base.join("whole");
+    succeeds(&study(&whole, &[]));
+    same(&out, &whole);
+    fs::remove_dir_all(base).ok();
+}
+
+/// The same file for ever, complete, and fit to be run.
+#[test]
+fn generated_scenarios_stand_by_themselves() {
+    let base = folder("generate");
+    let generate = |out: &Path, n: &str| {
+        let out = out.to_str().unwrap();
+        succeeds(
+            &metrotwin(&["generate", SMALL, "-n", n, "--out", out])
+                .output()
+                .unwrap(),
+        );
+    };
+    let (few, many) = (base.join("few"), base.join("many"));
+    generate(&few, "3");
+    generate(&many, "8");
+    for k in 0..3 {
+        let name = format!("small_{k:06}.toml");
+        let [a, b] = [&few, &many].map(|f| fs::read_to_string(f.join(&name)).unwrap());
+        assert_eq!(a, b);
+        // Defaults stand there too, with what they mean.
+        assert!(a.contains("pairs_per_s") || a.contains("latency_ms"), "{a}");
+        assert!(
+            a.contains("# From the last row of a frame to the result, ms."),
+            "{a}"
+        );
+        let path = few.join(&name);
+        succeeds(
+            &metrotwin(&["check", path.to_str().unwrap()])
+                .output()
+                .unwrap(),
+        );
+    }
+    let index = fs::read_to_string(many.join("index.csv")).unwrap();
+    assert_eq!(index.lines().count(), 9);
+    assert!(index.starts_with("index,file,seed,rejected,cars,gap_m,rail,speed_kmh,step_s\n"));
+    fs::remove_dir_all(base).ok();
+}
