@@ -293,9 +293,9 @@ fn a_full_disk_loses_nothing() {
     let base = folder("full");
     let out = base.join("out");
     let program = env!("CARGO_BIN_EXE_metrotwin");
-    // No file over 8 kB (16 blocks of 512 bytes): so full is the disk for the journal.
+    // No file over 4 KiB: so full is the disk for the journal.
     let line = format!(
-        "trap '' XFSZ; ulimit -f 16; exec '{program}' study run {SMALL} --renderer cpu --jobs 1 --out '{}'",
+        "trap '' XFSZ; ulimit -f 4; exec '{program}' study run {SMALL} --renderer cpu --jobs 1 --out '{}'",
         out.display()
     );
     // The copies of the inputs are larger: they are there already.

@@ -42,7 +42,10 @@ pub enum OverrideError {
         index: usize,
     },
     /// The key leads through something that has no keys.
-    #[error("`{key}`: `{part}` is a {kind}, which has no keys of its own")]
+    #[error(
+        "`{key}`: `{part}` is {kind}, which has no keys of its own{}",
+        hint(kind, part)
+    )]
     NotATable {
         /// The whole key.
         key: String,
@@ -51,6 +54,15 @@ pub enum OverrideError {
         /// What it is.
         kind: &'static str,
     },
+}
+
+/// A list has entries, and they have keys.
+fn hint(kind: &str, part: &str) -> String {
+    if kind == "a list" {
+        format!("; say which entry, counted from 0: `{part}[0]`")
+    } else {
+        String::new()
+    }
 }
 
 impl FromStr for Override {
@@ -116,7 +128,15 @@ impl Override {
         let mut place = root;
         let mut path = String::new();
         for step in steps(&self.key).unwrap_or_default() {
-            let kind = place.type_str();
+            let kind = match place.type_str() {
+                "array" => "a list",
+                "integer" => "an integer",
+                "table" => "a table",
+                "string" => "a text",
+                "float" => "a number",
+                "boolean" => "a flag",
+                _ => "a date",
+            };
             let no_table = |path: &str| OverrideError::NotATable {
                 key: self.key.clone(),
                 part: path.to_owned(),
@@ -194,7 +214,8 @@ mod tests {
         assert!(message("=3").contains("key=value"));
         assert!(message("a..b=3").contains("key=value"));
         assert!(message("obstacles[1].mass_kg=1").contains("1 entries"));
-        assert!(message("duration_s.x=1").contains("`duration_s` is a float"));
+        assert!(message("duration_s.x=1").contains("`duration_s` is a number"));
+        assert!(message("obstacles.mass_kg=1").contains("is a list, which has no keys of its own; say which entry, counted from 0: `obstacles[0]`"));
         assert!(message("train[0]=1").contains("`train` is a table"));
     }
 }

@@ -120,7 +120,7 @@ pub enum StudyError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The table of rows.
-    #[error(transparent)]
+    #[error("{0}; all rows are kept in rows.jsonl, and --resume writes the table again")]
     Table(#[from] ObserverError),
     /// No worker could be started.
     #[error("cannot start a worker: {0}")]

@@ -29,8 +29,6 @@ pub struct Pool<'a> {
     pub renderer: &'static str,
     /// How many.
     pub jobs: usize,
-    /// Threads of each: for its graphics driver, and for the plain renderer.
-    pub threads: usize,
 }
 
 /// What happens while workers are at it.
@@ -139,9 +137,10 @@ impl Worker {
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(File::create(&log)?);
-        for variable in ["LP_NUM_THREADS", "RAYON_NUM_THREADS"] {
+        // A worker is a core's work: none beside the driver's own thread.
+        for (variable, threads) in [("LP_NUM_THREADS", "0"), ("RAYON_NUM_THREADS", "1")] {
             if std::env::var_os(variable).is_none() {
-                command.env(variable, pool.threads.to_string());
+                command.env(variable, threads);
             }
         }
         let mut child = command.spawn()?;

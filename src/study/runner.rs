@@ -153,9 +153,6 @@ fn pool<'a>(folder: &'a Path, options: &Options<'_>) -> Result<Pool<'a>, StudyEr
             RendererChoice::Cpu => "cpu",
         },
         jobs,
-        // A worker is a core's work. Two threads of a software driver in one process do less than one
-        // thread in each of two.
-        threads: 1,
     })
 }
 

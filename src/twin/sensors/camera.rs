@@ -13,7 +13,8 @@ use crate::twin::random::Stream;
 use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{DeserializeOwned, Error};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// Which row of a rolling shutter opens first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -266,6 +267,8 @@ impl Optics {
         if !(frame_us.is_finite() && frame_us > 0.0) {
             return;
         }
+        let span_us = self.span_us();
+        let read_us = span_us - self.exposure_us;
         if self.exposure_us > frame_us {
             problems.push(Problem::new(
                 format!("{at}.exposure_us"),
@@ -274,13 +277,13 @@ impl Optics {
                     self.exposure_us, self.frames_per_s, self.rate_key
                 ),
                 format!(
-                    "expose for less than {frame_us:.0} us, or lower {}",
+                    "expose for at most {:.0} us, or lower {}",
+                    (frame_us - read_us).max(0.0),
                     self.rate_key
                 ),
             ));
             return;
         }
-        let span_us = self.span_us();
         if span_us > frame_us {
             let fits = ((frame_us - self.exposure_us) / self.line_time_us).floor() + 1.0;
             problems.push(Problem::new(
@@ -289,7 +292,11 @@ impl Optics {
                     "{} rows of {} us take {span_us:.0} us, but a frame lasts {frame_us:.0} us at {} {}",
                     self.height_px, self.line_time_us, self.frames_per_s, self.rate_key
                 ),
-                format!("read at most {fits:.0} rows, or lower line_time_us or {}", self.rate_key),
+                format!(
+                    "expose for at most {:.0} us, read at most {fits:.0} rows, or lower line_time_us or {}",
+                    (frame_us - read_us).max(0.0),
+                    self.rate_key
+                ),
             ));
         }
     }
@@ -327,12 +334,35 @@ pub struct WaysideCameraSettings {
     /// By how much the device really differs from the calibration that the stack is given.
     /// Default: not at all.
     pub calibration_error: WaysideError,
-    /// The glass.
+    /// The glass. What is left out is as with the rig, but `f_number`, whose default is 1.0.
+    #[serde(deserialize_with = "wayside_lens")]
     pub lens: LensSettings,
-    /// From photons to digital numbers.
+    /// From photons to digital numbers. What is left out is as with the rig, but `gain_db`, whose default
+    /// is 9.4.
+    #[serde(deserialize_with = "wayside_sensor")]
     pub sensor: SensorSettings,
     /// Exposure and gain that follow the light. Default: fixed.
     pub exposure_control: ExposureSettings,
+}
+
+fn wayside_lens<'de, D: Deserializer<'de>>(input: D) -> Result<LensSettings, D::Error> {
+    over(WaysideCameraSettings::default().lens, input)
+}
+
+fn wayside_sensor<'de, D: Deserializer<'de>>(input: D) -> Result<SensorSettings, D::Error> {
+    over(WaysideCameraSettings::default().sensor, input)
+}
+
+/// Reads a table whose missing keys are those of `base`, not those of its type.
+fn over<'de, D, T>(base: T, input: D) -> Result<T, D::Error>
+where
+    D: Deserializer<'de>,
+    T: Serialize + DeserializeOwned,
+{
+    let given = toml::Table::deserialize(input)?;
+    let mut whole = toml::Table::try_from(base).map_err(Error::custom)?;
+    whole.extend(given);
+    whole.try_into().map_err(Error::custom)
 }
 
 impl Default for WaysideCameraSettings {
@@ -585,6 +615,22 @@ pub(super) fn positive(
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+
+    /// A table with one key that takes the rig's sensor and glass for the rest.
+    #[test]
+    fn what_is_left_out_is_the_wayside_cameras_own() {
+        let text = "sensor = { bits = 12 }\nlens = { focus_m = 20.0 }\n";
+        let camera: WaysideCameraSettings = toml::from_str(text).unwrap();
+        let mut expected = WaysideCameraSettings::default();
+        expected.sensor.bits = 12;
+        expected.lens.focus_m = Some(20.0);
+        assert_eq!(camera, expected);
+        let wrong = toml::from_str::<WaysideCameraSettings>("sensor = { bitz = 12 }").unwrap_err();
+        assert!(
+            wrong.to_string().contains("unknown field `bitz`"),
+            "{wrong}"
+        );
+    }
 
     /// The error moves the device, camera and lidar alike, and leaves its calibration sheet.
     #[test]

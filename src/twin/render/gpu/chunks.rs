@@ -14,7 +14,7 @@ use std::collections::BTreeMap;
 use wgpu::util::DeviceExt;
 
 /// Range drawn before and behind a camera.
-const AHEAD_M: f64 = 160.0;
+pub const AHEAD_M: f64 = 160.0;
 const BEHIND_M: f64 = 20.0;
 /// Jobs after which an unseen chunk is dropped.
 const KEEP_JOBS: u64 = 200;

@@ -63,8 +63,7 @@ impl Detail {
         match self {
             Self::Near => 0.25,
             Self::Close => 0.3,
-            Self::Middle => 0.5,
-            Self::Far => 1.0,
+            Self::Middle | Self::Far => 0.5,
         }
     }
 
@@ -74,7 +73,7 @@ impl Detail {
             Self::Near => 0.06,
             Self::Close => 0.15,
             Self::Middle => 0.4,
-            Self::Far => CHUNK_M,
+            Self::Far => 0.8,
         }
     }
 }

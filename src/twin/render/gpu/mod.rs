@@ -35,7 +35,7 @@
 //! The end walls where two cross-sections meet (dark). Between vertices positions run straight, so edges
 //! close to a fast camera are bent by the shutter only facet by facet (0.5 m), and by the lens cell by
 //! cell (0.25 px, `bend.rs`); lamps are exact. Of every 5 m of tunnel one lamp blinks, the others give
-//! their mean, and on bodies all do. The tunnel ends 160 m ahead of the camera; glare of a lamp under a
+//! their mean, and on bodies all do. The tunnel ends 160 m ahead of the camera, in the air's own light; glare of a lamp under a
 //! quarter of the usual read noise is not drawn. Out of focus, light of what the middle of the pupil does
 //! not see is missing.
 
@@ -262,7 +262,13 @@ impl GpuRenderer {
         let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
         let mut constants = framed.constants(job, air, &mut view.poses);
         constants.mirrored = view.sight.mirrored.len() as u32;
+        /// Largest number in half precision.
+        const BRIGHTEST_E: f64 = 65_504.0;
+        // Half of what lies beyond the end of what is drawn, as it is seen, is nearer than this.
+        let beyond_m = std::f64::consts::SQRT_2 * chunks::AHEAD_M;
+        let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         let data = ViewData {
+            beyond_e: ((1.0 - self.scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
             constants,
             poses: &view.poses,
             sight: &view.sight,

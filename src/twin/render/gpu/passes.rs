@@ -56,6 +56,8 @@ pub struct ViewBuffers {
     glare_rows: Upload,
     glare_count: u32,
     pub(super) shadows: ShadowBuffers,
+    /// Signal where nothing is drawn: of the air before what is too far away.
+    beyond_e: f64,
 }
 
 /// What a view uploads, made by the caller.
@@ -70,6 +72,8 @@ pub struct ViewData<'a> {
     pub lamps: &'a LampTable,
     /// Shadows of bodies.
     pub shadows: &'a Shadows,
+    /// Signal where nothing is drawn.
+    pub beyond_e: f64,
 }
 
 /// The background's pipelines that a view uses, with their bind groups.
@@ -123,6 +127,7 @@ impl ViewBuffers {
             glare_rows: Upload::new(gpu, storage, size_of::<GlareRow>()),
             glare_count: 0,
             shadows: ShadowBuffers::new(gpu),
+            beyond_e: 0.0,
         }
     }
 
@@ -143,6 +148,7 @@ impl ViewBuffers {
         self.glare_rows.write(gpu, &table.glare_rows);
         self.glare_count = table.glares.len() as u32;
         self.shadows.write(gpu, data.shadows);
+        self.beyond_e = data.beyond_e;
     }
 
     fn brushes<'a>(
@@ -195,15 +201,19 @@ impl ViewBuffers {
             .map(|b| self.brushes(gpu, b, sight, stock))
             .collect();
         let (tunnel, bodies) = sight.draws.split_at(sight.tunnel().count());
+        let empty = wgpu::LoadOp::Clear(wgpu::Color {
+            r: self.beyond_e,
+            ..wgpu::Color::BLACK
+        });
         let mut draw = |encoder: &mut _, layers: &Layers, k| {
             let Some(key) = &key else {
-                let mut pass = begin(encoder, &layers.signal, BLACK, Some(&layers.depth));
+                let mut pass = begin(encoder, &layers.signal, empty, Some(&layers.depth));
                 sight.moving.clip(&mut pass, k > 0);
                 self.draw_instant(&mut pass, &brushes, (sight, &sight.draws), stock, k);
                 return;
             };
             if !backdrops.show(key, layers, encoder) {
-                let mut pass = begin(encoder, &layers.signal, BLACK, Some(&layers.depth));
+                let mut pass = begin(encoder, &layers.signal, empty, Some(&layers.depth));
                 self.draw_instant(&mut pass, &brushes, (sight, tunnel), stock, k);
                 drop(pass);
                 backdrops.keep(gpu, key.clone(), layers, encoder);
