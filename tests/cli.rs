@@ -129,7 +129,7 @@ fn all_problems_at_once() {
     let exposure = "rig.exposure_us: an exposure of 50000 us is longer than the frame";
     let words = [
         exposure,
-        "expose for at most 17371 us",
+        "expose for at most 17372 us",
         "rig.pixel_um",
         "3.75",
     ];
