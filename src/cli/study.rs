@@ -43,6 +43,7 @@ enum StudyCommand {
 
 const AFTER_RUN: &str = "\
 Into the output folder go:
+  report.html    figures with intervals, plots, worst runs; the plots as SVG in plots/
   rows.parquet   a row a run: what was drawn, what came out, with units and meanings in the schema
   rows.jsonl     the same as they came, appended and synced: a kill loses the runs in flight at most
   study.json     hashes of all inputs, version, renderer; a study goes on only while they are the same
@@ -154,12 +155,17 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
         StudyCommand::Run(args) => run(args),
         StudyCommand::Merge(args) => {
             let rows = study::merge(&args.folder)?;
-            conclude(&args.folder, &study::template_of(&args.folder)?.1, &rows)
+            conclude(
+                &args.folder,
+                &study::template_of(&args.folder)?.1,
+                &rows,
+                true,
+            )
         }
         StudyCommand::Report(args) => {
             let (page, digest) = study::report(&args.folder)?;
             print(&digest_text(&digest))?;
-            print(&format!("report: {}", page.display()))
+            print(&format!("report  {}", page.display()))
         }
         StudyCommand::Compare(args) => compare(args),
         StudyCommand::Submit(args) => submit(args),
@@ -199,7 +205,7 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     };
     let rows = study::run(&template, &out, &options);
     bar.finish();
-    conclude(&out, &template, &rows?)
+    conclude(&out, &template, &rows?, args.shard.is_none())
 }
 
 fn compare(args: &CompareArgs) -> Result<(), Failure> {
@@ -264,10 +270,15 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
     ))
 }
 
-/// Prints what there is now.
-fn conclude(out: &Path, template: &Template, rows: &[Row]) -> Result<(), Failure> {
+/// Prints what there is now; of a whole study, writes the report.
+fn conclude(out: &Path, template: &Template, rows: &[Row], whole: bool) -> Result<(), Failure> {
     print(&digest_text(&Digest::of(template, rows)?))?;
-    print(&format!("rows: {}", out.join("rows.parquet").display()))
+    print(&format!("rows    {}", out.join("rows.parquet").display()))?;
+    if whole {
+        let (page, _) = study::report(out)?;
+        print(&format!("report  {}", page.display()))?;
+    }
+    Ok(())
 }
 
 fn digest_text(digest: &Digest) -> String {

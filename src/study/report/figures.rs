@@ -100,6 +100,11 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
     let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
     let mut plots = Vec::new();
     for (name, condition) in events(template).unwrap_or_default() {
+        let told = || complete.iter().filter_map(|r| r.happened(&condition));
+        // What never happened, or always, hangs on nothing.
+        if told().all(|h| h) || !told().any(|h| h) {
+            continue;
+        }
         plots.extend(
             inputs
                 .iter()

@@ -10,10 +10,10 @@ use std::path::Path;
 const WORST: usize = 10;
 
 const STYLE: &str = "\
-body{font:15px/1.45 system-ui,sans-serif;color:#1c2126;max-width:1120px;margin:2rem auto;padding:0 1rem}\
+body{font:15px/1.45 system-ui,sans-serif;color:#1c2126;max-width:1180px;margin:2rem auto;padding:0 1rem}\
 h1{font-size:1.6rem;margin-bottom:.2rem}h2{font-size:1.15rem;margin:2rem 0 .5rem}\
 p.lead{color:#555c64;margin-top:0}table{border-collapse:collapse;margin:.5rem 0;width:100%}\
-th,td{text-align:left;padding:.25rem .6rem;border-bottom:1px solid #dfe3e8;vertical-align:top}\
+table{font-size:.88rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:1px solid #dfe3e8;vertical-align:top}\
 th{font-weight:600;background:#f5f7f9}td.n{font-variant-numeric:tabular-nums;white-space:nowrap}\
 code{background:#f2f4f6;padding:.1rem .3rem;border-radius:3px;font-size:.85em}\
 .plots{display:flex;flex-wrap:wrap;gap:12px}.plots figure{margin:0;border:1px solid #dfe3e8;border-radius:4px}\
@@ -55,7 +55,7 @@ fn escaped(text: &str) -> String {
         .replace('"', "&quot;")
 }
 
-/// A table of cells; those of numbers do not wrap.
+/// A table of cells; those that begin with a number do not wrap.
 fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let head: String = head
         .iter()

@@ -201,11 +201,16 @@ impl CpuRenderer {
     }
 
     fn new(scene: Scene, every_ray: bool) -> Self {
+        let paintings = Paintings::of(&scene.tunnel);
+        Self::painted(scene, paintings, every_ray)
+    }
+
+    fn painted(scene: Scene, paintings: Paintings, every_ray: bool) -> Self {
         Self {
             slices: None,
             world: World {
                 tunnel: TunnelCaster::new(&scene.tunnel),
-                paintings: Paintings::of(&scene.tunnel),
+                paintings,
                 lamps: LampField::new(&scene.lamps).in_air(scene.air),
                 line: scene.tunnel,
                 air: scene.air,
@@ -302,10 +307,15 @@ impl Renderer for CpuRenderer {
     }
 
     fn set_scene(&mut self, scene: Scene) {
+        let paintings = if self.world.line.sections == scene.tunnel.sections {
+            self.world.paintings.clone()
+        } else {
+            Paintings::of(&scene.tunnel)
+        };
         *self = Self {
             slices: self.slices,
             maps: std::mem::take(&mut self.maps),
-            ..Self::new(scene, self.every_ray)
+            ..Self::painted(scene, paintings, self.every_ray)
         };
     }
 
