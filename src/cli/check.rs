@@ -2,13 +2,15 @@
 
 use super::fault::Failure;
 use super::{print, report};
+use crate::scenario::draw::Template;
 use crate::scenario::{self, Scenario, ScenarioError};
 use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
 Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
 A file with any of [[plan]], [[sections]], [lamps] is a tunnel, one with [body] and [bogie] a
-vehicle, any other a scenario; of a scenario the files that it names are checked too.
+vehicle, any other a scenario; of a scenario the files that it names are checked too, and of one with a
+[study] what it draws.
 
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
@@ -16,7 +18,7 @@ Examples:
 
 Exit code 0 where all files are right, 2 where any is wrong.";
 
-/// Check tunnels, vehicles and scenarios: errors and a short report
+/// Check tunnels, vehicles, scenarios and studies: errors and a short report
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct CheckArgs {
@@ -55,7 +57,11 @@ fn report_on(path: &Path) -> Result<String, ScenarioError> {
     } else if has(&VEHICLE_KEYS) {
         scenario::parse_vehicle(path, &text).map(|vehicle| report::vehicle(&vehicle))
     } else {
-        Scenario::from_text(path, &text, &[]).map(|scenario| report::scenario(&scenario))
+        let mut said = report::scenario(&Scenario::from_text(path, &text, &[])?);
+        if has(&["study"]) {
+            said += &report::study(&Template::load(path)?);
+        }
+        Ok(said)
     }
 }
 

@@ -2,9 +2,11 @@
 
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
+use crate::scenario::draw::Template;
 use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
+use toml::Value;
 
 /// Length, radii, grades, sections, lamps, devices.
 pub(super) fn tunnel(tunnel: &Tunnel) -> String {
@@ -226,4 +228,29 @@ fn stripes(camera: &CameraModel, tunnel: &Tunnel) -> String {
 
 fn indented(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
+}
+/// What a study varies.
+pub(super) fn study(template: &Template) -> String {
+    let settings = &template.settings;
+    let (cells, runs) = (template.cells(), template.runs());
+    let of_cells = if cells > 1 {
+        format!(", {} for each of {cells} combinations", settings.runs)
+    } else {
+        String::new()
+    };
+    let mut text = format!("\n  study: {runs} runs{of_cells}, seed {}", settings.seed);
+    for (name, variable) in &settings.variables {
+        let from = Value::try_from(&variable.from).map(|v| v.to_string());
+        text += &format!("\n    {name}: {}", from.unwrap_or_default());
+        if !variable.keys.is_empty() {
+            text += &format!(" -> {}", variable.keys.join(", "));
+        }
+    }
+    for condition in &settings.require {
+        text += &format!("\n    only if {condition}");
+    }
+    for (name, event) in &settings.events {
+        text += &format!("\n    event {name}: {event}");
+    }
+    text
 }
