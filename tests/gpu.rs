@@ -14,7 +14,9 @@ use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{Body, Job, LampLight, Pattern, SensorSettings, Shape, View, sample};
+use metrotwin::twin::render::{
+    Air, Body, Job, LampLight, Pattern, Renderer, Scene, SensorSettings, Shape, View, sample,
+};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
@@ -357,4 +359,36 @@ fn noise_is_that_of_the_sensor() {
 #[test]
 fn collecting_nothing_is_an_error() {
     assert!(gpu(dark_scene(Vec::new())).collect().is_err());
+}
+
+/// A renderer that takes another scene draws it as a new one would: nothing of the first scene is left
+/// in meshes, textures, lamps' light, or the still camera's kept tunnel.
+#[test]
+fn another_scene_is_as_good_as_new() {
+    let first = sample::scene();
+    let mut second = sample::scene();
+    second.air = Air::of_visibility(60.0);
+    second.lamps.truncate(second.lamps.len() / 2);
+    let tunnel = first.tunnel.clone();
+    let jobs = [
+        sample::stereo_job(&tunnel, 70.0, 15.0),
+        sample::wayside_job(&tunnel, 100.0),
+    ];
+    for (name, make) in [("quick", quick as common::Make), ("gpu", gpu)] {
+        let mut used = make(first.clone());
+        for job in jobs.iter().cycle().take(4) {
+            draw(used.as_mut(), job);
+        }
+        used.submit(&jobs[0]).unwrap();
+        used.set_scene(second.clone());
+        let mut new = make(second.clone());
+        for job in &jobs {
+            let equal = draw(used.as_mut(), job) == draw(new.as_mut(), job);
+            assert!(equal, "{name} draws something of the first scene");
+        }
+    }
+}
+
+fn quick(scene: Scene) -> Box<dyn Renderer> {
+    Box::new(CpuRenderer::quick(scene))
 }

@@ -3,7 +3,8 @@
 use super::fault::Failure;
 use super::{print, report};
 use crate::scenario::draw::Template;
-use crate::scenario::{self, Scenario, ScenarioError};
+use crate::scenario::{self, Scenario};
+use crate::study;
 use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
@@ -34,7 +35,7 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
         match report_on(file) {
             Ok(text) => print(&format!("{}: right\n{text}", file.display()))?,
             Err(error) => {
-                Failure::from(error).print();
+                error.print();
                 wrong = true;
             }
         }
@@ -46,20 +47,22 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
     }
 }
 
-fn report_on(path: &Path) -> Result<String, ScenarioError> {
+fn report_on(path: &Path) -> Result<String, Failure> {
     let text = scenario::read(path)?;
     let has = |keys: &[&str]| {
         text.parse::<toml::Table>()
             .is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
     };
     if has(&TUNNEL_KEYS) {
-        scenario::parse_tunnel(path, &text).map(|tunnel| report::tunnel(&tunnel))
+        Ok(report::tunnel(&scenario::parse_tunnel(path, &text)?))
     } else if has(&VEHICLE_KEYS) {
-        scenario::parse_vehicle(path, &text).map(|vehicle| report::vehicle(&vehicle))
+        Ok(report::vehicle(&scenario::parse_vehicle(path, &text)?))
     } else {
         let mut said = report::scenario(&Scenario::from_text(path, &text, &[])?);
         if has(&["study"]) {
-            said += &report::study(&Template::load(path)?);
+            let template = Template::load(path)?;
+            study::check_names(&template)?;
+            said += &report::study(&template);
         }
         Ok(said)
     }

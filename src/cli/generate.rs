@@ -74,7 +74,7 @@ fn write(
     inputs.copy_to(&out.join("inputs"))?;
     let mut index = csv::Writer::from_writer(Vec::new());
     let variables = template.settings.variables.keys().map(String::as_str);
-    let head = ["index", "file", "seed", "rejected"]
+    let head = ["index", "file", "seed", "rejected", "weight"]
         .into_iter()
         .chain(variables);
     index.write_record(head)?;
@@ -86,6 +86,7 @@ fn write(
             file,
             draw.seed.to_string(),
             draw.rejected.to_string(),
+            draw.ln_weight.exp().to_string(),
         ];
         let values = draw.values.iter().map(|(_, value)| match value {
             toml::Value::String(text) => text.clone(),

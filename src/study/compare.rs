@@ -1,16 +1,17 @@
 //! Two studies held against each other, run by run: with the same seed and variables, run k of both
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
+use super::digest::is_weighed;
 use super::stats::{Estimate, paired_difference};
 use super::worker::template_of;
-use super::{MEASURES, Row, StudyError, report, table};
+use super::{MEASURES, Row, Status, StudyError, report, table};
 use crate::record::parquet::Kind;
 use std::path::Path;
 
 /// What differs between two studies, b less a.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// Runs that both have, by their indexes.
+    /// Runs that are complete in both, by their indexes.
     pub pairs: usize,
     /// Of these, how many were not drawn alike: then pairs are no pairs.
     pub drawn_otherwise: usize,
@@ -27,17 +28,22 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let pairs = rows_a
         .iter()
         .filter_map(|row| Some((row, &rows_b[of_b(row)?])));
+    let complete = |row: &Row| row.status == Status::Complete;
+    let pairs = pairs.filter(|(a, b)| complete(a) && complete(b));
     let pairs: Vec<(&Row, &Row)> = pairs.collect();
     let named = |row: &Row| (row.seed, row.values.clone());
     let drawn_otherwise = pairs.iter().filter(|(a, b)| named(a) != named(b)).count();
 
-    let events = table::events(&template_of(a)?.1)?;
+    let template = template_of(a)?.1;
+    // Weighed runs are not those of their distributions: they have no plain differences.
+    let weighed = is_weighed(&template);
+    let events = table::events(&template)?;
     let mut differences = Vec::new();
     let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
         let both = pairs.iter().filter_map(|(a, b)| Some((of(a)?, of(b)?)));
         let both: Vec<(f64, f64)> = both.collect();
         let differs = both.iter().any(|(a, b)| a.to_bits() != b.to_bits());
-        let estimate = paired_difference(&both).filter(|_| differs);
+        let estimate = paired_difference(&both).filter(|_| differs && !weighed);
         differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
     };
     for (name, condition) in &events {

@@ -6,7 +6,7 @@ use super::stats::{
 };
 use super::{MEASURES, Measure, Row, Status, StudyError, table};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::Template;
+use crate::scenario::draw::{Distribution, Template};
 
 /// Quantiles that are shown.
 pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
@@ -74,7 +74,7 @@ impl Digest {
             .filter(|r| r.status == Status::Complete)
             .collect();
         let ln_weights: Vec<f64> = complete.iter().map(|r| r.ln_weight).collect();
-        let normalise = !template.settings.require.is_empty();
+        let conditioned = !template.settings.require.is_empty();
         let events = table::events(template)?
             .into_iter()
             .map(|(name, condition)| {
@@ -87,7 +87,9 @@ impl Digest {
                     name,
                     condition: condition.text().to_owned(),
                     rate: rate(happened, told.len() as u64),
-                    weighted: weighed.then(|| weighted_rate(&told, normalise)).flatten(),
+                    weighted: weighed
+                        .then(|| weighted_rate(&told, conditioned || told.len() < rows.len()))
+                        .flatten(),
                 }
             });
         let shown = MEASURES.iter().filter(|m| is_shown(m));
@@ -113,6 +115,23 @@ pub fn is_weighed(template: &Template) -> bool {
         .any(|v| v.propose.is_some())
 }
 
+/// Whether two variables come from one table, whose rows tie them together.
+fn shares_a_table(template: &Template) -> bool {
+    let files = template
+        .settings
+        .variables
+        .values()
+        .filter_map(|v| match &v.from {
+            Distribution::Table { file, .. } => Some(file),
+            _ => None,
+        });
+    let files: Vec<_> = files.collect();
+    files
+        .iter()
+        .enumerate()
+        .any(|(k, file)| files[..k].contains(file))
+}
+
 fn is_shown(measure: &Measure) -> bool {
     matches!(measure.kind, Kind::Real | Kind::Int | Kind::Flag) && !measure.is_wall_time()
 }
@@ -133,10 +152,12 @@ impl FigureDigest {
             .variables
             .keys()
             .filter(|name| rows.iter().any(|r| r.number(name).is_some()));
+        let independent = settings.correlated.is_empty()
+            && settings.require.is_empty()
+            && !shares_a_table(template);
         let drivers = variables.map(|name| {
             let pair = |r: &&Row| Some((r.number(name)?, r.number(measure.name)?));
             let pairs: Vec<(f64, f64)> = rows.iter().filter_map(pair).collect();
-            let independent = settings.correlated.is_empty() && settings.require.is_empty();
             Driver {
                 variable: name.clone(),
                 correlation: rank_correlation(&pairs),

@@ -3,7 +3,7 @@
 
 use super::Row;
 use super::StudyError;
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
@@ -29,6 +29,12 @@ impl Journal {
             .truncate(false)
             .open(&path)
             .map_err(failed)?;
+        // Held until the file is closed, by whatever end of the process.
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => return Err(StudyError::Busy(folder.to_owned())),
+            Err(TryLockError::Error(source)) => return Err(failed(source)),
+        }
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(failed)?;
         let (rows, whole) = parse(&path, &text)?;
@@ -67,8 +73,9 @@ pub fn read(folder: &Path) -> Result<Vec<Row>, StudyError> {
     Ok(rows)
 }
 
-/// In the order of indexes, each once.
+/// In the order of indexes, each once: of a run that was tried again, the last.
 pub fn sort(rows: &mut Vec<Row>) {
+    rows.reverse();
     rows.sort_by_key(|row| row.index);
     rows.dedup_by_key(|row| row.index);
 }
@@ -119,8 +126,10 @@ mod tests {
         std::fs::remove_file(&path).ok();
         let (mut journal, rows) = Journal::open(&folder).unwrap();
         assert!(rows.is_empty());
+        assert!(matches!(Journal::open(&folder), Err(StudyError::Busy(_))));
         journal.add(&row(3)).unwrap();
         journal.add(&row(1)).unwrap();
+        drop(journal);
         let whole = std::fs::read(&path).unwrap();
         let second = whole.iter().position(|b| *b == b'\n').unwrap() + 1;
         for cut in second..whole.len() {
@@ -128,6 +137,7 @@ mod tests {
             let (mut journal, rows) = Journal::open(&folder).unwrap();
             assert_eq!(rows, [row(3)], "cut at {cut}");
             journal.add(&row(2)).unwrap();
+            drop(journal);
             assert_eq!(read(&folder).unwrap(), [row(2), row(3)]);
         }
         std::fs::write(&path, b"{}\n").unwrap();

@@ -28,7 +28,8 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
         let shard = manifest.shard.ok_or_else(|| {
             StudyError::Shards(format!("{} is a whole study, not a shard", path.display()))
         })?;
-        let of_shard = journal::read(path)?;
+        let mut of_shard = journal::read(path)?;
+        of_shard.retain(|row| row.index < manifest.runs);
         check_whole(path, shard, manifest.runs, &of_shard)?;
         found.insert(shard.number, shard.of);
         rows.extend(of_shard);
@@ -50,7 +51,24 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
         );
         return Err(StudyError::Shards(what));
     }
+    check_free(folder, first, rows.len())?;
     write(folder, first_path, first, rows)
+}
+
+/// A folder that holds another study, or more of this one, is left alone.
+fn check_free(folder: &Path, merged: &Manifest, rows: usize) -> Result<(), StudyError> {
+    let Some(there) = Manifest::read(folder)? else {
+        return Ok(());
+    };
+    let more = journal::read(folder)?.len() > rows;
+    let more = more.then(|| "more rows than the shards".to_owned());
+    match there.difference(merged).or(more) {
+        None => Ok(()),
+        Some(what) => Err(StudyError::Other {
+            path: folder.to_owned(),
+            what,
+        }),
+    }
 }
 
 /// Folders of shards, with their manifests.

@@ -50,6 +50,7 @@ pub use report::{REPORT, report, rows};
 pub use row::{Row, Status};
 pub use runner::{Options, Progress, run};
 pub use slurm::{Submission, Submitted};
+pub use table::check_names;
 pub use worker::{Desk, serve, template_of};
 
 use crate::scenario::ScenarioError;
@@ -98,6 +99,9 @@ pub enum StudyError {
         /// What differs.
         what: String,
     },
+    /// Somebody is at it.
+    #[error("another `study run` is at work in {}", .0.display())]
+    Busy(PathBuf),
     /// There is no study in a folder.
     #[error("{} holds no study (no {MANIFEST}); give the --out of a `study run`", .0.display())]
     NoStudy(PathBuf),
@@ -113,6 +117,9 @@ pub enum StudyError {
     /// An event that cannot be worked out.
     #[error("study.events: {0}")]
     Event(#[from] ConditionError),
+    /// A name that cannot be used.
+    #[error("{0} {1}")]
+    Name(String, String),
     /// A name that is no column.
     #[error("`{0}` is no variable, figure or event of this study")]
     NoColumn(String),

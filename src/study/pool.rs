@@ -15,6 +15,8 @@ use std::time::Duration;
 
 /// How often whoever waits for rows is asked whether to go on.
 const PATIENCE: Duration = Duration::from_millis(200);
+/// What a worker says before its first row.
+pub const READY: &str = "ready";
 /// Lines of a dead worker's messages that are kept as the reason.
 const LAST_WORDS: usize = 3;
 
@@ -146,12 +148,20 @@ impl Worker {
         let mut child = command.spawn()?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let (to, from) = pipes.ok_or_else(|| io::Error::other("it has no pipes"))?;
-        Ok(Self {
+        let mut worker = Self {
             child,
             to,
             from: BufReader::new(from),
             log,
-        })
+        };
+        let mut line = String::new();
+        match worker.from.read_line(&mut line) {
+            Ok(_) if line.trim() == READY => Ok(worker),
+            _ => {
+                let end = io::ErrorKind::UnexpectedEof.into();
+                Err(io::Error::other(worker.obituary(&end)))
+            }
+        }
     }
 
     fn ask(&mut self, index: u64) -> io::Result<Row> {

@@ -4,7 +4,7 @@ use super::journal::{self, Journal};
 use super::pool::{Pool, Watch};
 use super::stop::Precision;
 use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table};
-use crate::scenario::draw::{Inputs, Template};
+use crate::scenario::draw::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
 use std::fs;
@@ -59,7 +59,14 @@ pub fn run(
 ) -> Result<Vec<Row>, StudyError> {
     // What can be wrong with all runs is said before the first.
     template.draw(0)?;
-    table::events(template)?;
+    table::check_names(template)?;
+    if template.runs() > MOST_RUNS {
+        let what = format!(
+            "has {} runs, more than {MOST_RUNS}; ask for fewer",
+            template.runs()
+        );
+        return Err(StudyError::Name("the study".into(), what));
+    }
     let precision = Precision::of(template)?;
     if precision.is_some() && options.shard.is_some() {
         return Err(StudyError::Shards(
@@ -72,7 +79,7 @@ pub fn run(
     fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
     let kept = Manifest::read(folder)?;
     check_same(folder, kept.as_ref(), &manifest)?;
-    let (journal, rows) = Journal::open(folder)?;
+    let (journal, mut rows) = Journal::open(folder)?;
     if kept.is_none() && !rows.is_empty() {
         let what = "rows without a manifest".to_owned();
         return Err(StudyError::Other {
@@ -93,6 +100,9 @@ pub fn run(
     }
     manifest.write(folder)?;
 
+    // What crashed may have done so for want of memory: it is tried again.
+    journal::sort(&mut rows);
+    rows.retain(|row| row.status != Status::Crashed);
     let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
     let wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k));
     let lacking: Vec<u64> = (0..template.runs())
@@ -109,7 +119,7 @@ pub fn run(
         lacking.len(),
     );
     if !office.is_known_well_enough() {
-        pool(folder, options)?.work(template, lacking, &mut office)?;
+        pool(folder, &manifest, options)?.work(template, lacking, &mut office)?;
     }
     let rows = office.rows();
     table::write(folder, template, &rows)?;
@@ -133,7 +143,11 @@ fn check_same(folder: &Path, kept: Option<&Manifest>, now: &Manifest) -> Result<
     }
 }
 
-fn pool<'a>(folder: &'a Path, options: &Options<'_>) -> Result<Pool<'a>, StudyError> {
+fn pool<'a>(
+    folder: &'a Path,
+    manifest: &Manifest,
+    options: &Options<'_>,
+) -> Result<Pool<'a>, StudyError> {
     let cores = available_parallelism().map_or(1, usize::from);
     let jobs = if options.jobs == 0 {
         cores
@@ -147,10 +161,11 @@ fn pool<'a>(folder: &'a Path, options: &Options<'_>) -> Result<Pool<'a>, StudyEr
     Ok(Pool {
         program,
         folder,
-        renderer: match options.renderer {
-            RendererChoice::Auto => "auto",
-            RendererChoice::Gpu => "gpu",
-            RendererChoice::Cpu => "cpu",
+        // What the manifest says, and nothing else where that fails.
+        renderer: if manifest.renderer.backend == "cpu" {
+            "cpu"
+        } else {
+            "gpu"
         },
         jobs,
     })
@@ -175,6 +190,8 @@ struct Office<'a> {
     precision: Option<Precision>,
     begin: Instant,
     tabled: Instant,
+    /// Rows that the precision has looked at.
+    looked: usize,
     before: u64,
     of: u64,
 }
@@ -190,6 +207,7 @@ impl<'a> Office<'a> {
         lacking: usize,
     ) -> Self {
         Self {
+            looked: 0,
             before: rows.len() as u64,
             of: (rows.len() + lacking) as u64,
             template,
@@ -205,7 +223,8 @@ impl<'a> Office<'a> {
 
     fn is_known_well_enough(&mut self) -> bool {
         journal::sort(&mut self.rows);
-        (self.precision.as_ref()).is_some_and(|p| p.enough(&self.rows).is_some())
+        let (rows, looked) = (&self.rows, &mut self.looked);
+        (self.precision.as_ref()).is_some_and(|p| p.enough(rows, looked).is_some())
     }
 
     /// In order, up to where the study stops.

@@ -1,8 +1,9 @@
 //! Stopping when a figure is known well enough, at the same run for any number of workers.
 
+use super::digest::is_weighed;
 use super::stats::{Estimate, mean, rate};
 use super::table::events;
-use super::{MEASURES, Row, StudyError};
+use super::{MEASURES, Row, Status, StudyError};
 use crate::scenario::draw::{Condition, Template};
 
 /// Runs between two looks.
@@ -29,6 +30,13 @@ impl Precision {
         let Some(when) = &template.settings.stop.when else {
             return Ok(None);
         };
+        if is_weighed(template) {
+            return Err(StudyError::Name(
+                "study.stop.when".into(),
+                "does not go with `propose`: weighed figures have other intervals; leave one of them out"
+                    .into(),
+            ));
+        }
         let event = events(template)?
             .into_iter()
             .find(|(name, _)| *name == when.of);
@@ -45,36 +53,35 @@ impl Precision {
     }
 
     /// After how many of these rows, which are in order, the figure is known. Rows are looked at only
-    /// as far as none is missing.
-    pub fn enough(&self, rows: &[Row]) -> Option<usize> {
+    /// as far as none is missing. `looked` is how far earlier looks came, and found nothing.
+    pub fn enough(&self, rows: &[Row], looked: &mut usize) -> Option<usize> {
         let gap = rows.iter().zip(0u64..).position(|(row, k)| row.index != k);
         let whole = gap.unwrap_or(rows.len());
-        let looks = (AT_LEAST..=whole).step_by(EVERY);
-        looks.into_iter().find(|n| self.is_known(&rows[..*n]))
+        let looks = (AT_LEAST..=whole).step_by(EVERY).filter(|n| *n > *looked);
+        let found = looks.into_iter().find(|n| self.is_known(&rows[..*n]));
+        *looked = whole;
+        found
     }
 
     /// Leaves out the rows after that.
     pub fn truncate(&self, rows: &mut Vec<Row>) {
-        if let Some(n) = self.enough(rows) {
+        if let Some(n) = self.enough(rows, &mut 0) {
             rows.truncate(n);
         }
     }
 
     fn is_known(&self, rows: &[Row]) -> bool {
+        let rows = || rows.iter().filter(|r| r.status == Status::Complete);
         let estimate: Option<Estimate> = match &self.figure {
-            Figure::Mean(name) => mean(
-                &rows
-                    .iter()
-                    .filter_map(|r| r.number(name))
-                    .collect::<Vec<_>>(),
-            ),
+            Figure::Mean(name) => mean(&rows().filter_map(|r| r.number(name)).collect::<Vec<_>>()),
             Figure::Rate(condition) => {
-                let happened: Vec<bool> =
-                    rows.iter().filter_map(|r| r.happened(condition)).collect();
+                let happened: Vec<bool> = rows().filter_map(|r| r.happened(condition)).collect();
                 let events = happened.iter().filter(|h| **h).count();
                 rate(events as u64, happened.len() as u64).map(|r| r.wilson)
             }
         };
-        estimate.is_some_and(|e| 0.5 * (e.high - e.low) <= self.half_width)
+        // A figure that has not varied yet is not known at all.
+        let known = |e: Estimate| e.high > e.low && 0.5 * (e.high - e.low) <= self.half_width;
+        estimate.is_some_and(known)
     }
 }

@@ -26,6 +26,26 @@ pub fn events(template: &Template) -> Result<Vec<(String, Condition)>, Condition
     events.map(parse).collect()
 }
 
+/// Columns that every table has, before what is drawn.
+const OWN: [&str; 6] = ["index", "seed", "status", "reason", "rejected", "weight"];
+
+/// Whether events can be told, and no name stands for two columns.
+pub fn check_names(template: &Template) -> Result<(), StudyError> {
+    events(template)?;
+    let settings = &template.settings;
+    let taken = |name: &&String| {
+        OWN.contains(&name.as_str()) || MEASURES.iter().any(|m| m.name == name.as_str())
+    };
+    let mut names = settings.variables.keys().chain(settings.events.keys());
+    match names.find(taken) {
+        None => Ok(()),
+        Some(name) => Err(StudyError::Name(
+            format!("study: `{name}`"),
+            "is a column of every study; give the variable or event a name of its own".into(),
+        )),
+    }
+}
+
 impl Row {
     /// Whether an event happened in this run; `None` where it lacks a figure for it.
     pub fn happened(&self, event: &Condition) -> Option<bool> {
@@ -81,7 +101,7 @@ pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result<(), Stu
     let measures = MEASURES
         .iter()
         .map(|m| column(m.name, m.kind, m.unit, m.meaning));
-    let own = 6;
+    let own = OWN.len();
     let drawn = own + template.settings.variables.len();
     columns.extend(measures);
 

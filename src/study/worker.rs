@@ -2,6 +2,7 @@
 
 use super::manifest::{INPUTS, Manifest};
 use super::measures::Fixes;
+use super::pool::READY;
 use super::{Row, Status, StudyError};
 use crate::scenario::Scenario;
 use crate::scenario::draw::{Draw, Template};
@@ -29,6 +30,9 @@ pub fn serve(
     let (_, template) = template_of(folder)?;
     let mut desk = Desk::new(renderer);
     let failed = |source| StudyError::file(Path::new("the worker's pipe"), source);
+    writeln!(output, "{READY}")
+        .and_then(|()| output.flush())
+        .map_err(failed)?;
     for line in input.lines() {
         let line = line.map_err(failed)?;
         let index = line

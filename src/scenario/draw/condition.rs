@@ -69,7 +69,8 @@ ops_factory!(
 #[derive(Clone, Debug)]
 pub struct Condition {
     text: String,
-    expression: FlatEx<f64, Operators>,
+    /// Large: it holds its nodes by value.
+    expression: Box<FlatEx<f64, Operators>>,
 }
 
 /// Why a condition cannot be used.
@@ -93,7 +94,7 @@ impl Condition {
         let form = |e: exmex::ExError| ConditionError::Form(text.to_owned(), e.to_string());
         Ok(Self {
             text: text.to_owned(),
-            expression: FlatEx::parse(text).map_err(form)?,
+            expression: Box::new(FlatEx::parse(text).map_err(form)?),
         })
     }
 
@@ -127,12 +128,9 @@ impl Condition {
         let wrong = |why: String| ConditionError::NoCondition(self.text.clone(), why);
         let value = self.expression.eval(&values);
         match value.map_err(|e| wrong(e.to_string()))? {
-            // A flag of a run is a number too: `collision` alone is a condition.
-            0.0 => Ok(Some(false)),
-            1.0 => Ok(Some(true)),
-            x => Err(wrong(format!(
-                "it gives {x}; compare it with something, as in `x > 0`"
-            ))),
+            x if x.is_nan() => Err(wrong("it gives no number".into())),
+            // A flag or a count is a condition by itself: `collision`, `missed`.
+            x => Ok(Some(x.abs() > 0.0)),
         }
     }
 }
@@ -163,8 +161,10 @@ mod tests {
         assert_eq!(holds("!flag"), Ok(Some(false)));
         assert_eq!(holds("gone > 1 && a > 0"), Ok(None));
         assert!(matches!(holds("b > 1"), Err(ConditionError::Unknown(_, name)) if name == "b"));
+        assert_eq!(holds("a - 2"), Ok(Some(false)));
+        assert_eq!(holds("a + 1"), Ok(Some(true)));
         assert!(matches!(
-            holds("a + 1"),
+            holds("sqrt(1 - a)"),
             Err(ConditionError::NoCondition(..))
         ));
         assert!(matches!(holds("a > "), Err(ConditionError::Form(..))));

@@ -27,6 +27,26 @@ impl Distribution {
         )
     }
 
+    /// Whether it reaches wherever another one does.
+    pub fn covers(&self, other: &Self) -> bool {
+        let ([a0, a1], [b0, b1]) = (self.ends(), other.ends());
+        a0 <= b0 && b1 <= a1
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        match *self {
+            Self::Uniform { min, max }
+            | Self::LogUniform { min, max }
+            | Self::Triangular { min, max, .. } => [min, max],
+            Self::Normal { min, max, .. } => [
+                min.unwrap_or(f64::NEG_INFINITY),
+                max.unwrap_or(f64::INFINITY),
+            ],
+            Self::LogNormal { min, max, .. } => [min.unwrap_or(0.0), max.unwrap_or(f64::INFINITY)],
+            _ => [f64::NAN; 2],
+        }
+    }
+
     /// Whether all its values are numbers (a table's are looked at when it is read).
     pub fn is_of_numbers(&self) -> bool {
         match self {

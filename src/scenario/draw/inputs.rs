@@ -14,21 +14,23 @@ pub struct Inputs {
     root: PathBuf,
     /// The study's own file, below the root.
     pub study: PathBuf,
-    /// All files, below the root.
+    /// All files, below the root, or absolute.
     pub files: Vec<PathBuf>,
 }
 
 impl Inputs {
-    /// Of a study. Files that are named by absolute paths stay where they are.
+    /// Of a study. Files that are named by absolute paths are not copied, but hashed.
     pub fn of(template: &Template) -> io::Result<Self> {
         let study = plain(&std::path::absolute(&template.path)?);
         let folder = study.parent().unwrap_or(Path::new("/")).to_owned();
-        let named = template.files().into_iter().filter(|f| f.is_relative());
-        let mut files: Vec<_> = named.map(|f| plain(&folder.join(f))).collect();
+        let (absolute, relative): (Vec<_>, Vec<_>) =
+            template.files().into_iter().partition(|f| f.is_absolute());
+        let mut files: Vec<_> = relative.iter().map(|f| plain(&folder.join(f))).collect();
         files.push(study.clone());
         let root = files.iter().fold(folder, |root, file| common(&root, file));
         let below = |file: &PathBuf| file.strip_prefix(&root).unwrap_or(file).to_owned();
         let mut below_root: Vec<_> = files.iter().map(below).collect();
+        below_root.extend(absolute);
         below_root.sort();
         below_root.dedup();
         Ok(Self {
@@ -49,7 +51,7 @@ impl Inputs {
 
     /// Copies all files below a folder.
     pub fn copy_to(&self, folder: &Path) -> io::Result<()> {
-        for file in &self.files {
+        for file in self.files.iter().filter(|f| f.is_relative()) {
             let to = folder.join(file);
             if let Some(parent) = to.parent() {
                 fs::create_dir_all(parent)?;

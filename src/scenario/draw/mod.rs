@@ -66,4 +66,4 @@ pub use settings::{
     CorrelationSettings, Distribution, PlanSettings, PrecisionSettings, StopSettings,
     StudySettings, VariableSettings,
 };
-pub use template::{Draw, DrawError, Template};
+pub use template::{Draw, DrawError, MOST_RUNS, Template};

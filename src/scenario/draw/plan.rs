@@ -35,39 +35,36 @@ impl Plan {
         }
     }
 
-    /// The point of draw `index`, in (0, 1) for each variable. A draw that was rejected is tried again
-    /// at independent points: what is accepted at last has the distribution that was asked for,
-    /// whatever the plan.
-    pub fn point(&self, index: u64, attempt: u32) -> Vec<f64> {
-        let stream =
-            |what: &str, name: &str| Stream::new(self.seed, index, &format!("{what}/{name}"));
-        let random = |name: &String| stream("draw", name).uniform(u64::from(attempt));
+    /// The point of run `index`, which is number `repeat` of cell `cell` of a sweep, in (0, 1) for each
+    /// variable. Every cell has a plan of its own. A draw that was rejected is tried again at independent
+    /// points: what is accepted at last has the distribution that was asked for, whatever the plan.
+    pub fn point(&self, [index, cell, repeat]: [u64; 3], attempt: u32) -> Vec<f64> {
+        let random = |name: &String| {
+            Stream::new(self.seed, index, &format!("draw/{name}")).uniform(u64::from(attempt))
+        };
+        let of_cell =
+            |what: &str, name: &str| Stream::new(self.seed, cell, &format!("{what}/{name}"));
         let names = self.names.iter();
         match self.settings {
-            PlanSettings::LatinHypercube { points } if attempt == 0 => {
-                names.map(|n| self.slice(index, points, n)).collect()
-            }
+            PlanSettings::LatinHypercube { points } if attempt == 0 => names
+                .map(|name| {
+                    let cube = repeat / u64::from(points);
+                    let order = of_cell("slices", name).words(cube as u32, (cube >> 32) as u32);
+                    let within = (repeat % u64::from(points)) as u32;
+                    let slice = shuffled(within, points, [order[0], order[1]]);
+                    (f64::from(slice) + random(name)) / f64::from(points)
+                })
+                .collect(),
             PlanSettings::Sobol if attempt == 0 => names
                 .zip(&self.directions)
                 .map(|(name, directions)| {
-                    let key = Stream::new(self.seed, 0, &format!("scramble/{name}")).key;
-                    let x = owen(sobol(index, directions), key);
+                    let x = owen(sobol(repeat, directions), of_cell("scramble", name).key);
                     // 32 bits of the sequence; below them nothing is known, so any place will do.
                     (f64::from(x) + random(name)) / 4_294_967_296.0
                 })
                 .collect(),
             _ => names.map(random).collect(),
         }
-    }
-
-    /// Of one variable of a Latin hypercube: a random place in the slice that is this point's.
-    fn slice(&self, index: u64, points: u32, name: &str) -> f64 {
-        let cube = index / u64::from(points);
-        let within = (index % u64::from(points)) as u32;
-        let order = Stream::new(self.seed, cube, &format!("slices/{name}"));
-        let slice = shuffled(within, points, order.key);
-        let place = Stream::new(self.seed, index, &format!("draw/{name}")).uniform(0);
-        (f64::from(slice) + place) / f64::from(points)
     }
 }
 
@@ -163,7 +160,9 @@ mod tests {
         for (settings, n) in [(cube, 100u64), (PlanSettings::Sobol, 128)] {
             for (seed, block) in [(1, 0), (2, 0), (2, 3)] {
                 let plan = plan(settings, seed);
-                let points: Vec<_> = (0..n).map(|k| plan.point(block * n + k, 0)).collect();
+                let points: Vec<_> = (0..n)
+                    .map(|k| plan.point([block * n + k, 2, block * n + k], 0))
+                    .collect();
                 for v in 0..5 {
                     let slices = points.iter().map(|p| (p[v] * n as f64) as usize);
                     let mut slices: Vec<_> = slices.collect();
@@ -181,10 +180,25 @@ mod tests {
         let plan = plan(PlanSettings::Sobol, 7);
         let mut boxes = vec![0; 128];
         for k in 0..128 {
-            let p = plan.point(k, 0);
+            let p = plan.point([k, 0, k], 0);
             boxes[(p[0] * 16.0) as usize * 8 + (p[1] * 8.0) as usize] += 1;
         }
         assert!(boxes.iter().all(|n| *n == 1), "{boxes:?}");
+    }
+
+    /// Cells of a sweep that share their draws: figures over all of them would look surer than they are.
+    #[test]
+    fn cells_draw_by_themselves() {
+        for settings in [PlanSettings::Random, PlanSettings::Sobol] {
+            let plan = plan(settings, 3);
+            let cells = [0, 1].map(|cell| plan.point([2 * 7 + cell, cell, 7], 0));
+            assert!(
+                cells[0]
+                    .iter()
+                    .zip(&cells[1])
+                    .all(|(a, b)| (a - b).abs() > 1e-6)
+            );
+        }
     }
 
     /// Seeds and attempts that do not matter, a variable whose draws hang on the others'.
@@ -193,19 +207,11 @@ mod tests {
         let few = Plan::new(PlanSettings::Random, 1, vec!["v3".into()]);
         let many = plan(PlanSettings::Random, 1);
         for index in 0..10 {
-            assert_eq!(
-                few.point(index, 0)[0].to_bits(),
-                many.point(index, 0)[3].to_bits()
-            );
-            let other = [
-                many.point(index, 1),
-                plan(PlanSettings::Random, 2).point(index, 0),
-            ];
-            assert!(
-                other
-                    .iter()
-                    .all(|p| p[3].to_bits() != few.point(index, 0)[0].to_bits())
-            );
+            let at = |plan: &Plan, attempt| plan.point([index, 0, index], attempt);
+            let own = at(&few, 0)[0].to_bits();
+            assert_eq!(own, at(&many, 0)[3].to_bits());
+            let other = [at(&many, 1), at(&plan(PlanSettings::Random, 2), 0)];
+            assert!(other.iter().all(|p| p[3].to_bits() != own));
         }
     }
 }

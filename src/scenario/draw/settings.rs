@@ -324,6 +324,12 @@ impl VariableSettings {
                     "can only stand for a distribution with a density, and be one",
                     "use uniform, log_uniform, normal, log_normal or triangular for both",
                 ));
+            } else if !propose.covers(&self.from) {
+                problems.push(Problem::new(
+                    key,
+                    "does not reach all values that `from` has",
+                    "widen it: what it never proposes would be missing from every figure",
+                ));
             }
         }
     }

@@ -56,6 +56,16 @@ impl Tables {
         self.tables.keys().map(PathBuf::from).collect()
     }
 
+    /// All values of a column.
+    pub fn values(&self, file: &str, column: &str) -> Vec<&Value> {
+        let of = |table: &'_ Columns| table.headers.iter().position(|h| h == column);
+        let found = self.tables.get(file).and_then(|t| Some((t, of(t)?)));
+        let cells = found
+            .into_iter()
+            .flat_map(|(t, k)| t.rows.iter().map(move |row| row.get(k)));
+        cells.flatten().collect()
+    }
+
     /// The value of a column in the row that a share `u` of all rows lies before.
     pub fn value(&self, file: &str, column: &str, u: f64) -> Option<Value> {
         let table = self.tables.get(file)?;

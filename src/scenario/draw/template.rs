@@ -14,6 +14,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
+/// More runs than any study can be waited for.
+pub const MOST_RUNS: u64 = 10_000_000;
 /// How often a draw is tried again before its conditions are taken to be impossible.
 const MOST_ATTEMPTS: u32 = 10_000;
 
@@ -120,6 +122,17 @@ impl Template {
                 format!("draw at most {MOST_SOBOL}, or use latin_hypercube"),
             ));
         }
+        let swept = settings
+            .variables
+            .values()
+            .map(|v| v.from.swept().len().max(1) as u64);
+        if swept.fold(1, u64::saturating_mul) > MOST_RUNS {
+            problems.push(Problem::new(
+                "study.variables",
+                format!("the swept values have more than {MOST_RUNS} combinations"),
+                "sweep fewer values",
+            ));
+        }
         if !problems.is_empty() {
             return Err(wrong(FileError::Problems(problems)));
         }
@@ -164,12 +177,12 @@ impl Template {
         self.swept
             .iter()
             .map(|(_, values)| values.len() as u64)
-            .product()
+            .fold(1, u64::saturating_mul)
     }
 
     /// Number of runs: that of the settings for each combination of swept values.
     pub fn runs(&self) -> u64 {
-        self.cells() * u64::from(self.settings.runs)
+        self.cells().saturating_mul(u64::from(self.settings.runs))
     }
 
     /// Files that are read beside the study itself, for any draw.
@@ -180,7 +193,14 @@ impl Template {
         };
         add(self.file.clone());
         for variable in self.settings.variables.values() {
-            for value in variable.from.listed() {
+            let listed = match &variable.from {
+                Distribution::Choice { values, .. } | Distribution::Sweep { values } => {
+                    values.iter().collect()
+                }
+                Distribution::Table { file, column } => self.tables.values(file, column),
+                _ => Vec::new(),
+            };
+            for value in listed {
                 let changes = variable.overrides(value);
                 if let Ok(file) = overridden(&self.path, &self.text, &changes) {
                     add(file);
@@ -195,7 +215,7 @@ impl Template {
     /// Draws run `index`, which hangs on the study's seed and the index alone.
     ///
     /// Runs go through the combinations of swept values in turn, the first variable changing
-    /// slowest; every combination gets the same points of the plan, and noise of its own.
+    /// slowest; every combination gets points of the plan, and noise, of its own.
     pub fn draw(&self, index: u64) -> Result<Draw, DrawError> {
         let runs = self.runs();
         if index >= runs {
@@ -205,7 +225,7 @@ impl Template {
         let swept = self.swept_values(cell);
         let mut refused = vec![0u32; self.conditions.len()];
         for attempt in 0..MOST_ATTEMPTS {
-            let draw = self.attempt(index, repeat, attempt, &swept);
+            let draw = self.attempt([index, cell, repeat], attempt, &swept);
             match self.refusing(&draw)? {
                 None => return Ok(draw),
                 Some(k) => refused[k] += 1,
@@ -235,12 +255,11 @@ impl Template {
 
     fn attempt(
         &self,
-        index: u64,
-        repeat: u64,
+        [index, cell, repeat]: [u64; 3],
         attempt: u32,
         swept: &BTreeMap<&str, Value>,
     ) -> Draw {
-        let mut point = self.plan.point(repeat, attempt);
+        let mut point = self.plan.point([index, cell, repeat], attempt);
         for (places, lower) in &self.groups {
             let mut of_group: Vec<f64> = places.iter().map(|k| point[*k]).collect();
             copula::correlate(lower, &mut of_group);
@@ -272,6 +291,12 @@ impl Template {
             };
             values.extend(value.map(|v| (name.clone(), v)));
         }
+        // Files have no infinite numbers; this one's weight is 0 too.
+        let ln_weight = if ln_weight.is_finite() {
+            ln_weight
+        } else {
+            f64::MIN
+        };
         // 53 bits: every reader of JSON keeps them.
         let [low, high, ..] = Stream::new(self.settings.seed, index, "scenario seed").words(0, 0);
         let seed = (u64::from(high) << 32 | u64::from(low)) >> 11;
@@ -361,16 +386,6 @@ impl VariableSettings {
             value: value.clone(),
         };
         self.keys.iter().map(of).collect()
-    }
-}
-
-impl Distribution {
-    /// Values that stand in the file one by one.
-    fn listed(&self) -> &[Value] {
-        match self {
-            Self::Choice { values, .. } | Self::Sweep { values } => values,
-            _ => &[],
-        }
     }
 }
 

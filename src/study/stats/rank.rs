@@ -1,6 +1,7 @@
 //! Which input drives a figure, by ranks.
 
 use super::{Estimate, TAIL};
+use crate::twin::random::Stream;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// Spearman's rank correlation; equal values share their mean rank. `None` where one of both does not
@@ -57,8 +58,12 @@ pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
     if n < 10 {
         return None;
     }
-    let mut sorted = pairs.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // Runs of equal x in an order that has nothing to do with how they were drawn.
+    let shuffle = Stream::new(0, 0, "ties");
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by_key(|k| shuffle.words(*k as u32, 0));
+    order.sort_by(|a, b| pairs[*a].0.total_cmp(&pairs[*b].0));
+    let sorted: Vec<(f64, f64)> = order.iter().map(|k| pairs[*k]).collect();
     let mean = sorted.iter().map(|p| p.1).sum::<f64>() / n as f64;
     let y = |k: usize| sorted[k % n].1 - mean;
     let variance: f64 = (0..n).map(|k| y(k) * y(k)).sum();

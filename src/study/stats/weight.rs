@@ -49,7 +49,12 @@ pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> 
         rate: Estimate {
             value,
             low: (value - z * sigma).max(0.0),
-            high: value + z * sigma,
+            // Where it was never seen, nothing bounds it.
+            high: if happened.is_empty() {
+                1.0
+            } else {
+                value + z * sigma
+            },
             n,
         },
         effective_events: effective_runs(&happened),
