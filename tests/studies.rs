@@ -134,6 +134,54 @@ fn rows_are_the_same_however_they_came() {
     fs::remove_dir_all(base).ok();
 }
 
+/// A study that stops when a figure is known well enough does so after the same run, however many
+/// workers there are and however far ahead of it they have come.
+#[test]
+fn a_study_stops_at_the_same_run() {
+    let base = folder("stops");
+    let tests = base.join("tests/studies");
+    fs::create_dir_all(&tests).unwrap();
+    fs::create_dir_all(base.join("tunnels")).unwrap();
+    let line = "tunnels/chengdu_line1.toml";
+    fs::copy(line, base.join(line)).unwrap();
+    fs::copy("tests/studies/steps.csv", tests.join("steps.csv")).unwrap();
+    let text = fs::read_to_string(SMALL)
+        .unwrap()
+        .replace("duration_s = 1.5", "duration_s = 0.2");
+    let stop = "\n[study.stop.when]\nof = \"run_m\"\nhalf_width = 0.2\n";
+    let file = tests.join("small.toml");
+    fs::write(&file, text + stop).unwrap();
+    let run = |jobs: &str| {
+        let out = base.join(jobs);
+        let [file, out] = [&file, &out].map(|p| p.to_str().unwrap().to_owned());
+        let args = [
+            "study",
+            "run",
+            &file,
+            "--renderer",
+            "cpu",
+            "--runs",
+            "100",
+            "--jobs",
+            jobs,
+            "--out",
+            &out,
+        ];
+        succeeds(&metrotwin(&args).output().unwrap());
+        base.join(jobs)
+    };
+    let (one, three) = (run("1"), run("3"));
+    same(&one, &three);
+    let rows = metrotwin::study::rows(&one).unwrap();
+    assert!(
+        (30..200).contains(&rows.len()) && rows.len().is_multiple_of(10),
+        "{} rows",
+        rows.len()
+    );
+    assert!(read_rows(&three).unwrap().len() >= rows.len());
+    fs::remove_dir_all(base).ok();
+}
+
 /// A study goes on to more runs, and its first ones stay what they were.
 #[test]
 fn a_study_can_be_extended() {

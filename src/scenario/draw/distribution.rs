@@ -368,7 +368,7 @@ mod tests {
         max: 5.0,
     };
 
-    /// scipy's norm, truncnorm, lognorm and triang (src/study/stats/figures.py).
+    /// scipy's norm, truncnorm, lognorm and triang (tests/studies/figures.py).
     #[test]
     fn val_quantiles_and_densities_are_scipys() {
         let known = [

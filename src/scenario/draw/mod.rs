@@ -10,6 +10,7 @@
 //! std::fs::write(&path, r#"
 //!     name = "speeds"
 //!     tunnel = "bench.toml"
+//!     duration_s = 5.0
 //!     [train]
 //!     [study]
 //!     seed = 7

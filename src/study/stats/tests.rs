@@ -1,4 +1,4 @@
-//! Against scipy (figures.py makes the numbers), and against known truth.
+//! Against scipy (tests/studies/figures.py makes the numbers), and against known truth.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;

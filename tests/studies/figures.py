@@ -1,6 +1,6 @@
 """Figures that src/study/stats/tests.rs and src/scenario/draw hold against: run with scipy 1.x.
 
-    pip install scipy && python3 src/study/stats/figures.py
+    pip install scipy && python3 tests/studies/figures.py
 """
 import numpy as np
 from scipy import stats
@@ -40,3 +40,5 @@ show("triangular 1 2 5", [float(v) for v in triang(0.25, 1, 4).ppf(u)])
 show("ln density of truncated -1..2 at 0.5", float(truncnorm(-1, 2).logpdf(0.5)))
 show("ln density of lognormal 2 0.5 at 3", float(lognorm(0.5, scale=2).logpdf(3)))
 show("ln density of triangular 1 2 5 at 3", float(triang(0.25, 1, 4).logpdf(3)))
+show("Sobol points", [[float(v) for v in row] for row in qmc.Sobol(5, scramble=False).random(16)])
+show("P(N(0, 2) > 6.0316)", float(norm.sf(6.0316 / 2**0.5)))
