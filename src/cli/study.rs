@@ -201,7 +201,6 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
         renderer: args.renderer.into(),
         stop: Some(&STOP),
         progress: Some(&show),
-        program: None,
     };
     let rows = study::run(&template, &out, &options);
     bar.finish();
@@ -340,7 +339,6 @@ impl Bar {
             of,
             failed,
             per_minute,
-            ..
         } = *progress;
         let said = format!("; {per_minute:.1} a minute, {failed} failed");
         self.bar.set_length(of);

@@ -39,6 +39,7 @@ mod stream;
 mod tables;
 mod texts;
 
+pub(crate) use stream::part_name;
 pub use tables::FixTable;
 
 use crate::bus::SimTime;

@@ -178,7 +178,7 @@ impl Stream {
 }
 
 /// Name of a file while it is written.
-pub(super) fn part_name(path: &Path) -> PathBuf {
+pub(crate) fn part_name(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     PathBuf::from(name)

@@ -1,6 +1,6 @@
 //! What a study's folder holds: of which inputs, by which version, on which adapter.
 
-use super::StudyError;
+use super::{StudyError, write_whole};
 use crate::scenario::draw::{Inputs, Template};
 use crate::session::RendererChoice;
 use crate::twin::render::Backend;
@@ -145,11 +145,8 @@ impl Manifest {
 
     /// Writes it into a folder, whole or not at all.
     pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
-        let path = folder.join(MANIFEST);
-        let part = folder.join(format!("{MANIFEST}.part"));
         let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        let written = fs::write(&part, text).and_then(|()| fs::rename(&part, &path));
-        written.map_err(|source| StudyError::file(&path, source))
+        write_whole(&folder.join(MANIFEST), text.as_bytes())
     }
 
     /// What differs between two of them, in words; shard and number of runs aside: a study may go on

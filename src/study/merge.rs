@@ -2,7 +2,7 @@
 
 use super::journal::{self, JOURNAL};
 use super::worker::template_of;
-use super::{INPUTS, Manifest, Row, Shard, StudyError, table};
+use super::{INPUTS, Manifest, Row, Shard, StudyError, table, write_whole};
 use crate::scenario::draw::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
@@ -125,10 +125,7 @@ fn write(
         serde_json::to_writer(&mut text, row).map_err(|e| failed(e.into()))?;
         text.push(b'\n');
     }
-    let (part, path) = (folder.join(format!("{JOURNAL}.part")), folder.join(JOURNAL));
-    fs::write(&part, text)
-        .and_then(|()| fs::rename(&part, &path))
-        .map_err(failed)?;
+    write_whole(&folder.join(JOURNAL), &text)?;
     table::write(folder, &template, &rows)?;
     let whole = Manifest {
         shard: None,

@@ -16,7 +16,7 @@
 //! Run k hangs on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
 //! the same for one worker and many, for shards on other machines, and for a study that was killed and
 //! resumed. Workers are processes of their own, one a core: a software graphics driver starts threads
-//! of its own, and two processes with a thread each do more than one with two; and a driver that
+//! of its own, and two processes with one each do more than one with two; and a driver that
 //! crashes costs one run. Each row is appended to a journal and synced; a table in Parquet is made
 //! of it. A run that fails is a row with its reason.
 //!
@@ -53,6 +53,7 @@ pub use slurm::{Submission, Submitted};
 pub use table::check_names;
 pub use worker::{Desk, serve, template_of};
 
+use crate::record::part_name;
 use crate::scenario::ScenarioError;
 use crate::scenario::draw::{ConditionError, DrawError};
 use crate::session::ObserverError;
@@ -144,6 +145,13 @@ impl StudyError {
             source,
         }
     }
+}
+
+/// Writes under a temporary name and renames, so that a file is whole or not there.
+fn write_whole(path: &Path, content: &[u8]) -> Result<(), StudyError> {
+    let part = part_name(path);
+    let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
+    written.map_err(|source| StudyError::file(path, source))
 }
 
 fn advice(source: &io::Error) -> &'static str {

@@ -8,7 +8,7 @@ use crate::scenario::draw::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::available_parallelism;
 use std::time::{Duration, Instant};
@@ -28,8 +28,6 @@ pub struct Options<'a> {
     pub stop: Option<&'a AtomicBool>,
     /// Told how far it is, now and then.
     pub progress: Option<&'a dyn Fn(&Progress)>,
-    /// The program that works; this one by default.
-    pub program: Option<PathBuf>,
 }
 
 /// How far a study is.
@@ -37,8 +35,6 @@ pub struct Options<'a> {
 pub struct Progress {
     /// Rows there are.
     pub done: u64,
-    /// Rows there were before.
-    pub before: u64,
     /// Rows there are to be.
     pub of: u64,
     /// Of the rows, how many are not complete.
@@ -154,12 +150,8 @@ fn pool<'a>(
     } else {
         options.jobs
     };
-    let program = match &options.program {
-        Some(program) => program.clone(),
-        None => std::env::current_exe().map_err(StudyError::Worker)?,
-    };
     Ok(Pool {
-        program,
+        program: std::env::current_exe().map_err(StudyError::Worker)?,
         folder,
         // What the manifest says, and nothing else where that fails.
         renderer: if manifest.renderer.backend == "cpu" {
@@ -249,7 +241,6 @@ impl<'a> Office<'a> {
             .count();
         show(&Progress {
             done,
-            before: self.before,
             of: self.of,
             failed: failed as u64,
             per_minute: (done - self.before) as f64 / minutes.max(1e-9),

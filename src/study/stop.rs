@@ -3,7 +3,7 @@
 use super::digest::is_weighed;
 use super::stats::{Estimate, mean, rate};
 use super::table::events;
-use super::{MEASURES, Row, Status, StudyError};
+use super::{Row, Status, StudyError, measure};
 use crate::scenario::draw::{Condition, Template};
 
 /// Runs between two looks.
@@ -40,10 +40,9 @@ impl Precision {
         let event = events(template)?
             .into_iter()
             .find(|(name, _)| *name == when.of);
-        let known = MEASURES.iter().any(|m| m.name == when.of);
         let figure = match event {
             Some((_, condition)) => Figure::Rate(condition),
-            None if known => Figure::Mean(when.of.clone()),
+            None if measure(&when.of).is_some() => Figure::Mean(when.of.clone()),
             None => return Err(StudyError::NoColumn(when.of.clone())),
         };
         Ok(Some(Self {

@@ -1,6 +1,6 @@
 //! Rows as a table in Parquet.
 
-use super::{MEASURES, Row, StudyError};
+use super::{MEASURES, Row, StudyError, measure};
 use crate::record::parquet::{Column, Kind, Table, Value, column};
 use crate::scenario::draw::{Condition, ConditionError, Template};
 use serde_json::Value as Json;
@@ -11,9 +11,8 @@ pub const TABLE: &str = "rows.parquet";
 
 /// Events of a study, parsed, by name.
 pub fn events(template: &Template) -> Result<Vec<(String, Condition)>, ConditionError> {
-    let known = |name: &str| {
-        template.settings.variables.contains_key(name) || MEASURES.iter().any(|m| m.name == name)
-    };
+    let known =
+        |name: &str| template.settings.variables.contains_key(name) || measure(name).is_some();
     let events = template.settings.events.iter();
     let parse = |(name, text): (&String, &String)| {
         let condition = Condition::parse(text)?;
@@ -33,9 +32,7 @@ const OWN: [&str; 6] = ["index", "seed", "status", "reason", "rejected", "weight
 pub fn check_names(template: &Template) -> Result<(), StudyError> {
     events(template)?;
     let settings = &template.settings;
-    let taken = |name: &&String| {
-        OWN.contains(&name.as_str()) || MEASURES.iter().any(|m| m.name == name.as_str())
-    };
+    let taken = |name: &&String| OWN.contains(&name.as_str()) || measure(name).is_some();
     let mut names = settings.variables.keys().chain(settings.events.keys());
     match names.find(taken) {
         None => Ok(()),

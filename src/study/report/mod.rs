@@ -6,7 +6,7 @@ mod page;
 mod plot;
 
 use super::worker::template_of;
-use super::{Digest, Row, StudyError, journal, stop::Precision};
+use super::{Digest, Row, StudyError, journal, stop::Precision, write_whole};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -31,19 +31,14 @@ pub fn report(folder: &Path) -> Result<(PathBuf, Digest), StudyError> {
     let rows = rows(folder)?;
     let digest = Digest::of(&template, &rows)?;
     let plots = figures::all(&template, &digest, &rows);
-    let failed = |path: &Path| {
-        let path = path.to_owned();
-        move |source| StudyError::file(&path, source)
-    };
     let beside = folder.join(PLOTS);
-    fs::create_dir_all(&beside).map_err(failed(&beside))?;
+    fs::create_dir_all(&beside).map_err(|e| StudyError::file(&beside, e))?;
     for plot in &plots {
         let path = beside.join(format!("{}.svg", plot.name));
-        fs::write(&path, &plot.svg).map_err(failed(&path))?;
+        write_whole(&path, plot.svg.as_bytes())?;
     }
     let html = page::page(folder, &manifest, &template, &digest, &plots, &rows);
-    let (part, path) = (folder.join(format!("{REPORT}.part")), folder.join(REPORT));
-    let written = fs::write(&part, html).and_then(|()| fs::rename(&part, &path));
-    written.map_err(failed(&path))?;
+    let path = folder.join(REPORT);
+    write_whole(&path, html.as_bytes())?;
     Ok((path, digest))
 }
