@@ -27,9 +27,28 @@ fn metrotwin(args: &[&str]) -> Command {
 }
 
 fn study(out: &Path, more: &[&str]) -> Output {
-    let out = out.to_str().unwrap();
-    let args = ["study", "run", SMALL, "--renderer", "cpu", "--out", out];
+    study_of(Path::new(SMALL), out, more)
+}
+
+fn study_of(file: &Path, out: &Path, more: &[&str]) -> Output {
+    let [file, out] = [file, out].map(|p| p.to_str().unwrap());
+    let args = ["study", "run", file, "--renderer", "cpu", "--out", out];
     metrotwin(&[&args, more].concat()).output().unwrap()
+}
+
+/// A copy of the small study below a folder, at the same depth, with something changed.
+fn changed(base: &Path, from: &str, to: &str) -> PathBuf {
+    let text = fs::read_to_string(SMALL).unwrap();
+    assert!(text.contains(from));
+    let (folder, tunnels) = (base.join("tests/studies"), base.join("tunnels"));
+    fs::create_dir_all(&folder).unwrap();
+    fs::create_dir_all(&tunnels).unwrap();
+    let line = "chengdu_line1.toml";
+    fs::copy(Path::new("tunnels").join(line), tunnels.join(line)).unwrap();
+    fs::copy("tests/studies/steps.csv", folder.join("steps.csv")).unwrap();
+    let path = folder.join("small.toml");
+    fs::write(&path, text.replace(from, to)).unwrap();
+    path
 }
 
 fn said(output: &Output) -> String {
@@ -139,36 +158,12 @@ fn rows_are_the_same_however_they_came() {
 #[test]
 fn a_study_stops_at_the_same_run() {
     let base = folder("stops");
-    let tests = base.join("tests/studies");
-    fs::create_dir_all(&tests).unwrap();
-    fs::create_dir_all(base.join("tunnels")).unwrap();
-    let line = "tunnels/chengdu_line1.toml";
-    fs::copy(line, base.join(line)).unwrap();
-    fs::copy("tests/studies/steps.csv", tests.join("steps.csv")).unwrap();
-    let text = fs::read_to_string(SMALL)
-        .unwrap()
-        .replace("duration_s = 1.5", "duration_s = 0.2");
-    let stop = "\n[study.stop.when]\nof = \"run_m\"\nhalf_width = 0.2\n";
-    let file = tests.join("small.toml");
-    fs::write(&file, text + stop).unwrap();
+    let stop = "duration_s = 0.2\n[study.stop.when]\nof = \"run_m\"\nhalf_width = 0.2\n";
+    let file = changed(&base, "duration_s = 1.5", stop);
     let run = |jobs: &str| {
         let out = base.join(jobs);
-        let [file, out] = [&file, &out].map(|p| p.to_str().unwrap().to_owned());
-        let args = [
-            "study",
-            "run",
-            &file,
-            "--renderer",
-            "cpu",
-            "--runs",
-            "100",
-            "--jobs",
-            jobs,
-            "--out",
-            &out,
-        ];
-        succeeds(&metrotwin(&args).output().unwrap());
-        base.join(jobs)
+        succeeds(&study_of(&file, &out, &["--runs", "100", "--jobs", jobs]));
+        out
     };
     let (one, three) = (run("1"), run("3"));
     same(&one, &three);
@@ -179,6 +174,53 @@ fn a_study_stops_at_the_same_run() {
         rows.len()
     );
     assert!(read_rows(&three).unwrap().len() >= rows.len());
+    fs::remove_dir_all(base).ok();
+}
+
+/// A budget of time: no run is begun after it, all that were begun are kept, and `--resume` has the
+/// same budget again.
+#[test]
+fn a_study_stops_in_time() {
+    let base = folder("in_time");
+    let file = changed(&base, "[study]", "[study.stop]\nafter_s = 0.5\n\n[study]");
+    let out = base.join("out");
+    let runs = |more: &[&str]| {
+        succeeds(&study_of(
+            &file,
+            &out,
+            &[&["--runs", "5000"], more].concat(),
+        ));
+        read_rows(&out).unwrap().len()
+    };
+    let first = runs(&[]);
+    assert!((1..10_000).contains(&first), "{first}");
+    let second = runs(&["--resume"]);
+    assert!((first + 1..10_000).contains(&second), "{first}, {second}");
+    fs::remove_dir_all(base).ok();
+}
+
+/// A run that hangs: it is given up as a row that says so, the rest goes on, and the next `--resume`
+/// tries it again.
+#[test]
+fn a_run_that_takes_too_long_is_given_up() {
+    let base = folder("hung");
+    let (out, whole) = (base.join("out"), base.join("whole"));
+    // No run of 1500 steps and a start of the process is that short.
+    succeeds(&study(&out, &["--runs", "1", "--run-limit-s", "0.001"]));
+    let rows = read_rows(&out).unwrap();
+    assert_eq!(rows.len(), 2);
+    for row in &rows {
+        assert_eq!(row.status, metrotwin::study::Status::Crashed);
+        assert!(
+            row.reason
+                .as_ref()
+                .unwrap()
+                .contains("no word from it for 0.001 s")
+        );
+    }
+    succeeds(&study(&out, &["--runs", "1", "--resume"]));
+    succeeds(&study(&whole, &["--runs", "1"]));
+    same(&out, &whole);
     fs::remove_dir_all(base).ok();
 }
 
@@ -217,37 +259,8 @@ fn wrong_studies_are_refused() {
         "the whole of it, not shard 1/2",
     );
 
-    // A copy of the study with something changed, at the same depth.
-    let changed = |name: &str, from: &str, to: &str| {
-        let text = fs::read_to_string(SMALL).unwrap();
-        assert!(text.contains(from));
-        let folder = base.join(name).join("tests/studies");
-        fs::create_dir_all(&folder).unwrap();
-        let tunnels = base.join(name).join("tunnels");
-        fs::create_dir_all(&tunnels).unwrap();
-        let line = "chengdu_line1.toml";
-        fs::copy(Path::new("tunnels").join(line), tunnels.join(line)).unwrap();
-        fs::copy("tests/studies/steps.csv", folder.join("steps.csv")).unwrap();
-        let path = folder.join("small.toml");
-        fs::write(&path, text.replace(from, to)).unwrap();
-        path
-    };
-    let run = |path: &Path, out: &Path| {
-        let [path, out] = [path, out].map(|p| p.to_str().unwrap());
-        metrotwin(&[
-            "study",
-            "run",
-            path,
-            "--renderer",
-            "cpu",
-            "--out",
-            out,
-            "--resume",
-        ])
-        .output()
-        .unwrap()
-    };
-    let other = changed("other", "median = 60.0", "median = 61.0");
+    let run = |path: &Path, out: &Path| study_of(path, out, &["--resume"]);
+    let other = changed(&base.join("other"), "median = 60.0", "median = 61.0");
     refused(run(&other, &done), "small.toml has changed");
     for (name, from, to, what) in [
         (
@@ -291,7 +304,7 @@ fn wrong_studies_are_refused() {
         ("condition", "speed_kmh < 75", "speed_kmh <", "no condition"),
     ] {
         let out = base.join("never");
-        refused(run(&changed(name, from, to), &out), what);
+        refused(run(&changed(&base.join(name), from, to), &out), what);
         assert!(!out.join(MANIFEST).exists(), "{name} was begun");
     }
     fs::remove_dir_all(base).ok();

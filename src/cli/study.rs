@@ -9,6 +9,7 @@ use clap::Subcommand;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 const AFTER: &str = "\
 A study is a scenario file with a table [study]: which keys vary and how, conditions between them, how
@@ -75,6 +76,9 @@ struct RunArgs {
     /// What draws the images
     #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
     renderer: RendererArg,
+    /// Give up a run that takes longer, as one that has hung
+    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = seconds)]
+    run_limit_s: f64,
 }
 
 /// Make one study of all shards below its folder
@@ -199,12 +203,23 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
         resume: args.resume,
         shard: args.shard,
         renderer: args.renderer.into(),
+        run_limit: Some(Duration::from_secs_f64(args.run_limit_s)),
         stop: Some(&STOP),
         progress: Some(&show),
     };
     let rows = study::run(&template, &out, &options);
     bar.finish();
     conclude(&out, &template, &rows?, args.shard.is_none())
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().map_err(|e| e.to_string())?;
+    let range = 1e-3..=1e9;
+    let outside = || format!("is not from {} to {} s", range.start(), range.end());
+    range
+        .contains(&number)
+        .then_some(number)
+        .ok_or_else(outside)
 }
 
 fn compare(args: &CompareArgs) -> Result<(), Failure> {
@@ -221,7 +236,8 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
     );
     if found.drawn_otherwise > 0 {
         text += &format!(
-            "{} of them were not drawn alike: their differences scatter as if there were no pairs\n",
+            "{} of them were not drawn alike: their differences scatter as if there were no pairs (weighed \
+             runs have none)\n",
             found.drawn_otherwise
         );
     }

@@ -2,7 +2,7 @@
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
 use super::digest::is_weighed;
-use super::stats::{Estimate, paired_difference};
+use super::stats::{Estimate, mean, weighted_mean};
 use super::worker::template_of;
 use super::{MEASURES, Row, Status, StudyError, report, table};
 use crate::record::parquet::Kind;
@@ -13,7 +13,8 @@ use std::path::Path;
 pub struct Comparison {
     /// Runs that are complete in both, by their indexes.
     pub pairs: usize,
-    /// Of these, how many were not drawn alike: then pairs are no pairs.
+    /// Of these, how many were not drawn alike: then pairs are no pairs, and weighed runs, whose weights
+    /// are then two, have no differences.
     pub drawn_otherwise: usize,
     /// Name, unit, and mean difference of each figure and event that differs in some run.
     pub differences: Vec<(String, String, Estimate)>,
@@ -31,19 +32,29 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let complete = |row: &Row| row.status == Status::Complete;
     let pairs = pairs.filter(|(a, b)| complete(a) && complete(b));
     let pairs: Vec<(&Row, &Row)> = pairs.collect();
-    let named = |row: &Row| (row.seed, row.values.clone());
-    let drawn_otherwise = pairs.iter().filter(|(a, b)| named(a) != named(b)).count();
+    let alike = |a: &Row, b: &Row| {
+        a.seed == b.seed && a.values == b.values && a.ln_weight.to_bits() == b.ln_weight.to_bits()
+    };
+    let drawn_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
 
     let template = template_of(a)?.1;
-    // Weighed runs are not those of their distributions: they have no plain differences.
-    let weighed = is_weighed(&template);
+    let weighed = is_weighed(&template) || is_weighed(&template_of(b)?.1);
+    let conditioned = !template.settings.require.is_empty();
     let events = table::events(&template)?;
     let mut differences = Vec::new();
     let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
-        let both = pairs.iter().filter_map(|(a, b)| Some((of(a)?, of(b)?)));
+        let both = pairs
+            .iter()
+            .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
         let both: Vec<(f64, f64)> = both.collect();
-        let differs = both.iter().any(|(a, b)| a.to_bits() != b.to_bits());
-        let estimate = paired_difference(&both).filter(|_| differs && !weighed);
+        let estimate = if weighed {
+            let whole = both.len() == rows_a.len() && !conditioned;
+            weighted_mean(&both, !whole).filter(|_| drawn_otherwise == 0)
+        } else {
+            mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>())
+        };
+        let differs = both.iter().any(|(_, d)| d.abs() > 0.0);
+        let estimate = estimate.filter(|_| differs);
         differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
     };
     for (name, condition) in &events {

@@ -1,12 +1,13 @@
 //! What the rows of a study come to.
 
 use super::stats::{
-    Estimate, Rate, Weighted, effective_runs, first_order, mean, quantile, rank_correlation, rate,
-    weighted_rate,
+    Estimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean, quantile,
+    rank_correlation, rate, weighted_mean, weighted_rate,
 };
 use super::{MEASURES, Measure, Row, Status, StudyError, table};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::{Distribution, Template};
+use std::collections::BTreeSet;
 
 /// Quantiles that are shown.
 pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
@@ -50,7 +51,8 @@ pub struct FigureDigest {
     pub mean: Option<Estimate>,
     /// Its [`QUANTILES`].
     pub quantiles: [Option<Estimate>; QUANTILES.len()],
-    /// What drives it: each variable of numbers with its rank correlation and first-order share.
+    /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
+    /// no quantiles and drivers: theirs are not those of the distributions that were asked for.
     pub drivers: Vec<Driver>,
 }
 
@@ -59,7 +61,7 @@ pub struct FigureDigest {
 pub struct Driver {
     /// The variable.
     pub variable: String,
-    /// Spearman's rank correlation.
+    /// Spearman's rank correlation; `None` of names.
     pub correlation: Option<Estimate>,
     /// First-order Sobol index; `None` where inputs are not independent.
     pub first_order: Option<f64>,
@@ -137,33 +139,30 @@ fn is_shown(measure: &Measure) -> bool {
 }
 
 impl FigureDigest {
-    /// `None` of a figure that no run has, or that is the same in all. Weighed runs have no plain means:
-    /// they are not those of the distributions that were asked for.
+    /// `None` of a figure that no run has, or that is the same in all.
     fn of(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Option<Self> {
-        let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
-        let first = sample.first()?.to_bits();
-        if sample.iter().all(|x| x.to_bits() == first) || is_weighed(template) {
+        let told = rows
+            .iter()
+            .filter_map(|r| Some((r.ln_weight, r.number(measure.name)?)));
+        let told: Vec<(f64, f64)> = told.collect();
+        let first = told.first()?.1.to_bits();
+        if told.iter().all(|(_, x)| x.to_bits() == first) {
             return None;
         }
+        if is_weighed(template) {
+            let normalise = !template.settings.require.is_empty() || told.len() < rows.len();
+            return Some(Self {
+                measure,
+                mean: weighted_mean(&told, normalise),
+                quantiles: [None; QUANTILES.len()],
+                drivers: Vec::new(),
+            });
+        }
+        let mut sample: Vec<f64> = told.into_iter().map(|(_, x)| x).collect();
         let mean = mean(&sample);
         sample.sort_by(f64::total_cmp);
-        let settings = &template.settings;
-        let variables = settings
-            .variables
-            .keys()
-            .filter(|name| rows.iter().any(|r| r.number(name).is_some()));
-        let independent = settings.correlated.is_empty()
-            && settings.require.is_empty()
-            && !shares_a_table(template);
-        let drivers = variables.map(|name| {
-            let pair = |r: &&Row| Some((r.number(name)?, r.number(measure.name)?));
-            let pairs: Vec<(f64, f64)> = rows.iter().filter_map(pair).collect();
-            Driver {
-                variable: name.clone(),
-                correlation: rank_correlation(&pairs),
-                first_order: independent.then(|| first_order(&pairs)).flatten(),
-            }
-        });
+        let variables = template.settings.variables.keys();
+        let drivers = variables.map(|name| Driver::of(template, name, measure, rows));
         Some(Self {
             measure,
             mean,
@@ -171,6 +170,42 @@ impl FigureDigest {
             drivers: drivers.collect(),
         })
     }
+}
+
+impl Driver {
+    fn of(template: &Template, name: &str, measure: &Measure, rows: &[&Row]) -> Self {
+        let settings = &template.settings;
+        let independent = settings.correlated.is_empty()
+            && settings.require.is_empty()
+            && !shares_a_table(template);
+        let pairs = rows
+            .iter()
+            .filter_map(|r| Some((r.number(name)?, r.number(measure.name)?)));
+        let pairs: Vec<(f64, f64)> = pairs.collect();
+        let share = || {
+            if pairs.is_empty() {
+                first_order_of_groups(&by_name(name, measure, rows))
+            } else {
+                first_order(&pairs)
+            }
+        };
+        Self {
+            variable: name.to_owned(),
+            correlation: rank_correlation(&pairs),
+            first_order: independent.then(share).flatten(),
+        }
+    }
+}
+
+/// Runs by which of the names of a variable they have.
+fn by_name(variable: &str, measure: &Measure, rows: &[&Row]) -> Vec<(usize, f64)> {
+    let name = |row: &Row| Some(row.values.get(variable)?.to_string());
+    let names: BTreeSet<String> = rows.iter().filter_map(|r| name(r)).collect();
+    let place = |row: &Row| names.iter().position(|n| Some(n) == name(row).as_ref());
+    let pairs = rows
+        .iter()
+        .filter_map(|r| Some((place(r)?, r.number(measure.name)?)));
+    pairs.collect()
 }
 
 /// A figure with its interval, to the digits that it tells.

@@ -4,17 +4,19 @@ use super::{Row, Status, StudyError};
 use crate::scenario::draw::Template;
 use std::collections::VecDeque;
 use std::fs::{self, File};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
-use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 /// How often whoever waits for rows is asked whether to go on.
 const PATIENCE: Duration = Duration::from_millis(200);
+/// It reads the study's files before that: a machine that swaps may be slow, but not so slow.
+const START_LIMIT: Duration = Duration::from_secs(300);
 /// What a worker says before its first row.
 pub const READY: &str = "ready";
 /// Lines of a dead worker's messages that are kept as the reason.
@@ -31,6 +33,8 @@ pub struct Pool<'a> {
     pub renderer: &'static str,
     /// How many.
     pub jobs: usize,
+    /// A run that takes longer has hung, and its worker is ended.
+    pub run_limit: Duration,
 }
 
 /// What happens while workers are at it.
@@ -98,7 +102,7 @@ impl Pool<'_> {
                 Some(worker) => Ok(worker),
                 None => Worker::start(self, number).map_err(StudyError::Worker),
             }
-            .and_then(|mut of: Worker| match of.ask(index) {
+            .and_then(|mut of: Worker| match of.ask(index, self.run_limit) {
                 Ok(row) => {
                     worker = Some(of);
                     Ok(row)
@@ -125,7 +129,8 @@ impl Pool<'_> {
 struct Worker {
     child: Child,
     to: ChildStdin,
-    from: BufReader<ChildStdout>,
+    /// Its lines, read by a thread that ends with it: a pipe itself cannot be waited for with a limit.
+    lines: Receiver<io::Result<String>>,
     log: PathBuf,
 }
 
@@ -148,29 +153,42 @@ impl Worker {
         let mut child = command.spawn()?;
         let pipes = child.stdin.take().zip(child.stdout.take());
         let (to, from) = pipes.ok_or_else(|| io::Error::other("it has no pipes"))?;
+        let (line, lines) = channel();
+        thread::spawn(move || {
+            let all = BufReader::new(from).lines();
+            all.map(|text| line.send(text))
+                .take_while(Result::is_ok)
+                .count()
+        });
         let mut worker = Self {
             child,
             to,
-            from: BufReader::new(from),
+            lines,
             log,
         };
-        let mut line = String::new();
-        match worker.from.read_line(&mut line) {
-            Ok(_) if line.trim() == READY => Ok(worker),
-            _ => {
-                let end = io::ErrorKind::UnexpectedEof.into();
-                Err(io::Error::other(worker.obituary(&end)))
-            }
+        match worker.line(START_LIMIT) {
+            Ok(line) if line.trim() == READY => Ok(worker),
+            Ok(_) => Err(io::Error::other(
+                worker.obituary(&ErrorKind::InvalidData.into()),
+            )),
+            Err(error) => Err(io::Error::other(worker.obituary(&error))),
         }
     }
 
-    fn ask(&mut self, index: u64) -> io::Result<Row> {
+    fn ask(&mut self, index: u64, limit: Duration) -> io::Result<Row> {
         writeln!(self.to, "{index}").and_then(|()| self.to.flush())?;
-        let mut line = String::new();
-        if self.from.read_line(&mut line)? == 0 {
-            return Err(io::ErrorKind::UnexpectedEof.into());
+        Ok(serde_json::from_str(&self.line(limit)?)?)
+    }
+
+    fn line(&mut self, limit: Duration) -> io::Result<String> {
+        match self.lines.recv_timeout(limit) {
+            Ok(line) => line,
+            Err(RecvTimeoutError::Disconnected) => Err(ErrorKind::UnexpectedEof.into()),
+            Err(RecvTimeoutError::Timeout) => Err(io::Error::other(format!(
+                "no word from it for {} s",
+                limit.as_secs_f64()
+            ))),
         }
-        Ok(serde_json::from_str(&line)?)
     }
 
     /// Why it died.
@@ -178,7 +196,7 @@ impl Worker {
         // It may only have said something wrong.
         self.child.kill().ok();
         let end = match self.child.wait() {
-            Ok(status) if error.kind() == io::ErrorKind::UnexpectedEof => status.to_string(),
+            Ok(status) if error.kind() == ErrorKind::UnexpectedEof => status.to_string(),
             _ => error.to_string(),
         };
         let said = fs::read_to_string(&self.log).unwrap_or_default();

@@ -24,6 +24,8 @@ pub struct Options<'a> {
     pub shard: Option<Shard>,
     /// Which renderer.
     pub renderer: RendererChoice,
+    /// A run that takes longer has hung: it is given up, as a row that says so. None of its own: an hour.
+    pub run_limit: Option<Duration>,
     /// Set from elsewhere to begin no more runs.
     pub stop: Option<&'a AtomicBool>,
     /// Told how far it is, now and then.
@@ -43,6 +45,8 @@ pub struct Progress {
     pub per_minute: f64,
 }
 
+/// No run is known to take so long.
+const RUN_LIMIT: Duration = Duration::from_secs(3600);
 /// How often the table is written while runs go on.
 const TABLE_EVERY: Duration = Duration::from_secs(60);
 
@@ -77,11 +81,7 @@ pub fn run(
     check_same(folder, kept.as_ref(), &manifest)?;
     let (journal, mut rows) = Journal::open(folder)?;
     if kept.is_none() && !rows.is_empty() {
-        let what = "rows without a manifest".to_owned();
-        return Err(StudyError::Other {
-            path: folder.to_owned(),
-            what,
-        });
+        return Err(another(folder, "rows without a manifest".into()));
     }
     if !options.resume && !rows.is_empty() {
         return Err(StudyError::Exists {
@@ -132,11 +132,13 @@ fn check_same(folder: &Path, kept: Option<&Manifest>, now: &Manifest) -> Result<
     });
     match what {
         None => Ok(()),
-        Some(what) => Err(StudyError::Other {
-            path: folder.to_owned(),
-            what,
-        }),
+        Some(what) => Err(another(folder, what)),
     }
+}
+
+fn another(folder: &Path, what: String) -> StudyError {
+    let path = folder.to_owned();
+    StudyError::Other { path, what }
 }
 
 fn pool<'a>(
@@ -160,6 +162,7 @@ fn pool<'a>(
             "gpu"
         },
         jobs,
+        run_limit: options.run_limit.unwrap_or(RUN_LIMIT),
     })
 }
 

@@ -28,6 +28,10 @@ ties = [1, 2, 2, 3, 3, 3, 4, 5, 5, 6]
 other = [2, 1, 3, 3, 5, 4, 4, 6, 8, 7]
 show("spearman ties", stats.spearmanr(ties, other).statistic)
 d = np.array(y) - a
+# Kelley's epsilon squared by the F of an analysis of variance.
+shifted = np.array(y) + np.array([0.0, 2.0, 1.0])[np.arange(40) % 3]
+f = stats.f_oneway(*(shifted[np.arange(40) % 3 == g] for g in range(3))).statistic
+show("epsilon squared", float(2 * (f - 1) / (2 * f + 37)))
 show("paired", (d.mean(), *stats.t.interval(0.95, 39, d.mean(), stats.sem(d))))
 
 # Quantiles of distributions: u = 1e-6, 0.1, 0.5, 0.999.

@@ -2,23 +2,27 @@
 //!
 //! | figure | interval | source |
 //! |---|---|---|
-//! | [`mean`] | Student's t | needs some 30 runs where errors are skew |
+//! | [`mean`] | Student's t | needs some 30 runs where errors are skew; two studies are held against each other by the mean of the differences between runs of the same index, which met the same chances |
 //! | [`quantile`] | two order statistics, by the binomial distribution | exact for any distribution: David and Nagaraja, Order Statistics, 7.1 |
 //! | [`rate`] | Wilson's score, and Clopper and Pearson's exact one | Brown, Cai, DasGupta, Stat. Sci. 16 (2001) |
-//! | [`paired_difference`] | Student's t of the differences | runs of the same index meet the same chances |
-//! | [`weighted_rate`] | normal | importance sampling; with the effective number of runs (Kish) |
+//! | [`weighted_mean`], [`weighted_rate`] | normal | importance sampling; with the effective number of runs (Kish) |
 //! | [`rank_correlation`] | Fisher's z (Bonett and Wright 2000) | Spearman |
 //! | [`first_order`] | none | share of the variance that an input alone explains: Gamboa et al., Stat. Probab. Lett. 2022, from ranks, with any plan of independent inputs |
+//! | [`first_order_of_groups`] | none | the same of an input that has names: Kelley's epsilon squared |
+//!
+//! The intervals take runs for independent. Those of a Latin hypercube lie more evenly, and its means
+//! scatter by at most n / (n - 1) of that (Owen, SIAM J. Numer. Anal. 34 (1997)), mostly by less: its
+//! intervals are wider than they need be, and Sobol's too wherever few variables act at a time.
 
-mod rank;
 mod rate;
 mod sample;
+mod sensitivity;
 mod weight;
 
-pub use rank::{first_order, rank_correlation};
 pub use rate::{Rate, rate};
-pub use sample::{mean, paired_difference, quantile};
-pub use weight::{Weighted, effective_runs, weighted_rate};
+pub use sample::{mean, quantile};
+pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};
+pub use weight::{Weighted, effective_runs, weighted_mean, weighted_rate};
 
 /// A figure with its interval of 95 %.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,11 +23,6 @@ pub fn mean(sample: &[f64]) -> Option<Estimate> {
     })
 }
 
-/// Mean difference b - a of runs that met the same chances, in pairs.
-pub fn paired_difference(pairs: &[(f64, f64)]) -> Option<Estimate> {
-    mean(&pairs.iter().map(|(a, b)| b - a).collect::<Vec<_>>())
-}
-
 /// The quantile p of sorted numbers, interpolated between order statistics as numpy does by default,
 /// between the order statistics that hold the true one with 95 % at least. An end that the sample is
 /// too small for is infinite.

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::twin::random::Stream;
+use statrs::distribution::{ContinuousCDF, Normal};
 
 const SAMPLE: [f64; 40] = [
     0.167106, 0.302529, 0.403527, 0.491043, 0.571163, 0.646683, 0.719183, 0.789671, 0.85885,
@@ -52,9 +53,13 @@ fn val_means_and_quantiles_are_scipys() {
         far.high.is_infinite(),
         "40 runs do not bound the 95th percentile from above"
     );
-    let pairs: Vec<_> = (0..40).map(|k| (SAMPLE[k], y(k))).collect();
-    let d = paired_difference(&pairs).unwrap();
-    close(d, 0.0288275, -0.19932921510731455, 0.25698421510731456);
+    let differences: Vec<_> = (0..40).map(|k| y(k) - SAMPLE[k]).collect();
+    close(
+        mean(&differences).unwrap(),
+        0.0288275,
+        -0.19932921510731455,
+        0.25698421510731456,
+    );
 }
 
 #[test]
@@ -154,6 +159,52 @@ fn val_first_order_indices_of_ishigami() {
         let s = first_order(&pairs).unwrap();
         assert!((s - truth).abs() < 0.04, "input {v}: {s}, not {truth}");
     }
+}
+
+/// Groups in the place of ranks: the closed form of a known effect, and Kelley's statistic by scipy's F.
+#[test]
+fn val_first_order_of_groups() {
+    let groups: Vec<_> = (0..40)
+        .map(|k| (k % 3, y(k) + [0.0, 2.0, 1.0][k % 3]))
+        .collect();
+    let share = first_order_of_groups(&groups).unwrap();
+    assert!((share - 0.1357243424412402).abs() < 1e-9, "{share}");
+    // Three equal groups at 0, 1 and 2 with uniform noise of variance 1: 2/3 of 5/3 lie between them.
+    let stream = Stream::new(6, 0, "groups");
+    let noise = |k| (stream.uniform(k) - 0.5) * 12f64.sqrt();
+    let many: Vec<_> = (0..6000)
+        .map(|k| ((k % 3) as usize, (k % 3) as f64 + noise(k)))
+        .collect();
+    let share = first_order_of_groups(&many).unwrap();
+    assert!((share - 0.4).abs() < 0.03, "{share}");
+    let nothing: Vec<_> = (0..6000).map(|k| ((k % 3) as usize, noise(k))).collect();
+    assert!(first_order_of_groups(&nothing).unwrap().abs() < 0.003);
+    assert!(first_order_of_groups(&[(0, 1.0); 12]).is_none());
+}
+
+/// Weights, conditioned and not, of a normal shift: E[x] under N(0, 1) of draws from N(1, 1).
+#[test]
+fn weighted_means_are_those_of_the_distributions() {
+    let stream = Stream::new(7, 0, "weights");
+    let normal = Normal::standard();
+    let run = |k| {
+        let x = 1.0 + normal.inverse_cdf(stream.uniform(k));
+        (0.5 - x, x)
+    };
+    let runs: Vec<(f64, f64)> = (0..20_000).map(run).collect();
+    for normalise in [false, true] {
+        let e = weighted_mean(&runs, normalise).unwrap();
+        assert!(
+            (e.low..=e.high).contains(&0.0) && e.high - e.low < 0.1,
+            "{e:?}"
+        );
+    }
+    let plain: Vec<(f64, f64)> = SAMPLE.iter().map(|x| (0.0, *x)).collect();
+    let (e, m) = (
+        weighted_mean(&plain, false).unwrap(),
+        mean(&SAMPLE).unwrap(),
+    );
+    assert!((e.value - m.value).abs() < 1e-12);
 }
 
 /// Weights that are not those of the densities, and effective numbers of runs.

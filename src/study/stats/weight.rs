@@ -15,47 +15,50 @@ pub struct Weighted {
     pub events: usize,
 }
 
-/// Of the natural logarithm of each run's weight, and whether it happened. The weights have mean 1 by
-/// themselves, so the estimate is without bias; where conditions cut draws off (`normalise`), they are
-/// brought to mean 1 over what is left.
-pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> {
+/// The mean over the distributions that were asked for, of the natural logarithm of each run's weight
+/// and a number; `None` of fewer than two runs. The weights have mean 1 by themselves, so the estimate is
+/// without bias; where runs are missing or conditions cut draws off (`normalise`), they are brought to
+/// mean 1 over what is left.
+pub fn weighted_mean(runs: &[(f64, f64)], normalise: bool) -> Option<Estimate> {
     let n = runs.len();
     if n < 2 {
         return None;
     }
     let weights: Vec<f64> = runs.iter().map(|(ln, _)| ln.exp()).collect();
-    let scale = if normalise {
-        n as f64 / weights.iter().sum::<f64>()
-    } else {
-        1.0
-    };
-    let share = |k: usize| if runs[k].1 { scale * weights[k] } else { 0.0 };
+    let sum: f64 = weights.iter().sum();
+    let scale = if normalise { n as f64 / sum } else { 1.0 };
+    let share = |k: usize| scale * weights[k] * runs[k].1;
     let value = (0..n).map(share).sum::<f64>() / n as f64;
-    let squares: f64 = (0..n)
-        .map(|k| {
-            // Of a ratio, by its linearisation.
-            let centre = if normalise {
-                scale * weights[k] * value
-            } else {
-                value
-            };
-            (share(k) - centre).powi(2)
-        })
-        .sum();
+    // Of a ratio, by its linearisation.
+    let centre = |k: usize| {
+        if normalise {
+            scale * weights[k] * value
+        } else {
+            value
+        }
+    };
+    let squares: f64 = (0..n).map(|k| (share(k) - centre(k)).powi(2)).sum();
     let sigma = (squares / (n - 1) as f64 / n as f64).sqrt();
     let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    Some(Estimate {
+        value,
+        low: value - z * sigma,
+        high: value + z * sigma,
+        n,
+    })
+}
+
+/// How often something happens: [`weighted_mean`] of whether it did.
+pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> {
+    let numbers = runs.iter().map(|(ln, h)| (*ln, f64::from(u8::from(*h))));
+    let mean = weighted_mean(&numbers.collect::<Vec<_>>(), normalise)?;
     let happened: Vec<f64> = runs.iter().filter(|r| r.1).map(|r| r.0).collect();
     Some(Weighted {
         rate: Estimate {
-            value,
-            low: (value - z * sigma).max(0.0),
+            low: mean.low.max(0.0),
             // Where it was never seen, nothing bounds it.
-            high: if happened.is_empty() {
-                1.0
-            } else {
-                value + z * sigma
-            },
-            n,
+            high: if happened.is_empty() { 1.0 } else { mean.high },
+            ..mean
         },
         effective_events: effective_runs(&happened),
         events: happened.len(),

@@ -1,8 +1,9 @@
-//! Which input drives a figure, by ranks.
+//! Which input drives a figure.
 
 use super::{Estimate, TAIL};
 use crate::twin::random::Stream;
 use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::BTreeMap;
 
 /// Spearman's rank correlation; equal values share their mean rank. `None` where one of both does not
 /// vary, or of fewer than five pairs.
@@ -69,4 +70,28 @@ pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
     let variance: f64 = (0..n).map(|k| y(k) * y(k)).sum();
     let alike: f64 = (0..n).map(|k| y(k) * y(k + 1)).sum();
     (variance > 0.0).then(|| alike / variance)
+}
+
+/// The same of an input that has names, not numbers, or that was tried at a few values: the share of the
+/// variance of y that lies between the groups, less what chance alone puts there (Kelley's epsilon
+/// squared, Proc. Natl. Acad. Sci. 21 (1935)). `None` of fewer than ten runs, of one group, where every
+/// run is a group, or where y does not vary.
+pub fn first_order_of_groups(pairs: &[(usize, f64)]) -> Option<f64> {
+    let n = pairs.len();
+    let mut groups = BTreeMap::<usize, Vec<f64>>::new();
+    for (group, y) in pairs {
+        groups.entry(*group).or_default().push(*y);
+    }
+    if n < 10 || groups.len() < 2 || groups.len() == n {
+        return None;
+    }
+    let squares = |sample: &[f64]| {
+        let mean = sample.iter().sum::<f64>() / sample.len() as f64;
+        sample.iter().map(|y| (y - mean).powi(2)).sum::<f64>()
+    };
+    let all: Vec<f64> = pairs.iter().map(|p| p.1).collect();
+    let total = squares(&all) / (n - 1) as f64;
+    let within: f64 = groups.values().map(|g| squares(g)).sum();
+    let within = within / (n - groups.len()) as f64;
+    (total > 0.0).then(|| 1.0 - within / total)
 }
