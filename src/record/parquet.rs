@@ -9,7 +9,9 @@ use arrow::array::{
 use arrow::datatypes::{DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
+use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use serde_json::json;
 use std::borrow::Cow;
 use std::error::Error;
 use std::fs::{self, File};
@@ -201,6 +203,7 @@ impl Table {
         let schema = Arc::new(Schema::new(fields.collect::<Vec<_>>()));
         let settings = WriterProperties::builder()
             .set_compression(Compression::LZ4_RAW)
+            .set_key_value_metadata(Some(vec![about(columns)]))
             .set_created_by(format!("metrotwin {}", env!("CARGO_PKG_VERSION")))
             .build();
         let file = File::create(part_name(&path)).map_err(broken(&path))?;
@@ -248,6 +251,13 @@ impl Table {
         self.writer.close().map_err(broken(&self.path))?;
         fs::rename(part_name(&self.path), &self.path).map_err(broken(&self.path))
     }
+}
+
+/// Units and meanings once more, for readers that do not see the schema of Arrow: a list in JSON.
+fn about(columns: &[Column]) -> KeyValue {
+    let column = |c: &Column| json!({"name": c.name, "unit": c.unit, "meaning": c.meaning});
+    let list: Vec<_> = columns.iter().map(column).collect();
+    KeyValue::new("columns".to_owned(), json!(list).to_string())
 }
 
 fn broken<E: Into<Box<dyn Error + Send + Sync>>>(
