@@ -362,7 +362,8 @@ impl Bar {
         self.bar.set_message(said.clone());
         let reached = 10 * done / of.max(1);
         if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
-            eprintln!("{done} of {of} runs{said}");
+            let left = (of - done) as f64 / per_minute.max(1e-9);
+            eprintln!("{done} of {of} runs{said}, {left:.1} min to go");
         }
     }
 

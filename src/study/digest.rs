@@ -214,8 +214,10 @@ pub fn show(e: &Estimate) -> String {
     let digits = |x: f64| (1.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
     let digits = if width.is_finite() && width > 0.0 {
         digits(width)
+    } else if e.value.abs() > 0.0 {
+        digits(e.value)
     } else {
-        digits(e.value.abs().max(1e-9))
+        0
     };
     let end = |x: f64| {
         if x.is_infinite() {

@@ -55,6 +55,7 @@ mod concrete;
 mod condition;
 mod copula;
 mod distribution;
+mod drawing;
 mod inputs;
 mod plan;
 mod settings;
@@ -62,9 +63,10 @@ mod tables;
 mod template;
 
 pub use condition::{Condition, ConditionError};
+pub use drawing::{Draw, DrawError};
 pub use inputs::{Inputs, sha256};
 pub use settings::{
     CorrelationSettings, Distribution, PlanSettings, PrecisionSettings, StopSettings,
     StudySettings, VariableSettings,
 };
-pub use template::{Draw, DrawError, MOST_RUNS, Template};
+pub use template::{MOST_RUNS, Template};

@@ -1,6 +1,7 @@
 //! Which plots a study gets, and what is in them.
 
-use super::plot::{Axis, Bar, Layers, plot};
+use super::axis::Axis;
+use super::plot::{Layers, Plot};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::{Condition, Distribution, Template};
 use crate::study::stats::{mean, quantile, rate};
@@ -14,15 +15,6 @@ const MOST_GROUPS: usize = 12;
 const BINS: usize = 8;
 /// Variables that a figure is plotted against: those that drive it most.
 const MOST_DRIVERS: usize = 4;
-
-/// A plot with its file name.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Plot {
-    /// For its file: small letters, digits, `_`.
-    pub name: String,
-    /// The picture.
-    pub svg: String,
-}
 
 /// A variable as the x axis of plots.
 struct Input<'a> {
@@ -174,26 +166,19 @@ fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -
     let bars = groups(&pairs).into_iter().filter_map(|group| {
         let happened = group.iter().filter(|p| p.1 > 0.5).count() as u64;
         let e = rate(happened, group.len() as u64)?.wilson;
-        Some(Bar {
-            x: middle(group),
-            y: e.value,
-            low: e.low,
-            high: e.high,
-        })
+        Some((middle(group), e))
     });
     let layers = Layers {
         bars: bars.collect(),
         ..Layers::default()
     };
     let y = Axis::new(format!("rate of {name}, with 95 % interval"));
-    Some(Plot {
-        svg: plot(
-            &format!("{name} against {}", input.name),
-            [&input.axis, &y],
-            &layers,
-        )?,
-        name: format!("event_{name}_{}", input.name),
-    })
+    Plot::new(
+        format!("event_{name}_{}", input.name),
+        &format!("{name} against {}", input.name),
+        [&input.axis, &y],
+        &layers,
+    )
 }
 
 /// Where in the plane of two variables an event happened: of the two that most tell.
@@ -218,14 +203,12 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
     if layers.marked.is_empty() {
         return None;
     }
-    Some(Plot {
-        svg: plot(
-            &format!("{name}: red where it happened"),
-            [&x.axis, &y.axis],
-            &layers,
-        )?,
-        name: format!("map_{name}"),
-    })
+    Plot::new(
+        format!("map_{name}"),
+        &format!("{name}: red where it happened"),
+        [&x.axis, &y.axis],
+        &layers,
+    )
 }
 
 /// A figure of every run against a variable, with the mean of each group.
@@ -233,12 +216,7 @@ fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Pl
     let pairs = input.pairs(rows, |r| r.number(measure.name));
     let bars = groups(&pairs).into_iter().filter_map(|group| {
         let e = mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
-        Some(Bar {
-            x: middle(group),
-            y: e.value,
-            low: e.low,
-            high: e.high,
-        })
+        Some((middle(group), e))
     });
     let layers = Layers {
         bars: bars.collect(),
@@ -246,14 +224,12 @@ fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Pl
         ..Layers::default()
     };
     let y = Axis::new(label(measure));
-    Some(Plot {
-        svg: plot(
-            &format!("{} against {}", measure.name, input.name),
-            [&input.axis, &y],
-            &layers,
-        )?,
-        name: format!("{}_{}", measure.name, input.name),
-    })
+    Plot::new(
+        format!("{}_{}", measure.name, input.name),
+        &format!("{} against {}", measure.name, input.name),
+        [&input.axis, &y],
+        &layers,
+    )
 }
 
 /// Share of runs that lie below each value.
@@ -281,14 +257,12 @@ fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         Axis::new(label(measure)),
         Axis::new("share of runs below, with 95 % band"),
     ];
-    Some(Plot {
-        svg: plot(
-            &format!("Distribution of {}", measure.name),
-            [&axes[0], &axes[1]],
-            &layers,
-        )?,
-        name: format!("{}_cdf", measure.name),
-    })
+    Plot::new(
+        format!("{}_cdf", measure.name),
+        &format!("Distribution of {}", measure.name),
+        [&axes[0], &axes[1]],
+        &layers,
+    )
 }
 
 /// The mean after each run, with its interval.
@@ -306,14 +280,12 @@ fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         Axis::new("runs"),
         Axis::new(format!("mean of {}", label(measure))),
     ];
-    Some(Plot {
-        svg: plot(
-            &format!("Convergence of {}", measure.name),
-            [&axes[0], &axes[1]],
-            &layers,
-        )?,
-        name: format!("{}_convergence", measure.name),
-    })
+    Plot::new(
+        format!("{}_convergence", measure.name),
+        &format!("Convergence of {}", measure.name),
+        [&axes[0], &axes[1]],
+        &layers,
+    )
 }
 
 /// Errors of all positions of all runs against the distance of the lamp.
@@ -345,12 +317,10 @@ fn error_by_range(method: &str, rows: &[&Row]) -> Option<Plot> {
         Axis::new("distance of the lamp [m]"),
         Axis::new("error along the track [m]"),
     ];
-    Some(Plot {
-        svg: plot(
-            &format!("{method}: median error of a position, band 5 to 95 %"),
-            [&axes[0], &axes[1]],
-            &layers,
-        )?,
-        name: format!("{method}_error_by_range"),
-    })
+    Plot::new(
+        format!("{method}_error_by_range"),
+        &format!("{method}: median error of a position, band 5 to 95 %"),
+        [&axes[0], &axes[1]],
+        &layers,
+    )
 }

@@ -1,6 +1,7 @@
 //! A study on one page: figures with intervals, plots, worst runs with the command that replays each,
 //! failures. The page needs nothing but itself; the plots lie beside it as SVG too.
 
+mod axis;
 mod figures;
 mod page;
 mod plot;

@@ -1,8 +1,9 @@
 //! The page as HTML.
 
-use super::figures::Plot;
+use super::plot::Plot;
 use crate::scenario::draw::Template;
 use crate::study::{Digest, Manifest, Row, Status, show};
+use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -14,10 +15,12 @@ body{font:15px/1.45 system-ui,sans-serif;color:#1c2126;max-width:1180px;margin:2
 h1{font-size:1.6rem;margin-bottom:.2rem}h2{font-size:1.15rem;margin:2rem 0 .5rem}\
 p.lead{color:#555c64;margin-top:0}table{border-collapse:collapse;margin:.5rem 0;width:100%}\
 table{font-size:.88rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:1px solid #dfe3e8;vertical-align:top}\
-th{font-weight:600;background:#f5f7f9}td.n{font-variant-numeric:tabular-nums;white-space:nowrap}\
+th{font-weight:600;background:#f5f7f9}td{overflow-wrap:anywhere}\
+td.n{font-variant-numeric:tabular-nums;white-space:nowrap;overflow-wrap:normal}\
 code{background:#f2f4f6;padding:.1rem .3rem;border-radius:3px;font-size:.85em}\
-.plots{display:flex;flex-wrap:wrap;gap:12px}.plots figure{margin:0;border:1px solid #dfe3e8;border-radius:4px}\
-.plots svg{display:block;max-width:100%;height:auto}";
+.plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(480px,1fr));gap:12px}\
+.plots figure{margin:0;border:1px solid #dfe3e8;border-radius:4px}\
+.plots svg{display:block;width:100%;height:auto}";
 
 pub fn page(
     folder: &Path,
@@ -62,9 +65,15 @@ fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
         .map(|h| format!("<th>{}</th>", escaped(h)))
         .collect();
     let row = |cells: Vec<String>| {
+        let is_number = |c: &String| c.starts_with(|c: char| c.is_ascii_digit() || c == '-');
         let cells: String = cells
             .iter()
-            .map(|c| format!("<td class=\"n\">{c}</td>"))
+            .map(|c| {
+                format!(
+                    "<td{}>{c}</td>",
+                    if is_number(c) { " class=\"n\"" } else { "" }
+                )
+            })
             .collect();
         format!("<tr>{cells}</tr>\n")
     };
@@ -72,6 +81,12 @@ fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
         "<table><tr>{head}</tr>\n{}</table>\n",
         rows.map(row).collect::<String>()
     )
+}
+
+/// As the study's file has it.
+fn as_written(settings: &impl Serialize) -> String {
+    let value = toml::Value::try_from(settings);
+    value.map(|v| v.to_string()).unwrap_or_default()
 }
 
 fn about(manifest: &Manifest, template: &Template, digest: &Digest) -> String {
@@ -82,7 +97,7 @@ fn about(manifest: &Manifest, template: &Template, digest: &Digest) -> String {
             format!("{}, of which {} complete", digest.runs, digest.complete),
         ),
         ("seed", settings.seed.to_string()),
-        ("plan", escaped(&format!("{:?}", settings.plan))),
+        ("plan", escaped(&as_written(&settings.plan))),
         (
             "renderer",
             escaped(&format!(
@@ -110,14 +125,11 @@ fn about(manifest: &Manifest, template: &Template, digest: &Digest) -> String {
         ));
     }
     let variables = settings.variables.iter().map(|(name, v)| {
-        let from = toml::Value::try_from(&v.from)
-            .map(|f| f.to_string())
-            .unwrap_or_default();
         vec![
             escaped(name),
             escaped(&v.label),
             escaped(&v.keys.join(", ")),
-            format!("<code>{}</code>", escaped(&from)),
+            format!("<code>{}</code>", escaped(&as_written(&v.from))),
         ]
     });
     table(

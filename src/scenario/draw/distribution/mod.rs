@@ -1,0 +1,172 @@
+//! Distributions by their quantile functions: a number of the unit interval in, a value out, so
+//! that any plan of points serves any distribution.
+
+mod check;
+mod cut;
+
+use super::settings::Distribution;
+use cut::Cut;
+use toml::Value;
+
+impl Distribution {
+    /// Whether it is swept, not drawn.
+    pub fn is_swept(&self) -> bool {
+        matches!(self, Self::Sweep { .. } | Self::Grid { .. })
+    }
+
+    /// Whether it has a density, and so can be weighed against another one.
+    pub fn has_density(&self) -> bool {
+        matches!(
+            self,
+            Self::Uniform { .. }
+                | Self::LogUniform { .. }
+                | Self::Normal { .. }
+                | Self::LogNormal { .. }
+                | Self::Triangular { .. }
+        )
+    }
+
+    /// Whether it reaches wherever another one does.
+    pub fn covers(&self, other: &Self) -> bool {
+        let ([a0, a1], [b0, b1]) = (self.ends(), other.ends());
+        a0 <= b0 && b1 <= a1
+    }
+
+    fn ends(&self) -> [f64; 2] {
+        match *self {
+            Self::Uniform { min, max }
+            | Self::LogUniform { min, max }
+            | Self::Triangular { min, max, .. } => [min, max],
+            Self::Normal { min, max, .. } => [
+                min.unwrap_or(f64::NEG_INFINITY),
+                max.unwrap_or(f64::INFINITY),
+            ],
+            Self::LogNormal { min, max, .. } => [min.unwrap_or(0.0), max.unwrap_or(f64::INFINITY)],
+            _ => [f64::NAN; 2],
+        }
+    }
+
+    /// Whether all its values are numbers (a table's are looked at when it is read).
+    pub fn is_of_numbers(&self) -> bool {
+        match self {
+            Self::Choice { values, .. } | Self::Sweep { values } => {
+                values.iter().all(|v| v.is_integer() || v.is_float())
+            }
+            _ => true,
+        }
+    }
+
+    /// The values of a swept one, in order; none of others.
+    pub fn swept(&self) -> Vec<Value> {
+        match self {
+            Self::Sweep { values } => values.clone(),
+            Self::Grid { min, max, count } => (0..*count)
+                .map(|k| {
+                    let share = f64::from(k) / f64::from(count - 1);
+                    Value::Float(min + share * (max - min))
+                })
+                .collect(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Where a share `u` of all values lies below, 0 < u < 1. `None` of those that are swept or
+    /// stand in a table.
+    pub fn quantile(&self, u: f64) -> Option<Value> {
+        Some(match self {
+            Self::Integer { min, max } => {
+                let count = (max - min) as f64 + 1.0;
+                Value::Integer((min + (u * count) as i64).min(*max))
+            }
+            Self::Choice { values, weights } => values.get(pick(u, values.len(), weights))?.clone(),
+            _ => Value::Float(self.real_quantile(u)?),
+        })
+    }
+
+    fn real_quantile(&self, u: f64) -> Option<f64> {
+        Some(match *self {
+            Self::Uniform { min, max } => min + u * (max - min),
+            Self::LogUniform { min, max } => min * (u * (max / min).ln()).exp(),
+            Self::Normal {
+                mean,
+                sigma,
+                min,
+                max,
+            } => Cut::normal(mean, sigma, min, max).quantile(u),
+            Self::LogNormal {
+                median,
+                sigma_ln,
+                min,
+                max,
+            } => Cut::log_normal(median, sigma_ln, min, max)
+                .quantile(u)
+                .exp(),
+            Self::Triangular { min, mode, max } => {
+                let rising = (mode - min) / (max - min);
+                if u < rising {
+                    min + ((max - min) * (mode - min) * u).sqrt()
+                } else {
+                    max - ((max - min) * (max - mode) * (1.0 - u)).sqrt()
+                }
+            }
+            _ => return None,
+        })
+    }
+
+    /// Natural logarithm of the density at `x`: minus infinity where it has none.
+    pub fn ln_density(&self, x: f64) -> f64 {
+        let within = |min: f64, max: f64, density: f64| {
+            if (min..=max).contains(&x) {
+                density.ln()
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
+        match *self {
+            Self::Uniform { min, max } => within(min, max, 1.0 / (max - min)),
+            Self::LogUniform { min, max } => within(min, max, 1.0 / (x * (max / min).ln())),
+            Self::Normal {
+                mean,
+                sigma,
+                min,
+                max,
+            } => Cut::normal(mean, sigma, min, max).ln_density(x),
+            Self::LogNormal { .. } if x <= 0.0 => f64::NEG_INFINITY,
+            Self::LogNormal {
+                median,
+                sigma_ln,
+                min,
+                max,
+            } => Cut::log_normal(median, sigma_ln, min, max).ln_density(x.ln()) - x.ln(),
+            Self::Triangular { min, mode, max } => {
+                let height = 2.0 / (max - min);
+                let share = if x < mode {
+                    (x - min) / (mode - min)
+                } else {
+                    (max - x) / (max - mode)
+                };
+                // At a mode that is an end, the line is upright.
+                within(min, max, height * if share.is_nan() { 1.0 } else { share })
+            }
+            _ => f64::NEG_INFINITY,
+        }
+    }
+}
+
+/// Which of `len` entries a share `u` of all weight falls on.
+fn pick(u: f64, len: usize, weights: &[f64]) -> usize {
+    if weights.is_empty() {
+        return ((u * len as f64) as usize).min(len.saturating_sub(1));
+    }
+    let total: f64 = weights.iter().sum();
+    let mut left = u * total;
+    let found = weights.iter().position(|w| {
+        left -= w;
+        left < 0.0
+    });
+    let last = weights.iter().rposition(|w| *w > 0.0).unwrap_or(0);
+    found.unwrap_or(last)
+}
+
+#[cfg(test)]
+mod tests;

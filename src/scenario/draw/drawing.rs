@@ -1,0 +1,267 @@
+//! One run's draw: from an index to values, and from values to a scenario.
+
+use super::condition::ConditionError;
+use super::copula;
+use super::settings::{Distribution, VariableSettings};
+use super::template::{Template, table_coordinate};
+use crate::scenario::build::overridden;
+use crate::scenario::{Override, Scenario, ScenarioError, ScenarioFile};
+use crate::twin::random::Stream;
+use std::collections::BTreeMap;
+use toml::{Table, Value};
+
+/// How often a draw is tried again before its conditions are taken to be impossible.
+const MOST_ATTEMPTS: u32 = 10_000;
+
+/// One run's draw.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draw {
+    /// The run.
+    pub index: u64,
+    /// Seed of its scenario.
+    pub seed: u64,
+    /// Value of every variable, in the order of names.
+    pub values: Vec<(String, Value)>,
+    /// Draws that did not meet the conditions, before this one.
+    pub rejected: u32,
+    /// Logarithm of the run's weight: 0 but with importance sampling.
+    pub ln_weight: f64,
+}
+
+/// Why a run cannot be drawn.
+#[derive(Debug, thiserror::Error)]
+pub enum DrawError {
+    /// No draw meets the conditions.
+    #[error(
+        "run {index}: of {attempts} draws none meets the conditions; `{text}` turned down {refused} of \
+         them"
+    )]
+    Rejected {
+        /// The run.
+        index: u64,
+        /// Draws tried.
+        attempts: u32,
+        /// The condition that turned down most.
+        text: String,
+        /// How many.
+        refused: u32,
+    },
+    /// A condition that cannot be worked out.
+    #[error("study.require: {0}")]
+    Condition(#[from] ConditionError),
+    /// The study has fewer runs.
+    #[error("there is no run {index}: the study has {runs}, counted from 0")]
+    NoRun {
+        /// The run asked for.
+        index: u64,
+        /// How many there are.
+        runs: u64,
+    },
+    /// A key that cannot be set.
+    #[error("run {0}: {1}")]
+    Key(u64, String),
+}
+
+impl Template {
+    /// Draws run `index`, which hangs on the study's seed and the index alone.
+    ///
+    /// Runs go through the combinations of swept values in turn, the first variable changing
+    /// slowest; every combination gets points of the plan, and noise, of its own.
+    pub fn draw(&self, index: u64) -> Result<Draw, DrawError> {
+        let runs = self.runs();
+        if index >= runs {
+            return Err(DrawError::NoRun { index, runs });
+        }
+        let (cell, repeat) = (index % self.cells(), index / self.cells());
+        let swept = self.swept_values(cell);
+        let mut refused = vec![0u32; self.conditions.len()];
+        for attempt in 0..MOST_ATTEMPTS {
+            let draw = self.attempt([index, cell, repeat], attempt, &swept);
+            match self.refusing(&draw)? {
+                None => return Ok(draw),
+                Some(k) => refused[k] += 1,
+            }
+        }
+        let worst = (0..refused.len()).max_by_key(|k| refused[*k]).unwrap_or(0);
+        Err(DrawError::Rejected {
+            index,
+            attempts: MOST_ATTEMPTS,
+            text: self
+                .conditions
+                .get(worst)
+                .map_or(String::new(), |c| c.text().to_owned()),
+            refused: refused.get(worst).copied().unwrap_or(0),
+        })
+    }
+
+    fn swept_values(&self, cell: u64) -> BTreeMap<&str, Value> {
+        let mut left = cell;
+        let places = self.swept.iter().rev().map(|(name, values)| {
+            let place = (left % values.len() as u64) as usize;
+            left /= values.len() as u64;
+            (name.as_str(), values[place].clone())
+        });
+        places.collect()
+    }
+
+    fn attempt(
+        &self,
+        [index, cell, repeat]: [u64; 3],
+        attempt: u32,
+        swept: &BTreeMap<&str, Value>,
+    ) -> Draw {
+        let mut point = self.plan.point([index, cell, repeat], attempt);
+        for (places, lower) in &self.groups {
+            let mut of_group: Vec<f64> = places.iter().map(|k| point[*k]).collect();
+            copula::correlate(lower, &mut of_group);
+            for (k, u) in places.iter().zip(of_group) {
+                point[*k] = u;
+            }
+        }
+        let at = |name: &str| {
+            self.coordinates
+                .iter()
+                .position(|c| c == name)
+                .map(|k| point[k])
+        };
+        let mut ln_weight = 0.0;
+        let mut values = Vec::with_capacity(self.settings.variables.len());
+        for (name, variable) in &self.settings.variables {
+            let value = match (&variable.from, &variable.propose) {
+                (Distribution::Table { file, column }, _) => {
+                    at(&table_coordinate(file)).and_then(|u| self.tables.value(file, column, u))
+                }
+                (from, Some(propose)) => {
+                    let value = at(name).and_then(|u| propose.quantile(u));
+                    let x = value.as_ref().and_then(Value::as_float).unwrap_or(f64::NAN);
+                    ln_weight += from.ln_density(x) - propose.ln_density(x);
+                    value
+                }
+                (from, None) if from.is_swept() => swept.get(name.as_str()).cloned(),
+                (from, None) => at(name).and_then(|u| from.quantile(u)),
+            };
+            values.extend(value.map(|v| (name.clone(), v)));
+        }
+        // Files have no infinite numbers; this one's weight is 0 too.
+        let ln_weight = if ln_weight.is_finite() {
+            ln_weight
+        } else {
+            f64::MIN
+        };
+        // 53 bits: every reader of JSON keeps them.
+        let [low, high, ..] = Stream::new(self.settings.seed, index, "scenario seed").words(0, 0);
+        let seed = (u64::from(high) << 32 | u64::from(low)) >> 11;
+        Draw {
+            index,
+            seed,
+            values,
+            rejected: attempt,
+            ln_weight,
+        }
+    }
+
+    /// The first condition that a draw does not meet.
+    fn refusing(&self, draw: &Draw) -> Result<Option<usize>, DrawError> {
+        let mut document = None;
+        for (k, condition) in self.conditions.iter().enumerate() {
+            let names_keys = condition.names().any(|name| draw.number(name).is_none());
+            if names_keys && document.is_none() {
+                document = Some(self.document(draw)?);
+            }
+            let value_of = |name: &str| {
+                let key = || lookup(document.as_ref()?, name);
+                draw.number(name).or_else(key).map(Some).ok_or(())
+            };
+            if condition.holds(value_of)? != Some(true) {
+                return Ok(Some(k));
+            }
+        }
+        Ok(None)
+    }
+
+    /// The scenario's keys with their defaults, as drawn.
+    fn document(&self, draw: &Draw) -> Result<Table, DrawError> {
+        let key = |e: &dyn std::fmt::Display| DrawError::Key(draw.index, e.to_string());
+        let mut document = Table::try_from(&self.file).map_err(|e| key(&e))?;
+        for change in self.overrides(draw) {
+            change.apply(&mut document).map_err(|e| key(&e))?;
+        }
+        Ok(document)
+    }
+
+    /// What a draw changes in the file, its seed among it.
+    pub fn overrides(&self, draw: &Draw) -> Vec<Override> {
+        let of = |(name, value): &(String, Value)| {
+            let variable = self.settings.variables.get(name);
+            variable.map(|v| v.overrides(value)).unwrap_or_default()
+        };
+        let seed = Override {
+            key: "seed".into(),
+            value: Value::Integer(draw.seed as i64),
+        };
+        let drawn = draw.values.iter().flat_map(of);
+        std::iter::once(seed).chain(drawn).collect()
+    }
+
+    /// The scenario of a draw, checked.
+    pub fn scenario(&self, draw: &Draw) -> Result<Scenario, ScenarioError> {
+        Scenario::from_text(&self.path, &self.text, &self.overrides(draw))
+    }
+
+    /// The file of a draw.
+    pub fn concrete(&self, draw: &Draw) -> Result<ScenarioFile, ScenarioError> {
+        let mut file = overridden(&self.path, &self.text, &self.overrides(draw))?;
+        file.study = None;
+        Ok(file)
+    }
+}
+
+impl Draw {
+    /// A variable's value, where it is a number or a flag.
+    pub fn number(&self, name: &str) -> Option<f64> {
+        let (_, value) = self.values.iter().find(|(n, _)| n == name)?;
+        number(value)
+    }
+}
+
+impl VariableSettings {
+    /// What a value of it changes in the scenario.
+    pub(super) fn overrides(&self, value: &Value) -> Vec<Override> {
+        let same = self.scale.to_bits() == 1f64.to_bits() && self.offset.abs() == 0.0;
+        let value = match number(value) {
+            Some(x) if !same => Value::Float(self.offset + self.scale * x),
+            _ => value.clone(),
+        };
+        let of = |key: &String| Override {
+            key: key.clone(),
+            value: value.clone(),
+        };
+        self.keys.iter().map(of).collect()
+    }
+}
+
+fn number(value: &Value) -> Option<f64> {
+    match value {
+        Value::Integer(x) => Some(*x as f64),
+        Value::Float(x) => Some(*x),
+        Value::Boolean(x) => Some(f64::from(u8::from(*x))),
+        _ => None,
+    }
+}
+
+/// A number or flag of a document by its dotted key.
+fn lookup(document: &Table, key: &str) -> Option<f64> {
+    let (first, rest) = key.split_once('.').unwrap_or((key, ""));
+    let (name, mut indexes) = first.split_once('[').unwrap_or((first, ""));
+    let mut value = document.get(name)?;
+    while !indexes.is_empty() {
+        let (index, rest) = indexes.split_once(']')?;
+        value = value.as_array()?.get(index.parse::<usize>().ok()?)?;
+        indexes = rest.strip_prefix('[').unwrap_or(rest);
+    }
+    if rest.is_empty() {
+        number(value)
+    } else {
+        lookup(value.as_table()?, rest)
+    }
+}
