@@ -13,8 +13,9 @@ struct Corner {
 struct Tile {
     low_px: vec2f,
     high_px: vec2f,
-    // In the lists: shaded lights from here. Each is the number of its source, where its bodies that
-    // are no capsules begin, where its bodies end, and the numbers of its bodies, capsules first.
+    // In the lists: where the numbers of sources begin that bodies hide in whole, and then the shaded
+    // lights. Each is the number of its source, where its bodies that are no capsules begin, where its
+    // bodies end, and the numbers of its bodies, capsules first.
     shaded: u32,
     // From here the numbers of other sources, and their end.
     plain: u32,
@@ -269,7 +270,8 @@ fn shade(in: Varying) -> @location(0) vec4f {
     let start = p + n * OFFSET_M;
     var total_lx = in.ambient_lx;
     var hidden_lx = 0.0;
-    for (var k = in.lights.x; k < in.lights.y; k = word(k + 2u)) {
+    let hidden = word(in.lights.x);
+    for (var k = in.lights.x + 1u; k < hidden; k = word(k + 2u)) {
         let source = sources[word(k)];
         let lux = irradiance_lx(p, n, source);
         let others = word(k + 1u);
@@ -283,6 +285,11 @@ fn shade(in: Varying) -> @location(0) vec4f {
         }
         total_lx += lux;
         hidden_lx += lux * f32(countOneBits(mask)) / f32(PLACES);
+    }
+    for (var k = hidden; k < in.lights.y; k++) {
+        let lux = irradiance_lx(p, n, sources[word(k)]);
+        total_lx += lux;
+        hidden_lx += lux;
     }
     for (var k = in.lights.y; k < in.lights.z; k++) {
         total_lx += irradiance_lx(p, n, sources[word(k)]);

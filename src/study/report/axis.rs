@@ -44,7 +44,7 @@ impl Axis {
         } else {
             0.5
         };
-        (low <= high).then(|| low - margin..high + margin)
+        (low <= high).then_some(low - margin..high + margin)
     }
 
     /// Places of its ticks in a range, each with its text.

@@ -10,6 +10,7 @@
 //! exposure throws its shadow from where it is in the middle.
 
 mod falling;
+mod solid;
 mod tiles;
 
 use super::adapter::Gpu;
@@ -26,8 +27,9 @@ use super::view::{Framed, single};
 use crate::track::Tunnel;
 use crate::twin::render::light::{LampField, disc_places};
 use crate::twin::render::scene::{Body, Job, Shape};
-use falling::{Ball, Cast, Light};
+use falling::{Around, Bodies, Cast, Light};
 use nalgebra::{Point3, Vector3};
+use solid::{Cut, End};
 use std::collections::BTreeMap;
 use std::mem::size_of;
 use std::ops::Range;
@@ -55,10 +57,8 @@ pub struct Shadows {
     set: Vec<u64>,
 }
 
-/// Centre and radius of a ball, and the normal of the surface in it if it has one.
-type Around<'a> = (&'a Point3<f64>, f64, Option<&'a Vector3<f64>>);
-
-/// What matters in a tile, in the lists: shaded lights from `shaded` on, others from `plain` on.
+/// What matters in a tile, in the lists: where its hidden lights begin, and its shaded ones, from `shaded`
+/// on; others from `plain` on.
 #[derive(Clone, Copy)]
 struct List {
     shaded: u32,
@@ -71,13 +71,12 @@ struct List {
 /// Who may shade what.
 struct Falling<'j> {
     lights: Vec<Light<'j>>,
-    bodies: Vec<&'j Body>,
-    /// The first so many of them are capsules.
-    capsules: usize,
-    balls: Vec<Ball>,
+    bodies: Bodies<'j>,
     casts: Vec<Cast>,
     of_light: Vec<Range<usize>>,
     eyes: Eyes,
+    /// Where the camera is in the middle of the frame, and how far it goes from there.
+    eye: (Point3<f64>, f64),
 }
 
 impl Shadows {
@@ -93,23 +92,23 @@ impl Shadows {
         if job.bodies.is_empty() {
             return;
         }
-        let (bodies, capsules, balls) = falling::balls(framed, job);
+        let bodies = falling::bodies(framed, job);
         let lights = falling::lights(framed, job, field);
-        let (casts, of_light) = falling::casts(&lights, &bodies, &balls);
+        let (casts, of_light) = falling::casts(&lights, &bodies);
         if casts.is_empty() {
             return;
         }
+        let eyes = Eyes::of(framed, job.time);
         let falling = Falling {
             lights,
             bodies,
-            capsules,
-            balls,
             casts,
             of_light,
-            eyes: Eyes::of(framed, job.time),
+            eye: (framed.reference(), eyes.travel_m(&framed.reference())),
+            eyes,
         };
         let lens = &framed.view.camera.intrinsics;
-        let numbers = falling.lights.len() + falling.casts.len();
+        let numbers = 2 * falling.lights.len() + falling.casts.len();
         self.marks.reset((lens.width_px, lens.height_px), numbers);
         self.mark_tunnel(framed, &falling, tunnel, in_sight);
         self.mark_bodies(framed, &falling);
@@ -152,7 +151,10 @@ impl Shadows {
         first: usize,
     ) {
         let radius_m = cell.radius_m();
-        if !framed.may_see(&cell.centre, radius_m) {
+        if !framed.may_see(&cell.centre, radius_m)
+            || cell.turns_away(falling.eye)
+            || falling.hides(&cell.centre, radius_m)
+        {
             return;
         }
         let ball = (&cell.centre, radius_m, cell.normal.as_ref());
@@ -160,14 +162,15 @@ impl Shadows {
         falling.narrow(casts, Some(first), ball);
         if casts.len() > end {
             let away_m = (cell.centre - framed.reference()).norm().max(NEAREST_M);
-            let size_px = 2.0 * framed.view.camera.intrinsics.fx_px * radius_m / away_m;
+            let size_px =
+                2.0 * framed.view.camera.intrinsics.fx_px * cell.half_diagonal_m() / away_m;
             if size_px > f64::from(TILE_PX) {
                 // What is large in the picture is looked at in quarters.
                 for quarter in cell.quarters() {
                     self.mark_cell(framed, falling, &quarter, casts, end);
                 }
             } else {
-                falling.collect(&casts[end..], ball, &mut self.set);
+                falling.collect(&casts[end..], ball, true, &mut self.set);
                 self.marks.add_cell(framed, &falling.eyes, cell, &self.set);
             }
         }
@@ -176,16 +179,32 @@ impl Shadows {
 
     fn mark_bodies(&mut self, framed: &Framed<'_>, falling: &Falling<'_>) {
         let mut casts = Vec::new();
-        for ball in &falling.balls {
-            let around = (&ball.centre, ball.radius_m, None);
+        for of_body in falling.bodies.balls.chunk_by(|a, b| a.body == b.body) {
+            let number = of_body[0].body;
+            let body = falling.bodies.all[number];
             casts.clear();
-            falling.narrow(&mut casts, None, around);
+            for ball in of_body {
+                falling.narrow(&mut casts, None, ball.around());
+            }
+            casts.sort_unstable();
+            casts.dedup();
             // Nothing convex shades itself.
-            casts.retain(|k| falling.casts[*k].body != ball.body);
-            if !casts.is_empty() {
-                falling.collect(&casts, around, &mut self.set);
-                let body = falling.bodies[ball.body];
-                self.marks.add_body(framed, &falling.eyes, body, &self.set);
+            casts.retain(|k| falling.casts[*k].body != number);
+            if casts.is_empty() {
+                continue;
+            }
+            if let Shape::Box(half) = &body.shape {
+                Cell::of_box(body, half, falling.bodies.exposed_s, &mut self.cells);
+                let cells = std::mem::take(&mut self.cells);
+                for cell in &cells {
+                    self.mark_cell(framed, falling, cell, &mut casts, 0);
+                }
+                self.cells = cells;
+            } else {
+                for ball in of_body {
+                    falling.collect(&casts, ball.around(), false, &mut self.set);
+                    self.marks.add_body(framed, &falling.eyes, body, &self.set);
+                }
             }
         }
     }
@@ -236,7 +255,7 @@ impl Shadows {
         self.slabs.clear();
         self.sources
             .extend(falling.lights.iter().map(|light| source(light, &reference)));
-        for body in &falling.bodies {
+        for body in &falling.bodies.all {
             let mut made = blocker(body, &reference, &mut self.slabs);
             if self.slabs.len() > MAX_SLABS {
                 self.slabs.truncate(made.first_slab as usize);
@@ -270,19 +289,56 @@ impl Falling<'_> {
         }
     }
 
-    /// Makes the set of some casts, and of the lights on a surface in a ball.
-    fn collect(&self, casts: &[usize], around: Around<'_>, set: &mut Vec<u64>) {
+    /// Makes the set of some casts, and of the lights on a surface in a ball: those casts that fall on it
+    /// in part or in whole, the lights, and those lights that no body hides in whole. `exact` looks at the
+    /// bodies' planes, not only at balls around them.
+    fn collect(&self, casts: &[usize], around: Around<'_>, exact: bool, set: &mut Vec<u64>) {
         let (centre, radius_m, normal) = around;
+        let lights = self.lights.len();
         set.clear();
-        set.resize((self.lights.len() + self.casts.len()).div_ceil(64), 0);
-        for k in casts {
-            put(set, self.lights.len() + k);
-        }
+        set.resize((2 * lights + self.casts.len()).div_ceil(64), 0);
         for (k, light) in self.lights.iter().enumerate() {
             if light.may_light(centre, radius_m, normal) {
                 put(set, k);
+                put(set, self.open(k));
             }
         }
+        let ball = End { centre, radius_m };
+        for k in casts {
+            let cast = &self.casts[*k];
+            let light = &self.lights[cast.light];
+            let disc = End {
+                centre: &light.centre,
+                radius_m: light.radius_m,
+            };
+            let cut = if exact {
+                self.bodies.solids[cast.body].cut(ball, disc)
+            } else {
+                Cut::Some
+            };
+            if cut != Cut::None {
+                put(set, lights + k);
+            }
+            if cut == Cut::All {
+                take(set, self.open(cast.light));
+            }
+        }
+    }
+
+    /// The number of a light that is not hidden in whole.
+    fn open(&self, light: usize) -> usize {
+        self.lights.len() + self.casts.len() + light
+    }
+
+    /// Whether a body hides all that is in a ball from the camera.
+    fn hides(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
+        let ball = End { centre, radius_m };
+        let eye = End {
+            centre: &self.eye.0,
+            radius_m: self.eye.1,
+        };
+        let mut large = self.bodies.solids.iter().filter(|s| s.radius_m > radius_m);
+        large.any(|solid| solid.cut(ball, eye) == Cut::All)
     }
 
     /// Appends the list of a set.
@@ -295,19 +351,26 @@ impl Falling<'_> {
                 .filter(|k| has(set, lights + k))
                 .map(|k| &self.casts[k])
         };
-        let (dark, plain): (Vec<usize>, Vec<usize>) = (0..lights)
-            .filter(|k| has(set, *k))
-            .partition(|k| casts_in(*k).next().is_some());
-        for light in dark {
+        let lit = || (0..lights).filter(|k| has(set, *k));
+        let is_hidden = |light: &usize| !has(set, self.open(*light));
+        let is_shaded = |light: &usize| !is_hidden(light) && casts_in(*light).next().is_some();
+        // Where the hidden lights begin is known when the shaded ones are there.
+        lists.push(0);
+        for light in lit().filter(is_shaded) {
             let first = lists.len() + 3;
             let count = casts_in(light).count();
-            let capsules = casts_in(light).filter(|c| c.body < self.capsules).count();
+            let capsules = casts_in(light)
+                .filter(|c| c.body < self.bodies.capsules)
+                .count();
             others |= count > capsules;
             lists.extend([light, first + capsules, first + count].map(|k| k as u32));
             lists.extend(casts_in(light).map(|cast| cast.body as u32));
         }
+        lists[shaded as usize] = lists.len() as u32;
+        lists.extend(lit().filter(is_hidden).map(|light| light as u32));
         let border = lists.len() as u32;
-        lists.extend(plain.into_iter().map(|light| light as u32));
+        let is_plain = |light: &usize| !is_hidden(light) && !is_shaded(light);
+        lists.extend(lit().filter(is_plain).map(|light| light as u32));
         List {
             shaded,
             plain: border,
@@ -323,6 +386,10 @@ fn has(set: &[u64], number: usize) -> bool {
 
 fn put(set: &mut [u64], number: usize) {
     set[number / 64] |= 1 << (number % 64);
+}
+
+fn take(set: &mut [u64], number: usize) {
+    set[number / 64] &= !(1 << (number % 64));
 }
 
 /// A tile's place.

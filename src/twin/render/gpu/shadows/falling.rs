@@ -1,5 +1,6 @@
 //! Which lights may throw the shadow of which body where: by balls and cones, generously.
 
+use super::solid::Solid;
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, Shining};
@@ -21,12 +22,22 @@ pub struct Light<'j> {
     headlight: Option<&'j Headlight>,
 }
 
+/// Centre and radius of a ball, and the normal of the surface in it if it has one.
+pub type Around<'a> = (&'a Point3<f64>, f64, Option<&'a Vector3<f64>>);
+
 /// A ball around a piece of a body, wherever it is in a frame.
 pub struct Ball {
     /// The body's number.
     pub body: usize,
     pub centre: Point3<f64>,
     pub radius_m: f64,
+}
+
+impl Ball {
+    /// Itself, round.
+    pub fn around(&self) -> Around<'_> {
+        (&self.centre, self.radius_m, None)
+    }
 }
 
 /// The shadow of a ball.
@@ -137,9 +148,21 @@ pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &LampField) -> Vec<L
         .collect()
 }
 
-/// The bodies about a camera, capsules first; how many are capsules; and balls around them, wherever
-/// they go while the view is exposed.
-pub fn balls<'j>(framed: &Framed<'_>, job: &'j Job) -> (Vec<&'j Body>, usize, Vec<Ball>) {
+/// The bodies about a camera, capsules first.
+pub struct Bodies<'j> {
+    pub all: Vec<&'j Body>,
+    /// The first so many of them are capsules.
+    pub capsules: usize,
+    /// Balls around their pieces, wherever they go while the view is exposed.
+    pub balls: Vec<Ball>,
+    /// What each of them hides.
+    pub solids: Vec<Solid>,
+    /// The middle of the exposure after the job's time, and half of how long it lasts.
+    pub exposed_s: [f64; 2],
+}
+
+/// Finds them.
+pub fn bodies<'j>(framed: &Framed<'_>, job: &'j Job) -> Bodies<'j> {
     let eye = framed.reference();
     let away_m = |body: &Body| {
         let to = body.world_from_body.translation.vector - eye.coords;
@@ -168,7 +191,13 @@ pub fn balls<'j>(framed: &Framed<'_>, job: &'j Job) -> (Vec<&'j Body>, usize, Ve
             });
         }
     }
-    (bodies, capsules, balls)
+    Bodies {
+        solids: bodies.iter().map(|b| Solid::of(b, mid_s, half_s)).collect(),
+        all: bodies,
+        capsules,
+        balls,
+        exposed_s: [mid_s, half_s],
+    }
 }
 
 /// Whether the shader takes it for a capsule.
@@ -192,16 +221,12 @@ fn pieces(shape: &Shape) -> impl Iterator<Item = (Point3<f64>, f64)> {
 }
 
 /// All shadows, by light and within one light by body, and those of each light.
-pub fn casts(
-    lights: &[Light<'_>],
-    bodies: &[&Body],
-    balls: &[Ball],
-) -> (Vec<Cast>, Vec<Range<usize>>) {
+pub fn casts(lights: &[Light<'_>], bodies: &Bodies<'_>) -> (Vec<Cast>, Vec<Range<usize>>) {
     let mut casts = Vec::new();
     let of_light = lights.iter().enumerate().map(|(k, light)| {
         let first = casts.len();
-        for of_body in balls.chunk_by(|a, b| a.body == b.body) {
-            let body = bodies[of_body[0].body];
+        for of_body in bodies.balls.chunk_by(|a, b| a.body == b.body) {
+            let body = bodies.all[of_body[0].body];
             if light.headlight.is_some_and(|l| l.is_carried_by(body)) {
                 continue;
             }

@@ -23,6 +23,9 @@ pub struct Cell {
     half: [Vector3<f64>; 2],
     /// None where it stands for something that faces several ways.
     pub normal: Option<Vector3<f64>>,
+    /// It is there in the middle of the exposure, and goes this way.
+    velocity_mps: Vector3<f64>,
+    travel_m: f64,
 }
 
 /// A rectangle of the picture.
@@ -33,7 +36,7 @@ struct Bounds {
 }
 
 /// Where the camera is while a view is exposed: `camera_from_world`, and when after the job's time.
-pub struct Eyes(Vec<(Isometry3<f64>, f64)>);
+pub struct Eyes([(Isometry3<f64>, f64); 3]);
 
 /// Sets of numbers, one a tile.
 #[derive(Default)]
@@ -45,11 +48,33 @@ pub struct Marks {
 }
 
 impl Cell {
-    /// Radius of the ball around it.
+    /// That does not move.
+    fn still(centre: Point3<f64>, half: [Vector3<f64>; 2], normal: Option<Vector3<f64>>) -> Self {
+        Self {
+            centre,
+            half,
+            normal,
+            velocity_mps: Vector3::zeros(),
+            travel_m: 0.0,
+        }
+    }
+
+    /// Radius of the ball around it, wherever it goes in the exposure.
     pub fn radius_m(&self) -> f64 {
-        (self.half[0] + self.half[1])
-            .norm()
-            .max((self.half[0] - self.half[1]).norm())
+        self.half_diagonal_m() + self.travel_m
+    }
+
+    /// Half of its longer diagonal.
+    pub fn half_diagonal_m(&self) -> f64 {
+        let [a, b] = self.half;
+        (a + b).norm().max((a - b).norm())
+    }
+
+    /// Whether it is seen from its back, from wherever the camera is about a place.
+    pub fn turns_away(&self, (eye, travel_m): (Point3<f64>, f64)) -> bool {
+        let to = eye - self.centre;
+        self.normal
+            .is_some_and(|n| n.dot(&to) < -self.travel_m - travel_m)
     }
 
     /// The same surface in four parts.
@@ -57,7 +82,7 @@ impl Cell {
         [(-0.5, -0.5), (0.5, -0.5), (-0.5, 0.5), (0.5, 0.5)].map(|(x, y)| Self {
             centre: self.point(x, y),
             half: self.half.map(|side| 0.5 * side),
-            normal: self.normal,
+            ..*self
         })
     }
 
@@ -75,11 +100,8 @@ impl Cell {
             Self::of_walls(section, &frame, half_m, cells);
             for l_m in [-RAIL_OFFSET_M, RAIL_OFFSET_M] {
                 let [foot, head] = [-0.2, 0.1].map(|h_m| frame.world_from_section(l_m, h_m));
-                cells.push(Self {
-                    centre: nalgebra::center(&foot, &head),
-                    half: [frame.ahead() * half_m, 0.5 * (head - foot)],
-                    normal: None,
-                });
+                let half = [frame.ahead() * half_m, 0.5 * (head - foot)];
+                cells.push(Self::still(nalgebra::center(&foot, &head), half, None));
             }
         }
     }
@@ -90,11 +112,45 @@ impl Cell {
             let count = (edge.length_m() / CELL_M).ceil().clamp(1.0, 64.0);
             let (l, h) = edge.normal();
             let half = 0.5 / count * (b - a);
-            cells.extend((0..count as u32).map(|k| Self {
-                centre: a + half * (2.0 * f64::from(k) + 1.0),
-                half: [frame.ahead() * half_m, half],
-                normal: Some(frame.left() * l + Vector3::z() * h),
+            let normal = frame.left() * l + Vector3::z() * h;
+            cells.extend((0..count as u32).map(|k| {
+                let centre = a + half * (2.0 * f64::from(k) + 1.0);
+                Self::still(centre, [frame.ahead() * half_m, half], Some(normal))
             }));
+        }
+    }
+
+    /// The six sides of a box.
+    pub fn of_box(
+        body: &Body,
+        half: &Vector3<f64>,
+        [mid_s, half_s]: [f64; 2],
+        cells: &mut Vec<Self>,
+    ) {
+        cells.clear();
+        let rotation = body.world_from_body.rotation;
+        let centre =
+            Point3::from(body.world_from_body.translation.vector + body.velocity_mps * mid_s);
+        for axis in 0..3 {
+            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3].map(|k| {
+                let count = (2.0 * half[k] / CELL_M).ceil().clamp(1.0, 64.0);
+                let side = rotation * Vector3::ith(k, half[k] / count);
+                (side, count as i32)
+            });
+            for sign in [-1.0, 1.0] {
+                let normal = rotation * Vector3::ith(axis, sign);
+                for (i, j) in (0..u.1).flat_map(|i| (0..v.1).map(move |j| (i, j))) {
+                    let along = |k: i32, count: i32| f64::from(2 * k + 1 - count);
+                    let aside = u.0 * along(i, u.1) + v.0 * along(j, v.1);
+                    cells.push(Self {
+                        centre: centre + normal * half[axis] + aside,
+                        half: [u.0, v.0],
+                        normal: Some(normal),
+                        velocity_mps: body.velocity_mps,
+                        travel_m: body.velocity_mps.norm() * half_s,
+                    });
+                }
+            }
         }
     }
 
@@ -109,13 +165,18 @@ impl Eyes {
         let view = framed.view;
         let last = f64::from(view.camera.intrinsics.height_px.saturating_sub(1));
         let rows = [0.0, 0.5 * last, last];
-        Self(
-            rows.map(|v| {
-                let at = view.camera.shutter.row_mid(view.start, v);
-                (view.motion.pose_at(at).inverse(), at.since(job_time))
-            })
-            .into(),
-        )
+        Self(rows.map(|v| {
+            let at = view.camera.shutter.row_mid(view.start, v);
+            (view.motion.pose_at(at).inverse(), at.since(job_time))
+        }))
+    }
+}
+
+impl Eyes {
+    /// How far the camera goes from a place, between these rows as it does at them.
+    pub fn travel_m(&self, from: &Point3<f64>) -> f64 {
+        let away = |(eye, _): &(Isometry3<f64>, f64)| (eye * from).coords.norm();
+        self.0.iter().map(away).fold(0.0, f64::max)
     }
 }
 
@@ -140,8 +201,10 @@ impl Bounds {
 
     fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &Cell) -> Self {
         let mut bounds = Self::NONE;
-        for (eye, _) in &eyes.0 {
-            let corner = |x: f64, y: f64| eye * cell.point(x, y);
+        let mid_s = eyes.0[1].1;
+        for (eye, after_s) in &eyes.0 {
+            let moved = cell.velocity_mps * (after_s - mid_s);
+            let corner = |x: f64, y: f64| eye * (cell.point(x, y) + moved);
             let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
             let seen = corners.map(|(x, y)| corner(x, y));
             if seen.iter().all(|p| p.z > NEAR_M) {
