@@ -3,7 +3,7 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use metrotwin::study::{MANIFEST, read_rows};
+use metrotwin::study::{MANIFEST, Row, read_rows};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -301,6 +301,24 @@ fn wrong_studies_are_refused() {
             "matrix of correlations",
         ),
         ("event", "most_slip_mps >", "most_slip >", "most_slip"),
+        (
+            "twice",
+            "keys = [\"step_s\"]",
+            "keys = [\"train.cars\"]",
+            "set by `cars` too",
+        ),
+        (
+            "seed",
+            "keys = [\"step_s\"]",
+            "keys = [\"seed\"]",
+            "follows from the study's",
+        ),
+        (
+            "stop",
+            "[study]",
+            "[study.stop.when]\nof = \"wall_s\"\nhalf_width = 1.0\n[study]",
+            "`wall_s` is no event",
+        ),
         ("condition", "speed_kmh < 75", "speed_kmh <", "no condition"),
     ] {
         let out = base.join("never");
@@ -350,6 +368,84 @@ fn shards_that_are_no_whole_are_not_merged() {
     assert_ne!(of_another, manifest);
     fs::write(second.join(MANIFEST), of_another).unwrap();
     merge("are not of one study");
+    fs::remove_dir_all(base).ok();
+}
+
+/// Shards of a study that was merged, tried again where runs had crashed, and merged once more: what
+/// counts is kept; and a copy of a shard under another name is none.
+#[test]
+fn a_merge_keeps_what_counts() {
+    let base = folder("merge");
+    let whole = base.join("whole");
+    succeeds(&study(&whole, &["--runs", "1"]));
+    let all = base.join("all");
+    for (k, limit_s) in [("1/2", "3600"), ("2/2", "0.001")] {
+        let out = all.join(format!("shard-{}", k.replace('/', "-of-")));
+        succeeds(&study(
+            &out,
+            &["--runs", "1", "--shard", k, "--run-limit-s", limit_s],
+        ));
+    }
+    let merge = || {
+        succeeds(
+            &metrotwin(&["study", "merge", all.to_str().unwrap()])
+                .output()
+                .unwrap(),
+        )
+    };
+    merge();
+    assert!(!read_rows(&all).unwrap().iter().all(Row::is_complete));
+    succeeds(&study(&all, &["--runs", "1", "--resume"]));
+    let (shard, copy) = (all.join("shard-1-of-2"), all.join("shard-1-of-2.bak"));
+    fs::create_dir(&copy).unwrap();
+    for file in [MANIFEST, "rows.jsonl"] {
+        fs::copy(shard.join(file), copy.join(file)).unwrap();
+    }
+    merge();
+    same(&all, &whole);
+    fs::remove_dir_all(base).ok();
+}
+
+/// The end of a study ends its workers, whatever they are at: this one was asked for a run of minutes.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_worker_outlives_its_study() {
+    let base = folder("orphans");
+    let file = changed(&base, "duration_s = 1.5", "duration_s = 4000.0");
+    let [file, out] = [&file, &base.join("out")].map(|p| p.to_str().unwrap().to_owned());
+    let args = [
+        "study",
+        "run",
+        &file,
+        "--renderer",
+        "cpu",
+        "--jobs",
+        "1",
+        "--out",
+        &out,
+    ];
+    let mut child = metrotwin(&args).stderr(Stdio::null()).spawn().unwrap();
+    let workers = || -> Vec<PathBuf> {
+        let all = fs::read_dir("/proc")
+            .unwrap()
+            .filter_map(|e| Some(e.ok()?.path()));
+        all.filter(|p| {
+            let said = fs::read(p.join("cmdline")).unwrap_or_default();
+            let said = String::from_utf8_lossy(&said);
+            said.contains("worker") && said.contains(&out)
+        })
+        .collect()
+    };
+    let wait = |wanted: bool| {
+        (0..600).any(|_| {
+            sleep(Duration::from_millis(50));
+            workers().is_empty() != wanted
+        })
+    };
+    assert!(wait(true), "no worker was begun");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(wait(false), "a worker goes on by itself");
     fs::remove_dir_all(base).ok();
 }
 
@@ -430,7 +526,7 @@ fn generated_scenarios_stand_by_themselves() {
 #[test]
 fn val_a_rare_event_is_estimated() {
     use metrotwin::scenario::draw::Template;
-    use metrotwin::study::{Digest, read_rows};
+    use metrotwin::study::Digest;
     let base = folder("rare");
     let out = base.to_str().unwrap();
     let file = "tests/studies/rare.toml";

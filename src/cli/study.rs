@@ -4,7 +4,8 @@ use super::fault::Failure;
 use super::print;
 use super::running::{RendererArg, STOP, prepare, stop_on_ctrl_c};
 use crate::scenario::draw::Template;
-use crate::study::{self, Digest, Options, Progress, Row, Shard, StudyError, Submission, show};
+use crate::study::stats::Estimate;
+use crate::study::{self, Digest, Options, Progress, Row, Shard, StudyError, Submission};
 use clap::Subcommand;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
@@ -176,7 +177,8 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
         StudyCommand::Worker(args) => {
             // The study's own process is the one that decides when to stop.
             ctrlc::set_handler(|| {}).ok();
-            let (input, output) = (std::io::stdin().lock(), std::io::stdout().lock());
+            let input = std::io::BufReader::new(std::io::stdin());
+            let output = std::io::stdout().lock();
             Ok(study::serve(
                 &args.folder,
                 args.renderer.into(),
@@ -226,7 +228,7 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
     let found = study::compare(&args.a, &args.b)?;
     if args.same {
         return match found.first_difference {
-            None => print(&format!("{} rows, the same value by value", found.pairs)),
+            None => print(&format!("{} rows, the same value by value", found.rows)),
             Some(what) => Err(Failure::Run(anyhow::anyhow!("not the same: {what}"))),
         };
     }
@@ -242,14 +244,14 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
         );
     }
     for (name, unit, difference) in &found.differences {
-        text += &format!("  {name:<28} {} {unit}\n", show(difference));
+        text += &format!("  {name:<28} {} {unit}\n", difference);
     }
     print(&text)
 }
 
 fn submit(args: &SubmitArgs) -> Result<(), Failure> {
     let template = Template::load(&args.study)?.with(None, args.runs);
-    template.draw(0).map_err(StudyError::from)?;
+    study::check(&template, true)?;
     let name = template.file.name.clone();
     let out = args
         .out
@@ -309,21 +311,24 @@ fn digest_text(digest: &Digest) -> String {
         let said = match (&event.weighted, &event.rate) {
             (Some(w), _) => format!(
                 "{}, from {} runs worth {:.1}",
-                show(&w.rate),
-                w.events,
-                w.effective_events
+                w.rate, w.events, w.effective_events
             ),
-            (None, Some(r)) => format!("{}, {} of {}", show(&r.wilson), r.events, r.wilson.n),
+            (None, Some(r)) => format!("{}, {} of {}", r.wilson, r.events, r.wilson.n),
             (None, None) => "never told".into(),
         };
         text += &format!("  {:<28} rate {said}\n", event.name);
     }
     for figure in &digest.figures {
         let unit = figure.measure.unit;
-        let mean = figure.mean.as_ref().map_or("-".into(), show);
-        let p95 = figure.quantiles[2].as_ref().map_or("-".into(), show);
+        let said = |e: Option<Estimate>| e.map_or("-".into(), |e| e.to_string());
+        let [mean, p95] = [figure.mean, figure.quantiles[2]].map(said);
+        let some = if figure.runs < digest.complete {
+            format!(", of {} runs", figure.runs)
+        } else {
+            String::new()
+        };
         text += &format!(
-            "  {:<28} mean {mean}, 95 % below {p95} {unit}\n",
+            "  {:<28} mean {mean}, 95 % below {p95} {unit}{some}\n",
             figure.measure.name
         );
     }
@@ -379,10 +384,7 @@ impl From<StudyError> for Failure {
             StudyError::File { .. } | StudyError::Table(_) | StudyError::Worker(_) => {
                 Self::run(error)
             }
-            other => Self::input(
-                other,
-                "nothing was begun, and nothing that was there is lost",
-            ),
+            other => Self::input(other, "nothing that was there is lost"),
         }
     }
 }

@@ -26,13 +26,19 @@ impl Ride {
     }
 
     /// The figures; `None` without a train.
-    pub fn finish(&self, world: &World, stop_at_m: Option<f64>) -> Option<TrainFigures> {
+    pub fn finish(
+        &self,
+        world: &World,
+        stop_at_m: Option<f64>,
+        derailed: bool,
+    ) -> Option<TrainFigures> {
         let (energy, first_m) = (world.energy()?, self.first_m?);
         let rms = (self.squares / f64::from(self.samples)).map(f64::sqrt);
         let worst = world.wheel_extremes()?;
         Some(TrainFigures {
             run_m: self.last_m - first_m,
             stop_error_m: stop_at_m.filter(|_| self.standing).map(|s| self.last_m - s),
+            derailed,
             floor_accel_rms_mps2: rms.into(),
             least_wheel_load_share: worst.least_normal_n / world.wheel_load_n()?,
             most_slip_mps: worst.most_slip_mps,

@@ -17,7 +17,7 @@ use crate::bus::{CameraFault, CameraHealth, Frame, SimTime, TrainCommand, TrainR
 use crate::scenario::Scenario;
 use crate::stack::protection::Protection;
 use crate::twin::comms::Comms;
-use crate::twin::physics::World;
+use crate::twin::physics::{PhysicsError, World};
 use crate::twin::random::Stream;
 use crate::twin::render::{Job, Renderer, View};
 use image::GrayImage;
@@ -108,12 +108,16 @@ impl<'s> Run<'s> {
         self.open(&mut watchers)?;
         let end = self.steps(options, &mut watchers);
         watchers.each(|o| o.close())?;
+        let derailed = matches!(
+            end,
+            Err(SessionError::Physics(PhysicsError::Derailed { .. }))
+        );
         let end = match end {
             Ok(end) => end,
             Err(SessionError::Physics(error)) => End::Failed(error.to_string()),
             Err(other) => return Err(other),
         };
-        Ok(self.summary(end, &watchers))
+        Ok(self.summary(end, derailed, &watchers))
     }
 
     fn open(&self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
@@ -452,7 +456,7 @@ impl<'s> Run<'s> {
             .is_some_and(|(limit, stood)| stood >= limit)
     }
 
-    fn summary(mut self, end: End, watchers: &Watchers<'_, '_>) -> Summary {
+    fn summary(mut self, end: End, derailed: bool, watchers: &Watchers<'_, '_>) -> Summary {
         let eyes = self.eyes.as_mut();
         let dark_lamps = eyes
             .map(|e| std::mem::take(&mut e.dark_lamps))
@@ -476,7 +480,7 @@ impl<'s> Run<'s> {
             wayside: wayside.map(|w| w.finish()),
             cameras: self.health.finish(),
             protection: self.outcome.protection(&self.world),
-            train: self.ride.finish(&self.world, stop_at_m),
+            train: self.ride.finish(&self.world, stop_at_m, derailed),
             ..speed
         }
     }

@@ -258,6 +258,8 @@ pub struct TrainFigures {
     pub run_m: f64,
     /// Where its head stood at the end less the stop mark; `null` where there is none, or it runs.
     pub stop_error_m: Option<f64>,
+    /// A wheelset left the rails, and the run ended there.
+    pub derailed: bool,
     /// RMS of the acceleration of the leading car's floor over its first bogie: forward, left, up; 50
     /// samples a second.
     pub floor_accel_rms_mps2: [f64; 3],

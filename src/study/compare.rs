@@ -4,13 +4,15 @@
 use super::digest::is_weighed;
 use super::stats::{Estimate, mean, weighted_mean};
 use super::worker::template_of;
-use super::{MEASURES, Row, Status, StudyError, report, table};
+use super::{MEASURES, Row, StudyError, report, table};
 use crate::record::parquet::Kind;
 use std::path::Path;
 
 /// What differs between two studies, b less a.
 #[derive(Clone, Debug)]
 pub struct Comparison {
+    /// Rows of the first.
+    pub rows: usize,
     /// Runs that are complete in both, by their indexes.
     pub pairs: usize,
     /// Of these, how many were not drawn alike: then pairs are no pairs, and weighed runs, whose weights
@@ -29,8 +31,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let pairs = rows_a
         .iter()
         .filter_map(|row| Some((row, &rows_b[of_b(row)?])));
-    let complete = |row: &Row| row.status == Status::Complete;
-    let pairs = pairs.filter(|(a, b)| complete(a) && complete(b));
+    let pairs = pairs.filter(|(a, b)| a.is_complete() && b.is_complete());
     let pairs: Vec<(&Row, &Row)> = pairs.collect();
     let alike = |a: &Row, b: &Row| {
         a.seed == b.seed && a.values == b.values && a.ln_weight.to_bits() == b.ln_weight.to_bits()
@@ -39,7 +40,6 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
 
     let template = template_of(a)?.1;
     let weighed = is_weighed(&template) || is_weighed(&template_of(b)?.1);
-    let conditioned = !template.settings.require.is_empty();
     let events = table::events(&template)?;
     let mut differences = Vec::new();
     let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
@@ -48,8 +48,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
         let both: Vec<(f64, f64)> = both.collect();
         let estimate = if weighed {
-            let whole = both.len() == rows_a.len() && !conditioned;
-            weighted_mean(&both, !whole).filter(|_| drawn_otherwise == 0)
+            weighted_mean(&both).filter(|_| drawn_otherwise == 0)
         } else {
             mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>())
         };
@@ -58,7 +57,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
         differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
     };
     for (name, condition) in &events {
-        let happened = |row: &Row| row.happened(condition).map(|h| f64::from(u8::from(h)));
+        let happened = |row: &Row| row.happened(condition).map(f64::from);
         add(&format!("rate of {name}"), "1", &happened);
     }
     for m in MEASURES
@@ -72,6 +71,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let mut together = rows_a.iter().zip(&rows_b);
     let row = |(a, b): (&Row, &Row)| Some(format!("run {}: {}", a.index, a.difference(b)?));
     Ok(Comparison {
+        rows: rows_a.len(),
         pairs: pairs.len(),
         drawn_otherwise,
         differences,

@@ -4,7 +4,7 @@ use super::stats::{
     Estimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean, quantile,
     rank_correlation, rate, weighted_mean, weighted_rate,
 };
-use super::{MEASURES, Measure, Row, Status, StudyError, table};
+use super::{MEASURES, Measure, Row, StudyError, table};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::{Distribution, Template};
 use std::collections::BTreeSet;
@@ -47,6 +47,8 @@ pub struct EventDigest {
 pub struct FigureDigest {
     /// Which.
     pub measure: &'static Measure,
+    /// How many runs have it.
+    pub runs: usize,
     /// Its mean.
     pub mean: Option<Estimate>,
     /// Its [`QUANTILES`].
@@ -71,12 +73,10 @@ impl Digest {
     /// Of rows in order.
     pub fn of(template: &Template, rows: &[Row]) -> Result<Self, StudyError> {
         let weighed = is_weighed(template);
-        let complete: Vec<&Row> = rows
-            .iter()
-            .filter(|r| r.status == Status::Complete)
-            .collect();
+        let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
         let ln_weights: Vec<f64> = complete.iter().map(|r| r.ln_weight).collect();
-        let conditioned = !template.settings.require.is_empty();
+        // Weights have mean 1 by themselves only if no condition cut draws off and no run is missing.
+        let cut_off = !template.settings.require.is_empty();
         let events = table::events(template)?
             .into_iter()
             .map(|(name, condition)| {
@@ -90,7 +90,7 @@ impl Digest {
                     condition: condition.text().to_owned(),
                     rate: rate(happened, told.len() as u64),
                     weighted: weighed
-                        .then(|| weighted_rate(&told, conditioned || told.len() < rows.len()))
+                        .then(|| weighted_rate(&told, cut_off || told.len() < rows.len()))
                         .flatten(),
                 }
             });
@@ -150,10 +150,10 @@ impl FigureDigest {
             return None;
         }
         if is_weighed(template) {
-            let normalise = !template.settings.require.is_empty() || told.len() < rows.len();
             return Some(Self {
                 measure,
-                mean: weighted_mean(&told, normalise),
+                runs: told.len(),
+                mean: weighted_mean(&told),
                 quantiles: [None; QUANTILES.len()],
                 drivers: Vec::new(),
             });
@@ -165,6 +165,7 @@ impl FigureDigest {
         let drivers = variables.map(|name| Driver::of(template, name, measure, rows));
         Some(Self {
             measure,
+            runs: sample.len(),
             mean,
             quantiles: QUANTILES.map(|p| quantile(&sample, p)),
             drivers: drivers.collect(),
@@ -175,13 +176,16 @@ impl FigureDigest {
 impl Driver {
     fn of(template: &Template, name: &str, measure: &Measure, rows: &[&Row]) -> Self {
         let settings = &template.settings;
-        let independent = settings.correlated.is_empty()
-            && settings.require.is_empty()
-            && !shares_a_table(template);
         let pairs = rows
             .iter()
             .filter_map(|r| Some((r.number(name)?, r.number(measure.name)?)));
         let pairs: Vec<(f64, f64)> = pairs.collect();
+        // Inputs that conditions tie together explain no share alone, nor do those of runs that have
+        // the figure: a thing that was found is near or large.
+        let independent = settings.correlated.is_empty()
+            && settings.require.is_empty()
+            && !shares_a_table(template)
+            && rows.iter().all(|r| r.number(measure.name).is_some());
         let share = || {
             if pairs.is_empty() {
                 first_order_of_groups(&by_name(name, measure, rows))
@@ -206,25 +210,4 @@ fn by_name(variable: &str, measure: &Measure, rows: &[&Row]) -> Vec<(usize, f64)
         .iter()
         .filter_map(|r| Some((place(r)?, r.number(measure.name)?)));
     pairs.collect()
-}
-
-/// A figure with its interval, to the digits that it tells.
-pub fn show(e: &Estimate) -> String {
-    let width = 0.5 * (e.high - e.low);
-    let digits = |x: f64| (1.0 - x.abs().log10().floor()).clamp(0.0, 9.0) as usize;
-    let digits = if width.is_finite() && width > 0.0 {
-        digits(width)
-    } else if e.value.abs() > 0.0 {
-        digits(e.value)
-    } else {
-        0
-    };
-    let end = |x: f64| {
-        if x.is_infinite() {
-            if x > 0.0 { "inf".into() } else { "-inf".into() }
-        } else {
-            format!("{x:.digits$}")
-        }
-    };
-    format!("{:.digits$} ({} to {})", e.value, end(e.low), end(e.high))
 }

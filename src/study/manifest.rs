@@ -1,7 +1,8 @@
-//! What a study's folder holds: of which inputs, by which version, on which adapter.
+//! The manifest `study.json`: SHA-256 of every input and of the program, and the renderer, that the rows of a
+//! folder were made with; and shards.
 
 use super::{StudyError, write_whole};
-use crate::scenario::draw::{Inputs, Template};
+use crate::scenario::draw::{Inputs, Template, sha256};
 use crate::session::RendererChoice;
 use crate::twin::render::Backend;
 use crate::twin::render::gpu;
@@ -17,7 +18,8 @@ pub const MANIFEST: &str = "study.json";
 /// Folder for copies of all inputs.
 pub const INPUTS: &str = "inputs";
 
-/// One of several parts of a study, each run by itself.
+/// One of several parts of a study, each run by itself: runs are dealt in turn, so that shard I of N has
+/// those with index = I - 1 modulo N.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Shard {
     /// Which, counted from 1.
@@ -63,11 +65,13 @@ impl fmt::Display for Shard {
     }
 }
 
-/// Everything that a row hangs on. A study goes on only while all of it is the same.
+/// Everything that a row depends on. A study goes on only while all of it is the same.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Manifest {
     /// Version of the program.
     pub metrotwin: String,
+    /// SHA-256 of the program: another build may be another program.
+    pub program: String,
     /// The study's file, below [`INPUTS`].
     pub study: PathBuf,
     /// SHA-256 of every input file, by its path below [`INPUTS`].
@@ -111,6 +115,10 @@ impl Drawn {
     }
 }
 
+fn program_hash() -> std::io::Result<String> {
+    Ok(sha256(&fs::read(std::env::current_exe()?)?))
+}
+
 impl Manifest {
     /// Of a study about to be run here.
     pub fn of(
@@ -122,6 +130,7 @@ impl Manifest {
         let inputs = Inputs::of(template).map_err(unreadable)?;
         Ok(Self {
             metrotwin: env!("CARGO_PKG_VERSION").into(),
+            program: program_hash().map_err(StudyError::Worker)?,
             study: inputs.study.clone(),
             inputs: inputs.hashes().map_err(unreadable)?,
             runs: template.runs(),
@@ -170,6 +179,9 @@ impl Manifest {
         }
         if self.metrotwin != now.metrotwin {
             return said("version of metrotwin", &self.metrotwin, &now.metrotwin);
+        }
+        if self.program != now.program {
+            return Some("the program is of another build".into());
         }
         if self.renderer != now.renderer {
             return said("renderer", &self.renderer.adapter, &now.renderer.adapter);

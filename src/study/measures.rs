@@ -207,6 +207,8 @@ pub const MEASURES: &[Measure] = positioning![
     measure_of("impact_speed_mps", Real, "m/s", "of the first thing hit, 0 where nothing was",
         |s, _| of_protection(s, |p| Some(p.impacts.first().map_or(0.0, |i| i.speed_mps)))),
     measure_of("run_m", Real, "m", "distance run", |s, _| of_train(s, |t| Some(t.run_m))),
+    measure_of("derailed", Flag, "1", "a wheelset left the rails, and the run ended there",
+        |s, _| of_train(s, |t| Some(t.derailed))),
     measure_of("stop_error_m", Real, "m", "where the head stood at the end less the stop mark",
         |s, _| of_train(s, |t| t.stop_error_m)),
     measure_of("floor_accel_up_mps2", Real, "m/s^2", "RMS, vertical, of the leading car's floor",

@@ -1,8 +1,8 @@
 //! Shards put together.
 
-use super::journal::{self, JOURNAL};
+use super::journal::{self, JOURNAL, Journal};
 use super::worker::template_of;
-use super::{INPUTS, Manifest, Row, Shard, StudyError, table, write_whole};
+use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table, write_whole};
 use crate::scenario::draw::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
@@ -51,24 +51,28 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
         );
         return Err(StudyError::Shards(what));
     }
-    check_free(folder, first, rows.len())?;
+    // Nobody runs there meanwhile: the journal is locked.
+    let (_journal, there) = Journal::open(folder)?;
+    rows.extend(rows_kept(folder, first, there)?);
     write(folder, first_path, first, rows)
 }
 
-/// A folder that holds another study, or more of this one, is left alone.
-fn check_free(folder: &Path, merged: &Manifest, rows: usize) -> Result<(), StudyError> {
-    let Some(there) = Manifest::read(folder)? else {
-        return Ok(());
+/// Rows that the folder itself holds and that count: such as those of runs that crashed in a shard and
+/// were tried again after an earlier merge. A folder that holds another study is left alone.
+fn rows_kept(folder: &Path, merged: &Manifest, rows: Vec<Row>) -> Result<Vec<Row>, StudyError> {
+    let other = |what| {
+        let path = folder.to_owned();
+        StudyError::Other { path, what }
     };
-    let more = journal::read(folder)?.len() > rows;
-    let more = more.then(|| "more rows than the shards".to_owned());
-    match there.difference(merged).or(more) {
-        None => Ok(()),
-        Some(what) => Err(StudyError::Other {
-            path: folder.to_owned(),
-            what,
-        }),
-    }
+    let what = match Manifest::read(folder)? {
+        None if rows.is_empty() => return Ok(rows),
+        None => "rows without a manifest".to_owned(),
+        Some(there) => match there.difference(merged) {
+            None => return Ok(rows),
+            Some(what) => what,
+        },
+    };
+    Err(other(what))
 }
 
 /// Folders of shards, with their manifests.
@@ -78,9 +82,13 @@ fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
     for entry in fs::read_dir(folder).map_err(failed)? {
         let path = entry.map_err(failed)?.path();
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned());
-        if name.is_some_and(|n| n.starts_with("shard-")) {
-            let manifest = Manifest::read(&path)?;
-            let manifest = manifest.ok_or_else(|| StudyError::NoStudy(path.clone()))?;
+        let Some(name) = name.filter(|n| n.starts_with("shard-")) else {
+            continue;
+        };
+        let manifest = Manifest::read(&path)?;
+        let manifest = manifest.ok_or_else(|| StudyError::NoStudy(path.clone()))?;
+        // A copy kept under another name is no shard.
+        if manifest.shard.is_some_and(|shard| shard.folder() == name) {
             shards.push((path, manifest));
         }
     }
@@ -115,6 +123,8 @@ fn write(
     manifest: &Manifest,
     mut rows: Vec<Row>,
 ) -> Result<Vec<Row>, StudyError> {
+    // Sorting keeps the last of a run's rows: one that crashed gives way to any other.
+    rows.sort_by_key(|row| row.status != Status::Crashed);
     journal::sort(&mut rows);
     let (_, template) = template_of(shard)?;
     let failed = |e| StudyError::file(folder, e);

@@ -41,14 +41,14 @@ mod table;
 mod worker;
 
 pub use compare::{Comparison, compare};
-pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES, show};
+pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES};
 pub use journal::read as read_rows;
 pub use manifest::{Drawn, INPUTS, MANIFEST, Manifest, Shard};
 pub use measures::{Fixes, MEASURES, Measure, measure};
 pub use merge::merge;
 pub use report::{REPORT, report, rows};
 pub use row::{Row, Status};
-pub use runner::{Options, Progress, run};
+pub use runner::{Options, Progress, check, run};
 pub use slurm::{Submission, Submitted};
 pub use table::check_names;
 pub use worker::{Desk, serve, template_of};
@@ -121,9 +121,9 @@ pub enum StudyError {
     /// A name that cannot be used.
     #[error("{0} {1}")]
     Name(String, String),
-    /// A name that is no column.
-    #[error("`{0}` is no variable, figure or event of this study")]
-    NoColumn(String),
+    /// A name that no interval can be had of.
+    #[error("study.stop.when.of: `{0}` is no event of this study and no single figure of a run")]
+    NoFigure(String),
     /// A copy of the inputs is wrong.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),

@@ -98,23 +98,19 @@ impl Pool<'_> {
     ) {
         let mut worker = None;
         while let Some(index) = next() {
-            let row = match worker.take() {
+            let at_desk = match worker.take() {
                 Some(worker) => Ok(worker),
                 None => Worker::start(self, number).map_err(StudyError::Worker),
-            }
-            .and_then(|mut of: Worker| match of.ask(index, self.run_limit) {
+            };
+            let row = at_desk.map(|mut of: Worker| match of.ask(index, self.run_limit) {
                 Ok(row) => {
                     worker = Some(of);
-                    Ok(row)
+                    row
                 }
-                Err(error) => {
-                    let draw = template.draw(index)?;
-                    Ok(Row::without_figures(
-                        &draw,
-                        Status::Crashed,
-                        of.obituary(&error),
-                    ))
-                }
+                Err(error) => match template.draw(index) {
+                    Ok(draw) => Row::without_figures(&draw, Status::Crashed, of.obituary(&error)),
+                    Err(error) => Row::undrawn(index, &error),
+                },
             });
             if rows.send(row).is_err() {
                 return;

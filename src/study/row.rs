@@ -1,7 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
-use crate::scenario::draw::Draw;
+use crate::scenario::draw::{Draw, DrawError};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -10,13 +10,13 @@ use serde_json::{Map, Value};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Status {
-    /// To its end.
+    /// To its end, or to where the train left the rails.
     Complete,
     /// It began and failed: its figures are those up to there.
     Failed,
-    /// What was drawn is no scenario that can be run.
+    /// Nothing could be drawn, or what was drawn is no scenario that can be run.
     Invalid,
-    /// The process that ran it ended.
+    /// The worker died, or was ended at the limit of a run; `--resume` tries it again.
     Crashed,
 }
 
@@ -42,11 +42,11 @@ pub struct Row {
     pub seed: u64,
     /// How it came out.
     pub status: Status,
-    /// Why, where it is not complete.
+    /// Why, where it is not complete or ended early.
     pub reason: Option<String>,
     /// Draws before this one that did not meet the conditions.
     pub rejected: u32,
-    /// Logarithm of its weight: 0 but with importance sampling.
+    /// Natural logarithm of its weight; 0 without importance sampling.
     pub ln_weight: f64,
     /// What was drawn.
     pub values: Map<String, Value>,
@@ -55,6 +55,21 @@ pub struct Row {
 }
 
 impl Row {
+    /// Whether its figures count. Those of a run that failed are of a part of it: what it had not come
+    /// to yet, it lacks.
+    pub fn is_complete(&self) -> bool {
+        self.status == Status::Complete
+    }
+
+    /// Of a run for which nothing could be drawn.
+    pub fn undrawn(index: u64, error: &DrawError) -> Self {
+        let draw = Draw {
+            index,
+            ..Draw::default()
+        };
+        Self::without_figures(&draw, Status::Invalid, error.to_string())
+    }
+
     /// Of a run that has no figures.
     pub fn without_figures(draw: &Draw, status: Status, reason: String) -> Self {
         let json = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
@@ -76,6 +91,9 @@ impl Row {
         let (status, reason) = match &summary.end {
             End::Complete => (Status::Complete, None),
             End::Interrupted => (Status::Failed, Some("broken off".to_owned())),
+            End::Failed(why) if summary.train.as_ref().is_some_and(|t| t.derailed) => {
+                (Status::Complete, Some(why.clone()))
+            }
             End::Failed(why) => (Status::Failed, Some(why.clone())),
         };
         let figures = MEASURES.iter().filter_map(|m| {
@@ -92,9 +110,7 @@ impl Row {
     /// A variable or a figure as a number: flags are 0 and 1.
     pub fn number(&self, name: &str) -> Option<f64> {
         let value = self.values.get(name).or_else(|| self.figures.get(name))?;
-        value
-            .as_f64()
-            .or_else(|| value.as_bool().map(|b| f64::from(u8::from(b))))
+        value.as_f64().or_else(|| value.as_bool().map(f64::from))
     }
 
     /// A list of numbers.

@@ -47,18 +47,17 @@ pub struct Progress {
 
 /// No run is known to take so long.
 const RUN_LIMIT: Duration = Duration::from_secs(3600);
+/// Combinations of swept values that are drawn from before the first run.
+const MOST_CHECKED: u64 = 1000;
 /// How often the table is written while runs go on.
 const TABLE_EVERY: Duration = Duration::from_secs(60);
 
-/// Runs what a folder lacks of a study, and gives all its rows in the order of their indexes. The
-/// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
-pub fn run(
-    template: &Template,
-    folder: &Path,
-    options: &Options<'_>,
-) -> Result<Vec<Row>, StudyError> {
-    // What can be wrong with all runs is said before the first.
-    template.draw(0)?;
+/// Says what can be wrong with all runs before the first; gives the precision at which to stop.
+pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, StudyError> {
+    // The first run of each combination of swept values.
+    for cell in 0..template.cells().min(MOST_CHECKED) {
+        template.draw(cell)?;
+    }
     table::check_names(template)?;
     if template.runs() > MOST_RUNS {
         let what = format!(
@@ -68,17 +67,31 @@ pub fn run(
         return Err(StudyError::Name("the study".into(), what));
     }
     let precision = Precision::of(template)?;
-    if precision.is_some() && options.shard.is_some() {
+    if precision.is_some() && in_shards {
         return Err(StudyError::Shards(
             "study.stop.when looks at all runs, and a shard does not see the others': run the study \
              whole, or without it"
                 .into(),
         ));
     }
+    Ok(precision)
+}
+
+/// Runs what a folder lacks of a study, and gives all its rows in the order of their indexes. The
+/// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
+pub fn run(
+    template: &Template,
+    folder: &Path,
+    options: &Options<'_>,
+) -> Result<Vec<Row>, StudyError> {
+    let precision = check(template, options.shard.is_some())?;
     let manifest = Manifest::of(template, options.renderer, options.shard)?;
     fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
     let kept = Manifest::read(folder)?;
     check_same(folder, kept.as_ref(), &manifest)?;
+    // With fewer runs than it has, a study keeps those that it has.
+    let runs = kept.as_ref().map_or(0, |kept| kept.runs).max(manifest.runs);
+    let manifest = Manifest { runs, ..manifest };
     let (journal, mut rows) = Journal::open(folder)?;
     if kept.is_none() && !rows.is_empty() {
         return Err(another(folder, "rows without a manifest".into()));
@@ -237,11 +250,7 @@ impl<'a> Office<'a> {
         };
         let done = self.rows.len() as u64;
         let minutes = self.begin.elapsed().as_secs_f64() / 60.0;
-        let failed = self
-            .rows
-            .iter()
-            .filter(|r| r.status != Status::Complete)
-            .count();
+        let failed = self.rows.iter().filter(|r| !r.is_complete()).count();
         show(&Progress {
             done,
             of: self.of,

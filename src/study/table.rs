@@ -2,7 +2,7 @@
 
 use super::{MEASURES, Row, StudyError, measure};
 use crate::record::parquet::{Column, Kind, Table, Value, column};
-use crate::scenario::draw::{Condition, ConditionError, Template};
+use crate::scenario::draw::{Condition, ConditionError, Template, VariableSettings};
 use serde_json::Value as Json;
 use std::path::Path;
 
@@ -78,7 +78,7 @@ pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result<(), Stu
     ];
     let variables = template.settings.variables.iter().map(|(name, variable)| {
         let keys = variable.keys.join(", ");
-        let unit = unit_of(variable.keys.first().unwrap_or(name));
+        let unit = unit_of(name, variable);
         let meaning = format!("drawn: {}", if keys.is_empty() { name } else { &keys });
         Column {
             name: name.clone().into(),
@@ -162,18 +162,37 @@ fn cell(kind: Kind, value: Option<&Json>) -> Value {
     }
 }
 
+/// The unit of a variable: what its own name ends on tells, or the key that it sets as it is drawn. One
+/// that is rescaled to a key with a unit has another, which nobody said.
+pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
+    let of_key = variable.keys.first().and_then(|key| unit_in(key));
+    match (unit_in(name), of_key) {
+        (Some(unit), _) => unit,
+        (None, Some(_)) if variable.scale.to_bits() != 1f64.to_bits() => "",
+        (None, of_key) => of_key.unwrap_or("1"),
+    }
+}
+
 /// The unit that the end of a key tells.
-pub fn unit_of(key: &str) -> &'static str {
+fn unit_in(key: &str) -> Option<&'static str> {
     let last = key.rsplit('.').next().unwrap_or(key);
     let last = last.split('[').next().unwrap_or(last);
-    UNITS
-        .iter()
-        .find(|(end, _)| last.ends_with(end))
-        .map_or("1", |(_, unit)| unit)
+    let found = UNITS.iter().find(|(end, _)| last.ends_with(end));
+    found.map(|(_, unit)| *unit)
 }
 
 /// Longer ends first.
 const UNITS: &[(&str, &str)] = &[
+    ("_ms_per_s", "ms/s"),
+    ("_e_per_s", "e/s"),
+    ("_per_s", "1/s"),
+    ("_kg_per_m", "kg/m"),
+    ("_c_per_m", "degC/m"),
+    ("_per_m", "1/m"),
+    ("_mn_m", "MN m"),
+    ("_rad_s", "rad/s"),
+    ("_deg_s", "deg/s"),
+    ("_mps3", "m/s^3"),
     ("_mps2", "m/s^2"),
     ("_mps", "m/s"),
     ("_kmh", "km/h"),
@@ -189,6 +208,12 @@ const UNITS: &[(&str, &str)] = &[
     ("_mm", "mm"),
     ("_us", "us"),
     ("_ms", "ms"),
+    ("_mg", "mg"),
+    ("_cd", "cd"),
+    ("_lx", "lx"),
+    ("_kn", "kN"),
+    ("_kw", "kW"),
+    ("_c", "degC"),
     ("_m", "m"),
     ("_s", "s"),
     ("_n", "N"),

@@ -11,6 +11,8 @@ use crate::twin::render::Renderer;
 use std::io::{self, BufRead, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
+use std::sync::mpsc::channel;
+use std::thread;
 
 /// The study that a folder holds, from the copies of its inputs.
 pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
@@ -24,7 +26,7 @@ pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
 pub fn serve(
     folder: &Path,
     renderer: RendererChoice,
-    input: impl BufRead,
+    input: impl BufRead + Send + 'static,
     mut output: impl Write,
 ) -> Result<(), StudyError> {
     let (_, template) = template_of(folder)?;
@@ -33,19 +35,36 @@ pub fn serve(
     writeln!(output, "{READY}")
         .and_then(|()| output.flush())
         .map_err(failed)?;
-    for line in input.lines() {
+    for line in lines_while_wanted(input) {
         let line = line.map_err(failed)?;
         let index = line
             .trim()
             .parse()
             .map_err(|e| failed(io::Error::other(e)))?;
-        let row = serde_json::to_string(&desk.run(&template, index)?);
+        let row = serde_json::to_string(&desk.run(&template, index));
         let row = row.map_err(|e| failed(e.into()))?;
         writeln!(output, "{row}")
             .and_then(|()| output.flush())
             .map_err(failed)?;
     }
     Ok(())
+}
+
+/// The lines of the input. Whoever asks closes it after the last row; when it ends before, nobody waits
+/// for the run at hand any more, as after a kill, and the process ends with it.
+fn lines_while_wanted(
+    input: impl BufRead + Send + 'static,
+) -> impl Iterator<Item = io::Result<String>> {
+    let (sender, lines) = channel();
+    thread::spawn(move || {
+        for line in input.lines() {
+            if sender.send(line).is_err() {
+                return;
+            }
+        }
+        std::process::exit(0);
+    });
+    lines.into_iter()
 }
 
 /// Runs one scenario after the other, with one renderer.
@@ -64,17 +83,20 @@ impl Desk {
     }
 
     /// Runs one run of a study, without a recording.
-    pub fn run(&mut self, template: &Template, index: u64) -> Result<Row, StudyError> {
-        let draw = template.draw(index)?;
+    pub fn run(&mut self, template: &Template, index: u64) -> Row {
+        let draw = match template.draw(index) {
+            Ok(draw) => draw,
+            Err(error) => return Row::undrawn(index, &error),
+        };
         let run = AssertUnwindSafe(|| self.run_drawn(template, &draw));
-        Ok(catch_unwind(run).unwrap_or_else(|panic| {
+        catch_unwind(run).unwrap_or_else(|panic| {
             // Who knows what state it is in.
             self.renderer = None;
             let said = panic.downcast_ref::<String>().map(String::as_str);
             let said = said.or_else(|| panic.downcast_ref::<&str>().copied());
             let reason = format!("panic: {}", said.unwrap_or("without a word"));
             Row::without_figures(&draw, Status::Failed, reason)
-        }))
+        })
     }
 
     fn run_drawn(&mut self, template: &Template, draw: &Draw) -> Row {

@@ -2,10 +2,6 @@
 
 use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator, ops_factory};
 
-fn yes(holds: bool) -> f64 {
-    f64::from(u8::from(holds))
-}
-
 /// One operator between two numbers; a larger `prio` binds tighter.
 macro_rules! between {
     ($sign:literal, $prio:literal, $apply:expr) => {
@@ -24,16 +20,16 @@ macro_rules! between {
 ops_factory!(
     Operators,
     f64,
-    between!("||", 0, |a, b| yes(a > 0.5 || b > 0.5)),
-    between!("&&", 1, |a, b| yes(a > 0.5 && b > 0.5)),
-    between!("<", 2, |a, b| yes(a < b)),
-    between!("<=", 2, |a, b| yes(a <= b)),
-    between!(">", 2, |a, b| yes(a > b)),
-    between!(">=", 2, |a, b| yes(a >= b)),
-    between!("==", 2, |a: f64, b| yes(
+    between!("||", 0, |a, b| f64::from(a > 0.5 || b > 0.5)),
+    between!("&&", 1, |a, b| f64::from(a > 0.5 && b > 0.5)),
+    between!("<", 2, |a, b| f64::from(a < b)),
+    between!("<=", 2, |a, b| f64::from(a <= b)),
+    between!(">", 2, |a, b| f64::from(a > b)),
+    between!(">=", 2, |a, b| f64::from(a >= b)),
+    between!("==", 2, |a: f64, b| f64::from(
         a.to_bits() == f64::to_bits(b) || a - b == 0.0
     )),
-    between!("!=", 2, |a: f64, b| yes(a - b != 0.0)),
+    between!("!=", 2, |a: f64, b| f64::from(a - b != 0.0)),
     Operator::make_bin_unary(
         "+",
         BinOp {
@@ -57,7 +53,7 @@ ops_factory!(
     between!("^", 5, f64::powf),
     between!("min", 6, f64::min),
     between!("max", 6, f64::max),
-    Operator::make_unary("!", |a| yes(a < 0.5)),
+    Operator::make_unary("!", |a| f64::from(a < 0.5)),
     Operator::make_unary("abs", f64::abs),
     Operator::make_unary("sqrt", f64::sqrt),
     Operator::make_unary("ln", f64::ln),
@@ -94,7 +90,7 @@ impl Condition {
         let form = |e: exmex::ExError| ConditionError::Form(text.to_owned(), e.to_string());
         Ok(Self {
             text: text.to_owned(),
-            expression: Box::new(FlatEx::parse(text).map_err(form)?),
+            expression: Box::new(FlatEx::parse(&plain(text)).map_err(form)?),
         })
     }
 
@@ -135,6 +131,51 @@ impl Condition {
     }
 }
 
+/// As the parser wants it: names in braces, as it would take `min_gap_m` for the function `min`, and
+/// numbers without powers of ten, which it does not know.
+fn plain(text: &str) -> String {
+    let (mut out, mut rest) = (String::new(), text);
+    while let Some(first) = rest.chars().next() {
+        let length = match first {
+            '{' => rest.find('}').map_or(rest.len(), |k| k + 1),
+            '0'..='9' | '.' => number_length(rest),
+            'a'..='z' | 'A'..='Z' | '_' => word_length(rest),
+            _ => first.len_utf8(),
+        };
+        let (token, after) = rest.split_at(length);
+        let is_word = first.is_ascii_alphabetic() || first == '_';
+        match token.parse::<f64>() {
+            // Without an exponent, whatever its size.
+            Ok(number) if !is_word => out += &number.to_string(),
+            _ if is_word && !after.trim_start().starts_with('(') => out.extend(["{", token, "}"]),
+            _ => out += token,
+        }
+        rest = after;
+    }
+    out
+}
+
+fn word_length(text: &str) -> usize {
+    let is_inner = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    text.find(|c| !is_inner(c)).unwrap_or(text.len())
+}
+
+/// Of digits with a point, and of a power of ten behind them.
+fn number_length(text: &str) -> usize {
+    let digits = |t: &str| t.find(|c: char| !c.is_ascii_digit()).unwrap_or(t.len());
+    let mantissa = text
+        .find(|c: char| !c.is_ascii_digit() && c != '.')
+        .unwrap_or(text.len());
+    let Some(power) = text[mantissa..].strip_prefix(['e', 'E']) else {
+        return mantissa;
+    };
+    let sign = usize::from(power.starts_with(['+', '-']));
+    match digits(&power[sign..]) {
+        0 => mantissa,
+        n => mantissa + 1 + sign + n,
+    }
+}
+
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
@@ -144,7 +185,7 @@ mod tests {
         Condition::parse(text)?.holds(|name| match name {
             "a" => Ok(Some(2.0)),
             "train.speed[0]" => Ok(Some(5.0)),
-            "flag" => Ok(Some(1.0)),
+            "flag" | "min_flag" => Ok(Some(1.0)),
             "gone" => Ok(None),
             _ => Err(()),
         })
@@ -158,6 +199,9 @@ mod tests {
         assert_eq!(holds("a > 3 || (a < 3 && a != 2)"), Ok(Some(false)));
         assert_eq!(holds("flag && a == 2"), Ok(Some(true)));
         assert_eq!(holds("flag"), Ok(Some(true)));
+        assert_eq!(holds("min_flag > 0.5"), Ok(Some(true)));
+        assert_eq!(holds("max(a, 1.5e1) == 15"), Ok(Some(true)));
+        assert_eq!(holds("a > 2e-7 && a<.5E+1"), Ok(Some(true)));
         assert_eq!(holds("!flag"), Ok(Some(false)));
         assert_eq!(holds("gone > 1 && a > 0"), Ok(None));
         assert!(matches!(holds("b > 1"), Err(ConditionError::Unknown(_, name)) if name == "b"));

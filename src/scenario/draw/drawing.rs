@@ -14,7 +14,7 @@ use toml::{Table, Value};
 const MOST_ATTEMPTS: u32 = 10_000;
 
 /// One run's draw.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Draw {
     /// The run.
     pub index: u64,
@@ -225,11 +225,15 @@ impl Draw {
 }
 
 impl VariableSettings {
+    /// Whether its keys get other numbers than it has.
+    pub fn is_rescaled(&self) -> bool {
+        self.scale.to_bits() != 1f64.to_bits() || self.offset.abs() > 0.0
+    }
+
     /// What a value of it changes in the scenario.
     pub(super) fn overrides(&self, value: &Value) -> Vec<Override> {
-        let same = self.scale.to_bits() == 1f64.to_bits() && self.offset.abs() == 0.0;
         let value = match number(value) {
-            Some(x) if !same => Value::Float(self.offset + self.scale * x),
+            Some(x) if self.is_rescaled() => Value::Float(self.offset + self.scale * x),
             _ => value.clone(),
         };
         let of = |key: &String| Override {
@@ -244,7 +248,7 @@ fn number(value: &Value) -> Option<f64> {
     match value {
         Value::Integer(x) => Some(*x as f64),
         Value::Float(x) => Some(*x),
-        Value::Boolean(x) => Some(f64::from(u8::from(*x))),
+        Value::Boolean(x) => Some(f64::from(*x)),
         _ => None,
     }
 }

@@ -245,8 +245,35 @@ impl StudySettings {
                 "give the event a name of its own: both are columns of the results",
             ));
         }
+        self.check_keys(at, problems);
         self.check_groups(at, problems);
         self.stop.check(&format!("{at}.stop"), problems);
+    }
+
+    /// A key that two variables set would be what the last of them says.
+    fn check_keys(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut seen: Vec<(&str, &str)> = Vec::new();
+        for (name, variable) in &self.variables {
+            for key in &variable.keys {
+                let clash = seen
+                    .iter()
+                    .find(|(_, other)| is_within(key, other) || is_within(other, key));
+                let why = match clash {
+                    Some((other, _)) => format!("`{key}` is set by `{other}` too"),
+                    None if is_within(key, "study") => format!("`{key}` is no key of a scenario"),
+                    None if key == "seed" => "`seed` follows from the study's".to_owned(),
+                    None => {
+                        seen.push((name, key));
+                        continue;
+                    }
+                };
+                problems.push(Problem::new(
+                    format!("{at}.variables.{name}.keys"),
+                    why,
+                    "let each variable set keys of its own",
+                ));
+            }
+        }
     }
 
     fn check_groups(&self, at: &str, problems: &mut Vec<Problem>) {
@@ -285,6 +312,12 @@ impl StudySettings {
     }
 }
 
+/// Whether a dotted key is another one or lies below it.
+fn is_within(key: &str, other: &str) -> bool {
+    let rest = key.strip_prefix(other);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
 fn is_name(name: &str) -> bool {
     let mut letters = name.chars();
     letters.next().is_some_and(|c| c.is_ascii_lowercase())
@@ -307,8 +340,7 @@ impl VariableSettings {
             let key = format!("{at}.{name}");
             Problem::unless_within(problems, key, value, -1e12..=1e12, "");
         }
-        let moved = self.scale.to_bits() != 1f64.to_bits() || self.offset.abs() > 0.0;
-        if moved && !self.from.is_of_numbers() {
+        if self.is_rescaled() && !self.from.is_of_numbers() {
             problems.push(Problem::new(
                 format!("{at}.scale"),
                 "acts on numbers, and these values are none",
@@ -329,6 +361,12 @@ impl VariableSettings {
                     key,
                     "does not reach all values that `from` has",
                     "widen it: what it never proposes would be missing from every figure",
+                ));
+            } else if !propose.bounds_weights_of(&self.from) {
+                problems.push(Problem::new(
+                    key,
+                    "falls off so fast that the weights have no variance, and no figure an error",
+                    "give it at least 0.71 of the sigma of `from`, and no corners where `from` has some",
                 ));
             }
         }

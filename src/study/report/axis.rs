@@ -119,7 +119,7 @@ mod tests {
             texts(&axis, 99.9..102.6),
             ["100.0", "100.5", "101.0", "101.5", "102.0", "102.5"]
         );
-        assert_eq!(texts(&axis, -3e-7..3e-7).len(), 7);
+        assert_eq!(texts(&axis, -3.1e-7..3.1e-7).len(), 7);
         let log = Axis {
             log: true,
             ..Axis::new("")

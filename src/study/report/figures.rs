@@ -4,7 +4,8 @@ use super::axis::Axis;
 use super::plot::{Layers, Plot};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::{Condition, Distribution, Template};
-use crate::study::stats::{mean, quantile, rate};
+use crate::study::digest::is_weighed;
+use crate::study::stats::{mean, quantile, rank_correlation, rate};
 use crate::study::table::{events, unit_of};
 use crate::study::{Digest, FigureDigest, Measure, Row};
 use serde_json::Value;
@@ -26,10 +27,8 @@ impl<'a> Input<'a> {
     fn of(template: &'a Template, name: &'a str, rows: &[&Row]) -> Self {
         let variable = template.settings.variables.get(name);
         let label = variable.map(|v| v.label.as_str()).filter(|l| !l.is_empty());
-        let unit = variable
-            .and_then(|v| v.keys.first())
-            .map_or("1", |key| unit_of(key));
-        let with_unit = if unit == "1" {
+        let unit = variable.map_or("1", |v| unit_of(name, v));
+        let with_unit = if ["1", ""].contains(&unit) {
             name.to_owned()
         } else {
             format!("{name} [{unit}]")
@@ -87,9 +86,11 @@ fn middle(group: &[(f64, f64)]) -> f64 {
 
 /// All plots of a study.
 pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
-    let complete: Vec<&Row> = rows.iter().filter(|r| !r.figures.is_empty()).collect();
+    let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
     let names = template.settings.variables.keys();
     let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
+    // Weighed runs lie where they were proposed, not where nature has them: only maps show that.
+    let weighed = is_weighed(template);
     let mut plots = Vec::new();
     for (name, condition) in events(template).unwrap_or_default() {
         let told = || complete.iter().filter_map(|r| r.happened(&condition));
@@ -97,17 +98,14 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
         if told().all(|h| h) || !told().any(|h| h) {
             continue;
         }
-        plots.extend(
-            inputs
-                .iter()
-                .filter_map(|i| event_plot(i, &name, &condition, &complete)),
-        );
+        let groups = inputs.iter().filter(|_| !weighed);
+        plots.extend(groups.filter_map(|i| event_plot(i, &name, &condition, &complete)));
         plots.extend(event_map(&inputs, &name, &condition, &complete));
     }
     for figure in digest
         .figures
         .iter()
-        .filter(|f| is_worth_plotting(f.measure))
+        .filter(|f| is_worth_plotting(f.measure) && !weighed)
     {
         plots.extend(distribution(figure.measure, &complete));
         plots.extend(convergence(figure.measure, &complete));
@@ -117,7 +115,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
             .filter(|i| strongest.contains(&i.name) || !i.axis.names.is_empty());
         plots.extend(shown.filter_map(|i| figure_plot(i, figure.measure, &complete)));
     }
-    for method in ["paper", "mono"] {
+    for method in ["paper", "mono"].into_iter().filter(|_| !weighed) {
         plots.extend(error_by_range(method, &complete));
     }
     plots
@@ -162,7 +160,7 @@ fn label(measure: &Measure) -> String {
 
 /// How often an event happens at each value of a variable.
 fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
-    let pairs = input.pairs(rows, |r| r.happened(event).map(|h| f64::from(u8::from(h))));
+    let pairs = input.pairs(rows, |r| r.happened(event).map(f64::from));
     let bars = groups(&pairs).into_iter().filter_map(|group| {
         let happened = group.iter().filter(|p| p.1 > 0.5).count() as u64;
         let e = rate(happened, group.len() as u64)?.wilson;
@@ -184,8 +182,8 @@ fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -
 /// Where in the plane of two variables an event happened: of the two that most tell.
 fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
     let strength = |input: &&Input<'_>| {
-        let pairs = input.pairs(rows, |r| r.happened(event).map(|h| f64::from(u8::from(h))));
-        crate::study::stats::rank_correlation(&pairs).map_or(0.0, |c| c.value.abs())
+        let pairs = input.pairs(rows, |r| r.happened(event).map(f64::from));
+        rank_correlation(&pairs).map_or(0.0, |c| c.value.abs())
     };
     let mut order: Vec<_> = inputs.iter().filter(|i| i.axis.names.is_empty()).collect();
     order.sort_by(|a, b| strength(b).total_cmp(&strength(a)));

@@ -2,7 +2,8 @@
 
 use super::plot::Plot;
 use crate::scenario::draw::Template;
-use crate::study::{Digest, Manifest, Row, Status, show};
+use crate::study::stats::Estimate;
+use crate::study::{Digest, Manifest, Row};
 use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
@@ -150,7 +151,7 @@ fn events(digest: &Digest) -> String {
         ];
         match (&e.weighted, &e.rate) {
             (Some(w), _) => {
-                cells.push(show(&w.rate));
+                cells.push(w.rate.to_string());
                 cells.push(format!(
                     "{} runs, worth {:.1}",
                     w.events, w.effective_events
@@ -158,9 +159,9 @@ fn events(digest: &Digest) -> String {
                 cells.push(String::new());
             }
             (None, Some(r)) => {
-                cells.push(show(&r.wilson));
+                cells.push(r.wilson.to_string());
                 cells.push(format!("{} of {}", r.events, r.wilson.n));
-                cells.push(format!("{:.4} to {:.4}", r.exact.low, r.exact.high));
+                cells.push(r.exact.to_string());
             }
             (None, None) => cells.push("never told".into()),
         }
@@ -180,21 +181,23 @@ fn figures(digest: &Digest) -> String {
         return String::new();
     }
     let rows = digest.figures.iter().map(|f| {
-        let cell = |e: &Option<_>| e.as_ref().map_or(String::new(), show);
+        let cell = |e: &Option<Estimate>| e.map_or(String::new(), |e| e.to_string());
         let mut cells = vec![format!(
             "<span title=\"{}\">{}</span>",
             escaped(f.measure.meaning),
             f.measure.name
         )];
         cells.push(f.measure.unit.to_owned());
+        cells.push(f.runs.to_string());
         cells.push(cell(&f.mean));
         cells.extend(f.quantiles.iter().map(cell));
         cells
     });
     "<h2>Figures</h2>\n<p>With intervals of 95 %: of means Student's t, of quantiles order statistics, \
-     which hold for any distribution; an end that is inf needs more runs.</p>\n"
+     which hold for any distribution; an end that is inf needs more runs. Figures that only some runs have are over those, as the number of \
+     runs says.</p>\n"
         .to_owned()
-        + &table(&["figure", "unit", "mean", "half below", "90 % below", "95 % below"], rows)
+        + &table(&["figure", "unit", "runs", "mean", "half below", "90 % below", "95 % below"], rows)
 }
 
 fn drivers(digest: &Digest) -> String {
@@ -203,7 +206,7 @@ fn drivers(digest: &Digest) -> String {
             vec![
                 f.measure.name.to_owned(),
                 escaped(&d.variable),
-                d.correlation.as_ref().map_or(String::new(), show),
+                d.correlation.map_or(String::new(), |e| e.to_string()),
                 d.first_order.map_or(String::new(), |s| format!("{s:.2}")),
             ]
         })
@@ -268,10 +271,7 @@ fn replay(folder: &Path, row: &Row) -> String {
 }
 
 fn failures(folder: &Path, rows: &[Row]) -> String {
-    let failed: Vec<_> = rows
-        .iter()
-        .filter(|r| r.status != Status::Complete)
-        .collect();
+    let failed: Vec<_> = rows.iter().filter(|r| !r.is_complete()).collect();
     if failed.is_empty() {
         return String::new();
     }

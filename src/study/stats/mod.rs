@@ -24,6 +24,8 @@ pub use sample::{mean, quantile};
 pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};
 pub use weight::{Weighted, effective_runs, weighted_mean, weighted_rate};
 
+use std::fmt;
+
 /// A figure with its interval of 95 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
@@ -35,6 +37,30 @@ pub struct Estimate {
     pub high: f64,
     /// Of how many runs.
     pub n: usize,
+}
+
+/// To the digits that the interval tells; very small ones in powers of ten.
+impl fmt::Display for Estimate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let half = 0.5 * (self.high - self.low);
+        let scale = if half.is_finite() && half > 0.0 {
+            half
+        } else {
+            self.value.abs()
+        };
+        let Self {
+            value, low, high, ..
+        } = self;
+        if scale > 0.0 && scale < 1e-4 {
+            return write!(f, "{value:.2e} ({low:.2e} to {high:.2e})");
+        }
+        let digits = if scale > 0.0 {
+            (1.0 - scale.log10().floor()).max(0.0) as usize
+        } else {
+            0
+        };
+        write!(f, "{value:.digits$} ({low:.digits$} to {high:.digits$})")
+    }
 }
 
 /// What lies outside of an interval, on either side.

@@ -182,29 +182,40 @@ fn val_first_order_of_groups() {
     assert!(first_order_of_groups(&[(0, 1.0); 12]).is_none());
 }
 
-/// Weights, conditioned and not, of a normal shift: E[x] under N(0, 1) of draws from N(1, 1).
+/// Means under N(0, 1) of runs drawn from N(shift, 1), of numbers far from zero: those that are given hold
+/// the truth nearly as often as they say, and where a few runs decide, none is given. An unweighted sample
+/// has its plain mean; weights that are all 0 have none.
 #[test]
 fn weighted_means_are_those_of_the_distributions() {
-    let stream = Stream::new(7, 0, "weights");
     let normal = Normal::standard();
-    let run = |k| {
-        let x = 1.0 + normal.inverse_cdf(stream.uniform(k));
-        (0.5 - x, x)
+    let sample = |shift: f64, trial: u64| -> Vec<(f64, f64)> {
+        let stream = Stream::new(7, trial, "weights");
+        let x = |k| shift + normal.inverse_cdf(stream.uniform(k));
+        let run = |x: f64| (shift * (0.5 * shift - x), 100.0 + x);
+        (0..400).map(|k| run(x(k))).collect()
     };
-    let runs: Vec<(f64, f64)> = (0..20_000).map(run).collect();
-    for normalise in [false, true] {
-        let e = weighted_mean(&runs, normalise).unwrap();
+    let given = |shift| (0..400).filter_map(move |trial| weighted_mean(&sample(shift, trial)));
+    for (shift, least) in [(0.5, 0.92), (1.0, 0.88)] {
+        let all: Vec<Estimate> = given(shift).collect();
+        let held = all.iter().filter(|e| (e.low..=e.high).contains(&100.0));
+        let share = held.count() as f64 / all.len() as f64;
         assert!(
-            (e.low..=e.high).contains(&0.0) && e.high - e.low < 0.1,
-            "{e:?}"
+            all.len() > 300 && share > least,
+            "{} of {shift}: {share}",
+            all.len()
         );
     }
-    let plain: Vec<(f64, f64)> = SAMPLE.iter().map(|x| (0.0, *x)).collect();
-    let (e, m) = (
-        weighted_mean(&plain, false).unwrap(),
-        mean(&SAMPLE).unwrap(),
-    );
-    assert!((e.value - m.value).abs() < 1e-12);
+    assert_eq!(given(3.0).count(), 0);
+    let plain: Vec<(f64, f64)> = (0..400).map(|k| (0.0, f64::from(k))).collect();
+    assert!((weighted_mean(&plain).unwrap().value - 199.5).abs() < 1e-9);
+    let nothing = [(f64::MIN, 1.0); 200];
+    assert!(weighted_mean(&nothing).is_none());
+    assert!(weighted_rate(&nothing.map(|(ln, _)| (ln, true)), false).is_none());
+    assert!(effective_runs(&[f64::MIN; 200]).abs() < 1e-12);
+    // An event that happens always is no rarer than always.
+    let always: Vec<(f64, bool)> = sample(2.0, 0).iter().map(|(ln, _)| (*ln, true)).collect();
+    let rate = weighted_rate(&always, false).unwrap().rate;
+    assert!(rate.value <= 1.0 && rate.high <= 1.0, "{rate:?}");
 }
 
 /// Weights that are not those of the densities, and effective numbers of runs.

@@ -16,24 +16,48 @@ impl Distribution {
 
     /// Whether it has a density, and so can be weighed against another one.
     pub fn has_density(&self) -> bool {
-        matches!(
-            self,
-            Self::Uniform { .. }
-                | Self::LogUniform { .. }
-                | Self::Normal { .. }
-                | Self::LogNormal { .. }
-                | Self::Triangular { .. }
-        )
+        self.ends().is_some()
     }
 
     /// Whether it reaches wherever another one does.
     pub fn covers(&self, other: &Self) -> bool {
-        let ([a0, a1], [b0, b1]) = (self.ends(), other.ends());
-        a0 <= b0 && b1 <= a1
+        let (own, others) = (self.ends(), other.ends());
+        matches!((own, others), (Some([a, b]), Some([c, d])) if a <= c && d <= b)
     }
 
-    fn ends(&self) -> [f64; 2] {
-        match *self {
+    /// Whether the weights of draws from it, which stand for those of another one, have a variance: the
+    /// integral of other^2 / own is finite. Of what covers the other one, only tails without an end and
+    /// corners of triangles can fall off too fast; the latter are turned down as a whole.
+    pub fn bounds_weights_of(&self, other: &Self) -> bool {
+        let wide = |own: f64, other: f64| 2.0 * own * own > other * other;
+        match (self, other) {
+            (
+                Self::Normal { sigma, .. },
+                Self::Normal {
+                    sigma: of,
+                    min,
+                    max,
+                    ..
+                },
+            ) => (min.is_some() && max.is_some()) || wide(*sigma, *of),
+            (
+                Self::LogNormal { sigma_ln, .. },
+                Self::LogNormal {
+                    sigma_ln: of,
+                    min,
+                    max,
+                    ..
+                },
+            ) => (min.is_some() && max.is_some()) || wide(*sigma_ln, *of),
+            // Its tail to the right is thicker than any normal one, and a normal one thinner.
+            (Self::Normal { .. }, Self::LogNormal { max, .. }) => max.is_some(),
+            (Self::Triangular { .. }, _) => self == other,
+            _ => true,
+        }
+    }
+
+    fn ends(&self) -> Option<[f64; 2]> {
+        Some(match *self {
             Self::Uniform { min, max }
             | Self::LogUniform { min, max }
             | Self::Triangular { min, max, .. } => [min, max],
@@ -42,8 +66,8 @@ impl Distribution {
                 max.unwrap_or(f64::INFINITY),
             ],
             Self::LogNormal { min, max, .. } => [min.unwrap_or(0.0), max.unwrap_or(f64::INFINITY)],
-            _ => [f64::NAN; 2],
-        }
+            _ => return None,
+        })
     }
 
     /// Whether all its values are numbers (a table's are looked at when it is read).

@@ -192,3 +192,20 @@ fn wrong_distributions_say_why() {
         );
     }
 }
+
+/// Proposals whose weights have no variance: a normal one with less than 0.707 of sigma (the integral of
+/// f^2 / g has exp(x^2 (1/(2 s^2) - 1))), tails that are thinner, corners.
+#[test]
+fn proposals_fall_off_slowly_enough() {
+    let nature = normal(0.0, 1.0, None, None);
+    let cut = normal(0.0, 1.0, Some(-2.0), Some(2.0));
+    assert!(normal(3.0, 1.0, None, None).bounds_weights_of(&nature));
+    assert!(normal(0.0, 0.72, None, None).bounds_weights_of(&nature));
+    assert!(!normal(0.0, 0.7, None, None).bounds_weights_of(&nature));
+    assert!(normal(0.0, 0.4, None, None).bounds_weights_of(&cut));
+    assert!(!normal(0.0, 9.0, None, None).bounds_weights_of(&log_normal()));
+    let uniform = Distribution::Uniform { min: 1.0, max: 5.0 };
+    assert!(!TRIANGLE.bounds_weights_of(&uniform));
+    assert!(uniform.bounds_weights_of(&TRIANGLE));
+    assert!(nature.covers(&TRIANGLE) && !TRIANGLE.covers(&nature));
+}
