@@ -3,8 +3,8 @@
 use super::fault::Failure;
 use super::print;
 use super::running::prepare;
+use crate::record;
 use crate::scenario::draw::{Draw, Inputs, Template};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -80,7 +80,7 @@ fn write(
     index.write_record(head)?;
     for (draw, text) in draws.iter().zip(texts) {
         let file = format!("{}_{:06}.toml", template.file.name, draw.index);
-        fs::write(out.join(&file), text)?;
+        record::write_whole(&out.join(&file), text.as_bytes())?;
         let about = [
             draw.index.to_string(),
             file,
@@ -97,6 +97,5 @@ fn write(
     let text = index
         .into_inner()
         .map_err(|e| io::Error::other(e.to_string()))?;
-    let part = out.join("index.csv.part");
-    fs::write(&part, text).and_then(|()| fs::rename(&part, out.join("index.csv")))
+    record::write_whole(&out.join("index.csv"), &text)
 }

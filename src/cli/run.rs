@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
-use crate::record::{FixTable, Recording};
+use crate::record::{self, FixTable, Recording};
 use crate::scenario::draw::Draw;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RunOptions, Summary};
@@ -83,7 +83,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         Failure::run(anyhow::Error::new(e).context("cannot remove results of an earlier run"))
     })?;
     let text = serde_json::to_string_pretty(&summary).map_err(Failure::run)?;
-    write_whole(&out.join("summary.json"), &text)
+    record::write_whole(&out.join("summary.json"), format!("{text}\n").as_bytes())
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write summary.json")))?;
     if args.json {
         print(&text)?;
@@ -227,11 +227,4 @@ fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<(
         }
     }
     Ok(())
-}
-
-/// Writes under a temporary name and renames, so that a file is whole or not there.
-fn write_whole(path: &Path, text: &str) -> io::Result<()> {
-    let part = path.with_extension("json.part");
-    fs::write(&part, format!("{text}\n"))?;
-    fs::rename(&part, path)
 }

@@ -39,7 +39,7 @@ mod stream;
 mod tables;
 mod texts;
 
-pub(crate) use stream::part_name;
+pub(crate) use stream::write_whole;
 pub use tables::FixTable;
 
 use crate::bus::SimTime;

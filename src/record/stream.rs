@@ -177,8 +177,15 @@ impl Stream {
     }
 }
 
+/// Writes under a temporary name and renames, so that a file is whole or not there.
+pub(crate) fn write_whole(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    let part = part_name(path);
+    fs::write(&part, content)?;
+    fs::rename(&part, path)
+}
+
 /// Name of a file while it is written.
-pub(crate) fn part_name(path: &Path) -> PathBuf {
+pub(super) fn part_name(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".part");
     PathBuf::from(name)

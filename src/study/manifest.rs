@@ -154,8 +154,10 @@ impl Manifest {
 
     /// Writes it into a folder, whole or not at all.
     pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
-        let text = serde_json::to_string_pretty(self).unwrap_or_default() + "\n";
-        write_whole(&folder.join(MANIFEST), text.as_bytes())
+        let path = folder.join(MANIFEST);
+        let text = serde_json::to_string_pretty(self);
+        let text = text.map_err(|e| StudyError::file(&path, e.into()))? + "\n";
+        write_whole(&path, text.as_bytes())
     }
 
     /// What differs between two of them, in words; shard and number of runs aside: a study may go on

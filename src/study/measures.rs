@@ -3,9 +3,10 @@
 use crate::bus::Method;
 use crate::record::parquet::Kind;
 use crate::session::{
-    Distribution, Event, Observer, ObserverError, ObstacleScore, Opening, Positioning, Protection,
-    Summary, TrainFigures, Wayside,
+    Distribution, Event, Observer, ObserverError, ObstacleScore, Opening, Summary, Wayside,
 };
+use Kind::{Flag, Int, Real, Reals};
+use Method::{Mono, Paper};
 use nalgebra::Vector3;
 use serde_json::{Value, json};
 
@@ -16,7 +17,7 @@ pub struct Measure {
     pub name: &'static str,
     /// What its column holds.
     pub kind: Kind,
-    /// Its unit; 1 of ratios and counts, `wall s` and the like of what hangs on the machine.
+    /// Its unit; 1 of ratios and counts, `wall s` and the like of what depends on the machine.
     pub unit: &'static str,
     /// What it is.
     pub meaning: &'static str,
@@ -97,26 +98,13 @@ const fn measure_of(
     }
 }
 
-fn of_method<T: Into<Value>>(
-    s: &Summary,
-    method: Method,
-    get: impl Fn(&Positioning) -> Option<T>,
-) -> Value {
-    s.positioning
-        .get(&method)
-        .and_then(get)
-        .map_or(Value::Null, Into::into)
+/// A figure of a part of the summary, where a run has that part.
+fn of<P, T: Into<Value>>(part: Option<&P>, get: impl Fn(&P) -> Option<T>) -> Value {
+    part.and_then(get).map_or(Value::Null, Into::into)
 }
 
 fn error(s: &Summary, method: Method, get: fn(&Distribution) -> f64) -> Value {
-    of_method(s, method, |p| p.error_m.as_ref().map(get))
-}
-
-fn of_wayside<T: Into<Value>>(s: &Summary, get: impl Fn(&Wayside) -> Option<T>) -> Value {
-    s.wayside
-        .as_ref()
-        .and_then(get)
-        .map_or(Value::Null, Into::into)
+    of(s.positioning.get(&method), |p| p.error_m.as_ref().map(get))
 }
 
 fn worst(w: &Wayside, get: fn(&ObstacleScore) -> Option<f64>) -> Option<f64> {
@@ -124,38 +112,21 @@ fn worst(w: &Wayside, get: fn(&ObstacleScore) -> Option<f64>) -> Option<f64> {
     all.max_by(|a, b| f64::total_cmp(&a.abs(), &b.abs()))
 }
 
-fn of_train<T: Into<Value>>(s: &Summary, get: impl Fn(&TrainFigures) -> Option<T>) -> Value {
-    s.train
-        .as_ref()
-        .and_then(get)
-        .map_or(Value::Null, Into::into)
-}
-
-fn of_protection<T: Into<Value>>(s: &Summary, get: impl Fn(&Protection) -> Option<T>) -> Value {
-    s.protection
-        .as_ref()
-        .and_then(get)
-        .map_or(Value::Null, Into::into)
-}
-
-use Kind::{Flag, Int, Real, Reals};
-use Method::{Mono, Paper};
-
 /// The figures of one method of positioning.
 macro_rules! positioning {
     ($($method:ident $prefix:literal),*; $($rest:expr),* $(,)?) => {
         &[
             $(
                 measure_of(concat!($prefix, "_fixes"), Int, "1",
-                    "positions given", |s, _| of_method(s, $method, |p| Some(p.fixes))),
+                    "positions given", |s, _| of(s.positioning.get(&$method), |p| Some(p.fixes))),
                 measure_of(concat!($prefix, "_availability"), Real, "1",
-                    "positions a pair of images", |s, _| of_method(s, $method, |p| p.availability)),
+                    "positions a pair of images", |s, _| of(s.positioning.get(&$method), |p| p.availability)),
                 measure_of(concat!($prefix, "_uid_decode_rate"), Real, "1",
                     "share of the lamps passed whose name was read",
-                    |s, _| of_method(s, $method, |p| p.uid_decode_rate)),
+                    |s, _| of(s.positioning.get(&$method), |p| p.uid_decode_rate)),
                 measure_of(concat!($prefix, "_wrong_uid"), Int, "1",
                     "positions that rest on the wrong lamp",
-                    |s, _| of_method(s, $method, |p| Some(p.wrong_uid))),
+                    |s, _| of(s.positioning.get(&$method), |p| Some(p.wrong_uid))),
                 measure_of(concat!($prefix, "_error_mean_m"), Real, "m",
                     "error along the track, without sign, mean of the run's positions",
                     |s, _| error(s, $method, |e| e.mean)),
@@ -165,7 +136,7 @@ macro_rules! positioning {
                     "largest error of the run", |s, _| error(s, $method, |e| e.max)),
                 measure_of(concat!($prefix, "_nees_mean"), Real, "1",
                     "mean of (error / sigma)^2: 1 for an honest sigma",
-                    |s, _| of_method(s, $method, |p| p.nees_mean)),
+                    |s, _| of(s.positioning.get(&$method), |p| p.nees_mean)),
                 measure_of(concat!($prefix, "_fix_range_m"), Reals, "m",
                     "of every position: from the left eye to its lamp",
                     |_, f| f.ranges_m($method)),
@@ -183,42 +154,42 @@ pub const MEASURES: &[Measure] = positioning![
     measure_of("dark_lamps", Int, "1", "lamps that the stack says do not shine",
         |s, _| json!(s.dark_lamps.len())),
     measure_of("obstacles", Int, "1", "obstacles that were to be found",
-        |s, _| of_wayside(s, |w| Some(w.obstacles.len()))),
+        |s, _| of(s.wayside.as_ref(), |w| Some(w.obstacles.len()))),
     measure_of("missed", Int, "1", "of these, how many were never reported once they lay there",
-        |s, _| of_wayside(s, |w| {
+        |s, _| of(s.wayside.as_ref(), |w| {
             Some(w.obstacles.iter().filter(|o| o.latency_s.is_none()).count())
         })),
     measure_of("false_alarms", Int, "1", "dangers reported where nothing is, counted once a frame",
-        |s, _| of_wayside(s, |w| Some(w.false_alarms))),
+        |s, _| of(s.wayside.as_ref(), |w| Some(w.false_alarms))),
     measure_of("detection_latency_s", Real, "s",
         "from lying in view to the report, of the obstacle with the longest",
-        |s, _| of_wayside(s, |w| worst(w, |o| o.latency_s))),
+        |s, _| of(s.wayside.as_ref(), |w| worst(w, |o| o.latency_s))),
     measure_of("detection_distance_error_m", Real, "m",
         "reported less true distance, of the obstacle with the largest",
-        |s, _| of_wayside(s, |w| worst(w, |o| o.distance_error_m))),
+        |s, _| of(s.wayside.as_ref(), |w| worst(w, |o| o.distance_error_m))),
     measure_of("brake_commanded_s", Real, "s", "when the train first braked for an obstacle",
-        |s, _| of_protection(s, |p| p.brake_commanded_s)),
+        |s, _| of(s.protection.as_ref(), |p| p.brake_commanded_s)),
     measure_of("stopped_s", Real, "s", "when it first stood after that",
-        |s, _| of_protection(s, |p| p.stopped_s)),
+        |s, _| of(s.protection.as_ref(), |p| p.stopped_s)),
     measure_of("stop_margin_m", Real, "m", "from its head, then, to the obstacle",
-        |s, _| of_protection(s, |p| p.stop_margin_m)),
+        |s, _| of(s.protection.as_ref(), |p| p.stop_margin_m)),
     measure_of("collision", Flag, "1", "the train hit something",
-        |s, _| of_protection(s, |p| Some(p.collision))),
+        |s, _| of(s.protection.as_ref(), |p| Some(p.collision))),
     measure_of("impact_speed_mps", Real, "m/s", "of the first thing hit, 0 where nothing was",
-        |s, _| of_protection(s, |p| Some(p.impacts.first().map_or(0.0, |i| i.speed_mps)))),
-    measure_of("run_m", Real, "m", "distance run", |s, _| of_train(s, |t| Some(t.run_m))),
+        |s, _| of(s.protection.as_ref(), |p| Some(p.impacts.first().map_or(0.0, |i| i.speed_mps)))),
+    measure_of("run_m", Real, "m", "distance run", |s, _| of(s.train.as_ref(), |t| Some(t.run_m))),
     measure_of("derailed", Flag, "1", "a wheelset left the rails, and the run ended there",
-        |s, _| of_train(s, |t| Some(t.derailed))),
+        |s, _| of(s.train.as_ref(), |t| Some(t.derailed))),
     measure_of("stop_error_m", Real, "m", "where the head stood at the end less the stop mark",
-        |s, _| of_train(s, |t| t.stop_error_m)),
+        |s, _| of(s.train.as_ref(), |t| t.stop_error_m)),
     measure_of("floor_accel_up_mps2", Real, "m/s^2", "RMS, vertical, of the leading car's floor",
-        |s, _| of_train(s, |t| Some(t.floor_accel_rms_mps2[2]))),
+        |s, _| of(s.train.as_ref(), |t| Some(t.floor_accel_rms_mps2[2]))),
     measure_of("floor_accel_left_mps2", Real, "m/s^2", "RMS, lateral",
-        |s, _| of_train(s, |t| Some(t.floor_accel_rms_mps2[1]))),
+        |s, _| of(s.train.as_ref(), |t| Some(t.floor_accel_rms_mps2[1]))),
     measure_of("least_wheel_load", Real, "1", "least wheel force over its load at rest",
-        |s, _| of_train(s, |t| Some(t.least_wheel_load_share))),
+        |s, _| of(s.train.as_ref(), |t| Some(t.least_wheel_load_share))),
     measure_of("most_slip_mps", Real, "m/s", "most that any wheel slipped or slid",
-        |s, _| of_train(s, |t| Some(t.most_slip_mps))),
+        |s, _| of(s.train.as_ref(), |t| Some(t.most_slip_mps))),
     measure_of("simulated_s", Real, "s", "simulated time", |s, _| json!(s.simulated_s)),
     measure_of("stereo_frames", Int, "1", "stereo pairs drawn", |s, _| json!(s.stereo_frames)),
     measure_of("wayside_frames", Int, "1", "wayside frames drawn", |s, _| json!(s.wayside_frames)),

@@ -13,7 +13,7 @@
 //!
 //! # How it goes
 //!
-//! Run k hangs on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
+//! Run k depends on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
 //! the same for one worker and many, for shards on other machines, and for a study that was killed and
 //! resumed. Workers are processes of their own, one a core: a software graphics driver starts threads
 //! of its own, and two processes with one each do more than one with two; and a driver that
@@ -53,7 +53,7 @@ pub use slurm::{Submission, Submitted};
 pub use table::check_names;
 pub use worker::{Desk, serve, template_of};
 
-use crate::record::part_name;
+use crate::record;
 use crate::scenario::ScenarioError;
 use crate::scenario::draw::{ConditionError, DrawError};
 use crate::session::ObserverError;
@@ -147,11 +147,8 @@ impl StudyError {
     }
 }
 
-/// Writes under a temporary name and renames, so that a file is whole or not there.
 fn write_whole(path: &Path, content: &[u8]) -> Result<(), StudyError> {
-    let part = part_name(path);
-    let written = std::fs::write(&part, content).and_then(|()| std::fs::rename(&part, path));
-    written.map_err(|source| StudyError::file(path, source))
+    record::write_whole(path, content).map_err(|source| StudyError::file(path, source))
 }
 
 fn advice(source: &io::Error) -> &'static str {

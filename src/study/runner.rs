@@ -182,7 +182,7 @@ fn pool<'a>(
 /// The wall clock: for rates, and for the budget of time that the user gives.
 #[allow(
     clippy::disallowed_methods,
-    reason = "how long a study takes is shown and may be limited; no row hangs on it"
+    reason = "how long a study takes is shown and may be limited; no row depends on it"
 )]
 fn clock() -> Instant {
     Instant::now()

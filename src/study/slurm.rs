@@ -1,7 +1,7 @@
 //! A study as a Slurm job array: a task a shard, and a job that merges them when all have ended well.
 //! Slurm does the scheduling; here are only two scripts, which can be read before they are handed in.
 
-use super::StudyError;
+use super::{StudyError, write_whole};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ impl Submission {
     fn head(&self, log: &str) -> String {
         let folder = self.scripts().display().to_string();
         format!(
-            "#!/bin/bash\n#SBATCH --job-name={}\n#SBATCH --output={folder}/{log}.log\n",
+            "#!/bin/bash\n#SBATCH --job-name={}\n#SBATCH --output=\"{folder}/{log}.log\"\n",
             self.name
         )
     }
@@ -84,10 +84,7 @@ impl Submission {
         fs::create_dir_all(&folder).map_err(|e| StudyError::file(&folder, e))?;
         let write = |name: &str, text: String| {
             let path = folder.join(name);
-            let written = fs::write(&path, text);
-            written
-                .map(|()| path.clone())
-                .map_err(|e| StudyError::file(&path, e))
+            write_whole(&path, text.as_bytes()).map(|()| path)
         };
         Ok([
             write("array.sh", self.array_script())?,

@@ -76,7 +76,7 @@ impl Writer {
         let (below, own): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         for (key, value) in own {
             self.comment(text, self.property(schema, key));
-            _ = writeln!(text, "{} = {}", quoted(key), inline(value));
+            _ = writeln!(text, "{} = {}", quoted(key), value);
         }
         for (key, value) in below {
             let property = self.property(schema, key);
@@ -137,10 +137,6 @@ fn is_section(value: &Value) -> bool {
         Value::Array(list) => !list.is_empty() && list.iter().all(|v| v.is_table()),
         _ => false,
     }
-}
-
-fn inline(value: &Value) -> String {
-    value.to_string()
 }
 
 fn quoted(key: &str) -> String {

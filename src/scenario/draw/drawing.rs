@@ -63,7 +63,7 @@ pub enum DrawError {
 }
 
 impl Template {
-    /// Draws run `index`, which hangs on the study's seed and the index alone.
+    /// Draws run `index`, which depends on the study's seed and the index alone.
     ///
     /// Runs go through the combinations of swept values in turn, the first variable changing
     /// slowest; every combination gets points of the plan, and noise, of its own.

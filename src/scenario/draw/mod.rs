@@ -44,7 +44,7 @@
 //!    counted.
 //! 5. The values are set in the file as `--set` would, and it is checked like any other.
 //!
-//! The same (seed, index) is the same scenario for ever: nothing hangs on other runs, on the number
+//! The same (seed, index) is the same scenario for ever: nothing depends on other runs, on the number
 //! of runs, or on threads.
 //!
 //! # What it does not do

@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    /// Seeds and attempts that do not matter, a variable whose draws hang on the others'.
+    /// Seeds and attempts that do not matter, a variable whose draws depend on the others'.
     #[test]
     fn draws_hang_on_seed_index_and_name_alone() {
         let few = Plan::new(PlanSettings::Random, 1, vec!["v3".into()]);

@@ -94,7 +94,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
     let mut plots = Vec::new();
     for (name, condition) in events(template).unwrap_or_default() {
         let told = || complete.iter().filter_map(|r| r.happened(&condition));
-        // What never happened, or always, hangs on nothing.
+        // What never happened, or always, depends on nothing.
         if told().all(|h| h) || !told().any(|h| h) {
             continue;
         }

@@ -24,6 +24,7 @@ pub use sample::{mean, quantile};
 pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};
 pub use weight::{Weighted, effective_runs, weighted_mean, weighted_rate};
 
+use statrs::distribution::{ContinuousCDF, Normal};
 use std::fmt;
 
 /// A figure with its interval of 95 %.
@@ -65,6 +66,11 @@ impl fmt::Display for Estimate {
 
 /// What lies outside of an interval, on either side.
 const TAIL: f64 = 0.025;
+
+/// Half the width of a normal interval, in standard deviations: 1.96.
+fn z() -> f64 {
+    Normal::standard().inverse_cdf(1.0 - TAIL)
+}
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,7 @@
 //! How often something happens.
 
-use super::{Estimate, TAIL};
-use statrs::distribution::{Beta, ContinuousCDF, Normal};
+use super::{Estimate, TAIL, z};
+use statrs::distribution::{Beta, ContinuousCDF};
 
 /// A rate with both intervals.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub fn rate(events: u64, n: u64) -> Option<Rate> {
     }
     let (k, m) = (events as f64, n as f64);
     let p = k / m;
-    let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    let z = z();
     let middle = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
     let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
     let estimate = |low: f64, high: f64| Estimate {

@@ -1,8 +1,7 @@
 //! Which input drives a figure.
 
-use super::{Estimate, TAIL};
+use super::{Estimate, z};
 use crate::twin::random::Stream;
-use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::BTreeMap;
 
 /// Spearman's rank correlation; equal values share their mean rank. `None` where one of both does not
@@ -23,7 +22,7 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Estimate> {
         return None;
     }
     let r = (sum(&x, &y) / scatter).clamp(-1.0, 1.0);
-    let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    let z = z();
     let half = z * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
     // Of a perfect order, atanh is infinite, and so the ends stay there.
     let end = |shift: f64| (r.atanh() + shift).tanh();

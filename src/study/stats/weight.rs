@@ -1,7 +1,6 @@
 //! Importance sampling: runs drawn from elsewhere, weighed by the ratio of densities.
 
-use super::{Estimate, TAIL};
-use statrs::distribution::{ContinuousCDF, Normal};
+use super::{Estimate, z};
 
 /// A rate from weighed runs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +19,7 @@ pub struct Weighted {
 const LEAST_WORTH: f64 = 100.0;
 
 /// The mean over the distributions that were asked for, of the natural logarithm of each run's weight
-/// and a number. Weights are brought to mean 1, so that it does not hang on where the numbers' zero is;
+/// and a number. Weights are brought to mean 1, so that it does not depend on where the numbers' zero is;
 /// the interval is that of a ratio (delta method). `None` of runs worth fewer than 100.
 pub fn weighted_mean(runs: &[(f64, f64)]) -> Option<Estimate> {
     let ln_weights: Vec<f64> = runs.iter().map(|r| r.0).collect();
@@ -76,7 +75,7 @@ fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<Estimate> {
     };
     let squares: f64 = (0..n).map(|k| (share(k) - centre(k)).powi(2)).sum();
     let sigma = (squares / (n - 1) as f64 / n as f64).sqrt();
-    let z = Normal::standard().inverse_cdf(1.0 - TAIL);
+    let z = z();
     Some(Estimate {
         value,
         low: value - z * sigma,
