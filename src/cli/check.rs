@@ -61,13 +61,34 @@ fn report_on(path: &Path) -> Result<String, Failure> {
         let mut said = report::scenario(&Scenario::from_text(path, &text, &[])?);
         if has(&["study"]) {
             let template = Template::load(path)?;
-            study::check_names(&template)?;
+            study::check(&template, false)?;
             said += &report::study(&template);
+            said += &invalid_draws(&template);
         }
         Ok(said)
     }
 }
 
+/// What is wrong with the first runs that a study draws; each that is no scenario becomes a row that
+/// says so.
+fn invalid_draws(template: &Template) -> String {
+    let looked = template.runs().min(MOST_DRAWN);
+    let wrong = |k: u64| match template.draw(k) {
+        Ok(draw) => template.scenario(&draw).err().map(|e| e.to_string()),
+        Err(error) => Some(error.to_string()),
+    };
+    let wrong: Vec<String> = (0..looked).filter_map(wrong).collect();
+    match wrong.first() {
+        None => String::new(),
+        Some(first) => format!(
+            "\n    {} of the first {looked} runs cannot be run: {first}",
+            wrong.len()
+        ),
+    }
+}
+
+/// Runs of a study that are drawn to see whether they can be run.
+const MOST_DRAWN: u64 = 200;
 /// Keys that only tunnels have. What is not TOML is left to the scenario's parser to complain of.
 const TUNNEL_KEYS: [&str; 6] = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
 /// Keys that only vehicles have.

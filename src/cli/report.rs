@@ -2,11 +2,10 @@
 
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
-use crate::scenario::draw::Template;
+use crate::scenario::draw::{Template, as_written};
 use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
-use toml::Value;
 
 /// Length, radii, grades, sections, lamps, devices.
 pub(super) fn tunnel(tunnel: &Tunnel) -> String {
@@ -240,8 +239,7 @@ pub(super) fn study(template: &Template) -> String {
     };
     let mut text = format!("\n  study: {runs} runs{of_cells}, seed {}", settings.seed);
     for (name, variable) in &settings.variables {
-        let from = Value::try_from(&variable.from).map(|v| v.to_string());
-        text += &format!("\n    {name}: {}", from.unwrap_or_default());
+        text += &format!("\n    {name}: {}", as_written(&variable.from));
         if !variable.keys.is_empty() {
             text += &format!(" -> {}", variable.keys.join(", "));
         }

@@ -132,7 +132,13 @@ fn source(args: &RunArgs) -> Result<Source, Failure> {
 
 /// From the copies of the inputs that the study keeps.
 fn from_study(folder: &Path, index: u64) -> Result<Source, Failure> {
-    let (_, template) = study::template_of(folder)?;
+    let (manifest, template) = study::template_of(folder)?;
+    if let Some(file) = manifest.changed_outside() {
+        return Err(Failure::input(
+            format!("{file} has changed since the study was run, or is gone"),
+            "put it back as it was; the study's folder keeps copies of inputs with relative paths only",
+        ));
+    }
     let rows = study::read_rows(folder)?;
     let row = rows
         .into_iter()

@@ -3,13 +3,17 @@
 use super::fault::Failure;
 use super::print;
 use super::running::{RendererArg, STOP, prepare, stop_on_ctrl_c};
+use crate::record::parquet::Kind;
 use crate::scenario::draw::Template;
 use crate::study::stats::Estimate;
-use crate::study::{self, Digest, Options, Progress, Row, Shard, StudyError, Submission};
+use crate::study::{self, Digest, MEASURES, Options, Progress, Row, Shard, StudyError, Submission};
 use clap::Subcommand;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 const AFTER: &str = "\
@@ -23,6 +27,9 @@ many runs, when to stop. scenarios/studies has examples.
 On several machines that share a folder:
   metrotwin study run scenarios/studies/led_accuracy.toml --shard 1/4      and so on to 4/4
   metrotwin study merge out/led_accuracy";
+
+/// Reasons for incomplete runs that are shown.
+const MOST_REASONS: usize = 5;
 
 /// Run a study: many runs, rows, statistics, report
 #[derive(clap::Args)]
@@ -39,6 +46,8 @@ enum StudyCommand {
     Report(ReportArgs),
     Compare(CompareArgs),
     Submit(SubmitArgs),
+    /// List the figures of a run that events and stop rules may name
+    Figures,
     #[command(hide = true)]
     Worker(WorkerArgs),
 }
@@ -174,6 +183,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
         }
         StudyCommand::Compare(args) => compare(args),
         StudyCommand::Submit(args) => submit(args),
+        StudyCommand::Figures => figures(),
         StudyCommand::Worker(args) => {
             // The study's own process is the one that decides when to stop.
             ctrlc::set_handler(|| {}).ok();
@@ -211,7 +221,24 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     };
     let rows = study::run(&template, &out, &options);
     bar.finish();
-    conclude(&out, &template, &rows?, args.shard.is_none())
+    let rows = rows?;
+    conclude(&out, &template, &rows, args.shard.is_none())?;
+    if STOP.load(Ordering::Relaxed) {
+        let what = format!("broken off with {} rows; --resume goes on", rows.len());
+        return Err(Failure::Run(anyhow::anyhow!(what)));
+    }
+    Ok(())
+}
+
+fn figures() -> Result<(), Failure> {
+    let mut text =
+        "In conditions of events: these figures of a run, and the study's variables, with\n\
+         + - * / ^, < <= > >= == !=, && || !, abs sqrt ln exp floor min(x, y) max(x, y)\n\n"
+            .to_owned();
+    for m in MEASURES.iter().filter(|m| m.kind != Kind::Reals) {
+        text += &format!("  {:<28} {:<6} {}\n", m.name, m.unit, m.meaning);
+    }
+    print(text.trim_end())
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -244,7 +271,11 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
         );
     }
     for (name, unit, difference) in &found.differences {
-        text += &format!("  {name:<28} {} {unit}\n", difference);
+        let unit = if unit == "1" { "" } else { unit };
+        text += &format!("  {name:<28} {difference} {unit}\n");
+    }
+    if found.differences.is_empty() {
+        text += "no figure differs\n";
     }
     print(&text)
 }
@@ -290,12 +321,35 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
 /// Prints what there is now; of a whole study, writes the report.
 fn conclude(out: &Path, template: &Template, rows: &[Row], whole: bool) -> Result<(), Failure> {
     print(&digest_text(&Digest::of(template, rows)?))?;
+    let planned = template.runs();
+    if whole && (rows.len() as u64) < planned {
+        print(&format!("stopped after {} of {planned} runs", rows.len()))?;
+    }
+    for (reason, count) in reasons(rows) {
+        print(&format!("{count} not complete: {reason}"))?;
+    }
     print(&format!("rows    {}", out.join("rows.parquet").display()))?;
     if whole {
         let (page, _) = study::report(out)?;
         print(&format!("report  {}", page.display()))?;
     }
     Ok(())
+}
+
+/// Why runs are not complete, with how many, the most frequent first.
+fn reasons(rows: &[Row]) -> Vec<(&str, usize)> {
+    let mut counts = BTreeMap::<&str, usize>::new();
+    for row in rows.iter().filter(|row| !row.is_complete()) {
+        // What was drawn differs from run to run; what is wrong with it is said first.
+        let reason = row.reason.as_deref().unwrap_or_default();
+        *counts
+            .entry(reason.lines().next().unwrap_or_default())
+            .or_default() += 1;
+    }
+    let mut counts: Vec<_> = counts.into_iter().collect();
+    counts.sort_by_key(|(_, count)| Reverse(*count));
+    counts.truncate(MOST_REASONS);
+    counts
 }
 
 fn digest_text(digest: &Digest) -> String {
@@ -314,9 +368,14 @@ fn digest_text(digest: &Digest) -> String {
                 w.rate, w.events, w.effective_events
             ),
             (None, Some(r)) => format!("{}, {} of {}", r.wilson, r.events, r.wilson.n),
-            (None, None) => "never told".into(),
+            (None, None) => "unknown".into(),
         };
-        text += &format!("  {:<28} rate {said}\n", event.name);
+        let untold = digest.complete.saturating_sub(event.told);
+        let untold = match untold {
+            0 => String::new(),
+            n => format!("; {n} runs lack what it asks for"),
+        };
+        text += &format!("  {:<28} rate {said}{untold}\n", event.name);
     }
     for figure in &digest.figures {
         let unit = figure.measure.unit;
@@ -367,8 +426,9 @@ impl Bar {
         self.bar.set_message(said.clone());
         let reached = 10 * done / of.max(1);
         if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
-            let left = (of - done) as f64 / per_minute.max(1e-9);
-            eprintln!("{done} of {of} runs{said}, {left:.1} min to go");
+            let left = (of - done) as f64 / per_minute;
+            let left = left.is_finite().then(|| format!(", {left:.1} min to go"));
+            eprintln!("{done} of {of} runs{said}{}", left.unwrap_or_default());
         }
     }
 
@@ -384,6 +444,10 @@ impl From<StudyError> for Failure {
             StudyError::File { .. } | StudyError::Table(_) | StudyError::Worker(_) => {
                 Self::run(error)
             }
+            error @ (StudyError::Event(_) | StudyError::NoFigure(_)) => Self::input(
+                error,
+                "`metrotwin study figures` lists what may be named, and the signs",
+            ),
             other => Self::input(other, "nothing that was there is lost"),
         }
     }

@@ -36,7 +36,9 @@ pub struct EventDigest {
     pub name: String,
     /// Its condition.
     pub condition: String,
-    /// Runs in which it could be told whether it happened, counted.
+    /// Runs that have the figures to tell.
+    pub told: usize,
+    /// How often it happened in these.
     pub rate: Option<Rate>,
     /// The rate of the distributions that were asked for, where runs are weighed.
     pub weighted: Option<Weighted>,
@@ -88,6 +90,7 @@ impl Digest {
                 EventDigest {
                     name,
                     condition: condition.text().to_owned(),
+                    told: told.len(),
                     rate: rate(happened, told.len() as u64),
                     weighted: weighed
                         .then(|| weighted_rate(&told, cut_off || told.len() < rows.len()))

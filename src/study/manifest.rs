@@ -160,12 +160,28 @@ impl Manifest {
         write_whole(&path, text.as_bytes())
     }
 
+    /// An input that is named by an absolute path, so that the folder has no copy, and that has changed.
+    pub fn changed_outside(&self) -> Option<&str> {
+        let mut outside = self
+            .inputs
+            .iter()
+            .filter(|(file, _)| Path::new(file).is_absolute());
+        let is_other = |file: &str, hash: &str| {
+            fs::read(file).map(|b| sha256(&b)).ok().as_deref() != Some(hash)
+        };
+        let changed = outside.find(|(file, hash)| is_other(file, hash));
+        changed.map(|(file, _)| file.as_str())
+    }
+
     /// What differs between two of them, in words; shard and number of runs aside: a study may go on
     /// to more runs.
     pub fn difference(&self, now: &Self) -> Option<String> {
         let said = |what: &str, a: &dyn fmt::Display, b: &dyn fmt::Display| {
             Some(format!("{what}: {a} then, {b} now"))
         };
+        if self.study != now.study {
+            return said("file", &self.study.display(), &now.study.display());
+        }
         for (file, hash) in &self.inputs {
             match now.inputs.get(file) {
                 None => return Some(format!("{file} is no input any more")),
@@ -176,9 +192,6 @@ impl Manifest {
         if let Some(file) = now.inputs.keys().find(|f| !self.inputs.contains_key(*f)) {
             return Some(format!("{file} is a new input"));
         }
-        if self.study != now.study {
-            return said("file", &self.study.display(), &now.study.display());
-        }
         if self.metrotwin != now.metrotwin {
             return said("version of metrotwin", &self.metrotwin, &now.metrotwin);
         }
@@ -186,7 +199,7 @@ impl Manifest {
             return Some("the program is of another build".into());
         }
         if self.renderer != now.renderer {
-            return said("renderer", &self.renderer.adapter, &now.renderer.adapter);
+            return said("--renderer", &self.renderer.adapter, &now.renderer.adapter);
         }
         None
     }

@@ -5,6 +5,7 @@ use crate::scenario::draw::{Draw, DrawError};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::fmt;
 
 /// How a run came out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -124,17 +125,27 @@ impl Row {
 
     /// The first thing in which two rows of one run differ; wall times may.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let bare = |row: &Self| Self {
-            figures: Map::new(),
-            ..row.clone()
+        let said = |what: &str, a: &dyn fmt::Debug, b: &dyn fmt::Debug| {
+            Some(format!("{what}: {a:?} and {b:?}"))
         };
-        if bare(self) != bare(other) {
-            return Some(format!("{:?} and {:?}", bare(self), bare(other)));
+        if self.status != other.status {
+            return said("status", &self.status, &other.status);
+        }
+        if self.reason != other.reason {
+            return said("reason", &self.reason, &other.reason);
+        }
+        let drawn = |row: &Self| (row.index, row.seed, row.rejected, row.ln_weight.to_bits());
+        if drawn(self) != drawn(other) || self.values != other.values {
+            return said("drawn", &self.values, &other.values);
         }
         let compared = MEASURES.iter().filter(|m| !m.is_wall_time());
         let differs = |name: &&str| self.figures.get(*name) != other.figures.get(*name);
         let name = compared.map(|m| m.name).find(differs)?;
-        let [a, b] = [self, other].map(|row| row.figures.get(name));
-        Some(format!("{name}: {a:?} and {b:?}"))
+        let text = |row: &Self| {
+            row.figures
+                .get(name)
+                .map_or("nothing".into(), Value::to_string)
+        };
+        Some(format!("{name}: {} and {}", text(self), text(other)))
     }
 }

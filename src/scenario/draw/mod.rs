@@ -67,6 +67,6 @@ pub use drawing::{Draw, DrawError};
 pub use inputs::{Inputs, sha256};
 pub use settings::{
     CorrelationSettings, Distribution, PlanSettings, PrecisionSettings, StopSettings,
-    StudySettings, VariableSettings,
+    StudySettings, VariableSettings, as_written,
 };
 pub use template::{MOST_RUNS, Template};

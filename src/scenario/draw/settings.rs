@@ -160,7 +160,7 @@ pub enum Distribution {
         #[schemars(with = "Vec<serde_json::Value>")]
         values: Vec<toml::Value>,
         /// How likely each is, in any unit. Default: all alike.
-        #[serde(default)]
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
         weights: Vec<f64>,
     },
     /// A row of a table of measured values, every row alike. Variables of one file take the same row.
@@ -217,6 +217,15 @@ pub struct PrecisionSettings {
     pub of: String,
     /// Half the width of its 95 % interval, in the unit of the column.
     pub half_width: f64,
+}
+
+/// A part of the settings in one line, as a file has it.
+pub fn as_written(part: &impl Serialize) -> String {
+    let mut text = String::new();
+    match part.serialize(toml::ser::ValueSerializer::new(&mut text)) {
+        Ok(_) => text.trim_matches('"').to_owned(),
+        Err(error) => error.to_string(),
+    }
 }
 
 impl StudySettings {

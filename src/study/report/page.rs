@@ -1,10 +1,9 @@
 //! The page as HTML.
 
 use super::plot::Plot;
-use crate::scenario::draw::Template;
+use crate::scenario::draw::{Template, as_written};
 use crate::study::stats::Estimate;
 use crate::study::{Digest, Manifest, Row};
-use serde::Serialize;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -16,8 +15,8 @@ body{font:15px/1.45 system-ui,sans-serif;color:#1c2126;max-width:1180px;margin:2
 h1{font-size:1.6rem;margin-bottom:.2rem}h2{font-size:1.15rem;margin:2rem 0 .5rem}\
 p.lead{color:#555c64;margin-top:0}table{border-collapse:collapse;margin:.5rem 0;width:100%}\
 table{font-size:.88rem}th,td{text-align:left;padding:.25rem .6rem;border-bottom:1px solid #dfe3e8;vertical-align:top}\
-th{font-weight:600;background:#f5f7f9}td{overflow-wrap:anywhere}\
-td.n{font-variant-numeric:tabular-nums;white-space:nowrap;overflow-wrap:normal}\
+th{font-weight:600;background:#f5f7f9}td:first-child{white-space:nowrap}td code{overflow-wrap:anywhere}\
+td.n{font-variant-numeric:tabular-nums;white-space:nowrap}\
 code{background:#f2f4f6;padding:.1rem .3rem;border-radius:3px;font-size:.85em}\
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(480px,1fr));gap:12px}\
 .plots figure{margin:0;border:1px solid #dfe3e8;border-radius:4px}\
@@ -84,18 +83,17 @@ fn table(head: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     )
 }
 
-/// As the study's file has it.
-fn as_written(settings: &impl Serialize) -> String {
-    let value = toml::Value::try_from(settings);
-    value.map(|v| v.to_string()).unwrap_or_default()
-}
-
 fn about(manifest: &Manifest, template: &Template, digest: &Digest) -> String {
     let settings = &template.settings;
     let mut rows = vec![
         (
             "runs",
-            format!("{}, of which {} complete", digest.runs, digest.complete),
+            format!(
+                "{} of {}, of which {} complete",
+                digest.runs,
+                template.runs(),
+                digest.complete
+            ),
         ),
         ("seed", settings.seed.to_string()),
         ("plan", escaped(&as_written(&settings.plan))),
@@ -163,7 +161,10 @@ fn events(digest: &Digest) -> String {
                 cells.push(format!("{} of {}", r.events, r.wilson.n));
                 cells.push(r.exact.to_string());
             }
-            (None, None) => cells.push("never told".into()),
+            (None, None) => cells.push("unknown: no run has what it asks for".into()),
+        }
+        if e.told > 0 && e.told < digest.complete {
+            cells[3] += &format!("; {} lack what it asks for", digest.complete - e.told);
         }
         cells
     });
@@ -217,7 +218,8 @@ fn drivers(digest: &Digest) -> String {
     }
     "<h2>What drives the figures</h2>\n<p>Spearman's rank correlation with its interval of 95 %, and the \
      share of the variance that the variable alone explains (first-order Sobol index, estimated from \
-     ranks; scatters by about one over the root of the number of runs).</p>\n"
+     ranks; scatters by about one over the root of the number of runs; none where conditions, correlations \
+     or figures that only some runs have tie the variables together, nor of fewer than ten runs).</p>\n"
         .to_owned()
         + &table(&["figure", "variable", "rank correlation", "first-order share"], rows.into_iter())
 }
@@ -225,12 +227,14 @@ fn drivers(digest: &Digest) -> String {
 /// By the first figure that is an error, a latency or a margin.
 fn worst(folder: &Path, digest: &Digest, rows: &[Row]) -> String {
     /// Large is bad, or small.
-    const JUDGED: [(&str, f64); 5] = [
+    const JUDGED: [(&str, f64); 7] = [
         ("impact_speed_mps", 1.0),
         ("stop_margin_m", -1.0),
         ("paper_error_max_m", 1.0),
         ("missed", 1.0),
         ("detection_latency_s", 1.0),
+        ("stop_error_m", 1.0),
+        ("most_slip_mps", 1.0),
     ];
     let varies = |name: &str| digest.figures.iter().any(|f| f.measure.name == name);
     let found = JUDGED.iter().find(|(name, _)| varies(name));

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
+use crate::scenario::draw::{PlanSettings, as_written};
 
 const SHARES: [f64; 4] = [1e-6, 0.1, 0.5, 0.999];
 
@@ -208,4 +209,17 @@ fn proposals_fall_off_slowly_enough() {
     assert!(!TRIANGLE.bounds_weights_of(&uniform));
     assert!(uniform.bounds_weights_of(&TRIANGLE));
     assert!(nature.covers(&TRIANGLE) && !TRIANGLE.covers(&nature));
+}
+
+/// What users are shown is what they would write: keys in the order of the documentation, defaults left
+/// out.
+#[test]
+fn settings_are_shown_as_written() {
+    let shown = as_written(&Distribution::Uniform { min: 1.0, max: 5.0 });
+    assert_eq!(shown, "{ uniform = { min = 1.0, max = 5.0 } }");
+    assert_eq!(
+        as_written(&normal(0.0, 1.0, None, Some(2.0))),
+        "{ normal = { mean = 0.0, sigma = 1.0, max = 2.0 } }"
+    );
+    assert_eq!(as_written(&PlanSettings::Sobol), "sobol");
 }
