@@ -53,26 +53,33 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
     }
     // Nobody runs there meanwhile: the journal is locked.
     let (_journal, there) = Journal::open(folder)?;
-    rows.extend(rows_kept(folder, first, there)?);
-    write(folder, first_path, first, rows)
+    let kept = Manifest::read(folder)?;
+    check_free(folder, kept.as_ref(), first, &there)?;
+    // Rows that the folder itself holds count too, such as those of runs that crashed in a shard and were
+    // tried again after an earlier merge; and it may have gone on to more runs.
+    rows.extend(there);
+    let runs = kept.map_or(0, |kept| kept.runs).max(first.runs);
+    let merged = Manifest {
+        shard: None,
+        runs,
+        ..first.clone()
+    };
+    write(folder, first_path, &merged, rows)
 }
 
-/// Rows that the folder itself holds and that count: such as those of runs that crashed in a shard and
-/// were tried again after an earlier merge. A folder that holds another study is left alone.
-fn rows_kept(folder: &Path, merged: &Manifest, rows: Vec<Row>) -> Result<Vec<Row>, StudyError> {
-    let other = |what| {
-        let path = folder.to_owned();
-        StudyError::Other { path, what }
+/// A folder that holds another study is left alone.
+fn check_free(
+    folder: &Path,
+    kept: Option<&Manifest>,
+    merged: &Manifest,
+    rows: &[Row],
+) -> Result<(), StudyError> {
+    let what = match kept {
+        None => (!rows.is_empty()).then(|| "rows without a manifest".to_owned()),
+        Some(kept) => kept.difference(merged),
     };
-    let what = match Manifest::read(folder)? {
-        None if rows.is_empty() => return Ok(rows),
-        None => "rows without a manifest".to_owned(),
-        Some(there) => match there.difference(merged) {
-            None => return Ok(rows),
-            Some(what) => what,
-        },
-    };
-    Err(other(what))
+    let path = folder.to_owned();
+    what.map_or(Ok(()), |what| Err(StudyError::Other { path, what }))
 }
 
 /// Folders of shards, with their manifests.
@@ -137,10 +144,6 @@ fn write(
     }
     write_whole(&folder.join(JOURNAL), &text)?;
     table::write(folder, &template, &rows)?;
-    let whole = Manifest {
-        shard: None,
-        ..manifest.clone()
-    };
-    whole.write(folder)?;
+    manifest.write(folder)?;
     Ok(rows)
 }

@@ -22,7 +22,7 @@ pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
     Ok((manifest, template))
 }
 
-/// Answers every index with a row, a line each, until the input ends.
+/// Answers every index with a row, a line each, until the input ends; then the process ends too.
 pub fn serve(
     folder: &Path,
     renderer: RendererChoice,
