@@ -6,7 +6,9 @@ use super::running::{RendererArg, STOP, prepare, stop_on_ctrl_c};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::Template;
 use crate::study::stats::Estimate;
-use crate::study::{self, Digest, MEASURES, Options, Progress, Row, Shard, StudyError, Submission};
+use crate::study::{
+    self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, StudyError, Submission,
+};
 use clap::Subcommand;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::cell::Cell;
@@ -87,7 +89,7 @@ struct RunArgs {
     #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
     renderer: RendererArg,
     /// Give up a run that takes longer, as one that has hung
-    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = seconds)]
+    #[arg(long, value_name = "S", default_value_t = RUN_LIMIT_S, value_parser = seconds)]
     run_limit_s: f64,
 }
 

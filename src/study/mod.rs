@@ -48,9 +48,8 @@ pub use measures::{Fixes, MEASURES, Measure, measure};
 pub use merge::merge;
 pub use report::{REPORT, report, rows};
 pub use row::{Row, Status};
-pub use runner::{Options, Progress, check, run};
+pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
 pub use slurm::{Submission, Submitted};
-pub use table::check_names;
 pub use worker::{Desk, serve, template_of};
 
 use crate::record;

@@ -45,8 +45,8 @@ pub struct Progress {
     pub per_minute: f64,
 }
 
-/// No run is known to take so long.
-const RUN_LIMIT: Duration = Duration::from_secs(3600);
+/// No run is known to take so long, s.
+pub const RUN_LIMIT_S: f64 = 3600.0;
 /// Combinations of swept values that are drawn from before the first run.
 const MOST_CHECKED: u64 = 1000;
 /// How often the table is written while runs go on.
@@ -175,7 +175,9 @@ fn pool<'a>(
             "gpu"
         },
         jobs,
-        run_limit: options.run_limit.unwrap_or(RUN_LIMIT),
+        run_limit: options
+            .run_limit
+            .unwrap_or(Duration::from_secs_f64(RUN_LIMIT_S)),
     })
 }
 

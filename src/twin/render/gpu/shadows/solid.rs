@@ -53,18 +53,12 @@ impl Solid {
             Shape::Sphere(_) | Shape::Capsule(..) => (Vec::new(), false),
         };
         Self {
-            centre: body.world_from_body.translation.vector.into(),
+            centre: (body.world_from_body.translation.vector + body.velocity_mps * mid_s).into(),
             slabs,
             is_whole,
             travel_m: body.velocity_mps.norm() * half_s,
             radius_m: body.shape.half_extents_m().norm(),
         }
-        .moved(body.velocity_mps * mid_s)
-    }
-
-    fn moved(mut self, by: Vector3<f64>) -> Self {
-        self.centre += by;
-        self
     }
 
     /// Cuts of all lines from the one ball into the other that begin outside of it. At the share t of the
