@@ -170,7 +170,7 @@ impl Shadows {
                     self.mark_cell(framed, falling, &quarter, casts, end);
                 }
             } else {
-                falling.collect(&casts[end..], ball, true, &mut self.set);
+                falling.collect(&casts[end..], ball, &mut self.set);
                 self.marks.add_cell(framed, &falling.eyes, cell, &self.set);
             }
         }
@@ -202,7 +202,7 @@ impl Shadows {
                 self.cells = cells;
             } else {
                 for ball in of_body {
-                    falling.collect(&casts, ball.around(), false, &mut self.set);
+                    falling.collect(&casts, ball.around(), &mut self.set);
                     self.marks.add_body(framed, &falling.eyes, body, &self.set);
                 }
             }
@@ -290,9 +290,8 @@ impl Falling<'_> {
     }
 
     /// Makes the set of some casts, and of the lights on a surface in a ball: those casts that fall on it
-    /// in part or in whole, the lights, and those lights that no body hides in whole. `exact` looks at the
-    /// bodies' planes, not only at balls around them.
-    fn collect(&self, casts: &[usize], around: Around<'_>, exact: bool, set: &mut Vec<u64>) {
+    /// in part or in whole, the lights, and those lights that no body hides in whole.
+    fn collect(&self, casts: &[usize], around: Around<'_>, set: &mut Vec<u64>) {
         let (centre, radius_m, normal) = around;
         let lights = self.lights.len();
         set.clear();
@@ -311,11 +310,7 @@ impl Falling<'_> {
                 centre: &light.centre,
                 radius_m: light.radius_m,
             };
-            let cut = if exact {
-                self.bodies.solids[cast.body].cut(ball, disc)
-            } else {
-                Cut::Some
-            };
+            let cut = self.bodies.solids[cast.body].cut(ball, disc);
             if cut != Cut::None {
                 put(set, lights + k);
             }
