@@ -24,6 +24,7 @@ pub mod lenses;
 mod message;
 mod motion;
 mod time;
+mod train_id;
 mod wayside;
 
 pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
@@ -34,6 +35,7 @@ pub use health::{CameraFault, CameraHealth};
 pub use message::{Delivery, ObstacleWarning, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
 pub use time::SimTime;
+pub use train_id::TrainId;
 pub use wayside::{
     Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,
     WaysideCalibration, WaysideReport,

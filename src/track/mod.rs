@@ -52,6 +52,7 @@ mod document;
 mod file;
 mod furniture;
 mod gauge;
+mod place;
 mod problem;
 mod section;
 pub mod uid;
@@ -65,6 +66,7 @@ pub use file::{
 };
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
 pub use gauge::{Gauge, RAIL_FOOT_M, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
+pub use place::{Direction, Place, TrackId};
 pub use problem::{Checker, FileError, Problem, key_below};
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,

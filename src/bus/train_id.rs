@@ -1,0 +1,32 @@
+//! Trains by number.
+
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Number of a train in a scenario, from 0. Train 0 is the one of the scenario's `[train]` table,
+/// train `k` the `k`-th of `[[other_trains]]`.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+)]
+pub struct TrainId(pub u8);
+
+impl TrainId {
+    /// Most trains that a scenario may have.
+    pub const MOST: usize = 8;
+
+    /// From a position in a list of trains.
+    pub fn from_index(index: usize) -> Self {
+        Self(u8::try_from(index).unwrap_or(u8::MAX))
+    }
+
+    /// Position in a list of all trains.
+    pub fn index(self) -> usize {
+        usize::from(self.0)
+    }
+}
+
+impl fmt::Display for TrainId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "train {}", self.0)
+    }
+}
