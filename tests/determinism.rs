@@ -25,7 +25,7 @@ impl Observer for Digest {
 
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Pair(pair, report, truths_m) => {
+            Event::Pair(_, pair, report, truths_m) => {
                 pair.left.image.as_raw().hash(&mut self.hasher);
                 pair.right.image.as_raw().hash(&mut self.hasher);
                 format!("{report:?}{truths_m:?}").hash(&mut self.hasher);

@@ -71,7 +71,7 @@ impl Observer for Seen {
     }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Pair(pair, report, _) => {
+            Event::Pair(_, pair, report, _) => {
                 let images = [hash(&pair.left.image), hash(&pair.right.image)];
                 let faults = report.eyes.map(|eye| eye.fault);
                 assert_eq!(report.number, pair.left.number);
@@ -85,14 +85,17 @@ impl Observer for Seen {
                 (self.frames).push((report.number, start, image, fault, report.blind));
                 image.hash(&mut self.hasher);
             }
-            Event::Camera(time, camera, fault) => {
+            Event::Camera(time, _, camera, fault) => {
                 self.said.push(format!("{time} {camera} {fault:?}"));
             }
-            Event::Delivery(delivery) => {
-                let warning = &delivery.warning;
-                self.warnings.push((warning.blind, warning.danger));
+            Event::Message(Node::Train(_), message) => {
+                if let Content::Warning(warning) = &message.content {
+                    self.warnings.push((warning.blind, warning.danger));
+                }
+                format!("{message:?}").hash(&mut self.hasher);
             }
-            Event::Train(truth, _) => self.now = truth.time,
+            Event::Train(_, truth, _) => self.now = truth.time,
+            Event::Cost(..) => {}
             other => format!("{other:?}").hash(&mut self.hasher),
         }
         Ok(())

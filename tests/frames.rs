@@ -74,7 +74,7 @@ impl Observer for Delivered {
             self.0.insert(name, image.clone());
         };
         match event {
-            Event::Pair(pair, ..) => {
+            Event::Pair(_, pair, ..) => {
                 keep("left", pair.left.number, &pair.left.image);
                 keep("right", pair.right.number, &pair.right.image);
             }

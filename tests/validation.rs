@@ -55,7 +55,7 @@ impl Observer for ErrorByDistance {
         Ok(())
     }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        if let Event::Pair(_, report, truths_m) = event {
+        if let Event::Pair(_, _, report, truths_m) = event {
             let fixes = report.fixes.iter().zip(*truths_m);
             self.0
                 .extend(fixes.filter(|(fix, _)| fix.method == Method::Paper).map(
@@ -165,10 +165,12 @@ impl Observer for ErrorByTime {
     }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Protection(report) => {
-                self.said = report.position_m.map(|m| (report.time, m));
+            Event::Message(_, message) => {
+                if let Content::Protection(report) = &message.content {
+                    self.said = report.position_m.map(|m| (report.time, m));
+                }
             }
-            Event::Train(truth, _) => {
+            Event::Train(_, truth, _) => {
                 let settled = truth.time.secs() > 3.0;
                 if let Some((time, said_m)) = self.said.filter(|_| settled)
                     && time == truth.time

@@ -191,7 +191,7 @@ impl RigCalibration {
 }
 
 /// One image as read out.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Frame {
     /// Counts up from 0, gaps are lost frames.
     pub number: u32,
@@ -202,11 +202,12 @@ pub struct Frame {
     /// Gain before the converter, as the camera says.
     pub gain_db: f64,
     /// 8-bit grey; 0 x 0 where the camera has delivered none.
+    #[serde(with = "super::image_serde")]
     pub image: GrayImage,
 }
 
 /// Both eyes, triggered together or one a known time after the other.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StereoPair {
     /// Left eye.
     pub left: Frame,

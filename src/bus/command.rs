@@ -25,6 +25,14 @@ pub struct TrainCommand {
     pub permitted_speed_mps: f64,
 }
 
+impl TrainCommand {
+    /// The driver drives as he likes.
+    pub const UNSUPERVISED: Self = Self {
+        brake: BrakeDemand::None,
+        permitted_speed_mps: f64::INFINITY,
+    };
+}
+
 /// One lamp with its buzzer, on the driver's display.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -39,7 +47,7 @@ pub enum Lamp {
 }
 
 /// The driver's display.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct DriverDisplay {
     /// The equipment has power.
     pub power: bool,
@@ -69,7 +77,7 @@ pub enum Supervision {
 }
 
 /// One cycle of the protection, for the record.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ProtectionReport {
     /// When.
     pub time: SimTime,

@@ -3,10 +3,13 @@
 use super::{CameraHealth, SimTime};
 use crate::track::uid::Uid;
 use nalgebra::{Point2, Point3, Vector3};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Which estimator made a fix.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema,
+)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Stereo triangulation of the lamp centre.
@@ -49,7 +52,7 @@ pub struct PixelBox {
 }
 
 /// An ellipse in the image.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ellipse {
     /// Centre.
     pub centre: Point2<f64>,
@@ -62,7 +65,7 @@ pub struct Ellipse {
 }
 
 /// One lamp image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spot {
     /// Its bounding box.
     pub bounds: PixelBox,
@@ -79,7 +82,7 @@ pub struct Spot {
 }
 
 /// A position.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PositionFix {
     /// When the train was there (mid-exposure of the lamp's centre row).
     pub time: SimTime,
@@ -100,7 +103,7 @@ pub struct PositionFix {
 }
 
 /// Everything said of one pair.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LedReport {
     /// Start of the pair's first row.
     pub time: SimTime,
@@ -108,6 +111,8 @@ pub struct LedReport {
     pub number: u32,
     /// How the eyes do, left then right. What one of them shows while it has a fault is not used.
     pub eyes: [CameraHealth; 2],
+    /// The method whose fix a train should run by: both eyes, or the one that is left.
+    pub best: Method,
     /// Lamps seen by the left eye.
     pub left: Vec<Spot>,
     /// Lamps seen by the right eye.
@@ -119,10 +124,8 @@ pub struct LedReport {
 }
 
 impl LedReport {
-    /// The position that a train should run by: that of both eyes, or of the one that is left.
+    /// The position that a train should run by.
     pub fn best_fix(&self) -> Option<&PositionFix> {
-        let by = |method| self.fixes.iter().find(|fix| fix.method == method);
-        let one_eyed = self.eyes.iter().any(|eye| !eye.is_good());
-        by(Method::Paper).or_else(|| by(Method::Mono).filter(|_| one_eyed))
+        self.fixes.iter().find(|fix| fix.method == self.best)
     }
 }

@@ -34,7 +34,7 @@ impl fmt::Display for CameraFault {
 }
 
 /// How a camera does at one frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CameraHealth {
     /// What is wrong with it.
     pub fault: Option<CameraFault>,
@@ -42,7 +42,25 @@ pub struct CameraHealth {
     pub lost: u32,
 }
 
+/// How a camera does, by its name on its node: `rig.left`, `rig.right`, or the device's name.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CameraStatus {
+    /// Which camera.
+    pub camera: String,
+    /// How it does.
+    pub health: CameraHealth,
+}
+
+/// Names of the eyes of a stereo rig, left then right.
+pub const EYES: [&str; 2] = ["rig.left", "rig.right"];
+
 impl CameraHealth {
+    /// It delivers nothing any more.
+    pub const SILENT: Self = Self {
+        fault: Some(CameraFault::Silent),
+        lost: 0,
+    };
+
     /// The image may be used.
     pub fn is_good(&self) -> bool {
         self.fault.is_none()

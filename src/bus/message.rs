@@ -1,44 +1,154 @@
-//! Messages from a wayside device to a train.
+//! One message, and who sends and receives it.
+//!
+//! ```
+//! use metrotwin::bus::{Content, Message, Node, OdometerSample, Receiver, SimTime, TrainId, Via};
+//! let time = SimTime::from_secs(1.0);
+//! let sample = OdometerSample { time, distance_m: 12.0, speed_mps: 6.0 };
+//! let message = Message::own(Node::Train(TrainId(0)), time, Content::Odometer(sample));
+//! assert_eq!((message.receiver, message.via), (Receiver::Own, Via::Wire));
+//! ```
 
-use super::{DangerLevel, SimTime};
+use super::{
+    CameraStatus, DopplerSample, Frame, ImuSample, LedReport, LidarScan, ObstacleWarning,
+    OdometerSample, PositionEstimate, ProtectionReport, RigCalibration, SimTime, StereoPair,
+    TrainCommand, TrainId, TrainReport, WaysideCalibration, WaysideReport,
+};
 use serde::{Deserialize, Serialize};
 
-/// The way a message came.
+/// A place with equipment, or with something that stores messages. Everything on one node hears
+/// everything else there at once; between nodes messages travel by links.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Node {
+    /// A train.
+    Train(TrainId),
+    /// A wayside device, by its name.
+    Post(String),
+    /// A balise, by its name: it keeps the last message written to it.
+    Balise(String),
+    /// The control centre.
+    Control,
+}
+
+/// To whom a message goes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Receiver {
+    /// Everything on the sender's node.
+    Own,
+    /// Another node.
+    Node(Node),
+    /// Every train that the radio reaches.
+    Trains,
+    /// Every wayside device.
+    Posts,
+    /// Every other node that the radio reaches.
+    All,
+}
+
+/// By which way a message came.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Via {
-    /// Stored in a balise, read as the train passes over it.
+    /// By the wiring of one node.
+    Wire,
+    /// From a balise, read as the train passes over it.
     Balise,
-    /// From a base station by radio.
+    /// By radio.
     Radio,
 }
 
-/// "There is, or is no longer, an obstacle here", or "I cannot see whether there is one".
+/// A message.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ObstacleWarning {
-    /// Name of the device.
-    pub device: String,
-    /// Counts up with every message of the device.
-    pub number: u32,
-    /// When the device issued it.
-    pub issued: SimTime,
-    /// `None` clears the device's earlier warnings.
-    pub danger: DangerLevel,
-    /// Chainage of the obstacle's near and far end as a train running up the line meets them.
-    pub from_chainage_m: f64,
-    /// The far end.
-    pub to_chainage_m: f64,
-    /// Nothing was found: the device is blind, and this is the stretch that it cannot vouch for.
-    pub blind: bool,
+pub struct Message {
+    /// The node that sent it.
+    pub sender: Node,
+    /// To whom.
+    pub receiver: Receiver,
+    /// When its content was true, by the clock of whoever measured it.
+    pub valid_at: SimTime,
+    /// When it was sent.
+    pub sent_at: SimTime,
+    /// When it arrived; until then, when it was sent.
+    pub received_at: SimTime,
+    /// By which way it came.
+    pub via: Via,
+    /// What it says.
+    pub content: Content,
 }
 
-/// A message as a train gets it.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Delivery {
-    /// When it was received.
-    pub received: SimTime,
-    /// By which way.
-    pub via: Via,
-    /// What was said.
-    pub warning: ObstacleWarning,
+/// What messages say.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "messages are handed on by reference; the frequent ones are small"
+)]
+pub enum Content {
+    /// An inertial sample.
+    Imu(ImuSample),
+    /// An odometer sample.
+    Odometer(OdometerSample),
+    /// A sample of the Doppler radar.
+    Doppler(DopplerSample),
+    /// A stereo pair.
+    Pair(StereoPair),
+    /// A frame of a wayside camera.
+    Frame(Frame),
+    /// A sweep of a lidar.
+    Scan(LidarScan),
+    /// The antenna passed over the balise of this name.
+    BalisePassed(String),
+    /// The calibration sheet of a stereo rig.
+    RigCalibration(RigCalibration),
+    /// The calibration sheet of a wayside device.
+    WaysideCalibration(WaysideCalibration),
+    /// What was read from a stereo pair.
+    Led(LedReport),
+    /// Where a train takes itself to be.
+    Position(PositionEstimate),
+    /// What was found in a wayside frame.
+    Wayside(WaysideReport),
+    /// How a camera does that delivers no frames to tell it by.
+    Camera(CameraStatus),
+    /// A wayside device warns, or takes a warning back.
+    Warning(ObstacleWarning),
+    /// A wayside device is alive and says what it sees.
+    Heartbeat(ObstacleWarning),
+    /// A train tells where it is.
+    Train(TrainReport),
+    /// A cycle of a train protection.
+    Protection(ProtectionReport),
+    /// What the train is to do.
+    Command(TrainCommand),
+}
+
+impl Message {
+    /// To everything on the sender's node, true and sent at one time.
+    pub fn own(sender: Node, time: SimTime, content: Content) -> Self {
+        Self::to(Receiver::Own, sender, time, content)
+    }
+
+    /// To a receiver, true and sent at one time.
+    pub fn to(receiver: Receiver, sender: Node, time: SimTime, content: Content) -> Self {
+        Self {
+            sender,
+            receiver,
+            valid_at: time,
+            sent_at: time,
+            received_at: time,
+            via: Via::Wire,
+            content,
+        }
+    }
+
+    /// As it arrives by a link.
+    #[must_use]
+    pub fn arrived(self, time: SimTime, via: Via) -> Self {
+        Self {
+            received_at: time,
+            via,
+            ..self
+        }
+    }
 }

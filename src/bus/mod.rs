@@ -17,25 +17,30 @@
 mod camera;
 mod command;
 mod distortion;
+mod estimate;
 mod fix;
 mod health;
+mod image_serde;
 #[cfg(test)]
 pub mod lenses;
 mod message;
 mod motion;
 mod time;
 mod train_id;
+mod warning;
 mod wayside;
 
 pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
 pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
 pub use distortion::{Distortion, DistortionCoefficients};
+pub use estimate::{PositionEstimate, PositionSource};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
-pub use health::{CameraFault, CameraHealth};
-pub use message::{Delivery, ObstacleWarning, Via};
+pub use health::{CameraFault, CameraHealth, CameraStatus, EYES};
+pub use message::{Content, Message, Node, Receiver, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
-pub use time::SimTime;
+pub use time::{SimTime, Ticker};
 pub use train_id::TrainId;
+pub use warning::ObstacleWarning;
 pub use wayside::{
     Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,
     WaysideCalibration, WaysideReport,

@@ -2,9 +2,10 @@
 
 use super::SimTime;
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 /// One inertial sample, in the vehicle frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImuSample {
     /// When it was taken.
     pub time: SimTime,
@@ -15,7 +16,7 @@ pub struct ImuSample {
 }
 
 /// Wheel pulses turned into distance, as the odometer box sends them.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OdometerSample {
     /// When it was taken.
     pub time: SimTime,
@@ -26,7 +27,7 @@ pub struct OdometerSample {
 }
 
 /// What a Doppler radar says of the speed over ground.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DopplerSample {
     /// When it was taken: the end of the time that it is a mean of.
     pub time: SimTime,

@@ -46,6 +46,35 @@ impl SimTime {
     }
 }
 
+/// What happens at a fixed rate: number k at k / rate.
+#[derive(Clone, Copy, Debug)]
+pub struct Ticker {
+    rate_hz: f64,
+    next: u32,
+}
+
+impl Ticker {
+    /// Number 0 is due at time zero.
+    pub fn new(rate_hz: f64) -> Self {
+        Self { rate_hz, next: 0 }
+    }
+
+    /// Number and time of the next.
+    pub fn next(&self) -> (u32, SimTime) {
+        let seconds = f64::from(self.next) / self.rate_hz;
+        (self.next, SimTime::from_secs(seconds))
+    }
+
+    /// The next one, if it is due, `delay_s` after its time; moves on if so.
+    pub fn due(&mut self, now: SimTime, delay_s: f64) -> Option<(u32, SimTime)> {
+        let (number, time) = self.next();
+        (now >= time.plus(delay_s)).then(|| {
+            self.next += 1;
+            (number, time)
+        })
+    }
+}
+
 impl fmt::Display for SimTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.3} s", self.secs())

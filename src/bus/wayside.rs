@@ -1,6 +1,7 @@
 //! What a wayside device sees, knows and says.
 
 use super::{CameraHealth, CameraModel, PixelBox, SimTime};
+use crate::track::Direction;
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3};
 use schemars::JsonSchema;
@@ -9,7 +10,7 @@ use std::fmt;
 
 /// One lidar echo, in the lidar's own angles: X = R cos w sin a, Y = R cos w cos a, Z = R sin w,
 /// Y along the lidar's axis, Z up.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LidarReturn {
     /// Range R.
     pub range_m: f64,
@@ -20,7 +21,7 @@ pub struct LidarReturn {
 }
 
 /// One sweep.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LidarScan {
     /// When it began.
     pub time: SimTime,
@@ -29,7 +30,7 @@ pub struct LidarScan {
 }
 
 /// A wayside device as surveyed and calibrated.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WaysideCalibration {
     /// Name of the device.
     pub name: String,
@@ -74,7 +75,7 @@ pub enum Plan {
 }
 
 /// A connected region of the binary difference image.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Blob {
     /// Where in the image.
     pub bounds: PixelBox,
@@ -83,7 +84,7 @@ pub struct Blob {
 }
 
 /// An obstacle, placed on the line.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DetectedObstacle {
     /// Its region in the image.
     pub blob: Blob,
@@ -97,9 +98,9 @@ pub struct DetectedObstacle {
     pub far_range_m: f64,
     /// Angle of the farthest point (alpha).
     pub far_angle_rad: f64,
-    /// Chainage of the end that a train running up the line meets first.
+    /// Lower chainage of its two ends.
     pub from_chainage_m: f64,
-    /// Chainage of the other end.
+    /// Higher chainage.
     pub to_chainage_m: f64,
     /// Left of the centreline.
     pub lateral_m: f64,
@@ -112,18 +113,20 @@ pub struct DetectedObstacle {
 }
 
 /// What a train tells of itself to the devices along the line.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainReport {
     /// Chainage of its head.
     pub chainage_m: f64,
-    /// Speed up the line.
+    /// Which way it runs.
+    pub direction: Direction,
+    /// Speed that way.
     pub speed_mps: f64,
     /// When it was there.
     pub time: SimTime,
 }
 
 /// The report of one frame. As text it is the list that the paper prints.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WaysideReport {
     /// Start of the frame.
     pub time: SimTime,
@@ -157,8 +160,10 @@ pub struct WaysideReport {
     /// Which plan.
     pub plan: Plan,
     /// Difference image and binary image, for the record.
+    #[serde(with = "super::image_serde::optional")]
     pub difference: Option<GrayImage>,
     /// Binary image, 0 or 255.
+    #[serde(with = "super::image_serde::optional")]
     pub binary: Option<GrayImage>,
 }
 

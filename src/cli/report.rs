@@ -126,7 +126,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
             bench.points, bench.step_m, bench.first_m, bench.fixes_per_point
         ));
     }
-    if let Some(rig) = &scenario.rig {
+    if let Some(rig) = scenario.rig() {
         let calibration = rig.calibration();
         lines.push(format!(
             "rig: {}",

@@ -224,7 +224,7 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
 fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
     let stale = [
         ("recording.rrd", args.no_recording),
-        ("fixes.csv", scenario.rig.is_none()),
+        ("fixes.csv", scenario.rig().is_none()),
     ];
     for (name, _) in stale.into_iter().filter(|(_, stale)| *stale) {
         match fs::remove_file(out.join(name)) {

@@ -42,7 +42,7 @@ mod texts;
 pub(crate) use stream::write_whole;
 pub use tables::FixTable;
 
-use crate::bus::SimTime;
+use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, ObserverError, Opening};
 use images::Images;
@@ -186,12 +186,12 @@ impl Open {
         opening: &Opening<'_>,
         settings: &RecordSettings,
     ) -> Result<Self, ObserverError> {
-        let devices = opening.wayside.len();
+        let (devices, first) = (opening.wayside.len(), opening.first());
         let contents = Contents {
-            rig: opening.rig.is_some(),
-            train: opening.cars > 0,
-            radar: opening.radar,
-            protection: opening.protection,
+            rig: first.is_some_and(|train| train.rig.is_some()),
+            train: first.is_some_and(|train| train.cars > 0),
+            radar: first.is_some_and(|train| train.radar),
+            protection: first.is_some_and(|train| train.protection),
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
         let scene = Scene::new(opening.tunnel);
@@ -213,28 +213,26 @@ impl Open {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         let (stream, scene) = (&self.stream, &self.scene);
         let time = match *event {
-            Event::Train(train, left) => {
+            // Panes show the first train.
+            Event::Train(id, ..) | Event::Pair(id, ..) if id != TrainId::default() => return Ok(()),
+            Event::Train(_, train, left) => {
                 self.moving.train(scene, train, left);
                 self.plots.train(train);
                 let head = train.world_from_vehicle;
                 self.lay_out(Some(&head))?;
                 train.time
             }
-            Event::Odometer(sample) => {
-                self.plots.odometer(sample);
-                sample.time
+            Event::Message(node, message) if *node == Node::Train(TrainId::default()) => {
+                self.message(message)?
             }
-            Event::Doppler(sample) => {
-                self.plots.doppler(sample);
-                sample.time
-            }
+            Event::Message(..) => return Ok(()),
             Event::Bodies(time, bodies) => {
                 self.moving.bodies(stream, scene, time, bodies)?;
                 time
             }
             // Its images come when they reach the stack.
-            Event::Exposure(_) => return Ok(()),
-            Event::Pair(pair, report, true_chainages_m) => {
+            Event::Exposure(_) | Event::Cost(..) => return Ok(()),
+            Event::Pair(_, pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
                 self.plots.taken(RIG_CAMERA, &pair.left);
                 Texts::dark_lamps(stream, report)?;
@@ -257,19 +255,9 @@ impl Open {
                     .obstacles(stream, scene, device, &report.obstacles)?;
                 time
             }
-            Event::Protection(report) => {
-                self.plots.protection(report);
-                self.texts.protection(stream, report)?;
-                self.texts.display(stream, report.time, &report.display)?;
-                report.time
-            }
-            Event::Camera(time, camera, fault) => {
+            Event::Camera(time, _, camera, fault) => {
                 Texts::camera(stream, time, camera, fault)?;
                 time
-            }
-            Event::Delivery(delivery) => {
-                self.texts.delivery(stream, delivery)?;
-                delivery.received
             }
             Event::Note(time, text) => {
                 Texts::note(stream, time, text)?;
@@ -281,6 +269,23 @@ impl Open {
             self.flush()?;
         }
         Ok(())
+    }
+
+    /// A message of the first train's node, or one that arrived there; gives its time.
+    fn message(&mut self, message: &Message) -> Result<SimTime, ObserverError> {
+        let stream = &self.stream;
+        match &message.content {
+            Content::Odometer(sample) => self.plots.odometer(sample),
+            Content::Doppler(sample) => self.plots.doppler(sample),
+            Content::Protection(report) => {
+                self.plots.protection(report);
+                self.texts.protection(stream, report)?;
+                self.texts.display(stream, report.time, &report.display)?;
+            }
+            Content::Warning(warning) => self.texts.warning(stream, message, warning)?,
+            _ => {}
+        }
+        Ok(message.received_at)
     }
 
     /// Sends the layout, once: with the first truth, which says where to look.

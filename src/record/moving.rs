@@ -75,30 +75,34 @@ pub(super) struct Moving {
 impl Moving {
     /// Draws the train, and makes ready for its motion.
     pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
-        let half = opening.car_half_extents_m.map(|x| x as f32);
-        for car in 0..opening.cars {
+        let first = opening.first();
+        let half = first.map_or(Vector3::zeros(), |train| train.car_half_extents_m);
+        let half = half.map(|x| x as f32);
+        let cars = first.map_or(0, |train| train.cars);
+        let rig = first.and_then(|train| train.rig);
+        for car in 0..cars {
             let body = Boxes3D::from_half_sizes([[half.x, half.y, half.z]])
                 .with_colors([palette::TRAIN])
                 .with_fill_mode(FillMode::TransparentFillMajorWireframe);
             stream.log_static(&car_path(car), &body)?;
         }
         let eyes = [images::LEFT, images::RIGHT];
-        if let Some(rig) = opening.rig {
+        if let Some(rig) = rig {
             for (eye, camera) in eyes.into_iter().zip([rig.left, rig.right]) {
                 stream.log_static(eye, &images::pinhole(&camera.intrinsics, 1.2))?;
             }
         }
         let mut train = Vec::new();
-        if opening.cars > 0 || opening.rig.is_some() {
+        if cars > 0 || rig.is_some() {
             train.push(Poses::of(HEAD));
-            train.extend((0..opening.cars).map(|car| Poses::of(car_path(car))));
+            train.extend((0..cars).map(|car| Poses::of(car_path(car))));
             // On the head itself: the viewer's eye can follow only what has a shape of its own,
             // and keeps a distance that fits its size.
             let (mast, tip) = mast(8.4, "true", palette::TRUTH);
             stream.log_static(HEAD, &[&mast as &dyn AsComponents, &tip])?;
         }
         Ok(Self {
-            rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
+            rig: rig.map(|rig| (rig, eyes.map(Poses::of))),
             train,
             left: None,
             shown: [false; KINDS.len()],

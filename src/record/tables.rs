@@ -1,7 +1,7 @@
 //! Tables for other programs.
 
 use super::stream::{failed, part_name};
-use crate::bus::{Identity, Method};
+use crate::bus::{Identity, Method, TrainId};
 use crate::session::{Event, Observer, ObserverError, Opening};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -42,7 +42,9 @@ impl Observer for FixTable {
     }
 
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        let (Some(rows), Event::Pair(_, report, true_chainages_m)) = (&mut self.rows, event) else {
+        let (Some(rows), Event::Pair(TrainId(0), _, report, true_chainages_m)) =
+            (&mut self.rows, event)
+        else {
             return Ok(());
         };
         for (fix, true_m) in report.fixes.iter().zip(*true_chainages_m) {

@@ -10,10 +10,11 @@ use super::stream::part_name;
 use super::trial::{Size, play};
 use super::{FixTable, Recording};
 use crate::bus::{
-    DangerLevel, Delivery, DopplerSample, ObstacleWarning, OdometerSample, SimTime, Via,
+    Content, DangerLevel, DopplerSample, Message, Node, ObstacleWarning, OdometerSample, SimTime,
+    TrainId,
 };
 use crate::scenario::RecordSettings;
-use crate::session::{Event, Observer, Opening};
+use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::Tunnel;
 use rerun::StoreKind;
 use rerun::components::Name;
@@ -208,18 +209,21 @@ fn the_layout_leaves_out_what_is_missing() {
     }
 }
 
+/// A message of the first train.
+fn observe(recording: &mut Recording, time: SimTime, content: Content) {
+    let node = Node::Train(TrainId(0));
+    let message = Message::own(node.clone(), time, content);
+    recording.observe(&Event::Message(&node, &message)).unwrap();
+}
+
 /// What a run without rig, train and devices opens with.
 fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
     Opening {
         scenario,
         seed: 0,
         tunnel,
-        rig: None,
+        trains: &[],
         wayside: &[],
-        car_half_extents_m: nalgebra::Vector3::zeros(),
-        cars: 0,
-        radar: false,
-        protection: false,
     }
 }
 
@@ -233,24 +237,21 @@ fn regress_the_log_tells_a_repeated_warning_once() {
     recording.open(&bare("repeated", &tunnel)).unwrap();
     for number in 0..6 {
         let cleared = number == 5;
-        let delivery = Delivery {
-            received: SimTime::from_secs(f64::from(number)),
-            via: Via::Radio,
-            warning: ObstacleWarning {
-                device: "W1".into(),
-                number,
-                issued: SimTime::from_secs(f64::from(number)),
-                danger: if cleared {
-                    DangerLevel::None
-                } else {
-                    DangerLevel::High
-                },
-                from_chainage_m: 100.0,
-                to_chainage_m: 101.0,
-                blind: false,
+        let warning = ObstacleWarning {
+            device: "W1".into(),
+            number,
+            issued: SimTime::from_secs(f64::from(number)),
+            danger: if cleared {
+                DangerLevel::None
+            } else {
+                DangerLevel::High
             },
+            from_chainage_m: 100.0,
+            to_chainage_m: 101.0,
+            blind: false,
         };
-        recording.observe(&Event::Delivery(&delivery)).unwrap();
+        let issued = warning.issued;
+        observe(&mut recording, issued, Content::Warning(warning));
     }
     recording.close().unwrap();
     let rows = chunks(&path, StoreKind::Recording);
@@ -270,9 +271,16 @@ fn sensors_of_motion_become_series() {
     for radar in [true, false] {
         let path = folder.file(if radar { "with.rrd" } else { "without.rrd" });
         let mut recording = Recording::to_file(&path, &RecordSettings::default());
-        let opening = Opening {
+        let train = TrainOpening {
+            id: TrainId(0),
+            rig: None,
+            car_half_extents_m: nalgebra::Vector3::zeros(),
             cars: 1,
             radar,
+            protection: false,
+        };
+        let opening = Opening {
+            trains: &[train],
             ..bare("motion", &tunnel)
         };
         recording.open(&opening).unwrap();
@@ -283,13 +291,13 @@ fn sensors_of_motion_become_series() {
                 distance_m: f64::from(k),
                 speed_mps: 10.0,
             };
-            recording.observe(&Event::Odometer(&odometer)).unwrap();
+            observe(&mut recording, time, Content::Odometer(odometer));
             let doppler = DopplerSample {
                 time,
                 speed_mps: (k < 5).then_some(10.0),
             };
             if radar {
-                recording.observe(&Event::Doppler(&doppler)).unwrap();
+                observe(&mut recording, time, Content::Doppler(doppler));
             }
         }
         recording.close().unwrap();

@@ -3,8 +3,8 @@
 use super::palette;
 use super::stream::Stream;
 use crate::bus::{
-    BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, LedReport, ProtectionReport,
-    SimTime, Via, WaysideReport,
+    BrakeDemand, CameraFault, DangerLevel, DriverDisplay, LedReport, Message, ObstacleWarning,
+    ProtectionReport, SimTime, Via, WaysideReport,
 };
 use crate::session::{ObserverError, Opening};
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
@@ -89,23 +89,24 @@ impl Texts {
         Ok(())
     }
 
-    /// A message reached the train. Devices repeat theirs; the log does not.
-    pub(super) fn delivery(
+    /// A warning reached the train. Devices repeat theirs; the log does not.
+    pub(super) fn warning(
         &mut self,
         stream: &Stream,
-        delivery: &Delivery,
+        message: &Message,
+        warning: &ObstacleWarning,
     ) -> Result<(), ObserverError> {
-        let warning = &delivery.warning;
-        let via = match delivery.via {
+        let via = match message.via {
             Via::Balise => "balise",
             Via::Radio => "radio",
+            Via::Wire => "wire",
         };
         let (device, number) = (&warning.device, warning.number);
         let before = self.sent.insert((device.clone(), via), warning.danger);
         if before == Some(warning.danger) {
             return Ok(());
         }
-        let delay_s = delivery.received.since(warning.issued);
+        let delay_s = message.received_at.since(warning.issued);
         let (level, what) = match warning.danger {
             DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
             danger if warning.blind => (
@@ -127,7 +128,7 @@ impl Texts {
             ),
         };
         let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
-        log(stream, delivery.received, level, &text)
+        log(stream, message.received_at, level, &text)
     }
 
     /// A wayside device changed its mind about the danger, or about how many things lie there.

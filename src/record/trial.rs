@@ -8,7 +8,7 @@
 )]
 
 use crate::bus::*;
-use crate::session::{Event, Observer, Opening};
+use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::uid::Uid;
 use crate::track::*;
 use crate::twin::physics::{TrainState, WheelForces};
@@ -184,16 +184,20 @@ pub(super) fn play(observer: &mut dyn Observer, size: Size) {
     } else {
         Vec::new()
     };
-    let opening = Opening {
-        scenario: "made_up",
-        seed: 7,
-        tunnel: &tunnel,
-        rig: Some(&rig),
-        wayside: &devices,
+    let train = TrainOpening {
+        id: TrainId(0),
+        rig: Some(rig),
         car_half_extents_m: Vector3::new(9.5, 1.4, 1.7),
         cars: size.cars,
         radar: false,
         protection: size.cars > 0,
+    };
+    let opening = Opening {
+        scenario: "made_up",
+        seed: 7,
+        tunnel: &tunnel,
+        trains: &[train],
+        wayside: &devices,
     };
     observer.open(&opening).unwrap();
     let mut session = Session {
@@ -240,6 +244,12 @@ impl Session<'_> {
         self.observer.observe(event).unwrap();
     }
 
+    fn message(&mut self, time: SimTime, content: Content) {
+        let node = Node::Train(TrainId(0));
+        let message = Message::own(node.clone(), time, content);
+        self.tell(&Event::Message(&node, &message));
+    }
+
     fn say(&mut self, t_s: f64, text: &str) {
         self.tell(&Event::Note(SimTime::from_secs(t_s), text));
     }
@@ -281,7 +291,7 @@ impl Session<'_> {
             ..TrainState::default()
         };
         let left = truth.world_from_vehicle * self.rig.vehicle_from_left;
-        self.tell(&Event::Train(&truth, Some(&left)));
+        self.tell(&Event::Train(TrainId(0), &truth, Some(&left)));
     }
 
     fn bodies(&mut self, t_s: f64) {
@@ -357,7 +367,7 @@ impl Session<'_> {
             display,
             ..ProtectionReport::default()
         };
-        self.tell(&Event::Protection(&report));
+        self.message(report.time, Content::Protection(report));
     }
 
     fn pair(&mut self, t_s: f64, number: u32) {
@@ -389,7 +399,12 @@ impl Session<'_> {
             right: std::mem::take(&mut eyes[1].1),
             fixes,
         };
-        self.tell(&Event::Pair(&StereoPair { left, right }, &report, &truths));
+        self.tell(&Event::Pair(
+            TrainId(0),
+            &StereoPair { left, right },
+            &report,
+            &truths,
+        ));
     }
 
     fn fixes(&self, t_s: f64, uid: Uid, lamp: Vector3<f64>) -> Vec<PositionFix> {
@@ -538,11 +553,7 @@ impl Session<'_> {
                 to_chainage_m: OBSTACLE_M + 0.5,
                 blind: false,
             };
-            self.tell(&Event::Delivery(&Delivery {
-                received: report.time,
-                via: Via::Radio,
-                warning,
-            }));
+            self.message(report.time, Content::Warning(warning));
         }
     }
 }

@@ -1,14 +1,16 @@
 //! From a file to a checked scenario.
 
 use super::RecordSettings;
-use super::file::{BenchSettings, ScenarioFile, StackSettings};
+use super::file::{BenchSettings, OnboardEquipment, ScenarioFile, StackSettings};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
-use crate::bus::WaysideCalibration;
-use crate::track::{FileError, Problem, Tunnel, key_below, read_toml};
+use crate::bus::{TrainId, WaysideCalibration};
+use crate::stack::positioning::LedSettings;
+use crate::stack::protection::ProtectionSettings;
+use crate::track::{Direction, FileError, Problem, Tunnel, key_below, read_toml};
 use crate::twin::air::AirSettings;
-use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
+use crate::twin::links::RadioSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -39,14 +41,9 @@ pub struct Scenario {
     pub physics: PhysicsSettings,
     /// A still rig moved from point to point, in place of a train.
     pub bench: Option<BenchSettings>,
-    /// The stereo rig.
-    pub rig: Option<RigSettings>,
-    /// The inertial unit.
-    pub imu: ImuSettings,
-    /// The odometer.
-    pub odometer: OdometerSettings,
-    /// The Doppler radar.
-    pub doppler: Option<DopplerSettings>,
+    /// Sensors and equipment of the trains that have any, in the order of their numbers; of a bench,
+    /// those of its rig.
+    pub onboard: Vec<Onboard>,
     /// Wayside devices in use.
     pub wayside: Vec<WaysidePost>,
     /// The radio.
@@ -59,6 +56,80 @@ pub struct Scenario {
     pub stack: StackSettings,
     /// What goes into the recording.
     pub record: RecordSettings,
+}
+
+/// Sensors and equipment of one train.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Onboard {
+    /// Which train.
+    pub train: TrainId,
+    /// Which way it runs.
+    pub direction: Direction,
+    /// The stereo rig.
+    pub rig: Option<RigSettings>,
+    /// The inertial unit.
+    pub imu: ImuSettings,
+    /// The odometer.
+    pub odometer: OdometerSettings,
+    /// The Doppler radar.
+    pub doppler: Option<DopplerSettings>,
+    /// Positioning by lamps.
+    pub led: LedSettings,
+    /// Warning and control.
+    pub protection: ProtectionSettings,
+    /// Equipment, in the order in which it works.
+    pub equipment: Vec<OnboardEquipment>,
+}
+
+impl Onboard {
+    /// It finds its position by lamps.
+    pub fn positions(&self) -> bool {
+        self.rig.is_some() && self.equipment.contains(&OnboardEquipment::Led)
+    }
+
+    /// Its speed is supervised.
+    pub fn protects(&self) -> bool {
+        self.equipment.contains(&OnboardEquipment::Protection)
+    }
+
+    /// Of all trains of a file.
+    fn of(file: &ScenarioFile) -> Vec<Self> {
+        let trains: Vec<&TrainSettings> = file.train.iter().chain(&file.other_trains).collect();
+        let direction = |id: TrainId| {
+            trains
+                .get(id.index())
+                .map_or(Direction::Up, |t| t.direction)
+        };
+        let first = TrainId::default();
+        let first = (file.train.is_some() || file.bench.is_some()).then(|| Self {
+            train: first,
+            direction: direction(first),
+            rig: file.rig.clone(),
+            imu: file.imu,
+            odometer: file.odometer,
+            doppler: file.doppler,
+            led: file.stack.led.clone(),
+            protection: file.stack.protection.clone(),
+            equipment: match file.bench {
+                Some(_) => vec![OnboardEquipment::Led],
+                None => file.stack.onboard.clone(),
+            },
+        });
+        let others = file.onboard.iter().map(|other| Self {
+            train: TrainId(other.train),
+            direction: direction(TrainId(other.train)),
+            rig: other.rig.clone(),
+            imu: other.imu,
+            odometer: other.odometer,
+            doppler: other.doppler,
+            led: other.led.clone(),
+            protection: other.protection.clone(),
+            equipment: other.equipment.clone(),
+        });
+        let mut all: Vec<Self> = first.into_iter().chain(others).collect();
+        all.sort_by_key(|onboard| onboard.train);
+        all
+    }
 }
 
 /// A wayside device in use, at its place.
@@ -186,12 +257,25 @@ impl Scenario {
         }
     }
 
+    /// Sensors and equipment of the first train, or of a bench.
+    pub fn first(&self) -> Option<&Onboard> {
+        self.onboard
+            .first()
+            .filter(|o| o.train == TrainId::default())
+    }
+
+    /// The rig of the first train, or of a bench.
+    pub fn rig(&self) -> Option<&RigSettings> {
+        self.first()?.rig.as_ref()
+    }
+
     /// The map of the line that the stack is given.
     pub fn map(&self) -> Arc<Tunnel> {
         Arc::new(self.survey.map(&self.tunnel, self.seed))
     }
 
     fn put_together(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
+        let onboard = Onboard::of(&file);
         let physics = PhysicsSettings {
             history_s: history_s(&file),
             ..file.physics()
@@ -209,10 +293,7 @@ impl Scenario {
             survey: file.survey,
             physics,
             bench: file.bench,
-            rig: file.rig,
-            imu: file.imu,
-            odometer: file.odometer,
-            doppler: file.doppler,
+            onboard,
             wayside,
             radio: file.radio,
             air: file.air,
@@ -304,7 +385,9 @@ pub(super) fn overridden(
 
 /// Poses are asked for until the last row of a frame has closed.
 fn history_s(file: &ScenarioFile) -> f64 {
-    let span_s = (file.rig.as_ref()).map_or(0.0, |rig| rig.as_built().pair_span_s());
+    let others = file.onboard.iter().filter_map(|other| other.rig.as_ref());
+    let spans = file.rig.iter().chain(others);
+    let span_s = spans.fold(0.0, |s: f64, rig| s.max(rig.as_built().pair_span_s()));
     let late_s = file.faults.cameras.iter().map(|fault| fault.late_s());
     let latency_s = 1e-3 * file.stack.latency_ms + late_s.fold(0.0, f64::max);
     // A fix is scored when it has gone through the stack.

@@ -34,6 +34,7 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     if let Some(rig) = &file.rig {
         rig.check("rig", problems);
     }
+    check_onboard(file, problems);
     for (k, post) in file.wayside.iter().enumerate() {
         post.camera.check(&format!("wayside[{k}].camera"), problems);
         if let Some(lidar) = &post.lidar {
@@ -87,6 +88,42 @@ pub(super) fn in_tunnel(
     posts
         .filter_map(|(k, post)| place(post, &format!("wayside[{k}]"), tunnel, problems))
         .collect()
+}
+
+/// Sensors and equipment of other trains, each of a train that there is, and named once.
+fn check_onboard(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+    for (k, onboard) in file.onboard.iter().enumerate() {
+        let at = format!("onboard[{k}]");
+        if let Some(rig) = &onboard.rig {
+            rig.check(&format!("{at}.rig"), problems);
+        }
+        if let Some(doppler) = &onboard.doppler {
+            doppler.check(&format!("{at}.doppler"), problems);
+        }
+        onboard.imu.check(&format!("{at}.imu"), problems);
+        onboard.odometer.check(&format!("{at}.odometer"), problems);
+        onboard.led.check(&format!("{at}.led"), problems);
+        (onboard.protection).check(&format!("{at}.protection"), problems);
+        let (number, others) = (usize::from(onboard.train), file.other_trains.len());
+        let twice = file.onboard[..k].iter().any(|o| o.train == onboard.train);
+        if number == 0 || number > others || twice {
+            problems.push(Problem::new(
+                format!("{at}.train"),
+                if twice {
+                    format!("train {number} has its equipment already")
+                } else {
+                    format!("there is no other train {number}")
+                },
+                match others {
+                    0 => "add it to [[other_trains]]".to_owned(),
+                    1 => "give 1: the one of [[other_trains]]".to_owned(),
+                    most => {
+                        format!("give 1 to {most}, each once, in the order of [[other_trains]]")
+                    }
+                },
+            ));
+        }
+    }
 }
 
 fn check_name(name: &str, problems: &mut Vec<Problem>) {

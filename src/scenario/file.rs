@@ -7,8 +7,8 @@ use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
 use crate::track::Problem;
 use crate::twin::air::AirSettings;
-use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
+use crate::twin::links::RadioSettings;
 use crate::twin::physics::{
     CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, TrackSettings, TrainSettings,
     WorkerSettings,
@@ -83,6 +83,9 @@ pub struct ScenarioFile {
     /// A Doppler radar on the train. Default: none.
     #[serde(default)]
     pub doppler: Option<DopplerSettings>,
+    /// Sensors and equipment of other trains. Default: none.
+    #[serde(default)]
+    pub onboard: Vec<OnboardSettings>,
     /// Wayside devices in use, each at a place that the tunnel file names. Default: none.
     #[serde(default)]
     pub wayside: Vec<WaysidePostSettings>,
@@ -118,6 +121,53 @@ fn default_step_s() -> f64 {
     0.001
 }
 
+/// Sensors and equipment of one of the other trains; what is left out is as on the first train without
+/// a word about it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OnboardSettings {
+    /// Which train: 1 is the first of `other_trains`.
+    pub train: u8,
+    /// Its stereo rig. Default: none.
+    #[serde(default)]
+    pub rig: Option<RigSettings>,
+    /// Its inertial unit.
+    #[serde(default)]
+    pub imu: ImuSettings,
+    /// Its odometer.
+    #[serde(default)]
+    pub odometer: OdometerSettings,
+    /// Its Doppler radar. Default: none.
+    #[serde(default)]
+    pub doppler: Option<DopplerSettings>,
+    /// Its positioning by lamps.
+    #[serde(default)]
+    pub led: LedSettings,
+    /// Its warning and control.
+    #[serde(default)]
+    pub protection: ProtectionSettings,
+    /// Its equipment. Default: all.
+    #[serde(default = "OnboardEquipment::all")]
+    pub equipment: Vec<OnboardEquipment>,
+}
+
+/// A kind of equipment of trains.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnboardEquipment {
+    /// Positioning by lamps; needs a rig.
+    Led,
+    /// Warning and control.
+    Protection,
+}
+
+impl OnboardEquipment {
+    /// In the order in which they work.
+    pub fn all() -> Vec<Self> {
+        vec![Self::Led, Self::Protection]
+    }
+}
+
 /// A wayside device in use.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -145,6 +195,8 @@ pub struct StackSettings {
     pub protection: ProtectionSettings,
     /// From the last row of a frame to the result, ms. Default 50.
     pub latency_ms: f64,
+    /// Equipment of the first train. Default: all.
+    pub onboard: Vec<OnboardEquipment>,
 }
 
 impl Default for StackSettings {
@@ -154,6 +206,7 @@ impl Default for StackSettings {
             wayside: WaysideSettings::default(),
             protection: ProtectionSettings::default(),
             latency_ms: 50.0,
+            onboard: OnboardEquipment::all(),
         }
     }
 }

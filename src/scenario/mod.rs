@@ -42,8 +42,11 @@ mod overrides;
 mod recording;
 pub mod schema;
 
-pub use build::{Scenario, ScenarioError, WaysidePost};
+pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
 pub(crate) use build::{parse_tunnel, parse_vehicle, read};
-pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
+pub use file::{
+    BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
+    WaysidePostSettings,
+};
 pub use overrides::{Override, OverrideError};
 pub use recording::RecordSettings;

@@ -1,8 +1,8 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
 use crate::bus::{
-    CameraFault, Delivery, DopplerSample, Frame, LedReport, OdometerSample, ProtectionReport,
-    RigCalibration, SimTime, StereoPair, WaysideCalibration, WaysideReport,
+    CameraFault, Frame, LedReport, Message, Node, RigCalibration, SimTime, StereoPair, TrainId,
+    WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use crate::twin::physics::{Belonging, TrainState};
@@ -18,15 +18,24 @@ pub struct Opening<'a> {
     pub seed: u64,
     /// The line.
     pub tunnel: &'a Tunnel,
-    /// The rig on the train.
-    pub rig: Option<&'a RigCalibration>,
+    /// Trains with equipment, and the rig of a bench.
+    pub trains: &'a [TrainOpening],
     /// Wayside devices in use.
     pub wayside: &'a [WaysideCalibration],
+}
+
+/// What is known of a train before the first step.
+#[derive(Clone, Copy, Debug)]
+pub struct TrainOpening {
+    /// Its number.
+    pub id: TrainId,
+    /// Its rig.
+    pub rig: Option<RigCalibration>,
     /// Half extents of every car body and the pose of its centre over the vehicle frame.
     pub car_half_extents_m: Vector3<f64>,
-    /// Cars of the train, 0 where there is none.
+    /// Its cars, 0 on a bench.
     pub cars: usize,
-    /// The train has a Doppler radar.
+    /// It has a Doppler radar.
     pub radar: bool,
     /// A protection runs: its reports and the driver's display will come.
     pub protection: bool,
@@ -35,8 +44,8 @@ pub struct Opening<'a> {
 /// Whose images they are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// The rig's pair, left then right.
-    Rig,
+    /// The pair of a train's rig, left then right.
+    Rig(TrainId),
     /// A wayside device; the index is into [`Opening::wayside`].
     Wayside(usize),
 }
@@ -57,6 +66,15 @@ pub struct Exposure<'a> {
     pub train: Option<TrainPoint>,
 }
 
+impl Opening<'_> {
+    /// The first train, or the rig of a bench.
+    pub fn first(&self) -> Option<&TrainOpening> {
+        self.trains
+            .iter()
+            .find(|train| train.id == TrainId::default())
+    }
+}
+
 /// Where a train is at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainPoint {
@@ -71,28 +89,26 @@ pub struct TrainPoint {
 /// One thing that happened. Events come in order of their time of completion.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
-    /// The train as it really is and the pose of its left camera, where it has a rig; 50 times a
+    /// A train as it really is and the pose of its left camera, where it has a rig; 50 times a
     /// second.
-    Train(&'a TrainState, Option<&'a Isometry3<f64>>),
-    /// What the odometer says.
-    Odometer(&'a OdometerSample),
-    /// What the Doppler radar says.
-    Doppler(&'a DopplerSample),
-    /// Everything solid but the train, 10 times a second.
+    Train(TrainId, &'a TrainState, Option<&'a Isometry3<f64>>),
+    /// A message arrived at a node, or was sent there; those with images come as [`Event::Pair`] and
+    /// [`Event::Wayside`].
+    Message(&'a Node, &'a Message),
+    /// Everything solid but the first train, 10 times a second.
     Bodies(SimTime, &'a [Body]),
     /// A frame has been taken.
     Exposure(&'a Exposure<'a>),
     /// A pair of images, what the stack said of it, and the true chainage at each fix's time.
-    Pair(&'a StereoPair, &'a LedReport, &'a [f64]),
+    Pair(TrainId, &'a StereoPair, &'a LedReport, &'a [f64]),
     /// A wayside frame and its report; the index is into [`Opening::wayside`].
     Wayside(usize, &'a Frame, &'a WaysideReport),
-    /// A cycle of the protection.
-    Protection(&'a ProtectionReport),
-    /// The stack says that a camera has failed, with another fault than before, or that it is well
-    /// again.
-    Camera(SimTime, &'a str, Option<CameraFault>),
-    /// A message arrived at the train.
-    Delivery(&'a Delivery),
+    /// The equipment of a node says that a camera has failed, with another fault than before, or that
+    /// it is well again.
+    Camera(SimTime, &'a Node, &'a str, Option<CameraFault>),
+    /// How long the equipment of a node worked on an image, in milliseconds of wall time. Nothing depends
+    /// on it.
+    Cost(&'a Node, f64),
     /// Anything worth a line in the log.
     Note(SimTime, &'a str),
 }

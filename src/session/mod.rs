@@ -18,37 +18,40 @@
 //! What it does not do: many runs, and files (observers write them).
 
 mod bench;
-mod cameras;
-mod devices;
+mod costs;
 mod event;
-mod eyes;
+mod fitting;
 mod health;
-mod motion;
+mod imaging;
 mod outcome;
+mod posts;
+mod presence;
 mod ride;
-mod run;
+mod scheduler;
 mod score;
-mod shots;
 mod speed;
 mod summary;
-mod watch;
+mod train_score;
 
-pub use event::{Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
+pub use event::{
+    Event, Exposure, Observer, ObserverError, Opening, Source, TrainOpening, TrainPoint,
+};
+pub use fitting::{Fitted, Fitting, Mounted};
 pub use speed::{Speeds, measure};
 pub use summary::{
     CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
-    Protection, Summary, TrainFigures, WallShares, Wayside,
+    Protection, Summary, TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;
-use crate::twin::faults;
+use crate::twin::lamps;
 use crate::twin::physics::PhysicsError;
 use crate::twin::physics::RailState;
-use crate::twin::random::Stream;
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::gloss::Wet;
 use crate::twin::render::gpu::GpuRenderer;
-use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
+use crate::twin::render::{RenderError, Renderer, Scene};
+use crate::twin::sensors::SensorError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What draws the images.
@@ -92,14 +95,9 @@ pub enum SessionError {
     /// An observer failed.
     #[error(transparent)]
     Observer(#[from] ObserverError),
-    /// A frame is longer than the poses that the world keeps.
-    #[error(
-        "the pose of the train at {0:.4} s is no longer known: a frame is longer than the world's memory"
-    )]
-    PoseForgotten(f64),
-    /// The renderer broke its word.
-    #[error("{1} images were drawn in place of {0}")]
-    Images(usize, usize),
+    /// A sensor could not work.
+    #[error(transparent)]
+    Sensor(#[from] SensorError),
 }
 
 /// Runs a scenario to its end. A failure of the world in the middle of the run ends it as
@@ -124,12 +122,18 @@ pub fn run_on(
     options: &RunOptions<'_>,
     observers: &mut [&mut dyn Observer],
 ) -> Result<Summary, SessionError> {
-    match (&scenario.bench, &scenario.rig) {
-        (Some(bench), Some(rig)) => {
-            bench::Bench::new(scenario, *bench, rig, renderer).run(options, observers)
-        }
-        _ => run::Run::new(scenario, renderer)?.run(options, observers),
-    }
+    run_with(scenario, renderer, &|_| (), options, observers)
+}
+
+/// As [`run_on`], with sensors and equipment of the user's own: `add` puts them in.
+pub fn run_with(
+    scenario: &Scenario,
+    renderer: &mut dyn Renderer,
+    add: &dyn Fn(&mut Fitting),
+    options: &RunOptions<'_>,
+    observers: &mut [&mut dyn Observer],
+) -> Result<Summary, SessionError> {
+    scheduler::Session::new(scenario, renderer, add)?.run(options, observers)
 }
 
 /// The renderer of a scenario, as [`run`] uses it; says so once where it has to fall back on the plain one.
@@ -154,24 +158,10 @@ pub fn renderer(
     }
 }
 
-/// One sigma of a lamp's clock: a crystal without temperature compensation.
-const LAMP_CLOCK_SIGMA: f64 = 20e-6;
-
-/// What stands still in a scenario. The lamps start to send at times of their own, by clocks of
-/// their own, and fail as the scenario has it.
+/// What stands still in a scenario.
 pub fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
-    let phase = Stream::new(scenario.seed, 0, "lamp phase");
-    let clock = Stream::new(scenario.seed, 0, "lamp clock");
-    let mut lamps: Vec<_> = (0u64..)
-        .zip(&tunnel.lamps)
-        .map(|(k, site)| {
-            let mut lamp = LampLight::from_site(site, phase.uniform(k));
-            lamp.waveform.chip_s *= 1.0 + LAMP_CLOCK_SIGMA * clock.normal(k);
-            lamp
-        })
-        .collect();
-    faults::age(&mut lamps, &scenario.faults.lamps, &tunnel, scenario.seed);
+    let lamps = lamps::shining(&tunnel, &scenario.faults.lamps, scenario.seed);
     let everywhere = f64::NEG_INFINITY..f64::INFINITY;
     let zones = scenario.physics.track.rail_zones.iter();
     let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));

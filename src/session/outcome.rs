@@ -1,7 +1,7 @@
 //! How the train fared: whether it ran, braked for an obstacle, stood, hit something.
 
 use super::summary::Protection;
-use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
+use crate::bus::{BrakeDemand, ProtectionReport, SimTime, TrainId};
 use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
 
@@ -30,7 +30,7 @@ impl Outcome {
     }
 
     /// Follows whether the train has run, and since when it stands.
-    pub fn on_motion(&mut self, train: &TrainState, world: &World, line: &Alignment) {
+    pub fn on_motion(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
         self.standing = train.standing;
         self.has_run |= !train.standing;
         if !train.standing {
@@ -44,7 +44,7 @@ impl Outcome {
         self.standing_since.get_or_insert(train.time);
         if self.brake_commanded.is_some() && self.stopped.is_none() {
             self.stopped = Some(train.time);
-            self.stop_margin_m = margin_m(world, line, train.chainage_m);
+            self.stop_margin_m = margin_m(id, train, world, line);
         }
     }
 
@@ -55,23 +55,34 @@ impl Outcome {
     }
 
     /// The figures; `None` without a train.
-    pub fn protection(&self, world: &World) -> Option<Protection> {
-        world.head_m()?;
+    pub fn protection(&self, id: TrainId, world: &World) -> Option<Protection> {
+        world.head_m(id)?;
+        let impacts = world.impacts().iter().filter(|hit| hit.train == id);
+        let impacts: Vec<_> = impacts.cloned().collect();
         Some(Protection {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.stop_margin_m,
-            collision: !world.impacts().is_empty(),
-            impacts: world.impacts().to_vec(),
+            collision: !impacts.is_empty(),
+            impacts,
         })
     }
 }
 
-/// From the head to the nearest obstacle that it would meet. A little behind the head counts too:
-/// that is what a train has hit and not pushed away.
-fn margin_m(world: &World, line: &Alignment, head_m: f64) -> Option<f64> {
-    (world.obstacles().filter(|o| fouls(line, o)))
-        .map(|o| o.chainage_m - o.half_extents_m.x - head_m)
+/// From the head to the nearest obstacle or train that it would meet. A little behind the head counts
+/// too: that is what a train has hit and not pushed away.
+fn margin_m(id: TrainId, train: &TrainState, world: &World, line: &Alignment) -> Option<f64> {
+    let ahead_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
+    let obstacles = world.obstacles().filter(|o| fouls(line, o));
+    let obstacles = obstacles.map(|o| ahead_m(o.chainage_m) - o.half_extents_m.x);
+    let others = world.train_ids().filter(|other| *other != id);
+    let trains = others.filter_map(|other| {
+        let (state, length_m) = (world.train(other)?, world.train_length_m(other)?);
+        let tail_m = state.chainage_m - state.direction.sign() * length_m;
+        Some(ahead_m(state.chainage_m).min(ahead_m(tail_m)))
+    });
+    obstacles
+        .chain(trains)
         .filter(|margin_m| *margin_m > -1.0)
         .min_by(f64::total_cmp)
 }

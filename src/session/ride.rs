@@ -1,6 +1,8 @@
 //! How the train ran: distance, ride, wheel loads, slip, energy.
 
 use super::summary::TrainFigures;
+use crate::bus::TrainId;
+use crate::track::Direction;
 use crate::twin::physics::{TrainState, World};
 use nalgebra::Vector3;
 
@@ -9,6 +11,7 @@ use nalgebra::Vector3;
 pub struct Ride {
     first_m: Option<f64>,
     last_m: f64,
+    direction: Direction,
     standing: bool,
     samples: u32,
     squares: Vector3<f64>,
@@ -19,6 +22,7 @@ impl Ride {
     pub fn on_motion(&mut self, train: &TrainState) {
         self.first_m.get_or_insert(train.chainage_m);
         self.last_m = train.chainage_m;
+        self.direction = train.direction;
         self.standing = train.standing;
         let accel = train.floor_accel_mps2;
         self.squares += accel.component_mul(&accel);
@@ -28,19 +32,22 @@ impl Ride {
     /// The figures; `None` without a train.
     pub fn finish(
         &self,
+        id: TrainId,
         world: &World,
         stop_at_m: Option<f64>,
         derailed: bool,
     ) -> Option<TrainFigures> {
-        let (energy, first_m) = (world.energy()?, self.first_m?);
+        let (energy, first_m) = (world.energy(id)?, self.first_m?);
         let rms = (self.squares / f64::from(self.samples)).map(f64::sqrt);
-        let worst = world.wheel_extremes()?;
+        let worst = world.wheel_extremes(id)?;
         Some(TrainFigures {
-            run_m: self.last_m - first_m,
-            stop_error_m: stop_at_m.filter(|_| self.standing).map(|s| self.last_m - s),
+            run_m: self.direction.ahead_m(first_m, self.last_m),
+            stop_error_m: stop_at_m
+                .filter(|_| self.standing)
+                .map(|mark_m| self.direction.ahead_m(mark_m, self.last_m)),
             derailed,
             floor_accel_rms_mps2: rms.into(),
-            least_wheel_load_share: worst.least_normal_n / world.wheel_load_n()?,
+            least_wheel_load_share: worst.least_normal_n / world.wheel_load_n(id)?,
             most_slip_mps: worst.most_slip_mps,
             energy,
             energy_gap_share: energy.gap_share(),

@@ -6,7 +6,8 @@ use crate::bus::{
     WaysideReport,
 };
 use crate::track::uid::Uid;
-use crate::track::{BED_M, TrackPoint, Tunnel};
+use crate::track::{BED_M, Direction, TrackPoint, Tunnel};
+use crate::twin::physics::TrainState;
 use nalgebra::{Isometry3, Point2, Point3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -22,6 +23,19 @@ struct Errors {
     wrong_uid: u32,
 }
 
+/// A train's head and which way it runs.
+#[derive(Clone, Copy, Debug)]
+struct TrainPlace {
+    head_m: f64,
+    direction: Direction,
+}
+
+impl TrainPlace {
+    fn ahead_m(&self, chainage_m: f64) -> f64 {
+        self.direction.ahead_m(self.head_m, chainage_m)
+    }
+}
+
 /// Scores positioning.
 #[derive(Debug)]
 pub struct PositioningScore {
@@ -30,8 +44,8 @@ pub struct PositioningScore {
     named: BTreeSet<Uid>,
     pairs: u32,
     costs_ms: Vec<f64>,
-    /// Chainage of the train head: first and furthest.
-    run_m: Option<(f64, f64)>,
+    /// Where the head was first, and how far it has run from there.
+    run: Option<(TrainPlace, f64)>,
 }
 
 impl PositioningScore {
@@ -43,14 +57,20 @@ impl PositioningScore {
             named: BTreeSet::new(),
             pairs: 0,
             costs_ms: Vec::new(),
-            run_m: None,
+            run: None,
         }
     }
 
     /// The head was here.
-    pub fn head_at(&mut self, chainage_m: f64) {
-        let (first, furthest) = self.run_m.unwrap_or((chainage_m, chainage_m));
-        self.run_m = Some((first, furthest.max(chainage_m)));
+    pub fn head_at(&mut self, train: &TrainState) {
+        let (first, run_m) = self.run.get_or_insert((
+            TrainPlace {
+                head_m: train.chainage_m,
+                direction: train.direction,
+            },
+            0.0,
+        ));
+        *run_m = run_m.max(first.ahead_m(train.chainage_m));
     }
 
     /// One report, the cost of making it, and the true pose of the left eye at a time.
@@ -118,8 +138,8 @@ impl PositioningScore {
 
     /// Share of the lamps passed whose name was read from the stripes.
     fn decode_rate(&self) -> Option<f64> {
-        let (first, furthest) = self.run_m?;
-        let passed = |s: f64| s >= first + APPROACH_M && s <= furthest;
+        let (first, run_m) = self.run?;
+        let passed = |s_m: f64| (APPROACH_M..=run_m).contains(&first.ahead_m(s_m));
         let lamps = || self.tunnel.lamps.iter().filter(|l| passed(l.chainage_m));
         let named = lamps().filter(|l| self.named.contains(&l.uid)).count();
         (lamps().count() > 0).then(|| named as f64 / lamps().count() as f64)

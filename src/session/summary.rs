@@ -1,7 +1,7 @@
 //! What a session comes to, as `summary.json` has it.
 
-use super::watch::{Costs, Watchers};
-use crate::bus::{CameraFault, Method};
+use super::costs::{Costs, Observers};
+use crate::bus::{CameraFault, Method, TrainId};
 use crate::scenario::Scenario;
 use crate::twin::physics::{EnergyBook, Impact};
 use crate::twin::render::Backend;
@@ -45,6 +45,28 @@ pub struct Summary {
     pub protection: Option<Protection>,
     /// How the train ran.
     pub train: Option<TrainFigures>,
+    /// Every train, where there are several; the figures over this list are the first one's.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub trains: Vec<TrainSummary>,
+}
+
+/// The figures of one train, as in [`Summary`].
+#[derive(Clone, Debug, Serialize)]
+pub struct TrainSummary {
+    /// Its number.
+    pub id: TrainId,
+    /// Stereo pairs read.
+    pub stereo_frames: u32,
+    /// Positioning, by method.
+    pub positioning: BTreeMap<Method, Positioning>,
+    /// What the equipment says of its cameras.
+    pub cameras: BTreeMap<String, CameraFigures>,
+    /// Lamps that the equipment says do not shine, by their UIDs, in the order passed.
+    pub dark_lamps: Vec<String>,
+    /// Train protection.
+    pub protection: Option<Protection>,
+    /// How it ran.
+    pub train: Option<TrainFigures>,
 }
 
 impl Summary {
@@ -55,9 +77,9 @@ impl Summary {
         simulated_s: f64,
         renderer: Backend,
         cost: &Costs,
-        watchers: &Watchers<'_, '_>,
+        observers: &Observers<'_, '_>,
     ) -> Self {
-        let wall_s = watchers.wall_s();
+        let wall_s = observers.wall_s();
         Self {
             scenario: scenario.name.clone(),
             seed: scenario.seed,
@@ -76,7 +98,7 @@ impl Summary {
                 submit_s: cost.submit.total_s,
                 wait_s: cost.wait.total_s,
                 stack_s: cost.stack.total_s,
-                record_s: watchers.watch.total_s,
+                record_s: observers.watch.total_s,
             },
             positioning: BTreeMap::new(),
             wayside: None,
@@ -84,6 +106,7 @@ impl Summary {
             dark_lamps: Vec::new(),
             protection: None,
             train: None,
+            trains: Vec::new(),
         }
     }
 }

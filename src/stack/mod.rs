@@ -1,9 +1,14 @@
 //! The real thing, as it would run on a train or in a wayside box: raw sensor output, the
 //! surveyed map and calibrations in; fixes, reports, messages and commands out. No clock, no
 //! randomness, no files, no knowledge of the simulated world.
+//!
+//! Each part is [`Equipment`] of a train or a wayside post.
 
 pub mod camera_watch;
+mod equipment;
 pub mod led;
 pub mod positioning;
 pub mod protection;
 pub mod wayside;
+
+pub use equipment::Equipment;

@@ -54,6 +54,7 @@ mod furniture;
 mod gauge;
 mod place;
 mod problem;
+mod route;
 mod section;
 pub mod uid;
 mod waveform;
@@ -68,6 +69,7 @@ pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
 pub use gauge::{Gauge, RAIL_FOOT_M, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use place::{Direction, Place, TrackId};
 pub use problem::{Checker, FileError, Problem, key_below};
+pub use route::Route;
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,

@@ -3,13 +3,14 @@
 //! What is true is known here and in the session only. A step of the world moves the train and all
 //! that lies about ([`physics`]); cameras look along poses that it remembers, row by row
 //! ([`render`]); sensors turn its motion into counts and samples with their errors ([`sensors`]);
-//! messages take their time ([`comms`]); lamps and cameras fail ([`faults`]); and what the stack believes of the line is not quite the
+//! messages take their time ([`links`]); lamps and cameras fail ([`faults`]); and what the stack believes of the line is not quite the
 //! line ([`survey`]). Everything random comes from counter-based streams ([`random`]), so nothing
 //! depends on order or threads. What is left out is said in each of these.
 
 pub mod air;
-pub mod comms;
 pub mod faults;
+pub mod lamps;
+pub mod links;
 pub mod physics;
 pub mod random;
 pub mod render;

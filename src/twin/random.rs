@@ -44,6 +44,12 @@ impl Stream {
     }
 }
 
+/// The seed of a named part of what a seed makes.
+pub fn branch(seed: u64, name: &str) -> u64 {
+    let [low, high] = Stream::new(seed, 0, name).key;
+    u64::from(high) << 32 | u64::from(low)
+}
+
 /// 53 bits to the open interval (0, 1).
 fn unit(low: u32, high: u32) -> f64 {
     let bits = (u64::from(high) << 32 | u64::from(low)) >> 11;

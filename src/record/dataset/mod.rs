@@ -194,7 +194,11 @@ impl<'a> DataSet<'a> {
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
         let bench = scenario.bench.is_some();
         let rides = bench || scenario.physics.train.is_some();
-        let rig = scenario.rig.iter().filter(|_| rides).flat_map(|_| EYES);
+        let rig = scenario
+            .rig()
+            .into_iter()
+            .filter(|_| rides)
+            .flat_map(|_| EYES);
         let devices = scenario.wayside.iter().filter(|_| !bench);
         let devices = devices.map(|w| w.calibration.name.clone());
         rig.map(str::to_owned).chain(devices).collect()
@@ -304,6 +308,9 @@ impl<'a> DataSet<'a> {
     }
 }
 
+/// The rig that images are kept of.
+const RIG: Source = Source::Rig(TrainId(0));
+
 const EYES: [&str; 2] = ["left", "right"];
 
 impl Observer for DataSet<'_> {
@@ -319,8 +326,10 @@ impl Observer for DataSet<'_> {
             over: false,
             last: None,
         };
-        let eyes = opening.rig.iter().flat_map(|_| EYES.iter().enumerate());
-        let eyes = eyes.map(|(k, name)| camera(name, Source::Rig, k, None));
+        let first = opening.first();
+        let rig = first.and_then(|train| train.rig);
+        let eyes = rig.iter().flat_map(|_| EYES.iter().enumerate());
+        let eyes = eyes.map(|(k, name)| camera(name, RIG, k, None));
         let devices = opening.wayside.iter().enumerate();
         let devices =
             devices.map(|(k, d)| camera(&d.name, Source::Wayside(k), 0, Some(d.chainage_m)));
@@ -345,9 +354,9 @@ impl Observer for DataSet<'_> {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match *event {
             Event::Exposure(exposure) => self.expose(exposure),
-            Event::Pair(pair, ..) => {
+            Event::Pair(TrainId(0), pair, ..) => {
                 let images = [&pair.left.image, &pair.right.image];
-                self.images(Source::Rig, pair.left.number, &images)?;
+                self.images(RIG, pair.left.number, &images)?;
             }
             Event::Wayside(k, frame, _) => {
                 self.images(Source::Wayside(k), frame.number, &[&frame.image])?;

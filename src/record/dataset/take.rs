@@ -118,7 +118,7 @@ impl DataSet<'_> {
         let files = self.write_pictures(&paths, &sight, shot, image, drawn, labels.as_ref())?;
         self.push_tables(frame_id, k, shot, &sight, labels.as_ref())?;
 
-        let left = matches!(shot.source, super::Source::Rig).then(|| &shot.job.views[0]);
+        let left = matches!(shot.source, super::Source::Rig(_)).then(|| &shot.job.views[0]);
         let camera = &view.camera.intrinsics;
         self.images.push(json!({
             "id": frame_id,

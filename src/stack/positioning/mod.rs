@@ -62,6 +62,7 @@
 //! It takes the train to run up the line, its rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 
+mod equipment;
 mod naming;
 mod positioner;
 mod reckoning;
@@ -72,5 +73,6 @@ mod stereo;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
+pub use equipment::LampPositioning;
 pub use positioner::LedPositioner;
 pub use settings::LedSettings;

@@ -139,7 +139,21 @@ impl LedPositioner {
             }),
         };
         report.eyes = eyes;
+        report.best = self.best_method(eyes.iter().any(|eye| !eye.is_good()));
         report
+    }
+
+    fn gives(&self, method: Method) -> bool {
+        self.settings.methods.contains(&method)
+    }
+
+    /// The method that a train should run by. One eye alone has nothing better than `mono`.
+    fn best_method(&self, one_eyed: bool) -> Method {
+        if one_eyed || !self.gives(Method::Paper) {
+            Method::Mono
+        } else {
+            Method::Paper
+        }
     }
 
     /// Whether no pair has come for so long that there must be something wrong.
@@ -208,12 +222,17 @@ impl LedPositioner {
             if let Some(r) = sighting.right {
                 right[r].spot.uid = sighting.named;
             }
-            keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
-            keep_surer(&mut mono, self.mono_fix(&sighting, &left));
+            if self.gives(Method::Paper) {
+                keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
+            }
+            if self.gives(Method::Mono) {
+                keep_surer(&mut mono, self.mono_fix(&sighting, &left));
+            }
         }
-        // One eye alone has nothing better.
-        let one_eyed = pair.right.image.is_empty();
-        let best = if one_eyed { &mono } else { &paper };
+        let best = match self.best_method(pair.right.image.is_empty()) {
+            Method::Paper => &paper,
+            Method::Mono => &mono,
+        };
         if let Some(fix) = best {
             self.anchor = Some(Anchor {
                 time: fix.time,
@@ -227,6 +246,7 @@ impl LedPositioner {
             time: start,
             number: pair.left.number,
             eyes: [CameraHealth::default(); 2],
+            best: Method::Paper,
             dark: self.call_lamps(pair, &left),
             left: spots(&left),
             right: spots(&right),

@@ -1,5 +1,6 @@
 //! What a user may set about the positioning.
 
+use crate::bus::Method;
 use crate::track::{Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -8,6 +9,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct LedSettings {
+    /// By which methods fixes are given: `paper` by both eyes, `mono` by one.
+    pub methods: Vec<Method>,
     /// A spot must stand out of the darkness by this many grey levels (of 255).
     pub min_contrast_grey: f64,
     /// A spot must cover this many pixels after closing.
@@ -62,6 +65,7 @@ pub struct LedSettings {
 impl Default for LedSettings {
     fn default() -> Self {
         Self {
+            methods: Method::ALL.to_vec(),
             min_contrast_grey: 15.0,
             min_area_px: 60.0,
             tilt_over_rows: 0.5,
@@ -89,6 +93,13 @@ impl Default for LedSettings {
 impl LedSettings {
     /// Appends what is wrong, with keys under `at`.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        if self.methods.is_empty() {
+            problems.push(Problem::new(
+                format!("{at}.methods"),
+                "without a method there are no fixes",
+                "name `paper`, `mono` or both; or take `led` out of the train's equipment",
+            ));
+        }
         let mut check = Checker::new(at, problems);
         check.within("min_contrast_grey", self.min_contrast_grey, 2.0..=250.0, "");
         check.within("min_area_px", self.min_area_px, 9.0..=1e5, "px");

@@ -3,8 +3,7 @@
 //! train until the track is clear.
 //!
 //! ```
-//! use metrotwin::bus::{BrakeDemand, DangerLevel, Delivery, ObstacleWarning, OdometerSample,
-//!     SimTime, Via};
+//! use metrotwin::bus::{BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, SimTime};
 //! use metrotwin::stack::protection::{Protection, ProtectionSettings};
 //! # use metrotwin::track::{Alignment, PlanElement, Tunnel};
 //! # let straight = PlanElement { length_m: 2000.0, start_per_m: 0.0, end_per_m: 0.0,
@@ -19,13 +18,9 @@
 //! protection.on_odometer(&OdometerSample { time, distance_m: 0.0, speed_mps: 20.0 });
 //! assert_eq!(protection.cycle(time).command.brake, BrakeDemand::None);
 //! // A device reports an obstacle 150 m ahead: too near for the service brake.
-//! protection.on_delivery(&Delivery {
-//!     received: time,
-//!     via: Via::Radio,
-//!     warning: ObstacleWarning { device: "W1".into(), number: 0, issued: time,
-//!         danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5,
-//!         blind: false },
-//! });
+//! let warning = ObstacleWarning { device: "W1".into(), number: 0, issued: time,
+//!     danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5, blind: false };
+//! protection.on_warning(&warning, time);
 //! assert_eq!(protection.cycle(time.plus(0.1)).command.brake, BrakeDemand::Emergency);
 //! ```
 //!
@@ -67,6 +62,7 @@
 
 mod curve;
 mod display;
+mod equipment;
 mod monitor;
 mod obstacles;
 mod position;
@@ -75,11 +71,12 @@ mod supervision;
 #[cfg(test)]
 mod tests;
 
+pub use equipment::TrainProtection;
 pub use settings::ProtectionSettings;
 
 use crate::bus::{
-    BrakeDemand, DangerLevel, Delivery, OdometerSample, PositionFix, ProtectionReport, SimTime,
-    TrainCommand,
+    BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, PositionFix, ProtectionReport,
+    SimTime, TrainCommand,
 };
 use crate::track::Tunnel;
 use curve::Grades;
@@ -134,7 +131,7 @@ impl Protection {
     }
 
     /// The antenna on the train head passed over a balise at `time`. A balise that the map does
-    /// not know tells nothing. What message it stores comes as a [`Delivery`].
+    /// not know tells nothing. What message it stores comes by [`Self::on_warning`].
     pub fn on_balise(&mut self, name: &str, time: SimTime) {
         if let Some(balise) = self.map.balises.iter().find(|b| b.name == name) {
             self.position
@@ -142,9 +139,9 @@ impl Protection {
         }
     }
 
-    /// Takes a message, by balise or by radio.
-    pub fn on_delivery(&mut self, delivery: &Delivery) {
-        self.obstacles.on_delivery(delivery);
+    /// Takes a warning, received by balise or by radio.
+    pub fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
+        self.obstacles.on_warning(warning, received);
     }
 
     /// Decides; called 10 times a second.

@@ -4,7 +4,7 @@
 //! come late, twice, or not at all. A warning stays in force until its own device clears it;
 //! silence clears nothing.
 
-use crate::bus::{DangerLevel, Delivery, ObstacleWarning, SimTime};
+use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
 
 /// The last word of one device.
 #[derive(Clone, Debug)]
@@ -19,15 +19,14 @@ pub(super) struct Obstacles {
 }
 
 impl Obstacles {
-    pub fn on_delivery(&mut self, delivery: &Delivery) {
-        let warning = &delivery.warning;
+    pub fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
         let ends = [warning.from_chainage_m, warning.to_chainage_m];
         if warning.danger != DangerLevel::None && ends.iter().any(|x| !x.is_finite()) {
             return;
         }
         let notice = Notice {
             warning: warning.clone(),
-            received: delivery.received,
+            received,
         };
         let known = self
             .notices

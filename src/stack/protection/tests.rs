@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use super::*;
-use crate::bus::{Identity, Lamp, Method, ObstacleWarning, Supervision, Via};
+use crate::bus::{Identity, Lamp, Method, ObstacleWarning, Supervision};
 use crate::track::uid::Uid;
 use crate::track::{Alignment, Balise, Grade, PlanElement};
 use nalgebra::{Point3, Vector3};
@@ -41,19 +41,15 @@ pub(super) fn map(permille: f64) -> Arc<Tunnel> {
     })
 }
 
-fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> Delivery {
-    Delivery {
-        received: issued,
-        via: Via::Radio,
-        warning: ObstacleWarning {
-            device: "W1".into(),
-            number,
-            issued,
-            danger,
-            from_chainage_m: from_m,
-            to_chainage_m: from_m + 0.5,
-            blind: false,
-        },
+fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> ObstacleWarning {
+    ObstacleWarning {
+        device: "W1".into(),
+        number,
+        issued,
+        danger,
+        from_chainage_m: from_m,
+        to_chainage_m: from_m + 0.5,
+        blind: false,
     }
 }
 
@@ -175,7 +171,8 @@ fn drive(
     };
     let mut outcome = Outcome::default();
     let mut before_m = 0.0;
-    protection.on_delivery(&warning(0, SimTime::ZERO, DangerLevel::High, obstacle_m));
+    let danger = warning(0, SimTime::ZERO, DangerLevel::High, obstacle_m);
+    protection.on_warning(&danger, danger.issued);
     let dt = 0.01;
     for k in 0..20_000 {
         let time = SimTime::from_secs(f64::from(k) * dt);
@@ -339,12 +336,8 @@ impl Bench {
     }
 
     fn hear(&mut self, number: u32, issued_s: f64, danger: DangerLevel, from_m: f64) {
-        self.protection.on_delivery(&warning(
-            number,
-            SimTime::from_secs(issued_s),
-            danger,
-            from_m,
-        ));
+        let warning = warning(number, SimTime::from_secs(issued_s), danger, from_m);
+        self.protection.on_warning(&warning, warning.issued);
     }
 }
 

@@ -38,14 +38,15 @@ impl Cells {
         self.spans[v / CELL_PX * self.wide + u / CELL_PX].is_some()
     }
 
-    /// Blinds the cells whose line of sight passes the stretch that a train occupies.
-    pub fn occupy(&mut self, train: Option<(f64, f64)>) {
+    /// Blinds the cells whose line of sight passes a stretch that a train occupies.
+    pub fn occupy(&mut self, trains: &[(f64, f64)]) {
         self.any_blind = false;
         for (blind, span) in self.blind.iter_mut().zip(&self.spans) {
-            *blind = match (train, span) {
-                (Some((tail, head)), Some(span)) => span.from_m <= head && span.to_m >= tail,
-                _ => false,
+            let passes = |span: &GaugeSpan, (from_m, to_m): (f64, f64)| {
+                span.from_m <= to_m && span.to_m >= from_m
             };
+            *blind = (span.as_ref())
+                .is_some_and(|span| trains.iter().any(|stretch| passes(span, *stretch)));
             self.any_blind |= *blind;
         }
     }

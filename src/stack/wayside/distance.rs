@@ -67,10 +67,11 @@ pub fn tangent_error_m(radius_m: f64, arc_m: f64, inside_m: f64) -> f64 {
 pub fn train_distance_m(
     map: &Tunnel,
     calibration: &WaysideCalibration,
-    train: TrainReport,
+    train: &TrainReport,
     obstacle: &DetectedObstacle,
 ) -> (f64, f64) {
-    let exact = obstacle.from_chainage_m - train.chainage_m;
+    let ahead_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
+    let exact = ahead_m(obstacle.from_chainage_m).min(ahead_m(obstacle.to_chainage_m));
     let m = calibration.chainage_m - calibration.balise_chainage_m;
     let n = train.chainage_m - calibration.balise_chainage_m;
     let (range, angle) = if obstacle.far_angle_rad.cos() < 0.0 {

@@ -40,7 +40,7 @@
 //! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
 //!     let start = SimTime::from_secs(f64::from(number) * 0.1);
 //!     let (exposure_s, gain_db) = (8e-3, 0.0);
-//!     detector.on_frame(&Frame { number, start, exposure_s, gain_db, image: image.clone() }, None, None)
+//!     detector.on_frame(&Frame { number, start, exposure_s, gain_db, image: image.clone() }, None, &[])
 //! };
 //! assert!(report(&mut detector, 0, &image).learning);
 //! assert!(report(&mut detector, 1, &image).passage_possible);
@@ -97,6 +97,7 @@ mod cells;
 mod confirm;
 mod difference;
 pub mod distance;
+mod equipment;
 mod gauge;
 mod place;
 mod rails;
@@ -111,6 +112,7 @@ mod test_scene;
 mod tests;
 mod vision;
 
+pub use equipment::WaysideDetection;
 pub use place::lidar_point;
 pub use settings::WaysideSettings;
 
@@ -162,22 +164,26 @@ pub struct WaysideDetector {
 }
 
 /// What goes into a report besides what was found.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Look {
     time: SimTime,
     number: u32,
     camera: CameraHealth,
-    /// Where the train is at that time.
-    train: Option<TrainReport>,
+    /// Where the trains are at that time.
+    trains: Vec<TrainReport>,
 }
 
-/// The train's report carried on to a time.
-fn reckoned(train: TrainReport, time: SimTime) -> TrainReport {
-    TrainReport {
-        chainage_m: train.chainage_m + train.speed_mps * time.since(train.time).max(0.0),
-        time,
-        ..train
-    }
+/// Reports of trains carried on to a time.
+fn reckoned(trains: &[TrainReport], time: SimTime) -> Vec<TrainReport> {
+    let on = |train: &TrainReport| {
+        let run_m = train.speed_mps * time.since(train.time).max(0.0);
+        TrainReport {
+            chainage_m: train.chainage_m + train.direction.sign() * run_m,
+            time,
+            ..*train
+        }
+    };
+    trains.iter().map(on).collect()
 }
 
 impl WaysideDetector {
@@ -209,14 +215,14 @@ impl WaysideDetector {
         }
     }
 
-    /// Looks at one frame; `scan` is a lidar sweep of about the same time, `train` the last
-    /// position report of the train on approach. A frame in which the camera shows a fault tells
+    /// Looks at one frame; `scan` is a lidar sweep of about the same time, `trains` the last
+    /// position reports of the trains of the line. A frame in which the camera shows a fault tells
     /// nothing: what was confirmed stays confirmed, and soon the device counts as blind.
     pub fn on_frame(
         &mut self,
         frame: &Frame,
         scan: Option<&LidarScan>,
-        train: Option<TrainReport>,
+        trains: &[TrainReport],
     ) -> WaysideReport {
         let intrinsics = self.sight.calibration().camera.intrinsics;
         let camera = self.vision.look(frame);
@@ -224,7 +230,7 @@ impl WaysideDetector {
             time: frame.start,
             number: frame.number,
             camera,
-            train: train.map(|t| reckoned(t, frame.start)),
+            trains: reckoned(trains, frame.start),
         };
         if !camera.is_good() {
             return self.report(look, Vec::new());
@@ -233,15 +239,16 @@ impl WaysideDetector {
             self.learn(frame.image.as_raw());
             return self.report(look, Vec::new());
         }
-        let train = look.train;
         self.number = frame.number;
-        self.cells.occupy(train.map(|t| self.occupied_m(t)));
+        let occupied_m: Vec<_> = look.trains.iter().map(|t| self.occupied_m(t)).collect();
+        self.cells.occupy(&occupied_m);
+        let train_near = look.trains.iter().any(|t| self.may_light(t));
         self.difference.run(
             frame.image.as_raw(),
             &self.reference.mean,
             &self.reference.valid,
             (&self.cells, &self.rails),
-            train.is_some_and(|t| self.may_light(t)),
+            train_near,
         );
         let width_px = intrinsics.width_px as usize;
         if self.settings.dismiss_shadows {
@@ -278,13 +285,13 @@ impl WaysideDetector {
 
     /// To be called at least some times a second: a camera that has fallen silent has no frames to
     /// tell of it. Gives a report where it has.
-    pub fn on_time(&mut self, now: SimTime, train: Option<TrainReport>) -> Option<WaysideReport> {
+    pub fn on_time(&mut self, now: SimTime, trains: &[TrainReport]) -> Option<WaysideReport> {
         let camera = self.vision.wait(now)?;
         let look = Look {
             time: now,
             number: self.number,
             camera,
-            train: train.map(|t| reckoned(t, now)),
+            trains: reckoned(trains, now),
         };
         Some(self.report(look, Vec::new()))
     }
@@ -308,37 +315,47 @@ impl WaysideDetector {
     }
 
     /// What a train covers and dazzles: from its tail to where its glare ends.
-    fn occupied_m(&self, train: TrainReport) -> (f64, f64) {
-        (
-            train.chainage_m - self.settings.train_length_m - TRAIN_MARGIN_M,
-            train.chainage_m + GLARE_M,
-        )
+    fn occupied_m(&self, train: &TrainReport) -> (f64, f64) {
+        let sign = train.direction.sign();
+        let tail_m = train.chainage_m - sign * (self.settings.train_length_m + TRAIN_MARGIN_M);
+        let glare_m = train.chainage_m + sign * GLARE_M;
+        (tail_m.min(glare_m), tail_m.max(glare_m))
     }
 
-    fn may_light(&self, train: TrainReport) -> bool {
+    fn may_light(&self, train: &TrainReport) -> bool {
         let device = self.sight.calibration().chainage_m;
         let reach = self.settings.reach_m + HEADLIGHT_M;
-        train.chainage_m > device - reach
-            && train.chainage_m - self.settings.train_length_m < device + reach
+        let tail_m = train.chainage_m - train.direction.sign() * self.settings.train_length_m;
+        train.chainage_m.max(tail_m) > device - reach
+            && train.chainage_m.min(tail_m) < device + reach
+    }
+
+    /// The least distance of a train's head to an obstacle before it, by the paper's formula and
+    /// exact.
+    fn nearest_m(
+        &self,
+        trains: &[TrainReport],
+        obstacles: &[DetectedObstacle],
+    ) -> Option<(f64, f64)> {
+        let dangerous = || (obstacles.iter()).filter(|o| o.danger != DangerLevel::None);
+        let (map, calibration) = (self.sight.map(), self.sight.calibration());
+        let pairs = trains.iter().flat_map(|t| dangerous().map(move |o| (t, o)));
+        pairs
+            .filter(|(t, o)| {
+                let ahead_m = |s_m| t.direction.ahead_m(t.chainage_m, s_m);
+                ahead_m(o.from_chainage_m).max(ahead_m(o.to_chainage_m)) >= 0.0
+            })
+            .map(|(t, o)| distance::train_distance_m(map, calibration, t, o))
+            .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
     fn report(&self, look: Look, blobs: Vec<crate::bus::Blob>) -> WaysideReport {
-        let train = look.train;
         let obstacles: Vec<DetectedObstacle> = self.confirmation.confirmed().cloned().collect();
         let blind = self.vision.is_blind();
         let of_blindness = blind.then_some(self.settings.blind_danger);
         let found = obstacles.iter().map(|o| o.danger);
         let danger = found.chain(of_blindness).max().unwrap_or_default();
-        // Only what lies before the train's head concerns it; the nearest comes first.
-        let distances = train.and_then(|t| {
-            obstacles
-                .iter()
-                .filter(|o| o.danger != DangerLevel::None && o.to_chainage_m >= t.chainage_m)
-                .map(|o| {
-                    distance::train_distance_m(self.sight.map(), self.sight.calibration(), t, o)
-                })
-                .min_by(|a, b| a.1.total_cmp(&b.1))
-        });
+        let distances = self.nearest_m(&look.trains, &obstacles);
         let learning = !self.reference.ready();
         WaysideReport {
             time: look.time,

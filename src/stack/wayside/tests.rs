@@ -23,7 +23,7 @@ fn quiet() -> WaysideSettings {
 fn taught(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
     let mut d = detector(scene, settings);
     for n in 0..settings.reference_frames {
-        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
         assert!(report.learning == (n + 1 < settings.reference_frames));
     }
     d
@@ -36,7 +36,7 @@ fn noise_raises_no_alarm() {
     let settings = quiet();
     let mut d = taught(&scene, &settings);
     for n in 10..310 {
-        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
         assert!(
             report.obstacles.is_empty() && report.blobs.is_empty(),
             "frame {n}"
@@ -79,7 +79,7 @@ fn find_crates(scene: &Scene) {
         let item = Crate::on_bed(s, l, size);
         let mut last = None;
         for n in 10..14 {
-            last = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, grey)]), None, None));
+            last = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, grey)]), None, &[]));
         }
         let report = last.unwrap();
         assert_eq!(report.obstacles.len(), 1, "crate at {s} m");
@@ -129,11 +129,11 @@ fn a_lens_that_is_not_known_misplaces() {
     let [told, untold] = [scene.calibration.clone(), straight].map(|calibration| {
         let mut d = WaysideDetector::new(&settings, calibration, scene.map.clone());
         for n in 0..settings.reference_frames {
-            d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+            d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
         }
         let frame = |n| scene.frame(n, STEADY, &[(item, 200.0)]);
-        (10..13).for_each(|n| drop(d.on_frame(&frame(n), None, None)));
-        let report = d.on_frame(&frame(13), None, None);
+        (10..13).for_each(|n| drop(d.on_frame(&frame(n), None, &[])));
+        let report = d.on_frame(&frame(13), None, &[]);
         (report.obstacles[0].to_chainage_m - item.s.1).abs()
     });
     assert!(untold > 0.3 && untold > 3.0 * told, "{told} {untold}");
@@ -177,7 +177,7 @@ fn lidar_sharpens_the_place() {
     let mut d = taught(&scene, &settings);
     let mut report = None;
     for n in 10..14 {
-        report = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), Some(&scan), None));
+        report = Some(d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), Some(&scan), &[]));
     }
     let report = report.unwrap();
     let o = &report.obstacles[0];
@@ -207,7 +207,7 @@ fn what_stays_stays_found() {
     let item = Crate::on_bed(180.0, 0.0, 0.5);
     let mut messages = Vec::new();
     for n in 10..310 {
-        let report = d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), None, None);
+        let report = d.on_frame(&scene.frame(n, STEADY, &[(item, 20.0)]), None, &[]);
         assert_eq!(report.obstacles.len(), usize::from(n >= 12), "frame {n}");
         messages.extend(d.message(&report));
     }
@@ -245,7 +245,7 @@ fn a_worker_leaves_his_box() {
         if (30..90).contains(&n) {
             things.push((tool_box, 20.0));
         }
-        let report = d.on_frame(&scene.frame(n, STEADY, &things), None, None);
+        let report = d.on_frame(&scene.frame(n, STEADY, &things), None, &[]);
         if (70..90).contains(&n) {
             assert_eq!(report.obstacles.len(), 1, "frame {n}");
             boxes += usize::from(report.danger == DangerLevel::High);
@@ -278,7 +278,7 @@ fn flicker_raises_no_alarm() {
                 bands
             }
         };
-        let report = d.on_frame(&scene.frame(n, light, &[]), None, None);
+        let report = d.on_frame(&scene.frame(n, light, &[]), None, &[]);
         assert!(report.blobs.is_empty(), "frame {n}");
     }
 }
@@ -300,7 +300,7 @@ fn brightening_is_told_from_an_obstacle() {
         for n in 10..60u32 {
             let step = f64::from(n - 10) / 50.0;
             let light = |u: u32, _| 1.0 + step * (0.5 + f64::from(u) / 640.0);
-            let report = d.on_frame(&scene.frame(n, light, &things), None, None);
+            let report = d.on_frame(&scene.frame(n, light, &things), None, &[]);
             found += report.obstacles.len();
             if !with_crate {
                 assert!(report.obstacles.is_empty(), "frame {n}");
@@ -332,10 +332,11 @@ fn the_train_is_no_obstacle() {
             let frame = scene.frame(n, light, &[(train, 210.0), (item, 20.0)]);
             let report = TrainReport {
                 chainage_m: head - 1.0,
+                direction: Direction::Up,
                 speed_mps: 20.0,
                 time: frame.start.plus(-0.05),
             };
-            let report = d.on_frame(&frame, None, reported.then_some(report));
+            let report = d.on_frame(&frame, None, reported.then_some(report).as_slice());
             let behind = |o: &DetectedObstacle| o.to_chainage_m < 183.0;
             if reported {
                 assert!(!report.obstacles.iter().any(behind), "train at {head} m");
@@ -367,10 +368,11 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
             let frame = scene.frame(n, STEADY, things);
             let train = head_m.map(|chainage_m| TrainReport {
                 chainage_m,
+                direction: Direction::Up,
                 speed_mps: 0.0,
                 time: frame.start,
             });
-            d.on_frame(&frame, None, train).obstacles.len()
+            d.on_frame(&frame, None, train.as_slice()).obstacles.len()
         };
         assert_eq!(look(10, &[], head_m), 0);
         for n in 11..40 {
@@ -396,10 +398,11 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
         let frame = scene.frame(n, STEADY, &item);
         let train = TrainReport {
             chainage_m: 40.0 + 0.5 * f64::from(n),
+            direction: Direction::Up,
             speed_mps: 0.0,
             time: frame.start,
         };
-        let report = d.on_frame(&frame, None, Some(train));
+        let report = d.on_frame(&frame, None, &[train]);
         if n < 14 {
             continue;
         }
@@ -430,7 +433,7 @@ fn a_shadow_is_no_obstacle() {
                     1.0
                 }
             };
-            let report = d.on_frame(&scene.frame(n, light, things), None, None);
+            let report = d.on_frame(&scene.frame(n, light, things), None, &[]);
             let expected = usize::from(with_crate && n >= 12);
             assert_eq!(report.obstacles.len(), expected, "frame {n}");
         }
@@ -443,7 +446,7 @@ fn odd_input_is_survived() {
     let scene = Scene::new(64, 36);
     let mut d = detector(&scene, &quiet());
     let other = Scene::new(32, 36).frame(0, STEADY, &[]);
-    assert!(d.on_frame(&other, None, None).learning);
+    assert!(d.on_frame(&other, None, &[]).learning);
     let mut calibration = scene.calibration.clone();
     for (w, h) in [(0, 0), (1, 1), (2, 7), (9, 2)] {
         calibration.camera.intrinsics = Intrinsics::centred(w, h, 10.0);
@@ -535,10 +538,10 @@ fn a_blind_device_is_not_silent() {
                     _ => {}
                 }
                 let report = if fault == CameraFault::Silent && gone {
-                    d.on_time(frame.start, None)
+                    d.on_time(frame.start, &[])
                 } else {
-                    assert!(d.on_time(frame.start, None).is_none() || n == 50);
-                    Some(d.on_frame(&frame, None, None))
+                    assert!(d.on_time(frame.start, &[]).is_none() || n == 50);
+                    Some(d.on_frame(&frame, None, &[]))
                 };
                 let Some(report) = report else {
                     assert!(n < 30, "nothing said in frame {n}");
@@ -584,7 +587,7 @@ fn a_device_that_never_sees_warns() {
             image: first.image.clone(),
             ..first
         };
-        let report = d.on_frame(&frame, None, None);
+        let report = d.on_frame(&frame, None, &[]);
         assert!(report.learning && !report.passage_possible);
         told.extend(d.message(&report));
     }
@@ -592,7 +595,7 @@ fn a_device_that_never_sees_warns() {
     assert!(told[0].blind);
     let mut d = taught(&scene, &quiet());
     for (n, lost) in [(10, 0), (13, 2), (14, 0), (22, 7)] {
-        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, None);
+        let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
         assert_eq!(report.camera.lost, lost);
         assert!(report.passage_possible && d.message(&report).is_none());
     }

@@ -16,7 +16,7 @@ pub struct CameraFaultSettings {
     /// Whose: `rig` (both eyes), `left` or `right` (one of them), or the name of a wayside device.
     pub camera: String,
     /// What is wrong with it.
-    pub fault: Kind,
+    pub fault: CameraFaultKind,
     /// Since when, s. Default 0.
     #[serde(default)]
     pub from_s: f64,
@@ -28,7 +28,7 @@ pub struct CameraFaultSettings {
 /// What may be wrong with a camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Kind {
+pub enum CameraFaultKind {
     /// Its frame grabber is stuck: the image before comes again and again, with new numbers and
     /// times.
     Freeze,
@@ -66,16 +66,16 @@ impl CameraFaultSettings {
             Problem::unless_within(problems, key, value, 0.0..=most, unit);
         };
         match self.fault {
-            Kind::Drop { share, .. } => within("share", share, 1.0, ""),
-            Kind::Late { by_ms } => within("by_ms", by_ms, MAX_LATE_MS, "ms"),
-            Kind::Freeze | Kind::Dead => {}
+            CameraFaultKind::Drop { share, .. } => within("share", share, 1.0, ""),
+            CameraFaultKind::Late { by_ms } => within("by_ms", by_ms, MAX_LATE_MS, "ms"),
+            CameraFaultKind::Freeze | CameraFaultKind::Dead => {}
         }
     }
 
     /// Images come as much later as this at most.
     pub fn late_s(&self) -> f64 {
         match self.fault {
-            Kind::Late { by_ms } => 1e-3 * by_ms,
+            CameraFaultKind::Late { by_ms } => 1e-3 * by_ms,
             _ => 0.0,
         }
     }
@@ -88,11 +88,11 @@ impl CameraFaultSettings {
 
 /// All that is wrong with one camera, through a run.
 #[derive(Clone, Debug)]
-pub struct CameraTrouble {
+pub struct CameraFaults {
     faults: Vec<(CameraFaultSettings, Stream)>,
 }
 
-impl CameraTrouble {
+impl CameraFaults {
     /// The faults that a scenario has for a camera of these names.
     pub fn of(names: &[&str], faults: &[CameraFaultSettings], seed: u64) -> Self {
         let own = faults.iter().enumerate();
@@ -114,7 +114,7 @@ impl CameraTrouble {
     /// Whether a frame that starts then is lost.
     pub fn drops(&self, number: u32, start: SimTime) -> bool {
         self.at(start).any(|(f, stream)| match &f.fault {
-            Kind::Drop { share, frames } => {
+            CameraFaultKind::Drop { share, frames } => {
                 frames.as_ref().is_none_or(|list| list.contains(&number))
                     && stream.uniform(number.into()) < *share
             }
@@ -128,46 +128,43 @@ impl CameraTrouble {
         delays.fold(0.0, f64::max)
     }
 
-    fn has(&self, kind: &Kind, time: SimTime) -> bool {
+    fn has(&self, kind: &CameraFaultKind, time: SimTime) -> bool {
         self.at(time).any(|(f, _)| f.fault == *kind)
     }
 }
 
 /// Hands on the images of one camera, with its faults.
 #[derive(Clone, Debug)]
-pub struct Grabber {
-    trouble: CameraTrouble,
+pub struct CameraOutput {
+    faults: CameraFaults,
     held: Option<GrayImage>,
 }
 
-impl Grabber {
+impl CameraOutput {
     /// Before the first image.
-    pub fn new(trouble: CameraTrouble) -> Self {
-        Self {
-            trouble,
-            held: None,
-        }
+    pub fn new(faults: CameraFaults) -> Self {
+        Self { faults, held: None }
     }
 
     /// By how much the images of a frame that starts then are late.
     pub fn late_s(&self, start: SimTime) -> f64 {
-        self.trouble.late_s(start)
+        self.faults.late_s(start)
     }
 
     /// What is handed on in place of the image of a frame; 0 x 0 pixels where it is lost.
-    pub fn grab(&mut self, number: u32, start: SimTime, image: GrayImage) -> GrayImage {
-        if self.trouble.faults.is_empty() {
+    pub fn deliver(&mut self, number: u32, start: SimTime, image: GrayImage) -> GrayImage {
+        if self.faults.faults.is_empty() {
             return image;
         }
-        if self.trouble.drops(number, start) {
+        if self.faults.drops(number, start) {
             return GrayImage::default();
         }
-        if self.trouble.has(&Kind::Freeze, start)
+        if self.faults.has(&CameraFaultKind::Freeze, start)
             && let Some(held) = &self.held
         {
             return held.clone();
         }
-        let image = if self.trouble.has(&Kind::Dead, start) {
+        let image = if self.faults.has(&CameraFaultKind::Dead, start) {
             GrayImage::new(image.width(), image.height())
         } else {
             image
@@ -185,9 +182,9 @@ mod tests {
     use crate::twin::faults::FaultSettings;
     use image::Luma;
 
-    fn trouble(names: &[&str], seed: u64, text: &str) -> CameraTrouble {
+    fn faults(names: &[&str], seed: u64, text: &str) -> CameraFaults {
         let settings: FaultSettings = read_toml(text).unwrap();
-        CameraTrouble::of(names, &settings.cameras, seed)
+        CameraFaults::of(names, &settings.cameras, seed)
     }
 
     fn start(number: u32) -> SimTime {
@@ -195,10 +192,10 @@ mod tests {
     }
 
     /// What comes of the images 1, 2, 3 ..., each of one grey; 0 where none comes.
-    fn delivered(grabber: &mut Grabber, numbers: std::ops::Range<u32>) -> Vec<u8> {
+    fn delivered(output: &mut CameraOutput, numbers: std::ops::Range<u32>) -> Vec<u8> {
         let grey = |number: u32| {
             let image = GrayImage::from_pixel(3, 2, Luma([number as u8 + 1]));
-            let image = grabber.grab(number, start(number), image);
+            let image = output.deliver(number, start(number), image);
             image.as_raw().first().copied().unwrap_or(0)
         };
         numbers.map(grey).collect()
@@ -210,12 +207,12 @@ mod tests {
     fn a_frozen_camera_repeats_its_last_image() {
         let text =
             "cameras = [{ camera = 'W1', fault = { kind = 'freeze' }, from_s = 0.3, to_s = 0.6 }]";
-        let images = |name| delivered(&mut Grabber::new(trouble(&[name], 1, text)), 0..8);
+        let images = |name| delivered(&mut CameraOutput::new(faults(&[name], 1, text)), 0..8);
         assert_eq!(images("W1"), [1, 2, 3, 3, 3, 3, 7, 8]);
         assert_eq!(images("W2"), [1, 2, 3, 4, 5, 6, 7, 8]);
         let from_start = "cameras = [{ camera = 'W1', fault = { kind = 'freeze' } }]";
-        let mut grabber = Grabber::new(trouble(&["W1"], 1, from_start));
-        assert_eq!(delivered(&mut grabber, 0..3), [1, 1, 1]);
+        let mut output = CameraOutput::new(faults(&["W1"], 1, from_start));
+        assert_eq!(delivered(&mut output, 0..3), [1, 1, 1]);
     }
 
     /// A dead sensor gives nothing but zeros, and is frozen as such.
@@ -223,11 +220,11 @@ mod tests {
     fn a_dead_camera_is_black() {
         let text = "[[cameras]]\ncamera = 'left'\nfault = { kind = 'dead' }\nfrom_s = 0.1\nto_s = 0.3\n\
                     [[cameras]]\ncamera = 'rig'\nfault = { kind = 'freeze' }\nfrom_s = 0.2\nto_s = 0.4\n";
-        let mut left = Grabber::new(trouble(&["rig", "left"], 1, text));
-        let black = left.grab(0, start(1), GrayImage::from_pixel(3, 2, Luma([9])));
+        let mut left = CameraOutput::new(faults(&["rig", "left"], 1, text));
+        let black = left.deliver(0, start(1), GrayImage::from_pixel(3, 2, Luma([9])));
         assert_eq!(black.dimensions(), (3, 2));
         assert_eq!(delivered(&mut left, 0..6), [1, 0, 0, 0, 5, 6]);
-        let mut right = Grabber::new(trouble(&["rig", "right"], 1, text));
+        let mut right = CameraOutput::new(faults(&["rig", "right"], 1, text));
         assert_eq!(delivered(&mut right, 0..6), [1, 2, 2, 2, 5, 6]);
     }
 
@@ -237,7 +234,7 @@ mod tests {
     fn frames_are_dropped_by_share_list_and_stretch() {
         let text =
             "cameras = [{ camera = 'W1', fault = { kind = 'drop', share = 0.1 }, from_s = 10.0 }]";
-        let one = trouble(&["W1"], 1, text);
+        let one = faults(&["W1"], 1, text);
         let dropped: Vec<u32> = (0..5000).filter(|k| one.drops(*k, start(*k))).collect();
         assert!(dropped[0] >= 100);
         let share = dropped.len() as f64 / 4900.0;
@@ -248,12 +245,12 @@ mod tests {
         );
         let backwards = (0..5000).rev().filter(|k| one.drops(*k, start(*k)));
         assert!(backwards.eq(dropped.iter().rev().copied()));
-        let other = trouble(&["W1"], 2, text);
+        let other = faults(&["W1"], 2, text);
         assert!(dropped.iter().any(|k| !other.drops(*k, start(*k))));
         let list =
             "cameras = [{ camera = 'W1', fault = { kind = 'drop', frames = [2, 5] }, to_s = 0.4 }]";
-        let mut grabber = Grabber::new(trouble(&["W1"], 1, list));
-        assert_eq!(delivered(&mut grabber, 0..7), [1, 2, 0, 4, 5, 6, 7]);
+        let mut output = CameraOutput::new(faults(&["W1"], 1, list));
+        assert_eq!(delivered(&mut output, 0..7), [1, 2, 0, 4, 5, 6, 7]);
     }
 
     /// The longest delay of those that act counts.
@@ -261,7 +258,7 @@ mod tests {
     fn late_images_are_late_while_they_are() {
         let text = "[[cameras]]\ncamera = 'rig'\nfault = { kind = 'late', by_ms = 40.0 }\n\
                     [[cameras]]\ncamera = 'rig'\nfault = { kind = 'late', by_ms = 90.0 }\nfrom_s = 1.0\nto_s = 2.0\n";
-        let rig = trouble(&["rig"], 1, text);
+        let rig = faults(&["rig"], 1, text);
         for (k, expected_s) in [(5, 0.04), (10, 0.09), (19, 0.09), (20, 0.04)] {
             assert!((rig.late_s(start(k)) - expected_s).abs() < 1e-12, "{k}");
         }

@@ -28,7 +28,7 @@ pub struct LampFaultSettings {
     #[serde(default = "all")]
     pub share: f64,
     /// What is wrong with them.
-    pub fault: LampTrouble,
+    pub fault: LampFaultKind,
     /// Since when, s. Default 0.
     #[serde(default)]
     pub from_s: f64,
@@ -44,7 +44,7 @@ fn all() -> f64 {
 /// What may be wrong with a lamp.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum LampTrouble {
+pub enum LampFaultKind {
     /// It is out.
     Dead,
     /// It has aged, or is dirty.
@@ -86,9 +86,9 @@ impl LampFaultSettings {
             }
         }
         match self.fault {
-            LampTrouble::Dead => {}
-            LampTrouble::Dim { level } => check.within("fault.level", level, 0.0..=1.0, ""),
-            LampTrouble::Flicker {
+            LampFaultKind::Dead => {}
+            LampFaultKind::Dim { level } => check.within("fault.level", level, 0.0..=1.0, ""),
+            LampFaultKind::Flicker {
                 depth,
                 frequency_hz,
                 phase_deg,
@@ -213,11 +213,11 @@ pub fn age(lamps: &mut [LampLight], faults: &[LampFaultSettings], tunnel: &Tunne
 }
 
 /// A lamp's level and ripple with one fault more.
-fn with((level, ripple): (f64, Ripple), fault: LampTrouble, own_rad: f64) -> (f64, Ripple) {
+fn with((level, ripple): (f64, Ripple), fault: LampFaultKind, own_rad: f64) -> (f64, Ripple) {
     match fault {
-        LampTrouble::Dead => (0.0, ripple),
-        LampTrouble::Dim { level: share } => (level * share, ripple),
-        LampTrouble::Flicker {
+        LampFaultKind::Dead => (0.0, ripple),
+        LampFaultKind::Dim { level: share } => (level * share, ripple),
+        LampFaultKind::Flicker {
             depth,
             frequency_hz,
             phase_deg,
@@ -230,7 +230,7 @@ fn with((level, ripple): (f64, Ripple), fault: LampTrouble, own_rad: f64) -> (f6
             };
             (level, ripple)
         }
-        LampTrouble::Flicker { .. } => (level, ripple),
+        LampFaultKind::Flicker { .. } => (level, ripple),
     }
 }
 

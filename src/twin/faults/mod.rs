@@ -37,8 +37,8 @@
 mod camera;
 mod lamp;
 
-pub use camera::{CameraFaultSettings, CameraTrouble, Grabber, Kind};
-pub use lamp::{LampFaultSettings, LampTrouble, age};
+pub use camera::{CameraFaultKind, CameraFaultSettings, CameraFaults, CameraOutput};
+pub use lamp::{LampFaultKind, LampFaultSettings, age};
 
 use crate::track::{Problem, Tunnel};
 use schemars::JsonSchema;

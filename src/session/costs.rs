@@ -46,14 +46,14 @@ fn now() -> std::time::Instant {
 }
 
 /// All observers as one, timed.
-pub struct Watchers<'a, 'b> {
+pub struct Observers<'a, 'b> {
     begin: std::time::Instant,
     observers: &'a mut [&'b mut dyn Observer],
     /// Time spent in them.
     pub watch: Stopwatch,
 }
 
-impl<'a, 'b> Watchers<'a, 'b> {
+impl<'a, 'b> Observers<'a, 'b> {
     /// Of these observers.
     pub fn new(observers: &'a mut [&'b mut dyn Observer]) -> Self {
         Self {

@@ -1,0 +1,189 @@
+//! What sensors and equipment trains and wayside posts carry, as the scenario has it.
+//!
+//! A sensor or an equipment of a new kind is one line here.
+
+use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
+use crate::scenario::{Onboard, OnboardEquipment, Scenario, WaysidePost};
+use crate::stack::Equipment;
+use crate::stack::positioning::LampPositioning;
+use crate::stack::protection::TrainProtection;
+use crate::stack::wayside::WaysideDetection;
+use crate::track::{Direction, Route, Tunnel};
+use crate::twin::physics::World;
+use crate::twin::random::{Stream, branch};
+use crate::twin::sensors::{
+    BaliseAntenna, Doppler, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera, WaysideCamera,
+    WaysideLidar,
+};
+use std::sync::Arc;
+
+/// A sensor at its node.
+pub struct Mounted {
+    /// Where it is.
+    pub node: Node,
+    /// The sensor.
+    pub sensor: Box<dyn Sensor>,
+}
+
+/// A piece of equipment at its node.
+pub struct Fitted {
+    /// Where it is.
+    pub node: Node,
+    /// The equipment.
+    pub equipment: Box<dyn Equipment>,
+}
+
+/// Everything that senses and computes in a scenario.
+#[derive(Default)]
+pub struct Fitting {
+    /// In the order in which they are sampled.
+    pub sensors: Vec<Mounted>,
+    /// In the order in which they work.
+    pub equipment: Vec<Fitted>,
+}
+
+impl Fitting {
+    /// Of all trains and posts of a scenario.
+    pub fn new(scenario: &Scenario, world: &World) -> Self {
+        let maps = Maps::new(scenario);
+        let mut fitting = Self::default();
+        for onboard in &scenario.onboard {
+            fitting.add_train(scenario, onboard, world, &maps);
+        }
+        for post in &scenario.wayside {
+            fitting.add_post(scenario, post, &maps);
+        }
+        fitting
+    }
+
+    /// A sensor of the user's own.
+    pub fn add_sensor(&mut self, node: Node, sensor: impl Sensor + 'static) {
+        let sensor = Box::new(sensor);
+        self.sensors.push(Mounted { node, sensor });
+    }
+
+    /// A piece of equipment of the user's own.
+    pub fn add_equipment(&mut self, node: Node, equipment: impl Equipment + 'static) {
+        let equipment = Box::new(equipment);
+        self.equipment.push(Fitted { node, equipment });
+    }
+
+    /// All nodes that have equipment, each once.
+    pub fn nodes(&self) -> Vec<Node> {
+        let mut nodes: Vec<Node> = self.equipment.iter().map(|e| e.node.clone()).collect();
+        nodes.sort();
+        nodes.dedup();
+        nodes
+    }
+
+    fn add_train(&mut self, scenario: &Scenario, onboard: &Onboard, world: &World, maps: &Maps) {
+        let (train, seed) = (onboard.train, train_seed(scenario.seed, onboard.train));
+        let node = Node::Train(train);
+        if scenario.bench.is_none() {
+            self.add_motion_sensors(onboard, &node, seed);
+            let antenna = BaliseAntenna::new(train, scenario.tunnel.clone(), world);
+            self.add_sensor(node.clone(), antenna);
+        }
+        if let Some(rig) = &onboard.rig {
+            let camera = StereoCamera::new(train, rig, &scenario.faults.cameras, seed);
+            self.add_sensor(node.clone(), camera);
+        }
+        for kind in &onboard.equipment {
+            self.equipment
+                .extend(onboard_equipment(*kind, onboard, maps));
+        }
+    }
+
+    fn add_motion_sensors(&mut self, onboard: &Onboard, node: &Node, seed: u64) {
+        let train = onboard.train;
+        let mut imu = Imu::new(&onboard.imu, seed, 0);
+        let read = move |world: &World, time| {
+            let sample = imu.sample(world, train)?;
+            Some(Content::Imu(ImuSample { time, ..sample }))
+        };
+        let (rate_hz, clock) = (onboard.imu.rate_hz, onboard.imu.clock);
+        self.add_sensor(node.clone(), Periodic::new(rate_hz, clock, read));
+
+        let mut odometer = Odometer::new(&onboard.odometer, seed, 0);
+        let read = move |world: &World, time| {
+            let sample = odometer.sample(world, train)?;
+            Some(Content::Odometer(OdometerSample { time, ..sample }))
+        };
+        let (rate_hz, clock) = (onboard.odometer.rate_hz, onboard.odometer.clock);
+        self.add_sensor(node.clone(), Periodic::new(rate_hz, clock, read));
+
+        if let Some(settings) = &onboard.doppler {
+            let mut doppler = Doppler::new(settings, seed, 0);
+            let read = move |world: &World, time| {
+                let sample = doppler.sample(world, train)?;
+                Some(Content::Doppler(DopplerSample { time, ..sample }))
+            };
+            let radar = Periodic::new(settings.rate_hz, settings.clock, read);
+            self.add_sensor(node.clone(), radar);
+        }
+    }
+
+    fn add_post(&mut self, scenario: &Scenario, post: &WaysidePost, maps: &Maps) {
+        let name = &post.calibration.name;
+        let node = Node::Post(name.clone());
+        if let (Some(settings), Some(pose)) = (&post.lidar, post.actual.world_from_lidar) {
+            let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
+            let lidar = Lidar::new(settings, &scenario.tunnel, &pose, stream);
+            let delay_s = 1e-3 * scenario.stack.latency_ms;
+            let lidar = WaysideLidar::new(lidar, settings.clock, delay_s);
+            self.add_sensor(node.clone(), lidar);
+        }
+        let faults = &scenario.faults.cameras;
+        let camera = WaysideCamera::new(&post.actual, &post.camera, faults, scenario.seed);
+        self.add_sensor(node.clone(), camera);
+        let (settings, calibration) = (&scenario.stack.wayside, post.calibration.clone());
+        let detection = WaysideDetection::new(settings, calibration, maps.up.clone());
+        self.add_equipment(node, detection);
+    }
+}
+
+/// A piece of equipment of a train; `None` where the train lacks what it needs.
+pub fn onboard_equipment(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Option<Fitted> {
+    let node = Node::Train(onboard.train);
+    let (route, map) = maps.of(onboard.direction);
+    let at = (node.clone(), route);
+    let equipment: Box<dyn Equipment> = match kind {
+        OnboardEquipment::Led => {
+            let rig = onboard.rig.as_ref()?.calibration();
+            Box::new(LampPositioning::new(at, &onboard.led, rig, map))
+        }
+        OnboardEquipment::Protection => {
+            Box::new(TrainProtection::new(at, &onboard.protection, map))
+        }
+    };
+    Some(Fitted { node, equipment })
+}
+
+/// The surveyed map, as trains meet it that run up or down the line.
+pub struct Maps {
+    up: Arc<Tunnel>,
+}
+
+impl Maps {
+    /// Of a scenario's line.
+    pub fn new(scenario: &Scenario) -> Self {
+        Self { up: scenario.map() }
+    }
+
+    fn of(&self, direction: Direction) -> (Route, Arc<Tunnel>) {
+        let map = match direction {
+            Direction::Up => self.up.clone(),
+            Direction::Down => Arc::new(self.up.reversed()),
+        };
+        (Route::new(&self.up, direction), map)
+    }
+}
+
+/// What everything random on a train follows from: the scenario's seed for its first train.
+pub fn train_seed(seed: u64, train: TrainId) -> u64 {
+    if train == TrainId::default() {
+        seed
+    } else {
+        branch(seed, &train.to_string())
+    }
+}

@@ -1,0 +1,98 @@
+//! How the wayside posts did, held against the truth.
+
+use super::health::Health;
+use super::presence::FieldOfView;
+use super::score::{Presence, WaysideScore};
+use super::summary::Summary;
+use crate::bus::{Node, SimTime, WaysideReport};
+use crate::scenario::{Scenario, WaysidePost};
+use crate::twin::physics::World;
+use std::collections::VecDeque;
+
+/// The scores of all posts, in the order of the scenario.
+pub struct Posts {
+    posts: Vec<Post>,
+    /// How their cameras do, by what the equipment says.
+    pub health: Health,
+    frames: u32,
+}
+
+struct Post {
+    node: Node,
+    view: FieldOfView,
+    score: WaysideScore,
+    /// What there was at each frame that has not been reported on yet.
+    exposed: VecDeque<(u32, Vec<Presence>)>,
+}
+
+impl Posts {
+    /// Before the first frame.
+    pub fn new(scenario: &Scenario) -> Self {
+        let mut health = Health::default();
+        let names = scenario.wayside.iter().map(|post| &post.calibration.name);
+        names.for_each(|name| health.expect(name));
+        let posts = scenario.wayside.iter();
+        Self {
+            posts: posts.map(|post| Post::new(scenario, post)).collect(),
+            health,
+            frames: 0,
+        }
+    }
+
+    /// The place of a post in the scenario's list.
+    pub fn index(&self, node: &Node) -> usize {
+        let place = self.posts.iter().position(|post| post.node == *node);
+        place.unwrap_or(self.posts.len())
+    }
+
+    /// A frame of a post is over.
+    pub fn expose(&mut self, post: usize, number: u32, world: &World) {
+        if let Some(post) = self.posts.get_mut(post) {
+            let present = post.view.present(world);
+            post.exposed.push_back((number, present));
+        }
+    }
+
+    /// What a post reports of a frame, when, and what making it cost.
+    pub fn report(&mut self, post: usize, report: &WaysideReport, given: SimTime, cost_ms: f64) {
+        self.frames += 1;
+        let Some(post) = self.posts.get_mut(post) else {
+            return;
+        };
+        while let Some((number, present)) = post.exposed.pop_front() {
+            if number == report.number {
+                post.score.report(report, given, cost_ms, &present);
+                return;
+            }
+        }
+    }
+
+    /// A summary with their figures.
+    pub fn finish(self, mut summary: Summary) -> Summary {
+        let scores = self.posts.into_iter().map(|post| post.score);
+        let all = scores.reduce(|mut a, b| {
+            a.add(b);
+            a
+        });
+        summary.wayside = all.map(WaysideScore::finish);
+        summary.wayside_frames = self.frames;
+        summary.cameras.extend(self.health.finish());
+        summary
+    }
+}
+
+impl Post {
+    fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
+        let camera = &post.actual.world_from_camera.translation.vector;
+        let line = &scenario.tunnel.alignment;
+        Self {
+            node: Node::Post(post.calibration.name.clone()),
+            view: FieldOfView::new(scenario, post),
+            score: WaysideScore::new(
+                line.track_from_world(&(*camera).into(), post.actual.chainage_m),
+                post.actual.camera.intrinsics.height_px,
+            ),
+            exposed: VecDeque::new(),
+        }
+    }
+}

@@ -1,0 +1,590 @@
+//! The loop of a session: every step the world moves, sensors sample, links deliver, images that are
+//! due are read out, equipment works, and what it commands acts on the trains.
+
+use super::bench::Bench;
+use super::costs::{Costs, Observers};
+use super::fitting::{Fitted, Fitting, Maps, Mounted, onboard_equipment};
+use super::imaging::{Imaging, Pending};
+use super::posts::Posts;
+use super::train_score::TrainScore;
+use super::{
+    End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary,
+    TrainOpening, TrainPoint,
+};
+use crate::bus::{
+    CameraHealth, Content, EYES, LedReport, Message, Node, Receiver, SimTime, Ticker, TrainCommand,
+    TrainId, WaysideReport,
+};
+use crate::scenario::{Onboard, Scenario};
+use crate::twin::links::Links;
+use crate::twin::physics::{PhysicsError, World};
+use crate::twin::random::Stream;
+use crate::twin::render::{Job, Renderer};
+use crate::twin::sensors::{Capture, Output};
+use std::collections::BTreeMap;
+
+/// Samples of the truth shown to observers a second.
+const TRUTH_HZ: f64 = 50.0;
+/// Positions of everything else shown to observers a second.
+const BODIES_HZ: f64 = 10.0;
+
+/// One session under way.
+pub struct Session<'s> {
+    scenario: &'s Scenario,
+    /// All that is true.
+    pub(super) world: World,
+    sensors: Vec<Mounted>,
+    equipment: Vec<Fitted>,
+    links: Links,
+    imaging: Imaging<'s>,
+    /// Samples that take their time to the equipment, with when and where they arrive.
+    delayed: BTreeMap<(SimTime, u64), (Node, Message)>,
+    delayed_so_far: u64,
+    /// Messages with images that were delivered in this step, and what working on each cost.
+    images: Vec<Delivered>,
+    commands: Vec<TrainCommand>,
+    trains: BTreeMap<TrainId, TrainScore>,
+    posts: Posts,
+    bench: Option<Bench>,
+    truth_ticker: Ticker,
+    bodies_ticker: Ticker,
+    cost: Costs,
+}
+
+/// What trains are told before their equipment's first cycle: those without a protection, to run as
+/// their drivers like.
+fn first_commands(scenario: &Scenario) -> Vec<TrainCommand> {
+    let mut commands = vec![TrainCommand::UNSUPERVISED; TrainId::MOST];
+    let protected = scenario.onboard.iter().filter(|o| o.protects());
+    for onboard in protected {
+        if let Some(command) = commands.get_mut(onboard.train.index()) {
+            *command = TrainCommand::default();
+        }
+    }
+    commands
+}
+
+/// A message with images, for those who look at it after the equipment.
+struct Delivered {
+    message: Message,
+    cost_ms: f64,
+}
+
+impl<'s> Session<'s> {
+    /// At time zero, with the equipment of the scenario and whatever `add` puts in.
+    pub fn new(
+        scenario: &'s Scenario,
+        renderer: &'s mut dyn Renderer,
+        add: &dyn Fn(&mut Fitting),
+    ) -> Result<Self, SessionError> {
+        let seed = scenario.seed;
+        let world = World::new(scenario.tunnel.clone(), &scenario.physics, seed, 0)?;
+        let mut fitting = Fitting::new(scenario, &world);
+        add(&mut fitting);
+        let stations = &scenario.tunnel.base_stations;
+        let radio = Stream::new(seed, 0, "radio");
+        let links = Links::new(&scenario.radio, stations, fitting.nodes(), radio);
+        let latency_ms = match scenario.bench {
+            // The rig goes on when its pairs have been read.
+            Some(_) => 0.0,
+            None => scenario.stack.latency_ms,
+        };
+        let onboard = |id| scenario.onboard.iter().find(|o| o.train == id);
+        let ids = world
+            .train_ids()
+            .chain(scenario.onboard.iter().map(|o| o.train));
+        let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id))));
+        Ok(Self {
+            trains: trains.collect(),
+            posts: Posts::new(scenario),
+            bench: scenario.bench.map(|bench| Bench::new(&bench)),
+            commands: first_commands(scenario),
+            scenario,
+            world,
+            sensors: fitting.sensors,
+            equipment: fitting.equipment,
+            links,
+            imaging: Imaging::new(renderer, 1e-3 * latency_ms),
+            delayed: BTreeMap::new(),
+            delayed_so_far: 0,
+            images: Vec::new(),
+            truth_ticker: Ticker::new(TRUTH_HZ),
+            bodies_ticker: Ticker::new(BODIES_HZ),
+            cost: Costs::default(),
+        })
+    }
+
+    /// To the end of the scenario. A failure of the world ends it as [`End::Failed`].
+    pub fn run(
+        mut self,
+        options: &RunOptions<'_>,
+        observers: &mut [&mut dyn Observer],
+    ) -> Result<Summary, SessionError> {
+        let mut observers = Observers::new(observers);
+        self.open(&mut observers)?;
+        let end = self.steps(options, &mut observers);
+        observers.each(|o| o.close())?;
+        let derailed = match &end {
+            Err(SessionError::Physics(PhysicsError::Derailed { train, .. })) => Some(*train),
+            _ => None,
+        };
+        let end = match end {
+            Ok(end) => end,
+            Err(SessionError::Physics(error)) => End::Failed(error.to_string()),
+            Err(other) => return Err(other),
+        };
+        Ok(self.summary(end, derailed, &observers))
+    }
+
+    fn open(&self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
+        let posts = self.scenario.wayside.iter();
+        let calibrations: Vec<_> = posts.map(|post| post.calibration.clone()).collect();
+        let opening = |onboard: &Onboard| TrainOpening {
+            id: onboard.train,
+            rig: onboard.rig.as_ref().map(|rig| rig.calibration()),
+            car_half_extents_m: (self.world.car_half_extents_m(onboard.train)).unwrap_or_default(),
+            cars: (self.world.train(onboard.train)).map_or(0, |t| t.world_from_cars.len()),
+            radar: onboard.doppler.is_some(),
+            protection: onboard.protects(),
+        };
+        let trains: Vec<_> = self.scenario.onboard.iter().map(opening).collect();
+        let opening = Opening {
+            scenario: &self.scenario.name,
+            seed: self.scenario.seed,
+            tunnel: &self.scenario.tunnel,
+            trains: &trains,
+            wayside: &calibrations,
+        };
+        observers.each(|o| o.open(&opening))?;
+        Ok(())
+    }
+
+    fn steps(
+        &mut self,
+        options: &RunOptions<'_>,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<End, SessionError> {
+        let mut next_progress_s = 0.0;
+        loop {
+            let time_s = self.world.time().secs();
+            if options.stopped() {
+                return Ok(End::Interrupted);
+            }
+            if self.bench_is_over(observers)? || self.is_over(time_s) {
+                return Ok(End::Complete);
+            }
+            if let Some(progress) = options.progress.filter(|_| time_s >= next_progress_s) {
+                progress(time_s);
+                next_progress_s = time_s + 0.1;
+            }
+            self.step(observers)?;
+        }
+    }
+
+    /// The scenario's time is over, or all trains with equipment have stood long enough.
+    fn is_over(&self, time_s: f64) -> bool {
+        if self.bench.is_some() {
+            return false;
+        }
+        let stood_long = |limit_s: f64| {
+            let now = self.world.time();
+            let mut equipped = self.scenario.onboard.iter().map(|o| &self.trains[&o.train]);
+            !self.scenario.onboard.is_empty()
+                && equipped.all(|train| train.stood_s(now).is_some_and(|s| s >= limit_s))
+        };
+        let standstill = self.scenario.stop_after_standstill_s;
+        time_s >= self.scenario.duration_s || standstill.is_some_and(stood_long)
+    }
+
+    /// A bench goes on to its next point where it is done with one; whether it was the last.
+    fn bench_is_over(&mut self, observers: &mut Observers<'_, '_>) -> Result<bool, SessionError> {
+        let Some(mut bench) = self.bench.take() else {
+            return Ok(false);
+        };
+        let over = bench.go_on(self, observers)?;
+        self.bench = Some(bench);
+        Ok(over)
+    }
+
+    fn step(&mut self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
+        let (world, commands) = (&mut self.world, &self.commands);
+        let hits = world.impacts().len();
+        self.cost.physics.time(|| world.step(commands)).0?;
+        let now = self.world.time();
+        for hit in &self.world.impacts()[hits..] {
+            let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
+            observers.show(&Event::Note(now, &format!("hit {with} at {kmh:.1} km/h")))?;
+        }
+        self.images.clear();
+        self.sample(now, observers)?;
+        self.receive(now, observers)?;
+        self.read_out(now, observers)?;
+        self.work(now, observers)?;
+        self.show_truth(now, observers)
+    }
+
+    /// Every sensor gives what is due.
+    fn sample(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        for k in 0..self.sensors.len() {
+            for output in self.sensors[k].sensor.sample(&self.world)? {
+                match output {
+                    Output::Capture(capture) => self.submit(k, now, capture, observers)?,
+                    Output::Sample(sample) => {
+                        let node = self.sensors[k].node.clone();
+                        let due = now.plus(sample.delay_s);
+                        let message = Message {
+                            valid_at: sample.valid_at,
+                            ..Message::own(node.clone(), due, sample.content)
+                        };
+                        if sample.delay_s > 0.0 {
+                            let number = self.delayed_so_far;
+                            self.delayed_so_far += 1;
+                            self.delayed.insert((due, number), (node, message));
+                        } else {
+                            self.deliver(&node, message, observers)?;
+                        }
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands a capture to the renderer, with the world as it is now.
+    fn submit(
+        &mut self,
+        sensor: usize,
+        now: SimTime,
+        capture: Capture,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let Capture {
+            header,
+            views,
+            late_s,
+        } = capture;
+        let (source, own) = match &self.sensors[sensor].node {
+            Node::Train(id) => (Source::Rig(*id), Some(*id)),
+            node => (Source::Wayside(self.posts.index(node)), None),
+        };
+        let (bodies, owners) = self.world.owned_bodies(own);
+        let train = views.first().and_then(|view| {
+            let id = own.or(self.world.train_ids().next())?;
+            self.train_at(id, view.mid())
+        });
+        let job = Job {
+            time: now,
+            bodies,
+            headlights: self.world.headlights(),
+            views,
+            ..Job::default()
+        };
+        observers.show(&Event::Exposure(&Exposure {
+            source,
+            number: header.number,
+            job: &job,
+            owners: &owners,
+            train,
+        }))?;
+        if let Source::Wayside(post) = source {
+            self.posts.expose(post, header.number, &self.world);
+        }
+        let pending = Pending {
+            sensor,
+            header,
+            late_s,
+        };
+        Ok(self.imaging.submit(&job, pending, &mut self.cost)?)
+    }
+
+    /// Time that the pairs of a bench take.
+    fn pairs_s(&self) -> f64 {
+        let rig = self.scenario.onboard.first().and_then(|o| o.rig.as_ref());
+        let pairs = self
+            .trains
+            .get(&TrainId::default())
+            .map_or(0, TrainScore::pairs);
+        rig.map_or(0.0, |rig| {
+            SimTime::from_secs(f64::from(pairs) / rig.pairs_per_s).secs()
+        })
+    }
+
+    /// A train at a time of the recent past, by the speed that it has now.
+    fn train_at(&self, id: TrainId, time: SimTime) -> Option<TrainPoint> {
+        Some(TrainPoint {
+            chainage_m: self.world.chainage_at(id, time)?,
+            speed_mps: self.world.train(id)?.speed_mps,
+            world_from_vehicle: self.world.vehicle_at(id, time)?,
+        })
+    }
+
+    /// What comes by links, and samples that took their time.
+    fn receive(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        while let Some(first) = self.delayed.first_entry().filter(|e| e.key().0 <= now) {
+            let (node, message) = first.remove();
+            self.deliver(&node, message, observers)?;
+        }
+        loop {
+            let world = &self.world;
+            let Some(message) = self.links.receive(now, |id| world.head_m(id)) else {
+                return Ok(());
+            };
+            if let Receiver::Node(node) = message.receiver.clone() {
+                self.deliver(&node, message, observers)?;
+            }
+        }
+    }
+
+    /// Images that are due.
+    fn read_out(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        while let Some((pending, images)) = self.imaging.due(now, &mut self.cost)? {
+            let Mounted { node, sensor } = &mut self.sensors[pending.sensor];
+            let node = node.clone();
+            if let Some(content) = sensor.read_out(&pending.header, images)? {
+                let message = Message {
+                    valid_at: pending.header.start,
+                    ..Message::own(node.clone(), now, content)
+                };
+                self.deliver(&node, message, observers)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Hands a message to all equipment of a node.
+    fn deliver(
+        &mut self,
+        node: &Node,
+        message: Message,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let has_images = matches!(message.content, Content::Pair(_) | Content::Frame(_));
+        if !has_images {
+            observers.show(&Event::Message(node, &message))?;
+        }
+        let equipment = &mut self.equipment;
+        let hand_on = || {
+            let own = equipment.iter_mut().filter(|e| e.node == *node);
+            own.for_each(|e| e.equipment.on(&message));
+        };
+        if has_images {
+            let cost_s = self.cost.stack.time(hand_on).1;
+            let cost_ms = 1e3 * cost_s;
+            observers.show(&Event::Cost(node, cost_ms))?;
+            self.images.push(Delivered { message, cost_ms });
+            return Ok(());
+        }
+        hand_on();
+        if let (Content::BalisePassed(name), Node::Train(id)) = (&message.content, node)
+            && let Some(telegram) = self.links.read_balise(message.received_at, name, *id)
+        {
+            self.deliver(node, telegram, observers)?;
+        }
+        Ok(())
+    }
+
+    /// Every piece of equipment does what is due; what it says reaches those after it on its node in
+    /// this cycle, and those before it in the next.
+    fn work(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        for k in 0..self.equipment.len() {
+            let equipment = &mut self.equipment[k].equipment;
+            let messages = self.cost.stack.time(|| equipment.cycle(now)).0;
+            for message in messages {
+                self.take_down(now, &message, observers)?;
+                self.send(k, message);
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends what equipment `k` says.
+    fn send(&mut self, k: usize, message: Message) {
+        if let (Content::Command(command), Node::Train(id)) = (&message.content, &message.sender)
+            && let Some(current) = self.commands.get_mut(id.index())
+        {
+            *current = *command;
+        }
+        if message.receiver != Receiver::Own {
+            let world = &self.world;
+            self.links.send(message, |id| world.head_m(id));
+            return;
+        }
+        let sender = &message.sender;
+        let others = self.equipment.iter_mut().enumerate();
+        let others = others.filter(|(other, e)| *other != k && e.node == *sender);
+        others.for_each(|(_, e)| e.equipment.on(&message));
+    }
+
+    /// Scores what equipment says, and shows it.
+    fn take_down(
+        &mut self,
+        now: SimTime,
+        message: &Message,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let sender = &message.sender;
+        match (&message.content, sender) {
+            (Content::Led(report), Node::Train(id)) => self.take_down_led(*id, report, observers),
+            (Content::Wayside(report), Node::Post(_)) => {
+                self.take_down_wayside(now, sender, report, observers)
+            }
+            (Content::Camera(status), _) => {
+                self.note_camera(sender, &status.camera, now, status.health, observers)
+            }
+            (Content::Protection(report), Node::Train(id)) => {
+                if let Some(train) = self.trains.get_mut(id) {
+                    train.on_protection(now, report);
+                }
+                Ok(observers.show(&Event::Message(sender, message))?)
+            }
+            _ => Ok(observers.show(&Event::Message(sender, message))?),
+        }
+    }
+
+    fn take_down_led(
+        &mut self,
+        id: TrainId,
+        report: &LedReport,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let node = Node::Train(id);
+        for (eye, health) in EYES.into_iter().zip(report.eyes) {
+            self.note_camera(&node, eye, report.time, health, observers)?;
+        }
+        let (world, images) = (&self.world, &self.images);
+        let delivered = images.iter().find_map(|d| match &d.message.content {
+            Content::Pair(pair)
+                if d.message.sender == node && pair.left.number == report.number =>
+            {
+                Some((pair, d.cost_ms))
+            }
+            _ => None,
+        });
+        if let (Some(train), Some((pair, cost_ms))) = (self.trains.get_mut(&id), delivered) {
+            let truths_m = train.on_led(report, cost_ms, world)?;
+            observers.show(&Event::Pair(id, pair, report, &truths_m))?;
+        }
+        Ok(())
+    }
+
+    fn take_down_wayside(
+        &mut self,
+        now: SimTime,
+        node: &Node,
+        report: &WaysideReport,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let post = self.posts.index(node);
+        let delivered = self.images.iter().find_map(|d| match &d.message.content {
+            Content::Frame(frame) if d.message.sender == *node && frame.number == report.number => {
+                Some((frame, d.cost_ms))
+            }
+            _ => None,
+        });
+        if let Some((frame, cost_ms)) = delivered {
+            self.posts.report(post, report, now, cost_ms);
+            observers.show(&Event::Wayside(post, frame, report))?;
+        }
+        let Node::Post(name) = node else {
+            return Ok(());
+        };
+        self.note_camera(node, name, report.time, report.camera, observers)
+    }
+
+    /// Takes down what equipment says of a camera, and shows it where it is new.
+    fn note_camera(
+        &mut self,
+        node: &Node,
+        camera: &str,
+        time: SimTime,
+        health: CameraHealth,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let all = match node {
+            Node::Train(id) => self.trains.get_mut(id).map(|train| &mut train.health),
+            _ => Some(&mut self.posts.health),
+        };
+        if all.is_some_and(|all| all.note(camera, time, health)) {
+            observers.show(&Event::Camera(time, node, camera, health.fault))?;
+        }
+        Ok(())
+    }
+
+    fn show_truth(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        if self.truth_ticker.due(now, 0.0).is_some() {
+            let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
+            for (id, score) in &mut self.trains {
+                if let Some(train) = world.train(*id) {
+                    score.on_motion(&train, world, line);
+                    let left = score.left_eye(&train.world_from_vehicle);
+                    observers.show(&Event::Train(*id, &train, left.as_ref()))?;
+                }
+            }
+        }
+        if self.bodies_ticker.due(now, 0.0).is_some() {
+            let (bodies, _) = self.world.owned_bodies(self.world.train_ids().next());
+            observers.show(&Event::Bodies(now, &bodies))?;
+        }
+        Ok(())
+    }
+
+    /// Fixes of the rig of a bench so far, by the first of its methods.
+    pub(super) fn fixes(&self) -> usize {
+        let onboard = self.scenario.onboard.first();
+        let method = onboard.and_then(|onboard| onboard.led.methods.first());
+        let score = self.trains.get(&TrainId::default()).zip(method);
+        score.map_or(0, |(score, method)| score.fixes(*method))
+    }
+
+    /// Puts the rig of a bench at a point. Its equipment starts anew.
+    pub(super) fn place_rig(&mut self, head_m: f64) {
+        self.world.place_carrier(head_m);
+        let maps = Maps::new(self.scenario);
+        for onboard in &self.scenario.onboard {
+            let node = Node::Train(onboard.train);
+            self.equipment.retain(|fitted| fitted.node != node);
+            let kinds = onboard.equipment.iter();
+            self.equipment
+                .extend(kinds.filter_map(|kind| onboard_equipment(*kind, onboard, &maps)));
+        }
+    }
+
+    fn summary(
+        self,
+        end: End,
+        derailed: Option<TrainId>,
+        observers: &Observers<'_, '_>,
+    ) -> Summary {
+        let simulated_s = match &self.bench {
+            Some(_) => self.pairs_s(),
+            None => self.world.time().secs(),
+        };
+        let (backend, cost) = (self.imaging.backend(), &self.cost);
+        let summary = Summary::new(self.scenario, end, simulated_s, backend, cost, observers);
+        let world = &self.world;
+        let trains = self.trains.into_iter();
+        let trains = trains.map(|(id, score)| score.finish(world, derailed == Some(id)));
+        let trains = trains.collect();
+        self.posts.finish(summary).with_trains(trains)
+    }
+}

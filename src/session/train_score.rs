@@ -1,0 +1,164 @@
+//! How one train and its equipment did, held against the truth.
+
+use super::SessionError;
+use super::health::Health;
+use super::outcome::Outcome;
+use super::ride::Ride;
+use super::score::PositioningScore;
+use super::summary::{Summary, TrainSummary};
+use crate::bus::{EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainId};
+use crate::scenario::{Onboard, Scenario};
+use crate::track::Alignment;
+use crate::twin::physics::{TrainState, World};
+use crate::twin::sensors::SensorError;
+use nalgebra::Isometry3;
+
+/// The scores of one train.
+pub struct TrainScore {
+    id: TrainId,
+    /// Its rig as it really is.
+    rig: Option<RigCalibration>,
+    positioning: Option<PositioningScore>,
+    outcome: Outcome,
+    ride: Ride,
+    dark_lamps: Vec<String>,
+    stereo_frames: u32,
+    /// Speed that its driver aims at.
+    aim_mps: f64,
+    stop_at_m: Option<f64>,
+    /// How its cameras do, by what the equipment says.
+    pub health: Health,
+}
+
+impl TrainScore {
+    /// Before the first step.
+    pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&Onboard>) -> Self {
+        let train = scenario.physics.trains.get(id.index());
+        let rig = onboard.and_then(|onboard| onboard.rig.as_ref());
+        let positioning = onboard
+            .filter(|o| o.positions())
+            .map(|onboard| PositioningScore::new(scenario.tunnel.clone(), &onboard.led.methods));
+        let mut health = Health::default();
+        if positioning.is_some() {
+            EYES.iter().for_each(|eye| health.expect(eye));
+        }
+        Self {
+            id,
+            rig: rig.map(|rig| rig.actual()),
+            positioning,
+            outcome: Outcome::default(),
+            ride: Ride::default(),
+            dark_lamps: Vec::new(),
+            stereo_frames: 0,
+            aim_mps: train.map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6),
+            stop_at_m: train.and_then(|t| t.stop_at_m),
+            health,
+        }
+    }
+
+    /// Takes down where the train really is.
+    pub fn on_motion(&mut self, train: &TrainState, world: &World, line: &Alignment) {
+        self.outcome.on_motion(self.id, train, world, line);
+        self.ride.on_motion(train);
+        if let Some(positioning) = &mut self.positioning {
+            positioning.head_at(train);
+        }
+    }
+
+    /// Takes down a report of the lamp positioning and what making it cost; gives the true chainage of
+    /// the head at each fix.
+    pub fn on_led(
+        &mut self,
+        report: &LedReport,
+        cost_ms: f64,
+        world: &World,
+    ) -> Result<Vec<f64>, SessionError> {
+        let (Some(rig), Some(positioning)) = (&self.rig, &mut self.positioning) else {
+            return Ok(Vec::new());
+        };
+        self.stereo_frames += 1;
+        let dark = report.dark.iter().map(|uid| uid.to_string());
+        self.dark_lamps.extend(dark);
+        let left_at = |t| Some(world.vehicle_at(self.id, t)? * rig.vehicle_from_left);
+        positioning.report(report, cost_ms, &rig.left.intrinsics, left_at);
+        let mut truths_m = Vec::with_capacity(report.fixes.len());
+        for fix in &report.fixes {
+            let true_m = head_at(world, self.id, fix.time)
+                .ok_or(SensorError::PoseForgotten(fix.time.secs()))?;
+            positioning.fix(fix, true_m);
+            truths_m.push(true_m);
+        }
+        Ok(truths_m)
+    }
+
+    /// Takes down a cycle of the protection.
+    pub fn on_protection(&mut self, now: SimTime, report: &ProtectionReport) {
+        self.outcome.on_cycle(now, report, self.aim_mps);
+    }
+
+    /// Fixes of a method so far.
+    pub fn fixes(&self, method: Method) -> usize {
+        let positioning = self.positioning.as_ref();
+        positioning.map_or(0, |p| p.fixes(method))
+    }
+
+    /// Stereo pairs read so far.
+    pub fn pairs(&self) -> u32 {
+        self.stereo_frames
+    }
+
+    /// For how long the train has stood again after it ran.
+    pub fn stood_s(&self, now: SimTime) -> Option<f64> {
+        self.outcome.stood_s(now)
+    }
+
+    /// Pose of the left eye on a vehicle.
+    pub fn left_eye(&self, world_from_vehicle: &Isometry3<f64>) -> Option<Isometry3<f64>> {
+        let rig = self.rig.as_ref()?;
+        Some(world_from_vehicle * rig.vehicle_from_left)
+    }
+
+    /// The figures.
+    pub fn finish(self, world: &World, derailed: bool) -> TrainSummary {
+        let positioning = self.positioning.map(PositioningScore::finish);
+        TrainSummary {
+            id: self.id,
+            stereo_frames: self.stereo_frames,
+            positioning: positioning.unwrap_or_default(),
+            cameras: self.health.finish(),
+            dark_lamps: self.dark_lamps,
+            protection: self.outcome.protection(self.id, world),
+            train: self.ride.finish(self.id, world, self.stop_at_m, derailed),
+        }
+    }
+}
+
+/// Chainage of a train's head at a time. The stamp of a clock that is fast may lie ahead of the world:
+/// over that moment the speed goes on.
+fn head_at(world: &World, id: TrainId, time: SimTime) -> Option<f64> {
+    world.chainage_at(id, time).or_else(|| {
+        let train = world.train(id)?;
+        let ahead_s = time.since(train.time);
+        (ahead_s > 0.0).then(|| train.chainage_m + train.speed_mps * ahead_s)
+    })
+}
+
+impl Summary {
+    /// With the figures of the trains: the first one's at the top, and all in a list where there are
+    /// several.
+    #[must_use]
+    pub fn with_trains(mut self, trains: Vec<TrainSummary>) -> Self {
+        if let Some(first) = trains.first().cloned() {
+            self.stereo_frames = first.stereo_frames;
+            self.positioning = first.positioning;
+            self.cameras.extend(first.cameras);
+            self.dark_lamps = first.dark_lamps;
+            self.protection = first.protection;
+            self.train = first.train;
+        }
+        if trains.len() > 1 {
+            self.trains = trains;
+        }
+        self
+    }
+}

@@ -1,0 +1,123 @@
+//! Train protection as a piece of equipment of a train.
+//!
+//! Inside, distances are those of the train's route; what it hears and says is in chainage of the
+//! track.
+
+use super::{Protection, ProtectionSettings};
+use crate::bus::{
+    Content, Message, Node, ObstacleWarning, PositionFix, ProtectionReport, Receiver, SimTime,
+    Ticker, TrainReport,
+};
+use crate::stack::Equipment;
+use crate::track::{Route, Tunnel};
+use std::sync::Arc;
+
+/// Cycles of the protection a second.
+const CYCLE_HZ: f64 = 10.0;
+
+/// Takes positions, odometer samples, balises and warnings; commands the train, and tells the
+/// wayside devices where it is.
+#[derive(Debug)]
+pub struct TrainProtection {
+    node: Node,
+    route: Route,
+    protection: Protection,
+    cycles: Ticker,
+}
+
+impl TrainProtection {
+    /// On a node, with the surveyed map of the route, as the train runs it.
+    pub fn new(
+        (node, route): (Node, Route),
+        settings: &ProtectionSettings,
+        map: Arc<Tunnel>,
+    ) -> Self {
+        let initial_chainage_m = settings.initial_chainage_m.map(|s_m| route.run_m(s_m));
+        let settings = ProtectionSettings {
+            initial_chainage_m,
+            ..settings.clone()
+        };
+        Self {
+            node,
+            route,
+            protection: Protection::new(&settings, map),
+            cycles: Ticker::new(CYCLE_HZ),
+        }
+    }
+
+    fn on_fix(&mut self, fix: &PositionFix) {
+        let chainage_m = self.route.run_m(fix.chainage_m);
+        self.protection.on_fix(&PositionFix {
+            chainage_m,
+            ..fix.clone()
+        });
+    }
+
+    fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
+        let (from_chainage_m, to_chainage_m) =
+            (self.route).stretch_m(warning.from_chainage_m, warning.to_chainage_m);
+        let warning = ObstacleWarning {
+            from_chainage_m,
+            to_chainage_m,
+            ..warning.clone()
+        };
+        self.protection.on_warning(&warning, received);
+    }
+
+    /// With the chainages of the track.
+    fn in_chainage(&self, report: ProtectionReport) -> ProtectionReport {
+        let on_track = |run_m: Option<f64>| run_m.map(|run_m| self.route.chainage_m(run_m));
+        let mut display = report.display;
+        display.position_m = on_track(display.position_m);
+        ProtectionReport {
+            position_m: on_track(report.position_m),
+            authority_end_m: on_track(report.authority_end_m),
+            display,
+            ..report
+        }
+    }
+}
+
+impl Equipment for TrainProtection {
+    fn on(&mut self, message: &Message) {
+        match &message.content {
+            Content::Odometer(sample) => self.protection.on_odometer(sample),
+            Content::Led(report) => {
+                if let Some(fix) = report.best_fix() {
+                    self.on_fix(fix);
+                }
+            }
+            Content::BalisePassed(name) => self.protection.on_balise(name, message.valid_at),
+            Content::Warning(warning) => {
+                self.on_warning(warning, message.received_at);
+            }
+            _ => {}
+        }
+    }
+
+    fn cycle(&mut self, now: SimTime) -> Vec<Message> {
+        if self.cycles.due(now, 0.0).is_none() {
+            return Vec::new();
+        }
+        let report = self.protection.cycle(now);
+        let report = self.in_chainage(report);
+        let own = |content| Message::own(self.node.clone(), now, content);
+        let position = report.position_m.map(|chainage_m| {
+            let train = TrainReport {
+                chainage_m,
+                direction: self.route.direction,
+                speed_mps: report.speed_mps,
+                time: now,
+            };
+            Message::to(
+                Receiver::Posts,
+                self.node.clone(),
+                now,
+                Content::Train(train),
+            )
+        });
+        let command = own(Content::Command(report.command));
+        let report = own(Content::Protection(report));
+        [report, command].into_iter().chain(position).collect()
+    }
+}

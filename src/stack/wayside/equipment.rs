@@ -1,0 +1,115 @@
+//! Obstacle detection as the equipment of a wayside post.
+
+use super::{WaysideDetector, WaysideSettings};
+use crate::bus::{
+    CameraStatus, Content, LidarScan, Message, Node, Receiver, SimTime, Ticker, TrainId,
+    TrainReport, WaysideCalibration, WaysideReport,
+};
+use crate::stack::Equipment;
+use crate::track::Tunnel;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// How often a second it is looked whether the camera has fallen silent.
+const WATCH_HZ: f64 = 10.0;
+/// A train that has not reported for this long may be anywhere.
+const REPORT_LIFE_S: f64 = 5.0;
+
+/// Takes frames, sweeps and the reports of trains; says a [`Content::Wayside`] a frame, and warns
+/// trains by radio and through its balise.
+#[derive(Debug)]
+pub struct WaysideDetection {
+    node: Node,
+    name: String,
+    /// The balise that stores its messages.
+    balise: Option<String>,
+    detector: WaysideDetector,
+    scan: Option<LidarScan>,
+    trains: BTreeMap<TrainId, TrainReport>,
+    watch: Ticker,
+    messages: Vec<Message>,
+}
+
+impl WaysideDetection {
+    /// Of a device as calibrated, with the surveyed map, which knows its balise.
+    pub fn new(
+        settings: &WaysideSettings,
+        calibration: WaysideCalibration,
+        map: Arc<Tunnel>,
+    ) -> Self {
+        let name = calibration.name.clone();
+        let site = map.wayside.iter().find(|site| site.name == name);
+        Self {
+            node: Node::Post(name.clone()),
+            balise: site.map(|site| site.balise.clone()),
+            name,
+            detector: WaysideDetector::new(settings, calibration, map),
+            scan: None,
+            trains: BTreeMap::new(),
+            watch: Ticker::new(WATCH_HZ),
+            messages: Vec::new(),
+        }
+    }
+
+    /// The trains that have reported lately.
+    fn trains(&self, now: SimTime) -> Vec<TrainReport> {
+        let reports = self.trains.values().copied();
+        reports
+            .filter(|train| now.since(train.time) <= REPORT_LIFE_S)
+            .collect()
+    }
+
+    /// What the trains are to know of a report.
+    fn warn(&mut self, report: &WaysideReport, now: SimTime) {
+        let Some(warning) = self.detector.message(report) else {
+            return;
+        };
+        let balise = self.balise.clone().map(Node::Balise).map(Receiver::Node);
+        for receiver in balise.into_iter().chain([Receiver::Trains]) {
+            let content = Content::Warning(warning.clone());
+            self.messages
+                .push(Message::to(receiver, self.node.clone(), now, content));
+        }
+    }
+}
+
+impl Equipment for WaysideDetection {
+    fn on(&mut self, message: &Message) {
+        match (&message.content, &message.sender) {
+            (Content::Scan(scan), _) => self.scan = Some(scan.clone()),
+            (Content::Train(report), Node::Train(id)) => {
+                self.trains.insert(*id, *report);
+            }
+            (Content::Frame(frame), _) => {
+                let now = message.received_at;
+                let trains = self.trains(now);
+                let report = self.detector.on_frame(frame, self.scan.as_ref(), &trains);
+                self.warn(&report, now);
+                self.messages.push(Message {
+                    valid_at: report.time,
+                    ..Message::own(self.node.clone(), now, Content::Wayside(report))
+                });
+            }
+            _ => {}
+        }
+    }
+
+    fn cycle(&mut self, now: SimTime) -> Vec<Message> {
+        if self.watch.due(now, 0.0).is_some() {
+            let trains = self.trains(now);
+            if let Some(report) = self.detector.on_time(now, &trains) {
+                self.warn(&report, now);
+                let status = CameraStatus {
+                    camera: self.name.clone(),
+                    health: report.camera,
+                };
+                self.messages.push(Message::own(
+                    self.node.clone(),
+                    now,
+                    Content::Camera(status),
+                ));
+            }
+        }
+        std::mem::take(&mut self.messages)
+    }
+}
