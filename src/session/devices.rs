@@ -130,8 +130,7 @@ impl Device {
             return;
         };
         if let Some((number, start)) = clock.due(world.time(), lidar.sweep_s()) {
-            let mut bodies = world.bodies();
-            bodies.extend(world.train_bodies());
+            let bodies = world.bodies(None);
             self.scan = Some(lidar.scan(start, number, world.time(), &bodies));
         }
     }
@@ -260,19 +259,19 @@ impl Outlook {
             lies_in_view_since: None,
             obstacle: false,
         });
-        let half = world.car_half_extents_m().unwrap_or_default();
-        let own = world.head_m().zip(world.train_length_m());
-        let trains = own.into_iter().chain(world.other_trains_m());
-        let trains = trains.map(|(head_m, length_m)| Presence {
-            name: "train".into(),
-            size_m: length_m,
-            chainage_m: head_m - 0.5 * length_m,
-            lateral_m: 0.0,
-            half_length_m: 0.5 * length_m,
-            half_width_m: half.y,
-            foot_m: 0.0,
-            lies_in_view_since: None,
-            obstacle: false,
+        let trains = world.train_ids().filter_map(|id| {
+            let length_m = world.train_length_m(id)?;
+            Some(Presence {
+                name: "train".into(),
+                size_m: length_m,
+                chainage_m: world.head_m(id)? - world.direction(id)?.sign() * 0.5 * length_m,
+                lateral_m: 0.0,
+                half_length_m: 0.5 * length_m,
+                half_width_m: world.car_half_extents_m(id)?.y,
+                foot_m: 0.0,
+                lies_in_view_since: None,
+                obstacle: false,
+            })
         });
         obstacles.chain(workers).chain(trains).collect()
     }
@@ -326,7 +325,7 @@ mod tests {
         let mut scans = Vec::new();
         let mut frames = 0;
         while world.time().secs() < 1.0 {
-            world.step(&TrainCommand::default()).unwrap();
+            world.step(&[TrainCommand::default()]).unwrap();
             device.sweep(&world);
             if device.due(world.time()).is_some() {
                 frames += 1;
@@ -365,7 +364,7 @@ mod tests {
     fn a_device_answers_for_what_it_has_in_view() {
         let (_, mut world, device) = post();
         while world.time().secs() < 2.0 {
-            world.step(&TrainCommand::default()).unwrap();
+            world.step(&[TrainCommand::default()]).unwrap();
         }
         let lying: Vec<_> = (device.look(&world).present.into_iter())
             .filter(|p| p.lies_in_view_since.is_some())

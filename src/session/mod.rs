@@ -40,6 +40,7 @@ pub use summary::{
     Protection, Summary, TrainFigures, WallShares, Wayside,
 };
 
+use crate::bus::TrainId;
 use crate::scenario::Scenario;
 use crate::twin::faults;
 use crate::twin::physics::PhysicsError;
@@ -50,6 +51,9 @@ use crate::twin::render::gloss::Wet;
 use crate::twin::render::gpu::GpuRenderer;
 use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The train that carries the equipment.
+const OWN_TRAIN: TrainId = TrainId(0);
 
 /// What draws the images.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! The sensors of motion of a run, each sampled at its own rate.
 
 use super::cameras::Clock;
-use crate::bus::{DopplerSample, ImuSample, OdometerSample};
+use crate::bus::{DopplerSample, ImuSample, OdometerSample, TrainId};
 use crate::scenario::Scenario;
 use crate::twin::physics::World;
 use crate::twin::sensors::{Doppler, Imu, Odometer};
@@ -48,16 +48,16 @@ impl MotionSensors {
         self.doppler.is_some()
     }
 
-    /// Samples that are due now.
-    pub fn sample(&mut self, world: &World) -> MotionSamples {
+    /// Samples that are due now, on a train.
+    pub fn sample(&mut self, world: &World, train: TrainId) -> MotionSamples {
         let now = world.time();
         let (imu, odometer) = (&mut self.imu, &mut self.odometer);
         MotionSamples {
-            imu: (imu.1.due(now, 0.0)).and_then(|_| imu.0.sample(world)),
-            odometer: (odometer.1.due(now, 0.0)).and_then(|_| odometer.0.sample(world)),
+            imu: (imu.1.due(now, 0.0)).and_then(|_| imu.0.sample(world, train)),
+            odometer: (odometer.1.due(now, 0.0)).and_then(|_| odometer.0.sample(world, train)),
             doppler: (self.doppler.as_mut()).and_then(|(doppler, clock)| {
                 clock.due(now, 0.0)?;
-                doppler.sample(world)
+                doppler.sample(world, train)
             }),
         }
     }
@@ -103,8 +103,8 @@ mod tests {
             ..TrainCommand::default()
         };
         while world.time().secs() < 4.0 {
-            world.step(&command).unwrap();
-            let samples = sensors.sample(&world);
+            world.step(&[command]).unwrap();
+            let samples = sensors.sample(&world, TrainId(0));
             imus += usize::from(samples.imu.is_some());
             if let Some(sample) = samples.odometer {
                 odometers += 1;
@@ -113,12 +113,12 @@ mod tests {
             if let Some(sample) = samples.doppler {
                 radars += 1;
                 radar += sample.speed_mps.unwrap();
-                truth += world.train().unwrap().speed_mps;
+                truth += world.train(TrainId(0)).unwrap().speed_mps;
             }
         }
         // Of inertial unit and radar the first call only starts them.
         assert_eq!((imus, odometers, radars), (800, 201, 80));
-        let speed = world.train().unwrap().speed_mps;
+        let speed = world.train(TrainId(0)).unwrap().speed_mps;
         assert!((wheel / speed - 1.0).abs() < 0.0095, "{wheel} of {speed}");
         assert!((radar / truth - 1.0).abs() < 0.005, "{radar} of {truth}");
     }

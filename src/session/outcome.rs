@@ -1,5 +1,6 @@
 //! How the train fared: whether it ran, braked for an obstacle, stood, hit something.
 
+use super::OWN_TRAIN;
 use super::summary::Protection;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime};
 use crate::track::{Alignment, Gauge};
@@ -56,13 +57,15 @@ impl Outcome {
 
     /// The figures; `None` without a train.
     pub fn protection(&self, world: &World) -> Option<Protection> {
-        world.head_m()?;
+        world.head_m(OWN_TRAIN)?;
+        let impacts = world.impacts().iter().filter(|hit| hit.train == OWN_TRAIN);
+        let impacts: Vec<_> = impacts.cloned().collect();
         Some(Protection {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.stop_margin_m,
-            collision: !world.impacts().is_empty(),
-            impacts: world.impacts().to_vec(),
+            collision: !impacts.is_empty(),
+            impacts,
         })
     }
 }
@@ -107,7 +110,7 @@ mod tests {
                 ..TrainSettings::default()
             };
             let settings = PhysicsSettings {
-                train: Some(train),
+                trains: vec![train],
                 ..PhysicsSettings::default()
             };
             let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
@@ -122,8 +125,8 @@ mod tests {
             };
             let mut outcome = Outcome::default();
             for _ in 0..100 {
-                world.step(&command).unwrap();
-                let train = world.train().unwrap();
+                world.step(&[command]).unwrap();
+                let train = world.train(OWN_TRAIN).unwrap();
                 outcome.on_motion(&train, &world, &tunnel.alignment);
                 outcome.on_cycle(world.time(), &report, 20.0);
             }
@@ -144,13 +147,13 @@ mod tests {
             ..ObstacleSettings::default()
         };
         let settings = PhysicsSettings {
-            train: None,
+            trains: Vec::new(),
             obstacles: vec![lying(190.0, 2.5), lying(200.0, 0.5), lying(150.0, 0.0)],
             ..PhysicsSettings::default()
         };
         let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
         while world.time().secs() < 1.5 {
-            world.step(&TrainCommand::default()).unwrap();
+            world.step(&[TrainCommand::default()]).unwrap();
         }
         let margin = margin_m(&world, &tunnel.alignment, 180.0).unwrap();
         assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");

@@ -1,5 +1,6 @@
 //! How the train ran: distance, ride, wheel loads, slip, energy.
 
+use super::OWN_TRAIN;
 use super::summary::TrainFigures;
 use crate::twin::physics::{TrainState, World};
 use nalgebra::Vector3;
@@ -32,15 +33,15 @@ impl Ride {
         stop_at_m: Option<f64>,
         derailed: bool,
     ) -> Option<TrainFigures> {
-        let (energy, first_m) = (world.energy()?, self.first_m?);
+        let (energy, first_m) = (world.energy(OWN_TRAIN)?, self.first_m?);
         let rms = (self.squares / f64::from(self.samples)).map(f64::sqrt);
-        let worst = world.wheel_extremes()?;
+        let worst = world.wheel_extremes(OWN_TRAIN)?;
         Some(TrainFigures {
             run_m: self.last_m - first_m,
             stop_error_m: stop_at_m.filter(|_| self.standing).map(|s| self.last_m - s),
             derailed,
             floor_accel_rms_mps2: rms.into(),
-            least_wheel_load_share: worst.least_normal_n / world.wheel_load_n()?,
+            least_wheel_load_share: worst.least_normal_n / world.wheel_load_n(OWN_TRAIN)?,
             most_slip_mps: worst.most_slip_mps,
             energy,
             energy_gap_share: energy.gap_share(),

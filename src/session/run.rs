@@ -11,7 +11,8 @@ use super::ride::Ride;
 use super::shots::{Shot, Shots, What};
 use super::watch::{Costs, Watchers};
 use super::{
-    End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary, TrainPoint,
+    End, Event, Exposure, OWN_TRAIN, Observer, Opening, RunOptions, SessionError, Source, Summary,
+    TrainPoint,
 };
 use crate::bus::{CameraFault, CameraHealth, Frame, SimTime, TrainCommand, TrainReport};
 use crate::scenario::Scenario;
@@ -67,7 +68,7 @@ impl<'s> Run<'s> {
         let radio = Stream::new(seed, 0, "radio");
         let rig = scenario.rig.as_ref();
         let eyes = rig
-            .filter(|_| scenario.physics.train.is_some())
+            .filter(|_| !scenario.physics.trains.is_empty())
             .map(|rig| Eyes::new(scenario, rig, &map));
         let mut health = Health::default();
         let eye_names = EYES.iter().filter(|_| eyes.is_some()).copied();
@@ -130,10 +131,16 @@ impl<'s> Run<'s> {
             tunnel: &self.scenario.tunnel,
             rig: rig.as_ref(),
             wayside: &calibrations,
-            car_half_extents_m: self.world.car_half_extents_m().unwrap_or(Vector3::zeros()),
-            cars: self.world.train().map_or(0, |t| t.world_from_cars.len()),
+            car_half_extents_m: self
+                .world
+                .car_half_extents_m(OWN_TRAIN)
+                .unwrap_or(Vector3::zeros()),
+            cars: self
+                .world
+                .train(OWN_TRAIN)
+                .map_or(0, |t| t.world_from_cars.len()),
             radar: self.motion.has_radar(),
-            protection: self.world.head_m().is_some(),
+            protection: self.world.head_m(OWN_TRAIN).is_some(),
         };
         watchers.each(|o| o.open(&opening))?;
         Ok(())
@@ -162,12 +169,13 @@ impl<'s> Run<'s> {
     }
 
     fn step(&mut self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
-        let before_m = self.world.head_m();
+        let before_m = self.world.head_m(OWN_TRAIN);
         let (world, command) = (&mut self.world, &self.command);
         let hits = world.impacts().len();
-        self.cost.physics.time(|| world.step(command)).0?;
+        self.cost.physics.time(|| world.step(&[*command])).0?;
         let now = self.world.time();
-        for hit in &self.world.impacts()[hits..] {
+        let hits = self.world.impacts()[hits..].iter();
+        for hit in hits.filter(|hit| hit.train == OWN_TRAIN) {
             let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
             watchers.show(&Event::Note(now, &format!("hit {with} at {kmh:.1} km/h")))?;
         }
@@ -184,7 +192,7 @@ impl<'s> Run<'s> {
 
     /// Inertial unit, odometer, radar.
     fn sample_motion(&mut self, watchers: &mut Watchers<'_, '_>) -> Result<(), SessionError> {
-        let samples = self.motion.sample(&self.world);
+        let samples = self.motion.sample(&self.world, OWN_TRAIN);
         let mut positioner = self.eyes.as_mut().map(|e| &mut e.positioner);
         if let (Some(sample), Some(positioner)) = (&samples.imu, &mut positioner) {
             positioner.on_imu(sample);
@@ -209,7 +217,7 @@ impl<'s> Run<'s> {
         before_m: Option<f64>,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        let (Some(before_m), Some(head_m)) = (before_m, self.world.head_m()) else {
+        let (Some(before_m), Some(head_m)) = (before_m, self.world.head_m(OWN_TRAIN)) else {
             return Ok(());
         };
         let tunnel = self.scenario.tunnel.clone();
@@ -239,7 +247,7 @@ impl<'s> Run<'s> {
             let world = &self.world;
             let mut views = eyes
                 .camera
-                .views(number, start, |t| world.vehicle_at(t))
+                .views(number, start, |t| world.vehicle_at(OWN_TRAIN, t))
                 .ok_or(SessionError::PoseForgotten(start.secs()))?;
             let with = eyes.expose(&mut views);
             let shot = Shot {
@@ -279,7 +287,8 @@ impl<'s> Run<'s> {
             What::Pair => Source::Rig,
             What::Wayside(k, _) => Source::Wayside(k),
         };
-        let (bodies, owners) = self.world.owned_bodies(source != Source::Rig);
+        let without = (source == Source::Rig).then_some(OWN_TRAIN);
+        let (bodies, owners) = self.world.owned_bodies(without);
         let train = views.first().and_then(|view| self.train_at(view.mid()));
         let job = Job {
             time: now,
@@ -301,9 +310,9 @@ impl<'s> Run<'s> {
     /// The train at a time of the recent past, by the speed that it has now.
     fn train_at(&self, time: SimTime) -> Option<TrainPoint> {
         Some(TrainPoint {
-            chainage_m: self.world.chainage_at(time)?,
-            speed_mps: self.world.train()?.speed_mps,
-            world_from_vehicle: self.world.vehicle_at(time)?,
+            chainage_m: self.world.chainage_at(OWN_TRAIN, time)?,
+            speed_mps: self.world.train(OWN_TRAIN)?.speed_mps,
+            world_from_vehicle: self.world.vehicle_at(OWN_TRAIN, time)?,
         })
     }
 
@@ -336,7 +345,10 @@ impl<'s> Run<'s> {
             return Ok(());
         };
         let watch = &mut self.cost.stack;
-        let (vehicle_at, head_at) = (|t| world.vehicle_at(t), |t| world.chainage_at(t));
+        let (vehicle_at, head_at) = (
+            |t| world.vehicle_at(OWN_TRAIN, t),
+            |t| world.chainage_at(OWN_TRAIN, t),
+        );
         let read = eyes.read(taken, images, watch, vehicle_at, head_at)?;
         self.stereo_frames += 1;
         if let Some(fix) = read.report.best_fix() {
@@ -403,16 +415,17 @@ impl<'s> Run<'s> {
         now: SimTime,
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
-        if self.world.head_m().is_none() || self.protection_clock.due(now, 0.0).is_none() {
+        if self.world.head_m(OWN_TRAIN).is_none() || self.protection_clock.due(now, 0.0).is_none() {
             return Ok(());
         }
         let protection = &mut self.protection;
         let report = self.cost.stack.time(|| protection.cycle(now)).0;
-        let aim_mps = (self.scenario.physics.train.as_ref())
+        let aim_mps = (self.scenario.physics.trains.first())
             .map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6);
         self.outcome.on_cycle(now, &report, aim_mps);
         self.command = report.command;
-        if let (Some(chainage_m), Some(head_m)) = (report.position_m, self.world.head_m()) {
+        if let (Some(chainage_m), Some(head_m)) = (report.position_m, self.world.head_m(OWN_TRAIN))
+        {
             let train = TrainReport {
                 chainage_m,
                 speed_mps: report.speed_mps,
@@ -430,7 +443,7 @@ impl<'s> Run<'s> {
         watchers: &mut Watchers<'_, '_>,
     ) -> Result<(), SessionError> {
         if self.truth_clock.due(now, 0.0).is_some()
-            && let Some(train) = self.world.train()
+            && let Some(train) = self.world.train(OWN_TRAIN)
         {
             let line = &self.scenario.tunnel.alignment;
             self.outcome.on_motion(&train, &self.world, line);
@@ -443,7 +456,7 @@ impl<'s> Run<'s> {
             watchers.show(&Event::Train(&train, left.as_ref()))?;
         }
         if self.bodies_clock.due(now, 0.0).is_some() {
-            watchers.show(&Event::Bodies(now, &self.world.bodies()))?;
+            watchers.show(&Event::Bodies(now, &self.world.bodies(Some(OWN_TRAIN))))?;
         }
         Ok(())
     }
@@ -466,7 +479,7 @@ impl<'s> Run<'s> {
             a.add(b);
             a
         });
-        let train = self.scenario.physics.train.as_ref();
+        let train = self.scenario.physics.trains.first();
         let stop_at_m = train.and_then(|t| t.stop_at_m);
         let simulated_s = self.world.time().secs();
         let backend = self.shots.backend();

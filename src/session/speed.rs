@@ -9,7 +9,7 @@ use super::eyes::Eyes;
 use super::motion::MotionSensors;
 use super::summary::Cost;
 use super::watch::Stopwatch;
-use super::{RendererChoice, SessionError, renderer};
+use super::{OWN_TRAIN, RendererChoice, SessionError, renderer};
 use crate::bus::{Frame, SimTime, TrainCommand};
 use crate::scenario::{Scenario, ScenarioFile};
 use crate::stack::wayside::WaysideDetector;
@@ -117,20 +117,20 @@ fn train_seconds(
     let mut jobs = Vec::new();
     // One pair more than is timed: the first one also builds what later ones use.
     while jobs.len() <= rounds * ROUND {
-        steps.time(|| world.step(&command)).0?;
+        steps.time(|| world.step(&[command])).0?;
         if steps.times == STEPS {
             times.step_s.push(steps.total_s / STEPS as f64);
             steps = Stopwatch::default();
         }
         let now = world.time();
-        let samples = motion.sample(world);
+        let samples = motion.sample(world, OWN_TRAIN);
         samples.imu.iter().for_each(|s| eyes.positioner.on_imu(s));
         let odometer = samples.odometer.iter();
         odometer.for_each(|s| eyes.positioner.on_odometer(s));
         let Some((number, start)) = eyes.clock.due(now, eyes.camera.delay_s()) else {
             continue;
         };
-        let vehicle_at = |t| world.vehicle_at(t);
+        let vehicle_at = |t| world.vehicle_at(OWN_TRAIN, t);
         let mut views = (eyes.camera.views(number, start, vehicle_at))
             .ok_or(SessionError::PoseForgotten(start.secs()))?;
         let taken = Taken {
@@ -140,7 +140,7 @@ fn train_seconds(
         };
         jobs.push(job(world, views.into()));
         let before_s = stack.total_s;
-        let head_at = |t| world.chainage_at(t);
+        let head_at = |t| world.chainage_at(OWN_TRAIN, t);
         draw(renderer, &jobs[jobs.len() - 1..], |images| {
             Ok(eyes
                 .read(&taken, images, &mut stack, vehicle_at, head_at)
@@ -197,7 +197,7 @@ fn wayside_seconds(
 fn job(world: &World, views: Vec<View>) -> Job {
     Job {
         time: world.time(),
-        bodies: world.bodies(),
+        bodies: world.bodies(Some(OWN_TRAIN)),
         headlights: world.headlights(),
         views,
         ..Job::default()

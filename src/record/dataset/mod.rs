@@ -193,7 +193,7 @@ impl<'a> DataSet<'a> {
     /// Names of the cameras of which a scenario takes images, in the order of their numbers.
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
         let bench = scenario.bench.is_some();
-        let rides = bench || scenario.physics.train.is_some();
+        let rides = bench || !scenario.physics.trains.is_empty();
         let rig = scenario.rig.iter().filter(|_| rides).flat_map(|_| EYES);
         let devices = scenario.wayside.iter().filter(|_| !bench);
         let devices = devices.map(|w| w.calibration.name.clone());

@@ -21,7 +21,7 @@
 //! constant scale that calibration takes out), water and ice, rails and sleepers as lines in the
 //! spectrum, other radars.
 
-use crate::bus::DopplerSample;
+use crate::bus::{DopplerSample, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -145,10 +145,10 @@ impl Doppler {
         1.0 / self.settings.rate_hz
     }
 
-    /// A sample of the time since the last one; `None` without a train, and on the first call,
+    /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the radar.
-    pub fn sample(&mut self, world: &World) -> Option<DopplerSample> {
-        let now = *world.vehicle_motion()?;
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<DopplerSample> {
+        let now = *world.vehicle_motion(train)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }

@@ -14,7 +14,7 @@
 //! Not modelled: missing or double pulses, conicity (the radius where the rail touches), an
 //! eccentric wheel.
 
-use crate::bus::{OdometerSample, SimTime};
+use crate::bus::{OdometerSample, SimTime, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -123,10 +123,10 @@ impl Odometer {
         1.0 / self.settings.rate_hz
     }
 
-    /// A sample now; `None` without a train, or without that wheelset.
-    pub fn sample(&mut self, world: &World) -> Option<OdometerSample> {
+    /// A sample now; `None` without the train that carries it, or without that wheelset.
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<OdometerSample> {
         let axle = (self.settings.axle as usize).saturating_sub(1);
-        Some(self.read(world.time(), world.wheel_run_m(axle)?))
+        Some(self.read(world.time(), world.wheel_run_m(train, axle)?))
     }
 
     /// What the box says when its wheelset's tread has rolled `run_m` since the start.

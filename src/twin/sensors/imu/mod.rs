@@ -19,7 +19,7 @@
 //! bandwidth (330 Hz, above what a car body does), vibration rectification, rate random walk beyond
 //! the drift's slowest part, the Earth's turn (15 deg/h, which the null takes out with the bias).
 
-use crate::bus::ImuSample;
+use crate::bus::{ImuSample, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -257,10 +257,10 @@ impl Imu {
         self.period_s
     }
 
-    /// A sample of the time since the last one; `None` without a train, and on the first call,
+    /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the unit.
-    pub fn sample(&mut self, world: &World) -> Option<ImuSample> {
-        let now = *world.vehicle_motion()?;
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<ImuSample> {
+        let now = *world.vehicle_motion(train)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }
