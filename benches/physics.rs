@@ -1,4 +1,4 @@
-//! What a step of the world costs, by cars of the train and by things that lie about.
+//! What a step of the world costs, by trains, their cars, and things that lie about.
 //!
 //! ```text
 //! cargo bench --bench physics
@@ -14,7 +14,6 @@
     reason = "a benchmark measures time and prints its figures, and may fail by panicking"
 )]
 
-use metrotwin::bus::TrainCommand;
 use metrotwin::track::Tunnel;
 use metrotwin::twin::physics::{ObstacleSettings, PhysicsSettings, TrainSettings, World};
 use std::sync::Arc;
@@ -23,10 +22,10 @@ use std::time::Instant;
 const STEPS: u32 = 2000;
 
 /// Microseconds a step.
-fn cost_us(tunnel: &Arc<Tunnel>, cars: u32, obstacles: u32) -> f64 {
-    let train = TrainSettings {
+fn cost_us(tunnel: &Arc<Tunnel>, trains: u32, cars: u32, obstacles: u32) -> f64 {
+    let train = |k: u32| TrainSettings {
         cars,
-        start_chainage_m: 700.0,
+        start_chainage_m: 700.0 - 200.0 * f64::from(k),
         start_speed_kmh: 60.0,
         ..TrainSettings::default()
     };
@@ -38,19 +37,15 @@ fn cost_us(tunnel: &Arc<Tunnel>, cars: u32, obstacles: u32) -> f64 {
         ..ObstacleSettings::default()
     });
     let settings = PhysicsSettings {
-        train: (cars > 0).then_some(train),
+        trains: (0..trains).map(train).collect(),
         obstacles: lying.collect(),
         ..PhysicsSettings::default()
     };
     let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
-    let command = TrainCommand {
-        permitted_speed_mps: 60.0,
-        ..TrainCommand::default()
-    };
     let mut stretch = |steps: u32| {
         let begin = Instant::now();
         for _ in 0..steps {
-            world.step(&command).unwrap();
+            world.step(&[]).unwrap();
         }
         1e6 * begin.elapsed().as_secs_f64() / f64::from(steps)
     };
@@ -62,16 +57,21 @@ fn cost_us(tunnel: &Arc<Tunnel>, cars: u32, obstacles: u32) -> f64 {
 fn main() {
     let text = include_str!("../tunnels/chengdu_line1.toml");
     let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
-    let report = |cars, obstacles| {
-        let us = cost_us(&tunnel, cars, obstacles);
-        println!("{cars:4}  {obstacles:9}  {us:7.1}  {:15.0}", 1000.0 / us);
+    let report = |trains, cars, obstacles| {
+        let us = cost_us(&tunnel, trains, cars, obstacles);
+        let faster = 1000.0 / us;
+        println!("{trains:6}  {cars:4}  {obstacles:9}  {us:7.1}  {faster:15.0}");
+        us
     };
-    println!("cars  obstacles  us/step  times real time");
-    for cars in [0, 1, 2, 4, 6, 8] {
-        report(cars, 0);
+    println!("trains  cars  obstacles  us/step  times real time");
+    report(0, 0, 0);
+    for cars in [1, 2, 4, 6, 8] {
+        report(1, cars, 0);
     }
     for obstacles in [1, 10, 100, 500] {
-        report(0, obstacles);
-        report(6, obstacles);
+        report(0, 0, obstacles);
+        report(1, 6, obstacles);
     }
+    let ratio = report(2, 6, 0) / report(1, 6, 0);
+    println!("two trains of six cars cost {ratio:.2} times as much as one");
 }

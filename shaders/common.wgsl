@@ -6,7 +6,7 @@ const PI: f32 = 3.14159265;
 const NEAR_M: f32 = 0.05;
 // The largest number of half precision, in which signals are kept.
 const BRIGHTEST_E: f32 = 65504.0;
-const MAX_HEADLIGHTS: u32 = 8u;
+const MAX_HEADLIGHTS: u32 = 16u;
 
 struct Headlight {
     // Relative to the view's reference point.

@@ -66,7 +66,7 @@ override OTHERS: bool = true;
 @group(0) @binding(6) var<uniform> slabs: array<Slab, MAX_SLABS>;
 
 const MAX_WORDS: u32 = 16384u;
-const MAX_SOURCES: u32 = 128u;
+const MAX_SOURCES: u32 = 136u;
 const MAX_BLOCKERS: u32 = 512u;
 const MAX_SLABS: u32 = 1024u;
 const PLACES: u32 = 16u;

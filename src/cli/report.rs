@@ -104,9 +104,8 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         "{:.1} s on `{}`, seed {}",
         scenario.duration_s, scenario.tunnel.name, scenario.seed
     ));
-    let own = scenario.physics.train.iter().map(|t| ("train", t));
-    let others = scenario.physics.other_trains.iter();
-    for (what, train) in own.chain(others.map(|t| ("other train", t))) {
+    for (k, train) in scenario.physics.trains.iter().enumerate() {
+        let what = if k == 0 { "train" } else { "other train" };
         let stop = train
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));

@@ -181,8 +181,7 @@ fn observed(
     let mut file = (!args.no_recording)
         .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.record));
     let mut fixes = scenario
-        .rig
-        .as_ref()
+        .rig()
         .map(|_| FixTable::to_file(&out.join("fixes.csv")));
     let mut observers: Vec<&mut dyn Observer> = vec![errors];
     observers.extend(file.as_mut().map(|r| r as &mut dyn Observer));

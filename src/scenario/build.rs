@@ -209,11 +209,13 @@ impl Scenario {
 
         let mut problems = Vec::new();
         let folder = path.parent().unwrap_or(Path::new(""));
-        let own = file.train.iter_mut().map(|t| ("train".to_owned(), t));
-        let others = file.other_trains.iter_mut().enumerate();
-        let others = others.map(|(k, t)| (format!("other_trains[{k}]"), t));
-        for (at, train) in own.chain(others) {
-            load_vehicle(folder, (key_below(&at, "vehicle"), train), &mut problems)?;
+        let keys: Vec<_> = (0..file.trains().count())
+            .map(|k| file.train_key(k))
+            .collect();
+        let trains = file.train.iter_mut().chain(&mut file.other_trains);
+        for (at, train) in keys.iter().zip(trains) {
+            let key = key_below(at, "vehicle");
+            load_vehicle(folder, (key, train), &mut problems)?;
         }
         read_meshes(&mut file, folder, &mut problems);
         // What could not be read would be missed once more.

@@ -2,7 +2,7 @@
 
 use super::WaysidePost;
 use super::file::{ScenarioFile, WaysidePostSettings};
-use crate::track::{Problem, Tunnel, did_you_mean};
+use crate::track::{Direction, Problem, Tunnel, did_you_mean};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{RigSettings, ever_sees};
 
@@ -15,7 +15,15 @@ pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         let key = "stop_after_standstill_s";
         Problem::unless_within(problems, key, standstill, 0.0..=86_400.0, "s");
     }
-    file.physics().check("", problems);
+    if file.train.is_none() && !file.other_trains.is_empty() {
+        problems.push(Problem::new(
+            "other_trains",
+            "there is no first train that they are added to",
+            "call the first of them [train]",
+        ));
+    } else {
+        file.physics().check("", problems);
+    }
     file.survey.check("survey", problems);
     file.imu.check("imu", problems);
     file.odometer.check("odometer", problems);
@@ -284,28 +292,38 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
 
 /// Each on the line, and no two in the same place.
 fn check_trains(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
-    let own = file.train.iter().map(|train| ("train".to_owned(), train));
-    let others = file.other_trains.iter().enumerate();
-    let others = others.map(|(k, train)| (format!("other_trains[{k}]"), train));
-    let trains: Vec<_> = own.chain(others).collect();
-    for (k, (at, train)) in trains.iter().enumerate() {
-        check_train(at, train, file.duration_s, tunnel, problems);
-        let taken = |train: &TrainSettings| {
-            let head_m = train.start_chainage_m;
-            (head_m - train.length_m(), head_m)
-        };
-        let (tail_m, head_m) = taken(train);
-        let before = trains[..k].iter().find(|(_, other)| {
-            let (other_tail_m, other_head_m) = taken(other);
-            tail_m < other_head_m && other_tail_m < head_m
+    for (k, train) in file.trains().enumerate() {
+        let at = file.train_key(k);
+        check_train(&at, train, file.duration_s, tunnel, problems);
+        let [from_m, to_m] = stands_m(train);
+        let before = file.trains().take(k).position(|other| {
+            let [other_from_m, other_to_m] = stands_m(other);
+            from_m < other_to_m && other_from_m < to_m
         });
-        if let Some((other, _)) = before {
+        if let Some(other) = before.map(|other| file.train_key(other)) {
             problems.push(Problem::new(
                 format!("{at}.start_chainage_m"),
-                format!("it stands from {tail_m:.1} to {head_m:.1} m, where `{other}` stands too"),
+                format!("it stands from {from_m:.1} to {to_m:.1} m, where `{other}` stands too"),
                 "start them clear of each other",
             ));
         }
+    }
+}
+
+/// Which way it runs, in words.
+fn way(train: &TrainSettings) -> &'static str {
+    match train.direction {
+        Direction::Up => "up",
+        Direction::Down => "down",
+    }
+}
+
+/// Where a train stands at the start.
+fn stands_m(train: &TrainSettings) -> [f64; 2] {
+    let head_m = train.start_chainage_m;
+    match train.direction {
+        Direction::Up => [head_m - train.length_m(), head_m],
+        Direction::Down => [head_m, head_m + train.length_m()],
     }
 }
 
@@ -322,25 +340,31 @@ fn check_train(
     let head_m = train.start_chainage_m;
     let length_m = train.length_m();
     inside_line(&start_key, "the train head", head_m, tunnel, problems);
-    if head_m < length_m {
+    let (begins_outside, first_m) = match train.direction {
+        Direction::Up => (head_m < length_m, length_m),
+        Direction::Down => (head_m > end_m - length_m, end_m - length_m),
+    };
+    let way = way(train);
+    if begins_outside {
         problems.push(Problem::new(
             start_key,
             format!("with its head at {head_m} m a train of {length_m:.1} m begins outside"),
-            format!("start at {length_m:.1} m or further up the line"),
+            format!("start at {first_m:.1} m or further {way} the line"),
         ));
     }
     if let Some(stop_m) = train.stop_at_m {
         inside_line(&stop_key, "the train head", stop_m, tunnel, problems);
     } else {
-        let reach_m = head_m + farthest_run_m(train, duration_s);
-        if reach_m > end_m {
+        let reach_m = head_m + train.direction.sign() * farthest_run_m(train, duration_s);
+        if !(0.0..=end_m).contains(&reach_m) {
+            let last_m = reach_m.clamp(0.0, end_m);
             problems.push(Problem::new(
                 stop_key,
                 format!(
                     "it is not given, and in {duration_s} s the train can get to {reach_m:.0} m, \
-                     past the end of the tunnel at {end_m:.0} m"
+                     past the end of the tunnel at {last_m:.0} m"
                 ),
-                format!("give a stop_at_m up to {end_m:.0} m, or shorten duration_s"),
+                format!("give a stop_at_m {way} to {last_m:.0} m, or shorten duration_s"),
             ));
         }
     }
@@ -540,6 +564,7 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::bus::TrainId;
     use crate::track::read_toml;
     use crate::twin::render::gpu::layout::MAX_HEADLIGHTS;
 
@@ -615,10 +640,9 @@ mod tests {
     fn all_headlights_light_a_picture() {
         let keys =
             |others: usize| keys(&format!("[train]\n{}", "[[other_trains]]\n".repeat(others)));
-        assert_eq!(keys(3), [""; 0]);
-        assert_eq!(keys(4), ["other_trains"]);
-        let (trains, headlights) = (1 + 3, 2);
-        assert_eq!(trains * headlights, MAX_HEADLIGHTS);
+        assert_eq!(keys(7), [""; 0]);
+        assert_eq!(keys(8), ["other_trains"]);
+        assert_eq!(TrainId::MOST * 2, MAX_HEADLIGHTS);
     }
 
     /// Two trains in one place would burst apart.

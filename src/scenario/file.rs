@@ -11,7 +11,7 @@ use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
 use crate::twin::physics::{
     CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, TrackSettings, TrainSettings,
-    WorkerSettings,
+    WorkerSettings, train_key,
 };
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -55,7 +55,7 @@ pub struct ScenarioFile {
     /// The train and how it is driven. Default: no train.
     #[serde(default)]
     pub train: Option<TrainSettings>,
-    /// Other trains on the line, up to three: each with a driver of its own, whom nothing supervises.
+    /// Other trains on the line, up to seven: each with a driver of its own, whom nothing supervises.
     /// Default: none.
     #[serde(default)]
     pub other_trains: Vec<TrainSettings>,
@@ -302,13 +302,22 @@ impl ScenarioFile {
         tunnel.chain(vehicles).chain(meshes).collect()
     }
 
+    /// All trains, by number.
+    pub(super) fn trains(&self) -> impl Iterator<Item = &TrainSettings> {
+        self.train.iter().chain(&self.other_trains)
+    }
+
+    /// Key of the `k`-th of [`Self::trains`].
+    pub(super) fn train_key(&self, k: usize) -> String {
+        train_key(k + usize::from(self.train.is_none()))
+    }
+
     /// What the physics is made from.
     pub(super) fn physics(&self) -> PhysicsSettings {
         PhysicsSettings {
             step_s: self.step_s,
             track: self.track.clone(),
-            train: self.train.clone(),
-            other_trains: self.other_trains.clone(),
+            trains: self.trains().cloned().collect(),
             obstacles: self.obstacles.clone(),
             cables: self.cables.clone(),
             workers: self.workers.clone(),

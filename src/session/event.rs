@@ -5,7 +5,7 @@ use crate::bus::{
     WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
-use crate::twin::physics::{Belonging, TrainState};
+use crate::twin::physics::{BodyLabel, TrainState};
 use crate::twin::render::{Body, Job};
 use nalgebra::{Isometry3, Vector3};
 
@@ -61,7 +61,7 @@ pub struct Exposure<'a> {
     /// The scene and the views, as the renderer is given them.
     pub job: &'a Job,
     /// Owners of the job's bodies, in order.
-    pub owners: &'a [Belonging<'a>],
+    pub owners: &'a [BodyLabel<'a>],
     /// The train in the middle of the exposure of the first view's middle row.
     pub train: Option<TrainPoint>,
 }

@@ -4,9 +4,6 @@ use super::summary::{CameraFigures, FaultSpan};
 use crate::bus::{CameraFault, CameraHealth, SimTime};
 use std::collections::BTreeMap;
 
-/// Names of the rig's eyes, left then right.
-pub const EYES: [&str; 2] = ["rig.left", "rig.right"];
-
 /// Follows every camera that the stack looks through.
 #[derive(Debug, Default)]
 pub struct Health {

@@ -375,7 +375,7 @@ impl<'s> Session<'s> {
             observers.show(&Event::Message(node, &message))?;
         }
         let equipment = &mut self.equipment;
-        let hand_on = || {
+        let mut hand_on = || {
             let own = equipment.iter_mut().filter(|e| e.node == *node);
             own.for_each(|e| e.equipment.on(&message));
         };

@@ -17,6 +17,8 @@ use crate::bus::{CameraFault, CameraHealth, Frame, SimTime};
 pub struct CameraWatch {
     size_px: (u32, u32),
     repeats_allowed: bool,
+    /// When it was first asked about silence.
+    watched_since: Option<SimTime>,
     last: Option<Seen>,
 }
 
@@ -42,6 +44,7 @@ impl CameraWatch {
         Self {
             size_px,
             repeats_allowed,
+            watched_since: None,
             last: None,
         }
     }
@@ -74,14 +77,15 @@ impl CameraWatch {
         CameraHealth { fault, lost }
     }
 
-    /// Whether the last frame is longer ago than `patience_s`, and than a camera of its rate may
+    /// Whether the last frame is longer ago than `limit_s`, and than a camera of its rate may
     /// take.
-    pub fn silence(&self, now: SimTime, patience_s: f64) -> bool {
+    pub fn silence(&mut self, now: SimTime, limit_s: f64) -> bool {
+        let since = *self.watched_since.get_or_insert(now);
         let (heard, usual_s) = match self.last {
             Some(last) => (last.start, MISSING * last.interval_s),
-            None => (SimTime::ZERO, STARTING_S),
+            None => (since, STARTING_S),
         };
-        now.since(heard) > patience_s.max(usual_s)
+        now.since(heard) > limit_s.max(usual_s)
     }
 }
 
@@ -200,6 +204,7 @@ mod tests {
     fn silence_is_longer_than_patience_and_rate() {
         let mut watch = CameraWatch::new((33, 7), false);
         let at = SimTime::from_secs;
+        assert!(!watch.silence(at(0.0), 0.5));
         assert!(!watch.silence(at(4.9), 0.5) && watch.silence(at(5.1), 0.5));
         for (number, start_s) in [(0, 0.0), (1, 0.1), (3, 0.3)] {
             let mut frame = frame(number, &image(number));

@@ -1,6 +1,6 @@
 //! The figures of a run that a study keeps, each with its unit and meaning.
 
-use crate::bus::Method;
+use crate::bus::{Method, TrainId};
 use crate::record::parquet::Kind;
 use crate::session::{
     Distribution, Event, Observer, ObserverError, ObstacleScore, Opening, Summary, Wayside,
@@ -49,7 +49,7 @@ impl Observer for Fixes {
     }
 
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        let Event::Pair(_, report, truths_m) = event else {
+        let Event::Pair(TrainId(0), _, report, truths_m) = event else {
             return Ok(());
         };
         for (fix, truth_m) in report.fixes.iter().zip(*truths_m) {

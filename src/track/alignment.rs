@@ -23,6 +23,7 @@ pub use profile::Grade;
 
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use profile::{Parabola, profile};
+use std::f64::consts::PI;
 
 /// One element of the plan: curvature runs linearly from `start_per_m` to `end_per_m`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -209,6 +210,19 @@ impl Piece {
         terms.fold((0.0, 0.0), |(x, y), (cx, cy)| (x * ds + cx, y * ds + cy))
     }
 
+    /// The piece from here to `end_m` of a line of `length_m`, as met from its other end.
+    fn reversed(&self, end_m: f64, length_m: f64) -> Self {
+        let ds = end_m - self.s0;
+        let opposite = |end: f64, rate: f64| Linear { start: -end, rate };
+        Self::new(
+            length_m - end_m,
+            self.position(ds),
+            self.heading(ds) + PI,
+            opposite(self.curvature(ds), self.curvature_rate),
+            opposite(self.cant(ds), self.cant_rate),
+        )
+    }
+
     /// The piece that begins `ds` further.
     fn next(&self, ds: f64, curvature: Linear, cant: Linear) -> Self {
         let (s0, heading0) = (self.s0 + ds, self.heading(ds));
@@ -236,6 +250,19 @@ impl Linear {
             rate,
         }
     }
+}
+
+/// A chain from its last stretch to its first, each turned round knowing where it ends. The last one
+/// runs on for ever, and so does the first one of the result: it ends, and begins, in one place.
+fn backwards<T>(chain: &[T], begin_m: impl Fn(&T) -> f64, turn: impl Fn(&T, f64) -> T) -> Vec<T> {
+    let ends_m = chain.iter().skip(1).chain(chain.last()).map(begin_m);
+    let mut turned: Vec<T> = chain
+        .iter()
+        .zip(ends_m)
+        .map(|(t, end_m)| turn(t, end_m))
+        .collect();
+    turned.reverse();
+    turned
 }
 
 /// How many pieces an element needs.
@@ -317,6 +344,23 @@ impl Alignment {
             plan,
             profile: profile(start.z, grades),
             length_m: begin_m,
+        }
+    }
+
+    /// The same line as met by who runs down it: chainage counts from its end, its left is right.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let length_m = self.length_m;
+        let plan = backwards(&self.plan, |p| p.s0, |p, end_m| p.reversed(end_m, length_m));
+        let profile = backwards(
+            &self.profile,
+            |p| p.s0,
+            |p, end_m| p.reversed(end_m, length_m),
+        );
+        Self {
+            plan,
+            profile,
+            length_m,
         }
     }
 

@@ -54,6 +54,7 @@ mod furniture;
 mod gauge;
 mod place;
 mod problem;
+mod reversal;
 mod route;
 mod section;
 pub mod uid;

@@ -51,6 +51,7 @@ pub use files::{clear, is_empty};
 pub use plan::{NoSuchPart, Part, Parts, Plan};
 
 use super::stream::failed;
+use crate::bus::TrainId;
 use crate::record::parquet::{Column, Table, Value};
 use crate::scenario::Scenario;
 use crate::scenario::draw::sha256;
@@ -193,12 +194,9 @@ impl<'a> DataSet<'a> {
     /// Names of the cameras of which a scenario takes images, in the order of their numbers.
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
         let bench = scenario.bench.is_some();
-        let rides = bench || scenario.physics.train.is_some();
-        let rig = scenario
-            .rig()
-            .into_iter()
-            .filter(|_| rides)
-            .flat_map(|_| EYES);
+        let rides = bench || !scenario.physics.trains.is_empty();
+        let rig = scenario.rig().into_iter();
+        let rig = rig.filter(|_| rides).flat_map(|_| EYES);
         let devices = scenario.wayside.iter().filter(|_| !bench);
         let devices = devices.map(|w| w.calibration.name.clone());
         rig.map(str::to_owned).chain(devices).collect()

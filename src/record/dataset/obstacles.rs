@@ -5,7 +5,7 @@ use super::coco::Mask;
 use crate::record::parquet::Kind::{Flag, Int, Real, Text};
 use crate::record::parquet::{Column, Value, column};
 use crate::track::{Alignment, Gauge};
-use crate::twin::physics::{Belonging, BodyOwner};
+use crate::twin::physics::{BodyLabel, BodyOwner};
 use crate::twin::render::cpu::{Labels, SIGHT_M, Sight, Surface, Whole, whole};
 use crate::twin::render::{Body, Job};
 use image::{ImageBuffer, Luma};
@@ -127,11 +127,11 @@ const CARS: usize = 100;
 /// The owner's number in masks and tables, and its category.
 fn identity(owner: BodyOwner) -> (u32, usize) {
     let (id, category) = match owner {
-        BodyOwner::Thing(k) => (1 + k, 0),
+        BodyOwner::Obstacle(k) => (1 + k, 0),
         BodyOwner::Cable(k) => (CABLES + k, 1),
         BodyOwner::Worker(k) => (WORKERS + k, 2),
         BodyOwner::Load(k) => (LOADS + k, 0),
-        BodyOwner::Car(train, car) => (TRAINS + CARS * train + car, 3),
+        BodyOwner::Car(train, car) => (TRAINS + CARS * train.index() + car, 3),
     };
     (id.min(usize::from(u16::MAX)) as u32, category)
 }
@@ -348,7 +348,7 @@ fn bounds(
 }
 
 /// Owners with names of their own, to be kept.
-pub(super) fn kept(owners: &[Belonging<'_>]) -> Vec<(BodyOwner, String)> {
+pub(super) fn kept(owners: &[BodyLabel<'_>]) -> Vec<(BodyOwner, String)> {
     owners
         .iter()
         .map(|b| (b.owner, b.name.to_owned()))

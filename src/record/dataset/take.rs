@@ -303,7 +303,7 @@ mod tests {
         let list = |owners: &[BodyOwner]| -> Vec<_> {
             owners.iter().map(|o| (*o, String::new())).collect()
         };
-        let (thing, worker) = (BodyOwner::Thing, BodyOwner::Worker(0));
+        let (thing, worker) = (BodyOwner::Obstacle, BodyOwner::Worker(0));
         let now = list(&[thing(0), thing(1), worker, worker]);
         let then = list(&[thing(1), thing(2), worker, worker]);
         assert_eq!(successors(&now, &then), [None, Some(0), Some(2), Some(3)]);

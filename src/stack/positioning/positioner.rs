@@ -157,9 +157,10 @@ impl LedPositioner {
     }
 
     /// Whether no pair has come for so long that there must be something wrong.
-    pub fn is_silent(&self, now: SimTime) -> bool {
-        let patience_s = self.settings.silent_after_s;
-        self.watches.iter().all(|w| w.silence(now, patience_s))
+    pub fn is_silent(&mut self, now: SimTime) -> bool {
+        let limit_s = self.settings.silent_after_s;
+        let [left, right] = self.watches.each_mut().map(|w| w.silence(now, limit_s));
+        left && right
     }
 
     /// Rows are timed by the exposure that each eye says it had, which may differ from the sheet's. A

@@ -31,6 +31,17 @@ impl Parabola {
             self.slope0 + self.bend_per_m * d,
         )
     }
+
+    /// The stretch from here to `end_m` of a line of `length_m`, as met from its other end.
+    pub fn reversed(&self, end_m: f64, length_m: f64) -> Self {
+        let (z0, slope) = self.at(end_m);
+        Self {
+            s0: length_m - end_m,
+            z0,
+            slope0: -slope,
+            bend_per_m: self.bend_per_m,
+        }
+    }
 }
 
 /// Grades and the parabolas between them as one chain. Every vertical curve adds its bend where

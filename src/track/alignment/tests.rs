@@ -234,3 +234,31 @@ fn ends_run_on_straight() {
     assert!((beyond.origin - truth).norm() < 1e-9);
     assert!((line.at(-3.0).heading_rad - 0.7).abs() < 1e-15);
 }
+
+/// Provokes: a place, heading, curvature, slope or cant of the reversed line that is not the line's,
+/// within it and beyond its ends.
+#[test]
+fn the_reversed_line_is_the_same_curve() {
+    let line = winding();
+    let reversed = line.reversed();
+    let twice = reversed.reversed();
+    let length_m = line.length_m();
+    assert!((reversed.length_m() - length_m).abs() < 1e-12);
+    for k in 0..2000 {
+        let s = -50.0 + (length_m + 100.0) * (0.618_034 * f64::from(k)).fract();
+        let (a, b, c) = (line.at(s), reversed.at(length_m - s), twice.at(s));
+        assert!((a.origin - b.origin).norm() < 1e-9, "{s}");
+        assert!((a.ahead() + b.ahead()).norm() < 1e-12, "{s}");
+        assert!((a.slope + b.slope).abs() < 1e-12, "{s}");
+        assert!((a.curvature_per_m + b.curvature_per_m).abs() < 1e-12);
+        assert!((a.roll_rad + b.roll_rad).abs() < 1e-12, "{s}");
+        let turn = a.world_from_rails().rotation.inverse() * b.world_from_rails().rotation;
+        assert!((turn * Vector3::x() + Vector3::x()).norm() < 1e-9, "{s}");
+        assert!((turn * Vector3::z() - Vector3::z()).norm() < 1e-9, "{s}");
+        assert!((a.origin - c.origin).norm() < 1e-9, "{s}");
+        assert!((a.ahead() - c.ahead()).norm() < 1e-9, "{s}");
+        assert!((a.slope - c.slope).abs() < 1e-9, "{s}");
+        assert!((a.curvature_per_m - c.curvature_per_m).abs() < 1e-9);
+        assert!((a.roll_rad - c.roll_rad).abs() < 1e-9, "{s}");
+    }
+}

@@ -10,8 +10,8 @@ use super::cable_settings::CableSettings;
 
 use super::catenary::Catenary;
 use super::convert::{isometry, point3, pose, vector3};
-use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUP, groups};
-use super::owner::Owner;
+use super::entity::Entity;
+use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUPS, groups};
 use super::thing::{RESTING_MPS, Rest};
 use crate::bus::SimTime;
 use crate::track::Alignment;
@@ -61,7 +61,7 @@ impl Cable {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         settings: &CableSettings,
-        owner: Owner,
+        entity: Entity,
     ) -> Self {
         let [from, to] =
             [&settings.from, &settings.to].map(|end| alignment.world_from_track(end.place()));
@@ -70,7 +70,7 @@ impl Cable {
         let curve: Vec<Point3<f64>> = Catenary::new(from, to, settings.length_m)
             .points(count)
             .collect();
-        Self::along(world, settings, &curve, owner)
+        Self::along(world, settings, &curve, entity)
     }
 
     /// A cable whose joints are at the points of a curve.
@@ -78,13 +78,13 @@ impl Cable {
         world: &mut PhysicsWorld,
         settings: &CableSettings,
         curve: &[Point3<f64>],
-        owner: Owner,
+        entity: Entity,
     ) -> Self {
         let count = curve.len() - 1;
         let links: Vec<Link> = (curve.windows(2).enumerate())
             .map(|(k, ends)| {
                 let end = k == 0 || k + 1 == count;
-                insert_link(world, settings, [ends[0], ends[1]], end, owner)
+                insert_link(world, settings, [ends[0], ends[1]], end, entity)
             })
             .collect();
         let joints = (0..=count).map(|k| {
@@ -235,7 +235,7 @@ impl Cable {
 
 /// What a link touches; the pieces at its ends do not touch the wall that they are fixed to.
 fn touching(at_wall: bool) -> InteractionGroups {
-    let others = TRAIN_GROUP | SOLID_GROUP;
+    let others = TRAIN_GROUPS | SOLID_GROUP;
     let of = if at_wall {
         others
     } else {
@@ -249,7 +249,7 @@ fn insert_link(
     settings: &CableSettings,
     ends: [Point3<f64>; 2],
     at_wall: bool,
-    owner: Owner,
+    entity: Entity,
 ) -> Link {
     let along = ends[1] - ends[0];
     let half_m = 0.5 * along.norm();
@@ -262,7 +262,7 @@ fn insert_link(
             .pose(pose(&place))
             .linear_damping(settings.drag_per_s())
             .angular_damping(TWIST_PER_S)
-            .user_data(owner.id())
+            .user_data(entity.user_data())
             .additional_solver_iterations(CHAIN_PASSES),
     );
     if let Some(body) = world.bodies.get_mut(body) {
@@ -273,7 +273,7 @@ fn insert_link(
         .mass(2.0 * half_m * settings.mass_kg_per_m)
         .friction(settings.friction)
         .restitution(0.0)
-        .user_data(owner.id())
+        .user_data(entity.user_data())
         .collision_groups(touching(at_wall));
     world.insert_collider(collider, Some(body));
     Link { body, half_m }

@@ -3,23 +3,22 @@
 
 use super::PhysicsError;
 use super::convert::{isometry, vector, vector3};
+use super::directed_track::DirectedTrack;
 use super::driver::{Effort, Instruments};
 use super::energy::{EnergyBook, Ledger};
-use super::groups::{OBSTACLE_GROUP, OTHER_TRAIN_GROUP, TRAIN_GROUP, groups};
+use super::entity::{Entity, train_name};
+use super::groups::{self, train_group};
 use super::history::VehicleMotion;
-use super::line::Line;
-use super::owner::Owner;
-use super::placement::{self, AXLES, BODIES, Part};
+use super::placement::{BODIES, BodyKind, body_name, place_train, wheelset_of};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
-use super::vehicle::{GRAVITY_MPS2, Mass, Vehicle};
+use super::vehicle::{AXLES, GRAVITY_MPS2, Mass, Vehicle};
 use super::wheelset::{Drive, WheelExtremes, Wheelset};
-use crate::bus::SimTime;
-use crate::track::Tunnel;
+use crate::bus::{SimTime, TrainId};
 use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::prelude::{
-    ColliderBuilder, ColliderHandle, MassProperties, PhysicsWorld, RigidBodyBuilder,
+    ColliderBuilder, ColliderHandle, Group, MassProperties, PhysicsWorld, RigidBodyBuilder,
     RigidBodyHandle,
 };
 
@@ -33,6 +32,7 @@ const HOLD_PER_S: f64 = 50.0;
 /// The train.
 #[derive(Clone)]
 pub(super) struct Consist {
+    id: TrainId,
     pub vehicle: Vehicle,
     pub settings: TrainSettings,
     pub wheelsets: Vec<Wheelset>,
@@ -58,19 +58,20 @@ impl Consist {
     /// Puts the train on the track with its head at a chainage, running.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        line: &Line<'_>,
+        track: &DirectedTrack,
         settings: &TrainSettings,
         head_m: f64,
-        owner: Option<Owner>,
+        id: TrainId,
     ) -> Self {
         let vehicle = settings.vehicle();
-        let alignment = line.alignment;
+        let alignment = track.alignment();
         let speed_mps = settings.start_speed_kmh / 3.6;
-        let cars = placement::train(&vehicle, line, settings.cars, head_m, speed_mps);
+        let cars = place_train(&vehicle, track, settings.cars, head_m, speed_mps);
         let Some(previous) = cars.first().map(|car| car[0]) else {
             unreachable!("a train has at least one car: the settings are checked");
         };
         let mut consist = Self {
+            id,
             vehicle,
             settings: settings.clone(),
             wheelsets: Vec::new(),
@@ -87,7 +88,7 @@ impl Consist {
             start_potential_j: 0.0,
         };
         for car in &cars {
-            consist.insert(world, car, owner);
+            consist.insert(world, car);
             for state in &car[3..] {
                 let p = super::convert::point3(state.position);
                 let s_m = alignment.track_from_world(&p, head_m).s_m;
@@ -99,17 +100,7 @@ impl Consist {
     }
 
     /// The bodies of a car, and the box that hits things.
-    fn insert(
-        &mut self,
-        world: &mut PhysicsWorld,
-        states: &[BodyState; BODIES],
-        owner: Option<Owner>,
-    ) {
-        let touching = match owner {
-            None => groups(TRAIN_GROUP, OBSTACLE_GROUP | OTHER_TRAIN_GROUP),
-            Some(_) => groups(OTHER_TRAIN_GROUP, OBSTACLE_GROUP | TRAIN_GROUP),
-        };
-        let id = owner.map_or(0, Owner::id);
+    fn insert(&mut self, world: &mut PhysicsWorld, states: &[BodyState; BODIES]) {
         for (k, state) in states.iter().enumerate() {
             let Mass { kg, kg_m2 } = self.mass(k);
             let body = RigidBodyBuilder::dynamic()
@@ -117,9 +108,8 @@ impl Consist {
                 .linvel(state.velocity)
                 .angvel(state.angular)
                 .additional_mass_properties(MassProperties::new(Vector::ZERO, kg, kg_m2))
-                .gyroscopic_forces_enabled(matches!(Part::of(k), Part::Wheelset))
-                .can_sleep(false)
-                .user_data(if k == 0 { id } else { 0 });
+                .gyroscopic_forces_enabled(matches!(BodyKind::of(k), BodyKind::Wheelset))
+                .can_sleep(false);
             self.handles.push(world.insert_body(body));
         }
         let half = self.half_extents_m();
@@ -128,19 +118,29 @@ impl Consist {
             .density(0.0)
             .friction(0.3)
             .restitution(0.1)
-            .collision_groups(touching)
-            .user_data(id);
+            .collision_groups(groups::train(self.id))
+            // By default a body is of every group, and nobody could keep out of its way.
+            .solver_groups(groups::groups(train_group(self.id), Group::ALL))
+            .user_data(Entity::Train(self.id).user_data());
         let car = self.handles[self.handles.len() - BODIES];
         self.colliders
             .push(world.insert_collider(collider, Some(car)));
     }
 
+    /// Of body `k`, for messages.
+    fn body_name(&self, k: usize) -> String {
+        match self.id.index() {
+            0 => body_name(k),
+            _ => format!("{} of {}", body_name(k), train_name(self.id)),
+        }
+    }
+
     /// Of body `k`.
     fn mass(&self, k: usize) -> Mass {
-        match Part::of(k) {
-            Part::Body => self.vehicle.car,
-            Part::Bogie => self.vehicle.bogie,
-            Part::Wheelset => self.vehicle.wheelset,
+        match BodyKind::of(k) {
+            BodyKind::Car => self.vehicle.car,
+            BodyKind::Bogie => self.vehicle.bogie,
+            BodyKind::Wheelset => self.vehicle.wheelset,
         }
     }
 
@@ -184,15 +184,15 @@ impl Consist {
     }
 
     /// What the driver goes by.
-    pub(super) fn instruments(&self, time: SimTime, tunnel: &Tunnel) -> Instruments {
+    pub(super) fn instruments(&self, time: SimTime, track: &DirectedTrack) -> Instruments {
         let v = &self.vehicle;
-        let slope = tunnel.alignment.at(self.middle_m()).slope;
+        let slope = track.alignment().at(self.middle_m()).slope;
         let share = v.total_kg() / v.effective_kg();
         Instruments {
             time_s: time.secs(),
             chainage_m: self.head_chainage_m(),
             speed_mps: self.speed_mps(),
-            resistance_mps2: self.davis_mps2(tunnel) + GRAVITY_MPS2 * slope * share,
+            resistance_mps2: self.davis_mps2(track) + GRAVITY_MPS2 * slope * share,
         }
     }
 
@@ -204,9 +204,9 @@ impl Consist {
 
     /// Running resistance as a deceleration, without gradients and curves: those take theirs by
     /// weight and by creep.
-    fn davis_mps2(&self, tunnel: &Tunnel) -> f64 {
+    fn davis_mps2(&self, track: &DirectedTrack) -> f64 {
         let (s, v) = (&self.settings, self.speed_mps().abs());
-        let confined = match tunnel.section_at(self.middle_m()) {
+        let confined = match track.tunnel.section_at(self.middle_m()) {
             Some(_) => s.tunnel_factor,
             None => 1.0,
         };
@@ -217,17 +217,16 @@ impl Consist {
     pub(super) fn apply_forces(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
-        line: &Line<'_>,
+        track: &DirectedTrack,
         effort: Effort,
         dt_s: f64,
     ) {
         self.previous = self.states[0];
         self.wrenches.fill(Wrench::default());
         self.ledger = Ledger::default();
-        let davis_mps2 = self.davis_mps2(tunnel);
+        let davis_mps2 = self.davis_mps2(track);
         for k in 0..self.settings.cars as usize {
-            self.car_forces(k, line, effort, dt_s);
+            self.car_forces(k, track, effort, dt_s);
             self.resist(k, davis_mps2);
         }
         self.coupler_forces();
@@ -243,7 +242,7 @@ impl Consist {
     }
 
     /// Suspension, rails, traction and brakes of car `k`.
-    fn car_forces(&mut self, k: usize, line: &Line<'_>, effort: Effort, dt_s: f64) {
+    fn car_forces(&mut self, k: usize, track: &DirectedTrack, effort: Effort, dt_s: f64) {
         let v = &self.vehicle;
         let share_kg = 0.25 * v.effective_kg();
         let drive = Drive {
@@ -274,7 +273,7 @@ impl Consist {
                     self.primary_travel_m = travel_m;
                 }
                 let wheelset = &mut self.wheelsets[AXLES * k + w];
-                let torque = wheelset.apply(v, line, drive, (state, wrench), ledger, dt_s);
+                let torque = wheelset.apply(v, track, drive, (state, wrench), ledger, dt_s);
                 bogies[b].torque -= torque;
             }
         }
@@ -314,7 +313,7 @@ impl Consist {
     pub(super) fn read(&mut self, world: &PhysicsWorld, time: SimTime) -> Result<(), PhysicsError> {
         for (k, (handle, state)) in self.handles.iter().zip(&mut self.states).enumerate() {
             let Some(body) = world.bodies.get(*handle).filter(|b| b.is_enabled()) else {
-                let body = placement::name(k);
+                let body = self.body_name(k);
                 return Err(PhysicsError::NonFinite { body, time });
             };
             *state = BodyState {
@@ -331,8 +330,11 @@ impl Consist {
     pub(super) fn on_rails(&self, time: SimTime) -> Result<(), PhysicsError> {
         let off = self.wheelsets.iter().position(Wheelset::derailed);
         off.map_or(Ok(()), |axle| {
-            let body = placement::name(placement::wheelset(axle));
-            Err(PhysicsError::Derailed { body, time })
+            Err(PhysicsError::Derailed {
+                train: self.id,
+                body: self.body_name(wheelset_of(axle)),
+                time,
+            })
         })
     }
 
@@ -341,8 +343,8 @@ impl Consist {
     pub(super) fn hold_speed(&mut self, world: &mut PhysicsWorld, speed_mps: f64, dt_s: f64) {
         for (k, handle) in self.handles.iter().enumerate() {
             let state = &self.states[k];
-            let along = match Part::of(k) {
-                Part::Wheelset => state.velocity.normalize_or_zero(),
+            let along = match BodyKind::of(k) {
+                BodyKind::Wheelset => state.velocity.normalize_or_zero(),
                 _ => state.rotation * Vector::X,
             };
             let off = speed_mps - state.velocity.dot(along);

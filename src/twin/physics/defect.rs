@@ -14,7 +14,7 @@
 //! parameters on wheel/rail vertical dynamic forces", Railway Engineering Journal 3 (1974). A
 //! wheel on one dipped rail lowers the middle of the axle by half of it, and rolls it.
 
-use super::irregularity::Deviation;
+use super::deviation::Deviation;
 use crate::track::{CANT_BASE_M, Checker, Problem};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

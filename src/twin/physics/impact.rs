@@ -1,4 +1,5 @@
-//! What happens when the train hits something: momentum, energy, damage.
+//! What happens when a train hits something: momentum, energy, damage. Where two trains hit each
+//! other, each of them has its own record.
 //!
 //! The solver's impulse J (along the normals; friction is left out) acts on the thing at the
 //! contact, and -J on the train. With u the velocity of the thing's point against the train's,
@@ -20,18 +21,22 @@
 //! The bounds hold for hits where these parts are. A thing that hits equipment below the floor does
 //! harm at less.
 
-use super::groups::{TRAIN_GROUP, groups};
-use super::owner::Owner;
-use crate::bus::SimTime;
+use super::entity::Entity;
+use super::placement::BODIES;
+use super::train::Train;
+use crate::bus::{SimTime, TrainId};
 use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;
-use rapier3d_f64::prelude::{ColliderHandle, Group, PhysicsWorld, RigidBodyHandle};
+use rapier3d_f64::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
 use serde::{Serialize, Serializer};
 use std::fmt;
 
-/// One hit of the train on something.
+/// One hit of a train on something.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Impact {
+    /// The train. Files list hits by train.
+    #[serde(skip)]
+    pub train: TrainId,
     /// When it began; seconds in files.
     #[serde(rename = "time_s", serialize_with = "seconds")]
     pub time: SimTime,
@@ -153,35 +158,37 @@ impl Motion {
     }
 }
 
-/// A part of the train that things can hit.
+/// The box of a car, which things can hit.
 #[derive(Clone)]
-struct Part {
+struct CarBox {
+    train: TrainId,
     collider: ColliderHandle,
     body: RigidBodyHandle,
     before: Motion,
 }
 
-/// A thing in touch with the train.
+/// What a train is in touch with.
 #[derive(Clone)]
 struct Touch {
-    owner: Owner,
+    train: TrainId,
+    with: Entity,
     /// Which hit, unless that was too slow or too late to be kept.
     impact: Option<usize>,
     since: SimTime,
     last: SimTime,
     momentum: Vector,
-    /// Bodies of the thing that have been hit.
+    /// Bodies of it that have been hit.
     bodies: Vec<RigidBodyHandle>,
 }
 
-/// One contact of the train in one step.
+/// One contact of a car in one step.
 pub(super) struct Hit {
-    /// Who was hit.
-    pub owner: Owner,
+    /// What was hit.
+    pub with: Entity,
     /// With force, not by its touch alone.
     pub force: bool,
     body: RigidBodyHandle,
-    part: usize,
+    car: usize,
     pair: Vec<Push>,
 }
 
@@ -195,29 +202,32 @@ struct Push {
 /// All hits so far.
 #[derive(Clone, Default)]
 pub(super) struct Impacts {
-    parts: Vec<Part>,
-    bounds: DamageBounds,
+    cars: Vec<CarBox>,
+    /// By train.
+    bounds: Vec<DamageBounds>,
     touches: Vec<Touch>,
     list: Vec<Impact>,
 }
 
 impl Impacts {
-    /// Watches whatever of the train can be hit.
-    pub(super) fn new(world: &mut PhysicsWorld, train_mass_kg: Option<f64>) -> Self {
-        let parts = world.all_colliders_mut().filter_map(|(collider, c)| {
-            let train = c.collision_groups().memberships.intersects(TRAIN_GROUP);
-            let body = c.parent().filter(|_| train)?;
-            // By default a body is of every group, and nobody could keep out of its way.
-            c.set_solver_groups(groups(TRAIN_GROUP, Group::ALL));
-            Some(Part {
-                collider,
-                body,
-                before: Motion::default(),
-            })
+    /// Of trains that are in the world already.
+    pub(super) fn new(trains: &[Train]) -> Self {
+        let cars = trains.iter().flat_map(|train| {
+            let consist = &train.consist;
+            let bodies = consist.handles.iter().step_by(BODIES);
+            bodies
+                .zip(&consist.colliders)
+                .map(|(body, collider)| CarBox {
+                    train: train.id,
+                    collider: *collider,
+                    body: *body,
+                    before: Motion::default(),
+                })
         });
+        let masses_kg = trains.iter().map(|train| train.consist.mass_kg());
         Self {
-            parts: parts.collect(),
-            bounds: DamageBounds::of_train(train_mass_kg.unwrap_or_default()),
+            cars: cars.collect(),
+            bounds: masses_kg.map(DamageBounds::of_train).collect(),
             ..Self::default()
         }
     }
@@ -228,23 +238,23 @@ impl Impacts {
 
     /// To be called before a step.
     pub(super) fn before_step(&mut self, world: &PhysicsWorld) {
-        for part in &mut self.parts {
-            part.before = Motion::of(world, part.body);
+        for car in &mut self.cars {
+            car.before = Motion::of(world, car.body);
         }
     }
 
-    /// What the train is in touch with after a step.
+    /// What the trains are in touch with after a step.
     pub(super) fn hits(&self, world: &PhysicsWorld) -> Vec<Hit> {
         let mut hits = Vec::new();
-        for (k, part) in self.parts.iter().enumerate() {
-            for pair in world.narrow_phase.contact_pairs_with(part.collider) {
-                hits.extend(hit(world, part, k, pair));
+        for (k, car) in self.cars.iter().enumerate() {
+            for pair in world.narrow_phase.contact_pairs_with(car.collider) {
+                hits.extend(hit(world, car, k, pair));
             }
         }
         hits
     }
 
-    /// Takes a hit down; `before` is how the thing moved before the step.
+    /// Records a hit; `before` is how a body that is no car moved before the step.
     pub(super) fn record(
         &mut self,
         world: &PhysicsWorld,
@@ -253,13 +263,16 @@ impl Impacts {
         before: impl Fn(RigidBodyHandle) -> Motion,
         now: SimTime,
     ) {
-        let part = &self.parts[hit.part];
-        let (was, is) = (before(hit.body), Motion::of(world, hit.body));
-        let (train_was, train_is) = (part.before, Motion::of(world, part.body));
+        let car = &self.cars[hit.car];
+        let train = car.train;
+        let other_car = self.cars.iter().find(|other| other.body == hit.body);
+        let was = other_car.map_or_else(|| before(hit.body), |other| other.before);
+        let is = Motion::of(world, hit.body);
+        let (train_was, train_is) = (car.before, Motion::of(world, car.body));
         let closing = |push: &Push| was.at(push.arm) - train_was.at(push.train_arm);
         let fastest = hit.pair.iter().map(|push| closing(push).length());
         let speed_mps = fastest.fold(0.0, f64::max);
-        let k = self.touch(hit.owner, name, speed_mps, now);
+        let k = self.touch((train, hit.with), name, speed_mps, now);
         let touch = &mut self.touches[k];
         touch.last = now;
         let blow = now.since(touch.since) <= BLOW_S;
@@ -283,12 +296,18 @@ impl Impacts {
             impact.energy_lost_j -= 0.5 * push.impulse.dot(closing(push) + after);
         }
         impact.momentum_n_s = touch.momentum.length();
-        impact.damage = self.bounds.class(impact.energy_lost_j);
+        impact.damage = self.bounds[train.index()].class(impact.energy_lost_j);
     }
 
     /// The touch that goes on, or a new one, with a hit of its own where it is one.
-    fn touch(&mut self, owner: Owner, name: &str, speed_mps: f64, now: SimTime) -> usize {
-        let known = self.touches.iter().position(|touch| touch.owner == owner);
+    fn touch(
+        &mut self,
+        (train, with): (TrainId, Entity),
+        name: &str,
+        speed_mps: f64,
+        now: SimTime,
+    ) -> usize {
+        let known = (self.touches.iter()).position(|t| (t.train, t.with) == (train, with));
         if let Some(k) = known
             && now.since(self.touches[k].last) <= GAP_S
         {
@@ -296,7 +315,8 @@ impl Impacts {
         }
         let hit = (known.is_none() || speed_mps >= AGAIN_MPS) && self.list.len() < MOST;
         let touch = Touch {
-            owner,
+            train,
+            with,
             impact: hit.then_some(self.list.len()),
             since: now,
             last: now,
@@ -305,6 +325,7 @@ impl Impacts {
         };
         if hit {
             self.list.push(Impact {
+                train,
                 time: now,
                 with: name.to_owned(),
                 speed_mps,
@@ -327,9 +348,9 @@ impl Impacts {
     }
 }
 
-/// A contact pair of the train with a thing, where they touch.
-fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Option<Hit> {
-    let train_first = pair.collider1 == part.collider;
+/// A contact pair of a car with a thing, where they touch.
+fn hit(world: &PhysicsWorld, car: &CarBox, k: usize, pair: &ContactPair) -> Option<Hit> {
+    let train_first = pair.collider1 == car.collider;
     let other = if train_first {
         pair.collider2
     } else {
@@ -354,10 +375,10 @@ fn hit(world: &PhysicsWorld, part: &Part, k: usize, pair: &ContactPair) -> Optio
         points.into_iter().any(|point| point.dist <= 0.0)
     };
     (!pushes.is_empty() || touching()).then_some(Hit {
-        owner: Owner::of(other.user_data)?,
+        with: Entity::of(other.user_data)?,
         force: !pushes.is_empty(),
         body: other.parent()?,
-        part: k,
+        car: k,
         pair: pushes,
     })
 }
@@ -370,6 +391,7 @@ mod tests {
     #[test]
     fn files_keep_their_keys() {
         let impact = Impact {
+            train: TrainId::default(),
             time: SimTime::from_nanos(1_500_000_000),
             with: "crate".to_owned(),
             speed_mps: 10.0,

@@ -14,7 +14,7 @@
 //! wavelength bounds and nothing outside. The table is periodic in its length, which is over
 //! that of the line.
 
-use super::defect::{DefectSettings, Defects};
+use super::deviation::Deviation;
 use crate::track::{CANT_BASE_M, Checker, Problem};
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
@@ -183,27 +183,6 @@ impl Spectra {
     }
 }
 
-/// Deviation of the track at one chainage, and its derivative along it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Deviation {
-    /// Up.
-    pub up_m: f64,
-    /// To the left.
-    pub left_m: f64,
-    /// Left rail over right, as an angle.
-    pub roll_rad: f64,
-    /// Of the rails' distance.
-    pub gauge_m: f64,
-    /// Of `up_m`.
-    pub up_per_m: f64,
-    /// Of `left_m`.
-    pub left_per_m: f64,
-    /// Of `roll_rad`.
-    pub roll_rad_per_m: f64,
-    /// Of `gauge_m`.
-    pub gauge_per_m: f64,
-}
-
 /// Grid of the table: ten points in the shortest wavelength that the settings allow.
 const GRID_M: f64 = 0.05;
 
@@ -212,7 +191,6 @@ const GRID_M: f64 = 0.05;
 pub(super) struct Irregularity {
     /// Up, left, roll, gauge; empty for perfect track, otherwise a power of two long.
     table: Vec<[f64; 4]>,
-    defects: Defects,
 }
 
 impl Irregularity {
@@ -238,28 +216,13 @@ impl Irregularity {
         let roll = signal(Signal::CrossLevel, "track cross level");
         let gauge = signal(Signal::Gauge, "track gauge");
         let rows = (0..n).map(|k| [up[k], left[k], roll[k], gauge[k]]);
-        let table = rows.collect();
         Self {
-            table,
-            ..Self::default()
+            table: rows.collect(),
         }
     }
 
-    /// The same with single defects on top.
-    pub(super) fn with_defects(self, defects: &[DefectSettings]) -> Self {
-        let defects = Defects::new(defects);
-        Self { defects, ..self }
-    }
-
-    /// At any chainage.
+    /// At any chainage, by cubic (Catmull-Rom) interpolation.
     pub(super) fn at(&self, s_m: f64) -> Deviation {
-        let mut deviation = self.random_at(s_m);
-        self.defects.add(s_m, &mut deviation);
-        deviation
-    }
-
-    /// By cubic (Catmull-Rom) interpolation.
-    fn random_at(&self, s_m: f64) -> Deviation {
         if self.table.is_empty() {
             return Deviation::default();
         }

@@ -1,29 +1,27 @@
 //! Where the bodies of a train are at the start: cars over the track as it lies, couplers closed.
 
 use super::convert::{rotation, vector3};
-use super::line::{Line, rail_axes};
+use super::directed_track::{DirectedTrack, rail_axes};
 use super::suspension::BodyState;
-use super::vehicle::Vehicle;
+use super::vehicle::{AXLES, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
 
 /// Bodies of a car: itself, front and rear bogie, four wheelsets from the front.
 pub(super) const BODIES: usize = 7;
-/// Wheelsets of a car.
-pub(super) const AXLES: usize = 4;
 
 /// Which of a car's bodies.
 #[derive(Clone, Copy)]
-pub(super) enum Part {
-    Body,
+pub(super) enum BodyKind {
+    Car,
     Bogie,
     Wheelset,
 }
 
-impl Part {
+impl BodyKind {
     /// Body `k` of a train.
     pub(super) fn of(k: usize) -> Self {
         match k % BODIES {
-            0 => Self::Body,
+            0 => Self::Car,
             1 | 2 => Self::Bogie,
             _ => Self::Wheelset,
         }
@@ -31,12 +29,12 @@ impl Part {
 }
 
 /// The body of an axle, counted from the front of the train.
-pub(super) fn wheelset(axle: usize) -> usize {
+pub(super) fn wheelset_of(axle: usize) -> usize {
     BODIES * (axle / AXLES) + 3 + axle % AXLES
 }
 
 /// Body `k` of a train, for messages.
-pub(super) fn name(k: usize) -> String {
+pub(super) fn body_name(k: usize) -> String {
     let part = match k % BODIES {
         0 => "body".to_owned(),
         1 => "front bogie".to_owned(),
@@ -47,9 +45,9 @@ pub(super) fn name(k: usize) -> String {
 }
 
 /// One car after the other, the head of the train at a chainage, running.
-pub(super) fn train(
+pub(super) fn place_train(
     vehicle: &Vehicle,
-    line: &Line<'_>,
+    track: &DirectedTrack,
     cars: u32,
     head_m: f64,
     speed_mps: f64,
@@ -58,13 +56,13 @@ pub(super) fn train(
     let mut front_m = head_m - (0.5 * vehicle.length_m - vehicle.semi_bogie_distance_m);
     let mut placed = Vec::new();
     for _ in 0..cars {
-        let mut states = car(vehicle, line, front_m, speed_mps);
+        let mut states = car(vehicle, track, front_m, speed_mps);
         // Where the track bends, cars are chords: their couplers shall meet all the same.
         if let Some(meet) = front_end {
             for _ in 0..6 {
                 let gap = meet - states[0].point(vehicle.coupler_m(1.0));
                 front_m += gap.dot(states[0].rotation * Vector::X);
-                states = car(vehicle, line, front_m, speed_mps);
+                states = car(vehicle, track, front_m, speed_mps);
             }
         }
         front_end = Some(states[0].point(vehicle.coupler_m(-1.0)));
@@ -75,9 +73,14 @@ pub(super) fn train(
 }
 
 /// A car on the track, its front bogie at a chainage.
-fn car(vehicle: &Vehicle, line: &Line<'_>, front_m: f64, speed_mps: f64) -> [BodyState; BODIES] {
+fn car(
+    vehicle: &Vehicle,
+    track: &DirectedTrack,
+    front_m: f64,
+    speed_mps: f64,
+) -> [BodyState; BODIES] {
     let distance = 2.0 * vehicle.semi_bogie_distance_m;
-    let at = |s_m: f64, height_m: f64| on_rails(line, s_m, height_m, speed_mps);
+    let at = |s_m: f64, height_m: f64| on_rails(track, s_m, height_m, speed_mps);
     let front = at(front_m, vehicle.bogie_cg_m);
     let mut rear_m = front_m - distance;
     let mut rear = at(rear_m, vehicle.bogie_cg_m);
@@ -109,10 +112,10 @@ fn car(vehicle: &Vehicle, line: &Line<'_>, front_m: f64, speed_mps: f64) -> [Bod
 }
 
 /// A body over the rails that runs along them.
-fn on_rails(line: &Line<'_>, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
-    let frame = line.alignment.at(s_m);
+fn on_rails(track: &DirectedTrack, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
+    let frame = track.alignment().at(s_m);
     let (origin, axes) = rail_axes(&frame);
-    let d = line.irregularity.at(s_m);
+    let d = track.deviation_at(s_m);
     BodyState {
         position: origin + axes.y * d.left_m + axes.z * (d.up_m + height_m),
         rotation: turned(axes.x, axes.y, axes.z),

@@ -2,17 +2,17 @@
 //! is to take the clone.
 //!
 //! ```
-//! # use metrotwin::bus::TrainCommand;
+//! # use metrotwin::bus::{TrainCommand, TrainId};
 //! # use metrotwin::track::Tunnel;
 //! # use metrotwin::twin::physics::{PhysicsSettings, World};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let tunnel = std::sync::Arc::new(Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?);
 //! let mut world = World::new(tunnel, &PhysicsSettings::default(), 1, 0)?;
 //! let saved = world.clone();
-//! world.step(&TrainCommand::default())?;
+//! world.step(&[TrainCommand::default()])?;
 //! let mut again = saved.clone();
-//! again.step(&TrainCommand::default())?;
-//! assert_eq!(again.train(), world.train());
+//! again.step(&[TrainCommand::default()])?;
+//! assert_eq!(again.train(TrainId(0)), world.train(TrainId(0)));
 //! # Ok(()) }
 //! ```
 
@@ -23,11 +23,9 @@ impl Clone for World {
     fn clone(&self) -> Self {
         Self {
             tunnel: self.tunnel.clone(),
-            settings: self.settings.clone(),
             rapier: copy(&self.rapier),
-            irregularity: self.irregularity.clone(),
-            train: self.train.clone(),
-            others: self.others.clone(),
+            trains: self.trains.clone(),
+            carrier: self.carrier,
             things: self.things.clone(),
             time: self.time,
             step: self.step,

@@ -5,12 +5,12 @@ use super::cable_settings::CableSettings;
 use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
-use super::placement::AXLES;
 use super::stability::longest_step_s;
-use super::vehicle::Vehicle;
+use super::vehicle::{AXLES, Vehicle};
 use super::vehicle_file::VehicleFile;
 use super::worker::WorkerSettings;
-use crate::track::{Checker, Problem, key_below};
+use crate::bus::TrainId;
+use crate::track::{Checker, Direction, Problem, key_below};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,10 +25,8 @@ pub struct PhysicsSettings {
     pub history_s: f64,
     /// How even the track is.
     pub track: TrackSettings,
-    /// The train, if there is one.
-    pub train: Option<TrainSettings>,
-    /// Other trains, up to three, with drivers of their own that nothing supervises.
-    pub other_trains: Vec<TrainSettings>,
+    /// Trains, up to eight.
+    pub trains: Vec<TrainSettings>,
     /// Things that lie or fall on the line.
     pub obstacles: Vec<ObstacleSettings>,
     /// Cables that hang on the wall.
@@ -43,8 +41,7 @@ impl Default for PhysicsSettings {
             step_s: 0.001,
             history_s: 0.5,
             track: TrackSettings::default(),
-            train: Some(TrainSettings::default()),
-            other_trains: Vec::new(),
+            trains: vec![TrainSettings::default()],
             obstacles: Vec::new(),
             cables: Vec::new(),
             workers: Vec::new(),
@@ -59,15 +56,11 @@ impl PhysicsSettings {
         check.within("step_s", self.step_s, 1e-4..=2e-3, "s");
         check.within("history_s", self.history_s, 0.01..=60.0, "s");
         self.track.check(&key_below(at, "track"), problems);
-        if let Some(train) = &self.train {
-            train.check(&key_below(at, "train"), problems);
-        }
-        let others = self.other_trains.len() as f64;
-        // With the own train they carry eight headlights, and more would not light a picture that is
-        // drawn on a graphics adapter.
-        Checker::new(at, problems).within("other_trains", others, 0.0..=3.0, "trains");
-        for (k, train) in self.other_trains.iter().enumerate() {
-            train.check(&key_below(at, &format!("other_trains[{k}]")), problems);
+        let others = self.trains.len().saturating_sub(1) as f64;
+        let most = TrainId::MOST as f64 - 1.0;
+        Checker::new(at, problems).within("other_trains", others, 0.0..=most, "trains");
+        for (k, train) in self.trains.iter().enumerate() {
+            train.check(&key_below(at, &train_key(k)), problems);
         }
         self.check_step(at, problems);
         for (k, obstacle) in self.obstacles.iter().enumerate() {
@@ -84,7 +77,7 @@ impl PhysicsSettings {
     /// Whether the trains' springs, and the rails, bear the step.
     fn check_step(&self, at: &str, problems: &mut Vec<Problem>) {
         let support = self.track.support();
-        for train in self.train.iter().chain(&self.other_trains) {
+        for train in &self.trains {
             let (longest_s, what) = longest_step_s(&train.vehicle(), support);
             if self.step_s > longest_s {
                 problems.push(Problem::new(
@@ -102,6 +95,14 @@ impl PhysicsSettings {
                 return;
             }
         }
+    }
+}
+
+/// Where a scenario has the train of a number.
+pub fn train_key(number: usize) -> String {
+    match number {
+        0 => "train".to_owned(),
+        _ => format!("other_trains[{}]", number - 1),
     }
 }
 
@@ -174,6 +175,8 @@ pub struct TrainSettings {
     pub vehicle_file: Option<VehicleFile>,
     /// Number of cars, 1 to 8.
     pub cars: u32,
+    /// Which way along the line it runs.
+    pub direction: Direction,
     /// Chainage of the train head at the start, metres.
     pub start_chainage_m: f64,
     /// Speed at the start, km/h.
@@ -214,6 +217,7 @@ impl Default for TrainSettings {
             vehicle: DEFAULT_VEHICLE.to_owned(),
             vehicle_file: None,
             cars: 6,
+            direction: Direction::Up,
             start_chainage_m: 150.0,
             start_speed_kmh: 0.0,
             start_s: 0.0,
@@ -288,7 +292,11 @@ impl TrainSettings {
             "km/h",
         );
         if let Some(stop) = self.stop_at_m {
-            check.within("stop_at_m", stop, self.start_chainage_m..=1e6, "m");
+            let ahead_m = match self.direction {
+                Direction::Up => self.start_chainage_m..=1e6,
+                Direction::Down => -1e6..=self.start_chainage_m,
+            };
+            check.within("stop_at_m", stop, ahead_m, "m");
         }
         check.within("accel_mps2", self.accel_mps2, 0.05..=2.0, "m/s^2");
         check.within(

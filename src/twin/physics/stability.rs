@@ -5,8 +5,7 @@
 //! each would between fixed neighbours (Gershgorin's circles, two bodies to a spring), so half of it
 //! is allowed here.
 
-use super::vehicle::{HALF_CONTACT_M, Vehicle};
-use super::wheelset::FLANGE_STIFFNESS_N_M;
+use super::vehicle::{FLANGE_STIFFNESS_N_M, HALF_CONTACT_M, Vehicle};
 use rapier3d_f64::math::Vector;
 
 /// The longest step, and what limits it, for rails of a stiffness and damping under a wheel.

@@ -1,8 +1,12 @@
 //! What tests of the physics share.
 
+use crate::bus::TrainId;
 use crate::track::{Alignment, Grade, PlanElement, Tunnel};
 use nalgebra::Point3;
 use std::sync::Arc;
+
+/// The first train.
+pub(super) const TRAIN: TrainId = TrainId(0);
 
 /// A line of one slope without walls, 5 m over zero.
 pub(super) fn line(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {

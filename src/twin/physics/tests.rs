@@ -11,7 +11,7 @@ use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::PlanElement;
-use testing::line;
+use testing::{TRAIN, line};
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 fn car(name: &str) -> Vehicle {
@@ -32,7 +32,7 @@ fn settings(train: TrainSettings) -> PhysicsSettings {
             },
             ..TrackSettings::default()
         },
-        train: Some(train),
+        trains: vec![train],
         ..PhysicsSettings::default()
     }
 }
@@ -48,7 +48,7 @@ const GO: f64 = 200.0;
 
 fn run(world: &mut World, seconds: f64, command: &TrainCommand) {
     for _ in 0..(seconds * 1000.0).round() as usize {
-        world.step(command).unwrap();
+        world.step(&[*command]).unwrap();
     }
 }
 
@@ -58,7 +58,7 @@ fn stands_in_equilibrium() {
     let tunnel = straight();
     let mut world = World::new(tunnel.clone(), &settings(TrainSettings::default()), 1, 0).unwrap();
     run(&mut world, 2.0, &command(BrakeDemand::None, 0.0));
-    let train = world.train().unwrap();
+    let train = world.train(TRAIN).unwrap();
     let want = tunnel.alignment.at(150.0).world_from_rails();
     let off = want.inverse() * train.world_from_vehicle;
     assert!(off.translation.vector.norm() < 1e-6, "{off}");
@@ -74,9 +74,9 @@ fn holds_on_a_gradient() {
     let line = line(&[PlanElement::straight(3000.0)], 0.03);
     let mut world = World::new(line, &settings(TrainSettings::default()), 1, 0).unwrap();
     run(&mut world, 5.0, &command(BrakeDemand::None, 0.0));
-    let a = world.train().unwrap().chainage_m;
+    let a = world.train(TRAIN).unwrap().chainage_m;
     run(&mut world, 10.0, &command(BrakeDemand::None, 0.0));
-    assert!((world.train().unwrap().chainage_m - a).abs() < 1e-4);
+    assert!((world.train(TRAIN).unwrap().chainage_m - a).abs() < 1e-4);
 }
 
 /// The driver keeps under the permitted speed, within jerk and acceleration, and stops at the mark.
@@ -92,14 +92,14 @@ fn driver_keeps_limits_and_stops_at_the_mark() {
     let (mut fastest, mut hardest) = (0.0f64, 0.0f64);
     let mut lever = -1.0;
     for _ in 0..100_000 {
-        world.step(&command(BrakeDemand::None, 50.0)).unwrap();
-        let train = world.train.as_ref().unwrap();
+        world.step(&[command(BrakeDemand::None, 50.0)]).unwrap();
+        let train = &world.trains[0];
         let now = train.effort.traction_mps2 - train.effort.brake_mps2;
         hardest = hardest.max((now - lever).abs() / 0.001);
         lever = now;
         fastest = fastest.max(train.consist.speed_mps());
     }
-    let state = world.train().unwrap();
+    let state = world.train(TRAIN).unwrap();
     eprintln!(
         "fastest {:.2} km/h of 50, stopped at {:.3} m of 900",
         3.6 * fastest,
@@ -118,7 +118,7 @@ fn determinism() {
         ..TrainSettings::default()
     };
     let shaken = PhysicsSettings {
-        train: Some(train),
+        trains: vec![train],
         obstacles: vec![ObstacleSettings {
             chainage_m: 300.0,
             ..ObstacleSettings::default()
@@ -128,7 +128,7 @@ fn determinism() {
     let fly = |seed, index| {
         let mut world = World::new(straight(), &shaken, seed, index).unwrap();
         run(&mut world, 2.0, &command(BrakeDemand::None, GO));
-        (world.train().unwrap(), world.bodies())
+        (world.train(TRAIN).unwrap(), world.bodies(Some(TRAIN)))
     };
     let a = fly(1, 0);
     assert_eq!(a, fly(1, 0));
@@ -146,7 +146,7 @@ fn pose_history_of_a_shaken_train() {
         ..TrainSettings::default()
     };
     let shaken = PhysicsSettings {
-        train: Some(train),
+        trains: vec![train],
         ..PhysicsSettings::default()
     };
     let mut world = World::new(straight(), &shaken, 1, 0).unwrap();
@@ -154,8 +154,8 @@ fn pose_history_of_a_shaken_train() {
     let mut coarse = History::new(300);
     let mut between = Vec::new();
     for k in 0..500 {
-        world.step(&command(BrakeDemand::None, GO)).unwrap();
-        let motion = *world.vehicle_motion().unwrap();
+        world.step(&[command(BrakeDemand::None, GO)]).unwrap();
+        let motion = *world.vehicle_motion(TRAIN).unwrap();
         if k % 2 == 0 {
             coarse.push(motion);
         } else {
@@ -174,8 +174,8 @@ fn pose_history_of_a_shaken_train() {
         worst_m, worst_rad
     );
     assert!(worst_m < 1e-4 && worst_rad < 5e-6);
-    assert!(world.vehicle_at(world.time().plus(-0.3)).is_some());
-    assert!(world.vehicle_at(world.time().plus(0.001)).is_none());
+    assert!(world.vehicle_at(TRAIN, world.time().plus(-0.3)).is_some());
+    assert!(world.vehicle_at(TRAIN, world.time().plus(0.001)).is_none());
 }
 
 /// A world that was saved in the middle of a fall and a shake goes on in every byte as the one that
@@ -195,12 +195,14 @@ fn a_saved_world_goes_on_exactly() {
     };
     let ball = ObstacleShape::Sphere { diameter_m: 0.2 };
     let settings = PhysicsSettings {
-        train: Some(train.clone()),
-        other_trains: vec![TrainSettings {
-            start_chainage_m: 600.0,
-            start_speed_kmh: 0.0,
-            ..train
-        }],
+        trains: vec![
+            train.clone(),
+            TrainSettings {
+                start_chainage_m: 600.0,
+                start_speed_kmh: 0.0,
+                ..train
+            },
+        ],
         // The first is hit by the train, the others fall meanwhile.
         obstacles: vec![
             falling(175.0, ObstacleSettings::default().body),
@@ -211,7 +213,13 @@ fn a_saved_world_goes_on_exactly() {
     };
     let go = command(BrakeDemand::None, 50.0);
     let mut through = World::new(straight(), &settings, 1, 0).unwrap();
-    let truth = |world: &World| (world.train(), world.bodies(), world.impacts().to_vec());
+    let truth = |world: &World| {
+        (
+            world.train(TRAIN),
+            world.bodies(Some(TRAIN)),
+            world.impacts().to_vec(),
+        )
+    };
     for _ in 0..4 {
         let mut saved = through.clone();
         run(&mut through, 0.6, &go);
@@ -222,45 +230,62 @@ fn a_saved_world_goes_on_exactly() {
     assert!(!through.impacts().is_empty());
 }
 
-/// A train that runs into another one, standing or under way, takes the momentum of a nearly plastic
-/// hit, and the hit is told with the speed at which they close and no more energy than it had.
+/// Two trains of two cars on straight track that meet, at line speeds in km/h, and their hits: of
+/// the first, then of the second. Their ends are 30 m apart at the start.
+fn crash(kmh: [f64; 2]) -> (World, [Impact; 2]) {
+    let train = |kmh: f64, direction: Direction, start_chainage_m: f64| TrainSettings {
+        direction,
+        start_chainage_m,
+        start_speed_kmh: kmh.abs(),
+        cruise_speed_kmh: kmh.abs(),
+        cars: 2,
+        ..TrainSettings::default()
+    };
+    let length_m = train(0.0, Direction::Up, 0.0).length_m();
+    let second = match kmh[1] < 0.0 {
+        true => train(kmh[1], Direction::Down, 180.0),
+        false => train(kmh[1], Direction::Up, 180.0 + length_m),
+    };
+    let mut settings = settings(train(kmh[0], Direction::Up, 150.0));
+    settings.trains.push(second);
+    let mut world = World::new(straight(), &settings, 1, 0).unwrap();
+    let closing_mps = (kmh[0] - kmh[1]) / 3.6;
+    for _ in 0..(1000.0 * (30.0 / closing_mps + 1.0)) as usize {
+        world.step(&[]).unwrap();
+    }
+    let hits = world.impacts();
+    assert_eq!(hits.len(), 2, "{hits:?}");
+    let hits = [0, 1].map(|k| {
+        hits.iter()
+            .find(|hit| hit.train == TrainId(k))
+            .unwrap()
+            .clone()
+    });
+    (world, hits)
+}
+
+/// A train that runs into another one, that stands, runs the same way or comes against it, takes the
+/// momentum of a nearly plastic hit, and both have the hit on record with the speed at which they
+/// close and no more energy than they had.
 #[test]
 fn trains_collide() {
-    for other_kmh in [0.0, 15.0] {
-        let train = TrainSettings {
-            start_speed_kmh: 30.0,
-            cruise_speed_kmh: 30.0,
-            cars: 2,
-            ..TrainSettings::default()
-        };
-        let settings = PhysicsSettings {
-            other_trains: vec![TrainSettings {
-                start_chainage_m: 220.0,
-                start_speed_kmh: other_kmh,
-                cruise_speed_kmh: other_kmh,
-                ..train.clone()
-            }],
-            ..settings(train)
-        };
-        let mut world = World::new(straight(), &settings, 1, 0).unwrap();
-        let (head_m, length_m) = world.other_trains_m().next().unwrap();
-        assert!((head_m - 220.0).abs() < 1e-2 && (length_m - 39.34).abs() < 1e-9);
-        let closing_mps = (30.0 - other_kmh) / 3.6;
-        run(
-            &mut world,
-            30.66 / closing_mps + 1.0,
-            &command(BrakeDemand::None, GO),
-        );
-        let hit = &world.impacts()[0];
-        eprintln!("{hit:?}");
-        assert_eq!(hit.with, "other train 1");
-        assert!((hit.time.secs() - 30.66 / closing_mps).abs() < 0.05);
-        assert!((hit.speed_mps - closing_mps).abs() < 0.05);
+    for kmh in [[30.0, 0.0], [30.0, 15.0], [15.0, -15.0]] {
+        let (world, hits) = crash(kmh);
+        let closing_mps = (kmh[0] - kmh[1]) / 3.6;
         // Two like trains in a plastic hit share the momentum; in an elastic one they swap it.
         let most = car("metro_b1_crush").total_kg() * 2.0 * closing_mps;
-        assert!((0.3 * most..most).contains(&hit.momentum_n_s));
-        assert!(hit.energy_lost_j > 0.0 && hit.energy_lost_j < 0.5 * 0.5 * most * closing_mps);
-        assert!(world.train().unwrap().speed_mps < 30.0 / 3.6 - 0.3 * closing_mps);
+        for (hit, with) in hits.iter().zip(["other train 1", "train"]) {
+            eprintln!("{hit:?}");
+            assert_eq!(hit.with, with);
+            assert!((hit.time.secs() - 30.0 / closing_mps).abs() < 0.05);
+            assert!((hit.speed_mps - closing_mps).abs() < 0.05);
+            assert!((0.3 * most..most).contains(&hit.momentum_n_s));
+            assert!(hit.energy_lost_j > 0.0 && hit.energy_lost_j < 0.25 * most * closing_mps);
+        }
+        assert!((hits[0].momentum_n_s - hits[1].momentum_n_s).abs() < 1e-6 * most);
+        let speed = |id| world.train(TrainId(id)).unwrap().speed_mps;
+        assert!(speed(0) < kmh[0] / 3.6 - 0.3 * closing_mps);
+        assert!(speed(1) > kmh[1] / 3.6 + 0.3 * closing_mps);
     }
 }
 
@@ -268,9 +293,9 @@ fn trains_collide() {
 #[test]
 fn non_finite_state_is_reported() {
     let mut world = World::new(straight(), &PhysicsSettings::default(), 1, 0).unwrap();
-    let body = world.train.as_ref().unwrap().consist.handles[14];
+    let body = world.trains[0].consist.handles[14];
     world.rapier.bodies[body].set_linvel(Vector::new(f64::NAN, 0.0, 0.0), true);
-    let failed = (0..5).find_map(|_| world.step(&TrainCommand::default()).err());
+    let failed = (0..5).find_map(|_| world.step(&[TrainCommand::default()]).err());
     assert!(
         matches!(failed, Some(PhysicsError::NonFinite { .. })),
         "{failed:?}"
@@ -285,10 +310,13 @@ fn check_names_the_keys() {
     assert!(problems.is_empty(), "{problems:?}");
     let wrong = PhysicsSettings {
         step_s: f64::NAN,
-        train: Some(TrainSettings {
-            cars: 9,
-            ..TrainSettings::default()
-        }),
+        trains: vec![
+            TrainSettings {
+                cars: 9,
+                ..TrainSettings::default()
+            };
+            2
+        ],
         obstacles: vec![ObstacleSettings {
             mass_kg: -1.0,
             ..ObstacleSettings::default()
@@ -297,7 +325,15 @@ fn check_names_the_keys() {
     };
     wrong.check("x", &mut problems);
     let keys: Vec<&str> = problems.iter().map(|p| p.key.as_str()).collect();
-    assert_eq!(keys, ["x.step_s", "x.train.cars", "x.obstacles[0].mass_kg"]);
+    assert_eq!(
+        keys,
+        [
+            "x.step_s",
+            "x.train.cars",
+            "x.other_trains[0].cars",
+            "x.obstacles[0].mass_kg"
+        ]
+    );
     assert!(World::new(straight(), &wrong, 1, 0).is_err());
 }
 
@@ -401,7 +437,7 @@ fn val_energy_closes() {
         settings.track.rail = rail;
         let mut world = World::new(line(&[element], slope), &settings, 1, 0).unwrap();
         run(&mut world, 15.0, &command(brake, GO));
-        let book = world.energy().unwrap();
+        let book = world.energy(TRAIN).unwrap();
         eprintln!("{name}: gap {:.5} %, {book:?}", 100.0 * book.gap_share());
         assert!(book.gap_share() < 5e-4, "{name}: {book:?}");
         // Nor is it much of the smallest accounts, where these are not small against the brakes'.
@@ -447,15 +483,18 @@ fn follows_a_crooked_track() {
     let (mut aside, mut lean) = (Vec::new(), Vec::new());
     for _ in 0..1200 {
         run(&mut world, 0.05, &command(BrakeDemand::None, GO));
-        let consist = &world.train.as_ref().unwrap().consist;
+        let consist = &world.trains[0].consist;
         let place = |k: usize| {
             let p = convert::point3(consist.states[k].position);
             world.tunnel.alignment.track_from_world(&p, 300.0)
         };
         let axle = place(3);
-        aside.push((world.irregularity.at(axle.s_m).left_m, axle.l_m));
+        aside.push((
+            world.trains[0].track.deviation_at(axle.s_m).left_m,
+            axle.l_m,
+        ));
         let across = consist.states[0].rotation * Vector::Y;
-        let at = |k| world.irregularity.at(place(k).s_m).roll_rad;
+        let at = |k| world.trains[0].track.deviation_at(place(k).s_m).roll_rad;
         lean.push((0.5 * (at(1) + at(2)), across.z));
     }
     for (what, pairs) in [("aside", aside), ("lean", lean)] {
@@ -485,8 +524,8 @@ fn val_curve_resistance() {
         let mut world = World::new(line, &settings(train), 1, 0).unwrap();
         run(&mut world, 10.0, &command(BrakeDemand::None, GO));
         let weight_kn = 1e-3 * GRAVITY_MPS2 * car("metro_b1_crush").total_kg();
-        let run_m = world.train().unwrap().chainage_m - 150.0;
-        let got = world.energy().unwrap().creep_j / run_m / weight_kn;
+        let run_m = world.train(TRAIN).unwrap().chainage_m - 150.0;
+        let got = world.energy(TRAIN).unwrap().creep_j / run_m / weight_kn;
         let rule = 600.0 / radius_m;
         eprintln!("R {radius_m} m: {got:.2} N/kN, by the rule {rule:.2}");
         assert!((0.3..1.5).contains(&(got / rule)), "{got} against {rule}");
@@ -508,15 +547,15 @@ fn runs_steadily_at_design_speed() {
         let mut world = World::new(straight(), &settings(train), 1, 0).unwrap();
         let across = world.tunnel.alignment.at(0.0).left();
         let across = Vector::new(across.x, across.y, across.z);
-        for handle in world.train.as_ref().unwrap().consist.handles.clone() {
+        for handle in world.trains[0].consist.handles.clone() {
             let body = &mut world.rapier.bodies[handle];
             body.set_linvel(body.linvel() + across * 0.05, true);
         }
         let mut swing = |seconds: f64| {
             let mut most_m = 0.0f64;
             for _ in 0..(1000.0 * seconds) as usize {
-                world.step(&command(BrakeDemand::None, GO)).unwrap();
-                let axle = world.train.as_ref().unwrap().consist.states[3].position;
+                world.step(&[command(BrakeDemand::None, GO)]).unwrap();
+                let axle = world.trains[0].consist.states[3].position;
                 let line = &world.tunnel.alignment;
                 let place = line.track_from_world(&convert::point3(axle), 300.0);
                 most_m = most_m.max(place.l_m.abs());

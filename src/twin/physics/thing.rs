@@ -1,10 +1,10 @@
 //! A thing in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
 
 use super::convert::{isometry, pose, vector, vector3};
+use super::entity::Entity;
 use super::groups::{fixed, loose};
 use super::impact::Motion;
 use super::obstacle::{HingeEdge, HingeSettings, Piece};
-use super::owner::Owner;
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
 use crate::twin::render::{Body, Shape};
@@ -65,7 +65,7 @@ impl Thing {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         piece: &Piece,
-        owner: Owner,
+        entity: Entity,
     ) -> Self {
         let settings = &piece.settings;
         let frame = alignment.at(settings.chainage_m);
@@ -87,7 +87,7 @@ impl Thing {
             builder
                 .pose(pose(&place))
                 .ccd_enabled(true)
-                .user_data(owner.id())
+                .user_data(entity.user_data())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let (hold, solver) = match settings.held_until_s {
@@ -98,7 +98,7 @@ impl Thing {
             .mass(settings.mass_kg)
             .friction(settings.friction)
             .restitution(settings.restitution)
-            .user_data(owner.id())
+            .user_data(entity.user_data())
             .collision_groups(loose())
             .solver_groups(solver);
         Self {

@@ -1,21 +1,22 @@
-//! All that is not the train: obstacles, cables and workers, what they lie on, and what the train
-//! does to them.
+//! All that is no train: obstacles, cables and workers, what they lie on, and what trains do to
+//! them.
 //!
 //! A step costs by what is awake. Rapier puts to sleep what lies still for half a second; nothing
-//! here looks at a sleeping body, and the contacts of the train are asked of the train.
+//! here looks at a sleeping body, and the contacts of trains are asked of the trains.
 
 use super::PhysicsError;
 use super::cable::Cable;
 use super::convert::point3;
+use super::entity::{Entity, train_name};
 use super::ground::Ground;
 use super::impact::{Impact, Impacts, Motion};
 use super::obstacle::Piece;
-use super::owner::Owner;
 use super::settings::PhysicsSettings;
 use super::thing::Thing;
-use super::truth::{Belonging, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
+use super::train::Train;
+use super::truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
 use super::walker::{Act, Walker};
-use crate::bus::SimTime;
+use crate::bus::{SimTime, TrainId};
 use crate::track::{Alignment, Tunnel};
 use crate::twin::render::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
@@ -26,18 +27,18 @@ const LOOK_STEPS: u64 = 50;
 #[derive(Clone)]
 struct Awake {
     body: RigidBodyHandle,
-    owner: Owner,
+    entity: Entity,
     before: Motion,
 }
 
-/// Everything that the train may hit.
+/// Everything that trains may hit.
 #[derive(Clone, Default)]
 pub(super) struct Things {
     /// `None` for what was taken away again.
     pub things: Vec<Option<Thing>>,
     pub cables: Vec<Cable>,
     walkers: Vec<Walker>,
-    /// Names of other trains.
+    /// Names of the trains.
     trains: Vec<String>,
     ground: Ground,
     /// Still to come, the next one last.
@@ -50,14 +51,14 @@ pub(super) struct Things {
 }
 
 impl Things {
-    /// What is there at time zero. Everything random in it depends on `seed` and run `index`. The
-    /// train must be in the world already.
+    /// What is there at time zero, besides trains that are in the world already. Everything random in
+    /// it depends on `seed` and run `index`.
     pub(super) fn new(
         world: &mut PhysicsWorld,
         tunnel: &Tunnel,
         settings: &PhysicsSettings,
         [seed, index]: [u64; 2],
-        train_mass_kg: Option<f64>,
+        trains: &[Train],
     ) -> Self {
         let solver = &mut world.integration_parameters;
         // Each step goes on from the tension that a cable had in the last one.
@@ -77,23 +78,21 @@ impl Things {
         });
         let mut things = Self {
             walkers: walkers.collect(),
-            trains: (1..=settings.other_trains.len())
-                .map(|number| format!("other train {number}"))
-                .collect(),
+            trains: trains.iter().map(|train| train_name(train.id)).collect(),
             things: Vec::new(),
             cables: Vec::new(),
             ground: Ground::default(),
             releases_s: releases_s(settings),
             to_come,
-            impacts: Impacts::new(world, train_mass_kg),
+            impacts: Impacts::new(trains),
             awake: Vec::new(),
             steps: 0,
         };
         for (k, cable) in settings.cables.iter().enumerate() {
             things.ground.lay(world, tunnel, cable.from.chainage_m);
             things.ground.lay(world, tunnel, cable.to.chainage_m);
-            let owner = Owner::Cable(k);
-            let cable = Cable::insert(world, &tunnel.alignment, cable, owner);
+            let entity = Entity::Cable(k);
+            let cable = Cable::insert(world, &tunnel.alignment, cable, entity);
             things.cables.push(cable);
         }
         things.go_on(world, tunnel, 0.0);
@@ -107,7 +106,7 @@ impl Things {
         let awake = world.active_bodies().filter_map(|(body, state)| {
             Some(Awake {
                 body,
-                owner: Owner::of(state.user_data)?,
+                entity: Entity::of(state.user_data)?,
                 before: Motion::of(world, body),
             })
         });
@@ -128,7 +127,7 @@ impl Things {
     ) -> Result<(), PhysicsError> {
         self.steps += 1;
         self.watch_awake(world, tunnel, now)?;
-        self.watch_train(world, now);
+        self.watch_trains(world, now);
         self.go_on(world, tunnel, now.secs());
         Ok(())
     }
@@ -145,27 +144,27 @@ impl Things {
         for k in 0..self.awake.len() {
             let Awake {
                 body,
-                owner,
+                entity,
                 before,
             } = self.awake[k];
             if !world.bodies.get(body).is_some_and(|b| b.is_enabled()) {
                 return Err(PhysicsError::NonFinite {
-                    body: self.name(owner).to_owned(),
+                    body: self.name(entity).to_owned(),
                     time: now,
                 });
             }
             if look {
-                self.lay_ground(world, tunnel, body, owner);
+                self.lay_ground(world, tunnel, body, entity);
             }
-            match owner {
-                Owner::Thing(k) => {
+            match entity {
+                Entity::Obstacle(k) => {
                     if let Some(thing) = &mut self.things[k] {
                         thing.observe(world, now);
                         thing.resist_rolling(world, &before);
                     }
                 }
                 // The links of a cable follow one another.
-                Owner::Cable(k) if last_cable != Some(k) => {
+                Entity::Cable(k) if last_cable != Some(k) => {
                     last_cable = Some(k);
                     self.cables[k].observe(world, now);
                     self.cables[k].tear(world);
@@ -182,16 +181,16 @@ impl Things {
         world: &mut PhysicsWorld,
         tunnel: &Tunnel,
         body: RigidBodyHandle,
-        owner: Owner,
+        entity: Entity,
     ) {
         let Some(at) = world.bodies.get(body).map(|body| body.translation()) else {
             return;
         };
-        let near_m = match owner {
-            Owner::Thing(k) => self.things[k].as_mut().map(|thing| &mut thing.near_m),
-            Owner::Cable(k) => Some(&mut self.cables[k].near_m),
-            Owner::Worker(k) => Some(&mut self.walkers[k].near_m),
-            Owner::Train(_) => None,
+        let near_m = match entity {
+            Entity::Obstacle(k) => self.things[k].as_mut().map(|thing| &mut thing.near_m),
+            Entity::Cable(k) => Some(&mut self.cables[k].near_m),
+            Entity::Worker(k) => Some(&mut self.walkers[k].near_m),
+            Entity::Train(_) => None,
         };
         let Some(near_m) = near_m else {
             return;
@@ -201,24 +200,24 @@ impl Things {
         self.ground.lay(world, tunnel, *near_m);
     }
 
-    /// Hits of the train, and what they tear off and knock down.
-    fn watch_train(&mut self, world: &mut PhysicsWorld, now: SimTime) {
+    /// Hits of the trains, and what they tear off and knock down.
+    fn watch_trains(&mut self, world: &mut PhysicsWorld, now: SimTime) {
         for hit in self.impacts.hits(world) {
             if hit.force {
-                let name = self.name(hit.owner).to_owned();
+                let name = self.name(hit.with).to_owned();
                 let before = |body| {
                     let awake = self.awake.iter().find(|awake| awake.body == body);
                     awake.map_or(Motion::default(), |awake| awake.before)
                 };
                 self.impacts.record(world, &hit, &name, before, now);
             }
-            match hit.owner {
-                Owner::Thing(k) => {
+            match hit.with {
+                Entity::Obstacle(k) => {
                     if let Some(thing) = &mut self.things[k] {
                         thing.tear_off(world);
                     }
                 }
-                Owner::Worker(k) if hit.force => {
+                Entity::Worker(k) if hit.force => {
                     self.walkers[k].knock_down(world, now.secs());
                 }
                 _ => {}
@@ -240,7 +239,7 @@ impl Things {
             }
         }
         for k in 0..self.walkers.len() {
-            self.walkers[k].lead(world, &tunnel.alignment, now_s, Owner::Worker(k));
+            self.walkers[k].lead(world, &tunnel.alignment, now_s, Entity::Worker(k));
             match self.walkers[k].act(now_s) {
                 Some(Act::PutDown(load)) => {
                     let number = self.insert(world, tunnel, &load);
@@ -258,8 +257,8 @@ impl Things {
     fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, piece: &Piece) -> usize {
         let number = self.things.len();
         self.ground.lay(world, tunnel, piece.settings.chainage_m);
-        let owner = Owner::Thing(number);
-        let thing = Thing::insert(world, &tunnel.alignment, piece, owner);
+        let entity = Entity::Obstacle(number);
+        let thing = Thing::insert(world, &tunnel.alignment, piece, entity);
         self.things.push(Some(thing));
         number
     }
@@ -285,60 +284,60 @@ impl Things {
         reached.is_some()
     }
 
-    fn name(&self, owner: Owner) -> &str {
-        match owner {
-            Owner::Thing(k) => {
+    fn name(&self, entity: Entity) -> &str {
+        match entity {
+            Entity::Obstacle(k) => {
                 let thing = self.things.get(k).and_then(Option::as_ref);
                 thing.map_or("obstacle", |thing| &thing.piece.settings.name)
             }
-            Owner::Cable(k) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
-            Owner::Worker(k) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
-            Owner::Train(k) => self.trains.get(k).map_or("train", String::as_str),
+            Entity::Cable(k) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
+            Entity::Worker(k) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
+            Entity::Train(k) => self.trains.get(k.index()).map_or("train", String::as_str),
         }
     }
 
-    /// Hits of the train so far.
+    /// Hits of the trains so far.
     pub(super) fn impacts(&self) -> &[Impact] {
         self.impacts.list()
     }
 
-    /// As renderers draw them, with their owners.
-    pub(super) fn draw_owned(
+    /// As renderers draw them, with their labels.
+    pub(super) fn draw(
         &self,
         world: &PhysicsWorld,
         line: &Alignment,
         now_s: f64,
-    ) -> Vec<(Body, Belonging<'_>)> {
-        let mut owned = Vec::new();
+    ) -> Vec<(Body, BodyLabel<'_>)> {
+        let mut labelled = Vec::new();
         for (k, thing) in self.things.iter().enumerate() {
             let Some((body, thing)) = thing.as_ref().and_then(|t| Some((t.draw(world)?, t))) else {
                 continue;
             };
-            let (owner, name) = (BodyOwner::Thing(k), thing.piece.settings.name.as_str());
-            owned.push((body, Belonging { owner, name }));
+            let (owner, name) = (BodyOwner::Obstacle(k), thing.piece.settings.name.as_str());
+            labelled.push((body, BodyLabel { owner, name }));
         }
         let mut bodies = Vec::new();
         for (k, cable) in self.cables.iter().enumerate() {
             cable.draw(world, &mut bodies);
             let (owner, name) = (BodyOwner::Cable(k), cable.settings.name.as_str());
-            owned.extend(bodies.drain(..).map(|b| (b, Belonging { owner, name })));
+            labelled.extend(bodies.drain(..).map(|b| (b, BodyLabel { owner, name })));
         }
         for (k, walker) in self.walkers.iter().enumerate() {
             walker.draw(world, line, now_s, &mut bodies);
             let load = walker.draw_load(world, line, now_s);
             let (owner, name) = (BodyOwner::Worker(k), walker.settings.name.as_str());
-            owned.extend(bodies.drain(..).map(|b| (b, Belonging { owner, name })));
+            labelled.extend(bodies.drain(..).map(|b| (b, BodyLabel { owner, name })));
             if let Some((body, name)) = load {
                 let owner = BodyOwner::Load(k);
-                owned.push((body, Belonging { owner, name }));
+                labelled.push((body, BodyLabel { owner, name }));
             }
         }
-        owned
+        labelled
     }
 
-    /// Name of another train.
-    pub(super) fn train_name(&self, number: usize) -> &str {
-        self.name(Owner::Train(number))
+    /// Name of a train.
+    pub(super) fn train_name(&self, id: TrainId) -> &str {
+        self.name(Entity::Train(id))
     }
 
     /// Obstacles that are there now; what is fixed to the lining is none.

@@ -10,7 +10,8 @@
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::{BED_M, PlanElement};
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
+use testing::TRAIN;
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
 /// A straight line of 3 km without walls, 5 m over zero.
@@ -20,7 +21,7 @@ fn straight() -> Arc<Tunnel> {
 
 fn without_train() -> PhysicsSettings {
     PhysicsSettings {
-        train: None,
+        trains: Vec::new(),
         ..PhysicsSettings::default()
     }
 }
@@ -44,7 +45,7 @@ fn with_car() -> PhysicsSettings {
             irregularity,
             ..TrackSettings::default()
         },
-        train: Some(train),
+        trains: vec![train],
         ..PhysicsSettings::default()
     }
 }
@@ -55,7 +56,7 @@ fn run(world: &mut World, seconds: f64) {
         permitted_speed_mps: 30.0,
     };
     for _ in 0..(seconds * 1000.0).round() as usize {
-        world.step(&go).unwrap();
+        world.step(&[go]).unwrap();
     }
 }
 
@@ -93,7 +94,7 @@ fn obstacles_come_to_rest_on_the_bed() {
         ..ObstacleSettings::default()
     });
     let settings = PhysicsSettings {
-        train: None,
+        trains: Vec::new(),
         obstacles: obstacles.collect(),
         ..PhysicsSettings::default()
     };
@@ -131,7 +132,7 @@ fn worker_leaves_his_toolbox() {
         ..ObstacleSettings::default()
     };
     let settings = PhysicsSettings {
-        train: None,
+        trains: Vec::new(),
         workers: vec![WorkerSettings {
             path: vec![at(1.0, 1.5), at(3.0, 0.0), at(5.0, 0.0), at(7.0, 1.5)],
             carries: Some(toolbox),
@@ -141,14 +142,20 @@ fn worker_leaves_his_toolbox() {
         ..PhysicsSettings::default()
     };
     let mut world = World::new(straight(), &settings, 1, 0).unwrap();
-    assert!(world.bodies().is_empty());
+    assert!(world.bodies(Some(TRAIN)).is_empty());
     run(&mut world, 3.5);
     // Torso, head, two legs, and the box in his hand.
-    assert_eq!((world.bodies().len(), world.obstacles().count()), (5, 0));
+    assert_eq!(
+        (world.bodies(Some(TRAIN)).len(), world.obstacles().count()),
+        (5, 0)
+    );
     run(&mut world, 1.0);
-    assert_eq!((world.bodies().len(), world.obstacles().count()), (5, 1));
+    assert_eq!(
+        (world.bodies(Some(TRAIN)).len(), world.obstacles().count()),
+        (5, 1)
+    );
     run(&mut world, 3.0);
-    assert_eq!(world.bodies().len(), 1);
+    assert_eq!(world.bodies(Some(TRAIN)).len(), 1);
     let left = world.obstacles().next().unwrap();
     assert!(left.resting_since.is_some() && (left.chainage_m - 200.0).abs() < 0.6);
 }
@@ -245,7 +252,7 @@ fn the_train_loses_what_the_crate_gains() {
     // 0.6 m g for 60 ms are 177 N s.
     assert!((hit.momentum_n_s - gained - 90.0).abs() < 150.0, "{gained}");
     run(&mut world, 1.0);
-    let head_m = world.train().unwrap().chainage_m;
+    let head_m = world.train(TRAIN).unwrap().chainage_m;
     let crate_m = world.obstacles().next().unwrap().chainage_m;
     assert!(crate_m > head_m, "the train ran through it");
 }
@@ -324,10 +331,13 @@ fn a_panel_comes_loose() {
         ..without_train()
     };
     let mut world = World::new(straight(), &settings, 1, 0).unwrap();
-    assert_eq!((world.bodies().len(), world.obstacles().count()), (2, 0));
-    let held = world.bodies();
+    assert_eq!(
+        (world.bodies(Some(TRAIN)).len(), world.obstacles().count()),
+        (2, 0)
+    );
+    let held = world.bodies(Some(TRAIN));
     run(&mut world, 0.999);
-    assert_eq!(held, world.bodies());
+    assert_eq!(held, world.bodies(Some(TRAIN)));
     run(&mut world, 0.201);
     let heights: Vec<f64> = world.obstacles().map(|o| o.height_m).collect();
     let start = held[0].world_from_body.translation.z - 5.0;
@@ -382,7 +392,7 @@ fn the_train_tears_off_what_is_fixed() {
     eprintln!("{hit:?}");
     assert_eq!(hit.damage, Damage::Superficial);
     assert!((hit.time.secs() - 1.47).abs() < 0.01 && (hit.speed_mps - 10.0).abs() < 0.1);
-    assert!(world.train().unwrap().speed_mps > 9.9);
+    assert!(world.train(TRAIN).unwrap().speed_mps > 9.9);
     let lamp = world.obstacles().next().unwrap();
     assert!(lamp.velocity_mps.norm() > 9.0, "{lamp:?}");
 }
@@ -407,11 +417,17 @@ fn worker_picks_up_his_toolbox() {
     };
     let mut world = World::new(straight(), &settings, 1, 0).unwrap();
     run(&mut world, 5.0);
-    assert_eq!((world.bodies().len(), world.obstacles().count()), (5, 1));
+    assert_eq!(
+        (world.bodies(Some(TRAIN)).len(), world.obstacles().count()),
+        (5, 1)
+    );
     run(&mut world, 1.0);
-    assert_eq!((world.bodies().len(), world.obstacles().count()), (5, 0));
+    assert_eq!(
+        (world.bodies(Some(TRAIN)).len(), world.obstacles().count()),
+        (5, 0)
+    );
     run(&mut world, 2.5);
-    assert!(world.bodies().is_empty());
+    assert!(world.bodies(Some(TRAIN)).is_empty());
 }
 
 /// The train hits a worker with the mass of a man, not of a wall, and throws him.
@@ -438,11 +454,11 @@ fn the_train_runs_a_worker_down() {
     // other end the rest.
     let blow = 80.0 * 1.05 * 10.0;
     assert!((0.6 * blow..1.1 * blow).contains(&hit.momentum_n_s));
-    assert!(world.train().unwrap().speed_mps > 9.9);
+    assert!(world.train(TRAIN).unwrap().speed_mps > 9.9);
     run(&mut world, 2.0);
     let worker = world.workers().next().unwrap();
     assert!(worker.chainage_m > 170.0, "{worker:?}");
-    assert_eq!(world.bodies().len(), 4);
+    assert_eq!(world.bodies(Some(TRAIN)).len(), 4);
 }
 
 fn hung(span_m: f64, length_m: f64) -> CableSettings {
@@ -469,7 +485,7 @@ fn with_cable(cable: CableSettings) -> PhysicsSettings {
 
 /// Lowest point of all that is drawn, over top of rail.
 fn lowest_m(world: &World) -> f64 {
-    let bodies = world.bodies();
+    let bodies = world.bodies(Some(TRAIN));
     let ends = bodies.iter().flat_map(|body| {
         let half = body.shape.half_extents_m().z;
         [half, -half].map(|z| (body.world_from_body * Point3::new(0.0, 0.0, z)).z)
@@ -486,10 +502,10 @@ fn val_a_cable_hangs_on_the_catenary() {
         let body = world.rapier.bodies.get_mut(link.body).unwrap();
         body.set_linvel(Vector::new(0.6, 0.8, 0.5), true);
     }
-    let hanging = world.bodies();
+    let hanging = world.bodies(Some(TRAIN));
     run(&mut world, 0.3);
     let moved = world
-        .bodies()
+        .bodies(None)
         .iter()
         .zip(&hanging)
         .fold(0.0, |far: f64, (a, b)| {
@@ -562,7 +578,7 @@ fn the_train_tears_a_cable() {
     eprintln!("{hit:?}");
     assert_eq!(hit.with, "cable");
     run(&mut world, 2.0);
-    assert!(world.train().unwrap().speed_mps > 9.8);
+    assert!(world.train(TRAIN).unwrap().speed_mps > 9.8);
     assert_eq!(world.obstacles().count(), 1, "it does not tear");
     for hit in world.impacts() {
         eprintln!("{hit:?}");
@@ -596,7 +612,7 @@ fn a_rock_fall_comes_to_rest_the_same_way_twice() {
         assert!(world.obstacles().all(|o| o.resting_since.is_some()));
         assert!(world.obstacles().all(|o| o.height_m > BED_M));
         assert_eq!(world.rapier.active_bodies().count(), 0);
-        world.bodies()
+        world.bodies(Some(TRAIN))
     };
     let once = fall(1);
     assert_eq!(once, fall(1));

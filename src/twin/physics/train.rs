@@ -1,18 +1,18 @@
 //! A train under way: its bodies, its driver, its recent past, and what it looks like.
 
 use super::consist::Consist;
+use super::directed_track::DirectedTrack;
 use super::driver::{Driver, Effort, STANDING_MPS};
 use super::history::{History, VehicleMotion};
-use super::line::Line;
-use super::owner::Owner;
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
-use crate::bus::{SimTime, TrainCommand};
-use crate::track::Tunnel;
+use crate::bus::{SimTime, TrainCommand, TrainId};
+use crate::track::Alignment;
 use crate::twin::render::{Body, Headlight, Shape};
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::PhysicsWorld;
+use std::sync::Arc;
 
 /// So long a train runs, or stands, before its start: springs and dampers come to rest.
 pub(super) const RUN_IN_S: f64 = 5.0;
@@ -30,6 +30,8 @@ const CAR_ALBEDO: f64 = 0.5;
 /// A train under way.
 #[derive(Clone)]
 pub(super) struct Train {
+    pub id: TrainId,
+    pub track: Arc<DirectedTrack>,
     pub consist: Consist,
     pub history: History,
     driver: Driver,
@@ -40,28 +42,30 @@ impl Train {
     /// A train that has yet to run in over the last metres before its starting place.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        line: &Line<'_>,
+        track: Arc<DirectedTrack>,
         settings: &TrainSettings,
-        owner: Option<Owner>,
+        id: TrainId,
         history_steps: usize,
     ) -> Self {
+        // From here on, places are those of the train's run.
+        let settings = TrainSettings {
+            start_chainage_m: track.turned_m(settings.start_chainage_m),
+            stop_at_m: settings.stop_at_m.map(|line_m| track.turned_m(line_m)),
+            ..settings.clone()
+        };
         let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
         Self {
-            consist: Consist::new(world, line, settings, head_m, owner),
+            id,
+            consist: Consist::new(world, &track, &settings, head_m, id),
+            track,
             history: History::new(history_steps),
-            driver: Driver::new(settings),
+            driver: Driver::new(&settings),
             effort: Effort::default(),
         }
     }
 
     /// Forces of a step of the run-in: held at the starting speed, or braked at standstill.
-    pub(super) fn run_in(
-        &mut self,
-        world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
-        line: &Line<'_>,
-        dt_s: f64,
-    ) {
+    pub(super) fn run_in(&mut self, world: &mut PhysicsWorld, dt_s: f64) {
         let settings = &self.consist.settings;
         let speed_mps = settings.start_speed_kmh / 3.6;
         let runs = speed_mps > STANDING_MPS;
@@ -73,7 +77,7 @@ impl Train {
                 settings.service_brake_mps2
             },
         };
-        self.consist.apply_forces(world, tunnel, line, effort, dt_s);
+        self.consist.apply_forces(world, &self.track, effort, dt_s);
         if runs {
             self.consist.hold_speed(world, speed_mps, dt_s);
         }
@@ -89,15 +93,13 @@ impl Train {
     pub(super) fn drive(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
-        line: &Line<'_>,
         command: &TrainCommand,
         (now, dt_s): (SimTime, f64),
     ) {
-        let instruments = self.consist.instruments(now, tunnel);
+        let instruments = self.consist.instruments(now, &self.track);
         self.effort = self.driver.step(&instruments, command, dt_s);
         self.consist
-            .apply_forces(world, tunnel, line, self.effort, dt_s);
+            .apply_forces(world, &self.track, self.effort, dt_s);
     }
 
     /// What a step came to.
@@ -113,21 +115,21 @@ impl Train {
         self.history.latest()
     }
 
-    /// Chainage of the origin of its vehicle frame at a pose.
-    pub(super) fn chainage_m(&self, tunnel: &Tunnel, world_from_vehicle: &Isometry3<f64>) -> f64 {
-        let near_m = self.consist.head_chainage_m();
+    /// Chainage on the line of the origin of its vehicle frame at a pose.
+    pub(super) fn chainage_m(&self, line: &Alignment, world_from_vehicle: &Isometry3<f64>) -> f64 {
+        let near_m = self.track.turned_m(self.consist.head_chainage_m());
         let origin = world_from_vehicle.translation.vector.into();
-        tunnel.alignment.track_from_world(&origin, near_m).s_m
+        line.track_from_world(&origin, near_m).s_m
     }
 
-    /// As it really is.
-    pub(super) fn state(&self, tunnel: &Tunnel, dt_s: f64) -> Option<TrainState> {
+    /// As it really is, seen along the line.
+    pub(super) fn state(&self, line: &Alignment, dt_s: f64) -> Option<TrainState> {
         let (consist, motion) = (&self.consist, self.motion()?);
-        let chainage_m = self.chainage_m(tunnel, &motion.world_from_vehicle);
-        let frame = tunnel.alignment.at(chainage_m);
-        let along = frame.world_from_line().rotation * Vector3::x();
+        let chainage_m = self.chainage_m(line, &motion.world_from_vehicle);
+        let along = line.at(chainage_m).world_from_line().rotation * Vector3::x();
         Some(TrainState {
             time: motion.time,
+            direction: self.track.direction,
             chainage_m,
             speed_mps: motion.velocity_mps.dot(&along),
             accel_mps2: consist.accel_mps2(along, dt_s),

@@ -3,8 +3,8 @@
 use super::cable::{Cable, bounds};
 use super::obstacle::Piece;
 use super::thing::Thing;
-use super::{WheelExtremes, World};
-use crate::bus::SimTime;
+use super::{Impact, World};
+use crate::bus::{SimTime, TrainId};
 use crate::track::Alignment;
 use crate::twin::render::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -48,25 +48,25 @@ pub struct WorkerTruth<'a> {
     pub lateral_m: f64,
 }
 
-/// Who a body belongs to. Numbers stay with their owner for a whole run.
+/// What a body belongs to. Numbers stay with their owner for a whole run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum BodyOwner {
-    /// Something loose or fixed to the lining, in the order of appearance.
-    Thing(usize),
+    /// An obstacle, loose or fixed to the lining, in the order of appearance.
+    Obstacle(usize),
     /// A cable.
     Cable(usize),
     /// A worker.
     Worker(usize),
-    /// What a worker carries; put down, it is a thing.
+    /// What a worker carries; put down, it is an obstacle.
     Load(usize),
-    /// A car of a train, from its front. Train 0 is the scenario's own, 1 the first of the others.
-    Car(usize, usize),
+    /// A car of a train, from its front.
+    Car(TrainId, usize),
 }
 
 /// A body's owner and the name that the scenario gives it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Belonging<'a> {
-    /// Who it belongs to.
+pub struct BodyLabel<'a> {
+    /// What it belongs to.
     pub owner: BodyOwner,
     /// Name.
     pub name: &'a str,
@@ -76,64 +76,48 @@ pub struct Belonging<'a> {
 const RESTING_S: f64 = 0.25;
 
 impl World {
-    /// Chainage of the train head now; `None` without a train.
-    pub fn head_m(&self) -> Option<f64> {
-        self.chainage_of(&self.vehicle_motion()?.world_from_vehicle)
+    /// All bodies that are there now, to draw, but for those of one train: a camera does not see the
+    /// train that carries it.
+    pub fn bodies(&self, without: Option<TrainId>) -> Vec<Body> {
+        self.owned_bodies(without).0
     }
 
-    /// Chainage of the train head at a time of the recent past.
-    pub fn chainage_at(&self, time: SimTime) -> Option<f64> {
-        self.chainage_of(&self.vehicle_at(time)?)
-    }
-
-    /// Length of the train over couplers; `None` without a train.
-    pub fn train_length_m(&self) -> Option<f64> {
-        Some(self.train.as_ref()?.consist.length_m())
-    }
-
-    /// Chainage of the head and length of every other train.
-    pub fn other_trains_m(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
-        self.others.iter().filter_map(|train| {
-            let pose = train.motion()?.world_from_vehicle;
-            let head_m = train.chainage_m(&self.tunnel, &pose);
-            Some((head_m, train.consist.length_m()))
-        })
-    }
-
-    /// What the worst of the train's wheels has been through; `None` without a train.
-    pub fn wheel_extremes(&self) -> Option<WheelExtremes> {
-        let wheelsets = self.train.as_ref()?.consist.wheelsets.iter();
-        wheelsets.map(|w| w.extremes).reduce(WheelExtremes::and)
-    }
-
-    /// Normal force of a wheel at rest; `None` without a train.
-    pub fn wheel_load_n(&self) -> Option<f64> {
-        Some(self.train.as_ref()?.consist.vehicle.wheel_load_n())
-    }
-
-    /// [`World::bodies`] and, where asked for, [`World::train_bodies`], each with its owner.
-    pub fn owned_bodies(&self, with_train: bool) -> (Vec<Body>, Vec<Belonging<'_>>) {
+    /// [`World::bodies`], each with its label.
+    pub fn owned_bodies(&self, without: Option<TrainId>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
         let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
-        let mut owned = self.things.draw_owned(&self.rapier, line, now_s);
-        let others = self.others.iter().enumerate();
-        let others = others.map(|(k, train)| (k + 1, train, self.things.train_name(k)));
-        let own = self.train.iter().filter(|_| with_train);
-        let own = own.map(|train| (0, train, "train"));
-        for (number, train, name) in others.chain(own) {
+        let mut owned = self.things.draw(&self.rapier, line, now_s);
+        // The order may decide pixels: the first train comes last.
+        let trains = self.trains.iter().skip(1).chain(self.trains.first());
+        for train in trains.filter(|train| Some(train.id) != without) {
+            let name = self.things.train_name(train.id);
             let cars = train.consist.boxes().count();
             for (k, body) in train.bodies().into_iter().enumerate() {
                 // After the cars come the lenses on the leading one.
                 let car = if k < cars { k } else { 0 };
-                let owner = BodyOwner::Car(number, car);
-                owned.push((body, Belonging { owner, name }));
+                let owner = BodyOwner::Car(train.id, car);
+                owned.push((body, BodyLabel { owner, name }));
             }
         }
         owned.into_iter().unzip()
     }
 
-    fn chainage_of(&self, world_from_vehicle: &Isometry3<f64>) -> Option<f64> {
-        let train = self.train.as_ref()?;
-        Some(train.chainage_m(&self.tunnel, world_from_vehicle))
+    /// Obstacles that are there now: what lies, falls or swings. What is still fixed to the lining
+    /// is none.
+    pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
+        let line = &self.tunnel.alignment;
+        self.things.obstacles(&self.rapier, line, self.time)
+    }
+
+    /// Workers who are on the line now.
+    pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
+        let line = &self.tunnel.alignment;
+        self.things.workers(&self.rapier, line, self.time.secs())
+    }
+
+    /// Hits of trains on obstacles, cables, workers and other trains, in order of time; the first
+    /// thousand. Where two trains hit each other, each of them has its own.
+    pub fn impacts(&self) -> &[Impact] {
+        self.things.impacts()
     }
 }
 

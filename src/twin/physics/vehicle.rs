@@ -7,6 +7,10 @@ use rapier3d_f64::math::Vector;
 pub(super) const GRAVITY_MPS2: f64 = 9.806_65;
 /// Half the distance of the wheels' contact points (1435 mm gauge).
 pub(super) const HALF_CONTACT_M: f64 = 0.75;
+/// Wheelsets of a car.
+pub(super) const AXLES: usize = 4;
+/// Stiffness of a rail under a flange: sideways, it gives more than downwards.
+pub(super) const FLANGE_STIFFNESS_N_M: f64 = 40e6;
 
 /// Springs and dampers of one element along its x, y and z, under a static load along z.
 #[derive(Clone, Copy, Debug, PartialEq)]

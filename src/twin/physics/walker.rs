@@ -5,9 +5,9 @@
 //! From then on it is a body like others: it is thrown, falls, and lies.
 
 use super::convert::{isometry, pose, vector, vector3};
-use super::groups::{OBSTACLE_GROUP, TRAIN_GROUP, groups, loose};
+use super::entity::Entity;
+use super::groups::{OBSTACLE_GROUP, TRAIN_GROUPS, groups, loose};
 use super::obstacle::Piece;
-use super::owner::Owner;
 use super::thing::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
@@ -80,7 +80,7 @@ impl Walker {
         world: &mut PhysicsWorld,
         alignment: &Alignment,
         now_s: f64,
-        owner: Owner,
+        entity: Entity,
     ) {
         if self.hit.is_some() {
             return;
@@ -95,7 +95,7 @@ impl Walker {
         let centre = feet * Isometry3::translation(0.0, 0.0, self.half_m());
         let body = match self.body {
             Some(body) => body,
-            None => *self.body.insert(self.insert(world, &centre, owner)),
+            None => *self.body.insert(self.insert(world, &centre, entity)),
         };
         if let Some(body) = world.bodies.get_mut(body) {
             body.set_position(pose(&centre), true);
@@ -108,21 +108,21 @@ impl Walker {
         &self,
         world: &mut PhysicsWorld,
         at: &Isometry3<f64>,
-        owner: Owner,
+        entity: Entity,
     ) -> RigidBodyHandle {
         let body = world.insert_body(
             RigidBodyBuilder::dynamic()
                 .pose(pose(at))
                 .gravity_scale(0.0)
-                .user_data(owner.id())
+                .user_data(entity.user_data())
                 .additional_solver_iterations(EXTRA_PASSES),
         );
         let collider = ColliderBuilder::capsule_z(self.half_m() - RADIUS_M, RADIUS_M)
             .mass(self.settings.mass_kg)
             .friction(0.6)
             .restitution(0.0)
-            .user_data(owner.id())
-            .collision_groups(groups(OBSTACLE_GROUP, TRAIN_GROUP));
+            .user_data(entity.user_data())
+            .collision_groups(groups(OBSTACLE_GROUP, TRAIN_GROUPS));
         world.insert_collider(collider, Some(body));
         body
     }

@@ -26,11 +26,11 @@
 //! of the law, the slip's own dynamics), which is stable at any speed and exact where it is steady.
 
 use super::adhesion::{KALKER_ACROSS_N, KALKER_ALONG_N};
+use super::deviation::Deviation;
+use super::directed_track::{DirectedTrack, rail_axes};
 use super::energy::Ledger;
-use super::irregularity::Deviation;
-use super::line::Line;
 use super::suspension::{Axes, BodyState, Wrench};
-use super::vehicle::{GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
+use super::vehicle::{FLANGE_STIFFNESS_N_M, GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
 use rapier3d_f64::math::Vector;
 
 /// Equivalent conicity of moderately worn treads, by UIC 519.
@@ -40,8 +40,6 @@ const FLANGE_PLAY_M: f64 = 0.007;
 /// Of a rail's head (60 kg), and of a flange.
 const RAIL_HEAD_M: f64 = 0.073;
 const FLANGE_HEIGHT_M: f64 = 0.028;
-/// Sideways, a rail gives more than downwards.
-pub(super) const FLANGE_STIFFNESS_N_M: f64 = 40e6;
 /// Creepage is slip over speed, and at standstill over this.
 const LEAST_SPEED_MPS: f64 = 0.01;
 /// Discs and pads of one wheelset give by this before they slip, at the wheel's tread.
@@ -155,14 +153,14 @@ impl Wheelset {
     pub(super) fn apply(
         &mut self,
         vehicle: &Vehicle,
-        line: &Line<'_>,
+        track: &DirectedTrack,
         drive: Drive,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
         dt_s: f64,
     ) -> Vector {
-        let rails = self.follow(line, state, dt_s);
-        self.carry(vehicle, line, &rails, (state, wrench), ledger);
+        let rails = self.follow(track, state, dt_s);
+        self.carry(vehicle, track, &rails, (state, wrench), ledger);
         let axle = state.rotation * Vector::Y;
         let spin = state.angular.dot(axle);
         let tread_mps = spin * vehicle.wheel_radius_m;
@@ -172,7 +170,7 @@ impl Wheelset {
         ledger.brake_w -= brake * tread_mps;
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
         wrench.torque += torque;
-        self.creep(vehicle, line, &rails, (state, wrench), ledger, dt_s);
+        self.creep(vehicle, track, &rails, (state, wrench), ledger, dt_s);
         self.extremes = self.extremes.and(WheelExtremes {
             least_normal_n: self.forces.normal_n[0].min(self.forces.normal_n[1]),
             most_slip_mps: self.forces.slip_mps.abs(),
@@ -186,11 +184,11 @@ impl Wheelset {
     }
 
     /// The rails under the axle, a step on.
-    fn follow(&mut self, line: &Line<'_>, state: &BodyState, dt_s: f64) -> Rails {
+    fn follow(&mut self, track: &DirectedTrack, state: &BodyState, dt_s: f64) -> Rails {
         // Predicted to some micrometres; the rest is a step along the tangent.
         let guess = self.s_m + state.velocity.length() * dt_s;
-        let frame = line.alignment.at(guess);
-        let (origin, designed) = super::line::rail_axes(&frame);
+        let frame = track.alignment().at(guess);
+        let (origin, designed) = rail_axes(&frame);
         let along = (state.position - origin).dot(designed.x);
         let s_m = guess + along / (1.0 + frame.slope * frame.slope).sqrt();
         let (run_m, turn) = (s_m - self.s_m, frame.roll_rad - self.roll_rad);
@@ -199,7 +197,7 @@ impl Wheelset {
             self.roll_rad_per_m = turn / run_m;
         }
         (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
-        let d = line.irregularity.at(s_m);
+        let d = track.deviation_at(s_m);
         // The angle is some mrad at most: to 1e-12.
         let half = 0.5 * d.roll_rad * d.roll_rad;
         let (sin, cos) = (d.roll_rad * (1.0 - half / 3.0), 1.0 - half);
@@ -219,7 +217,7 @@ impl Wheelset {
     fn carry(
         &mut self,
         vehicle: &Vehicle,
-        line: &Line<'_>,
+        track: &DirectedTrack,
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
@@ -237,8 +235,8 @@ impl Wheelset {
             // Of the wheel's body without its own turning, which is along the rail.
             let velocity = state.velocity + state.angular.cross(axle * side);
             let rate = velocity.dot(z) - speed * rise_per_m;
-            let damper = line.support.1 * rate;
-            let normal = (load_n - line.support.0 * over_m - damper).max(0.0);
+            let damper = track.support.1 * rate;
+            let normal = (load_n - track.support.0 * over_m - damper).max(0.0);
             self.forces.normal_n[k] = normal;
             self.over_m = if k == 0 {
                 over_m
@@ -246,7 +244,7 @@ impl Wheelset {
                 self.over_m.min(over_m)
             };
             if normal > 0.0 {
-                ledger.springs_j += (0.5 * line.support.0 * over_m - load_n) * over_m;
+                ledger.springs_j += (0.5 * track.support.0 * over_m - load_n) * over_m;
                 ledger.dampers_w += damper * rate;
             }
             // At right angles to the way of the contact, so that the rails do no work, and through
@@ -293,7 +291,7 @@ impl Wheelset {
     fn creep(
         &mut self,
         vehicle: &Vehicle,
-        line: &Line<'_>,
+        track: &DirectedTrack,
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
@@ -315,7 +313,7 @@ impl Wheelset {
         let linear = f_along * f_along + f_across * f_across + f_yaw * f_yaw;
         let linear = 2.0 * per_mps * linear.sqrt();
         let total_mps = (along_mps * along_mps + across_mps * across_mps).sqrt();
-        let share = line.adhesion_at(self.s_m).share(linear, load_n, total_mps);
+        let share = track.adhesion_at(self.s_m).share(linear, load_n, total_mps);
         let along_c = 2.0 * KALKER_ALONG_N * per_mps * share;
         let across_c = 2.0 * KALKER_ACROSS_N * per_mps * share;
         let yaw_c = along_c * HALF_CONTACT_M * HALF_CONTACT_M;

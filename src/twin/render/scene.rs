@@ -345,7 +345,7 @@ pub struct Job {
     pub time: SimTime,
     /// Everything solid that is not the tunnel.
     pub bodies: Vec<Body>,
-    /// Headlights that are lit. On a graphics adapter the nearest eight light a view.
+    /// Headlights that are lit. On a graphics adapter the nearest sixteen light a view.
     pub headlights: Vec<Headlight>,
     /// One image each.
     pub views: Vec<View>,

@@ -4,7 +4,7 @@
 //! A mount turns by yaw about the vertical (left positive) and then by pitch about its own right
 //! hand axis (up positive). Zhang et al. 2023 measure psi from the lateral direction: psi = 90 deg - yaw.
 
-use super::ExposureSettings;
+use super::{ClockSettings, ExposureSettings};
 use crate::bus::{
     CameraModel, DistortionCoefficients, Intrinsics, Shutter, SimTime, WaysideCalibration,
 };
@@ -343,6 +343,8 @@ pub struct WaysideCameraSettings {
     pub sensor: SensorSettings,
     /// Exposure and gain that follow the light. Default: fixed.
     pub exposure_control: ExposureSettings,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 fn wayside_lens<'de, D: Deserializer<'de>>(input: D) -> Result<LensSettings, D::Error> {
@@ -390,6 +392,7 @@ impl Default for WaysideCameraSettings {
                 ..SensorSettings::default()
             },
             exposure_control: ExposureSettings::default(),
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -487,6 +490,7 @@ impl WaysideCameraSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.clock.check(&format!("{at}.clock"), problems);
         check_jitter(at, self.frame_jitter_us, self.frames_per_s, problems);
         self.sensor.check(&format!("{at}.sensor"), problems);
         self.lens.check(&format!("{at}.lens"), problems);

@@ -21,7 +21,8 @@
 //! constant scale that calibration takes out), water and ice, rails and sleepers as lines in the
 //! spectrum, other radars.
 
-use crate::bus::DopplerSample;
+use super::ClockSettings;
+use crate::bus::{DopplerSample, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -52,6 +53,8 @@ pub struct DopplerSettings {
     pub mount_error_deg: f64,
     /// Speed below which it says nothing, m/s.
     pub min_speed_mps: f64,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 impl Default for DopplerSettings {
@@ -65,6 +68,7 @@ impl Default for DopplerSettings {
             janus: false,
             mount_error_deg: 0.2,
             min_speed_mps: 0.2,
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -72,6 +76,7 @@ impl Default for DopplerSettings {
 impl DopplerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.clock.check(&format!("{at}.clock"), problems);
         let mut check = Checker::new(at, problems);
         check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
         let [x, y, z] = self.position_m;
@@ -145,10 +150,10 @@ impl Doppler {
         1.0 / self.settings.rate_hz
     }
 
-    /// A sample of the time since the last one; `None` without a train, and on the first call,
+    /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the radar.
-    pub fn sample(&mut self, world: &World) -> Option<DopplerSample> {
-        let now = *world.vehicle_motion()?;
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<DopplerSample> {
+        let now = *world.vehicle_motion(train)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }

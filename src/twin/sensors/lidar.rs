@@ -6,6 +6,7 @@
 //! met at angle i is proportional to rho cos(i) / R^2 (the lidar equation without extinction);
 //! below the detector's threshold there is no echo. No beam divergence, no mixed echoes at edges.
 
+use super::ClockSettings;
 use crate::bus::{LidarReturn, LidarScan, SimTime};
 use crate::track::{Checker, Problem, Tunnel};
 use crate::twin::random::Stream;
@@ -43,6 +44,8 @@ pub struct LidarSettings {
     /// Reflectance that, met square, is just seen at the longest range; darker or slanted surfaces
     /// are lost earlier. 0 to lose none. Default 0.1.
     pub threshold_reflectance: f64,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 impl Default for LidarSettings {
@@ -58,6 +61,7 @@ impl Default for LidarSettings {
             min_range_m: 0.5,
             max_range_m: 120.0,
             threshold_reflectance: 0.1,
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -65,6 +69,7 @@ impl Default for LidarSettings {
 impl LidarSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.clock.check(&format!("{at}.clock"), problems);
         let mut check = Checker::new(at, problems);
         check.within("channels", f64::from(self.channels), 1.0..=256.0, "beams");
         check.within("lowest_deg", self.lowest_deg, -89.0..=89.0, "deg");

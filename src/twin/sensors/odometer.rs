@@ -14,7 +14,8 @@
 //! Not modelled: missing or double pulses, conicity (the radius where the rail touches), an
 //! eccentric wheel.
 
-use crate::bus::{OdometerSample, SimTime};
+use super::ClockSettings;
+use crate::bus::{OdometerSample, SimTime, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -45,6 +46,8 @@ pub struct OdometerSettings {
     pub worn_m: f64,
     /// One sigma of how well it was measured, as a share; the wear comes on top.
     pub radius_error_share: f64,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 impl Default for OdometerSettings {
@@ -57,6 +60,7 @@ impl Default for OdometerSettings {
             wheel_radius_m: 0.43,
             worn_m: 0.0,
             radius_error_share: 0.003,
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -64,6 +68,7 @@ impl Default for OdometerSettings {
 impl OdometerSettings {
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.clock.check(&format!("{at}.clock"), problems);
         let mut check = Checker::new(at, problems);
         check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
         check.within("axle", f64::from(self.axle), 1.0..=64.0, "");
@@ -123,10 +128,10 @@ impl Odometer {
         1.0 / self.settings.rate_hz
     }
 
-    /// A sample now; `None` without a train, or without that wheelset.
-    pub fn sample(&mut self, world: &World) -> Option<OdometerSample> {
+    /// A sample now; `None` without the train that carries it, or without that wheelset.
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<OdometerSample> {
         let axle = (self.settings.axle as usize).saturating_sub(1);
-        Some(self.read(world.time(), world.wheel_run_m(axle)?))
+        Some(self.read(world.time(), world.wheel_run_m(train, axle)?))
     }
 
     /// What the box says when its wheelset's tread has rolled `run_m` since the start.

@@ -24,8 +24,8 @@
 //! of the lenses it misses of both alike. Both eyes share the jitter of the trigger, and one line
 //! time: it does not drift. Nothing changes with temperature or vibration.
 
-use super::ExposureSettings;
 use super::camera::{Optics, ReadOut, check_jitter, most_jitter_s, mounted, positive};
+use super::{ClockSettings, ExposureSettings};
 use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration};
 use crate::track::{Checker, LampSite, Problem, Tunnel};
 use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
@@ -92,6 +92,8 @@ pub struct RigSettings {
     pub sensor: SensorSettings,
     /// Exposure and gain that follow the light. Default: fixed.
     pub exposure_control: ExposureSettings,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 impl Default for RigSettings {
@@ -121,6 +123,7 @@ impl Default for RigSettings {
             lens: LensSettings::default(),
             sensor: SensorSettings::default(),
             exposure_control: ExposureSettings::default(),
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -267,6 +270,7 @@ impl RigSettings {
     /// Appends what is wrong.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         self.optics().check(at, problems);
+        self.clock.check(&format!("{at}.clock"), problems);
         self.right
             .check(&format!("{at}.right"), &self.optics(), problems);
         self.lens.check(&format!("{at}.lens"), problems);

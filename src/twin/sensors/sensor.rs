@@ -2,6 +2,7 @@
 
 use super::Exposed;
 use crate::bus::{Content, Frame, SimTime, Ticker};
+use crate::track::{Checker, Problem};
 use crate::twin::physics::World;
 use crate::twin::render::View;
 use image::GrayImage;
@@ -102,6 +103,13 @@ pub struct ClockSettings {
 }
 
 impl ClockSettings {
+    /// Appends what is wrong, with keys below `at`.
+    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        let mut check = Checker::new(at, problems);
+        check.within("offset_ms", self.offset_ms, -100.0..=100.0, "ms");
+        check.within("drift_ppm", self.drift_ppm, -1000.0..=1000.0, "ppm");
+    }
+
     /// What the clock shows at a time.
     pub fn local(&self, time: SimTime) -> SimTime {
         if self.is_exact() {

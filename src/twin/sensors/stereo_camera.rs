@@ -1,8 +1,8 @@
 //! The stereo camera on a train, at work: when it triggers, what there is to draw, what it delivers.
 
 use super::{
-    AutoExposure, Capture, ClockSettings, Exposed, FrameHeader, Output, RigSettings, Sensor,
-    SensorError, Trigger,
+    AutoExposure, Capture, ClockSettings, FrameHeader, Output, RigSettings, Sensor, SensorError,
+    Trigger,
 };
 use crate::bus::{CameraModel, Content, RigCalibration, SimTime, StereoPair, Ticker, TrainId};
 use crate::twin::faults::{CameraFaultSettings, CameraFaults, CameraOutput};

@@ -5,7 +5,7 @@ use super::{
     AutoExposure, Capture, ClockSettings, FrameHeader, Output, Sample, Sensor, SensorError,
     Trigger, WaysideCameraSettings,
 };
-use crate::bus::{Content, SimTime, Ticker, TrainId, WaysideCalibration};
+use crate::bus::{Content, SimTime, Ticker, WaysideCalibration};
 use crate::twin::faults::{CameraFaultSettings, CameraFaults, CameraOutput};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -136,12 +136,7 @@ impl Sensor for WaysideLidar {
         let Some((number, start)) = self.ticker.due(local, self.lidar.sweep_s()) else {
             return Ok(Vec::new());
         };
-        let mut bodies = world.bodies();
-        bodies.extend(
-            world
-                .train_ids()
-                .flat_map(|id: TrainId| world.train_bodies(id)),
-        );
+        let bodies = world.bodies(None);
         let time = self.clock.time_of(start);
         let mut scan = self.lidar.scan(time, number, world.time(), &bodies);
         scan.time = start;

@@ -12,7 +12,7 @@
 
 use super::model::{CAR, G_MPS2, Linear, ROLL, Under, Y, dof};
 use super::*;
-use nalgebra::DVector;
+use nalgebra::{DVector, Vector3};
 use rapier3d_f64::math::Vector;
 
 /// A curve to the left, and the car that runs in it.

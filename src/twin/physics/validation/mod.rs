@@ -19,7 +19,7 @@ mod running;
 
 use super::consist::Consist;
 use super::driver::Effort;
-use super::testing::line;
+use super::testing::{TRAIN, line};
 use super::*;
 use crate::bus::BrakeDemand;
 use crate::track::{Alignment, Grade, PlanElement};
@@ -58,7 +58,7 @@ fn on_track(train: TrainSettings, class: IrregularityClass) -> PhysicsSettings {
             },
             ..TrackSettings::default()
         },
-        train: Some(train),
+        trains: vec![train],
         ..PhysicsSettings::default()
     }
 }
@@ -77,16 +77,15 @@ fn go() -> TrainCommand {
 
 fn run(world: &mut World, seconds: f64, command: &TrainCommand) {
     for _ in 0..(seconds / world.step_s).round() as usize {
-        world.step(command).unwrap();
+        world.step(&[*command]).unwrap();
     }
 }
 
 /// A step with an effort of ours in place of the driver's, held at a speed or free.
 fn step_with(world: &mut World, effort: Effort, held_mps: Option<f64>) {
-    let (tunnel, dt_s) = (&world.tunnel, world.step_s);
-    let line = Line::new(tunnel, &world.irregularity, &world.settings.track);
-    let consist = &mut world.train.as_mut().unwrap().consist;
-    consist.apply_forces(&mut world.rapier, tunnel, &line, effort, dt_s);
+    let (train, dt_s) = (&mut world.trains[0], world.step_s);
+    let consist = &mut train.consist;
+    consist.apply_forces(&mut world.rapier, &train.track, effort, dt_s);
     if let Some(speed_mps) = held_mps {
         consist.hold_speed(&mut world.rapier, speed_mps, dt_s);
     }
@@ -99,7 +98,7 @@ fn coast(world: &mut World) {
 }
 
 fn consist(world: &World) -> &Consist {
-    &world.train.as_ref().unwrap().consist
+    &world.trains[0].consist
 }
 
 fn rms(values: &[f64]) -> f64 {

@@ -7,7 +7,7 @@
 
 use super::model::{BOGIES, CAR, Linear, Mode, PITCH, ROLL, Under, Y, Z, dof};
 use super::*;
-use nalgebra::{Complex, DMatrix, DVector};
+use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use rapier3d_f64::math::Rotation;
 
 const SPEED_MPS: f64 = 20.0;
@@ -72,7 +72,7 @@ fn excite(world: &mut World, model: &Linear, mode: &Mode) {
         body.set_angvel(turn * angular + rate, true);
     }
     let now = world.time;
-    let train = world.train.as_mut().unwrap();
+    let train = &mut world.trains[0];
     train.consist.read(&world.rapier, now).unwrap();
 }
 

@@ -35,10 +35,10 @@ fn measure(step_s: f64, slack_m: f64) -> Vec<(&'static str, f64)> {
     let mut world = World::new(line(&plan, 0.01), &settings, 3, 0).unwrap();
     let mut series: Vec<Vec<f64>> = vec![Vec::new(); 10];
     for k in 0..(30.0 / step_s) as usize {
-        world.step(&go()).unwrap();
+        world.step(&[go()]).unwrap();
         // The same moments for either step.
         if k % (0.002 / step_s).round() as usize == 0 {
-            let state = world.train().unwrap();
+            let state = world.train(TRAIN).unwrap();
             let car = &consist(&world).states[0];
             let turned = car.rotation.to_scaled_axis();
             let level = car.rotation * Vector::X;

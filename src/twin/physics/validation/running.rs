@@ -172,7 +172,7 @@ fn val_coasting() {
         for _ in 0..(1000.0 * seconds) as usize {
             coast(&mut world);
         }
-        let state = world.train().unwrap();
+        let state = world.train(TRAIN).unwrap();
         let (s, v) = Motion::new(&tunnel, &train).run(seconds, |_| (0.0, 0.0));
         compare(&format!("{what}, speed m/s"), state.speed_mps, v, 0.005);
         compare(
@@ -204,7 +204,7 @@ fn val_starting() {
         };
         let mut world = World::new(tunnel.clone(), &smooth(&train), 1, 0).unwrap();
         run(&mut world, 14.0, &go());
-        let state = world.train().unwrap();
+        let state = world.train(TRAIN).unwrap();
         let motion = Motion::new(&tunnel, &train);
         // From the full service brake over zero to the full traction, at the driver's jerk.
         let lever = |t: f64| (0.75 * t - 1.0).min(1.0);
@@ -238,7 +238,7 @@ fn val_braking_distance() {
             let train = train(2, 80.0);
             let mut world = World::new(tunnel.clone(), &smooth(&train), 1, 0).unwrap();
             run(&mut world, 40.0, &command(brake, 200.0));
-            let state = world.train().unwrap();
+            let state = world.train(TRAIN).unwrap();
             let ramp = |t: f64| (0.0, full * (t / build_up_s).min(1.0));
             let (s, _) = Motion::new(&tunnel, &train).run(100.0, ramp);
             compare(
@@ -250,10 +250,10 @@ fn val_braking_distance() {
             assert!(state.standing);
             let stood = state.chainage_m;
             run(&mut world, 5.0, &command(brake, 200.0));
-            assert!((world.train().unwrap().chainage_m - stood).abs() < 1e-3);
+            assert!((world.train(TRAIN).unwrap().chainage_m - stood).abs() < 1e-3);
             run(&mut world, 10.0, &go());
             assert!(
-                world.train().unwrap().speed_mps > 1.0,
+                world.train(TRAIN).unwrap().speed_mps > 1.0,
                 "does not start again"
             );
         }
@@ -275,12 +275,12 @@ fn val_stop_mark() {
                 settings.track.rail = rail;
                 let tunnel = line(&[PlanElement::straight(3000.0)], slope);
                 let mut world = World::new(tunnel, &settings, 1, 0).unwrap();
-                while !world.train().unwrap().standing && world.time().secs() < 120.0 {
+                while !world.train(TRAIN).unwrap().standing && world.time().secs() < 120.0 {
                     run(&mut world, 0.1, &go());
                 }
                 // Stopped short, the driver draws up.
                 run(&mut world, 6.0, &go());
-                let state = world.train().unwrap();
+                let state = world.train(TRAIN).unwrap();
                 let off = state.chainage_m - 850.0;
                 let what = format!(
                     "{rail:?} rails, {:+.0} permille, {kmh} km/h: {off:+.3} m",
@@ -307,7 +307,7 @@ fn regress_past_the_mark_it_stops() {
     };
     let mut world = World::new(straight(3000.0), &smooth(&train), 1, 0).unwrap();
     run(&mut world, 60.0, &go());
-    let state = world.train().unwrap();
+    let state = world.train(TRAIN).unwrap();
     eprintln!(
         "marked 100 m ahead at 80 km/h, stands {:.1} m past",
         state.chainage_m - 400.0
@@ -367,11 +367,11 @@ fn val_braking_on_slippery_rails() {
                 let load_n: f64 = wheel.normal_n.iter().sum();
                 over = over.max(-wheel.along_n / load_n / peak(rail, v, 0.5 * load_n));
             }
-            if world.train().unwrap().standing {
+            if world.train(TRAIN).unwrap().standing {
                 break;
             }
         }
-        let distance = world.train().unwrap().chainage_m - 300.0;
+        let distance = world.train(TRAIN).unwrap().chainage_m - 300.0;
         let most =
             (1..=100).map(|k| peak(rail, start * 0.01 * f64::from(k), total_kg * G_MPS2 / 8.0));
         let most = most.fold(0.0, f64::max) * G_MPS2;
@@ -383,7 +383,7 @@ fn val_braking_on_slippery_rails() {
             100.0 * deepest,
             over
         );
-        assert!(world.train().unwrap().standing);
+        assert!(world.train(TRAIN).unwrap().standing);
         assert!(over < 1.02 && distance > least_m && deepest < 0.95);
         // Protection hunts about the peak: it must use most of what there is.
         assert!(distance < 1.5 * least_m + start * 1.5);
@@ -413,7 +413,7 @@ fn val_starting_on_leaves() {
             .map(|w| w.slip_mps);
         slips = slips.min(least.fold(0.0, f64::min));
     }
-    let v = world.train().unwrap().speed_mps;
+    let v = world.train(TRAIN).unwrap().speed_mps;
     eprintln!(
         "20 s on leaves: {v:.2} m/s, slips by up to {:.2} m/s",
         -slips
@@ -437,7 +437,7 @@ fn val_energy_over_the_line() {
     while world.time().secs() < 195.0 {
         run(&mut world, 1.0, &go());
     }
-    let (state, book) = (world.train().unwrap(), world.energy().unwrap());
+    let (state, book) = (world.train(TRAIN).unwrap(), world.energy(TRAIN).unwrap());
     eprintln!("stands at {:.3} m; {book:#?}", state.chainage_m);
     eprintln!(
         "gap {:.0} J, {:.3} % of what was turned over, {:.1} % of what dampers took",

@@ -4,12 +4,12 @@
 use bytemuck::{Pod, Zeroable};
 
 /// Headlights beyond this many do not light a view; the nearest ones do.
-pub const MAX_HEADLIGHTS: usize = 8;
+pub const MAX_HEADLIGHTS: usize = 16;
 
 /// Numbers in the lists of a view's shadows.
 pub const MAX_WORDS: usize = 16384;
 /// Lights that may throw shadows in a view: the nearest.
-pub const MAX_SOURCES: usize = 128;
+pub const MAX_SOURCES: usize = 136;
 /// Bodies that may throw shadows in a view: the nearest.
 pub const MAX_BLOCKERS: usize = 512;
 /// Slabs of all of them.

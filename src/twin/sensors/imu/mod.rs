@@ -19,7 +19,8 @@
 //! bandwidth (330 Hz, above what a car body does), vibration rectification, rate random walk beyond
 //! the drift's slowest part, the Earth's turn (15 deg/h, which the null takes out with the bias).
 
-use crate::bus::ImuSample;
+use super::ClockSettings;
+use crate::bus::{ImuSample, TrainId};
 use crate::track::{Checker, Problem};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -89,6 +90,8 @@ pub struct ImuSettings {
     pub accel_range_g: f64,
     /// Round to the steps of the sensor's 32-bit outputs.
     pub quantise: bool,
+    /// Its clock.
+    pub clock: ClockSettings,
 }
 
 impl Default for ImuSettings {
@@ -113,6 +116,7 @@ impl Default for ImuSettings {
             accel_skew_deg: 0.035,
             accel_range_g: 18.0,
             quantise: true,
+            clock: ClockSettings::default(),
         }
     }
 }
@@ -142,6 +146,7 @@ impl ImuSettings {
 
     /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
     pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.clock.check(&format!("{at}.clock"), problems);
         let mut check = Checker::new(at, problems);
         // The data sheet's fastest is 2460 a second; the physics steps a thousand times.
         check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
@@ -257,10 +262,10 @@ impl Imu {
         self.period_s
     }
 
-    /// A sample of the time since the last one; `None` without a train, and on the first call,
+    /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the unit.
-    pub fn sample(&mut self, world: &World) -> Option<ImuSample> {
-        let now = *world.vehicle_motion()?;
+    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<ImuSample> {
+        let now = *world.vehicle_motion(train)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }

@@ -1,0 +1,167 @@
+//! A tunnel as met by who runs down the line: chainage counts from its end, its left is right. What
+//! stands in it stays where it is in the world.
+
+use super::{
+    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, Tunnel, WaysideSite,
+};
+use std::f64::consts::PI;
+
+impl Tunnel {
+    /// The tunnel in the other direction.
+    ///
+    /// ```
+    /// # use metrotwin::track::Tunnel;
+    /// let tunnel = Tunnel::from_toml(include_str!("../../tunnels/test_bench.toml"))?;
+    /// let reversed = tunnel.reversed();
+    /// let (lamp, same) = (&tunnel.lamps[0], &reversed.lamps[tunnel.lamps.len() - 1]);
+    /// assert_eq!((lamp.uid, lamp.centre), (same.uid, same.centre));
+    /// # Ok::<(), metrotwin::track::TunnelError>(())
+    /// ```
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let length_m = self.alignment.length_m();
+        let from_end = |s_m: f64| length_m - s_m;
+        let turned_site = |site: &WaysideSite| WaysideSite {
+            chainage_m: from_end(site.chainage_m),
+            lateral_m: -site.lateral_m,
+            yaw_rad: site.yaw_rad - PI.copysign(site.yaw_rad),
+            ..site.clone()
+        };
+        let turned_balise = |balise: &Balise| Balise {
+            chainage_m: from_end(balise.chainage_m),
+            ..balise.clone()
+        };
+        let turned_base = |base: &BaseStation| BaseStation {
+            chainage_m: from_end(base.chainage_m),
+            ..base.clone()
+        };
+        let turned_station = |(name, s_m): &(String, f64)| (name.clone(), from_end(*s_m));
+        Self {
+            name: self.name.clone(),
+            alignment: self.alignment.reversed(),
+            sections: backwards(&self.sections, |range| SectionRange {
+                from_m: from_end(range.to_m),
+                to_m: from_end(range.from_m),
+                section: range.section.mirrored(),
+            }),
+            lamps: backwards(&self.lamps, |lamp| LampSite {
+                chainage_m: from_end(lamp.chainage_m),
+                lateral_m: -lamp.lateral_m,
+                ..lamp.clone()
+            }),
+            wayside: sorted(&self.wayside, turned_site, |site| site.chainage_m),
+            balises: sorted(&self.balises, turned_balise, |balise| balise.chainage_m),
+            base_stations: sorted(&self.base_stations, turned_base, |base| base.chainage_m),
+            line_number: self.line_number,
+            stations: sorted(&self.stations, turned_station, |(_, s_m)| *s_m),
+            ambient_lx: self.ambient_lx,
+        }
+    }
+}
+
+fn backwards<T>(list: &[T], turned: impl Fn(&T) -> T) -> Vec<T> {
+    list.iter().rev().map(turned).collect()
+}
+
+/// The same, of what a file may name in any order.
+fn sorted<T>(list: &[T], turned: impl Fn(&T) -> T, chainage_m: impl Fn(&T) -> f64) -> Vec<T> {
+    let mut list = backwards(list, turned);
+    list.sort_by(|a, b| chainage_m(a).total_cmp(&chainage_m(b)));
+    list
+}
+
+impl CrossSection {
+    /// As seen the other way along the line.
+    fn mirrored(&self) -> Self {
+        let points = backwards(&self.points, |p| OutlinePoint::new(-p.l_m, p.h_m));
+        // Each edge starts where it ended: the one that closes the outline stays the last.
+        let mut materials = self.materials.clone();
+        if let Some((_, others)) = materials.split_last_mut() {
+            others.reverse();
+        }
+        Self {
+            points,
+            materials,
+            closed: self.closed,
+        }
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::track::TrackPoint;
+
+    fn tunnel() -> Tunnel {
+        Tunnel::from_toml(include_str!("../../tunnels/chengdu_line1.toml")).unwrap()
+    }
+
+    /// Provokes: a lamp or device that is elsewhere, or looks elsewhere, in the reversed tunnel, or a
+    /// list that does not ascend.
+    #[test]
+    fn all_stays_where_it_is() {
+        let (tunnel, reversed) = (tunnel(), tunnel().reversed());
+        let line = &reversed.alignment;
+        let ascending = |list: Vec<f64>| list.windows(2).all(|pair| pair[0] <= pair[1]);
+        for lamp in &reversed.lamps {
+            let place = line.world_from_track(TrackPoint {
+                s_m: lamp.chainage_m,
+                l_m: lamp.lateral_m,
+                h_m: lamp.height_m,
+            });
+            assert!((place - lamp.centre).norm() < 1e-9, "{}", lamp.uid);
+            assert_eq!(tunnel.lamp(lamp.uid).unwrap().facing, lamp.facing);
+        }
+        assert_eq!(tunnel.lamps.len(), reversed.lamps.len());
+        for site in &tunnel.wayside {
+            let same = reversed.wayside.iter().find(|s| s.name == site.name);
+            let axis = |line: &crate::track::Alignment, site: &WaysideSite| {
+                let heading = line.at(site.chainage_m).heading_rad + site.yaw_rad;
+                let place = TrackPoint {
+                    s_m: site.chainage_m,
+                    l_m: site.lateral_m,
+                    h_m: site.height_m,
+                };
+                (line.world_from_track(place), heading.cos(), heading.sin())
+            };
+            let (a, b) = (axis(&tunnel.alignment, site), axis(line, same.unwrap()));
+            assert!((a.0 - b.0).norm() < 1e-9 && (a.1 - b.1).hypot(a.2 - b.2) < 1e-9);
+        }
+        assert!(ascending(
+            reversed.lamps.iter().map(|l| l.chainage_m).collect()
+        ));
+        assert!(ascending(
+            reversed.wayside.iter().map(|w| w.chainage_m).collect()
+        ));
+        assert!(ascending(reversed.stations.iter().map(|s| s.1).collect()));
+        let length_m = line.length_m();
+        for balise in &tunnel.balises {
+            let same = reversed.balise(&balise.name).unwrap();
+            assert!((same.chainage_m + balise.chainage_m - length_m).abs() < 1e-9);
+        }
+        assert!(!tunnel.balises.is_empty() && !tunnel.base_stations.is_empty());
+    }
+
+    /// Provokes: an outline that is not mirrored, runs the wrong way round, has the material of a
+    /// neighbouring edge, or stands at another chainage.
+    #[test]
+    fn sections_are_mirrored() {
+        let (tunnel, reversed) = (tunnel(), tunnel().reversed());
+        let length_m = tunnel.alignment.length_m();
+        for range in &tunnel.sections {
+            let middle_m = 0.5 * (range.from_m + range.to_m);
+            let mirrored = reversed.section_at(length_m - middle_m).unwrap();
+            assert_eq!(mirrored.mirrored(), range.section);
+            assert_eq!(mirrored.edges().count(), range.section.edges().count());
+            for edge in range.section.edges() {
+                let [a, b] = [edge.b, edge.a].map(|p| OutlinePoint::new(-p.l_m, p.h_m));
+                let same = mirrored.edges().find(|e| e.a == a && e.b == b);
+                assert_eq!(same.unwrap().material, edge.material);
+            }
+        }
+        for pair in reversed.sections.windows(2) {
+            assert!((pair[0].to_m - pair[1].from_m).abs() < 1e-9);
+        }
+    }
+}
