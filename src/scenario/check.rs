@@ -663,4 +663,50 @@ mod tests {
         assert_eq!(keys(420.0), [""; 0]);
         assert_eq!(keys(417.0), ["other_trains[0].start_chainage_m"]);
     }
+
+    /// Fails where a train that runs down stands, stops or ends as one that runs up.
+    #[test]
+    fn a_train_that_runs_down_stands_up_the_line_of_its_head() {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let end_m = tunnel.alignment.length_m();
+        let problems = |start_m: f64, rest: &str| {
+            let text = format!(
+                "name = \"test\"\ntunnel = \"given\"\n[[wayside]]\ndevice = \"W1530\"\n[train]\n\
+                 start_chainage_m = 300.0\nstop_at_m = 600.0\n[[other_trains]]\n\
+                 direction = \"down\"\nstart_chainage_m = {start_m}\n{rest}"
+            );
+            let (file, mut problems) = (read_toml(&text).unwrap(), Vec::new());
+            alone(&file, &mut problems);
+            in_tunnel(&file, &tunnel, &mut problems);
+            problems
+        };
+        let keys = |start_m: f64, rest: &str| -> Vec<String> {
+            let problems = problems(start_m, rest).into_iter();
+            problems.map(|p| p.key).collect()
+        };
+        let (start, stop) = (
+            "other_trains[0].start_chainage_m",
+            "other_trains[0].stop_at_m",
+        );
+        assert_eq!(keys(end_m - 120.0, "stop_at_m = 1000.0"), [""; 0]);
+        assert_eq!(keys(end_m - 100.0, "stop_at_m = 1000.0"), [start]);
+        assert_eq!(keys(1000.0, "stop_at_m = 1200.0"), [stop]);
+        // Its tail would be in the first train's head, and its own head behind that one's tail.
+        assert_eq!(keys(290.0, "stop_at_m = 0.0"), [start]);
+        assert_eq!(keys(310.0, "stop_at_m = 0.0"), [""; 0]);
+        let far = problems(800.0, "");
+        assert_eq!(far[0].key, stop);
+        assert!(far[0].remedy.contains("down to 0 m"), "{}", far[0].remedy);
+    }
+
+    /// Fails where trains are numbered without a first one, or their keys are those of others.
+    #[test]
+    fn other_trains_are_other_than_a_first_one() {
+        let rest = "[[wayside]]\ndevice = \"W1530\"\n[[other_trains]]\n";
+        assert_eq!(keys(rest), ["other_trains"]);
+        let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
+        let file: ScenarioFile = read_toml(&text).unwrap();
+        assert_eq!(file.train_key(0), "other_trains[0]");
+    }
 }

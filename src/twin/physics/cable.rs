@@ -12,7 +12,7 @@ use super::catenary::Catenary;
 use super::convert::{isometry, point3, pose, vector3};
 use super::entity::Entity;
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUPS, groups};
-use super::thing::{RESTING_MPS, Rest};
+use super::obstacle_body::{RESTING_MPS, Rest};
 use crate::bus::SimTime;
 use crate::track::Alignment;
 use crate::twin::render::{Body, Shape};

@@ -38,9 +38,18 @@ fn run(world: &mut World, seconds: f64) {
 /// curve, grade, mark or speed that is taken the wrong way round shows.
 #[test]
 fn down_the_line_is_up_the_reversed_line() {
+    let transition = |from: f64, to: f64| PlanElement {
+        length_m: 60.0,
+        start_per_m: from / 300.0,
+        end_per_m: to / 300.0,
+        start_cant_m: 0.06 * from,
+        end_cant_m: 0.06 * to,
+    };
     let bends = [
         PlanElement::straight(300.0),
-        PlanElement::arc(200.0, 1.0 / 300.0, 0.06),
+        transition(0.0, 1.0),
+        PlanElement::arc(80.0, 1.0 / 300.0, 0.06),
+        transition(1.0, 0.0),
         PlanElement::straight(300.0),
     ];
     let tunnel = line(&bends, 0.01);

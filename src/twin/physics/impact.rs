@@ -6,21 +6,8 @@
 //! before and after, both together lose -J (u_before + u_after) / 2: exact for rigid bodies,
 //! spinning or not, on springs or not. A hit lasts until the train has left the thing, 50 ms at
 //! most: what is pushed along after that is no blow any more.
-//!
-//! Damage classes go by the energy that the hit used up, all of it taken to have gone into the
-//! train. Their bounds are energies that trains are designed for:
-//!
-//! - up to [`DamageBounds::glazing_j`]: EN 15152 has the front glazing withstand a projectile of
-//!   1 kg at the train's top speed plus 160 km/h;
-//! - up to the others: a train that runs into a standing one of the same kind. Both go on with
-//!   half the speed, so m v^2 / 4 is used up and each takes m v^2 / 8. EN 15227 wants a metro
-//!   (category C-II) to keep its survival space at 25 km/h. Below that metros are commonly bought
-//!   with couplers whose buffers take 5 km/h without any harm, and whose collapse tubes, to be
-//!   replaced afterwards, take 15 km/h.
-//!
-//! The bounds hold for hits where these parts are. A thing that hits equipment below the floor does
-//! harm at less.
 
+use super::damage::{Damage, DamageBounds};
 use super::entity::Entity;
 use super::placement::BODIES;
 use super::train::Train;
@@ -29,7 +16,6 @@ use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
 use serde::{Serialize, Serializer};
-use std::fmt;
 
 /// One hit of a train on something.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -56,76 +42,6 @@ pub struct Impact {
 
 fn seconds<S: Serializer>(time: &SimTime, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_f64(time.secs())
-}
-
-/// What a hit does to the train, by the energy that it uses up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Damage {
-    /// Scratches: no more than the front glazing must withstand.
-    #[default]
-    Superficial,
-    /// Dents; what the couplers' buffers take without harm.
-    Light,
-    /// Parts that are made to collapse must be replaced.
-    Repairable,
-    /// The crash zone at the train's end is used up in part; passengers' rooms are whole.
-    Structural,
-    /// More than the train was designed to take.
-    BeyondDesign,
-}
-
-impl fmt::Display for Damage {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Superficial => "superficial",
-            Self::Light => "light",
-            Self::Repairable => "repairable",
-            Self::Structural => "structural",
-            Self::BeyondDesign => "beyond design",
-        })
-    }
-}
-
-/// Energies between the classes of damage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DamageBounds {
-    /// Superficial up to this.
-    pub glazing_j: f64,
-    /// Light up to this.
-    pub buffers_j: f64,
-    /// Repairable up to this.
-    pub tubes_j: f64,
-    /// Structural up to this.
-    pub design_j: f64,
-}
-
-/// Top speed that metros of this kind are built for.
-const TOP_SPEED_KMH: f64 = 80.0;
-
-impl DamageBounds {
-    /// Of a train of a mass.
-    pub fn of_train(mass_kg: f64) -> Self {
-        let into_like = |kmh: f64| mass_kg * (kmh / 3.6).powi(2) / 8.0;
-        Self {
-            glazing_j: 0.5 * ((TOP_SPEED_KMH + 160.0) / 3.6).powi(2),
-            buffers_j: into_like(5.0),
-            tubes_j: into_like(15.0),
-            design_j: into_like(25.0),
-        }
-    }
-
-    /// The class of a hit.
-    pub fn class(&self, energy_lost_j: f64) -> Damage {
-        let classes = [
-            (self.glazing_j, Damage::Superficial),
-            (self.buffers_j, Damage::Light),
-            (self.tubes_j, Damage::Repairable),
-            (self.design_j, Damage::Structural),
-        ];
-        let class = classes.iter().find(|(bound, _)| energy_lost_j <= *bound);
-        class.map_or(Damage::BeyondDesign, |(_, class)| *class)
-    }
 }
 
 /// After this, a hit is over.
@@ -407,23 +323,5 @@ mod tests {
                  \"energy_j\":4.0,\"energy_lost_j\":3.0,\"damage\":\"beyond_design\"}"
             )
         );
-    }
-
-    /// Fails where the bounds are not those of two like trains, or classes are out of order.
-    #[test]
-    fn damage_classes_are_those_of_like_trains() {
-        let mass_kg = 302_000.0;
-        let bounds = DamageBounds::of_train(mass_kg);
-        let v = 25.0 / 3.6;
-        let before = 0.5 * mass_kg * v * v;
-        let after = 0.5 * (2.0 * mass_kg) * (v / 2.0) * (v / 2.0);
-        assert!((bounds.design_j - (before - after) / 2.0).abs() < 1.0);
-        assert!((bounds.glazing_j - 2222.0).abs() < 1.0);
-        let classes = [1e3, 1e4, 3e5, 1e6, 1e7].map(|e| bounds.class(e));
-        assert!(
-            classes.windows(2).all(|pair| pair[0] < pair[1]),
-            "{classes:?}"
-        );
-        assert_eq!(classes[4], Damage::BeyondDesign);
     }
 }

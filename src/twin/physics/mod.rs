@@ -28,7 +28,7 @@
 //! |---|---|
 //! | track | `irregularity`, `defect` and `deviation` (where the rails lie), `adhesion` (how slippery they are), `directed_track` (all of it, as a wheelset asks) |
 //! | train | `vehicle_file` and `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train`; `carrier` in place of one on a bench |
-//! | things | `obstacle`, `shape`, `thing`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact`, `entity`, `things` |
+//! | obstacles | `obstacle`, `shape`, `obstacle_body`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact` and `damage`, `entity`, `surroundings` |
 //! | world | `settings`, `train_truth` and `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
 //!
 //! Vehicles are files; Manchester benchmark vehicle 1 (Iwnicki 1998) and a metro car of class B1
@@ -49,6 +49,7 @@ mod carrier;
 mod catenary;
 mod consist;
 mod convert;
+mod damage;
 mod defect;
 mod deviation;
 mod directed_track;
@@ -64,20 +65,20 @@ mod history;
 mod impact;
 mod irregularity;
 mod obstacle;
+mod obstacle_body;
 mod placement;
 mod saved;
 mod settings;
 mod shape;
 mod stability;
+mod surroundings;
+#[cfg(test)]
+mod surroundings_tests;
 mod suspension;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
 mod tests;
-mod thing;
-mod things;
-#[cfg(test)]
-mod things_tests;
 mod train;
 mod train_truth;
 mod truth;
@@ -91,11 +92,12 @@ mod worker;
 
 pub use adhesion::{RailState, RailZone};
 pub use cable_settings::{CableEnd, CableSettings};
+pub use damage::{Damage, DamageBounds};
 pub use defect::{DefectSettings, DefectShape, Side};
 pub use energy::EnergyBook;
 pub use error::PhysicsError;
 pub use history::VehicleMotion;
-pub use impact::{Damage, DamageBounds, Impact};
+pub use impact::Impact;
 pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
@@ -117,7 +119,7 @@ use irregularity::Irregularity;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
 use std::sync::Arc;
-use things::Things;
+use surroundings::Surroundings;
 use train::{RUN_IN_S, Train};
 
 /// Everything that moves.
@@ -128,7 +130,7 @@ pub struct World {
     trains: Vec<Train>,
     /// What carries a rig at rest where there is no train.
     carrier: Option<Carrier>,
-    things: Things,
+    surroundings: Surroundings,
     time: SimTime,
     step: SimTime,
     step_s: f64,
@@ -162,14 +164,14 @@ impl World {
             tunnel,
             rapier,
             carrier: None,
-            things: Things::default(),
+            surroundings: Surroundings::default(),
             time: SimTime::ZERO,
             step,
             step_s,
         };
         world.run_in()?;
         let (rapier, run) = (&mut world.rapier, [seed, index]);
-        world.things = Things::new(rapier, &world.tunnel, settings, run, &world.trains);
+        world.surroundings = Surroundings::new(rapier, &world.tunnel, settings, run, &world.trains);
         Ok(world)
     }
 
@@ -205,16 +207,16 @@ impl World {
 
     /// A step of everything under the forces that act, and what comes of it.
     fn go(&mut self) -> Result<(), PhysicsError> {
-        self.things.before_step(&self.rapier);
+        self.surroundings.before_step(&self.rapier);
         self.time = SimTime::from_nanos(self.time.nanos() + self.step.nanos());
         // What lies or is not there needs no search for what it flies through.
-        let substeps = usize::from(self.things.moving());
+        let substeps = usize::from(self.surroundings.moving());
         self.rapier.integration_parameters.max_ccd_substeps = substeps;
         self.rapier.step();
         for train in &mut self.trains {
             train.read(&self.rapier, self.time)?;
         }
-        self.things
+        self.surroundings
             .after_step(&mut self.rapier, &self.tunnel, self.time)
     }
 

@@ -26,7 +26,7 @@ impl Clone for World {
             rapier: copy(&self.rapier),
             trains: self.trains.clone(),
             carrier: self.carrier,
-            things: self.things.clone(),
+            surroundings: self.surroundings.clone(),
             time: self.time,
             step: self.step,
             step_s: self.step_s,

@@ -27,7 +27,7 @@ pub struct PhysicsSettings {
     pub track: TrackSettings,
     /// Trains, up to eight.
     pub trains: Vec<TrainSettings>,
-    /// Things that lie or fall on the line.
+    /// Surroundings that lie or fall on the line.
     pub obstacles: Vec<ObstacleSettings>,
     /// Cables that hang on the wall.
     pub cables: Vec<CableSettings>,

@@ -2,7 +2,7 @@
 
 use super::cable::{Cable, bounds};
 use super::obstacle::Piece;
-use super::thing::Thing;
+use super::obstacle_body::ObstacleBody;
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::Alignment;
@@ -85,11 +85,11 @@ impl World {
     /// [`World::bodies`], each with its label.
     pub fn owned_bodies(&self, without: Option<TrainId>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
         let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
-        let mut owned = self.things.draw(&self.rapier, line, now_s);
+        let mut owned = self.surroundings.draw(&self.rapier, line, now_s);
         // The order may decide pixels: the first train comes last.
         let trains = self.trains.iter().skip(1).chain(self.trains.first());
         for train in trains.filter(|train| Some(train.id) != without) {
-            let name = self.things.train_name(train.id);
+            let name = self.surroundings.train_name(train.id);
             let cars = train.consist.boxes().count();
             for (k, body) in train.bodies().into_iter().enumerate() {
                 // After the cars come the lenses on the leading one.
@@ -105,19 +105,20 @@ impl World {
     /// is none.
     pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
         let line = &self.tunnel.alignment;
-        self.things.obstacles(&self.rapier, line, self.time)
+        self.surroundings.obstacles(&self.rapier, line, self.time)
     }
 
     /// Workers who are on the line now.
     pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
         let line = &self.tunnel.alignment;
-        self.things.workers(&self.rapier, line, self.time.secs())
+        self.surroundings
+            .workers(&self.rapier, line, self.time.secs())
     }
 
     /// Hits of trains on obstacles, cables, workers and other trains, in order of time; the first
     /// thousand. Where two trains hit each other, each of them has its own.
     pub fn impacts(&self) -> &[Impact] {
-        self.things.impacts()
+        self.surroundings.impacts()
     }
 }
 
@@ -125,17 +126,17 @@ fn resting(since: Option<SimTime>, now: SimTime) -> Option<SimTime> {
     since.filter(|since| now.since(*since) >= RESTING_S)
 }
 
-/// A thing as it lies, flies or swings.
-pub(super) fn thing_truth<'a>(
-    thing: &'a Thing,
+/// An obstacle as it lies, flies or swings.
+pub(super) fn obstacle_truth<'a>(
+    obstacle: &'a ObstacleBody,
     world: &PhysicsWorld,
     line: &Alignment,
     now: SimTime,
 ) -> Option<ObstacleTruth<'a>> {
-    let (world_from_body, velocity_mps) = thing.state(world)?;
-    let Piece { settings, body } = &thing.piece;
+    let (world_from_body, velocity_mps) = obstacle.state(world)?;
+    let Piece { settings, body } = &obstacle.piece;
     let centre = world_from_body.translation.vector.into();
-    let place = line.track_from_world(&centre, thing.near_m);
+    let place = line.track_from_world(&centre, obstacle.near_m);
     let world_from_line = line.at(place.s_m).world_from_line().rotation;
     let body_from_line = world_from_body.rotation.inverse() * world_from_line;
     let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
@@ -151,7 +152,7 @@ pub(super) fn thing_truth<'a>(
         half_extents_m: half.into(),
         world_from_body,
         velocity_mps,
-        resting_since: resting(thing.rest.since, now),
+        resting_since: resting(obstacle.rest.since, now),
         temperature_c: settings.temperature_c,
     })
 }

@@ -8,7 +8,7 @@ use super::convert::{isometry, pose, vector, vector3};
 use super::entity::Entity;
 use super::groups::{OBSTACLE_GROUP, TRAIN_GROUPS, groups, loose};
 use super::obstacle::Piece;
-use super::thing::EXTRA_PASSES;
+use super::obstacle_body::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
 use crate::twin::render::Body;

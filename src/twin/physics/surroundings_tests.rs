@@ -498,7 +498,7 @@ fn lowest_m(world: &World) -> f64 {
 fn val_a_cable_hangs_on_the_catenary() {
     let (span_m, length_m) = (6.0, 6.5);
     let mut world = World::new(straight(), &with_cable(hung(span_m, length_m)), 1, 0).unwrap();
-    for link in &world.things.cables[0].links {
+    for link in &world.surroundings.cables[0].links {
         let body = world.rapier.bodies.get_mut(link.body).unwrap();
         body.set_linvel(Vector::new(0.6, 0.8, 0.5), true);
     }
@@ -524,7 +524,7 @@ fn val_a_cable_hangs_on_the_catenary() {
     let got = 4.0 - lowest_m(&world);
     eprintln!("sag {got:.4} m, catenary {sag:.4} m");
     // The pull at a length s from the lowest point is the weight of hypot(a, s).
-    let cable = &world.things.cables[0];
+    let cable = &world.surroundings.cables[0];
     let (weight, links) = (
         cable.settings.mass_kg_per_m * GRAVITY_MPS2,
         cable.links.len(),

@@ -1,4 +1,4 @@
-//! A thing in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
+//! An obstacle in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
 
 use super::convert::{isometry, pose, vector, vector3};
 use super::entity::Entity;
@@ -34,7 +34,7 @@ impl Rest {
     }
 }
 
-/// What still holds a thing.
+/// What still holds an obstacle.
 #[derive(Clone, Copy)]
 enum Hold {
     Nothing,
@@ -47,9 +47,9 @@ enum Hold {
     },
 }
 
-/// A thing.
+/// An obstacle.
 #[derive(Clone)]
-pub(super) struct Thing {
+pub(super) struct ObstacleBody {
     pub piece: Piece,
     pub body: RigidBodyHandle,
     pub collider: ColliderHandle,
@@ -59,8 +59,8 @@ pub(super) struct Thing {
     pub rest: Rest,
 }
 
-impl Thing {
-    /// Puts a thing where its settings say: its lowest point at their height.
+impl ObstacleBody {
+    /// Puts an obstacle where its settings say: its lowest point at their height.
     pub(super) fn insert(
         world: &mut PhysicsWorld,
         alignment: &Alignment,

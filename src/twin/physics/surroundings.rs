@@ -11,17 +11,17 @@ use super::entity::{Entity, train_name};
 use super::ground::Ground;
 use super::impact::{Impact, Impacts, Motion};
 use super::obstacle::Piece;
+use super::obstacle_body::ObstacleBody;
 use super::settings::PhysicsSettings;
-use super::thing::Thing;
 use super::train::Train;
-use super::truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, thing_truth};
+use super::truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, obstacle_truth};
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
 use crate::track::{Alignment, Tunnel};
 use crate::twin::render::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
 
-/// Steps between looks at where a moving thing is along the line.
+/// Steps between looks at where a moving obstacle is along the line.
 const LOOK_STEPS: u64 = 50;
 /// A body that was awake before the step.
 #[derive(Clone)]
@@ -33,9 +33,9 @@ struct Awake {
 
 /// Everything that trains may hit.
 #[derive(Clone, Default)]
-pub(super) struct Things {
+pub(super) struct Surroundings {
     /// `None` for what was taken away again.
-    pub things: Vec<Option<Thing>>,
+    pub obstacles: Vec<Option<ObstacleBody>>,
     pub cables: Vec<Cable>,
     walkers: Vec<Walker>,
     /// Names of the trains.
@@ -50,7 +50,7 @@ pub(super) struct Things {
     steps: u64,
 }
 
-impl Things {
+impl Surroundings {
     /// What is there at time zero, besides trains that are in the world already. Everything random in
     /// it depends on `seed` and run `index`.
     pub(super) fn new(
@@ -76,10 +76,10 @@ impl Things {
             let load = load.map(|load| load.pieces(&format!("load {k}"), seed, index));
             Walker::new(worker, load.and_then(|pieces| pieces.into_iter().next()))
         });
-        let mut things = Self {
+        let mut surroundings = Self {
             walkers: walkers.collect(),
             trains: trains.iter().map(|train| train_name(train.id)).collect(),
-            things: Vec::new(),
+            obstacles: Vec::new(),
             cables: Vec::new(),
             ground: Ground::default(),
             releases_s: releases_s(settings),
@@ -89,14 +89,16 @@ impl Things {
             steps: 0,
         };
         for (k, cable) in settings.cables.iter().enumerate() {
-            things.ground.lay(world, tunnel, cable.from.chainage_m);
-            things.ground.lay(world, tunnel, cable.to.chainage_m);
+            surroundings
+                .ground
+                .lay(world, tunnel, cable.from.chainage_m);
+            surroundings.ground.lay(world, tunnel, cable.to.chainage_m);
             let entity = Entity::Cable(k);
             let cable = Cable::insert(world, &tunnel.alignment, cable, entity);
-            things.cables.push(cable);
+            surroundings.cables.push(cable);
         }
-        things.go_on(world, tunnel, 0.0);
-        things
+        surroundings.go_on(world, tunnel, 0.0);
+        surroundings
     }
 
     /// To be called before a step.
@@ -158,9 +160,9 @@ impl Things {
             }
             match entity {
                 Entity::Obstacle(k) => {
-                    if let Some(thing) = &mut self.things[k] {
-                        thing.observe(world, now);
-                        thing.resist_rolling(world, &before);
+                    if let Some(obstacle) = &mut self.obstacles[k] {
+                        obstacle.observe(world, now);
+                        obstacle.resist_rolling(world, &before);
                     }
                 }
                 // The links of a cable follow one another.
@@ -187,7 +189,9 @@ impl Things {
             return;
         };
         let near_m = match entity {
-            Entity::Obstacle(k) => self.things[k].as_mut().map(|thing| &mut thing.near_m),
+            Entity::Obstacle(k) => self.obstacles[k]
+                .as_mut()
+                .map(|obstacle| &mut obstacle.near_m),
             Entity::Cable(k) => Some(&mut self.cables[k].near_m),
             Entity::Worker(k) => Some(&mut self.walkers[k].near_m),
             Entity::Train(_) => None,
@@ -213,8 +217,8 @@ impl Things {
             }
             match hit.with {
                 Entity::Obstacle(k) => {
-                    if let Some(thing) = &mut self.things[k] {
-                        thing.tear_off(world);
+                    if let Some(obstacle) = &mut self.obstacles[k] {
+                        obstacle.tear_off(world);
                     }
                 }
                 Entity::Worker(k) if hit.force => {
@@ -231,8 +235,8 @@ impl Things {
             self.insert(world, tunnel, &next);
         }
         while self.releases_s.pop_if(|at_s| *at_s <= now_s).is_some() {
-            for thing in self.things.iter_mut().flatten() {
-                thing.release(world, now_s);
+            for obstacle in self.obstacles.iter_mut().flatten() {
+                obstacle.release(world, now_s);
             }
             for cable in &mut self.cables {
                 cable.release(world, now_s);
@@ -255,15 +259,15 @@ impl Things {
     }
 
     fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, piece: &Piece) -> usize {
-        let number = self.things.len();
+        let number = self.obstacles.len();
         self.ground.lay(world, tunnel, piece.settings.chainage_m);
         let entity = Entity::Obstacle(number);
-        let thing = Thing::insert(world, &tunnel.alignment, piece, entity);
-        self.things.push(Some(thing));
+        let obstacle = ObstacleBody::insert(world, &tunnel.alignment, piece, entity);
+        self.obstacles.push(Some(obstacle));
         number
     }
 
-    /// Takes a thing out of the world if it is within reach.
+    /// Takes an obstacle out of the world if it is within reach.
     fn take_away(
         &mut self,
         world: &mut PhysicsWorld,
@@ -271,15 +275,15 @@ impl Things {
         number: usize,
         place: [f64; 2],
     ) -> bool {
-        let slot = &mut self.things[number];
-        let reached = slot.take_if(|thing| {
-            thing.state(world).is_some_and(|(pose, _)| {
+        let slot = &mut self.obstacles[number];
+        let reached = slot.take_if(|obstacle| {
+            obstacle.state(world).is_some_and(|(pose, _)| {
                 let at = line.track_from_world(&pose.translation.vector.into(), place[0]);
                 Walker::reaches(place, at.s_m, at.l_m)
             })
         });
-        if let Some(thing) = &reached {
-            world.remove_body(thing.body);
+        if let Some(obstacle) = &reached {
+            world.remove_body(obstacle.body);
         }
         reached.is_some()
     }
@@ -287,8 +291,8 @@ impl Things {
     fn name(&self, entity: Entity) -> &str {
         match entity {
             Entity::Obstacle(k) => {
-                let thing = self.things.get(k).and_then(Option::as_ref);
-                thing.map_or("obstacle", |thing| &thing.piece.settings.name)
+                let obstacle = self.obstacles.get(k).and_then(Option::as_ref);
+                obstacle.map_or("obstacle", |obstacle| &obstacle.piece.settings.name)
             }
             Entity::Cable(k) => self.cables.get(k).map_or("cable", |c| &c.settings.name),
             Entity::Worker(k) => self.walkers.get(k).map_or("worker", |w| &w.settings.name),
@@ -309,11 +313,15 @@ impl Things {
         now_s: f64,
     ) -> Vec<(Body, BodyLabel<'_>)> {
         let mut labelled = Vec::new();
-        for (k, thing) in self.things.iter().enumerate() {
-            let Some((body, thing)) = thing.as_ref().and_then(|t| Some((t.draw(world)?, t))) else {
+        for (k, obstacle) in self.obstacles.iter().enumerate() {
+            let Some((body, obstacle)) = obstacle.as_ref().and_then(|t| Some((t.draw(world)?, t)))
+            else {
                 continue;
             };
-            let (owner, name) = (BodyOwner::Obstacle(k), thing.piece.settings.name.as_str());
+            let (owner, name) = (
+                BodyOwner::Obstacle(k),
+                obstacle.piece.settings.name.as_str(),
+            );
             labelled.push((body, BodyLabel { owner, name }));
         }
         let mut bodies = Vec::new();
@@ -347,10 +355,15 @@ impl Things {
         line: &'a Alignment,
         now: SimTime,
     ) -> impl Iterator<Item = ObstacleTruth<'a>> {
-        let loose = self.things.iter().flatten().filter(|thing| !thing.fixed());
-        let things = loose.filter_map(move |thing| thing_truth(thing, world, line, now));
+        let loose = self
+            .obstacles
+            .iter()
+            .flatten()
+            .filter(|obstacle| !obstacle.fixed());
+        let obstacles =
+            loose.filter_map(move |obstacle| obstacle_truth(obstacle, world, line, now));
         let fallen = self.cables.iter().filter(|cable| cable.loose());
-        things.chain(fallen.filter_map(move |cable| cable_truth(cable, world, line, now)))
+        obstacles.chain(fallen.filter_map(move |cable| cable_truth(cable, world, line, now)))
     }
 
     /// Workers who are on the line now.
@@ -374,13 +387,13 @@ impl Things {
 
 /// All times when something lets go, the first one last.
 fn releases_s(settings: &PhysicsSettings) -> Vec<f64> {
-    let things = settings.obstacles.iter().flat_map(|o| {
+    let obstacles = settings.obstacles.iter().flat_map(|o| {
         let hinge = o.hinge.and_then(|hinge| hinge.until_s);
         [o.held_until_s, hinge]
     });
     let cables = settings.cables.iter();
     let cables = cables.flat_map(|c| [c.from.lets_go_s, c.to.lets_go_s]);
-    let mut times: Vec<f64> = things.chain(cables).flatten().collect();
+    let mut times: Vec<f64> = obstacles.chain(cables).flatten().collect();
     times.sort_by(|a, b| b.total_cmp(a));
     times
 }
