@@ -12,10 +12,10 @@ use crate::stack::wayside::WaysideDetector;
 use crate::track::{BED_M, Tunnel};
 use crate::twin::comms::Comms;
 use crate::twin::faults::{CameraTrouble, Grabber};
+use crate::twin::geometry::TunnelCaster;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::View;
-use crate::twin::render::cpu::TunnelCaster;
 use crate::twin::sensors::{AutoExposure, Lidar, Trigger, WaysideCameraSettings};
 use image::GrayImage;
 use nalgebra::Point3;
@@ -203,7 +203,7 @@ struct Outlook {
     span_s: f64,
     reach_m: f64,
     walls: TunnelCaster,
-    slab: usize,
+    segment: usize,
 }
 
 impl Outlook {
@@ -211,7 +211,7 @@ impl Outlook {
         let device = &post.actual;
         let walls = TunnelCaster::new(&scenario.tunnel);
         Self {
-            slab: walls.slab_of(&device.world_from_camera.translation.vector.into(), None),
+            segment: walls.segment_of(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
             span_s: post.camera.longest_span_s(),
             reach_m: scenario.stack.wayside.reach_m,
@@ -230,7 +230,7 @@ impl Outlook {
         let sight = place - eye;
         in_picture
             && (chainage_m - self.device.chainage_m).abs() <= self.reach_m
-            && self.walls.cast(self.slab, &eye, &sight, 1.0).is_none()
+            && self.walls.cast(self.segment, &eye, &sight, 1.0).is_none()
     }
 
     /// Everything that the device may rightly report.

@@ -5,8 +5,9 @@ use crate::bus::{
     RigCalibration, SimTime, StereoPair, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
+use crate::twin::geometry::Body;
 use crate::twin::physics::{Belonging, TrainState};
-use crate::twin::render::{Body, Job};
+use crate::twin::render::Job;
 use nalgebra::{Isometry3, Vector3};
 
 /// What is known before the first step.

@@ -42,13 +42,14 @@ pub use summary::{
 
 use crate::scenario::Scenario;
 use crate::twin::faults;
+use crate::twin::lights::LampLight;
 use crate::twin::physics::PhysicsError;
 use crate::twin::physics::RailState;
 use crate::twin::random::Stream;
+use crate::twin::reflectance::Wet;
 use crate::twin::render::cpu::CpuRenderer;
-use crate::twin::render::gloss::Wet;
 use crate::twin::render::gpu::GpuRenderer;
-use crate::twin::render::{LampLight, RenderError, Renderer, Scene};
+use crate::twin::render::{RenderError, Renderer, Scene};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What draws the images.

@@ -10,8 +10,11 @@
 pub mod air;
 pub mod comms;
 pub mod faults;
+pub mod geometry;
+pub mod lights;
 pub mod physics;
 pub mod random;
+pub mod reflectance;
 pub mod render;
 pub mod sensors;
 pub mod survey;

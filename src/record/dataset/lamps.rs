@@ -4,9 +4,10 @@
 use crate::record::parquet::Kind::{Int, Real, Reals, Text};
 use crate::record::parquet::{Column, Value, column};
 use crate::track::LampSite;
+use crate::twin::lights::LampLight;
+use crate::twin::render::Job;
+use crate::twin::render::constants::LAMP_SIGHT_M;
 use crate::twin::render::cpu::{Labeller, Seen, Sight};
-use crate::twin::render::surface::LAMP_SIGHT_M;
-use crate::twin::render::{Job, LampLight};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
@@ -236,8 +237,9 @@ mod tests {
     use super::super::clean::clean;
     use super::*;
     use crate::track::uid::ChipFrame;
+    use crate::twin::geometry::{Body, Shape};
     use crate::twin::render::cpu::CpuRenderer;
-    use crate::twin::render::{Body, Renderer, Scene, Shape, View, sample};
+    use crate::twin::render::{Renderer, Scene, View, sample};
     use nalgebra::Translation3;
 
     const SPEED_MPS: f64 = 160.0 / 3.6;

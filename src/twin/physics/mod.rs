@@ -102,7 +102,8 @@ pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{BrakeDemand, SimTime, TrainCommand};
 use crate::track::{Problem, Tunnel};
-use crate::twin::render::{Body, Headlight};
+use crate::twin::geometry::Body;
+use crate::twin::lights::Headlight;
 use irregularity::Irregularity;
 use line::Line;
 use nalgebra::{Isometry3, Vector3};

@@ -10,7 +10,8 @@ use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
 use crate::bus::{SimTime, TrainCommand};
 use crate::track::Tunnel;
-use crate::twin::render::{Body, Headlight, Shape};
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::PhysicsWorld;
 

@@ -1,8 +1,8 @@
 //! How far things extend in an image: a quick bound for a row, and the extent of bodies as a whole.
 
-use super::{Sight, Solid};
+use super::Sight;
 use crate::bus::Intrinsics;
-use crate::twin::render::Body;
+use crate::twin::geometry::{Body, Solid};
 use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -20,10 +20,12 @@
 //! pixel belongs to what its centre sees.
 
 use super::extent::Outline;
-use super::{SIGHT_M, Sight, Solid, TunnelCaster};
+use super::{SIGHT_M, Sight};
 use crate::bus::{CameraModel, Intrinsics};
-use crate::twin::render::surface::LAMP_SIGHT_M;
-use crate::twin::render::{Body, Job, LampLight, Scene};
+use crate::twin::geometry::{Body, Solid, TunnelCaster};
+use crate::twin::lights::LampLight;
+use crate::twin::render::constants::LAMP_SIGHT_M;
+use crate::twin::render::{Job, Scene};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -147,13 +149,13 @@ impl Labeller {
         let eye = Point3::from(sight.pose(v).translation.vector);
         let way = place - eye;
         let reach = 1.0 - FLUSH_M / way.norm();
-        let slab = self.tunnel.slab_of(&eye, None);
+        let segment = self.tunnel.segment_of(&eye, None);
         let after_s = sight.after_s(v);
         let hides = |body: &Body| {
             let hit = Solid::at(body, after_s).cast(&eye, &way);
             hit.is_some_and(|(t, _)| t < reach)
         };
-        self.tunnel.cast(slab, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
+        self.tunnel.cast(segment, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
     }
 
     /// The lamps, in the order of the scene.
@@ -257,11 +259,11 @@ impl Labeller {
 
     fn cast_tunnel(&self, row: &Row<'_>, depth_m: &mut [f64]) {
         let eye = row.eye();
-        let slab = self.tunnel.slab_of(&eye, None);
+        let segment = self.tunnel.segment_of(&eye, None);
         for (u, depth_m) in depth_m.iter_mut().enumerate() {
             let ray = row.ray(u);
-            if let Some(strike) = self.tunnel.cast(slab, &eye, &ray, SIGHT_M / ray.norm()) {
-                *depth_m = strike.t;
+            if let Some(hit) = self.tunnel.cast(segment, &eye, &ray, SIGHT_M / ray.norm()) {
+                *depth_m = hit.t;
             }
         }
     }

@@ -1,13 +1,13 @@
 //! Reflectance of the tunnel's surface as a pixel sees it.
 
-use super::tunnel::SurfacePoint;
 use crate::track::Material;
+use crate::twin::geometry::SurfacePoint;
+use crate::twin::render::constants::MIN_SINE;
 use crate::twin::render::paint::Paintings;
-use crate::twin::render::surface::MIN_SINE;
 use nalgebra::Vector3;
 
-/// Mean albedo in a pixel whose ray struck at `at`; `aside` is by how much the ray changes over
-/// the pixel's width and over its height. Rays are as long as they had to be to strike with
+/// Mean albedo in a pixel whose ray hit at `at`; `aside` is by how much the ray changes over
+/// the pixel's width and over its height. Rays are as long as they had to be to hit with
 /// `t` of their length.
 pub(super) fn albedo(
     paintings: &Paintings,

@@ -21,7 +21,7 @@
 //! 1. the surface that the pixel's centre ray meets first: tunnel ([`TunnelCaster`]) or body
 //!    ([`Solid`]);
 //! 2. its reflected luminance, albedo * E / pi, the albedo from its [painting](super::paint) over
-//!    the pixel's footprint, E less what bodies shade ([`light`](super::light)), by lamps that blink,
+//!    the pixel's footprint, E less what bodies shade ([`photometry`](super::photometry)), by lamps that blink,
 //!    and what it mirrors ([`gloss`](super::gloss)), seen through the air;
 //! 3. lamp discs, by rays spread over the pixel and the lens's point spread in many instants;
 //! 4. the glare of each lamp;
@@ -45,32 +45,30 @@ mod extent;
 pub mod labels;
 mod lamps;
 mod look;
-mod outline;
 mod pupil;
 mod sensor;
 mod shadow;
 mod sight;
 mod smear;
-mod solid;
 mod spread;
-mod tunnel;
 
 pub use extent::{Whole, whole};
 pub use labels::{Labeller, Labels, Surface};
 pub use sight::{Seen, Sight};
-pub use solid::Solid;
-pub use tunnel::{Strike, SurfacePoint, TunnelCaster};
 
-use super::gloss::{Facing, Gloss, MIRROR_REACH_M, Source, Wet};
-use super::light::{LampField, Shining, headlights_lx};
+use super::gloss::{Facing, Gloss, MIRROR_REACH_M, Source};
+use super::lamp_field::{LampField, LampsInTime};
 use super::paint::Paintings;
+use super::photometry::{Shining, headlights_lx};
 use super::pixel_map::{MapCache, MapKey, PixelMap};
 use super::upper_bits;
-use super::{
-    Air, Backend, Job, LampLight, LampsInTime, RawImage, RenderError, Renderer, Scene, View,
-};
+use super::{Backend, Job, RawImage, RenderError, Renderer, Scene, View};
 use crate::bus::{CameraModel, Intrinsics};
 use crate::track::Tunnel;
+use crate::twin::air::Air;
+use crate::twin::geometry::{Solid, SurfacePoint, TunnelCaster, TunnelHit};
+use crate::twin::lights::LampLight;
+use crate::twin::reflectance::Wet;
 use blinking::Blinking;
 use dim::{CELL_PX, DimView};
 use extent::Outline;
@@ -124,7 +122,7 @@ struct World {
 #[derive(Clone, Copy)]
 struct Ground {
     /// Depth along the camera's axis and facet, or nothing within sight.
-    strike: Option<Strike>,
+    hit: Option<TunnelHit>,
     albedo: f64,
     /// By ambient light and lamps.
     luminance: f64,
@@ -142,8 +140,8 @@ struct Scenery<'a> {
     job: &'a Job,
     shades: Shades<'a>,
     airlight_cd_m2: f64,
-    /// Slab of the first pose.
-    slab: usize,
+    /// Segment of the first pose.
+    segment: usize,
     /// Indices of the lamps whose blinking may show.
     lamps: Vec<usize>,
 }
@@ -175,7 +173,7 @@ struct RowRays<'a> {
     row: &'a RowExposure,
     behind: Behind<'a>,
     eye: Point3<f64>,
-    slab: usize,
+    segment: usize,
     /// The job's bodies as they are by now.
     blockers: Vec<Blocker<'a>>,
     blinking: Blinking,
@@ -239,8 +237,8 @@ impl CpuRenderer {
         let still = view.motion.poses.len() == 1 && pupil::is_small(view);
         let kept = still.then(|| self.keep(&view.camera, pose));
         let lamps = self.world.lamps_by_distance(&pose);
-        let slab = (self.world.tunnel).slab_of(&Point3::from(pose.translation.vector), None);
-        let scenery = Scenery::new(&self.world, job, view, slab);
+        let segment = (self.world.tunnel).segment_of(&Point3::from(pose.translation.vector), None);
+        let scenery = Scenery::new(&self.world, job, view, segment);
         let dim = (!still && !self.every_ray && pupil::is_small(view))
             .then(|| DimView::new(&self.world, &scenery, view));
         let behind = match (kept.and_then(|k| self.kept.get(k)), &dim) {
@@ -369,7 +367,7 @@ impl World {
         let eye = Point3::from(pose.translation.vector);
         let away = |lamp: &Shining| (lamp.centre - eye).norm();
         // Through a frame a train moves by a few metres.
-        let reach = super::surface::LAMP_SIGHT_M + 20.0;
+        let reach = super::constants::LAMP_SIGHT_M + 20.0;
         let mut lamps: Vec<_> = self
             .lamps
             .lamps()
@@ -382,34 +380,34 @@ impl World {
 
     fn all_ground(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> Vec<Ground> {
         let eye = Point3::from(pose.translation.vector);
-        let slab = self.tunnel.slab_of(&eye, None);
+        let segment = self.tunnel.segment_of(&eye, None);
         let width = camera.width_px as usize;
         (0..width * camera.height_px as usize)
             .into_par_iter()
             .with_min_len(width.max(1))
             .map(|k| {
                 let pencil = Pencil::through(camera, pose, (k % width, k / width), 1.0);
-                self.ground(slab, &eye, &pencil)
+                self.ground(segment, &eye, &pencil)
             })
             .collect()
     }
 
     /// The tunnel along one ray.
-    fn ground(&self, slab: usize, eye: &Point3<f64>, pencil: &Pencil) -> Ground {
+    fn ground(&self, segment: usize, eye: &Point3<f64>, pencil: &Pencil) -> Ground {
         let ray = &pencil.ray;
-        let Some(strike) = self.tunnel.cast(slab, eye, ray, SIGHT_M / ray.norm()) else {
+        let Some(hit) = self.tunnel.cast(segment, eye, ray, SIGHT_M / ray.norm()) else {
             return Ground {
-                strike: None,
+                hit: None,
                 albedo: 0.0,
                 luminance: 0.0,
             };
         };
-        let at = self.tunnel.surface_at(eye, ray, &strike);
-        let albedo = look::albedo(&self.paintings, &at, ray, strike.t, pencil.aside)
+        let at = self.tunnel.surface_at(eye, ray, &hit);
+        let albedo = look::albedo(&self.paintings, &at, ray, hit.t, pencil.aside)
             * self.wet.albedo_factor(at.material, at.s_m);
         let lux = self.line.ambient_lx + self.lamps.irradiance_lx(&at.position, &at.normal);
         Ground {
-            strike: Some(strike),
+            hit: Some(hit),
             albedo,
             luminance: albedo * lux / PI,
         }
@@ -444,13 +442,13 @@ impl Pencil {
 }
 
 impl<'a> Scenery<'a> {
-    fn new(world: &'a World, job: &'a Job, view: &View, slab: usize) -> Self {
-        let s_m = world.tunnel.chainage_m(slab);
+    fn new(world: &'a World, job: &'a Job, view: &View, segment: usize) -> Self {
+        let s_m = world.tunnel.chainage_m(segment);
         Self {
             job,
-            shades: Shades::new(world, job, view, slab),
+            shades: Shades::new(world, job, view, segment),
             airlight_cd_m2: world.lamps.airlight_cd_m2(&world.line, s_m),
-            slab,
+            segment,
             lamps: world.lamps_about(view),
         }
     }
@@ -471,7 +469,7 @@ impl<'a> RowRays<'a> {
             scenery,
             view,
             row,
-            slab: world.tunnel.slab_of(&eye, Some(scenery.slab)),
+            segment: world.tunnel.segment_of(&eye, Some(scenery.segment)),
             blockers: scenery.shades.blockers(mid.since(scenery.job.time)),
             blinking: Blinking::new(world.lamps.lamps(), &scenery.lamps, view, row),
             eye,
@@ -489,8 +487,8 @@ impl<'a> RowRays<'a> {
     /// Whether pixel `u` sees a surface that may mirror a lamp.
     fn may_mirror(&self, u: usize) -> bool {
         let (tunnel, ray) = (&self.world.tunnel, self.ray(u));
-        let strike = tunnel.cast(self.slab, &self.eye, &ray, SIGHT_M / ray.norm());
-        strike.is_some_and(|strike| tunnel.is_level(&strike))
+        let hit = tunnel.cast(self.segment, &self.eye, &ray, SIGHT_M / ray.norm());
+        hit.is_some_and(|hit| tunnel.is_level(&hit))
     }
 
     /// Luminance and depth of the tunnel in pixel `u`.
@@ -501,27 +499,27 @@ impl<'a> RowRays<'a> {
             _ => {
                 let pixel = (u, self.row.v);
                 let pencil = Pencil::through(camera, &self.row.mid, pixel, self.side_px);
-                (self.world).ground(self.slab, &self.eye, &pencil)
+                (self.world).ground(self.segment, &self.eye, &pencil)
             }
         };
-        let Some(strike) = &ground.strike else {
+        let Some(hit) = &ground.hit else {
             return (ground.luminance, f64::INFINITY);
         };
         let Scenery { job, shades, .. } = self.scenery;
-        let (mut luminance, slab) = (ground.luminance, strike.slab as usize);
-        let lit_by_job = !job.headlights.is_empty() || !shades.leave_alone(slab);
-        let level = self.world.tunnel.is_level(strike);
+        let (mut luminance, segment) = (ground.luminance, hit.segment as usize);
+        let lit_by_job = !job.headlights.is_empty() || !shades.leave_alone(segment);
+        let level = self.world.tunnel.is_level(hit);
         if lit_by_job || level || self.blinking.shows {
-            let at = (self.world.tunnel).surface_at(&self.eye, &self.ray(u), strike);
-            let lux = self.by_job_lx(slab, &at.position, &at.normal);
+            let at = (self.world.tunnel).surface_at(&self.eye, &self.ray(u), hit);
+            let lux = self.by_job_lx(segment, &at.position, &at.normal);
             luminance += ground.albedo * lux / PI + self.mirrored_cd_m2(&at);
         }
-        (luminance, strike.t)
+        (luminance, hit.t)
     }
 
     /// What a job's headlights and bodies change in the illuminance of a surface, and the blinking of
     /// lamps.
-    fn by_job_lx(&self, slab: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
+    fn by_job_lx(&self, segment: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
         let (world, Scenery { job, shades, .. }) = (self.world, self.scenery);
         let blinking_lx = if self.blinking.shows {
             (world.lamps).flickering_lx(p, n, &self.blinking.flicker)
@@ -529,7 +527,7 @@ impl<'a> RowRays<'a> {
             0.0
         };
         blinking_lx + headlights_lx(&job.headlights, &world.air, p, n)
-            - shades.hidden_lx(slab, (p, n), (&self.blockers, &self.blinking), world)
+            - shades.hidden_lx(segment, (p, n), (&self.blockers, &self.blinking), world)
     }
 
     /// Luminance of what the tunnel's surface mirrors.
@@ -560,8 +558,8 @@ impl<'a> RowRays<'a> {
     fn depth(&self, u: usize, depths: &mut [f64]) -> f64 {
         if depths[u].is_nan() {
             let ray = self.ray(u);
-            let strike = (self.world.tunnel).cast(self.slab, &self.eye, &ray, SIGHT_M / ray.norm());
-            depths[u] = strike.map_or(f64::INFINITY, |s| s.t);
+            let hit = (self.world.tunnel).cast(self.segment, &self.eye, &ray, SIGHT_M / ray.norm());
+            depths[u] = hit.map_or(f64::INFINITY, |s| s.t);
         }
         depths[u]
     }
@@ -630,10 +628,10 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let slab = world.tunnel.slab_of(&at, Some(self.slab));
+                let segment = world.tunnel.segment_of(&at, Some(self.segment));
                 let lux = world.line.ambient_lx
                     + world.lamps.irradiance_lx(&at, &normal)
-                    + self.by_job_lx(slab, &at, &normal);
+                    + self.by_job_lx(segment, &at, &normal);
                 let body = solid.body();
                 buffers.depths[u] = t;
                 buffers.luminances[u] = body.luminance_cd_m2 + body.albedo * lux / PI;

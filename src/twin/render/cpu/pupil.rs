@@ -4,7 +4,7 @@
 //! be seen where the middle of the pupil sees it: the principal point moves by f a / z and f b / z.
 
 use crate::twin::render::View;
-use crate::twin::render::light::disc_points;
+use crate::twin::render::disc::disc_points;
 use nalgebra::{Point3, Translation3, Vector3};
 
 /// A circle of confusion smaller than this is that of a sharp picture.

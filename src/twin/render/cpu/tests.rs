@@ -5,11 +5,12 @@ use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
+use crate::twin::air::Air;
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::lights::Headlight;
 use crate::twin::random::Stream;
 use crate::twin::render::paint::Painting;
-use crate::twin::render::{
-    Air, Body, CameraMotion, Headlight, LensSettings, NoiseKey, SensorSettings, Shape, sample,
-};
+use crate::twin::render::{CameraMotion, LensSettings, NoiseKey, SensorSettings, sample};
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
 use std::sync::Arc;
 

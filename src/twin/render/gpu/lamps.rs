@@ -7,9 +7,11 @@
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
 use super::spread::Spread;
 use super::view::{Framed, single};
-use crate::twin::render::light::Shining;
-use crate::twin::render::scene::{Air, LampLight, View};
-use crate::twin::render::surface::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::air::Air;
+use crate::twin::lights::LampLight;
+use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::render::photometry::Shining;
+use crate::twin::render::scene::View;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 

@@ -2,9 +2,9 @@
 
 use super::bend;
 use super::layout::Vertex;
-use crate::twin::render::hull::Hull;
-use crate::twin::render::light::LampField;
-use crate::twin::render::scene::{Body, Shape, View};
+use crate::twin::geometry::{Body, Hull, Shape};
+use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::scene::View;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

@@ -63,12 +63,12 @@ mod view;
 pub use adapter::adapters;
 pub use pipeline::shader_source;
 
-use super::light::LampField;
 use super::paint::Paintings;
 use super::pixel_map::{MapCache, MapKey};
-use super::scene::{Job, LampsInTime, Scene};
+use super::scene::{Job, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::{Intrinsics, SimTime};
+use crate::twin::render::lamp_field::{LampField, LampsInTime};
 use adapter::Gpu;
 use backdrop::{Backdrops, Key};
 use chunks::{Chunks, Line};

@@ -1,6 +1,6 @@
 //! Shadows that bodies throw, laid over the finished background.
 //!
-//! What is hidden of a light is defined in [`light`](crate::twin::render::light) and counted by the
+//! What is hidden of a light is defined in [`photometry`](crate::twin::render::photometry) and counted by the
 //! shader, pixel by pixel. Here is found where it has to look: the tunnel's surface is taken in
 //! cells, and where the ball around a cell meets the cone behind a body that a light shines on, the
 //! tiles of the picture that show the cell get the number of that light and body. All other tiles
@@ -10,7 +10,7 @@
 //! exposure throws its shadow from where it is in the middle.
 
 mod falling;
-mod solid;
+mod occluder;
 mod tiles;
 
 use super::adapter::Gpu;
@@ -25,11 +25,13 @@ use super::target::Target;
 use super::upload::Upload;
 use super::view::{Framed, single};
 use crate::track::Tunnel;
-use crate::twin::render::light::{LampField, disc_places};
-use crate::twin::render::scene::{Body, Job, Shape};
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::render::disc::disc_places;
+use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::scene::Job;
 use falling::{Around, Bodies, Cast, Light};
 use nalgebra::{Point3, Vector3};
-use solid::{Cut, End};
+use occluder::{Cut, End};
 use std::collections::BTreeMap;
 use std::mem::size_of;
 use std::ops::Range;

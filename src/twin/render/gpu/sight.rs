@@ -8,9 +8,10 @@ use super::passes::BodyBuffers;
 use super::smear::{Rectangle, Smear};
 use super::textures;
 use super::view::{BESIDE, Framed, single};
-use crate::twin::render::light::{Shining, headlights_lx};
+use crate::twin::air::Air;
 use crate::twin::render::paint::{self, Paintings};
-use crate::twin::render::scene::{Air, Job};
+use crate::twin::render::photometry::{Shining, headlights_lx};
+use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 

@@ -5,10 +5,12 @@ use super::facets::{Facet, Side, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
-use crate::twin::render::gloss::{Gloss, Wet};
-use crate::twin::render::light::{LampField, Shining};
+use crate::twin::geometry::STATION_STEP_M;
+use crate::twin::reflectance::{Wet, mean_albedo};
+use crate::twin::render::gloss::Gloss;
+use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::paint::{Painting, Paintings};
-use crate::twin::render::surface;
+use crate::twin::render::photometry::Shining;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -228,7 +230,7 @@ impl Site<'_> {
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
             paint: paint as f32,
-            albedo: (paint * surface::mean_albedo(facet.material)) as f32,
+            albedo: (paint * mean_albedo(facet.material)) as f32,
             luminance_cd_m2: 0.0,
             gloss: gloss.map_or([0.0; 3], |g| {
                 [g.head_on, g.along, g.across].map(|x| x as f32)
@@ -246,12 +248,12 @@ fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3
             h_m: end.h_m,
         })
     };
-    let ring = s_m / surface::RING_M;
+    let ring = s_m / STATION_STEP_M;
     let share = ring - ring.floor();
     if detail >= Detail::Middle || share <= 0.0 {
         return at(s_m);
     }
-    let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * surface::RING_M));
+    let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * STATION_STEP_M));
     a + (b - a) * share
 }
 

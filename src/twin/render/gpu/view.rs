@@ -3,8 +3,9 @@
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
 use crate::bus::Intrinsics;
+use crate::twin::lights::Headlight;
 use crate::twin::render::pixel_map::Dark;
-use crate::twin::render::scene::{Headlight, Job, View};
+use crate::twin::render::scene::{Job, View};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 /// Poses in the table lie this close in time, far closer than any motion of a train bends.
@@ -238,7 +239,7 @@ mod tests {
     use super::*;
     use crate::bus::{Distortion, lenses};
     use crate::track::TrackPoint;
-    use crate::twin::render::light::LampField;
+    use crate::twin::render::lamp_field::LampField;
     use crate::twin::render::paint::Paintings;
     use crate::twin::render::sample;
 

@@ -8,7 +8,8 @@
 use super::super::whole;
 use super::*;
 use crate::track::TrackPoint;
-use crate::twin::render::{Shape, View, sample};
+use crate::twin::geometry::Shape;
+use crate::twin::render::{View, sample};
 use nalgebra::{Translation3, UnitQuaternion};
 
 const SPEED_MPS: f64 = 40.0;
