@@ -7,6 +7,8 @@ use std::fmt::Write;
 
 /// A pixel sees no surface at a flatter angle than this sine (of the ray to the surface).
 pub const MIN_SINE: f64 = 0.05;
+/// Surfaces farther away than this are not seen.
+pub const SIGHT_M: f64 = 160.0;
 /// Lamps are seen up to this distance.
 pub const LAMP_SIGHT_M: f64 = 80.0;
 /// Reflectance of a lamp's disc while it is off.

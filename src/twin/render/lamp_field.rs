@@ -1,7 +1,6 @@
-//! The lamps of a scene: which of them light a place, and what they are at a time.
+//! The lamps of a scene and their light at a place.
 
 use super::photometry::{LAMP_REACH_M, Shining};
-use crate::bus::SimTime;
 use crate::track::{TrackPoint, Tunnel};
 use crate::twin::air::Air;
 use crate::twin::lights::LampLight;
@@ -28,8 +27,8 @@ fn cell(x_m: f64) -> i32 {
 }
 
 impl LampField {
-    /// Sorts the lamps into cells.
-    pub fn new(lamps: &[LampLight]) -> Self {
+    /// Sorts lamps that shine through air into cells.
+    pub fn new(lamps: &[LampLight], air: Air) -> Self {
         let mut reach = Vec::new();
         for (k, lamp) in lamps.iter().enumerate() {
             let c = lamp.centre;
@@ -42,16 +41,9 @@ impl LampField {
         reach.sort_unstable();
         Self {
             lamps: lamps.iter().cloned().map(Shining::new).collect(),
-            air: Air::default(),
+            air,
             reach,
         }
-    }
-
-    /// The same lamps in air that is not clear.
-    #[must_use]
-    pub fn in_air(mut self, air: Air) -> Self {
-        self.air = air;
-        self
     }
 
     /// All lamps, in the order given.
@@ -138,38 +130,6 @@ impl LampField {
     }
 }
 
-/// Follows the lamps of a scene through time. Between changes all that they light stays as it is,
-/// so a renderer may keep it; a lamp changes between two jobs, never within one.
-#[derive(Clone, Debug)]
-pub struct LampsInTime {
-    lamps: Vec<LampLight>,
-    changes: Vec<SimTime>,
-    /// Of the changes, so many were over when it was asked last.
-    passed: usize,
-}
-
-impl LampsInTime {
-    /// At time 0.
-    pub fn new(lamps: &[LampLight]) -> Self {
-        let changes = lamps.iter().flat_map(|lamp| &lamp.changes);
-        let mut changes: Vec<_> = changes.map(|change| change.at).collect();
-        changes.sort_unstable();
-        changes.dedup();
-        Self {
-            lamps: lamps.to_vec(),
-            changes,
-            passed: 0,
-        }
-    }
-
-    /// All lamps as they are at a time, if any differs from what it was when this was asked last.
-    pub fn changed(&mut self, time: SimTime) -> Option<Vec<LampLight>> {
-        let passed = self.changes.partition_point(|at| *at <= time);
-        let before = std::mem::replace(&mut self.passed, passed);
-        (before != passed).then(|| self.lamps.iter().map(|lamp| lamp.at(time)).collect())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::photometry::tests::light;
@@ -188,7 +148,7 @@ mod tests {
                 )
             })
             .collect();
-        let field = LampField::new(&lamps);
+        let field = LampField::new(&lamps, Air::default());
         let lamps = field.lamps();
         let n = Vector3::new(0.0, 0.6, 0.8);
         for k in 0..500 {
@@ -205,7 +165,10 @@ mod tests {
     fn mist_dims_lamps_by_beer_and_lambert() {
         let lamps = [light(Point3::origin(), Vector3::x())];
         let air = Air::of_visibility(50.0);
-        let (clear, misty) = (LampField::new(&lamps), LampField::new(&lamps).in_air(air));
+        let (clear, misty) = (
+            LampField::new(&lamps, Air::default()),
+            LampField::new(&lamps, air),
+        );
         for d in [1.0f64, 7.0, 20.0] {
             let at =
                 |field: &LampField| field.irradiance_lx(&Point3::new(d, 0.0, 0.0), &-Vector3::x());
@@ -221,14 +184,15 @@ mod tests {
         let mut tunnel = sample::tunnel();
         tunnel.ambient_lx = 12.0 * PI;
         let mut air = Air::of_visibility(80.0);
-        let dark = LampField::new(&[]).in_air(air);
+        let dark = LampField::new(&[], air);
         assert!((dark.airlight_cd_m2(&tunnel, 100.0) - 12.0).abs() < 1e-9);
         air.scattered_share = 0.7;
-        let dust = LampField::new(&[]).in_air(air);
+        let dust = LampField::new(&[], air);
         assert!((dust.airlight_cd_m2(&tunnel, 100.0) - 8.4).abs() < 1e-9);
         // Lamps add to it, clear air has none.
-        let lit = LampField::new(&sample::scene().lamps);
-        assert!(lit.airlight_cd_m2(&tunnel, 100.0).abs() < 1e-300);
-        assert!(lit.in_air(air).airlight_cd_m2(&tunnel, 100.0) > 8.5);
+        let lamps = sample::scene().lamps;
+        let clear = LampField::new(&lamps, Air::default());
+        assert!(clear.airlight_cd_m2(&tunnel, 100.0).abs() < 1e-300);
+        assert!(LampField::new(&lamps, air).airlight_cd_m2(&tunnel, 100.0) > 8.5);
     }
 }

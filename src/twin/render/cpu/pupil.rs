@@ -22,7 +22,7 @@ pub(super) fn is_small(view: &View) -> bool {
 }
 
 /// The view from points spread evenly over the pupil.
-pub(super) fn looks(view: &View) -> Vec<View> {
+pub(super) fn pinholes(view: &View) -> Vec<View> {
     let Some(focus_m) = view.lens.focus_m.filter(|_| !is_small(view)) else {
         return vec![view.clone()];
     };

@@ -6,9 +6,10 @@
 //! tunnel: where the ball around the segment meets the shadow of the ball around the body.
 
 use super::blinking::Blinking;
-use super::{SIGHT_M, World};
+use super::cast_scene::CastScene;
 use crate::twin::geometry::{Body, Solid};
 use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
+use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::disc::disc_places;
 use crate::twin::render::photometry::{LAMP_REACH_M, OFFSET_M, Shining};
 use crate::twin::render::{Job, View};
@@ -162,13 +163,13 @@ impl<'a> Blocker<'a> {
 
 impl<'a> Shades<'a> {
     /// Of a view from somewhere in a segment.
-    pub fn new(world: &'a World, job: &'a Job, view: &View, segment: usize) -> Self {
+    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, segment: usize) -> Self {
         if job.bodies.is_empty() {
             return Self::default();
         }
-        let in_sight = world.tunnel.segments_about(segment, SIGHT_M);
+        let in_sight = scene.tunnel.segments_about(segment, SIGHT_M);
         let bodies: Vec<_> = job.bodies.iter().map(|b| (b, ball_m(b))).collect();
-        let lamps = world.lamps.lamps().iter().map(Source::lamp);
+        let lamps = scene.lit.lamps.lamps().iter().map(Source::lamp);
         let headlights = job.headlights.iter().map(Source::headlight);
         let sources: Vec<_> = lamps.chain(headlights).collect();
         let shadows = shadows(&sources, &bodies, job, view);
@@ -179,7 +180,7 @@ impl<'a> Shades<'a> {
             ..Self::default()
         };
         for segment in in_sight {
-            let (centre, radius) = world.tunnel.segment_ball(segment);
+            let (centre, radius) = scene.tunnel.segment_ball(segment);
             for of_light in shadows.chunk_by(|a, b| a.source == b.source) {
                 let source = &sources[of_light[0].source];
                 let to = centre - source.centre;
@@ -232,7 +233,7 @@ impl<'a> Shades<'a> {
         segment: usize,
         (p, n): (&Point3<f64>, &Vector3<f64>),
         (blockers, blinking): (&[Blocker<'_>], &Blinking),
-        world: &World,
+        scene: &CastScene,
     ) -> f64 {
         let lights = self.falling_on(segment).iter();
         lights
@@ -254,7 +255,7 @@ impl<'a> Shades<'a> {
                 // Lamps come first, and headlights do not blink.
                 let flicker = blinking.flicker.get(falling.source).unwrap_or(&0.0);
                 let lux = source.irradiance_lx(p, n) * (1.0 + flicker);
-                share * lux * world.air.transmission(distance)
+                share * lux * scene.lit.air.transmission(distance)
             })
             .sum()
     }

@@ -1,5 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
+use crate::bus::Intrinsics;
 use crate::bus::{Shutter, SimTime};
 use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
 use crate::track::{
@@ -8,10 +9,14 @@ use crate::track::{
 use crate::twin::air::Air;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::lights::Headlight;
+use crate::twin::lights::LampLight;
 use crate::twin::random::Stream;
+use crate::twin::reflectance::Wet;
 use crate::twin::render::paint::Painting;
 use crate::twin::render::{CameraMotion, LensSettings, NoiseKey, SensorSettings, sample};
+use nalgebra::Vector3;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 const AMBIENT_LX: f64 = 50.0;

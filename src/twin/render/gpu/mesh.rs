@@ -314,6 +314,7 @@ fn turned(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::air::Air;
     use nalgebra::Isometry3;
     use std::sync::Arc;
 
@@ -330,7 +331,7 @@ mod tests {
             px_per_m: 1e4,
             cell_m: CELL_M,
         };
-        mesh.add_body(&body, &LampField::new(&[]), 1.0, fineness);
+        mesh.add_body(&body, &LampField::new(&[], Air::default()), 1.0, fineness);
         mesh
     }
 

@@ -290,27 +290,6 @@ const FADE: wgpu::BlendState = {
     }
 };
 
-/// The resources of group 0, in the order of their bindings.
-pub fn bind(
-    device: &wgpu::Device,
-    pipeline: &wgpu::RenderPipeline,
-    resources: &[wgpu::BindingResource<'_>],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = resources
-        .iter()
-        .zip(0u32..)
-        .map(|(resource, binding)| wgpu::BindGroupEntry {
-            binding,
-            resource: resource.clone(),
-        })
-        .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &entries,
-    })
-}
-
 const fn attribute(
     format: wgpu::VertexFormat,
     offset: usize,

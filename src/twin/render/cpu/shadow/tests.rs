@@ -191,9 +191,9 @@ fn segments_know_every_shadow_that_falls_on_them() {
     let view = &job.views[0];
     let pose = view.motion.poses[0];
     let eye = Point3::from(pose.translation.vector);
-    let caster = &renderer.world.tunnel;
+    let caster = &renderer.scene.tunnel;
     let segment = caster.segment_of(&eye, None);
-    let shades = Shades::new(&renderer.world, &job, view, segment);
+    let shades = Shades::new(&renderer.scene, &job, view, segment);
     let (mut shaded, mut lights) = (0, 0);
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
@@ -208,7 +208,7 @@ fn segments_know_every_shadow_that_falls_on_them() {
             hit.segment as usize,
             (&at.position, &at.normal),
             (&blockers, &Blinking::default()),
-            &renderer.world,
+            &renderer.scene,
         );
         let all = shades.sources.iter().map(|source| {
             let lux = source.irradiance_lx(&at.position, &at.normal);
