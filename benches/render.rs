@@ -14,8 +14,9 @@
 
 use metrotwin::bus::Intrinsics;
 use metrotwin::track::Tunnel;
+use metrotwin::twin::lights::{Headlight, LampLight};
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Headlight, Job, LampLight, Renderer, sample};
+use metrotwin::twin::render::{Job, Renderer, sample};
 use nalgebra::Vector3;
 use std::time::Instant;
 

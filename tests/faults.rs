@@ -15,9 +15,10 @@ use metrotwin::session::{
 };
 use metrotwin::track::{Tunnel, read_toml};
 use metrotwin::twin::faults::{FaultSettings, age};
+use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Job, LampLight, Renderer, Scene, sample};
+use metrotwin::twin::render::{Job, Renderer, Scene, sample};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 const TUNNEL: &str = include_str!("../tunnels/chengdu_line1.toml");

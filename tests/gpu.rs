@@ -13,10 +13,11 @@ use common::{dark_scene, draw, gpu};
 use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
+use metrotwin::twin::air::Air;
+use metrotwin::twin::geometry::{Body, Shape};
+use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{
-    Air, Body, Job, LampLight, Pattern, Renderer, Scene, SensorSettings, Shape, View, sample,
-};
+use metrotwin::twin::render::{Job, Pattern, Renderer, Scene, SensorSettings, View, sample};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;

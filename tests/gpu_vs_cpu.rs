@@ -34,10 +34,10 @@ use common::{Make, cpu, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{TrackPoint, Tunnel};
-use metrotwin::twin::render::gloss::Wet;
-use metrotwin::twin::render::{
-    Body, CameraMotion, Headlight, Hull, Job, LampLight, Renderer, Scene, Shape, View, sample,
-};
+use metrotwin::twin::geometry::{Body, Hull, Shape};
+use metrotwin::twin::lights::{Headlight, LampLight};
+use metrotwin::twin::reflectance::Wet;
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 

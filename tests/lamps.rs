@@ -19,8 +19,9 @@ use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, SimTime};
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::{ChipFrame, LineCode, Ripple, Uid, Waveform};
-use metrotwin::twin::render::surface::FAINT_E;
-use metrotwin::twin::render::{CameraMotion, Job, LampLight, View, sample};
+use metrotwin::twin::lights::LampLight;
+use metrotwin::twin::render::constants::FAINT_E;
+use metrotwin::twin::render::{CameraMotion, Job, View, sample};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 

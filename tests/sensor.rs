@@ -16,9 +16,10 @@ mod common;
 
 use common::{RENDERERS, dark_scene};
 use metrotwin::bus::Intrinsics;
+use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::random::Stream;
 use metrotwin::twin::render::{
-    Body, Job, Pattern, RawImage, Renderer, SensorSettings, Shape, View, sample, upper_bits,
+    Job, Pattern, RawImage, Renderer, SensorSettings, View, sample, upper_bits,
 };
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;

@@ -7,8 +7,8 @@
 )]
 #![cfg(feature = "twin")]
 
+use metrotwin::twin::render::constants;
 use metrotwin::twin::render::gpu::{layout, shader_source};
-use metrotwin::twin::render::surface;
 use std::mem::{offset_of, size_of};
 
 fn parse(name: &str) -> naga::Module {
@@ -50,7 +50,7 @@ fn constants_have_one_source() {
     ] {
         assert_eq!(constant(file, name), ours as u32, "{name}");
     }
-    let from_rust = surface::wgsl();
+    let from_rust = constants::wgsl();
     for name in ["GLARE_STEP_PX"] {
         assert!(from_rust.contains(&format!("const {name}")));
         for file in ["common", "background", "blend", "lamps", "glare", "sensor"] {

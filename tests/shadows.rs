@@ -14,10 +14,10 @@ use common::{cpu, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
-use metrotwin::twin::render::light::Shining;
-use metrotwin::twin::render::{
-    Body, CameraMotion, Headlight, Hull, Job, Renderer, Scene, Shape, View, sample,
-};
+use metrotwin::twin::geometry::{Body, Hull, Shape};
+use metrotwin::twin::lights::Headlight;
+use metrotwin::twin::render::photometry::Shining;
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::f64::consts::PI;
 

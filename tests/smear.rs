@@ -16,8 +16,9 @@ mod common;
 use common::{Make, RENDERERS, cpu, dark_scene, draw, gpu};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
+use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{Body, CameraMotion, Job, Renderer, Scene, Shape, View, sample};
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
 use nalgebra::Vector3;
 
 fn brute_force(scene: Scene) -> Box<dyn Renderer> {

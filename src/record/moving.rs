@@ -7,8 +7,8 @@ use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
 use crate::session::{ObserverError, Opening};
 use crate::track::TrackPoint;
+use crate::twin::geometry::{Body, Hull, Shape};
 use crate::twin::physics::TrainState;
-use crate::twin::render::{Body, Hull, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::RotationQuat;
 use rerun::{

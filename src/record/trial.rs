@@ -11,9 +11,9 @@ use crate::bus::*;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::uid::Uid;
 use crate::track::*;
+use crate::twin::geometry::{Body, Shape};
 use crate::twin::physics::{TrainState, WheelForces};
 use crate::twin::random::Stream as Random;
-use crate::twin::render::{Body, Shape};
 use image::{GrayImage, Luma};
 use nalgebra::{Isometry3, Point2, Point3, Rotation3, Unit, UnitQuaternion, Vector3};
 

@@ -2,8 +2,8 @@
 
 use super::file::ScenarioFile;
 use crate::track::Problem;
+use crate::twin::geometry::Hull;
 use crate::twin::physics::ObstacleShape;
-use crate::twin::render::Hull;
 use nalgebra::Point3;
 use std::path::Path;
 use std::sync::Arc;

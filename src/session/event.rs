@@ -5,8 +5,9 @@ use crate::bus::{
     WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
+use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, TrainState};
-use crate::twin::render::{Body, Job};
+use crate::twin::render::Job;
 use nalgebra::{Isometry3, Vector3};
 
 /// What is known before the first step.

@@ -4,8 +4,9 @@ use super::score::Presence;
 use crate::bus::WaysideCalibration;
 use crate::scenario::{Scenario, WaysidePost};
 use crate::track::BED_M;
+use crate::twin::geometry::TunnelCaster;
 use crate::twin::physics::World;
-use crate::twin::render::cpu::TunnelCaster;
+
 use nalgebra::Point3;
 
 /// How far a walking man's limbs reach from his middle.
@@ -18,7 +19,7 @@ pub struct FieldOfView {
     span_s: f64,
     reach_m: f64,
     walls: TunnelCaster,
-    slab: usize,
+    segment: usize,
 }
 
 impl FieldOfView {
@@ -27,7 +28,7 @@ impl FieldOfView {
         let device = &post.actual;
         let walls = TunnelCaster::new(&scenario.tunnel);
         Self {
-            slab: walls.slab_of(&device.world_from_camera.translation.vector.into(), None),
+            segment: walls.segment_of(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
             span_s: post.camera.longest_span_s(),
             reach_m: scenario.stack.wayside.reach_m,
@@ -46,7 +47,7 @@ impl FieldOfView {
         let sight = place - eye;
         in_picture
             && (chainage_m - self.device.chainage_m).abs() <= self.reach_m
-            && self.walls.cast(self.slab, &eye, &sight, 1.0).is_none()
+            && self.walls.cast(self.segment, &eye, &sight, 1.0).is_none()
     }
 
     /// Everything that the device may rightly report.

@@ -4,8 +4,7 @@
 use super::{StudyError, write_whole};
 use crate::scenario::draw::{Inputs, Template, sha256};
 use crate::session::RendererChoice;
-use crate::twin::render::Backend;
-use crate::twin::render::gpu;
+use crate::twin::render::{Backend, gpu};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;

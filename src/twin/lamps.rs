@@ -2,8 +2,8 @@
 //! its own, and fails as the scenario has it.
 
 use super::faults::{LampFaultSettings, age};
+use super::lights::LampLight;
 use super::random::Stream;
-use super::render::LampLight;
 use crate::track::Tunnel;
 
 /// One sigma of a lamp's clock: a crystal without temperature compensation.

@@ -9,10 +9,13 @@
 
 pub mod air;
 pub mod faults;
+pub mod geometry;
 pub mod lamps;
+pub mod lights;
 pub mod links;
 pub mod physics;
 pub mod random;
+pub mod reflectance;
 pub mod render;
 pub mod sensors;
 pub mod survey;

@@ -8,9 +8,12 @@
 )]
 
 use image::GrayImage;
+use metrotwin::twin::air::Air;
+use metrotwin::twin::lights::LampLight;
+use metrotwin::twin::reflectance::Wet;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Air, Job, LampLight, Renderer, Scene, gloss, sample};
+use metrotwin::twin::render::{Job, Renderer, Scene, sample};
 
 /// Makes a renderer.
 pub type Make = fn(Scene) -> Box<dyn Renderer>;
@@ -46,6 +49,6 @@ pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
         tunnel: tunnel.into(),
         lamps,
         air: Air::default(),
-        wet: gloss::Wet::default(),
+        wet: Wet::default(),
     }
 }

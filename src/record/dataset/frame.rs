@@ -5,7 +5,7 @@ use crate::record::parquet::Kind::{Int, Real, Reals, Text};
 use crate::record::parquet::{Column, Value, column};
 use crate::session::TrainPoint;
 use crate::twin::render::View;
-use crate::twin::render::cpu::Sight;
+use crate::twin::render::labels::Projection;
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 
@@ -217,7 +217,7 @@ pub(super) struct Name<'a> {
 /// A row of `frames.parquet`, still without flow.
 pub(super) fn row(
     name: Name<'_>,
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     left: Option<&View>,
     train: Option<&TrainPoint>,
 ) -> Vec<Value> {
@@ -287,7 +287,7 @@ pub(super) fn set_flow(row: &mut [Value], file: String, to: i64) {
 }
 
 /// The rows of a frame.
-pub(super) fn rows(frame_id: i64, sight: &Sight<'_>) -> impl Iterator<Item = Vec<Value>> {
+pub(super) fn rows(frame_id: i64, sight: &Projection<'_>) -> impl Iterator<Item = Vec<Value>> {
     let view = sight.view;
     (0..view.camera.intrinsics.height_px).map(move |v| {
         let shutter = &view.camera.shutter;

@@ -4,9 +4,10 @@
 use crate::record::parquet::Kind::{Int, Real, Reals, Text};
 use crate::record::parquet::{Column, Value, column};
 use crate::track::LampSite;
-use crate::twin::render::cpu::{Labeller, Seen, Sight};
-use crate::twin::render::surface::LAMP_SIGHT_M;
-use crate::twin::render::{Job, LampLight};
+use crate::twin::lights::LampLight;
+use crate::twin::render::Job;
+use crate::twin::render::constants::LAMP_SIGHT_M;
+use crate::twin::render::labels::{Labeller, Projection, Seen};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 
@@ -111,7 +112,7 @@ pub(super) const COLUMNS: [Column; 27] = [
 pub(super) fn rows(
     frame_id: i64,
     job: &Job,
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     labeller: &Labeller,
     sites: &[LampSite],
 ) -> Vec<Vec<Value>> {
@@ -124,7 +125,7 @@ pub(super) fn rows(
 fn row(
     frame_id: i64,
     job: &Job,
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     labeller: &Labeller,
     (lamp, site): (&LampLight, &LampSite),
 ) -> Option<Vec<Value>> {
@@ -214,7 +215,7 @@ fn covered(coordinates: &[f64], size: u32) -> Option<[u32; 2]> {
 }
 
 /// Looked at evenly over the disc, on a spiral.
-fn visible_share(lamp: &LampLight, job: &Job, sight: &Sight<'_>, labeller: &Labeller) -> f64 {
+fn visible_share(lamp: &LampLight, job: &Job, sight: &Projection<'_>, labeller: &Labeller) -> f64 {
     let golden = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let seen = (0..PLACES).filter(|k| {
         let share = ((f64::from(*k) + 0.5) / f64::from(PLACES)).sqrt();
@@ -236,8 +237,9 @@ mod tests {
     use super::super::clean::clean;
     use super::*;
     use crate::track::uid::ChipFrame;
+    use crate::twin::geometry::{Body, Shape};
     use crate::twin::render::cpu::CpuRenderer;
-    use crate::twin::render::{Body, Renderer, Scene, Shape, View, sample};
+    use crate::twin::render::{Renderer, Scene, View, sample};
     use nalgebra::Translation3;
 
     const SPEED_MPS: f64 = 160.0 / 3.6;
@@ -254,7 +256,7 @@ mod tests {
 
     /// What the table says of the lamps in a view of a job.
     fn seen(scene: &Scene, job: &Job) -> Vec<Vec<Value>> {
-        let sight = Sight::new(&job.views[0], job.time);
+        let sight = Projection::new(&job.views[0], job.time);
         rows(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
     }
 

@@ -4,7 +4,7 @@
 //! that the renderer is given ([`Event::Exposure`]), and the images as they reach the stack. Beside
 //! each image it puts what is true: every pixel's depth, owner and flow by rays
 //! ([`Labeller`]), the row-time equation solved for every lamp
-//! ([`Sight`](crate::twin::render::cpu::Sight)), boxes, times, poses; and the picture that a better
+//! ([`Projection`](crate::twin::render::labels::Projection)), boxes, times, poses; and the picture that a better
 //! camera would have taken, for which it has a renderer of its own. So the run is the same, image
 //! by image, as without a data set.
 //!
@@ -58,7 +58,7 @@ use crate::scenario::draw::sha256;
 use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
 use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;
-use crate::twin::render::cpu::Labeller;
+use crate::twin::render::labels::Labeller;
 use crate::twin::render::{Job, Renderer};
 use files::{FOLDERS, write};
 use image::GrayImage;

@@ -5,9 +5,11 @@ use super::coco::Mask;
 use crate::record::parquet::Kind::{Flag, Int, Real, Text};
 use crate::record::parquet::{Column, Value, column};
 use crate::track::{Alignment, Gauge};
+use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, BodyOwner};
-use crate::twin::render::cpu::{Labels, SIGHT_M, Sight, Surface, Whole, whole};
-use crate::twin::render::{Body, Job};
+use crate::twin::render::Job;
+use crate::twin::render::constants::SIGHT_M;
+use crate::twin::render::labels::{Labels, Projection, Surface, Whole, whole};
 use image::{ImageBuffer, Luma};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
@@ -140,7 +142,7 @@ fn identity(owner: BodyOwner) -> (u32, usize) {
 pub(super) fn instances<'a>(
     job: &Job,
     owners: &'a [(BodyOwner, String)],
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     labels: &Labels,
 ) -> Vec<Instance<'a>> {
     let eye = sight.pose(0.0).translation.vector;
@@ -195,7 +197,7 @@ fn columns_of_bodies(labels: &Labels, width: usize, bodies: usize) -> Vec<Option
 /// The picture of numbers.
 pub(super) fn picture(
     owners: &[(BodyOwner, String)],
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     labels: &Labels,
 ) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let camera = &sight.view.camera.intrinsics;
@@ -219,7 +221,7 @@ pub(super) struct Sighting {
 pub(super) fn row(
     frame_id: i64,
     job: &Job,
-    sight: &Sight<'_>,
+    sight: &Projection<'_>,
     line: (&Alignment, f64),
     instance: &Instance<'_>,
 ) -> Option<Sighting> {
@@ -295,7 +297,7 @@ struct Space {
 }
 
 impl Space {
-    fn of(bodies: &[&Body], sight: &Sight<'_>, (line, near_m): (&Alignment, f64)) -> Self {
+    fn of(bodies: &[&Body], sight: &Projection<'_>, (line, near_m): (&Alignment, f64)) -> Self {
         let mid = 0.5 * (f64::from(sight.view.camera.intrinsics.height_px) - 1.0);
         let after_s = sight.after_s(mid);
         let first = bodies.first().map_or(Point3::origin(), |b| {

@@ -8,7 +8,7 @@ use super::{DataSet, Part, Shot, lamps, obstacles};
 use crate::record::stream::failed;
 use crate::session::ObserverError;
 use crate::twin::physics::BodyOwner;
-use crate::twin::render::cpu::{Labels, Sight};
+use crate::twin::render::labels::{Labels, Projection};
 use crate::twin::render::{Job, RawImage, View, upper_bits};
 use image::GrayImage;
 use rayon::prelude::*;
@@ -109,7 +109,7 @@ impl DataSet<'_> {
         let frame_id = FRAMES * k as i64 + i64::from(shot.number);
         let paths = Paths::new(&name, shot.number);
         let view = &shot.job.views[index];
-        let sight = Sight::new(view, shot.job.time);
+        let sight = Projection::new(view, shot.job.time);
         let rays = self.plan.needs_rays();
         let labels = rays.then(|| self.labeller.look(&shot.job, &sight));
         if let Some(labels) = labels.as_ref().filter(|_| self.plan.has(Part::Flow)) {
@@ -156,7 +156,7 @@ impl DataSet<'_> {
     fn write_flow(
         &mut self,
         k: usize,
-        (shot, next): (&Shot, &Sight<'_>),
+        (shot, next): (&Shot, &Projection<'_>),
         size: usize,
         to: i64,
     ) -> Result<(), ObserverError> {
@@ -164,7 +164,7 @@ impl DataSet<'_> {
         let Some(last) = last.filter(|last| last.labels.depth_m.len() == size) else {
             return Ok(());
         };
-        let sight = Sight::new(&last.job.views[last.view], last.job.time);
+        let sight = Projection::new(&last.job.views[last.view], last.job.time);
         let goes_on = successors(&last.owners, &shot.owners);
         let flow = self.labeller.flow(
             (&last.job, &sight, &last.labels),
@@ -183,7 +183,7 @@ impl DataSet<'_> {
     fn write_pictures(
         &self,
         paths: &Paths,
-        sight: &Sight<'_>,
+        sight: &Projection<'_>,
         shot: &Shot,
         image: &GrayImage,
         drawn: &Drawn,
@@ -233,7 +233,7 @@ impl DataSet<'_> {
         frame_id: i64,
         k: usize,
         shot: &Shot,
-        sight: &Sight<'_>,
+        sight: &Projection<'_>,
         labels: Option<&Labels>,
     ) -> Result<(), ObserverError> {
         let Some(tables) = &mut self.tables else {

@@ -4,8 +4,8 @@ use super::check_times;
 use crate::bus::SimTime;
 use crate::track::uid::Ripple;
 use crate::track::{Checker, Problem, Tunnel};
+use crate::twin::lights::{LampChange, LampLight};
 use crate::twin::random::Stream;
-use crate::twin::render::{LampChange, LampLight};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 

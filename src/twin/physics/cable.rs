@@ -15,7 +15,7 @@ use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUPS, gro
 use super::obstacle_body::{RESTING_MPS, Rest};
 use crate::bus::SimTime;
 use crate::track::Alignment;
-use crate::twin::render::{Body, Shape};
+use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{

@@ -2,8 +2,8 @@
 
 use super::shape::ObstacleShape;
 use crate::track::{Checker, Problem, key_below};
+use crate::twin::geometry::Shape;
 use crate::twin::random::Stream;
-use crate::twin::render::Shape;
 use nalgebra::{UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

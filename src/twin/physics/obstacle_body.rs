@@ -7,7 +7,7 @@ use super::impact::Motion;
 use super::obstacle::{HingeEdge, HingeSettings, Piece};
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
-use crate::twin::render::{Body, Shape};
+use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{

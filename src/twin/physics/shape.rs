@@ -2,8 +2,8 @@
 //! take it.
 
 use crate::track::{Checker, Problem, key_below};
+use crate::twin::geometry::{Hull, Shape};
 use crate::twin::random::Stream;
-use crate::twin::render::{Hull, Shape};
 use nalgebra::{Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -18,7 +18,7 @@ use super::truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
 use crate::track::{Alignment, Tunnel};
-use crate::twin::render::Body;
+use crate::twin::geometry::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
 
 /// Steps between looks at where a moving obstacle is along the line.

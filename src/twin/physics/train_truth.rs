@@ -5,7 +5,8 @@ use super::wheelset::{WheelExtremes, WheelForces};
 use super::{EnergyBook, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::Direction;
-use crate::twin::render::{Body, Headlight};
+use crate::twin::geometry::Body;
+use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, Vector3};
 
 /// A train as it really is.

@@ -6,7 +6,7 @@ use super::obstacle_body::ObstacleBody;
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::Alignment;
-use crate::twin::render::Body;
+use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 use rapier3d_f64::prelude::PhysicsWorld;
 

@@ -11,7 +11,7 @@ use super::obstacle::Piece;
 use super::obstacle_body::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
-use crate::twin::render::Body;
+use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Vector3};
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 

@@ -3,7 +3,7 @@
 
 use super::obstacle::{ObstacleSettings, Piece};
 use crate::track::{Alignment, BED_M, Checker, Problem, TrackPoint, key_below};
-use crate::twin::render::{Body, Shape};
+use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

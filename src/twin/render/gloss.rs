@@ -24,19 +24,14 @@
 //! Only lamps and headlights are mirrored; walls, trains and sky are not. Bodies do not hide what is
 //! mirrored. The film is even, without puddles.
 
-use super::LampLight;
-use super::light::HEADLIGHT_RADIUS_M;
-use super::scene::{Air, Headlight};
 use crate::track::Material;
+use crate::twin::air::Air;
+use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight, LampLight};
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use std::f64::consts::PI;
-use std::ops::Range;
 
 /// Lamps farther than this from a surface are not mirrored in it.
 pub const MIRROR_REACH_M: f64 = 60.0;
-/// Concrete under a film of water is darker by this: light is caught between the two (Lekner and
-/// Dorf, "Why some things are darker when wet", Applied Optics 27(7), 1988).
-const WET_ALBEDO: f64 = 0.6;
 /// A surface that is level but for this cosine counts as the head of a rail.
 const HEAD_COSINE: f64 = 0.8;
 
@@ -201,39 +196,11 @@ fn towards(
     axial_cd * cos.powf(exponent) * air.transmission(distance_m)
 }
 
-/// Where the line is wet.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Wet {
-    /// Ranges of chainage and whether they are; the last one that holds a place counts.
-    pub ranges: Vec<(Range<f64>, bool)>,
-}
-
-impl Wet {
-    /// Whether it is wet at a chainage.
-    pub fn at(&self, s_m: f64) -> bool {
-        let covers = self
-            .ranges
-            .iter()
-            .rev()
-            .find(|(range, _)| range.contains(&s_m));
-        covers.is_some_and(|(_, wet)| *wet)
-    }
-
-    /// By how much the diffuse light of a surface is less.
-    pub fn albedo_factor(&self, material: Material, s_m: f64) -> f64 {
-        if material == Material::Bed && self.at(s_m) {
-            WET_ALBEDO
-        } else {
-            1.0
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::print_stdout, reason = "a test prints its figures")]
     use super::*;
-    use crate::twin::render::light::disc_points;
+    use crate::twin::render::disc::disc_points;
 
     const LEVEL: fn() -> Facing = || Facing::new(Vector3::z(), &Vector3::x());
 
@@ -332,18 +299,5 @@ mod tests {
             (middle.x - 3.0).abs() < 0.12 && middle.y.abs() < 1e-9,
             "{middle}"
         );
-    }
-
-    /// Provokes ranges that count in the wrong order.
-    #[test]
-    fn the_last_range_counts() {
-        let all = f64::NEG_INFINITY..f64::INFINITY;
-        let wet = Wet {
-            ranges: vec![(all, true), (10.0..20.0, false), (15.0..18.0, true)],
-        };
-        assert!(wet.at(0.0) && !wet.at(12.0) && wet.at(16.0) && !wet.at(19.0) && wet.at(20.0));
-        assert!(!Wet::default().at(0.0));
-        assert!((wet.albedo_factor(Material::Bed, 0.0) - 0.6).abs() < 1e-12);
-        assert!((wet.albedo_factor(Material::Lining, 0.0) - 1.0).abs() < 1e-12);
     }
 }

@@ -1,25 +1,25 @@
 //! From the world to 8-bit images: a wgpu renderer, and a plain one beside it as oracle and
 //! fall-back. Both draw the same [`Scene`] through the same [`View`].
 
+pub mod constants;
 pub mod cpu;
+pub mod disc;
 pub mod glare;
 mod glass;
 pub mod gloss;
 pub mod gpu;
-mod hull;
-pub mod light;
+mod image_bounds;
+pub mod labels;
+pub mod lamp_field;
+mod lit_scene;
 pub mod paint;
+pub mod photometry;
 pub mod pixel_map;
 pub mod sample;
 mod scene;
 pub mod sensor;
-pub mod surface;
 
-pub use hull::{Face, Hull};
-pub use scene::{
-    Air, Body, CameraMotion, Headlight, Job, LampChange, LampLight, LampsInTime, NoiseKey, Scene,
-    Shape, View,
-};
+pub use scene::{CameraMotion, Job, NoiseKey, Scene, View};
 pub use sensor::{BLUR_PX, LensSettings, Pattern, SensorSettings, upper_bits};
 
 use image::{GrayImage, ImageBuffer, Luma};

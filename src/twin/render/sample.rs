@@ -8,17 +8,18 @@
 //! assert_eq!(scene.lamps.len(), 60);
 //! ```
 
-use super::{
-    Air, Body, CameraMotion, Job, LampLight, LensSettings, NoiseKey, Scene, SensorSettings, Shape,
-    View, gloss,
-};
+use super::{CameraMotion, Job, LensSettings, NoiseKey, Scene, SensorSettings, View};
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use crate::track::uid::{LineCode, Uid};
 use crate::track::{
     Alignment, CrossSection, LampSite, Material, OutlinePoint, PlanElement, SectionRange,
     TrackPoint, Tunnel,
 };
+use crate::twin::air::Air;
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::lights::LampLight;
 use crate::twin::random::Stream;
+use crate::twin::reflectance::Wet;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -86,7 +87,7 @@ pub fn scene() -> Scene {
         tunnel: Arc::new(tunnel),
         lamps,
         air: Air::default(),
-        wet: gloss::Wet::default(),
+        wet: Wet::default(),
     }
 }
 

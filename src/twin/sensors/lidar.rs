@@ -9,10 +9,9 @@
 use super::ClockSettings;
 use crate::bus::{LidarReturn, LidarScan, SimTime};
 use crate::track::{Checker, Problem, Tunnel};
+use crate::twin::geometry::{Body, Solid, TunnelCaster};
 use crate::twin::random::Stream;
-use crate::twin::render::Body;
-use crate::twin::render::cpu::{Solid, TunnelCaster};
-use crate::twin::render::surface;
+use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Isometry3, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -147,7 +146,7 @@ impl Lidar {
     ) -> Self {
         let caster = TunnelCaster::new(tunnel);
         let origin = Point3::from(world_from_lidar.translation.vector);
-        let slab = caster.slab_of(&origin, None);
+        let segment = caster.segment_of(&origin, None);
         let side = settings.side_shots();
         let mut beams = Vec::new();
         for shot in -side..=side {
@@ -160,12 +159,12 @@ impl Lidar {
                 let (sin_w, cos_w) = elevation_rad.sin_cos();
                 let direction =
                     world_from_lidar * Vector3::new(cos_w * sin_a, cos_w * cos_a, sin_w);
-                let strike = caster.cast(slab, &origin, &direction, settings.max_range_m);
-                let wall = strike.map(|strike| {
-                    let at = caster.surface_at(&origin, &direction, &strike);
+                let hit = caster.cast(segment, &origin, &direction, settings.max_range_m);
+                let wall = hit.map(|hit| {
+                    let at = caster.surface_at(&origin, &direction, &hit);
                     Echo {
-                        range_m: strike.t,
-                        brightness: surface::mean_albedo(at.material) * -at.normal.dot(&direction),
+                        range_m: hit.t,
+                        brightness: mean_albedo(at.material) * -at.normal.dot(&direction),
                     }
                 });
                 beams.push(Beam {
@@ -246,7 +245,8 @@ impl Lidar {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::render::{Shape, sample};
+    use crate::twin::geometry::Shape;
+    use crate::twin::render::sample;
 
     /// 20 m down the straight of the sample tunnel, on the right wall, looking up the line.
     fn mount(tunnel: &Tunnel) -> Isometry3<f64> {

@@ -2,7 +2,7 @@
 
 use super::lamps::RowExposure;
 use crate::twin::render::View;
-use crate::twin::render::light::Shining;
+use crate::twin::render::photometry::Shining;
 
 /// Light that changes by less than a level of 255 shows no bands.
 const BAND: f64 = 0.004;

@@ -6,10 +6,8 @@
 //! at most, and light itself changes little over 8 pixels but close to a lamp, where it is bright. Such
 //! cells are filled linearly. Bed and rails are never dark: they may mirror a lamp in any place.
 
-use super::blinking::Blinking;
-use super::{Behind, RowRays, Scenery, World};
+use super::lamps::RowExposure;
 use crate::twin::render::View;
-use crate::twin::render::cpu::lamps::RowExposure;
 use rayon::prelude::*;
 
 /// Side of a cell, pixels.
@@ -25,33 +23,18 @@ pub(super) struct DimView {
 }
 
 impl DimView {
-    pub fn new(world: &World, scenery: &Scenery<'_>, view: &View) -> Self {
+    /// Of a view; `luminances` finds them along a row of corners.
+    pub fn new(view: &View, luminances: impl Fn(&RowExposure, &mut [f64]) + Sync) -> Self {
         let camera = &view.camera.intrinsics;
         let columns = camera.width_px as usize / CELL_PX + 2;
         let rows = camera.height_px as usize / CELL_PX + 2;
         let mut corners = vec![0.0; columns * rows];
-        corners
-            .par_chunks_mut(columns)
-            .enumerate()
-            .for_each(|(i, corners)| {
-                let row = RowExposure::new(view, i * CELL_PX);
-                let mut rays = RowRays::new(world, scenery, view, &row, Behind::Unknown);
-                rays.side_px = CELL_PX as f64;
-                // A lamp that is off in this row may be on in the next.
-                rays.blinking = Blinking::steady(world.lamps.lamps());
-                for (j, corner) in corners.iter_mut().enumerate() {
-                    *corner = if rays.may_mirror(j * CELL_PX) {
-                        f64::INFINITY
-                    } else {
-                        rays.tunnel(j * CELL_PX).0
-                    };
-                }
-            });
-        let grey_per_luminance = view.grey_per_cd_m2();
+        let lines = corners.par_chunks_mut(columns).enumerate();
+        lines.for_each(|(i, corners)| luminances(&RowExposure::new(view, i * CELL_PX), corners));
         Self {
             corners,
             columns,
-            dark: DARK_GREY / grey_per_luminance,
+            dark: DARK_GREY / view.grey_per_cd_m2(),
         }
     }
 

@@ -6,9 +6,10 @@
 //! spread: a lattice of equal weights, mapped through the quantiles of both together.
 
 use super::spread::Spread;
-use crate::twin::render::light::Shining;
-use crate::twin::render::surface::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
-use crate::twin::render::{LampLight, View};
+use crate::twin::lights::LampLight;
+use crate::twin::render::View;
+use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::render::photometry::Shining;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::PI;
 

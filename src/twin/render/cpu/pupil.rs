@@ -4,7 +4,7 @@
 //! be seen where the middle of the pupil sees it: the principal point moves by f a / z and f b / z.
 
 use crate::twin::render::View;
-use crate::twin::render::light::disc_points;
+use crate::twin::render::disc::disc_points;
 use nalgebra::{Point3, Translation3, Vector3};
 
 /// A circle of confusion smaller than this is that of a sharp picture.
@@ -22,7 +22,7 @@ pub(super) fn is_small(view: &View) -> bool {
 }
 
 /// The view from points spread evenly over the pupil.
-pub(super) fn looks(view: &View) -> Vec<View> {
+pub(super) fn pinholes(view: &View) -> Vec<View> {
     let Some(focus_m) = view.lens.focus_m.filter(|_| !is_small(view)) else {
         return vec![view.clone()];
     };

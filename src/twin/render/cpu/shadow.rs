@@ -1,18 +1,18 @@
 //! Shadows: which share of a lamp's disc bodies hide from a point.
 //!
-//! What is hidden is defined in [`light`](crate::twin::render::light): rays from the point to 16
+//! What is hidden is defined in [`photometry`](crate::twin::render::photometry): rays from the point to 16
 //! places on the disc. To look at every light and body for every pixel would take minutes, so it
-//! is known beforehand which bodies may throw a shadow of which light into which slab of the
-//! tunnel: where the ball around the slab meets the shadow of the ball around the body.
+//! is known beforehand which bodies may throw a shadow of which light into which segment of the
+//! tunnel: where the ball around the segment meets the shadow of the ball around the body.
 
 use super::blinking::Blinking;
-use super::solid::Solid;
-use super::tunnel::TunnelCaster;
-use super::{SIGHT_M, World};
-use crate::twin::render::light::{
-    HEADLIGHT_RADIUS_M, LAMP_REACH_M, OFFSET_M, Shining, disc_places,
-};
-use crate::twin::render::{Body, Headlight, Job, View};
+use super::cast_scene::CastScene;
+use crate::twin::geometry::{Body, Solid};
+use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
+use crate::twin::render::constants::SIGHT_M;
+use crate::twin::render::disc::disc_places;
+use crate::twin::render::photometry::{LAMP_REACH_M, OFFSET_M, Shining};
+use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -44,15 +44,15 @@ pub(super) struct Blocker<'a> {
 pub(super) struct Shades<'a> {
     sources: Vec<Source<'a>>,
     bodies: Vec<(&'a Body, f64)>,
-    first_slab: usize,
-    /// What falls on slab k of those in sight: `falling[begins[k]..begins[k + 1]]`.
+    first_segment: usize,
+    /// What falls on segment k of those in sight: `falling[begins[k]..begins[k + 1]]`.
     begins: Vec<usize>,
     falling: Vec<Falling>,
-    /// Bodies, listed by what falls on slabs.
+    /// Bodies, listed by what falls on segments.
     listed: Vec<usize>,
 }
 
-/// The shadows of one light that may fall on a slab.
+/// The shadows of one light that may fall on a segment.
 struct Falling {
     source: usize,
     /// Of the list of bodies.
@@ -162,25 +162,25 @@ impl<'a> Blocker<'a> {
 }
 
 impl<'a> Shades<'a> {
-    /// Of a view from somewhere in a slab.
-    pub fn new(world: &'a World, job: &'a Job, view: &View, slab: usize) -> Self {
+    /// Of a view from somewhere in a segment.
+    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, segment: usize) -> Self {
         if job.bodies.is_empty() {
             return Self::default();
         }
-        let in_sight = world.tunnel.slabs_about(slab, SIGHT_M);
+        let in_sight = scene.tunnel.segments_about(segment, SIGHT_M);
         let bodies: Vec<_> = job.bodies.iter().map(|b| (b, ball_m(b))).collect();
-        let lamps = world.lamps.lamps().iter().map(Source::lamp);
+        let lamps = scene.lit.lamps.lamps().iter().map(Source::lamp);
         let headlights = job.headlights.iter().map(Source::headlight);
         let sources: Vec<_> = lamps.chain(headlights).collect();
         let shadows = shadows(&sources, &bodies, job, view);
         let mut shades = Self {
             bodies,
-            first_slab: in_sight.start,
+            first_segment: in_sight.start,
             begins: vec![0],
             ..Self::default()
         };
-        for slab in in_sight {
-            let (centre, radius) = world.tunnel.slab_ball(slab);
+        for segment in in_sight {
+            let (centre, radius) = scene.tunnel.segment_ball(segment);
             for of_light in shadows.chunk_by(|a, b| a.source == b.source) {
                 let source = &sources[of_light[0].source];
                 let to = centre - source.centre;
@@ -227,15 +227,15 @@ impl<'a> Shades<'a> {
             .collect()
     }
 
-    /// Illuminance that bodies take from a point of a surface in a slab.
+    /// Illuminance that bodies take from a point of a surface in a segment.
     pub fn hidden_lx(
         &self,
-        slab: usize,
+        segment: usize,
         (p, n): (&Point3<f64>, &Vector3<f64>),
         (blockers, blinking): (&[Blocker<'_>], &Blinking),
-        world: &World,
+        scene: &CastScene,
     ) -> f64 {
-        let lights = self.falling_on(slab).iter();
+        let lights = self.falling_on(segment).iter();
         lights
             .map(|falling| {
                 let source = &self.sources[falling.source];
@@ -255,18 +255,18 @@ impl<'a> Shades<'a> {
                 // Lamps come first, and headlights do not blink.
                 let flicker = blinking.flicker.get(falling.source).unwrap_or(&0.0);
                 let lux = source.irradiance_lx(p, n) * (1.0 + flicker);
-                share * lux * world.air.transmission(distance)
+                share * lux * scene.lit.air.transmission(distance)
             })
             .sum()
     }
 
-    /// Whether nothing shades a slab.
-    pub fn leave_alone(&self, slab: usize) -> bool {
-        self.falling_on(slab).is_empty()
+    /// Whether nothing shades a segment.
+    pub fn leave_alone(&self, segment: usize) -> bool {
+        self.falling_on(segment).is_empty()
     }
 
-    fn falling_on(&self, slab: usize) -> &[Falling] {
-        let here = slab.wrapping_sub(self.first_slab);
+    fn falling_on(&self, segment: usize) -> &[Falling] {
+        let here = segment.wrapping_sub(self.first_segment);
         match (self.begins.get(here), self.begins.get(here.wrapping_add(1))) {
             (Some(begin), Some(end)) => &self.falling[*begin..*end],
             _ => &[],
@@ -326,20 +326,6 @@ fn half_angle(radius_m: f64, distance_m: f64) -> f64 {
         (radius_m / distance_m).asin()
     } else {
         PI
-    }
-}
-
-impl TunnelCaster {
-    /// Slabs within some metres of chainage of one.
-    fn slabs_about(&self, slab: usize, reach_m: f64) -> Range<usize> {
-        if slab >= self.slabs() {
-            return 0..0;
-        }
-        let at = self.chainage_m(slab);
-        let near = |k: &usize| (self.chainage_m(*k) - at).abs() <= reach_m;
-        let begin = (0..slab).rev().take_while(near).last().unwrap_or(slab);
-        let end = (slab..self.slabs()).take_while(near).last().unwrap_or(slab);
-        begin..end + 1
     }
 }
 

@@ -1,7 +1,8 @@
 //! Into how many slices a row's exposure must be cut so that nothing moves by more than a pixel in
 //! any of them.
 
-use crate::twin::render::{Body, Job, View};
+use crate::twin::geometry::Body;
+use crate::twin::render::{Job, View};
 use nalgebra::Point3;
 
 /// Motion within a slice.

@@ -1,16 +1,22 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
+use crate::bus::Intrinsics;
 use crate::bus::{Shutter, SimTime};
 use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
+use crate::twin::air::Air;
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::lights::Headlight;
+use crate::twin::lights::LampLight;
 use crate::twin::random::Stream;
+use crate::twin::reflectance::Wet;
 use crate::twin::render::paint::Painting;
-use crate::twin::render::{
-    Air, Body, CameraMotion, Headlight, LensSettings, NoiseKey, SensorSettings, Shape, sample,
-};
+use crate::twin::render::{CameraMotion, LensSettings, NoiseKey, SensorSettings, sample};
+use nalgebra::Vector3;
 use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
+use std::f64::consts::PI;
 use std::sync::Arc;
 
 const AMBIENT_LX: f64 = 50.0;

@@ -2,7 +2,7 @@
 //! copy.
 
 use super::adapter::Gpu;
-use super::sight::Sight;
+use super::draw_list::DrawList;
 use super::target::Layers;
 use super::view::Framed;
 use crate::bus::Intrinsics;
@@ -14,19 +14,19 @@ const KEPT: usize = 4;
 
 /// What the picture of a tunnel in steady light depends on.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Key {
+pub struct BackdropKey {
     lens: Intrinsics,
     pose: Isometry3<f64>,
     electrons_per_cd_m2: f64,
     grey_per_cd_m2: f64,
 }
 
-impl Key {
+impl BackdropKey {
     /// Of a view; none where the camera moves, or the light on the tunnel.
-    pub fn of(framed: &Framed<'_>, sight: &Sight) -> Option<Self> {
+    pub fn of(framed: &Framed<'_>, list: &DrawList) -> Option<Self> {
         let view = framed.view;
         let still = view.motion.poses.len() == 1;
-        let steady = !sight.banded && sight.tunnel().all(|draw| !draw.headlit);
+        let steady = !list.banded && list.tunnel().all(|call| !call.headlit);
         (still && steady).then(|| Self {
             lens: view.camera.intrinsics,
             pose: framed.middle,
@@ -39,7 +39,7 @@ impl Key {
 /// Tunnels as seen, the latest last.
 #[derive(Default)]
 pub struct Backdrops {
-    kept: VecDeque<(Key, Layers)>,
+    kept: VecDeque<(BackdropKey, Layers)>,
 }
 
 impl Backdrops {
@@ -49,7 +49,12 @@ impl Backdrops {
     }
 
     /// Copies a tunnel that was kept; whether there was one.
-    pub fn show(&self, key: &Key, onto: &Layers, encoder: &mut wgpu::CommandEncoder) -> bool {
+    pub fn show(
+        &self,
+        key: &BackdropKey,
+        onto: &Layers,
+        encoder: &mut wgpu::CommandEncoder,
+    ) -> bool {
         let kept = self.kept.iter().find(|(k, _)| k == key);
         if let Some((_, layers)) = kept {
             layers.copy_to(onto, encoder);
@@ -58,7 +63,13 @@ impl Backdrops {
     }
 
     /// Keeps a tunnel.
-    pub fn keep(&mut self, gpu: &Gpu, key: Key, of: &Layers, encoder: &mut wgpu::CommandEncoder) {
+    pub fn keep(
+        &mut self,
+        gpu: &Gpu,
+        key: BackdropKey,
+        of: &Layers,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
         let oldest = if self.kept.len() >= KEPT {
             self.kept.pop_front()
         } else {

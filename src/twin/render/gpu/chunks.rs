@@ -3,12 +3,10 @@
 use super::adapter::Gpu;
 use super::bend::Bend;
 use super::detail::{CHUNK_M, ChunkKey, Detail};
-use super::tunnel::{Part, chunk_mesh};
+use super::tunnel::{ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
-use crate::twin::render::gloss::Wet;
-use crate::twin::render::light::LampField;
-use crate::twin::render::paint::Paintings;
+use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use wgpu::util::DeviceExt;
@@ -36,7 +34,7 @@ pub struct Chunk {
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
     /// Ranges of indices.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ChunkSide>,
     /// Some of its corners.
     pub probes: Vec<Probe>,
     /// Some of the corners that mirror, in the world.
@@ -60,18 +58,6 @@ const PROBE_EVERY: usize = 16;
 /// The same of those that mirror.
 const GLOSSY_EVERY: usize = 4;
 
-/// What chunks are made of.
-pub struct Line<'a> {
-    /// With its cross-sections.
-    pub tunnel: &'a Tunnel,
-    /// Where it is.
-    pub wet: &'a Wet,
-    /// That light it.
-    pub lamps: &'a LampField,
-    /// On it.
-    pub paintings: &'a Paintings,
-}
-
 /// All chunks in use.
 #[derive(Default)]
 pub struct Chunks {
@@ -94,12 +80,12 @@ impl Chunks {
     pub fn in_sight(
         &mut self,
         gpu: &Gpu,
-        world: &Line<'_>,
+        scene: &LitScene,
         framed: &Framed<'_>,
         keys: &mut Vec<ChunkKey>,
     ) -> f64 {
         keys.clear();
-        let tunnel = world.tunnel;
+        let tunnel = &scene.tunnel;
         let eye = framed.reference();
         let s_m = self.locate(tunnel, &eye);
         let frame = tunnel.alignment.at(s_m);
@@ -127,7 +113,7 @@ impl Chunks {
             let chunk = self
                 .made
                 .entry(key)
-                .or_insert_with(|| upload(gpu, world, key));
+                .or_insert_with(|| upload(gpu, scene, key));
             if let Some(chunk) = chunk {
                 // Kept whether it is in the picture or beside it: the next view may turn there.
                 chunk.near_in = job;
@@ -176,9 +162,9 @@ fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
         .map_or(from_m, |(_, s_m)| s_m)
 }
 
-fn upload(gpu: &Gpu, line: &Line<'_>, key: ChunkKey) -> Option<Chunk> {
-    let made = chunk_mesh((line.tunnel, line.wet), line.lamps, line.paintings, key);
-    let (sin, cos) = line
+fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Option<Chunk> {
+    let made = chunk_mesh(scene, key);
+    let (sin, cos) = scene
         .tunnel
         .alignment
         .at(key.start_m())

@@ -2,7 +2,7 @@
 
 use super::bend::Bend;
 use crate::track::{OutlinePoint, SectionRange, TrackPoint};
-use crate::twin::render::surface;
+use crate::twin::geometry::STATION_STEP_M;
 
 /// Length of a chunk: a whole number of rings, and a whole part of a painting's period.
 pub const CHUNK_M: f64 = 5.0;
@@ -50,8 +50,8 @@ impl Detail {
     /// From one station of a chunk to the next.
     pub fn step_m(self) -> f64 {
         match self {
-            Self::Near => 0.5 * surface::RING_M,
-            Self::Close => surface::RING_M,
+            Self::Near => 0.5 * STATION_STEP_M,
+            Self::Close => STATION_STEP_M,
             Self::Middle => 0.5 * CHUNK_M,
             Self::Far => CHUNK_M,
         }

@@ -7,9 +7,11 @@
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
 use super::spread::Spread;
 use super::view::{Framed, single};
-use crate::twin::render::light::Shining;
-use crate::twin::render::scene::{Air, LampLight, View};
-use crate::twin::render::surface::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::lights::LampLight;
+use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::photometry::Shining;
+use crate::twin::render::scene::View;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -42,19 +44,9 @@ pub struct LampTable {
     pub glare_rows: Vec<GlareRow>,
 }
 
-/// What else reaches a disc and the eye.
-pub struct Around<'a> {
-    /// On all surfaces.
-    pub ambient_lx: f64,
-    /// Between lamp and eye.
-    pub air: &'a Air,
-    /// Of endless air.
-    pub airlight_cd_m2: f64,
-}
-
 /// A lamp as the camera has it at one time.
 #[derive(Clone, Copy, Debug)]
-struct Sight {
+struct SeenLamp {
     centre: Vector3<f64>,
     normal: Vector3<f64>,
     image: Point2<f64>,
@@ -66,7 +58,7 @@ struct Sight {
     wide_e: f64,
 }
 
-impl Sight {
+impl SeenLamp {
     /// Nothing where the lamp shows its back or reaches the camera's plane.
     fn new(view: &View, lamp: &LampLight, camera_from_world: &Isometry3<f64>) -> Option<Self> {
         let centre = camera_from_world * lamp.centre;
@@ -110,12 +102,12 @@ impl Sight {
 #[derive(Default)]
 struct Track {
     step_s: f64,
-    knots: Vec<Option<Sight>>,
+    knots: Vec<Option<SeenLamp>>,
 }
 
 impl Track {
     /// At a time after the view's start.
-    fn at(&self, t_s: f64) -> Option<Sight> {
+    fn at(&self, t_s: f64) -> Option<SeenLamp> {
         let last = self.knots.len().checked_sub(1)?;
         if last == 0 {
             return self.knots[0];
@@ -126,7 +118,7 @@ impl Track {
         Some(a.mix(b, x - k as f64))
     }
 
-    fn most(&self, of: impl Fn(&Sight) -> f64) -> f64 {
+    fn most(&self, of: impl Fn(&SeenLamp) -> f64) -> f64 {
         let knots = self.knots.iter().flatten();
         knots.map(of).fold(0.0, f64::max)
     }
@@ -134,15 +126,14 @@ impl Track {
 
 impl LampTable {
     /// Makes the tables of all lamps that the view may see.
-    pub fn fill(&mut self, framed: &Framed<'_>, lamps: &[Shining], around: &Around<'_>) {
+    pub fn fill(&mut self, framed: &Framed<'_>, scene: &LitScene, airlight_cd_m2: f64) {
         self.lamps.clear();
         self.rows.clear();
         self.instants.clear();
         self.glares.clear();
         self.glare_rows.clear();
         let from = framed.reference();
-        let mut near: Vec<(f64, &Shining)> = lamps
-            .iter()
+        let mut near: Vec<(f64, &Shining)> = (scene.lamps.lamps().iter())
             .map(|lamp| ((lamp.centre - from).norm(), lamp))
             .filter(|(d, _)| *d < LAMP_SIGHT_M)
             .collect();
@@ -154,9 +145,9 @@ impl LampTable {
         for (away_m, lamp) in near {
             self.follow(framed.view, lamp);
             if self.track.knots.iter().any(Option::is_some) {
-                let clear = around.air.transmission(away_m);
+                let clear = scene.air.transmission(away_m);
                 let exposed = Exposed::new(framed.view, lamp, clear);
-                self.add_disc(&exposed, around);
+                self.add_disc(&exposed, scene.tunnel.ambient_lx, airlight_cd_m2);
                 self.add_glare(&exposed);
             }
         }
@@ -180,24 +171,27 @@ impl LampTable {
 
     fn follow(&mut self, view: &View, lamp: &LampLight) {
         self.track.knots.clear();
-        let sights = self.poses.iter().map(|pose| Sight::new(view, lamp, pose));
-        self.track.knots.extend(sights);
+        let seen = self
+            .poses
+            .iter()
+            .map(|pose| SeenLamp::new(view, lamp, pose));
+        self.track.knots.extend(seen);
     }
 
     /// The rows within `reach_px` of a lamp, first and last, and the columns.
-    fn bounds(&self, exposed: &Exposed<'_>, reach_px: Vector3<f64>) -> Option<Bounds> {
+    fn bounds(&self, exposed: &Exposed<'_>, reach_px: Vector3<f64>) -> Option<LampBounds> {
         let lens = &exposed.view.camera.intrinsics;
         let (width, height) = (f64::from(lens.width_px), lens.height_px);
-        let mut bounds: Option<Bounds> = None;
+        let mut bounds: Option<LampBounds> = None;
         for v in 0..height {
-            let Some(sight) = self.track.at(exposed.mid_s(v)) else {
+            let Some(lamp) = self.track.at(exposed.mid_s(v)) else {
                 continue;
             };
-            let at = sight.image;
+            let at = lamp.image;
             let (left, right) = (at.x - reach_px.x, at.x + reach_px.x);
             let near = (f64::from(v) - at.y).abs() <= reach_px.y;
             if near && right >= -0.5 && left <= width - 0.5 {
-                let b = bounds.get_or_insert(Bounds {
+                let b = bounds.get_or_insert(LampBounds {
                     rows: (v, v),
                     columns: (left, right),
                 });
@@ -214,7 +208,7 @@ impl LampTable {
         bounds
     }
 
-    fn add_disc(&mut self, exposed: &Exposed<'_>, around: &Around<'_>) {
+    fn add_disc(&mut self, exposed: &Exposed<'_>, ambient_lx: f64, airlight_cd_m2: f64) {
         let (view, lamp) = (exposed.view, exposed.lamp);
         let Some(extent_px) = self.extent_px(exposed) else {
             return;
@@ -229,8 +223,8 @@ impl LampTable {
         let count = (smear.norm() / STEP_PX).ceil().clamp(1.0, MAX_INSTANTS) as u32;
         let direct_cd_m2 = view.lens.direct_share() * lamp.luminance_cd_m2;
         let axial_e = direct_cd_m2 * view.electrons_per_cd_m2();
-        let dark_cd_m2 = exposed.clear * DARK_DISC_ALBEDO * around.ambient_lx / PI
-            + (1.0 - exposed.clear) * around.airlight_cd_m2;
+        let dark_cd_m2 = exposed.clear * DARK_DISC_ALBEDO * ambient_lx / PI
+            + (1.0 - exposed.clear) * airlight_cd_m2;
         let dark_e = dark_cd_m2 * view.electrons_per_cd_m2();
         let ([low, high], first_row) = bounds.corners();
         self.lamps.push(Lamp {
@@ -253,16 +247,16 @@ impl LampTable {
             for k in 0..count {
                 let from_s = open_s + f64::from(k) * step_s;
                 let part_e = axial_e * exposed.light(from_s, step_s) / f64::from(count);
-                let sight = self.track.at(from_s + 0.5 * step_s);
+                let seen = self.track.at(from_s + 0.5 * step_s);
                 // A disc behind the camera is hit by no ray.
-                let centre = sight.map_or(Vector3::new(0.0, 0.0, -1e3), |s| s.centre);
+                let centre = seen.map_or(Vector3::new(0.0, 0.0, -1e3), |s| s.centre);
                 self.instants.push(Instant {
                     centre: single(&centre),
                     signal_e: part_e as f32,
                 });
             }
-            let sight = self.track.at(exposed.mid_s(v));
-            let normal = sight.map_or(-Vector3::z(), |s| s.normal);
+            let seen = self.track.at(exposed.mid_s(v));
+            let normal = seen.map_or(-Vector3::z(), |s| s.normal);
             self.rows.push(LampRow {
                 normal: single(&normal),
                 unused: 0.0,
@@ -282,24 +276,24 @@ impl LampTable {
     fn extent_px(&self, exposed: &Exposed<'_>) -> Option<Vector3<f64>> {
         let (lens, lamp) = (&exposed.view.camera.intrinsics, exposed.lamp);
         let rows = (0..lens.height_px).step_by(4);
-        let sights = rows.filter_map(|v| {
-            let sight = self.track.at(exposed.mid_s(v))?;
-            Some(((sight.image.y - f64::from(v)).abs(), sight))
+        let seen = rows.filter_map(|v| {
+            let seen = self.track.at(exposed.mid_s(v))?;
+            Some(((seen.image.y - f64::from(v)).abs(), seen))
         });
-        let (_, sight) = sights.min_by(|a, b| f64::total_cmp(&a.0, &b.0))?;
-        let across = sight.normal.cross(&Vector3::x());
-        let other = sight.normal.cross(&Vector3::y());
+        let (_, seen) = seen.min_by(|a, b| f64::total_cmp(&a.0, &b.0))?;
+        let across = seen.normal.cross(&Vector3::x());
+        let other = seen.normal.cross(&Vector3::y());
         let side = if across.norm() > other.norm() {
             across.normalize()
         } else {
             other.normalize()
         };
-        let up = sight.normal.cross(&side);
+        let up = seen.normal.cross(&side);
         let mut extent_px = Vector3::zeros();
         for k in 0..RIM_POINTS {
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
-            let rim = sight.centre + (side * cos + up * sin) * lamp.radius_m;
-            let off = lens.project(&Point3::from(rim))? - sight.image;
+            let rim = seen.centre + (side * cos + up * sin) * lamp.radius_m;
+            let off = lens.project(&Point3::from(rim))? - seen.image;
             extent_px = extent_px.sup(&Vector3::new(off.x.abs(), off.y.abs(), 0.0));
         }
         Some(extent_px)
@@ -360,12 +354,12 @@ impl LampTable {
 }
 
 /// Rows and columns that a lamp touches.
-struct Bounds {
+struct LampBounds {
     rows: (u32, u32),
     columns: (f64, f64),
 }
 
-impl Bounds {
+impl LampBounds {
     /// For the rasteriser, and the first row.
     fn corners(&self) -> ([[f32; 2]; 2], i32) {
         let (first, last) = (self.rows.0 as f32, self.rows.1 as f32);

@@ -2,9 +2,9 @@
 
 use super::bend;
 use super::layout::Vertex;
-use crate::twin::render::hull::Hull;
-use crate::twin::render::light::LampField;
-use crate::twin::render::scene::{Body, Shape, View};
+use crate::twin::geometry::{Body, Hull, Shape};
+use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::scene::View;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -314,6 +314,7 @@ fn turned(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::twin::air::Air;
     use nalgebra::Isometry3;
     use std::sync::Arc;
 
@@ -330,7 +331,7 @@ mod tests {
             px_per_m: 1e4,
             cell_m: CELL_M,
         };
-        mesh.add_body(&body, &LampField::new(&[]), 1.0, fineness);
+        mesh.add_body(&body, &LampField::new(&[], Air::default()), 1.0, fineness);
         mesh
     }
 

@@ -41,17 +41,20 @@
 
 mod adapter;
 mod backdrop;
+mod background;
 mod bend;
+mod bodies;
 mod chunks;
 mod detail;
+mod draw_list;
 mod facets;
 mod lamps;
 pub mod layout;
 mod mesh;
 mod passes;
 mod pipeline;
+mod render_pass;
 mod shadows;
-mod sight;
 mod smear;
 mod spread;
 mod target;
@@ -59,41 +62,42 @@ mod textures;
 mod tunnel;
 mod upload;
 mod view;
+mod view_buffers;
 
 pub use adapter::adapters;
 pub use pipeline::shader_source;
 
-use super::light::LampField;
-use super::paint::Paintings;
+use super::lit_scene::LitScene;
 use super::pixel_map::{MapCache, MapKey};
-use super::scene::{Job, LampsInTime, Scene};
+use super::scene::{Job, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
-use crate::bus::{Intrinsics, SimTime};
+use crate::bus::Intrinsics;
 use adapter::Gpu;
-use backdrop::{Backdrops, Key};
-use chunks::{Chunks, Line};
+use backdrop::{BackdropKey, Backdrops};
+use background::Surfaces;
+use bodies::BodyBuffers;
+use chunks::Chunks;
+use draw_list::DrawList;
 use image::GrayImage;
-use lamps::{Around, LampTable};
+use lamps::LampTable;
 use layout::Pose;
-use mesh::{Fineness, Mesh};
-use passes::{BodyBuffers, Stock, ViewBuffers, ViewData};
 use pipeline::{Develop, Pipelines};
 use shadows::Shadows;
-use sight::{Sight, World};
 use std::collections::VecDeque;
 use target::{ReadBack, Target};
 use textures::Textures;
 use view::Framed;
+use view_buffers::{ViewBuffers, ViewData};
+
+/// Largest number in half precision.
+const BRIGHTEST_E: f64 = 65_504.0;
 
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
 pub struct GpuRenderer {
     gpu: Gpu,
     pipelines: Pipelines,
-    scene: Scene,
-    field: LampField,
-    lamps: LampsInTime,
+    scene: LitScene,
     chunks: Chunks,
-    paintings: Paintings,
     textures: Textures,
     bodies: BodyBuffers,
     maps: MapCache<wgpu::TextureView>,
@@ -102,8 +106,6 @@ pub struct GpuRenderer {
     backdrops: Backdrops,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
-    /// Of the bodies, used again for every job.
-    mesh: Mesh,
 }
 
 struct InFlight {
@@ -118,7 +120,7 @@ struct InFlight {
 struct Prepared {
     buffers: ViewBuffers,
     poses: Vec<Pose>,
-    sight: Sight,
+    list: DrawList,
     lamps: LampTable,
     shadows: Shadows,
 }
@@ -129,14 +131,11 @@ impl GpuRenderer {
         let gpu = Gpu::open()?;
         let pipelines = Pipelines::new(&gpu.device);
         gpu.check()?;
-        let paintings = Paintings::of(&scene.tunnel);
+        let scene = LitScene::new(scene);
         Ok(Self {
             pipelines,
-            field: LampField::new(&scene.lamps).in_air(scene.air),
-            lamps: LampsInTime::new(&scene.lamps),
             chunks: Chunks::default(),
-            textures: Textures::new(&gpu, &paintings),
-            paintings,
+            textures: Textures::new(&gpu, &scene.paintings),
             scene,
             bodies: BodyBuffers::new(&gpu),
             maps: MapCache::default(),
@@ -145,32 +144,8 @@ impl GpuRenderer {
             backdrops: Backdrops::default(),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
-            mesh: Mesh::default(),
             gpu,
         })
-    }
-
-    /// Where a lamp has failed since the last job, what the lamps light is made anew.
-    fn follow_lamps(&mut self, time: SimTime) {
-        if let Some(lamps) = self.lamps.changed(time) {
-            self.field = LampField::new(&lamps).in_air(self.scene.air);
-            self.chunks = Chunks::default();
-            self.backdrops.clear();
-        }
-    }
-
-    fn upload_bodies(&mut self, job: &Job) {
-        let mesh = &mut self.mesh;
-        mesh.vertices.clear();
-        mesh.indices.clear();
-        self.bodies.ranges.clear();
-        for body in &job.bodies {
-            let first = mesh.indices.len() as u32;
-            let fineness = Fineness::of(body, &job.views);
-            mesh.add_body(body, &self.field, self.scene.tunnel.ambient_lx, fineness);
-            self.bodies.ranges.push(first..mesh.indices.len() as u32);
-        }
-        self.bodies.write(&self.gpu, mesh);
     }
 
     /// Records all passes of view `k` and the way back of its image.
@@ -179,8 +154,8 @@ impl GpuRenderer {
         self.upload_view(&framed, job, k);
         let target = self.target_for(&framed.view.camera.intrinsics);
         let (gpu, target) = (&self.gpu, &self.targets[target]);
-        let Prepared { buffers, sight, .. } = &self.views[k];
-        let stock = Stock {
+        let Prepared { buffers, list, .. } = &self.views[k];
+        let surfaces = Surfaces {
             chunks: &self.chunks,
             bodies: &self.bodies,
             textures: &self.textures,
@@ -188,13 +163,13 @@ impl GpuRenderer {
         let backgrounds = [0, job.headlights.len()]
             .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
         let pipelines = &mut self.pipelines;
-        let key = Key::of(&framed, sight);
+        let key = BackdropKey::of(&framed, list);
         let background = (&*pipelines, &backgrounds);
         let onto = (target, &mut self.backdrops);
-        buffers.draw_background(gpu, background, encoder, onto, (sight, key), &stock);
-        buffers.draw_shadows(gpu, pipelines, encoder, target);
+        buffers.draw_background(gpu, background, encoder, onto, (list, key), &surfaces);
+        (buffers.shadows).draw(gpu, pipelines, encoder, target, &buffers.view);
         let gloss = &backgrounds[1].gloss;
-        buffers.draw_gloss(gpu, gloss, encoder, target, (sight, &stock));
+        buffers.draw_gloss(gpu, gloss, encoder, target, (list, &surfaces));
         if framed.defocus_reach_px() > 0 {
             buffers.blur(gpu, pipelines, encoder, target);
         }
@@ -230,48 +205,30 @@ impl GpuRenderer {
     }
 
     fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
-        let (gpu, tunnel) = (&self.gpu, &self.scene.tunnel);
+        let (gpu, scene) = (&self.gpu, &self.scene);
         while self.views.len() <= k {
             self.views.push(Prepared::new(gpu));
         }
         let view = &mut self.views[k];
-        let line = Line {
-            tunnel,
-            wet: &self.scene.wet,
-            lamps: &self.field,
-            paintings: &self.paintings,
-        };
-        let s_m = (self.chunks).in_sight(gpu, &line, framed, view.sight.keys());
-        let world = World {
-            lamps: self.field.lamps(),
-            air: &self.scene.air,
-            paintings: &self.paintings,
-        };
+        let s_m = (self.chunks).in_sight(gpu, scene, framed, view.list.keys());
         let meshes = (&self.chunks, &self.bodies);
-        view.sight.fill(framed, job, &world, meshes);
-        let in_sight = view.sight.keys().iter();
+        view.list.fill(framed, job, scene, meshes);
+        let in_sight = view.list.keys().iter();
         let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
-        (view.shadows).fill(framed, job, (tunnel, &self.field), in_sight);
-        let airlight_cd_m2 = self.field.airlight_cd_m2(tunnel, s_m);
-        let around = Around {
-            ambient_lx: tunnel.ambient_lx,
-            air: &self.scene.air,
-            airlight_cd_m2,
-        };
-        view.lamps.fill(framed, self.field.lamps(), &around);
-        let air = (self.scene.air.extinction_per_m, airlight_cd_m2);
+        view.shadows.fill(framed, job, scene, in_sight);
+        let airlight_cd_m2 = scene.airlight_cd_m2(s_m);
+        view.lamps.fill(framed, scene, airlight_cd_m2);
+        let air = (scene.air.extinction_per_m, airlight_cd_m2);
         let mut constants = framed.constants(job, air, &mut view.poses);
-        constants.mirrored = view.sight.mirrored.len() as u32;
-        /// Largest number in half precision.
-        const BRIGHTEST_E: f64 = 65_504.0;
+        constants.mirrored = view.list.mirrored.len() as u32;
         // Half of what lies beyond the end of what is drawn, as it is seen, is nearer than this.
         let beyond_m = std::f64::consts::SQRT_2 * chunks::AHEAD_M;
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         let data = ViewData {
-            beyond_e: ((1.0 - self.scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
+            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
             constants,
             poses: &view.poses,
-            sight: &view.sight,
+            list: &view.list,
             lamps: &view.lamps,
             shadows: &view.shadows,
         };
@@ -300,7 +257,7 @@ impl Prepared {
         Self {
             buffers: ViewBuffers::new(gpu),
             poses: Vec::new(),
-            sight: Sight::default(),
+            list: DrawList::default(),
             lamps: LampTable::default(),
             shadows: Shadows::default(),
         }
@@ -313,23 +270,25 @@ impl Renderer for GpuRenderer {
     }
 
     fn set_scene(&mut self, scene: Scene) {
-        if self.scene.tunnel.sections != scene.tunnel.sections {
-            self.paintings = Paintings::of(&scene.tunnel);
-            self.textures = Textures::new(&self.gpu, &self.paintings);
+        if self.scene.replace(scene) {
+            self.textures = Textures::new(&self.gpu, &self.scene.paintings);
         }
-        self.field = LampField::new(&scene.lamps).in_air(scene.air);
-        self.lamps = LampsInTime::new(&scene.lamps);
         self.chunks = Chunks::default();
         self.backdrops.clear();
         self.views.clear();
+        self.targets.clear();
+        self.spare.clear();
         self.in_flight.clear();
-        self.scene = scene;
     }
 
     fn submit(&mut self, job: &Job) -> Result<(), RenderError> {
-        self.follow_lamps(job.time);
+        if self.scene.follow_lamps(job.time) {
+            self.chunks = Chunks::default();
+            self.backdrops.clear();
+        }
         self.chunks.next_job();
-        self.upload_bodies(job);
+        let scene = &self.scene;
+        (self.bodies).write(&self.gpu, job, &scene.lamps, scene.tunnel.ambient_lx);
         let mut encoder = self
             .gpu
             .device

@@ -2,7 +2,7 @@
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use crate::twin::render::sensor::BLOOMING_REACH;
-use crate::twin::render::{pixel_map, surface};
+use crate::twin::render::{constants, pixel_map};
 use std::mem::{offset_of, size_of};
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -45,7 +45,7 @@ pub fn shader_source(name: &str) -> Option<String> {
         "background" | "gloss" => &["common", "rows"],
         _ => &["common"],
     };
-    let mut source = surface::wgsl() + &pixel_map::wgsl();
+    let mut source = constants::wgsl() + &pixel_map::wgsl();
     for shared in before {
         source.push_str(text(shared)?);
     }
@@ -289,27 +289,6 @@ const FADE: wgpu::BlendState = {
         alpha: fade,
     }
 };
-
-/// The resources of group 0, in the order of their bindings.
-pub fn bind(
-    device: &wgpu::Device,
-    pipeline: &wgpu::RenderPipeline,
-    resources: &[wgpu::BindingResource<'_>],
-) -> wgpu::BindGroup {
-    let entries: Vec<_> = resources
-        .iter()
-        .zip(0u32..)
-        .map(|(resource, binding)| wgpu::BindGroupEntry {
-            binding,
-            resource: resource.clone(),
-        })
-        .collect();
-    device.create_bind_group(&wgpu::BindGroupDescriptor {
-        label: None,
-        layout: &pipeline.get_bind_group_layout(0),
-        entries: &entries,
-    })
-}
 
 const fn attribute(
     format: wgpu::VertexFormat,

@@ -8,8 +8,7 @@
 use super::chunks::Chunk;
 use super::view::Framed;
 use crate::bus::SimTime;
-use crate::twin::render::cpu::Solid;
-use crate::twin::render::scene::Body;
+use crate::twin::geometry::{Body, Solid};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 /// What moves by less than this within the exposure may be drawn sharp.

@@ -2,8 +2,8 @@
 
 use super::adapter::Gpu;
 use super::pipeline::{DEPTH, PACKED, RAW, SIGNAL};
+use crate::twin::render::constants::GLARE_STEP_PX;
 use crate::twin::render::pixel_map::PixelMap;
-use crate::twin::render::surface::GLARE_STEP_PX;
 use crate::twin::render::{RawImage, RenderError, upper_bits};
 use image::GrayImage;
 use std::cell::OnceCell;

@@ -5,10 +5,13 @@ use super::facets::{Facet, Side, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
-use crate::twin::render::gloss::{Gloss, Wet};
-use crate::twin::render::light::{LampField, Shining};
-use crate::twin::render::paint::{Painting, Paintings};
-use crate::twin::render::surface;
+use crate::twin::geometry::STATION_STEP_M;
+use crate::twin::reflectance::mean_albedo;
+use crate::twin::render::gloss::Gloss;
+use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::paint::Painting;
+use crate::twin::render::photometry::Shining;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -29,12 +32,12 @@ pub struct ChunkMesh {
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
     /// For every cross-section in it one a [`Side`].
-    pub parts: Vec<Part>,
+    pub parts: Vec<ChunkSide>,
 }
 
 /// The triangles of one side of one cross-section in a chunk.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct ChunkSide {
     /// The corners of a box around them, from the chunk's origin.
     pub around: [Vector3<f32>; 8],
     /// Which of the tunnel's ranges of cross-sections.
@@ -49,9 +52,7 @@ pub struct Part {
 
 /// What all strips of a chunk share.
 struct Site<'a> {
-    tunnel: &'a Tunnel,
-    wet: &'a Wet,
-    field: &'a LampField,
+    scene: &'a LitScene,
     lamp: Option<&'a Shining>,
     near: Vec<TrackPoint>,
     key: ChunkKey,
@@ -59,20 +60,14 @@ struct Site<'a> {
 }
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
-pub fn chunk_mesh(
-    (tunnel, wet): (&Tunnel, &Wet),
-    field: &LampField,
-    paintings: &Paintings,
-    key: ChunkKey,
-) -> ChunkMesh {
+pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
+    let (tunnel, field, paintings) = (&scene.tunnel, &scene.lamps, &scene.paintings);
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let middle_m = from_m + 0.5 * CHUNK_M;
     let middle = tunnel.alignment.at(middle_m).origin;
     let lamp = strongest(field, &middle);
     let site = Site {
-        tunnel,
-        wet,
-        field,
+        scene,
         lamp: lamp.map(|k| &field.lamps()[k]),
         near: (field.near(&middle))
             .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
@@ -128,7 +123,7 @@ fn brightest_first(
     first: usize,
     section: usize,
     around: [Vector3<f32>; 8],
-) -> Part {
+) -> ChunkSide {
     let peak = |triangle: &[u32; 3]| {
         let peaks = triangle.map(|k| mesh.vertices[k as usize].peak_cd_m2());
         peaks.into_iter().fold(0.0, f32::max)
@@ -144,7 +139,7 @@ fn brightest_first(
     mesh.indices.extend(sorted.iter().flat_map(|(_, t)| *t));
     let border = mesh.indices.len() as u32;
     mesh.indices.extend(glossy);
-    Part {
+    ChunkSide {
         around,
         section,
         indices: first as u32..border,
@@ -211,24 +206,24 @@ impl Site<'_> {
     }
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
-        let normal = facet_normal(self.tunnel, facet, s_m);
-        let p = ruled(self.tunnel, s_m, end, self.key.detail);
+        let normal = facet_normal(&self.scene.tunnel, facet, s_m);
+        let p = ruled(&self.scene.tunnel, s_m, end, self.key.detail);
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
-        let all = self.field.irradiance_lx(&p, &normal) + self.tunnel.ambient_lx;
+        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.scene.tunnel.ambient_lx;
         // What begins or ends with the chunk does so for all of it.
         let inside_m = s_m - self.key.start_m();
         let within_m = self.key.start_m() + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
-        let gloss = Gloss::of(facet.material, self.wet.at(within_m), &normal);
-        let paint = self.wet.albedo_factor(facet.material, within_m);
+        let gloss = Gloss::of(facet.material, self.scene.wet.at(within_m), &normal);
+        let paint = self.scene.wet.albedo_factor(facet.material, within_m);
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
             paint: paint as f32,
-            albedo: (paint * surface::mean_albedo(facet.material)) as f32,
+            albedo: (paint * mean_albedo(facet.material)) as f32,
             luminance_cd_m2: 0.0,
             gloss: gloss.map_or([0.0; 3], |g| {
                 [g.head_on, g.along, g.across].map(|x| x as f32)
@@ -246,12 +241,12 @@ fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3
             h_m: end.h_m,
         })
     };
-    let ring = s_m / surface::RING_M;
+    let ring = s_m / STATION_STEP_M;
     let share = ring - ring.floor();
     if detail >= Detail::Middle || share <= 0.0 {
         return at(s_m);
     }
-    let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * surface::RING_M));
+    let [a, b] = [ring.floor(), ring.ceil()].map(|k| at(k * STATION_STEP_M));
     a + (b - a) * share
 }
 
@@ -272,29 +267,20 @@ mod tests {
     use super::*;
     use crate::twin::render::sample;
 
-    fn chunk(index: i64, detail: Detail) -> ChunkMesh {
-        let scene = sample::scene();
-        let lamps = LampField::new(&scene.lamps);
-        let paintings = Paintings {
-            all: Vec::new(),
-            of_range: Vec::new(),
+    fn chunk(scene: &LitScene, index: i64, detail: Detail) -> ChunkMesh {
+        let key = ChunkKey {
+            index,
+            detail,
+            bend: None,
         };
-        chunk_mesh(
-            (&scene.tunnel, &scene.wet),
-            &lamps,
-            &paintings,
-            ChunkKey {
-                index,
-                detail,
-                bend: None,
-            },
-        )
+        chunk_mesh(scene, key)
     }
 
     /// Provokes facets that face the rock: every normal of the lining points to the axis.
     #[test]
     fn lining_faces_inwards() {
-        let ChunkMesh { origin, mesh, .. } = chunk(13, Detail::Near);
+        let ChunkMesh { origin, mesh, .. } =
+            chunk(&LitScene::new(sample::scene()), 13, Detail::Near);
         let tunnel = sample::tunnel();
         let mut seen = 0;
         for v in mesh
@@ -318,9 +304,10 @@ mod tests {
     /// Provokes gaps between chunks: the last ring of one is the first ring of the next.
     #[test]
     fn chunks_meet() {
+        let scene = LitScene::new(sample::scene());
         for detail in [Detail::Near, Detail::Close, Detail::Middle, Detail::Far] {
             let at_end = |index: i64, end_m: f64| {
-                let ChunkMesh { origin, mesh, .. } = chunk(index, detail);
+                let ChunkMesh { origin, mesh, .. } = chunk(&scene, index, detail);
                 let at = |v: &Vertex| origin + Vector3::from(v.position_m).cast::<f64>();
                 let on_end = |v: &&Vertex| (f64::from(v.place_m[0]) - end_m).abs() < 1e-6;
                 let points: Vec<_> = mesh.vertices.iter().filter(on_end).map(at).collect();
@@ -338,8 +325,9 @@ mod tests {
     /// Provokes meshes beyond the ends of the tunnel, or none at its ends.
     #[test]
     fn chunks_end_with_the_tunnel() {
-        assert!(chunk(-1, Detail::Middle).mesh.vertices.is_empty());
-        assert!(!chunk(119, Detail::Middle).mesh.vertices.is_empty());
-        assert!(chunk(120, Detail::Middle).mesh.vertices.is_empty());
+        let scene = LitScene::new(sample::scene());
+        assert!(chunk(&scene, -1, Detail::Middle).mesh.vertices.is_empty());
+        assert!(!chunk(&scene, 119, Detail::Middle).mesh.vertices.is_empty());
+        assert!(chunk(&scene, 120, Detail::Middle).mesh.vertices.is_empty());
     }
 }

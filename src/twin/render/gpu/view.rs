@@ -3,8 +3,9 @@
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
 use crate::bus::Intrinsics;
+use crate::twin::lights::Headlight;
 use crate::twin::render::pixel_map::Dark;
-use crate::twin::render::scene::{Headlight, Job, View};
+use crate::twin::render::scene::{Job, View};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 /// Poses in the table lie this close in time, far closer than any motion of a train bends.
@@ -238,8 +239,7 @@ mod tests {
     use super::*;
     use crate::bus::{Distortion, lenses};
     use crate::track::TrackPoint;
-    use crate::twin::render::light::LampField;
-    use crate::twin::render::paint::Paintings;
+    use crate::twin::render::lit_scene::LitScene;
     use crate::twin::render::sample;
 
     /// Provokes sides of the tunnel that are left out though some row of some camera sees them: every
@@ -247,16 +247,15 @@ mod tests {
     /// 160 km/h.
     #[test]
     fn nothing_that_is_seen_is_left_out() {
-        let scene = sample::scene();
+        let scene = LitScene::new(sample::scene());
         let tunnel = &scene.tunnel;
-        let (lamps, paintings) = (LampField::new(&scene.lamps), Paintings::of(tunnel));
         let meshes = [8, 9, 10, 11, 12, 30, 80, 81, 82, 100].map(|index| {
             let key = ChunkKey {
                 index,
                 detail: Detail::Close,
                 bend: None,
             };
-            chunk_mesh((tunnel, &scene.wet), &lamps, &paintings, key)
+            chunk_mesh(&scene, key)
         });
         let (mut seen, mut left_out) = (0, 0);
         for (k, s_m) in [50.0, 52.5, 404.0].into_iter().cycle().take(72).enumerate() {

@@ -2,7 +2,8 @@
 use super::*;
 use crate::track::{PlatformShape, Side};
 use crate::twin::random::Stream;
-use crate::twin::render::{sample, surface};
+use crate::twin::reflectance::mean_albedo;
+use crate::twin::render::sample;
 
 fn bored() -> CrossSection {
     CrossSection::circular(3.0, 2.26, Some(Side::Left))
@@ -71,7 +72,7 @@ fn materials_keep_their_mean_albedo() {
                 sum += mean * (to - from);
                 area += to - from;
             }
-            let expected = surface::mean_albedo(*material);
+            let expected = mean_albedo(*material);
             let off = sum / area / expected - 1.0;
             assert!(
                 off.abs() < 0.12,

@@ -1,8 +1,9 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
 use crate::bus::SimTime;
+use crate::twin::geometry::Shape;
 use crate::twin::render::cpu::CpuRenderer;
-use crate::twin::render::{Shape, sample};
+use crate::twin::render::sample;
 use nalgebra::{Isometry3, UnitQuaternion};
 
 /// A headlight at (0, 0, 5) that looks down.
@@ -172,10 +173,10 @@ fn a_train_throws_no_shadow_by_its_own_light() {
     assert_eq!([&car, &lens, &board].map(thrown), [0, 0, 1]);
 }
 
-/// Fails where the lists of slabs forget a shadow, or where a body is taken where it was at the
+/// Fails where the lists of segments forget a shadow, or where a body is taken where it was at the
 /// job's time: the same light taken as by all lamps and all bodies together.
 #[test]
-fn slabs_know_every_shadow_that_falls_on_them() {
+fn segments_know_every_shadow_that_falls_on_them() {
     let tunnel = sample::tunnel();
     let renderer = CpuRenderer::oracle(sample::scene());
     let mut job = sample::wayside_job(&tunnel, 300.0);
@@ -190,24 +191,24 @@ fn slabs_know_every_shadow_that_falls_on_them() {
     let view = &job.views[0];
     let pose = view.motion.poses[0];
     let eye = Point3::from(pose.translation.vector);
-    let caster = &renderer.world.tunnel;
-    let slab = caster.slab_of(&eye, None);
-    let shades = Shades::new(&renderer.world, &job, view, slab);
+    let caster = &renderer.scene.tunnel;
+    let segment = caster.segment_of(&eye, None);
+    let shades = Shades::new(&renderer.scene, &job, view, segment);
     let (mut shaded, mut lights) = (0, 0);
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
         let ray = pose * view.camera.intrinsics.ray(u, v);
-        let Some(strike) = caster.cast(slab, &eye, &ray, SIGHT_M) else {
+        let Some(hit) = caster.cast(segment, &eye, &ray, SIGHT_M) else {
             continue;
         };
-        let at = caster.surface_at(&eye, &ray, &strike);
+        let at = caster.surface_at(&eye, &ray, &hit);
         let after_s = view.camera.shutter.row_mid(view.start, v).since(job.time);
         let blockers = shades.blockers(after_s);
         let seen = shades.hidden_lx(
-            strike.slab as usize,
+            hit.segment as usize,
             (&at.position, &at.normal),
             (&blockers, &Blinking::default()),
-            &renderer.world,
+            &renderer.scene,
         );
         let all = shades.sources.iter().map(|source| {
             let lux = source.irradiance_lx(&at.position, &at.normal);
@@ -216,7 +217,7 @@ fn slabs_know_every_shadow_that_falls_on_them() {
         let all: f64 = all.sum();
         assert!((seen - all).abs() < 1e-9, "{u} {v}: {seen} {all}");
         shaded += usize::from(all > 0.0);
-        lights += shades.falling_on(strike.slab as usize).len();
+        lights += shades.falling_on(hit.segment as usize).len();
     }
     assert!(shaded > 50, "{shaded}");
     // And are spared the rest of 61 lights.

@@ -1,8 +1,8 @@
 //! Tiles of a picture, and what may matter in each: lights, and shadows of bodies.
 
 use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
+use crate::twin::geometry::Body;
 use crate::twin::render::gpu::view::Framed;
-use crate::twin::render::scene::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// Side of a tile: over so few pixels a lens's distortion is even.

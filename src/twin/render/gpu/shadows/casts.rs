@@ -1,10 +1,13 @@
 //! Which lights may throw the shadow of which body where: by balls and cones, generously.
 
-use super::solid::Solid;
+use super::occluder::Occluder;
+use crate::twin::geometry::{Body, Shape};
+use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
-use crate::twin::render::light::{HEADLIGHT_RADIUS_M, LAMP_REACH_M, LampField, Shining};
-use crate::twin::render::scene::{Body, Headlight, Job, Shape};
+use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::photometry::{LAMP_REACH_M, Shining};
+use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 
@@ -156,7 +159,7 @@ pub struct Bodies<'j> {
     /// Balls around their pieces, wherever they go while the view is exposed.
     pub balls: Vec<Ball>,
     /// What each of them hides.
-    pub solids: Vec<Solid>,
+    pub solids: Vec<Occluder>,
     /// The middle of the exposure after the job's time, and half of how long it lasts.
     pub exposed_s: [f64; 2],
 }
@@ -192,7 +195,10 @@ pub fn bodies<'j>(framed: &Framed<'_>, job: &'j Job) -> Bodies<'j> {
         }
     }
     Bodies {
-        solids: bodies.iter().map(|b| Solid::of(b, mid_s, half_s)).collect(),
+        solids: bodies
+            .iter()
+            .map(|b| Occluder::of(b, mid_s, half_s))
+            .collect(),
         all: bodies,
         capsules,
         balls,

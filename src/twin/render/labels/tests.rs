@@ -5,10 +5,10 @@
     reason = "a test fails by panicking"
 )]
 
-use super::super::whole;
 use super::*;
 use crate::track::TrackPoint;
-use crate::twin::render::{Shape, View, sample};
+use crate::twin::geometry::Shape;
+use crate::twin::render::{View, sample};
 use nalgebra::{Translation3, UnitQuaternion};
 
 const SPEED_MPS: f64 = 40.0;
@@ -45,8 +45,8 @@ fn depth_of_the_bed_is_that_of_a_plane() {
         })
         .collect();
     let job = Job::default();
-    let sight = Sight::new(&view, job.time);
-    let labels = Labeller::new(&sample::scene()).look(&job, &sight);
+    let projection = Projection::new(&view, job.time);
+    let labels = Labeller::new(&sample::scene()).look(&job, &projection);
     let shutter = view.camera.shutter;
     for v in [0usize, 45, 90, 179] {
         let t = shutter.delay_s(v as f64) + 0.5 * shutter.exposure_s;
@@ -64,8 +64,8 @@ fn what_a_pixel_shows_is_seen_in_that_pixel() {
     for first_row in [0, 179] {
         let mut job = rig_job(100.0);
         job.views[0].camera.shutter.first_row = first_row;
-        let sight = Sight::new(&job.views[0], job.time);
-        let labels = Labeller::new(&sample::scene()).look(&job, &sight);
+        let projection = Projection::new(&job.views[0], job.time);
+        let labels = Labeller::new(&sample::scene()).look(&job, &projection);
         let camera = &job.views[0].camera.intrinsics;
         let mut asked = 0;
         for k in (0..labels.depth_m.len()).step_by(97) {
@@ -74,7 +74,7 @@ fn what_a_pixel_shows_is_seen_in_that_pixel() {
                 continue;
             }
             let in_camera = Point3::from(camera.ray(u, v) * labels.depth_m[k]);
-            let seen = sight.of(&(sight.pose(v) * in_camera)).unwrap();
+            let seen = projection.of(&(projection.pose(v) * in_camera)).unwrap();
             assert!((seen.pixel - Point2::new(u, v)).norm() < 1e-6, "{seen:?}");
             assert!((seen.depth_m - labels.depth_m[k]).abs() < 1e-6);
             asked += 1;
@@ -90,8 +90,8 @@ fn every_point_in_view_has_its_row() {
     for first_row in [0, 719] {
         let mut view = sample::rig_view(&sample::tunnel(), 100.0, 160.0 / 3.6);
         view.camera.shutter.first_row = first_row;
-        let sight = Sight::new(&view, view.start);
-        let pose = sight.pose(359.5);
+        let projection = Projection::new(&view, view.start);
+        let pose = projection.pose(359.5);
         for k in 0..2000u32 {
             let (x, y) = (
                 f64::from(k % 41) / 20.0 - 1.0,
@@ -99,9 +99,11 @@ fn every_point_in_view_has_its_row() {
             );
             let depth_m = 5.0 + f64::from(k % 13);
             let point = pose * (Point3::new(0.55 * x, 0.3 * y, 1.0) * depth_m);
-            let seen = sight.of(&point);
+            let seen = projection.of(&point);
             let seen = seen.unwrap_or_else(|| panic!("{point} has no row"));
-            let there = sight.pose(seen.pixel.y).inverse_transform_point(&point);
+            let there = projection
+                .pose(seen.pixel.y)
+                .inverse_transform_point(&point);
             let again = view.camera.intrinsics.project(&there).unwrap();
             assert!(
                 (again - seen.pixel).norm() < 1e-6,
@@ -120,13 +122,18 @@ fn interpolated_rows_agree_with_exact_ones() {
         let shake = if k % 2 == 0 { 1e-3 } else { -1e-3 };
         pose.rotation *= UnitQuaternion::from_euler_angles(shake, 0.5 * shake, 0.0);
     }
-    let sight = Sight::new(&job.views[0], job.time);
+    let projection = Projection::new(&job.views[0], job.time);
     let mut worst: f64 = 0.0;
     for lamp in &sample::scene().lamps {
-        let Some(seen) = sight.of(&lamp.centre).filter(|s| sight.contains(&s.pixel)) else {
+        let Some(seen) = projection
+            .of(&lamp.centre)
+            .filter(|s| projection.contains(&s.pixel))
+        else {
             continue;
         };
-        let quick = sight.within_image(&lamp.centre, &Vector3::zeros()).unwrap();
+        let quick = projection
+            .within_image(&lamp.centre, &Vector3::zeros())
+            .unwrap();
         worst = worst.max((quick.pixel - seen.pixel).norm());
     }
     assert!(worst > 0.0 && worst < 0.02, "{worst}");
@@ -148,7 +155,7 @@ fn flow_there_and_back_is_nothing() {
     let [mut a, mut b] = [rig_job(100.0), rig_job(100.3)];
     a.bodies.push(body(0.3, 2.0));
     b.bodies.push(body(0.4, 1.9));
-    let [from, to] = [&a, &b].map(|job| Sight::new(&job.views[0], job.time));
+    let [from, to] = [&a, &b].map(|job| Projection::new(&job.views[0], job.time));
     let mut labeller = Labeller::new(&sample::scene());
     let (there, back) = (labeller.look(&a, &from), labeller.look(&b, &to));
     let same = |k| Some(usize::from(k));
@@ -205,15 +212,15 @@ fn the_whole_of_a_ball_is_a_disc() {
         albedo: 0.5,
         luminance_cd_m2: 0.0,
     };
-    let sight = Sight::new(&view, view.start);
+    let projection = Projection::new(&view, view.start);
     let (centred, cut) = (ball(0.0), ball(159.5 / 260.0 * 5.0));
-    let all = whole(&[&centred], &sight).unwrap();
+    let all = whole(&[&centred], &projection).unwrap();
     // A ball of radius r at distance d is a disc of radius f r / sqrt(d^2 - r^2).
     let radius = 260.0 * 0.5 / (25.0f64 - 0.25).sqrt();
     assert!((all.pixels / (std::f64::consts::PI * radius * radius) - 1.0).abs() < 0.01);
     assert!((all.high.x + 1.0 - all.low.x - 2.0 * radius).abs() <= 1.0);
     assert!((all.in_frame - all.pixels).abs() < 1e-9);
-    let half = whole(&[&cut], &sight).unwrap();
+    let half = whole(&[&cut], &projection).unwrap();
     assert!((half.in_frame / half.pixels - 0.5).abs() < 0.03, "{half:?}");
-    assert_eq!(whole(&[&ball(1e3)], &sight), None);
+    assert_eq!(whole(&[&ball(1e3)], &projection), None);
 }

@@ -1,15 +1,14 @@
 //! Constants of the image model that both renderers hold to, and the one place where the shaders
-//! get theirs from: [`wgsl`]. What surfaces look like is painted, see [`paint`](super::paint).
+//! get theirs from: [`wgsl`].
 
 use super::gloss::MIRROR_REACH_M;
-use super::light::HEADLIGHT_RADIUS_M;
-use crate::track::Material;
+use crate::twin::lights::HEADLIGHT_RADIUS_M;
 use std::fmt::Write;
 
-/// Stations of the tunnel surface lie at multiples of this chainage; between them it is ruled.
-pub const RING_M: f64 = 1.0;
 /// A pixel sees no surface at a flatter angle than this sine (of the ray to the surface).
 pub const MIN_SINE: f64 = 0.05;
+/// Surfaces farther away than this are not seen.
+pub const SIGHT_M: f64 = 160.0;
 /// Lamps are seen up to this distance.
 pub const LAMP_SIGHT_M: f64 = 80.0;
 /// Reflectance of a lamp's disc while it is off.
@@ -21,21 +20,9 @@ pub const GLARE_STEP_PX: f64 = 4.0;
 /// Signals are followed up to this many times the full well.
 pub const SATURATION: f64 = 4.0;
 
-/// Share of light that a material reflects in the mean. Concrete as lighting handbooks table it (0.2
-/// to 0.4); the others are assumed.
-pub const fn mean_albedo(material: Material) -> f64 {
-    match material {
-        Material::Lining => 0.30,
-        Material::Bed => 0.22,
-        Material::Walkway => 0.35,
-        Material::Rail => 0.45,
-        Material::Platform => 0.50,
-    }
-}
-
 /// The constants that the shaders need, as WGSL declarations to stand in front of every shader.
 pub fn wgsl() -> String {
-    let mut text = String::from("// Written by twin/render/surface.rs.\n");
+    let mut text = String::from("// Written by twin/render/constants.rs.\n");
     // Writing to a String cannot fail.
     for (name, value) in [
         ("GLARE_STEP_PX", GLARE_STEP_PX),

@@ -1,6 +1,6 @@
 //! What convex bodies hide from a light, or from the eye, exactly where balls would be generous.
 
-use crate::twin::render::scene::{Body, Shape};
+use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Point3, Vector3};
 
 /// Surfaces lie this near to the cells that stand for them, and rays begin this near.
@@ -15,7 +15,7 @@ pub enum Cut {
 }
 
 /// A body as what lies between pairs of planes: normal, least and largest distance from the centre.
-pub struct Solid {
+pub struct Occluder {
     centre: Point3<f64>,
     slabs: Vec<(Vector3<f64>, f64, f64)>,
     /// Whether it is all of what lies there.
@@ -33,7 +33,7 @@ pub struct End<'a> {
     pub radius_m: f64,
 }
 
-impl Solid {
+impl Occluder {
     /// Of a body that is in the middle of the exposure `mid_s` after the job's time, and exposed for
     /// `half_s` before and after.
     pub fn of(body: &Body, mid_s: f64, half_s: f64) -> Self {
@@ -142,7 +142,7 @@ mod tests {
         for trial in 0..400 {
             let stream = Stream::new(9, trial, "solid");
             let body = body(&stream);
-            let solid = Solid::of(&body, 0.0, 0.0);
+            let solid = Occluder::of(&body, 0.0, 0.0);
             let around = |k: u64| {
                 let x = |n| 2.0 * stream.uniform(20 + 3 * k + n) - 1.0;
                 Vector3::new(x(0), x(1), x(2)).normalize()

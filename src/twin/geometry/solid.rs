@@ -1,6 +1,6 @@
 //! A ray against the solid shapes, in closed form.
 
-use crate::twin::render::{Body, Shape};
+use super::body::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 /// A body where it is at one instant, ready for rays.
@@ -140,9 +140,9 @@ fn cast_caps(o: &Vector3<f64>, d: &Vector3<f64>, radius: f64, half: f64) -> Entr
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+    use super::super::hull::Hull;
     use super::*;
     use crate::twin::random::Stream;
-    use crate::twin::render::Hull;
     use nalgebra::{Translation3, UnitQuaternion};
     use parry3d_f64::math::Vector as DVec3;
     use parry3d_f64::query::{Ray, RayCast};

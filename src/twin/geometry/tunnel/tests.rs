@@ -139,7 +139,7 @@ fn rays(tunnel: &Tunnel, count: u64) -> impl Iterator<Item = Cast> {
     })
 }
 
-/// Fails where the walk skips a slab or a cell, or meets an edge of the wrong side: parry's
+/// Fails where the walk skips a segment or a cell, or meets an edge of the wrong side: parry's
 /// bounding volumes over the same surface as triangles. A triangulated quad on a curve differs
 /// from the ruled surface by fractions of a millimetre, seen at the ray's grazing angle.
 #[test]
@@ -148,9 +148,9 @@ fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
     let (caster, mesh) = (TunnelCaster::new(&tunnel), mesh(&tunnel));
     let (mut hits, mut odd) = (0, 0);
     for Cast { o, d, inside } in rays(&tunnel, 10_000) {
-        let slab = caster.slab_of(&o, None);
-        assert_eq!(slab, inside.s_m.floor() as usize);
-        let ours = caster.cast(slab, &o, &d, 160.0);
+        let segment = caster.segment_of(&o, None);
+        assert_eq!(segment, inside.s_m.floor() as usize);
+        let ours = caster.cast(segment, &o, &d, 160.0);
         let ray = Ray::new(DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
         let theirs = mesh.cast_local_ray_and_get_normal(&ray, 160.0, false);
         let (Some(ours), Some(theirs)) = (ours, theirs) else {
@@ -172,16 +172,16 @@ fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
     assert!(odd <= 20, "{odd} of 10000 rays differ");
 }
 
-/// Fails where a strike's track coordinates are not those of its place in the world.
+/// Fails where a hit's track coordinates are not those of its place in the world.
 #[test]
-fn strikes_know_where_they_are_on_the_line() {
+fn hits_know_where_they_are_on_the_line() {
     let tunnel = tunnel();
     let caster = TunnelCaster::new(&tunnel);
     for Cast { o, d, .. } in rays(&tunnel, 1000) {
-        let Some(strike) = caster.cast(caster.slab_of(&o, None), &o, &d, 160.0) else {
+        let Some(hit) = caster.cast(caster.segment_of(&o, None), &o, &d, 160.0) else {
             continue;
         };
-        let at = caster.surface_at(&o, &d, &strike);
+        let at = caster.surface_at(&o, &d, &hit);
         let truth = tunnel.alignment.track_from_world(&at.position, at.s_m);
         // Between stations the tunnel is straight, the line is not: a sagitta of 0.6 mm.
         assert!((at.s_m - truth.s_m).abs() < 2e-3, "{at:?} {truth:?}");
@@ -209,8 +209,8 @@ fn between_cross_sections_it_is_dark() {
     let cast = |l_m: f64, up_m: f64, d: Vector3<f64>| {
         let o = frame * Point3::new(0.0, l_m, up_m);
         let d = frame * d;
-        let strike = caster.cast(caster.slab_of(&o, None), &o, &d, 160.0);
-        strike.map(|s| caster.surface_at(&o, &d, &s).s_m)
+        let hit = caster.cast(caster.segment_of(&o, None), &o, &d, 160.0);
+        hit.map(|s| caster.surface_at(&o, &d, &s).s_m)
     };
     // Straight at the step, from the wide side; beside it, on into the narrow one.
     assert_eq!(cast(3.4, 1.7, Vector3::x()), None);

@@ -6,24 +6,31 @@
 //!
 //! ```
 //! use metrotwin::bus::Intrinsics;
-//! use metrotwin::twin::render::cpu::{Labeller, Sight};
+//! use metrotwin::twin::render::labels::{Labeller, Projection};
 //! use metrotwin::twin::render::sample;
 //!
 //! let mut job = sample::wayside_job(&sample::tunnel(), 100.0);
 //! job.views[0].camera.intrinsics = Intrinsics::centred(96, 54, 55.0);
-//! let sight = Sight::new(&job.views[0], job.time);
-//! let labels = Labeller::new(&sample::scene()).look(&job, &sight);
+//! let projection = Projection::new(&job.views[0], job.time);
+//! let labels = Labeller::new(&sample::scene()).look(&job, &projection);
 //! assert_eq!(labels.depth_m.len(), 96 * 54);
 //! ```
 //!
 //! Not here: what is between surface and camera (mist, dirt on the glass), and mixed pixels: a
 //! pixel belongs to what its centre sees.
 
-use super::extent::Outline;
-use super::{SIGHT_M, Sight, Solid, TunnelCaster};
+mod projection;
+mod whole;
+
+pub use projection::{Projection, Seen};
+pub use whole::{Whole, whole};
+
+use super::constants::{LAMP_SIGHT_M, SIGHT_M};
+use super::image_bounds::ImageBounds;
 use crate::bus::{CameraModel, Intrinsics};
-use crate::twin::render::surface::LAMP_SIGHT_M;
-use crate::twin::render::{Body, Job, LampLight, Scene};
+use crate::twin::geometry::{Body, Solid, TunnelCaster};
+use crate::twin::lights::LampLight;
+use crate::twin::render::{Job, Scene};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use rayon::prelude::*;
 use std::collections::VecDeque;
@@ -106,10 +113,11 @@ impl Labeller {
     }
 
     /// What every pixel shows.
-    pub fn look(&mut self, job: &Job, sight: &Sight<'_>) -> Labels {
-        let camera = sight.view.camera.intrinsics;
+    pub fn look(&mut self, job: &Job, projection: &Projection<'_>) -> Labels {
+        let camera = projection.view.camera.intrinsics;
         let lens = self.keep_lens(&camera);
-        let still = (sight.view.motion.poses.len() == 1).then(|| self.keep_still(sight, lens));
+        let still =
+            (projection.view.motion.poses.len() == 1).then(|| self.keep_still(projection, lens));
         let this = &*self;
         let width = camera.width_px as usize;
         let size = width * camera.height_px as usize;
@@ -124,7 +132,7 @@ impl Labeller {
         rows.for_each(|(v, (depth_m, surface))| {
             let row = Row {
                 v,
-                pose: sight.pose(v as f64),
+                pose: projection.pose(v as f64),
                 rays: &this.lenses[lens].rays[v * width..(v + 1) * width],
             };
             match kept {
@@ -136,24 +144,30 @@ impl Labeller {
                     *surface = Surface::Tunnel;
                 }
             }
-            this.put_bodies(job, sight, &row, depth_m, surface);
-            this.put_lamps(sight, &row, depth_m, surface);
+            this.put_bodies(job, projection, &row, depth_m, surface);
+            this.put_lamps(projection, &row, depth_m, surface);
         });
         labels
     }
 
     /// Whether nothing stands between the camera and a place that it sees in row `v`.
-    pub fn sees(&self, job: &Job, sight: &Sight<'_>, v: f64, place: &Point3<f64>) -> bool {
-        let eye = Point3::from(sight.pose(v).translation.vector);
+    pub fn sees(
+        &self,
+        job: &Job,
+        projection: &Projection<'_>,
+        v: f64,
+        place: &Point3<f64>,
+    ) -> bool {
+        let eye = Point3::from(projection.pose(v).translation.vector);
         let way = place - eye;
         let reach = 1.0 - FLUSH_M / way.norm();
-        let slab = self.tunnel.slab_of(&eye, None);
-        let after_s = sight.after_s(v);
+        let segment = self.tunnel.segment_of(&eye, None);
+        let after_s = projection.after_s(v);
         let hides = |body: &Body| {
             let hit = Solid::at(body, after_s).cast(&eye, &way);
             hit.is_some_and(|(t, _)| t < reach)
         };
-        self.tunnel.cast(slab, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
+        self.tunnel.cast(segment, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
     }
 
     /// The lamps, in the order of the scene.
@@ -166,15 +180,15 @@ impl Labeller {
     /// number where nothing is within sight, or the place is outside of the other image.
     pub fn flow(
         &mut self,
-        (job, sight, labels): (&Job, &Sight<'_>, &Labels),
-        (next_job, next): (&Job, &Sight<'_>),
+        (job, projection, labels): (&Job, &Projection<'_>, &Labels),
+        (next_job, next): (&Job, &Projection<'_>),
         same: impl Fn(u16) -> Option<usize> + Sync,
     ) -> Vec<[f32; 2]> {
-        let camera = sight.view.camera.intrinsics;
+        let camera = projection.view.camera.intrinsics;
         let lens = self.keep_lens(&camera);
         let rays = &self.lenses[lens].rays;
         let width = camera.width_px as usize;
-        let (a, b) = (sight.view, next.view);
+        let (a, b) = (projection.view, next.view);
         let still = a.motion.poses.len() == 1 && (a.camera, &a.motion) == (b.camera, &b.motion);
         let goes_to = |k: usize, pose: &Isometry3<f64>| {
             let [x, y] = rays[k];
@@ -185,7 +199,7 @@ impl Labeller {
                 Surface::Nothing => None,
                 Surface::Body(body) => {
                     let then = next_job.bodies.get(same(body)?)?;
-                    let now = Solid::at(&job.bodies[usize::from(body)], sight.after_s(v));
+                    let now = Solid::at(&job.bodies[usize::from(body)], projection.after_s(v));
                     let point = then.world_from_body * now.in_body(&point);
                     next.within_image(&point, &then.velocity_mps)
                 }
@@ -198,7 +212,7 @@ impl Labeller {
         let mut flow = vec![[f32::NAN; 2]; labels.depth_m.len()];
         let rows = flow.par_chunks_mut(width.max(1)).enumerate();
         rows.for_each(|(v, flow)| {
-            let pose = sight.pose(v as f64);
+            let pose = projection.pose(v as f64);
             for (u, flow) in flow.iter_mut().enumerate() {
                 if let Some(to) = goes_to(v * width + u, &pose) {
                     *flow = to;
@@ -230,8 +244,8 @@ impl Labeller {
         self.lenses.len() - 1
     }
 
-    fn keep_still(&mut self, sight: &Sight<'_>, lens: usize) -> usize {
-        let (camera, pose) = (sight.view.camera, sight.pose(0.0));
+    fn keep_still(&mut self, projection: &Projection<'_>, lens: usize) -> usize {
+        let (camera, pose) = (projection.view.camera, projection.pose(0.0));
         let same = |k: &StillView| k.camera == camera && k.pose == pose;
         if let Some(k) = self.still.iter().position(same) {
             return k;
@@ -257,11 +271,11 @@ impl Labeller {
 
     fn cast_tunnel(&self, row: &Row<'_>, depth_m: &mut [f64]) {
         let eye = row.eye();
-        let slab = self.tunnel.slab_of(&eye, None);
+        let segment = self.tunnel.segment_of(&eye, None);
         for (u, depth_m) in depth_m.iter_mut().enumerate() {
             let ray = row.ray(u);
-            if let Some(strike) = self.tunnel.cast(slab, &eye, &ray, SIGHT_M / ray.norm()) {
-                *depth_m = strike.t;
+            if let Some(hit) = self.tunnel.cast(segment, &eye, &ray, SIGHT_M / ray.norm()) {
+                *depth_m = hit.t;
             }
         }
     }
@@ -269,17 +283,17 @@ impl Labeller {
     fn put_bodies(
         &self,
         job: &Job,
-        sight: &Sight<'_>,
+        projection: &Projection<'_>,
         row: &Row<'_>,
         depth_m: &mut [f64],
         surface: &mut [Surface],
     ) {
-        let (eye, after_s) = (row.eye(), sight.after_s(row.v as f64));
+        let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
         for (k, body) in job.bodies.iter().enumerate() {
             let solid = Solid::at(body, after_s);
-            let camera = &sight.view.camera.intrinsics;
-            let outline = Outline::of(solid.corners(), camera, &row.pose);
-            for u in outline.columns(row.v, row.rays.len()) {
+            let camera = &projection.view.camera.intrinsics;
+            let bounds = ImageBounds::of(solid.corners(), camera, &row.pose);
+            for u in bounds.columns(row.v, row.rays.len()) {
                 let ray = row.ray(u);
                 if let Some((t, _)) = solid.cast(&eye, &ray)
                     && t < depth_m[u]
@@ -294,7 +308,7 @@ impl Labeller {
 
     fn put_lamps(
         &self,
-        sight: &Sight<'_>,
+        projection: &Projection<'_>,
         row: &Row<'_>,
         depth_m: &mut [f64],
         surface: &mut [Surface],
@@ -305,10 +319,10 @@ impl Labeller {
             if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
                 continue;
             }
-            let camera = &sight.view.camera.intrinsics;
-            let corners = Outline::cube(&lamp.centre, lamp.radius_m);
-            let outline = Outline::of(corners, camera, &row.pose);
-            for u in outline.columns(row.v, row.rays.len()) {
+            let camera = &projection.view.camera.intrinsics;
+            let corners = ImageBounds::cube(&lamp.centre, lamp.radius_m);
+            let bounds = ImageBounds::of(corners, camera, &row.pose);
+            for u in bounds.columns(row.v, row.rays.len()) {
                 let ray = row.ray(u);
                 let t = lamp.facing.dot(&way) / lamp.facing.dot(&ray);
                 if t > 0.0

@@ -1,26 +1,27 @@
 //! A ray down the tunnel.
 //!
-//! The tunnel is a chain of slabs between the vertical planes across the line at its stations,
-//! one a metre and where a cross-section ends. Inside a slab the surface is ruled from station to station, so in the slab's own
-//! axes (x along the chord, y left, z up less the slope) it is a prism over the outline. A ray is
-//! followed from slab to slab; in each it is a straight line in the plane across.
+//! The tunnel is a chain of segments between the vertical planes across the line at its stations,
+//! one a metre and where a cross-section ends. Inside a segment the surface is ruled from station to
+//! station, so in the segment's own axes (x along the chord, y left, z up less the slope) it is a
+//! prism over the outline. A ray is followed from segment to segment; in each it is a straight line
+//! in the plane across.
 //!
-//! Calling the slab a prism leaves out two things: the cosine of half the turn between stations
-//! (1.4e-6 of the lateral distance at a radius of 300 m), and the difference of slope times chord
-//! between inner and outer side (0.15 mm at 30 permille and that radius). Where two cross-sections
-//! meet, the step between them is not drawn and stays dark.
+//! A prism leaves out two things: the cosine of half the turn between stations (1.4e-6 of the lateral
+//! distance at a radius of 300 m), and the difference of slope times chord between inner and outer
+//! side (0.15 mm at 30 permille and that radius). Where two cross-sections meet, the step between
+//! them is not drawn and stays dark.
 
-use super::outline::Outline;
+use super::section::SectionCaster;
 use crate::track::{Material, Tunnel};
-use crate::twin::render::surface::RING_M;
 use nalgebra::{Point3, Vector2, Vector3};
+use std::ops::Range;
 
 /// The swept tunnel with its rails, ready for rays.
 #[derive(Clone, Debug)]
 pub struct TunnelCaster {
     stations: Vec<Station>,
-    slabs: Vec<Slab>,
-    outlines: Vec<Outline>,
+    segments: Vec<Segment>,
+    sections: Vec<SectionCaster>,
 }
 
 #[derive(Clone, Debug)]
@@ -32,24 +33,25 @@ struct Station {
 }
 
 #[derive(Clone, Debug)]
-struct Slab {
+struct Segment {
     chord: Vector2<f64>,
     left: Vector2<f64>,
     /// Rise over run from station to station.
     slope: f64,
-    outline: Option<usize>,
+    section: Option<usize>,
 }
 
 /// Where a ray met the tunnel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Strike {
+pub struct TunnelHit {
     /// Along the ray, in lengths of its direction.
     pub t: f64,
-    pub(super) slab: u32,
+    /// The segment that it is in.
+    pub segment: u32,
     edge: u16,
 }
 
-/// The surface at a strike.
+/// The surface at a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfacePoint {
     /// In the world.
@@ -67,17 +69,19 @@ pub struct SurfacePoint {
     /// Which of the tunnel's section ranges it belongs to.
     pub range: usize,
     /// How s and q grow with the position, per metre.
-    pub(super) gradients: [Vector3<f64>; 2],
+    pub gradients: [Vector3<f64>; 2],
 }
 
 impl SurfacePoint {
     /// Up the line.
-    pub(super) fn along(&self) -> Vector3<f64> {
+    pub fn along(&self) -> Vector3<f64> {
         self.gradients[0]
     }
 }
 
-/// A slab begins this much early, so that rounding opens no crack between two of them.
+/// Stations of the tunnel surface lie at multiples of this chainage; between them it is ruled.
+pub const STATION_STEP_M: f64 = 1.0;
+/// A segment begins this much early, so that rounding opens no crack between two of them.
 const OVERLAP_M: f64 = 0.05;
 
 fn plan(v: Vector3<f64>) -> Vector2<f64> {
@@ -99,18 +103,18 @@ impl TunnelCaster {
                 }
             })
             .collect();
-        let slabs = stations
+        let segments = stations
             .windows(2)
             .map(|pair| {
                 let mid = 0.5 * (pair[0].s_m + pair[1].s_m);
                 let step = pair[1].origin - pair[0].origin;
                 let length = plan(step).norm();
                 let chord = plan(step) / length;
-                Slab {
+                Segment {
                     chord,
                     left: Vector2::new(-chord.y, chord.x),
                     slope: step.z / length,
-                    outline: tunnel
+                    section: tunnel
                         .sections
                         .iter()
                         .position(|r| r.from_m <= mid && mid < r.to_m),
@@ -119,54 +123,73 @@ impl TunnelCaster {
             .collect();
         Self {
             stations,
-            slabs,
-            outlines: tunnel
+            segments,
+            sections: tunnel
                 .sections
                 .iter()
-                .map(|r| Outline::new(&r.section))
+                .map(|r| SectionCaster::new(&r.section))
                 .collect(),
         }
     }
 
-    /// Whether the surface at a strike lies level and may mirror: bed, or top of a rail.
-    pub(super) fn is_level(&self, strike: &Strike) -> bool {
-        let outline = self.slabs[strike.slab as usize].outline;
+    /// Whether the surface at a hit lies level and may mirror: bed, or top of a rail.
+    pub fn is_level(&self, hit: &TunnelHit) -> bool {
+        let outline = self.segments[hit.segment as usize].section;
         outline.is_some_and(|range| {
-            let edge = &self.outlines[range].edges[strike.edge as usize];
+            let edge = &self.sections[range].edges[hit.edge as usize];
             edge.normal.y > 0.5 && matches!(edge.material, Material::Bed | Material::Rail)
         })
     }
 
-    /// How many slabs there are.
-    pub(super) fn slabs(&self) -> usize {
-        self.slabs.len()
+    /// How many segments there are.
+    pub fn segments(&self) -> usize {
+        self.segments.len()
     }
 
-    /// Where a slab begins.
-    pub(super) fn chainage_m(&self, slab: usize) -> f64 {
-        self.stations[slab].s_m
+    /// Where a segment begins.
+    pub fn chainage_m(&self, segment: usize) -> f64 {
+        self.stations[segment].s_m
     }
 
-    /// A ball around a slab's surface.
-    pub(super) fn slab_ball(&self, slab: usize) -> (Point3<f64>, f64) {
-        let [near, far] = [0, 1].map(|k| self.stations[slab + k].origin);
-        let (up_m, radius_m) = self.slabs[slab]
-            .outline
-            .map_or((0.0, 0.0), |i| self.outlines[i].disc());
+    /// Segments within some metres of chainage of one.
+    pub fn segments_about(&self, segment: usize, reach_m: f64) -> Range<usize> {
+        if segment >= self.segments() {
+            return 0..0;
+        }
+        let at = self.chainage_m(segment);
+        let near = |k: &usize| (self.chainage_m(*k) - at).abs() <= reach_m;
+        let begin = (0..segment)
+            .rev()
+            .take_while(near)
+            .last()
+            .unwrap_or(segment);
+        let end = (segment..self.segments())
+            .take_while(near)
+            .last()
+            .unwrap_or(segment);
+        begin..end + 1
+    }
+
+    /// A ball around a segment's surface.
+    pub fn segment_ball(&self, segment: usize) -> (Point3<f64>, f64) {
+        let [near, far] = [0, 1].map(|k| self.stations[segment + k].origin);
+        let (up_m, radius_m) = self.segments[segment]
+            .section
+            .map_or((0.0, 0.0), |i| self.sections[i].disc());
         let middle = nalgebra::center(&near, &far) + Vector3::z() * up_m;
         (middle, radius_m + (far - near).norm())
     }
 
-    /// The slab that a place is in: from a slab close by, or else by search for the nearest
+    /// The segment that a place is in: from a segment close by, or else by search for the nearest
     /// station.
-    pub fn slab_of(&self, p: &Point3<f64>, near: Option<usize>) -> usize {
+    pub fn segment_of(&self, p: &Point3<f64>, near: Option<usize>) -> usize {
         let mut k = near
             .unwrap_or_else(|| self.nearest(p))
-            .min(self.slabs.len() - 1);
-        for _ in 0..self.slabs.len() {
+            .min(self.segments.len() - 1);
+        for _ in 0..self.segments.len() {
             if k > 0 && self.ahead_of(k, p) < 0.0 {
                 k -= 1;
-            } else if k + 1 < self.slabs.len() && self.ahead_of(k + 1, p) >= 0.0 {
+            } else if k + 1 < self.segments.len() && self.ahead_of(k + 1, p) >= 0.0 {
                 k += 1;
             } else {
                 break;
@@ -188,25 +211,25 @@ impl TunnelCaster {
         s.forward.dot(&plan(p - s.origin))
     }
 
-    /// First surface that the ray o + t d meets for t up to `reach`; `slab` is that of o. Rays
+    /// First surface that the ray o + t d meets for t up to `reach`; `segment` is that of o. Rays
     /// from outside the line's ends meet nothing.
     pub fn cast(
         &self,
-        slab: usize,
+        segment: usize,
         o: &Point3<f64>,
         d: &Vector3<f64>,
         reach: f64,
-    ) -> Option<Strike> {
-        if slab >= self.slabs.len()
-            || self.ahead_of(slab, o) < -1e-6
-            || self.ahead_of(slab + 1, o) > 1e-6
+    ) -> Option<TunnelHit> {
+        if segment >= self.segments.len()
+            || self.ahead_of(segment, o) < -1e-6
+            || self.ahead_of(segment + 1, o) > 1e-6
         {
             return None;
         }
         let (d2, overlap) = (plan(*d), OVERLAP_M / d.norm());
-        let (mut k, mut entry) = (slab, 0.0f64);
+        let (mut k, mut entry) = (segment, 0.0f64);
         // Each station's plane is crossed once; the bound is for rays that are not numbers.
-        for _ in 0..self.slabs.len() {
+        for _ in 0..self.segments.len() {
             let exit_down = exit(-self.ahead_of(k, o), -self.stations[k].forward.dot(&d2));
             let exit_up = exit(
                 self.ahead_of(k + 1, o),
@@ -215,12 +238,12 @@ impl TunnelCaster {
             let leave = exit_up.min(exit_down);
             let (o_across, d_across) = self.across(k, o, d);
             let (from, to) = ((entry - overlap).max(0.0), leave.min(reach));
-            if let Some(i) = self.slabs[k].outline
-                && let Some((t, edge)) = self.outlines[i].first_hit(&o_across, &d_across, from, to)
+            if let Some(i) = self.segments[k].section
+                && let Some((t, edge)) = self.sections[i].first_hit(&o_across, &d_across, from, to)
             {
-                return Some(Strike {
+                return Some(TunnelHit {
                     t,
-                    slab: k as u32,
+                    segment: k as u32,
                     edge,
                 });
             }
@@ -232,10 +255,10 @@ impl TunnelCaster {
             } else {
                 k.wrapping_sub(1)
             };
-            let beyond = self.slabs.get(next)?;
-            if beyond.outline != self.slabs[k].outline
-                && let Some(i) = beyond.outline
-                && !self.outlines[i].contains(&(o_across + d_across * leave))
+            let beyond = self.segments.get(next)?;
+            if beyond.section != self.segments[k].section
+                && let Some(i) = beyond.section
+                && !self.sections[i].contains(&(o_across + d_across * leave))
             {
                 return None;
             }
@@ -244,34 +267,40 @@ impl TunnelCaster {
         None
     }
 
-    /// A ray in the plane across a slab's chord.
+    /// A ray in the plane across a segment's chord.
     fn across(&self, k: usize, o: &Point3<f64>, d: &Vector3<f64>) -> (Vector2<f64>, Vector2<f64>) {
-        let slab = &self.slabs[k];
+        let segment = &self.segments[k];
         let v = o - self.stations[k].origin;
         let (v2, d2) = (plan(v), plan(*d));
         (
-            Vector2::new(slab.left.dot(&v2), v.z - slab.slope * slab.chord.dot(&v2)),
-            Vector2::new(slab.left.dot(&d2), d.z - slab.slope * slab.chord.dot(&d2)),
+            Vector2::new(
+                segment.left.dot(&v2),
+                v.z - segment.slope * segment.chord.dot(&v2),
+            ),
+            Vector2::new(
+                segment.left.dot(&d2),
+                d.z - segment.slope * segment.chord.dot(&d2),
+            ),
         )
     }
 
-    /// The surface where the ray o + t d struck.
-    pub fn surface_at(&self, o: &Point3<f64>, d: &Vector3<f64>, strike: &Strike) -> SurfacePoint {
-        let k = strike.slab as usize;
-        let slab = &self.slabs[k];
+    /// The surface where the ray o + t d hit.
+    pub fn surface_at(&self, o: &Point3<f64>, d: &Vector3<f64>, hit: &TunnelHit) -> SurfacePoint {
+        let k = hit.segment as usize;
+        let segment = &self.segments[k];
         let (o_across, d_across) = self.across(k, o, d);
-        let position = o + d * strike.t;
-        let lh = o_across + d_across * strike.t;
+        let position = o + d * hit.t;
+        let lh = o_across + d_across * hit.t;
         let (near_m, far_m) = (self.stations[k].s_m, self.stations[k + 1].s_m);
         let (past, before) = (
             self.ahead_of(k, &position),
             -self.ahead_of(k + 1, &position),
         );
-        let range = slab.outline.unwrap_or(0);
-        let edge = &self.outlines[range].edges[strike.edge as usize];
+        let range = segment.section.unwrap_or(0);
+        let edge = &self.sections[range].edges[hit.edge as usize];
         // Across the edge and across the ruling, which climbs with the slope.
-        let (n, along) = (edge.normal, -edge.normal.y * slab.slope);
-        let level = slab.left * n.x + slab.chord * along;
+        let (n, along) = (edge.normal, -edge.normal.y * segment.slope);
+        let level = segment.left * n.x + segment.chord * along;
         SurfacePoint {
             position,
             normal: Vector3::new(level.x, level.y, n.y).normalize(),
@@ -281,32 +310,32 @@ impl TunnelCaster {
             material: edge.material,
             range,
             gradients: [
-                Vector3::new(slab.chord.x, slab.chord.y, 0.0)
+                Vector3::new(segment.chord.x, segment.chord.y, 0.0)
                     * ((far_m - near_m) / (past + before)),
-                Self::up_edge(slab, &edge.along),
+                Self::up_edge(segment, &edge.along),
             ],
         }
     }
 
     /// How metres along an edge grow with the position: the transpose of what
     /// [`Self::across`] does to directions.
-    fn up_edge(slab: &Slab, along: &Vector2<f64>) -> Vector3<f64> {
-        let level = slab.left * along.x - slab.chord * (slab.slope * along.y);
+    fn up_edge(segment: &Segment, along: &Vector2<f64>) -> Vector3<f64> {
+        let level = segment.left * along.x - segment.chord * (segment.slope * along.y);
         Vector3::new(level.x, level.y, along.y)
     }
 }
 
-/// Multiples of the ring length, and the ends of cross-sections, which may lie between them.
+/// Multiples of the step, and the ends of cross-sections, which may lie between them.
 fn station_chainages(tunnel: &Tunnel) -> Vec<f64> {
     let begin = tunnel.sections.first().map_or(0.0, |r| r.from_m);
     let end = tunnel.sections.last().map_or(0.0, |r| r.to_m);
     let (first, last) = (
-        (begin / RING_M).ceil() as i64,
-        (end / RING_M).floor() as i64,
+        (begin / STATION_STEP_M).ceil() as i64,
+        (end / STATION_STEP_M).floor() as i64,
     );
-    let rings = (first..=last).map(|k| k as f64 * RING_M);
+    let steps = (first..=last).map(|k| k as f64 * STATION_STEP_M);
     let ends = tunnel.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
-    let mut all: Vec<f64> = rings.chain(ends).collect();
+    let mut all: Vec<f64> = steps.chain(ends).collect();
     all.sort_by(f64::total_cmp);
     all.dedup_by(|b, a| *b - *a < 1e-6);
     all

@@ -12,11 +12,11 @@
 //! 2 m beside a camera at 60 km/h, far less than the 1 at which a picture would tear.
 //!
 //! ```
-//! use metrotwin::twin::render::{cpu::Sight, sample};
+//! use metrotwin::twin::render::{labels::Projection, sample};
 //! let job = sample::stereo_job(&sample::tunnel(), 100.0, 20.0);
-//! let sight = Sight::new(&job.views[0], job.time);
+//! let projection = Projection::new(&job.views[0], job.time);
 //! let lamp = &sample::scene().lamps[10];
-//! let seen = sight.of(&lamp.centre).ok_or("not seen")?;
+//! let seen = projection.of(&lamp.centre).ok_or("not seen")?;
 //! assert!(seen.depth_m > 0.0);
 //! # Ok::<(), &str>(())
 //! ```
@@ -31,7 +31,7 @@ const TOLERANCE_PX: f64 = 1e-7;
 const MAX_STEPS: usize = 20;
 
 /// A view with the time from which moving points are reckoned.
-pub struct Sight<'a> {
+pub struct Projection<'a> {
     /// What is looked through.
     pub view: &'a View,
     /// Time of the bodies' poses.
@@ -49,17 +49,17 @@ pub struct Seen {
     pub depth_m: f64,
 }
 
-impl<'a> Sight<'a> {
+impl<'a> Projection<'a> {
     /// Of a view of a job at `time`.
     pub fn new(view: &'a View, time: SimTime) -> Self {
-        let mut sight = Self {
+        let mut projection = Self {
             view,
             time,
             rows: Vec::new(),
         };
         let rows = 0..view.camera.intrinsics.height_px;
-        sight.rows = rows.map(|v| sight.pose(f64::from(v))).collect();
-        sight
+        projection.rows = rows.map(|v| projection.pose(f64::from(v))).collect();
+        projection
     }
 
     /// From the time of the bodies' poses to the middle of the exposure of row `v`.

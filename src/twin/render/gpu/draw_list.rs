@@ -1,16 +1,17 @@
 //! What a view draws: which triangles in full and which cheaply, at which instants of the exposure,
 //! under which lamps' blinking.
 
+use super::bodies::BodyBuffers;
 use super::chunks::{Chunk, Chunks};
 use super::detail::ChunkKey;
 use super::layout::{Mirrored, Placement};
-use super::passes::BodyBuffers;
 use super::smear::{Rectangle, Smear};
 use super::textures;
 use super::view::{BESIDE, Framed, single};
-use crate::twin::render::light::{Shining, headlights_lx};
-use crate::twin::render::paint::{self, Paintings};
-use crate::twin::render::scene::{Air, Job};
+use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::paint;
+use crate::twin::render::photometry::{Shining, headlights_lx};
+use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 
@@ -31,18 +32,8 @@ const MIRRORED_BEHIND_M: f64 = 5.0;
 /// Light that changes by less than the shot noise of a full pixel of 10,000 electrons shows no bands.
 const BAND: f32 = 0.01;
 
-/// What is lit and how.
-pub struct World<'a> {
-    /// All lamps.
-    pub lamps: &'a [Shining],
-    /// Between them and what they light.
-    pub air: &'a Air,
-    /// On the tunnel.
-    pub paintings: &'a Paintings,
-}
-
 /// Triangles of one mesh with one painting.
-pub struct Draw {
+pub struct DrawCall {
     /// The chunk that they are of; none for bodies.
     pub chunk: Option<ChunkKey>,
     /// Number of their texture.
@@ -61,10 +52,10 @@ pub struct Draw {
 
 /// All that a view draws of tunnel and bodies, and the buffers to find it in.
 #[derive(Default)]
-pub struct Sight {
+pub struct DrawList {
     keys: Vec<ChunkKey>,
     /// Of the tunnel, near ones first; then of the bodies.
-    pub draws: Vec<Draw>,
+    pub calls: Vec<DrawCall>,
     /// Of every mesh at the first instant, then of every mesh at the second, and so on.
     pub placements: Vec<Placement>,
     /// Number of meshes.
@@ -85,15 +76,15 @@ pub struct Sight {
     lamps: Vec<usize>,
 }
 
-impl Sight {
+impl DrawList {
     /// The buffer of the chunks in sight, for [`Chunks::in_sight`] to fill first.
     pub fn keys(&mut self) -> &mut Vec<ChunkKey> {
         &mut self.keys
     }
 
     /// What it draws of the tunnel: the first of all that it draws.
-    pub fn tunnel(&self) -> impl Iterator<Item = &Draw> {
-        self.draws.iter().take_while(|draw| draw.chunk.is_some())
+    pub fn tunnel(&self) -> impl Iterator<Item = &DrawCall> {
+        self.calls.iter().take_while(|call| call.chunk.is_some())
     }
 
     /// Finds what to draw of the chunks whose keys were given, and of the bodies.
@@ -101,10 +92,10 @@ impl Sight {
         &mut self,
         framed: &Framed<'_>,
         job: &Job,
-        world: &World<'_>,
+        scene: &LitScene,
         (chunks, bodies): (&Chunks, &BodyBuffers),
     ) {
-        self.draws.clear();
+        self.calls.clear();
         self.placements.clear();
         self.lamps.clear();
         self.mirror_rows = 0..0;
@@ -116,12 +107,12 @@ impl Sight {
         let keys = std::mem::take(&mut self.keys);
         for key in &keys {
             if let Some(chunk) = chunks.get(*key) {
-                self.add_chunk(framed, job, world, (*key, chunk), dim_cd_m2);
+                self.add_chunk(framed, job, scene, (*key, chunk), dim_cd_m2);
             }
         }
         self.keys = keys;
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
-            self.draws.push(Draw {
+            self.calls.push(DrawCall {
                 chunk: None,
                 texture: textures::BLANK,
                 mesh: self.placements.len() as u32,
@@ -139,7 +130,7 @@ impl Sight {
         }
         // Before those are added that are mirrored alone.
         self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
-        self.mirror(framed, world.lamps);
+        self.mirror(framed, scene.lamps.lamps());
         self.repeat(framed, job, chunks);
     }
 
@@ -147,13 +138,13 @@ impl Sight {
         &mut self,
         framed: &Framed<'_>,
         job: &Job,
-        world: &World<'_>,
+        scene: &LitScene,
         (key, chunk): (ChunkKey, &Chunk),
         dim_cd_m2: f64,
     ) {
         let headlit_cd_m2 = (chunk.probes.iter())
             .map(|probe| {
-                let lux = headlights_lx(&job.headlights, world.air, &probe.at, &probe.normal);
+                let lux = headlights_lx(&job.headlights, &scene.air, &probe.at, &probe.normal);
                 lux * f64::from(probe.reflected_per_lx)
             })
             .fold(0.0, f64::max);
@@ -173,8 +164,8 @@ impl Sight {
                 (part.peaks).partition_point(|peak| f64::from(*peak) > dim_cd_m2)
             };
             let border = part.indices.start + 3 * bright as u32;
-            let painting = world.paintings.of_range[part.section];
-            self.draws.push(Draw {
+            let painting = scene.paintings.of_range[part.section];
+            self.calls.push(DrawCall {
                 chunk: Some(key),
                 texture: textures::slanted(painting, away_m),
                 mesh: self.placements.len() as u32,
@@ -185,14 +176,14 @@ impl Sight {
             });
             let rows = framed.view.camera.intrinsics.height_px;
             let shares = match chunk.lamp.filter(|_| bright > 0) {
-                Some(lamp) => self.shares_of(framed, world.lamps, lamp, 0..rows),
+                Some(lamp) => self.shares_of(framed, scene.lamps.lamps(), lamp, 0..rows),
                 None => 0,
             };
             self.placements.push(Placement {
                 offset_m: single(&(chunk.origin - framed.reference())),
                 period_share: (period - period.floor()) as f32,
                 shares,
-                paint_per_m: textures::per_m(&world.paintings.all[painting]),
+                paint_per_m: textures::per_m(&scene.paintings.all[painting]),
                 along: single(&chunk.along),
                 ..Placement::default()
             });
@@ -225,7 +216,7 @@ impl Sight {
     /// Lists the lamps that what mirrors may show, where anything does.
     fn mirror(&mut self, framed: &Framed<'_>, lamps: &[Shining]) {
         self.mirrored.clear();
-        if self.draws.iter().all(|draw| draw.glossy.is_empty()) {
+        if self.calls.iter().all(|call| call.glossy.is_empty()) {
             return;
         }
         let (reference, ahead) = (framed.reference(), framed.middle * Vector3::z());
@@ -281,7 +272,7 @@ impl Sight {
     fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &Chunks) {
         self.meshes = self.placements.len() as u32;
         let smear = Smear::of(framed, job.time);
-        let anything = self.draws.iter().any(|d| !d.lit.is_empty());
+        let anything = self.calls.iter().any(|d| !d.lit.is_empty());
         let chunks = self.keys.iter().filter_map(|key| chunks.get(*key));
         self.instants = if anything {
             smear.instants(&job.bodies, chunks)

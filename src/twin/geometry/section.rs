@@ -9,7 +9,7 @@ use nalgebra::Vector2;
 
 /// A straight piece of outline, seen from its free side only.
 #[derive(Clone, Debug)]
-pub(super) struct Edge {
+pub(super) struct OutlineEdge {
     /// First corner: left of the centreline, above top of rail.
     pub start: Vector2<f64>,
     /// Unit vector to the second.
@@ -25,8 +25,8 @@ pub(super) struct Edge {
 
 /// A cross-section with the rails in it, ready for rays.
 #[derive(Clone, Debug)]
-pub(super) struct Outline {
-    pub edges: Vec<Edge>,
+pub(super) struct SectionCaster {
+    pub edges: Vec<OutlineEdge>,
     /// Corners of the tunnel itself where it is closed.
     ring: Vec<Vector2<f64>>,
     low: Vector2<f64>,
@@ -42,7 +42,7 @@ const CELL_M: f64 = 0.4;
 /// Edges reach this far over their ends, so that no ray slips through a corner.
 const OVERHANG_M: f64 = 1e-9;
 
-impl Outline {
+impl SectionCaster {
     pub fn new(section: &CrossSection) -> Self {
         let mut edges = edges_of(section);
         for side in [1.0, -1.0] {
@@ -166,7 +166,7 @@ impl Outline {
     }
 }
 
-impl Edge {
+impl OutlineEdge {
     fn touches(&self, centre: &Vector2<f64>) -> bool {
         let half = Vector2::repeat(0.5 * CELL_M + 1e-6);
         let end = self.start + self.along * self.length_m;
@@ -188,7 +188,7 @@ impl Edge {
 }
 
 /// The edges of an outline; corners that coincide make none.
-fn edges_of(section: &CrossSection) -> Vec<Edge> {
+fn edges_of(section: &CrossSection) -> Vec<OutlineEdge> {
     let n = section.points.len();
     let mut q_m = 0.0;
     let mut edges = Vec::with_capacity(n);
@@ -203,7 +203,7 @@ fn edges_of(section: &CrossSection) -> Vec<Edge> {
         let length_m = step.norm();
         if length_m > 1e-9 {
             let along = step / length_m;
-            edges.push(Edge {
+            edges.push(OutlineEdge {
                 start: Vector2::new(a.l_m, a.h_m),
                 along,
                 normal: Vector2::new(along.y, -along.x),

@@ -1,0 +1,86 @@
+//! A scene as renderers draw it: painted, and with its lamps as they are at a time.
+
+use super::lamp_field::LampField;
+use super::paint::Paintings;
+use super::scene::Scene;
+use crate::bus::SimTime;
+use crate::track::Tunnel;
+use crate::twin::air::Air;
+use crate::twin::lights::LampLight;
+use crate::twin::reflectance::Wet;
+use std::sync::Arc;
+
+/// A scene with what is worked out of it once.
+pub struct LitScene {
+    /// The line with its cross-sections.
+    pub tunnel: Arc<Tunnel>,
+    /// What there is to see through.
+    pub air: Air,
+    /// Where bed and rails mirror.
+    pub wet: Wet,
+    /// What the tunnel's surfaces look like.
+    pub paintings: Paintings,
+    /// The lamps as they are now.
+    pub lamps: LampField,
+    /// With all that becomes of them.
+    all_lamps: Vec<LampLight>,
+    /// When any of them changes.
+    changes: Vec<SimTime>,
+    /// So many changes are over.
+    passed: usize,
+}
+
+impl LitScene {
+    /// At time 0.
+    pub fn new(scene: Scene) -> Self {
+        let paintings = Paintings::of(&scene.tunnel);
+        Self::painted(scene, paintings)
+    }
+
+    fn painted(scene: Scene, paintings: Paintings) -> Self {
+        let changes = scene.lamps.iter().flat_map(|lamp| &lamp.changes);
+        let mut changes: Vec<_> = changes.map(|change| change.at).collect();
+        changes.sort_unstable();
+        changes.dedup();
+        Self {
+            tunnel: scene.tunnel,
+            air: scene.air,
+            wet: scene.wet,
+            paintings,
+            lamps: LampField::new(&scene.lamps, scene.air),
+            all_lamps: scene.lamps,
+            changes,
+            passed: 0,
+        }
+    }
+
+    /// Takes another scene; whether it had to be painted anew.
+    pub fn replace(&mut self, scene: Scene) -> bool {
+        let anew = self.tunnel.sections != scene.tunnel.sections;
+        let paintings = if anew {
+            Paintings::of(&scene.tunnel)
+        } else {
+            self.paintings.clone()
+        };
+        *self = Self::painted(scene, paintings);
+        anew
+    }
+
+    /// Takes the lamps as they are at a time; whether any has changed since the last call. Until one
+    /// does, all that they light stays as it is: a lamp changes between two jobs, never within one.
+    pub fn follow_lamps(&mut self, time: SimTime) -> bool {
+        let passed = self.changes.partition_point(|at| *at <= time);
+        let changed = passed != self.passed;
+        if changed {
+            self.passed = passed;
+            let lamps: Vec<_> = self.all_lamps.iter().map(|lamp| lamp.at(time)).collect();
+            self.lamps = LampField::new(&lamps, self.air);
+        }
+        changed
+    }
+
+    /// Luminance of endless air about a chainage.
+    pub fn airlight_cd_m2(&self, s_m: f64) -> f64 {
+        self.lamps.airlight_cd_m2(&self.tunnel, s_m)
+    }
+}
