@@ -8,7 +8,7 @@
     reason = "a test fails by panicking"
 )]
 
-use metrotwin::bus::{CameraFault, DangerLevel, Intrinsics, SimTime};
+use metrotwin::bus::{CameraFault, Content, DangerLevel, Intrinsics, Node, SimTime};
 use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{
     Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Summary, run,

@@ -12,7 +12,7 @@
     reason = "a test may fail by panicking, and prints its figures"
 )]
 
-use metrotwin::bus::{Method, SimTime};
+use metrotwin::bus::{Content, Method, SimTime};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
     Distribution, End, Event, Observer, ObserverError, Opening, RunOptions, Summary, run,

@@ -1,7 +1,7 @@
 //! What a wayside device sees, knows and says.
 
 use super::{CameraHealth, CameraModel, PixelBox, SimTime};
-use crate::track::Direction;
+use crate::track::{Direction, TrackId};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3};
 use schemars::JsonSchema;
@@ -112,11 +112,17 @@ pub struct DetectedObstacle {
     pub danger: DangerLevel,
 }
 
-/// What a train tells of itself to the devices along the line.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What a train tells of itself to wayside devices and other trains.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrainReport {
+    /// Its track.
+    pub track: TrackId,
     /// Chainage of its head.
     pub chainage_m: f64,
+    /// One sigma of that.
+    pub sigma_m: f64,
+    /// Its length over couplers.
+    pub length_m: f64,
     /// Which way it runs.
     pub direction: Direction,
     /// Speed that way.

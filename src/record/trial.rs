@@ -391,6 +391,7 @@ impl Session<'_> {
             }
         });
         let report = LedReport {
+            best: Method::Paper,
             eyes: Default::default(),
             dark: Vec::new(),
             time: start,

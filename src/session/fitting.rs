@@ -187,3 +187,6 @@ pub fn train_seed(seed: u64, train: TrainId) -> u64 {
         branch(seed, &train.to_string())
     }
 }
+
+#[cfg(test)]
+mod tests;

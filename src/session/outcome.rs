@@ -118,7 +118,7 @@ mod tests {
                 ..TrainSettings::default()
             };
             let settings = PhysicsSettings {
-                train: Some(train),
+                trains: vec![train],
                 ..PhysicsSettings::default()
             };
             let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
@@ -133,12 +133,12 @@ mod tests {
             };
             let mut outcome = Outcome::default();
             for _ in 0..100 {
-                world.step(&command).unwrap();
-                let train = world.train().unwrap();
-                outcome.on_motion(&train, &world, &tunnel.alignment);
+                world.step(&[command]).unwrap();
+                let train = world.train(TrainId(0)).unwrap();
+                outcome.on_motion(TrainId(0), &train, &world, &tunnel.alignment);
                 outcome.on_cycle(world.time(), &report, 20.0);
             }
-            let protection = outcome.protection(&world).unwrap();
+            let protection = outcome.protection(TrainId(0), &world).unwrap();
             assert_eq!(protection.brake_commanded_s.is_some(), braked);
             assert_eq!(protection.stopped_s, None);
         }
@@ -155,16 +155,22 @@ mod tests {
             ..ObstacleSettings::default()
         };
         let settings = PhysicsSettings {
-            train: None,
+            trains: Vec::new(),
             obstacles: vec![lying(190.0, 2.5), lying(200.0, 0.5), lying(150.0, 0.0)],
             ..PhysicsSettings::default()
         };
         let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
         while world.time().secs() < 1.5 {
-            world.step(&TrainCommand::default()).unwrap();
+            world.step(&[]).unwrap();
         }
-        let margin = margin_m(&world, &tunnel.alignment, 180.0).unwrap();
+        let head_at = |chainage_m| TrainState {
+            chainage_m,
+            ..TrainState::default()
+        };
+        let line = &tunnel.alignment;
+        let margin_m = |head_m| margin_m(TrainId(0), &head_at(head_m), &world, line);
+        let margin = margin_m(180.0).unwrap();
         assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");
-        assert_eq!(margin_m(&world, &tunnel.alignment, 202.0), None);
+        assert_eq!(margin_m(202.0), None);
     }
 }

@@ -60,7 +60,7 @@ fn frames_say_what_the_control_chose() {
         exposure_us = 10.0
         exposure_control = { mode = "auto", max_exposure_us = 40.0 }
     "#;
-    let tunnel = Tunnel::from_toml(include_str!("../../tunnels/test_bench.toml")).unwrap();
+    let tunnel = Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml")).unwrap();
     let scenario = Scenario::new(read_toml(text).unwrap(), tunnel).unwrap();
     let options = RunOptions {
         renderer: RendererChoice::Cpu,

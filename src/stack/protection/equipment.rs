@@ -5,23 +5,25 @@
 
 use super::{Protection, ProtectionSettings};
 use crate::bus::{
-    Content, Message, Node, ObstacleWarning, PositionFix, ProtectionReport, Receiver, SimTime,
-    Ticker, TrainReport,
+    Content, DangerLevel, Message, Node, ObstacleWarning, PositionFix, ProtectionReport, Receiver,
+    SimTime, Ticker, TrainReport,
 };
 use crate::stack::Equipment;
-use crate::track::{Route, Tunnel};
+use crate::track::{Direction, Route, Tunnel};
 use std::sync::Arc;
 
 /// Cycles of the protection a second.
 const CYCLE_HZ: f64 = 10.0;
 
-/// Takes positions, odometer samples, balises and warnings; commands the train, and tells the
-/// wayside devices where it is.
+/// Takes positions, odometer samples, balises, warnings and the reports of other trains; commands the
+/// train, and tells all others where it is.
 #[derive(Debug)]
 pub struct TrainProtection {
     node: Node,
     route: Route,
     protection: Protection,
+    train_length_m: f64,
+    position_sigmas: f64,
     cycles: Ticker,
 }
 
@@ -40,6 +42,8 @@ impl TrainProtection {
         Self {
             node,
             route,
+            train_length_m: settings.train_length_m,
+            position_sigmas: settings.position_sigmas,
             protection: Protection::new(&settings, map),
             cycles: Ticker::new(CYCLE_HZ),
         }
@@ -62,6 +66,32 @@ impl TrainProtection {
             ..warning.clone()
         };
         self.protection.on_warning(&warning, received);
+    }
+
+    /// Another train is an obstacle from its tail to its head, each as far out as its position may be
+    /// wrong, where it last said to be: it does not roll back.
+    fn on_train(&mut self, sender: &Node, report: &TrainReport, received: SimTime) {
+        let Node::Train(id) = sender else {
+            return;
+        };
+        let sign = report.direction.sign();
+        let margin_m = self.position_sigmas * report.sigma_m;
+        let head_m = report.chainage_m + sign * margin_m;
+        let tail_m = report.chainage_m - sign * (report.length_m + margin_m);
+        let (from_chainage_m, to_chainage_m) = match report.direction {
+            Direction::Up => (tail_m, head_m),
+            Direction::Down => (head_m, tail_m),
+        };
+        let warning = ObstacleWarning {
+            device: id.to_string(),
+            number: 0,
+            issued: report.time,
+            danger: DangerLevel::High,
+            from_chainage_m,
+            to_chainage_m,
+            blind: false,
+        };
+        self.on_warning(&warning, received);
     }
 
     /// With the chainages of the track.
@@ -91,6 +121,9 @@ impl Equipment for TrainProtection {
             Content::Warning(warning) => {
                 self.on_warning(warning, message.received_at);
             }
+            Content::Train(report) if report.track == self.route.track => {
+                self.on_train(&message.sender, report, message.received_at);
+            }
             _ => {}
         }
     }
@@ -104,17 +137,15 @@ impl Equipment for TrainProtection {
         let own = |content| Message::own(self.node.clone(), now, content);
         let position = report.position_m.map(|chainage_m| {
             let train = TrainReport {
+                track: self.route.track,
                 chainage_m,
+                sigma_m: report.sigma_m.unwrap_or_default(),
+                length_m: self.train_length_m,
                 direction: self.route.direction,
                 speed_mps: report.speed_mps,
                 time: now,
             };
-            Message::to(
-                Receiver::Posts,
-                self.node.clone(),
-                now,
-                Content::Train(train),
-            )
+            Message::to(Receiver::All, self.node.clone(), now, Content::Train(train))
         });
         let command = own(Content::Command(report.command));
         let report = own(Content::Protection(report));

@@ -104,6 +104,7 @@ pub fn train_distance_m(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::track::Direction;
 
     /// Coordinates worked out by hand on a circle: balise, device and obstacle placed by their
     /// arcs. A wrong term in the formula (asin, eta, sign) misses by metres.
@@ -183,10 +184,12 @@ mod tests {
             };
             let train = TrainReport {
                 chainage_m: 90.0,
+                direction: Direction::Up,
                 speed_mps: 0.0,
                 time: SimTime::ZERO,
+                ..TrainReport::default()
             };
-            let (paper, exact) = train_distance_m(&map, &calibration, train, &obstacle);
+            let (paper, exact) = train_distance_m(&map, &calibration, &train, &obstacle);
             assert!((exact - (s - 90.0)).abs() < 1e-9);
             let error = if curvature.abs() > 0.0 {
                 let arc = calibration.chainage_m - s;

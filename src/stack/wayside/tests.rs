@@ -5,6 +5,7 @@ use super::test_scene::*;
 use super::*;
 use crate::bus::lenses::EUROC;
 use crate::bus::{CameraFault, Distortion, DistortionCoefficients, Intrinsics, SimTime};
+use crate::track::Direction;
 
 const STEADY: fn(u32, u32) -> f64 = |_, _| 1.0;
 
@@ -335,6 +336,7 @@ fn the_train_is_no_obstacle() {
                 direction: Direction::Up,
                 speed_mps: 20.0,
                 time: frame.start.plus(-0.05),
+                ..TrainReport::default()
             };
             let report = d.on_frame(&frame, None, reported.then_some(report).as_slice());
             let behind = |o: &DetectedObstacle| o.to_chainage_m < 183.0;
@@ -371,6 +373,7 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
                 direction: Direction::Up,
                 speed_mps: 0.0,
                 time: frame.start,
+                ..TrainReport::default()
             });
             d.on_frame(&frame, None, train.as_slice()).obstacles.len()
         };
@@ -401,6 +404,7 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
             direction: Direction::Up,
             speed_mps: 0.0,
             time: frame.start,
+            ..TrainReport::default()
         };
         let report = d.on_frame(&frame, None, &[train]);
         if n < 14 {
@@ -463,7 +467,7 @@ fn odd_input_is_survived() {
                     image,
                 },
                 None,
-                None,
+                &[],
             );
         }
     }

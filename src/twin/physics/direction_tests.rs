@@ -9,6 +9,7 @@
 
 use super::testing::{TRAIN, line};
 use super::*;
+use crate::bus::BrakeDemand;
 use crate::track::PlanElement;
 use vehicle::GRAVITY_MPS2;
 

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
-use crate::twin::sensors::{ExposureMode, ExposureSettings, ReadOut, RigError};
+use crate::twin::sensors::{Exposed, ExposureMode, ExposureSettings, ReadOut, RigError};
 
 /// A train that runs along x at 30 m/s from time zero on.
 fn running(time: SimTime) -> Option<Isometry3<f64>> {
