@@ -74,7 +74,9 @@ impl Outcome {
 fn margin_m(id: TrainId, train: &TrainState, world: &World, line: &Alignment) -> Option<f64> {
     let ahead_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
     let obstacles = world.obstacles().filter(|o| fouls(line, o));
-    let obstacles = obstacles.map(|o| ahead_m(o.chainage_m) - o.half_extents_m.x);
+    let near_end_m =
+        |o: ObstacleTruth<'_>| ahead_m(o.chainage_m - train.direction.sign() * o.half_extents_m.x);
+    let obstacles = obstacles.map(near_end_m);
     let others = world.train_ids().filter(|other| *other != id);
     let trains = others.filter_map(|other| {
         let (state, length_m) = (world.train(other)?, world.train_length_m(other)?);
