@@ -5,7 +5,8 @@ use super::file::{BenchSettings, ScenarioFile, StackSettings};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::WaysideCalibration;
-use crate::track::{FileError, Problem, Tunnel, key_below, read_toml};
+use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
+use crate::track::Tunnel;
 use crate::twin::air::AirSettings;
 use crate::twin::comms::RadioSettings;
 use crate::twin::faults::FaultSettings;
@@ -147,7 +148,7 @@ impl Scenario {
         read_meshes(&mut file, folder, &mut problems);
         // What could not be read would be missed once more.
         if problems.is_empty() {
-            check::alone(&file, &mut problems);
+            file.check("", &mut problems);
         }
         let tunnel_path = folder.join(&file.tunnel);
         let tunnel = match std::fs::read_to_string(&tunnel_path) {
@@ -167,7 +168,7 @@ impl Scenario {
             Some(Ok(tunnel)) => tunnel,
             _ => return Err(wrong(FileError::Problems(problems))),
         };
-        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         if !problems.is_empty() {
             return Err(wrong(FileError::Problems(problems)));
         }
@@ -177,8 +178,8 @@ impl Scenario {
     /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
     pub fn new(file: ScenarioFile, tunnel: Tunnel) -> Result<Self, FileError> {
         let mut problems = Vec::new();
-        check::alone(&file, &mut problems);
-        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        file.check("", &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         if problems.is_empty() {
             Ok(Self::put_together(file, tunnel, wayside))
         } else {

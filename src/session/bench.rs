@@ -182,7 +182,7 @@ impl<'s> Bench<'s> {
 mod tests {
     use super::*;
     use crate::session::{ObserverError, RendererChoice, run};
-    use crate::track::read_toml;
+    use crate::settings::read_toml;
     use crate::twin::render::View;
 
     /// Exposures and gains as pairs are drawn, as their frames say, and by how much fixes are off the

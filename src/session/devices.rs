@@ -286,7 +286,7 @@ const STRIDE_REACH_M: f64 = 0.4;
 mod tests {
     use super::*;
     use crate::bus::TrainCommand;
-    use crate::track::read_toml;
+    use crate::settings::read_toml;
     use crate::twin::sensors::ExposureMode;
 
     const TUNNEL: &str = include_str!("../../tunnels/chengdu_line1.toml");

@@ -72,7 +72,8 @@ fn clock(period_s: f64) -> Clock {
 mod tests {
     use super::*;
     use crate::bus::TrainCommand;
-    use crate::track::{Tunnel, read_toml};
+    use crate::settings::read_toml;
+    use crate::track::Tunnel;
 
     const TUNNEL: &str = include_str!("../../tunnels/chengdu_line1.toml");
 

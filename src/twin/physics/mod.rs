@@ -92,7 +92,7 @@ pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
-pub use settings::{PhysicsSettings, TrackSettings, TrainSettings};
+pub use settings::{PhysicsSettings, STEP_S, TrackSettings, TrainSettings};
 pub use truth::{Belonging, BodyOwner, ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
     BodyFile, BogieFile, CouplerFile, PrimaryFile, SecondaryFile, VehicleFile, WheelsetFile,
@@ -101,7 +101,8 @@ pub use wheelset::{WheelExtremes, WheelForces};
 pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{BrakeDemand, SimTime, TrainCommand};
-use crate::track::{Problem, Tunnel};
+use crate::settings::{Problem, Settings};
+use crate::track::Tunnel;
 use crate::twin::render::{Body, Headlight};
 use irregularity::Irregularity;
 use line::Line;

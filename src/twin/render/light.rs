@@ -42,7 +42,7 @@
 //! the halo of lamps through it, are left out.
 
 use super::scene::{Air, Body, Headlight, LampLight};
-use crate::track::uid::{LightCurve, Ripple, Waveform};
+use crate::track::waveform::{LightCurve, Ripple, Waveform};
 use crate::track::{LampSite, TrackPoint, Tunnel};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::{PI, TAU};

@@ -6,7 +6,7 @@ use super::sensor::{LensSettings, SensorSettings};
 use super::surface::SATURATION;
 use crate::bus::{CameraModel, SimTime};
 use crate::track::Tunnel;
-use crate::track::uid::{Ripple, Waveform};
+use crate::track::waveform::{Ripple, Waveform};
 use crate::twin::random::Stream;
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::sync::Arc;

@@ -1,7 +1,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
 use crate::bus::{Shutter, SimTime};
-use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
+use crate::track::uid::{ChipFrame, Uid};
+use crate::track::waveform::{Ripple, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };
