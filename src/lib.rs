@@ -9,6 +9,7 @@
 //!
 //! | room | what it holds |
 //! |---|---|
+//! | [`settings`] | how files are read, declared and checked |
 //! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices |
 //! | [`bus`] | what travels between the world and the stack, as plain data |
 //! | [`stack`] | the real thing: lamp decoding, positioning, obstacle detection, protection |
@@ -23,6 +24,7 @@
 //! train or in a wayside box. The feature `twin` (on by default) adds the rest.
 
 pub mod bus;
+pub mod settings;
 pub mod stack;
 pub mod track;
 

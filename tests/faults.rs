@@ -13,7 +13,8 @@ use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{
     Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Summary, run,
 };
-use metrotwin::track::{Tunnel, read_toml};
+use metrotwin::settings::read_toml;
+use metrotwin::track::Tunnel;
 use metrotwin::twin::faults::{FaultSettings, age};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;

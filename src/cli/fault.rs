@@ -1,7 +1,7 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
 use crate::scenario::{Override, ScenarioError};
-use crate::track::{FileError, Problem, locate};
+use crate::settings::{FileError, Problem, locate};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report, Severity};
 use std::fmt;
 use std::path::Path;

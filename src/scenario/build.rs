@@ -5,9 +5,10 @@ use super::file::{BenchSettings, OnboardEquipment, ScenarioFile, StackSettings};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::{TrainId, WaysideCalibration};
+use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
-use crate::track::{Direction, FileError, Problem, Tunnel, key_below, read_toml};
+use crate::track::{Direction, Tunnel};
 use crate::twin::air::AirSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
@@ -220,7 +221,7 @@ impl Scenario {
         read_meshes(&mut file, folder, &mut problems);
         // What could not be read would be missed once more.
         if problems.is_empty() {
-            check::alone(&file, &mut problems);
+            file.check("", &mut problems);
         }
         let tunnel_path = folder.join(&file.tunnel);
         let tunnel = match std::fs::read_to_string(&tunnel_path) {
@@ -240,7 +241,7 @@ impl Scenario {
             Some(Ok(tunnel)) => tunnel,
             _ => return Err(wrong(FileError::Problems(problems))),
         };
-        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         if !problems.is_empty() {
             return Err(wrong(FileError::Problems(problems)));
         }
@@ -250,8 +251,8 @@ impl Scenario {
     /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
     pub fn new(file: ScenarioFile, tunnel: Tunnel) -> Result<Self, FileError> {
         let mut problems = Vec::new();
-        check::alone(&file, &mut problems);
-        let wayside = check::in_tunnel(&file, &tunnel, &mut problems);
+        file.check("", &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         if problems.is_empty() {
             Ok(Self::put_together(file, tunnel, wayside))
         } else {

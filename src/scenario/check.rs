@@ -2,172 +2,125 @@
 
 use super::WaysidePost;
 use super::file::{ScenarioFile, WaysidePostSettings};
-use crate::track::{Direction, Problem, Tunnel, did_you_mean};
+use crate::settings::{Checker, did_you_mean};
+use crate::track::{Direction, Tunnel};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{RigSettings, ever_sees};
 
-/// Checks that need no tunnel.
-pub(super) fn alone(file: &ScenarioFile, problems: &mut Vec<Problem>) {
-    check_name(&file.name, problems);
-    let duration = file.duration_s;
-    Problem::unless_within(problems, "duration_s", duration, 1e-3..=86_400.0, "s");
-    if let Some(standstill) = file.stop_after_standstill_s {
-        let key = "stop_after_standstill_s";
-        Problem::unless_within(problems, key, standstill, 0.0..=86_400.0, "s");
-    }
-    if file.train.is_none() && !file.other_trains.is_empty() {
-        problems.push(Problem::new(
-            "other_trains",
-            "there is no first train that they are added to",
-            "call the first of them [train]",
-        ));
-    } else {
-        file.physics().check("", problems);
-    }
-    file.survey.check("survey", problems);
-    file.imu.check("imu", problems);
-    file.odometer.check("odometer", problems);
-    if let Some(doppler) = &file.doppler {
-        doppler.check("doppler", problems);
-    }
-    file.radio.check("radio", problems);
-    file.stack.check("stack", problems);
-    file.record.check("record", problems);
-    if let Some(study) = &file.study {
-        study.check("study", problems);
-    }
-    if let Some(bench) = &file.bench {
-        bench.check("bench", problems);
-    }
-    if let Some(rig) = &file.rig {
-        rig.check("rig", problems);
-    }
-    check_onboard(file, problems);
-    for (k, post) in file.wayside.iter().enumerate() {
-        post.camera.check(&format!("wayside[{k}].camera"), problems);
-        if let Some(lidar) = &post.lidar {
-            lidar.check(&format!("wayside[{k}].lidar"), problems);
+impl ScenarioFile {
+    /// What needs no tunnel.
+    pub(super) fn check_together(&self, check: &mut Checker<'_>) {
+        check_name(&self.name, check);
+        if self.train.is_none() && !self.other_trains.is_empty() {
+            check.problem(
+                "other_trains",
+                "there is no first train that they are added to",
+                "call the first of them [train]",
+            );
+        } else {
+            self.physics().check_together(check);
         }
-        if file.wayside[..k].iter().any(|p| p.device == post.device) {
-            problems.push(Problem::new(
-                format!("wayside[{k}].device"),
-                format!("`{}` is in use already", post.device),
-                "name each device once",
-            ));
+        check_onboard(self, check);
+        for (k, post) in self.wayside.iter().enumerate() {
+            if self.wayside[..k].iter().any(|p| p.device == post.device) {
+                check.problem(
+                    &format!("wayside[{k}].device"),
+                    format!("`{}` is in use already", post.device),
+                    "name each device once",
+                );
+            }
         }
+        check_faulty_cameras(self, check);
+        check_carrier(self, check);
+        check_motion(self, check);
+        check_appearances(self, check);
     }
-    file.air.check("air", problems);
-    file.faults.check("faults", problems);
-    check_faulty_cameras(file, problems);
-    check_carrier(file, problems);
-    check_motion(file, problems);
-    check_appearances(file, problems);
 }
 
 /// Checks against the line, and the wayside devices at their places.
 pub(super) fn in_tunnel(
     file: &ScenarioFile,
     tunnel: &Tunnel,
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) -> Vec<WaysidePost> {
-    file.faults.check_in(tunnel, "faults", problems);
-    check_trains(file, tunnel, problems);
+    file.faults.check_in(tunnel, &mut check.below("faults"));
+    check_trains(file, tunnel, check);
     if let Some(bench) = &file.bench {
         let heads: Vec<f64> = bench.heads_m().collect();
         for (key, head) in [("first_m", heads.first()), ("points", heads.last())] {
             if let Some(&head_m) = head {
-                inside_line(
-                    &format!("bench.{key}"),
-                    "the head",
-                    head_m,
-                    tunnel,
-                    problems,
-                );
+                inside_line(&format!("bench.{key}"), "the head", head_m, tunnel, check);
             }
         }
     }
-    check_obstacles(file, tunnel, problems);
-    check_cables(file, tunnel, problems);
-    check_workers(file, tunnel, problems);
+    check_obstacles(file, tunnel, check);
+    check_cables(file, tunnel, check);
+    check_workers(file, tunnel, check);
     if let Some(rig) = &file.rig {
-        check_view(rig, tunnel, problems);
+        check_view(rig, tunnel, check);
     }
     let posts = file.wayside.iter().enumerate();
     posts
-        .filter_map(|(k, post)| place(post, &format!("wayside[{k}]"), tunnel, problems))
+        .filter_map(|(k, post)| place(post, &format!("wayside[{k}]"), tunnel, check))
         .collect()
 }
 
 /// Sensors and equipment of other trains, each of a train that there is, and named once.
-fn check_onboard(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let others = file.other_trains.len();
     for (k, onboard) in file.onboard.iter().enumerate() {
-        let at = format!("onboard[{k}]");
-        if let Some(rig) = &onboard.rig {
-            rig.check(&format!("{at}.rig"), problems);
-        }
-        if let Some(doppler) = &onboard.doppler {
-            doppler.check(&format!("{at}.doppler"), problems);
-        }
-        onboard.imu.check(&format!("{at}.imu"), problems);
-        onboard.odometer.check(&format!("{at}.odometer"), problems);
-        onboard.led.check(&format!("{at}.led"), problems);
-        (onboard.protection).check(&format!("{at}.protection"), problems);
-        let (number, others) = (usize::from(onboard.train), file.other_trains.len());
+        let number = usize::from(onboard.train);
         let twice = file.onboard[..k].iter().any(|o| o.train == onboard.train);
-        if number == 0 || number > others || twice {
-            problems.push(Problem::new(
-                format!("{at}.train"),
-                if twice {
-                    format!("train {number} has its equipment already")
-                } else {
-                    format!("there is no other train {number}")
-                },
-                match others {
-                    0 => "add it to [[other_trains]]".to_owned(),
-                    1 => "give 1: the one of [[other_trains]]".to_owned(),
-                    most => {
-                        format!("give 1 to {most}, each once, in the order of [[other_trains]]")
-                    }
-                },
-            ));
-        }
+        let what = if twice {
+            format!("train {number} has its equipment already")
+        } else if number == 0 || number > others {
+            format!("there is no other train {number}")
+        } else {
+            continue;
+        };
+        let remedy = match others {
+            0 => "add it to [[other_trains]]".to_owned(),
+            1 => "give 1: the one of [[other_trains]]".to_owned(),
+            most => format!("give 1 to {most}, each once, in the order of [[other_trains]]"),
+        };
+        check.problem(&format!("onboard[{k}].train"), what, remedy);
     }
 }
 
-fn check_name(name: &str, problems: &mut Vec<Problem>) {
+fn check_name(name: &str, check: &mut Checker<'_>) {
     let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     if name.is_empty() || !name.chars().all(fit) {
-        problems.push(Problem::new(
+        check.problem(
             "name",
             format!("`{name}` cannot name a folder of results"),
             "use letters, digits, `_` and `-`",
-        ));
+        );
     }
 }
 
 /// Something must move or look, and only one thing may carry the rig.
-fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
     match (&file.train, &file.bench, &file.rig) {
-        (Some(_), Some(_), _) => problems.push(Problem::new(
+        (Some(_), Some(_), _) => check.problem(
             "bench",
             "there is a train too, and the rig can be on one of them only",
             "take out [bench] or [train]",
-        )),
-        (None, Some(_), None) => problems.push(Problem::new(
+        ),
+        (None, Some(_), None) => check.problem(
             "bench",
             "there is no rig to stand at its points",
             "add [rig]; empty, it is the reference rig",
-        )),
-        (None, None, Some(_)) => problems.push(Problem::new(
+        ),
+        (None, None, Some(_)) => check.problem(
             "rig",
             "there is nothing that carries it",
             "add [train], or [bench] for a rig at rest",
-        )),
-        (None, None, None) if file.wayside.is_empty() => problems.push(Problem::new(
+        ),
+        (None, None, None) if file.wayside.is_empty() => check.problem(
             "train",
             "there is no train, no bench and no wayside device: nothing would be seen",
             "add [train] with [rig], [bench] with [rig], or [[wayside]]",
-        )),
+        ),
         _ => {}
     }
     if file.bench.is_none() {
@@ -181,17 +134,17 @@ fn check_carrier(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         ("workers", file.workers.len()),
     ] {
         if count > 0 {
-            problems.push(Problem::new(
+            check.problem(
                 key,
                 "a bench test has the rig and the lamps only: they would not be there",
                 format!("take out [bench] or [[{key}]]"),
-            ));
+            );
         }
     }
 }
 
 /// A fault of a camera that is not there would go unnoticed.
-fn check_faulty_cameras(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+fn check_faulty_cameras(file: &ScenarioFile, check: &mut Checker<'_>) {
     let eyes = ["rig", "left", "right"].map(str::to_owned);
     let eyes = eyes.into_iter().filter(|_| file.rig.is_some());
     let devices = file.wayside.iter().map(|post| post.device.clone());
@@ -203,31 +156,31 @@ fn check_faulty_cameras(file: &ScenarioFile, problems: &mut Vec<Problem>) {
                 None if names.is_empty() => "add [rig] or [[wayside]], or take this out".to_owned(),
                 None => format!("cameras of this scenario: {}", names.join(", ")),
             };
-            problems.push(Problem::new(
-                format!("faults.cameras[{k}].camera"),
+            check.problem(
+                &format!("faults.cameras[{k}].camera"),
                 format!("there is no camera `{}`", fault.camera),
                 remedy,
-            ));
+            );
         }
         if file.bench.is_some() && fault.late_s() > 0.0 {
-            problems.push(Problem::new(
-                format!("faults.cameras[{k}].fault.by_ms"),
+            check.problem(
+                &format!("faults.cameras[{k}].fault.by_ms"),
                 "a rig at rest on a bench does not wait for its images: they cannot be late",
                 "take this out",
-            ));
+            );
         }
     }
 }
 
 /// The sensors of motion need the part of the train that they sit on.
-fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
+fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
     let Some(train) = &file.train else {
         if file.doppler.is_some() {
-            problems.push(Problem::new(
+            check.problem(
                 "doppler",
                 "there is no train that carries it",
                 "add [train], or take this out",
-            ));
+            );
         }
         return;
     };
@@ -235,39 +188,39 @@ fn check_motion(file: &ScenarioFile, problems: &mut Vec<Problem>) {
     let axles = train.axles().max(1);
     let axle = file.odometer.axle;
     if axle > axles {
-        problems.push(Problem::new(
+        check.problem(
             "odometer.axle",
             format!("the train has {axles} wheelsets, not {axle}"),
             format!("give 1 to {axles}"),
-        ));
+        );
     }
 }
 
-fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
-    let late = |problems: &mut Vec<Problem>, key: String, what: &str, at_s: f64| {
+fn check_appearances(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let late = |check: &mut Checker<'_>, key: String, what: &str, at_s: f64| {
         if at_s > file.duration_s {
-            problems.push(Problem::new(
-                key,
+            check.problem(
+                &key,
                 format!(
                     "{what} at {at_s} s, but the run ends at {} s",
                     file.duration_s
                 ),
                 "choose an earlier time, or a longer duration_s",
-            ));
+            );
         }
     };
     for (k, obstacle) in file.obstacles.iter().enumerate() {
         let key = format!("obstacles[{k}].appears_s");
-        late(problems, key, "it appears", obstacle.appears_s);
+        late(check, key, "it appears", obstacle.appears_s);
         if let Some(at_s) = obstacle.held_until_s {
             let key = format!("obstacles[{k}].held_until_s");
-            late(problems, key, "it comes loose", at_s);
+            late(check, key, "it comes loose", at_s);
         }
     }
     for (k, cable) in file.cables.iter().enumerate() {
         for (end, at_s) in [("from", cable.from.lets_go_s), ("to", cable.to.lets_go_s)] {
             let key = format!("cables[{k}].{end}.lets_go_s");
-            late(problems, key, "it lets go", at_s.unwrap_or_default());
+            late(check, key, "it lets go", at_s.unwrap_or_default());
         }
     }
     for (k, worker) in file.workers.iter().enumerate() {
@@ -276,36 +229,36 @@ fn check_appearances(file: &ScenarioFile, problems: &mut Vec<Problem>) {
         };
         let key = format!("workers[{k}].puts_down_s");
         if worker.carries.is_none() {
-            problems.push(Problem::new(
-                key.clone(),
+            check.problem(
+                &key,
                 "he carries nothing that he could put down",
                 format!("add [workers.carries] to workers[{k}], or take this out"),
-            ));
+            );
         }
-        late(problems, key, "he puts it down", at_s);
+        late(check, key, "he puts it down", at_s);
         if let Some(at_s) = worker.picks_up_s {
             let key = format!("workers[{k}].picks_up_s");
-            late(problems, key, "he picks it up", at_s);
+            late(check, key, "he picks it up", at_s);
         }
     }
 }
 
 /// Each on the line, and no two in the same place.
-fn check_trains(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+fn check_trains(file: &ScenarioFile, tunnel: &Tunnel, check: &mut Checker<'_>) {
     for (k, train) in file.trains().enumerate() {
         let at = file.train_key(k);
-        check_train(&at, train, file.duration_s, tunnel, problems);
+        check_train(&at, train, file.duration_s, tunnel, check);
         let [from_m, to_m] = stands_m(train);
         let before = file.trains().take(k).position(|other| {
             let [other_from_m, other_to_m] = stands_m(other);
             from_m < other_to_m && other_from_m < to_m
         });
         if let Some(other) = before.map(|other| file.train_key(other)) {
-            problems.push(Problem::new(
-                format!("{at}.start_chainage_m"),
+            check.problem(
+                &format!("{at}.start_chainage_m"),
                 format!("it stands from {from_m:.1} to {to_m:.1} m, where `{other}` stands too"),
                 "start them clear of each other",
-            ));
+            );
         }
     }
 }
@@ -332,40 +285,40 @@ fn check_train(
     train: &TrainSettings,
     duration_s: f64,
     tunnel: &Tunnel,
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) {
     let start_key = format!("{at}.start_chainage_m");
     let stop_key = format!("{at}.stop_at_m");
     let end_m = tunnel.alignment.length_m();
     let head_m = train.start_chainage_m;
     let length_m = train.length_m();
-    inside_line(&start_key, "the train head", head_m, tunnel, problems);
+    inside_line(&start_key, "the train head", head_m, tunnel, check);
     let (begins_outside, first_m) = match train.direction {
         Direction::Up => (head_m < length_m, length_m),
         Direction::Down => (head_m > end_m - length_m, end_m - length_m),
     };
     let way = way(train);
     if begins_outside {
-        problems.push(Problem::new(
-            start_key,
+        check.problem(
+            &start_key,
             format!("with its head at {head_m} m a train of {length_m:.1} m begins outside"),
             format!("start at {first_m:.1} m or further {way} the line"),
-        ));
+        );
     }
     if let Some(stop_m) = train.stop_at_m {
-        inside_line(&stop_key, "the train head", stop_m, tunnel, problems);
+        inside_line(&stop_key, "the train head", stop_m, tunnel, check);
     } else {
         let reach_m = head_m + train.direction.sign() * farthest_run_m(train, duration_s);
         if !(0.0..=end_m).contains(&reach_m) {
             let last_m = reach_m.clamp(0.0, end_m);
-            problems.push(Problem::new(
-                stop_key,
+            check.problem(
+                &stop_key,
                 format!(
                     "it is not given, and in {duration_s} s the train can get to {reach_m:.0} m, \
                      past the end of the tunnel at {last_m:.0} m"
                 ),
                 format!("give a stop_at_m {way} to {last_m:.0} m, or shorten duration_s"),
-            ));
+            );
         }
     }
 }
@@ -380,7 +333,7 @@ fn farthest_run_m(train: &TrainSettings, duration_s: f64) -> f64 {
     waited_m + (start + 0.5 * train.accel_mps2 * ramp_s) * ramp_s + top * (driven_s - ramp_s)
 }
 
-fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, check: &mut Checker<'_>) {
     'obstacles: for (k, o) in file.obstacles.iter().enumerate() {
         let key = format!("obstacles[{k}].chainage_m");
         let Some(middle_m) = o.middle_m() else {
@@ -389,14 +342,14 @@ fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Prob
         let spread = if o.count > 1 { o.spread_m } else { [0.0; 3] };
         for side in [-1.0, 1.0] {
             let s_m = o.chainage_m + side * spread[0];
-            if !inside_line(&key, "it", s_m, tunnel, problems) {
+            if !inside_line(&key, "it", s_m, tunnel, check) {
                 break;
             }
             let at = format!("obstacles[{k}].lateral_m");
             for (across, up) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                 let l_m = o.lateral_m + across * spread[1];
                 let h_m = middle_m + up * spread[2];
-                if !in_the_open(&at, s_m, l_m, h_m, tunnel, problems) {
+                if !in_the_open(&at, s_m, l_m, h_m, tunnel, check) {
                     continue 'obstacles;
                 }
             }
@@ -404,38 +357,38 @@ fn check_obstacles(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Prob
     }
 }
 
-fn check_cables(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+fn check_cables(file: &ScenarioFile, tunnel: &Tunnel, check: &mut Checker<'_>) {
     for (k, cable) in file.cables.iter().enumerate() {
         let at = format!("cables[{k}]");
         let mut inside = true;
         for (key, end) in [("from", &cable.from), ("to", &cable.to)] {
             let (s_m, l_m) = (end.chainage_m, end.lateral_m);
             let at = format!("{at}.{key}");
-            inside &= inside_line(&format!("{at}.chainage_m"), "it", s_m, tunnel, problems)
+            inside &= inside_line(&format!("{at}.chainage_m"), "it", s_m, tunnel, check)
                 && in_the_open(
                     &format!("{at}.lateral_m"),
                     s_m,
                     l_m,
                     end.height_m,
                     tunnel,
-                    problems,
+                    check,
                 );
         }
         if inside {
-            cable.check_reach(&at, &tunnel.alignment, problems);
+            cable.check_reach(&tunnel.alignment, &mut check.below(&at));
         }
     }
 }
 
-fn check_workers(file: &ScenarioFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+fn check_workers(file: &ScenarioFile, tunnel: &Tunnel, check: &mut Checker<'_>) {
     for (k, worker) in file.workers.iter().enumerate() {
         for (j, p) in worker.path.iter().enumerate() {
             let at = format!("workers[{k}].path[{j}]");
             let key = format!("{at}.chainage_m");
-            if inside_line(&key, "he", p.chainage_m, tunnel, problems) {
+            if inside_line(&key, "he", p.chainage_m, tunnel, check) {
                 let middle_m = worker.ground_m + 0.5 * worker.stature_m;
                 let at = format!("{at}.lateral_m");
-                in_the_open(&at, p.chainage_m, p.lateral_m, middle_m, tunnel, problems);
+                in_the_open(&at, p.chainage_m, p.lateral_m, middle_m, tunnel, check);
             }
         }
     }
@@ -446,16 +399,16 @@ fn inside_line(
     who: &str,
     chainage_m: f64,
     tunnel: &Tunnel,
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) -> bool {
     let end_m = tunnel.alignment.length_m();
     let inside = (0.0..=end_m).contains(&chainage_m);
     if !inside {
-        problems.push(Problem::new(
+        check.problem(
             key,
             format!("{who} would be at {chainage_m} m, outside of the tunnel"),
             format!("the line runs from 0 to {end_m:.1} m"),
-        ));
+        );
     }
     inside
 }
@@ -466,30 +419,30 @@ fn in_the_open(
     lateral_m: f64,
     height_m: f64,
     tunnel: &Tunnel,
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) -> bool {
     let section = tunnel.section_at(chainage_m);
     let open = section.is_none_or(|section| section.contains(lateral_m, height_m));
     if !open {
-        problems.push(Problem::new(
+        check.problem(
             key,
             format!(
                 "{lateral_m} m to the left and {height_m:.2} m above top of rail is inside the \
                  wall at chainage {chainage_m} m"
             ),
             "bring it nearer to the centreline (0 m), or check its height",
-        ));
+        );
     }
     open
 }
 
-fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
+fn check_view(rig: &RigSettings, tunnel: &Tunnel, check: &mut Checker<'_>) {
     if tunnel.lamps.is_empty() {
-        problems.push(Problem::new(
+        check.problem(
             "rig",
             format!("tunnel `{}` has no lamps to see", tunnel.name),
             "choose a tunnel with lamps, or take out [rig]",
-        ));
+        );
         return;
     }
     let calibration = rig.calibration();
@@ -498,7 +451,7 @@ fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
         .iter()
         .any(|lamp| ever_sees(&calibration, tunnel, lamp))
     {
-        problems.push(Problem::new(
+        check.problem(
             "rig.yaw_deg",
             format!(
                 "turned {} deg to the left and {} deg up, the rig never sees a whole lamp with \
@@ -506,7 +459,7 @@ fn check_view(rig: &RigSettings, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
                 rig.yaw_deg, rig.pitch_deg
             ),
             "turn it towards the lamps; the reference rig has yaw_deg = 39, pitch_deg = 22",
-        ));
+        );
     }
 }
 
@@ -514,21 +467,21 @@ fn place(
     post: &WaysidePostSettings,
     at: &str,
     tunnel: &Tunnel,
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) -> Option<WaysidePost> {
     let Some(site) = tunnel.wayside.iter().find(|site| site.name == post.device) else {
-        problems.push(unknown_device(post, at, tunnel));
+        unknown_device(post, at, tunnel, check);
         return None;
     };
     let with_lidar = post.lidar.is_some();
     let calibration = post.camera.calibration(site, tunnel, with_lidar);
     let actual = post.camera.actual(site, tunnel, with_lidar);
     if calibration.is_none() {
-        problems.push(Problem::new(
-            format!("{at}.device"),
+        check.problem(
+            &format!("{at}.device"),
             format!("its balise `{}` is not in the tunnel", site.balise),
             "name a balise of the tunnel in the tunnel file",
-        ));
+        );
     }
     (calibration.zip(actual)).map(|(calibration, actual)| WaysidePost {
         calibration,
@@ -539,7 +492,7 @@ fn place(
     })
 }
 
-fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Problem {
+fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel, check: &mut Checker<'_>) {
     let names: Vec<String> = tunnel
         .wayside
         .iter()
@@ -550,14 +503,14 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
         None if names.is_empty() => "add [[wayside]] to the tunnel file".to_owned(),
         None => format!("devices of this tunnel: {}", names.join(", ")),
     };
-    Problem::new(
-        format!("{at}.device"),
+    check.problem(
+        &format!("{at}.device"),
         format!(
             "tunnel `{}` has no wayside device `{}`",
             tunnel.name, post.device
         ),
         remedy,
-    )
+    );
 }
 
 #[cfg(test)]
@@ -565,13 +518,15 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel) -> Prob
 mod tests {
     use super::*;
     use crate::bus::TrainId;
-    use crate::track::read_toml;
+    use crate::settings::{Settings, read_toml};
     use crate::twin::render::gpu::layout::MAX_HEADLIGHTS;
 
     fn keys(rest: &str) -> Vec<String> {
         let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
         let mut problems = Vec::new();
-        alone(&read_toml(&text).unwrap(), &mut problems);
+        read_toml::<ScenarioFile>(&text)
+            .unwrap()
+            .check("", &mut problems);
         problems.into_iter().map(|p| p.key).collect()
     }
 
@@ -595,16 +550,16 @@ mod tests {
                 "name = \"test\"\ntunnel = \"given\"\n[train]\nstop_at_m = 900.0\n[rig]\n\
                  [[wayside]]\ndevice = \"W1530\"\n{faults}"
             );
-            let (file, mut problems) = (read_toml(&text).unwrap(), Vec::new());
-            alone(&file, &mut problems);
-            in_tunnel(&file, &tunnel, &mut problems);
+            let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
+            file.check("", &mut problems);
+            in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
             problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
         };
         let lamp = |rest: &str| keys(&format!("[[faults.lamps]]\n{rest}\n"));
         assert_eq!(lamp("share = 0.22\nfault = { kind = 'dead' }"), [""; 0]);
         let bad = "share = 1.5\nfault = { kind = 'dim', level = -0.1 }\nfrom_s = 5.0\nto_s = 4.0";
         let at = "faults.lamps[0]";
-        let expected = ["to_s", "share", "fault.level"].map(|key| format!("{at}.{key}"));
+        let expected = ["share", "fault.level", "to_s"].map(|key| format!("{at}.{key}"));
         assert_eq!(lamp(bad), expected);
         let flicker = "fault = { kind = 'flicker', depth = 2.0, frequency_hz = 0.0 }";
         let expected = ["depth", "frequency_hz"].map(|key| format!("{at}.fault.{key}"));
@@ -657,7 +612,8 @@ mod tests {
                  stop_at_m = 2500.0\n"
             );
             let mut problems = Vec::new();
-            in_tunnel(&read_toml(&text).unwrap(), &tunnel, &mut problems);
+            let mut check = Checker::new("", &mut problems);
+            in_tunnel(&read_toml(&text).unwrap(), &tunnel, &mut check);
             problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
         };
         assert_eq!(keys(420.0), [""; 0]);
@@ -676,9 +632,9 @@ mod tests {
                  start_chainage_m = 300.0\nstop_at_m = 600.0\n[[other_trains]]\n\
                  direction = \"down\"\nstart_chainage_m = {start_m}\n{rest}"
             );
-            let (file, mut problems) = (read_toml(&text).unwrap(), Vec::new());
-            alone(&file, &mut problems);
-            in_tunnel(&file, &tunnel, &mut problems);
+            let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
+            file.check("", &mut problems);
+            in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
             problems
         };
         let keys = |start_m: f64, rest: &str| -> Vec<String> {

@@ -2,16 +2,16 @@
 
 use super::RecordSettings;
 use super::draw::StudySettings;
+use crate::settings::settings;
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
-use crate::track::Problem;
 use crate::twin::air::AirSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
 use crate::twin::physics::{
-    CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, TrackSettings, TrainSettings,
-    WorkerSettings, train_key,
+    CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, STEP_S, TrackSettings,
+    TrainSettings, WorkerSettings, train_key,
 };
 use crate::twin::sensors::{
     DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -22,91 +22,86 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A metrotwin scenario: one run, said in full.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct ScenarioFile {
-    /// Short name: letters, digits, `_` and `-`. Results go to `out/<name>` by default.
-    pub name: String,
-    /// What it shows, in a sentence or two. Default empty.
-    #[serde(default)]
-    pub description: String,
-    /// Tunnel file; a relative path counts from this file's folder.
-    pub tunnel: String,
-    /// Everything random follows from it. Default 1.
-    #[serde(default = "default_seed")]
-    pub seed: u64,
-    /// Simulated time, s. A bench run ends after its last point instead. Default 60.
-    #[serde(default = "default_duration_s")]
-    pub duration_s: f64,
-    /// End earlier, once the train has run and then stood for this long, s. Default: never.
-    #[serde(default)]
-    pub stop_after_standstill_s: Option<f64>,
-    /// Time step of the physics, s. Default 0.001.
-    #[serde(default = "default_step_s")]
-    pub step_s: f64,
-    /// How well the lamps of the map that the stack is given were surveyed. Default: without
-    /// error.
-    #[serde(default)]
-    pub survey: SurveySettings,
-    /// How even the track is. Default: German spectra, low disturbance.
-    #[serde(default)]
-    pub track: TrackSettings,
-    /// The train and how it is driven. Default: no train.
-    #[serde(default)]
-    pub train: Option<TrainSettings>,
-    /// Other trains on the line, up to seven: each with a driver of its own, whom nothing supervises.
-    /// Default: none.
-    #[serde(default)]
-    pub other_trains: Vec<TrainSettings>,
-    /// A still rig moved from point to point, in place of a train. Default: none.
-    #[serde(default)]
-    pub bench: Option<BenchSettings>,
-    /// Things that lie or fall on the line. Default: none.
-    #[serde(default)]
-    pub obstacles: Vec<ObstacleSettings>,
-    /// Cables that hang on the wall. Default: none.
-    #[serde(default)]
-    pub cables: Vec<CableSettings>,
-    /// People on the line. Default: none.
-    #[serde(default)]
-    pub workers: Vec<WorkerSettings>,
-    /// The stereo rig on the train head. Default: no rig, so no positioning by lamps.
-    #[serde(default)]
-    pub rig: Option<RigSettings>,
-    /// The inertial unit on the train. Default: ADIS16488 class.
-    #[serde(default)]
-    pub imu: ImuSettings,
-    /// The odometer on the train.
-    #[serde(default)]
-    pub odometer: OdometerSettings,
-    /// A Doppler radar on the train. Default: none.
-    #[serde(default)]
-    pub doppler: Option<DopplerSettings>,
-    /// Sensors and equipment of other trains. Default: none.
-    #[serde(default)]
-    pub onboard: Vec<OnboardSettings>,
-    /// Wayside devices in use, each at a place that the tunnel file names. Default: none.
-    #[serde(default)]
-    pub wayside: Vec<WaysidePostSettings>,
-    /// The radio from wayside devices to the train.
-    #[serde(default)]
-    pub radio: RadioSettings,
-    /// What one sees through. Default: clear air.
-    #[serde(default)]
-    pub air: AirSettings,
-    /// Lamps and cameras that are out of order. Default: none.
-    #[serde(default)]
-    pub faults: FaultSettings,
-    /// The stack: positioning, detection, protection.
-    #[serde(default)]
-    pub stack: StackSettings,
-    /// What goes into the recording.
-    #[serde(default)]
-    pub record: RecordSettings,
-    /// What varies from run to run, for `generate` and `study`. Default: nothing.
-    #[serde(default)]
-    pub study: Option<StudySettings>,
+settings! {
+    /// A metrotwin scenario: one run, said in full.
+    pub struct ScenarioFile {
+        /// Short name: letters, digits, `_` and `-`. Results go to `out/<name>` by default.
+        name: String;
+        /// What it shows, in a sentence or two. Default empty.
+        #[serde(default)]
+        description: String;
+        /// Tunnel file; a relative path counts from this file's folder.
+        tunnel: String;
+        /// Everything random follows from it.
+        #[serde(default = "default_seed")]
+        seed: u64;
+        /// Simulated time, s. A bench run ends after its last point instead.
+        #[serde(default = "default_duration_s")]
+        duration_s: f64, in 1e-3..=86_400.0;
+        /// End earlier, once the train has run and then stood for this long, s. Default: never.
+        stop_after_standstill_s: Option<f64>, in 0.0..=86_400.0;
+        /// Time step of the physics, s.
+        #[serde(default = "default_step_s")]
+        step_s: f64, in STEP_S;
+        /// How well the lamps of the map that the stack is given were surveyed. Default: without
+        /// error.
+        #[serde(default)]
+        survey: SurveySettings, nested;
+        /// How even the track is. Default: German spectra, low disturbance.
+        #[serde(default)]
+        track: TrackSettings, nested;
+        /// The train and how it is driven. Default: no train.
+        train: Option<TrainSettings>, nested;
+        /// Other trains on the line, up to seven: each with a driver of its own, whom nothing
+        /// supervises but the equipment of `onboard`. Default: none.
+        #[serde(default)]
+        other_trains: Vec<TrainSettings>, nested;
+        /// A still rig moved from point to point, in place of a train. Default: none.
+        bench: Option<BenchSettings>, nested;
+        /// Things that lie or fall on the line. Default: none.
+        #[serde(default)]
+        obstacles: Vec<ObstacleSettings>, nested;
+        /// Cables that hang on the wall. Default: none.
+        #[serde(default)]
+        cables: Vec<CableSettings>, nested;
+        /// People on the line. Default: none.
+        #[serde(default)]
+        workers: Vec<WorkerSettings>, nested;
+        /// The stereo rig on the train head. Default: no rig, so no positioning by lamps.
+        rig: Option<RigSettings>, nested;
+        /// The inertial unit on the train. Default: ADIS16488 class.
+        #[serde(default)]
+        imu: ImuSettings, nested;
+        /// The odometer on the train.
+        #[serde(default)]
+        odometer: OdometerSettings, nested;
+        /// A Doppler radar on the train. Default: none.
+        doppler: Option<DopplerSettings>, nested;
+        /// Sensors and equipment of other trains. Default: none.
+        #[serde(default)]
+        onboard: Vec<OnboardSettings>, nested;
+        /// Wayside devices in use, each at a place that the tunnel file names. Default: none.
+        #[serde(default)]
+        wayside: Vec<WaysidePostSettings>, nested;
+        /// The radio from wayside devices to the train.
+        #[serde(default)]
+        radio: RadioSettings, nested;
+        /// What one sees through. Default: clear air.
+        #[serde(default)]
+        air: AirSettings, nested;
+        /// Lamps and cameras that are out of order. Default: none.
+        #[serde(default)]
+        faults: FaultSettings, nested;
+        /// The stack: positioning, detection, protection.
+        #[serde(default)]
+        stack: StackSettings, nested;
+        /// What goes into the recording.
+        #[serde(default)]
+        record: RecordSettings, nested;
+        /// What varies from run to run, for `generate` and `study`. Default: nothing.
+        study: Option<StudySettings>, nested;
+    }
+    also check_together
 }
 
 fn default_seed() -> u64 {
@@ -121,34 +116,32 @@ fn default_step_s() -> f64 {
     0.001
 }
 
-/// Sensors and equipment of one of the other trains; what is left out is as on the first train without
-/// a word about it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct OnboardSettings {
-    /// Which train: 1 is the first of `other_trains`.
-    pub train: u8,
-    /// Its stereo rig. Default: none.
-    #[serde(default)]
-    pub rig: Option<RigSettings>,
-    /// Its inertial unit.
-    #[serde(default)]
-    pub imu: ImuSettings,
-    /// Its odometer.
-    #[serde(default)]
-    pub odometer: OdometerSettings,
-    /// Its Doppler radar. Default: none.
-    #[serde(default)]
-    pub doppler: Option<DopplerSettings>,
-    /// Its positioning by lamps.
-    #[serde(default)]
-    pub led: LedSettings,
-    /// Its warning and control.
-    #[serde(default)]
-    pub protection: ProtectionSettings,
-    /// Its equipment. Default: all.
-    #[serde(default = "OnboardEquipment::all")]
-    pub equipment: Vec<OnboardEquipment>,
+settings! {
+    /// Sensors and equipment of one of the other trains; what is left out is as on the first train
+    /// without a word about it.
+    pub struct OnboardSettings {
+        /// Which train: 1 is the first of `other_trains`.
+        train: u8;
+        /// Its stereo rig. Default: none.
+        rig: Option<RigSettings>, nested;
+        /// Its inertial unit.
+        #[serde(default)]
+        imu: ImuSettings, nested;
+        /// Its odometer.
+        #[serde(default)]
+        odometer: OdometerSettings, nested;
+        /// Its Doppler radar. Default: none.
+        doppler: Option<DopplerSettings>, nested;
+        /// Its positioning by lamps.
+        #[serde(default)]
+        led: LedSettings, nested;
+        /// Its warning and control.
+        #[serde(default)]
+        protection: ProtectionSettings, nested;
+        /// Its equipment. Default: all.
+        #[serde(default = "OnboardEquipment::all")]
+        equipment: Vec<OnboardEquipment>;
+    }
 }
 
 /// A kind of equipment of trains.
@@ -168,83 +161,49 @@ impl OnboardEquipment {
     }
 }
 
-/// A wayside device in use.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WaysidePostSettings {
-    /// Name of the device in the tunnel file, which says where it hangs and looks.
-    pub device: String,
-    /// Its camera. Default: 1920 x 1080, 10 frames a second.
-    #[serde(default)]
-    pub camera: WaysideCameraSettings,
-    /// Its lidar. Default: none, the camera alone.
-    #[serde(default)]
-    pub lidar: Option<LidarSettings>,
-}
-
-/// The stack's own settings. They are what an engineer would commission the equipment with; the
-/// world does not depend on them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StackSettings {
-    /// Positioning by lamps, on the train.
-    pub led: LedSettings,
-    /// Obstacle detection, in every wayside device.
-    pub wayside: WaysideSettings,
-    /// Onboard warning and control.
-    pub protection: ProtectionSettings,
-    /// From the last row of a frame to the result, ms. Default 50.
-    pub latency_ms: f64,
-    /// Equipment of the first train. Default: all.
-    pub onboard: Vec<OnboardEquipment>,
-}
-
-impl Default for StackSettings {
-    fn default() -> Self {
-        Self {
-            led: LedSettings::default(),
-            wayside: WaysideSettings::default(),
-            protection: ProtectionSettings::default(),
-            latency_ms: 50.0,
-            onboard: OnboardEquipment::all(),
-        }
+settings! {
+    /// A wayside device in use.
+    pub struct WaysidePostSettings {
+        /// Name of the device in the tunnel file, which says where it hangs and looks.
+        device: String;
+        /// Its camera. Default: 1920 x 1080, 10 frames a second.
+        #[serde(default)]
+        camera: WaysideCameraSettings, nested;
+        /// Its lidar. Default: none, the camera alone.
+        lidar: Option<LidarSettings>, nested;
     }
 }
 
-impl StackSettings {
-    /// Appends what is wrong.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.led.check(&format!("{at}.led"), problems);
-        self.wayside.check(&format!("{at}.wayside"), problems);
-        self.protection.check(&format!("{at}.protection"), problems);
-        let key = format!("{at}.latency_ms");
-        Problem::unless_within(problems, key, self.latency_ms, 0.0..=5000.0, "ms");
+settings! {
+    /// The stack's own settings. They are what an engineer would commission the equipment with; the
+    /// world does not depend on them.
+    pub struct StackSettings {
+        /// Positioning by lamps, on the train.
+        led: LedSettings = LedSettings::default(), nested;
+        /// Obstacle detection, in every wayside device.
+        wayside: WaysideSettings = WaysideSettings::default(), nested;
+        /// Onboard warning and control.
+        protection: ProtectionSettings = ProtectionSettings::default(), nested;
+        /// From the last row of a frame to the result, ms.
+        latency_ms: f64 = 50.0, in 0.0..=5000.0;
+        /// Equipment of the first train. Default: all.
+        onboard: Vec<OnboardEquipment> = OnboardEquipment::all();
     }
 }
 
-/// A static test: the rig stands at one point after the other and takes some fixes at each, as
-/// in the paper's experiment (20 points 0.5 m apart, 10 fixes each).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct BenchSettings {
-    /// Number of points. Default 20.
-    pub points: u32,
-    /// Chainage of the train head at the first point, m. Default 0.
-    pub first_m: f64,
-    /// From point to point, m. Default 0.5.
-    pub step_m: f64,
-    /// Fixes to take at each point, or as many as 5 s yield. Default 10.
-    pub fixes_per_point: u32,
-}
-
-impl Default for BenchSettings {
-    fn default() -> Self {
-        Self {
-            points: 20,
-            first_m: 0.0,
-            step_m: 0.5,
-            fixes_per_point: 10,
-        }
+settings! {
+    /// A static test: the rig stands at one point after the other and takes some fixes at each, as
+    /// in the paper's experiment (20 points 0.5 m apart, 10 fixes each).
+    #[derive(Copy)]
+    pub struct BenchSettings {
+        /// Number of points.
+        points: u32 = 20, in 1.0..=1e5;
+        /// Chainage of the train head at the first point, m.
+        first_m: f64 = 0.0;
+        /// From point to point, m.
+        step_m: f64 = 0.5, in -1e3..=1e3;
+        /// Fixes to take at each point, or as many as 5 s yield.
+        fixes_per_point: u32 = 10, in 1.0..=1e5;
     }
 }
 
@@ -260,27 +219,6 @@ impl BenchSettings {
     /// Time that all pairs of images take.
     pub fn duration_s(&self, pairs_per_s: f64) -> f64 {
         f64::from(self.points) * f64::from(self.fixes_per_point) / pairs_per_s
-    }
-
-    /// Appends what is wrong.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let points = f64::from(self.points);
-        let fixes = f64::from(self.fixes_per_point);
-        Problem::unless_within(problems, format!("{at}.points"), points, 1.0..=1e5, "");
-        Problem::unless_within(
-            problems,
-            format!("{at}.fixes_per_point"),
-            fixes,
-            1.0..=1e5,
-            "",
-        );
-        Problem::unless_within(
-            problems,
-            format!("{at}.step_m"),
-            self.step_m,
-            -1e3..=1e3,
-            "m",
-        );
     }
 }
 

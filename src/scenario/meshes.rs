@@ -1,7 +1,7 @@
 //! Reads the meshes that obstacles name, so that the physics needs no files.
 
 use super::file::ScenarioFile;
-use crate::track::Problem;
+use crate::settings::Problem;
 use crate::twin::geometry::Hull;
 use crate::twin::physics::ObstacleShape;
 use nalgebra::Point3;
@@ -16,14 +16,14 @@ const MAX_BYTES: u64 = 64 << 20;
 /// Reads all meshes; relative paths count from `folder`.
 pub(super) fn read_meshes(file: &mut ScenarioFile, folder: &Path, problems: &mut Vec<Problem>) {
     let obstacles = file.obstacles.iter_mut().enumerate();
-    let obstacles = obstacles.map(|(k, o)| (format!("obstacles[{k}].body"), &mut o.body));
+    let obstacles = obstacles.map(|(k, o)| (format!("obstacles[{k}].body.file"), &mut o.body));
     let loads = file
         .workers
         .iter_mut()
         .enumerate()
         .filter_map(|(k, worker)| {
             let load = worker.carries.as_mut()?;
-            Some((format!("workers[{k}].carries.body"), &mut load.body))
+            Some((format!("workers[{k}].carries.body.file"), &mut load.body))
         });
     for (key, body) in obstacles.chain(loads) {
         let ObstacleShape::Mesh {

@@ -9,7 +9,7 @@
 //!
 //! ```
 //! use metrotwin::scenario::ScenarioFile;
-//! use metrotwin::track::read_toml;
+//! use metrotwin::settings::read_toml;
 //!
 //! let file: ScenarioFile = read_toml(r#"
 //!     name = "first_run"
@@ -21,7 +21,7 @@
 //! assert_eq!(file.duration_s, 10.0);
 //! // What is not written has the reference values.
 //! assert_eq!(file.train.map(|t| t.cars), Some(6));
-//! # Ok::<(), metrotwin::track::FileError>(())
+//! # Ok::<(), metrotwin::settings::FileError>(())
 //! ```
 //!
 //! The settings of each part are declared beside its own code; this room puts them together, and

@@ -1,57 +1,30 @@
 //! What a recording holds, and how finely.
 
-use crate::track::{Checker, Problem};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::settings::settings;
 
-/// How much of a run goes into its recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RecordSettings {
-    /// Pairs of the train's cameras that are kept as images, a second. 0 keeps none.
-    pub stereo_image_hz: f64,
-    /// Frames of each wayside camera that are kept as images, a second. 0 keeps none.
-    pub wayside_image_hz: f64,
-    /// Quality of the JPEG images, 1 to 100.
-    pub jpeg_quality: u8,
-    /// Draw lamps, ellipses and obstacles into the images at every frame, also at those whose
-    /// image is not kept. They then run ahead of the image shown.
-    pub overlay_every_frame: bool,
-    /// Difference images are shown this many times brighter than they are.
-    pub difference_gain: f64,
-    /// Distance between the rings of the drawn tunnel, m.
-    pub ring_step_m: f64,
-}
-
-impl Default for RecordSettings {
-    fn default() -> Self {
-        Self {
-            stereo_image_hz: 5.0,
-            wayside_image_hz: 5.0,
-            jpeg_quality: 75,
-            overlay_every_frame: false,
-            difference_gain: 4.0,
-            ring_step_m: 5.0,
-        }
-    }
-}
-
-impl RecordSettings {
-    /// Appends what is wrong, with keys under `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("stereo_image_hz", self.stereo_image_hz, 0.0..=1e3, "Hz");
-        check.within("wayside_image_hz", self.wayside_image_hz, 0.0..=1e3, "Hz");
-        let quality = f64::from(self.jpeg_quality);
-        check.within("jpeg_quality", quality, 1.0..=100.0, "");
-        check.within("difference_gain", self.difference_gain, 1.0..=255.0, "");
-        check.within("ring_step_m", self.ring_step_m, 0.1..=1e3, "m");
+settings! {
+    /// How much of a run goes into its recording.
+    pub struct RecordSettings {
+        /// Pairs of the train's cameras that are kept as images, a second. 0 keeps none.
+        stereo_image_hz: f64 = 5.0, in 0.0..=1e3;
+        /// Frames of each wayside camera that are kept as images, a second. 0 keeps none.
+        wayside_image_hz: f64 = 5.0, in 0.0..=1e3;
+        /// Quality of the JPEG images, 1 to 100.
+        jpeg_quality: u8 = 75, in 1.0..=100.0;
+        /// Draw lamps, ellipses and obstacles into the images at every frame, also at those whose
+        /// image is not kept. They then run ahead of the image shown.
+        overlay_every_frame: bool = false;
+        /// Difference images are shown this many times brighter than they are.
+        difference_gain: f64 = 4.0, in 1.0..=255.0;
+        /// Distance between the rings of the drawn tunnel, m.
+        ring_step_m: f64 = 5.0, in 0.1..=1e3;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     #[test]
     fn reference_values_are_right() {

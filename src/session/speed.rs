@@ -11,7 +11,8 @@ use super::{
 };
 use crate::bus::{Node, TrainCommand};
 use crate::scenario::{Scenario, ScenarioFile};
-use crate::track::{Tunnel, read_toml};
+use crate::settings::read_toml;
+use crate::track::Tunnel;
 use crate::twin::physics::World;
 use crate::twin::render::{Backend, Job, RenderError, Renderer, gpu};
 use serde::Serialize;

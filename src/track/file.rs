@@ -2,50 +2,64 @@
 
 use super::section::Side;
 use super::uid::LineCode;
+use crate::settings::{Checker, settings};
 use schemars::{JsonSchema, Schema, schema_for};
 use serde::{Deserialize, Serialize};
 
-/// A tunnel file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct TunnelFile {
-    /// Short name.
-    pub name: String,
-    /// Line number, the first part of every lamp's UID, 0 to 15. Default 1.
-    #[serde(default = "one")]
-    pub line_number: u8,
-    /// Light that reaches every surface after many reflections, lux. Default 2.
-    #[serde(default = "two_lux")]
-    pub ambient_lx: f64,
-    /// Where the line begins in the world.
-    #[serde(default)]
-    pub start: StartEntry,
-    /// Plan elements in order up the line.
-    pub plan: Vec<PlanEntry>,
-    /// Grades in order; none means level.
-    #[serde(default)]
-    pub grades: Vec<GradeEntry>,
-    /// Cross-sections in order; none means circular, 3 m, without walkway, all along.
-    #[serde(default)]
-    pub sections: Vec<SectionEntry>,
-    /// A row of lamps at equal distances, and the properties of lamps of this tunnel.
-    #[serde(default)]
-    pub lamps: Option<LampRow>,
-    /// Single lamps.
-    #[serde(default)]
-    pub lamp: Vec<LampEntry>,
-    /// Wayside devices: a camera and a lidar on the tunnel wall.
-    #[serde(default)]
-    pub wayside: Vec<WaysideEntry>,
-    /// Balises between the rails.
-    #[serde(default)]
-    pub balises: Vec<BaliseEntry>,
-    /// Radio base stations.
-    #[serde(default)]
-    pub base_stations: Vec<BaseStationEntry>,
-    /// Places where trains stop.
-    #[serde(default)]
-    pub stations: Vec<StationEntry>,
+/// No line is longer: chainages stay exact to a nanometre.
+pub(super) const LONGEST_M: f64 = 1e6;
+/// The last of the numbers of 10 bits that lamps have.
+pub(super) const LAST_LAMP: u16 = 1023;
+
+settings! {
+    /// A tunnel file.
+    pub struct TunnelFile {
+        /// Short name.
+        name: String;
+        /// Line number, the first part of every lamp's UID.
+        #[serde(default = "one")]
+        line_number: u8, in 0.0..=15.0;
+        /// Light that reaches every surface after many reflections, lux.
+        #[serde(default = "two_lux")]
+        ambient_lx: f64, in 0.0..=1e5;
+        /// Where the line begins in the world.
+        #[serde(default)]
+        start: StartEntry, nested;
+        /// Plan elements in order up the line.
+        plan: Vec<PlanEntry>, nested;
+        /// Grades in order; none means level.
+        #[serde(default)]
+        grades: Vec<GradeEntry>, nested;
+        /// Cross-sections in order; none means circular, 3 m, without walkway, all along.
+        #[serde(default)]
+        sections: Vec<SectionEntry>;
+        /// A row of lamps at equal distances, and the properties of lamps of this tunnel.
+        lamps: Option<LampRow>, nested;
+        /// Single lamps.
+        #[serde(default)]
+        lamp: Vec<LampEntry>, nested;
+        /// Wayside devices: a camera and a lidar on the tunnel wall.
+        #[serde(default)]
+        wayside: Vec<WaysideEntry>, nested;
+        /// Balises between the rails.
+        #[serde(default)]
+        balises: Vec<BaliseEntry>;
+        /// Radio base stations.
+        #[serde(default)]
+        base_stations: Vec<BaseStationEntry>, nested;
+        /// Places where trains stop.
+        #[serde(default)]
+        stations: Vec<StationEntry>;
+    }
+    also check_name
+}
+
+impl TunnelFile {
+    fn check_name(&self, check: &mut Checker<'_>) {
+        if self.name.trim().is_empty() {
+            check.problem("name", "is empty", "give the tunnel a name");
+        }
+    }
 }
 
 fn one() -> u8 {
@@ -56,18 +70,18 @@ fn two_lux() -> f64 {
     2.0
 }
 
-/// Where the line begins.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StartEntry {
-    /// World x of chainage 0, metres. Default 0.
-    pub east_m: f64,
-    /// World y of chainage 0, metres. Default 0.
-    pub north_m: f64,
-    /// Height of top of rail at chainage 0, metres. Default 0.
-    pub up_m: f64,
-    /// Direction up the line, degrees from east towards north. Default 0.
-    pub heading_deg: f64,
+settings! {
+    /// Where the line begins.
+    pub struct StartEntry {
+        /// World x of chainage 0, metres.
+        east_m: f64 = 0.0, in -1e7..=1e7;
+        /// World y of chainage 0, metres.
+        north_m: f64 = 0.0, in -1e7..=1e7;
+        /// Height of top of rail at chainage 0, metres.
+        up_m: f64 = 0.0, in -1e7..=1e7;
+        /// Direction up the line, degrees from east towards north.
+        heading_deg: f64 = 0.0, in -360.0..=360.0;
+    }
 }
 
 /// Kind of a plan element.
@@ -82,36 +96,34 @@ pub enum PlanKind {
     Arc,
 }
 
-/// A plan element.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PlanEntry {
-    /// Its kind.
-    pub kind: PlanKind,
-    /// Length in plan, metres.
-    pub length_m: f64,
-    /// Radius of an arc, metres, positive.
-    #[serde(default)]
-    pub radius_m: Option<f64>,
-    /// To which side an arc turns, looking up the line.
-    #[serde(default)]
-    pub turn: Option<Side>,
-    /// Height of an arc's outer rail over the inner one, millimetres, 0 to 120. Default 0.
-    #[serde(default)]
-    pub cant_mm: Option<f64>,
+settings! {
+    /// A plan element.
+    pub struct PlanEntry {
+        /// Its kind.
+        kind: PlanKind;
+        /// Length in plan, metres.
+        length_m: f64, in 0.001..=LONGEST_M;
+        /// Radius of an arc, metres, positive.
+        radius_m: Option<f64>;
+        /// To which side an arc turns, looking up the line.
+        turn: Option<Side>;
+        /// Height of an arc's outer rail over the inner one, millimetres. Default 0.
+        // The most on metro lines (GB 50157).
+        cant_mm: Option<f64>, in 0.0..=120.0;
+    }
 }
 
-/// A grade.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GradeEntry {
-    /// Where it begins: where its tangent meets that of the grade before, metres.
-    pub from_m: f64,
-    /// Rise up the line, permille, -60 to 60.
-    pub grade_permille: f64,
-    /// Radius of the vertical curve that leads into it, metres (0 for none). Default 3000.
-    #[serde(default = "vertical_radius")]
-    pub vertical_radius_m: f64,
+settings! {
+    /// A grade.
+    pub struct GradeEntry {
+        /// Where it begins: where its tangent meets that of the grade before, metres.
+        from_m: f64;
+        /// Rise up the line, permille.
+        grade_permille: f64, in -60.0..=60.0;
+        /// Radius of the vertical curve that leads into it, metres (0 for none).
+        #[serde(default = "vertical_radius")]
+        vertical_radius_m: f64, in 0.0..=1e6;
+    }
 }
 
 fn vertical_radius() -> f64 {
@@ -142,145 +154,107 @@ pub struct SectionEntry {
     /// From this chainage, metres.
     pub from_m: f64,
     /// To this chainage, metres. Default: where the next begins, or the end of the line.
-    #[serde(default)]
     pub to_m: Option<f64>,
     /// Inner radius of a circular section, metres. Default 3.0.
-    #[serde(default)]
     pub radius_m: Option<f64>,
     /// Centre of a circular section over top of rail, metres. Default: 0.74 m of track structure
     /// under top of rail (2.26 for a radius of 3.0).
-    #[serde(default)]
     pub centre_m: Option<f64>,
     /// Width of a horseshoe (default 5.2) or of the bed in the open (default 6.0), metres.
-    #[serde(default)]
     pub width_m: Option<f64>,
     /// Height over top of rail where a horseshoe's arch springs, metres. Default 2.4.
-    #[serde(default)]
     pub springing_m: Option<f64>,
     /// Left wall of a rectangle from the centreline, metres. Default 2.9.
-    #[serde(default)]
     pub left_m: Option<f64>,
     /// Right wall of a rectangle from the centreline, metres. Default 2.9.
-    #[serde(default)]
     pub right_m: Option<f64>,
     /// Crown of a horseshoe (default 4.8) or ceiling of a rectangle (default 4.6) over top of
     /// rail, metres.
-    #[serde(default)]
     pub ceiling_m: Option<f64>,
     /// Side of an evacuation walkway. Default: none.
-    #[serde(default)]
     pub walkway: Option<Side>,
     /// Side of a platform. Default: none.
-    #[serde(default)]
     pub platform: Option<Side>,
     /// Edge of the platform from the centreline, metres. Default 1.5 (GB 50157, B cars).
-    #[serde(default)]
     pub platform_edge_m: Option<f64>,
     /// Platform over top of rail, metres. Default 1.05 (50 mm under the floor of a B car).
-    #[serde(default)]
     pub platform_height_m: Option<f64>,
 }
 
-/// A row of lamps, and the properties of lamps of this tunnel.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LampRow {
-    /// Chainage of the first lamp, metres. Default 0.
-    pub from_m: f64,
-    /// No lamp of the row stands beyond this chainage, metres. Default: the end of the line.
-    pub to_m: Option<f64>,
-    /// From lamp to lamp, metres. Default 10.
-    pub spacing_m: f64,
-    /// Left of the centreline, metres (negative: on the right wall). Default 2.70.
-    pub lateral_m: f64,
-    /// Above top of rail, metres. Default 3.20.
-    pub height_m: f64,
-    /// Turn of the disc's axis from the direction across the track towards trains that come up
-    /// the line, degrees. Default 65.
-    pub aim_yaw_deg: f64,
-    /// Tilt of the disc's axis, up positive, degrees. Default -10.
-    pub aim_pitch_deg: f64,
-    /// Diameter of the luminous disc, metres. Default 0.25.
-    pub diameter_m: f64,
-    /// Electrical power, watts. Default 21.
-    pub power_w: f64,
-    /// Luminous efficacy, lumens a watt. Default 100.
-    pub efficacy_lm_per_w: f64,
-    /// Full angle at which the intensity has fallen to half, degrees. Default 60.
-    pub beam_deg: f64,
-    /// Duration of a chip of the code, microseconds. Default 45.
-    pub chip_us: f64,
-    /// How bits become chips. Default manchester.
-    pub code: LineCode,
-    /// Number of the row's first lamp; the others count up. Default 1.
-    pub first_number: u16,
-}
-
-impl Default for LampRow {
-    fn default() -> Self {
-        Self {
-            from_m: 0.0,
-            to_m: None,
-            spacing_m: 10.0,
-            lateral_m: 2.70,
-            height_m: 3.20,
-            aim_yaw_deg: 65.0,
-            aim_pitch_deg: -10.0,
-            diameter_m: 0.25,
-            power_w: 21.0,
-            efficacy_lm_per_w: 100.0,
-            beam_deg: 60.0,
-            chip_us: 45.0,
-            code: LineCode::Manchester,
-            first_number: 1,
-        }
+settings! {
+    /// A row of lamps, and the properties of lamps of this tunnel.
+    pub struct LampRow {
+        /// Chainage of the first lamp, metres.
+        from_m: f64 = 0.0;
+        /// No lamp of the row stands beyond this chainage, metres. Default: the end of the line.
+        to_m: Option<f64> = None;
+        /// From lamp to lamp, metres.
+        spacing_m: f64 = 10.0, in 0.1..=10_000.0;
+        /// Left of the centreline, metres (negative: on the right wall).
+        lateral_m: f64 = 2.70, in -60.0..=60.0;
+        /// Above top of rail, metres.
+        height_m: f64 = 3.20, in -1.0..=30.0;
+        /// Turn of the disc's axis from the direction across the track towards trains that come up
+        /// the line, degrees.
+        aim_yaw_deg: f64 = 65.0, in -90.0..=90.0;
+        /// Tilt of the disc's axis, up positive, degrees.
+        aim_pitch_deg: f64 = -10.0, in -90.0..=90.0;
+        /// Diameter of the luminous disc, metres.
+        diameter_m: f64 = 0.25, in 0.01..=2.0;
+        /// Electrical power, watts.
+        power_w: f64 = 21.0, in 0.01..=10_000.0;
+        /// Luminous efficacy, lumens a watt.
+        efficacy_lm_per_w: f64 = 100.0, in 1.0..=700.0;
+        /// Full angle at which the intensity has fallen to half, degrees.
+        beam_deg: f64 = 60.0, in 5.0..=170.0;
+        /// Duration of a chip of the code, microseconds.
+        chip_us: f64 = 45.0, in 1.0..=10_000.0;
+        /// How bits become chips.
+        code: LineCode = LineCode::Manchester;
+        /// Number of the row's first lamp; the others count up.
+        first_number: u16 = 1;
     }
 }
 
-/// A single lamp. What is not given is as in `[lamps]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LampEntry {
-    /// Lamp number, 0 to 1023.
-    pub number: u16,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Left of the centreline, metres.
-    #[serde(default)]
-    pub lateral_m: Option<f64>,
-    /// Above top of rail, metres.
-    #[serde(default)]
-    pub height_m: Option<f64>,
-    /// Turn of the disc's axis from the direction across the track towards trains that come up
-    /// the line, degrees.
-    #[serde(default)]
-    pub aim_yaw_deg: Option<f64>,
-    /// Tilt of the disc's axis, up positive, degrees.
-    #[serde(default)]
-    pub aim_pitch_deg: Option<f64>,
-    /// Electrical power, watts.
-    #[serde(default)]
-    pub power_w: Option<f64>,
+settings! {
+    /// A single lamp. What is not given is as in `[lamps]`.
+    pub struct LampEntry {
+        /// Lamp number.
+        number: u16, in 0.0..=f64::from(LAST_LAMP);
+        /// Chainage, metres.
+        chainage_m: f64;
+        /// Left of the centreline, metres.
+        lateral_m: Option<f64>;
+        /// Above top of rail, metres.
+        height_m: Option<f64>;
+        /// Turn of the disc's axis from the direction across the track towards trains that come up
+        /// the line, degrees.
+        aim_yaw_deg: Option<f64>;
+        /// Tilt of the disc's axis, up positive, degrees.
+        aim_pitch_deg: Option<f64>;
+        /// Electrical power, watts.
+        power_w: Option<f64>;
+    }
 }
 
-/// A wayside device.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WaysideEntry {
-    /// Name.
-    pub name: String,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Left of the centreline, metres.
-    pub lateral_m: f64,
-    /// Above top of rail, metres.
-    pub height_m: f64,
-    /// Turn of its axis from up the line, to the left, degrees (180 looks down the line).
-    pub yaw_deg: f64,
-    /// Tilt of its axis, up positive, degrees.
-    pub pitch_deg: f64,
-    /// Name of the balise that gets its messages.
-    pub balise: String,
+settings! {
+    /// A wayside device.
+    pub struct WaysideEntry {
+        /// Name.
+        name: String;
+        /// Chainage, metres.
+        chainage_m: f64;
+        /// Left of the centreline, metres.
+        lateral_m: f64;
+        /// Above top of rail, metres.
+        height_m: f64;
+        /// Turn of its axis from up the line, to the left, degrees (180 looks down the line).
+        yaw_deg: f64, in -360.0..=360.0;
+        /// Tilt of its axis, up positive, degrees.
+        pitch_deg: f64, in -90.0..=90.0;
+        /// Name of the balise that gets its messages.
+        balise: String;
+    }
 }
 
 /// A balise.
@@ -293,16 +267,16 @@ pub struct BaliseEntry {
     pub chainage_m: f64,
 }
 
-/// A radio base station.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BaseStationEntry {
-    /// Name.
-    pub name: String,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Reach up and down the line, metres.
-    pub reach_m: f64,
+settings! {
+    /// A radio base station.
+    pub struct BaseStationEntry {
+        /// Name.
+        name: String;
+        /// Chainage, metres.
+        chainage_m: f64;
+        /// Reach up and down the line, metres.
+        reach_m: f64, in 1.0..=LONGEST_M;
+    }
 }
 
 /// A place where trains stop.

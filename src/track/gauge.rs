@@ -5,10 +5,8 @@
 //! here eight keep their governing widths (platform edge at 1.5 m below floor level, equipment at
 //! 1.6 m above it, 0.2 m over the roof). In curves it widens by what a car's ends swing out.
 
-use super::section::{CrossSection, Material, OutlinePoint};
+use super::section::{BED_M, CrossSection, Material, OutlinePoint};
 
-/// Height of a rail: its foot is this far under top of rail (176 mm for 60 kg/m rail, rounded).
-pub const RAIL_FOOT_M: f64 = -0.17;
 /// Distance of a rail's centre from the centreline (1435 mm gauge and a 70 mm head).
 pub const RAIL_OFFSET_M: f64 = 0.7525;
 /// Width of a rail's head; rails are drawn as boxes of it.
@@ -20,10 +18,10 @@ pub fn rail_outline(centre_m: f64) -> CrossSection {
     let (left_m, right_m) = (centre_m + 0.5 * RAIL_WIDTH_M, centre_m - 0.5 * RAIL_WIDTH_M);
     CrossSection {
         points: vec![
-            OutlinePoint::new(left_m, RAIL_FOOT_M),
+            OutlinePoint::new(left_m, BED_M),
             OutlinePoint::new(left_m, 0.0),
             OutlinePoint::new(right_m, 0.0),
-            OutlinePoint::new(right_m, RAIL_FOOT_M),
+            OutlinePoint::new(right_m, BED_M),
         ],
         materials: vec![Material::Rail; 4],
         closed: false,
@@ -135,7 +133,7 @@ mod tests {
                 0.5 * (edge.a.h_m + edge.b.h_m),
             );
             let (nl, nh) = edge.normal();
-            assert!((l - RAIL_OFFSET_M) * nl + (h - 0.5 * RAIL_FOOT_M) * nh > 0.0);
+            assert!((l - RAIL_OFFSET_M) * nl + (h - 0.5 * BED_M) * nh > 0.0);
         }
     }
 }

@@ -1,5 +1,5 @@
 //! The line as surveyed: where the track runs, what the tunnel looks like around it, and where
-//! its lamps, devices and balises are. Knows nobody.
+//! its lamps, devices and balises are. Knows the settings room alone.
 //!
 //! ```
 //! use metrotwin::track::Tunnel;
@@ -30,7 +30,7 @@
 //! )?;
 //! assert_eq!(tunnel.lamps.len(), 36);
 //! assert!((tunnel.alignment.at(200.0).curvature_per_m - 1.0 / 500.0).abs() < 1e-15);
-//! # Ok::<(), metrotwin::track::TunnelError>(())
+//! # Ok::<(), metrotwin::settings::FileError>(())
 //! ```
 //!
 //! Coordinates on the line are (s, l, h): s is chainage along the centreline in plan, l metres to
@@ -48,36 +48,29 @@
 
 mod alignment;
 mod check;
-mod document;
 mod file;
 mod furniture;
 mod gauge;
 mod place;
-mod problem;
 mod reversal;
 mod route;
 mod section;
 pub mod uid;
-mod waveform;
+pub mod waveform;
 
 pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
-pub use document::{did_you_mean, locate, read_toml};
 pub use file::{
     BaliseEntry, BaseStationEntry, GradeEntry, LampEntry, LampRow, PlanEntry, PlanKind,
     SectionEntry, SectionKind, StartEntry, StationEntry, TunnelFile, WaysideEntry, tunnel_schema,
 };
 pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
-pub use gauge::{Gauge, RAIL_FOOT_M, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
+pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use place::{Direction, Place, TrackId};
-pub use problem::{Checker, FileError, Problem, key_below};
 pub use route::Route;
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
-
-/// Why a tunnel file cannot be used.
-pub type TunnelError = FileError;
 
 /// A tunnel, checked and ready to use.
 #[derive(Clone, Debug)]

@@ -1,6 +1,5 @@
 //! Cross-sections: the outline of a tunnel as seen along the line.
 
-use super::gauge::RAIL_FOOT_M;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -99,8 +98,9 @@ impl Edge {
     }
 }
 
-/// Height of the track bed's surface: the rails stand on it (fastenings are not modelled).
-pub const BED_M: f64 = RAIL_FOOT_M;
+/// Height of the track bed's surface, over top of rail: rails of 60 kg/m, 176 mm high, stand on it
+/// (rounded; fastenings are not modelled).
+pub const BED_M: f64 = -0.17;
 /// Largest distance between an arc of the outline and its chords.
 pub const CHORD_ERROR_M: f64 = 0.005;
 

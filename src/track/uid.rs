@@ -24,8 +24,6 @@
 //! assert_eq!(Uid::from_frame(frame, LineCode::Manchester), Some(uid));
 //! ```
 
-pub use super::waveform::{LightCurve, Ripple, Waveform};
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;

@@ -4,7 +4,7 @@
 use super::geometry::Body;
 use crate::bus::SimTime;
 use crate::track::LampSite;
-use crate::track::uid::{LightCurve, Ripple, Waveform};
+use crate::track::waveform::{LightCurve, Ripple, Waveform};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::f64::consts::{PI, TAU};
 

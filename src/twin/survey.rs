@@ -14,33 +14,24 @@
 //! share (a control point that has moved) is not modelled, nor are errors of track and balises.
 
 use super::random::Stream;
-use crate::track::{Checker, Problem, TrackPoint, Tunnel};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::settings::settings;
+use crate::track::{TrackPoint, Tunnel};
 
-/// How well the map's lamps were surveyed: one sigma of the normal error of each lamp's place.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SurveySettings {
-    /// Along the track, m. What the stack takes it to be is `stack.led.survey_sigma_m`.
-    /// Default 0; 0.01 to 0.02 in a metro surveyed for operation.
-    pub along_sigma_m: f64,
-    /// Across the track, m. Default 0.
-    pub across_sigma_m: f64,
-    /// In height, m. Default 0.
-    pub height_sigma_m: f64,
+settings! {
+    /// How well the map's lamps were surveyed: one sigma of the normal error of each lamp's place.
+    #[derive(Copy)]
+    pub struct SurveySettings {
+        /// Along the track, m. What the stack takes it to be is `stack.led.survey_sigma_m`.
+        /// Default 0; 0.01 to 0.02 in a metro surveyed for operation.
+        along_sigma_m: f64 = 0.0, in 0.0..=0.5;
+        /// Across the track, m.
+        across_sigma_m: f64 = 0.0, in 0.0..=0.5;
+        /// In height, m.
+        height_sigma_m: f64 = 0.0, in 0.0..=0.5;
+    }
 }
 
 impl SurveySettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        let mut sigma = |key: &str, sigma_m: f64| check.within(key, sigma_m, 0.0..=0.5, "m");
-        sigma("along_sigma_m", self.along_sigma_m);
-        sigma("across_sigma_m", self.across_sigma_m);
-        sigma("height_sigma_m", self.height_sigma_m);
-    }
-
     /// The map of a tunnel as it was surveyed, with the errors of a run's seed.
     pub fn map(&self, tunnel: &Tunnel, seed: u64) -> Tunnel {
         let mut map = tunnel.clone();

@@ -1,51 +1,38 @@
 //! What varies from run to run, as written under `[study]`.
 
-use crate::track::Problem;
+use crate::settings::{Checker, settings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What varies from run to run, how often, and what is asked of it. `metrotwin run` ignores it and
-/// runs the scenario as it stands.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StudySettings {
-    /// All draws follow from it, and each run's own seed. Studies with the same seed meet the same
-    /// chances, run by run, and can be compared in pairs. Default 1.
-    pub seed: u64,
-    /// Number of runs; of a study that sweeps, for each combination of the swept values. Default 100.
-    pub runs: u32,
-    /// Which points the draws take. Default `random`.
-    pub plan: PlanSettings,
-    /// What is drawn, by a name of your own: it becomes a column of the results. Default: nothing
-    /// but the seed.
-    pub variables: BTreeMap<String, VariableSettings>,
-    /// Variables that go together. Default: all are independent.
-    pub correlated: Vec<CorrelationSettings>,
-    /// Conditions that a draw must meet, or it is drawn again: `"gap_m > 2.0 * size_m"`. They name
-    /// variables, or keys of the scenario in braces: `"{train.cruise_speed_kmh} < limit_kmh"`.
-    /// Default: none.
-    pub require: Vec<String>,
-    /// What counts as an event, by a name of your own: a condition on columns of the results, such
-    /// as `"collision"` or `"paper_error_max_m > 0.25"`. Its rate is reported. Default: none.
-    pub events: BTreeMap<String, String>,
-    /// When to stop before all runs are done. Default: never.
-    pub stop: StopSettings,
-}
-
-impl Default for StudySettings {
-    fn default() -> Self {
-        Self {
-            seed: 1,
-            runs: 100,
-            plan: PlanSettings::default(),
-            variables: BTreeMap::new(),
-            correlated: Vec::new(),
-            require: Vec::new(),
-            events: BTreeMap::new(),
-            stop: StopSettings::default(),
-        }
+settings! {
+    /// What varies from run to run, how often, and what is asked of it. `metrotwin run` ignores it and
+    /// runs the scenario as it stands.
+    pub struct StudySettings {
+        /// All draws follow from it, and each run's own seed. Studies with the same seed meet the
+        /// same chances, run by run, and can be compared in pairs.
+        seed: u64 = 1;
+        /// Number of runs; of a study that sweeps, for each combination of the swept values.
+        runs: u32 = 100, in 1.0..=1e7;
+        /// Which points the draws take.
+        plan: PlanSettings = PlanSettings::default();
+        /// What is drawn, by a name of your own: it becomes a column of the results. Default:
+        /// nothing but the seed.
+        variables: BTreeMap<String, VariableSettings> = BTreeMap::new(), nested;
+        /// Variables that go together. Default: all are independent.
+        correlated: Vec<CorrelationSettings> = Vec::new();
+        /// Conditions that a draw must meet, or it is drawn again: `"gap_m > 2.0 * size_m"`. They
+        /// name variables, or keys of the scenario in braces: `"{train.cruise_speed_kmh} <
+        /// limit_kmh"`. Default: none.
+        require: Vec<String> = Vec::new();
+        /// What counts as an event, by a name of your own: a condition on columns of the results,
+        /// such as `"collision"` or `"paper_error_max_m > 0.25"`. Its rate is reported. Default:
+        /// none.
+        events: BTreeMap<String, String> = BTreeMap::new();
+        /// When to stop before all runs are done. Default: never.
+        stop: StopSettings = StopSettings::default(), nested;
     }
+    also check_together
 }
 
 /// Which points of the unit cube the draws take.
@@ -66,32 +53,32 @@ pub enum PlanSettings {
     Sobol,
 }
 
-/// Something that is drawn.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct VariableSettings {
-    /// Keys of the scenario that it sets, dotted, as `--set` has them: `train.cruise_speed_kmh`,
-    /// `obstacles[0].body.size_m[2]`. Several get the same value. Default: none, it only stands
-    /// in conditions.
-    #[serde(default)]
-    pub keys: Vec<String>,
-    /// Its distribution: `{ uniform = { min = 20.0, max = 80.0 } }`.
-    pub from: Distribution,
-    /// What the keys get is `offset + scale * value`: a distance ahead of a device at chainage 1530 m
-    /// has scale -1 and offset 1530. Default 1.
-    #[serde(default = "one")]
-    pub scale: f64,
-    /// See `scale`. Default 0.
-    #[serde(default)]
-    pub offset: f64,
-    /// Importance sampling: draw from here in place of `from`, and weigh every run by the ratio of both
-    /// densities, so that figures stay those of `from` while rare events become frequent. Default:
-    /// none.
-    #[serde(default)]
-    pub propose: Option<Distribution>,
-    /// What it is, for the report. Default: its name.
-    #[serde(default)]
-    pub label: String,
+settings! {
+    /// Something that is drawn.
+    pub struct VariableSettings {
+        /// Keys of the scenario that it sets, dotted, as `--set` has them:
+        /// `train.cruise_speed_kmh`, `obstacles[0].body.size_m[2]`. Several get the same value.
+        /// Default: none, it only stands in conditions.
+        #[serde(default)]
+        keys: Vec<String>;
+        /// Its distribution: `{ uniform = { min = 20.0, max = 80.0 } }`.
+        from: Distribution, nested;
+        /// What the keys get is `offset + scale * value`: a distance ahead of a device at chainage
+        /// 1530 m has scale -1 and offset 1530. Default 1.
+        #[serde(default = "one")]
+        scale: f64, in -1e12..=1e12;
+        /// See `scale`. Default 0.
+        #[serde(default)]
+        offset: f64, in -1e12..=1e12;
+        /// Importance sampling: draw from here in place of `from`, and weigh every run by the ratio
+        /// of both densities, so that figures stay those of `from` while rare events become
+        /// frequent. Default: none.
+        propose: Option<Distribution>, nested;
+        /// What it is, for the report. Default: its name.
+        #[serde(default)]
+        label: String;
+    }
+    also check_together
 }
 
 fn one() -> f64 {
@@ -198,25 +185,25 @@ pub struct CorrelationSettings {
     pub matrix: Vec<Vec<f64>>,
 }
 
-/// When to stop before all runs are done.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct StopSettings {
-    /// After so much time, s: no run is begun then. Default: never.
-    pub after_s: Option<f64>,
-    /// When a figure is known well enough. Looked at after every 10 runs in the order of their
-    /// indexes, so that it is the same for any number of workers. Default: never.
-    pub when: Option<PrecisionSettings>,
+settings! {
+    /// When to stop before all runs are done.
+    pub struct StopSettings {
+        /// After so much time, s: no run is begun then. Default: never.
+        after_s: Option<f64> = None, in 1e-3..=1e9;
+        /// When a figure is known well enough. Looked at after every 10 runs in the order of their
+        /// indexes, so that it is the same for any number of workers. Default: never.
+        when: Option<PrecisionSettings> = None, nested;
+    }
 }
 
-/// A figure that is known well enough.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PrecisionSettings {
-    /// An event, whose rate is meant, or a column of the results, whose mean is meant.
-    pub of: String,
-    /// Half the width of its 95 % interval, in the unit of the column.
-    pub half_width: f64,
+settings! {
+    /// A figure that is known well enough.
+    pub struct PrecisionSettings {
+        /// An event, whose rate is meant, or a column of the results, whose mean is meant.
+        of: String;
+        /// Half the width of its 95 % interval, in the unit of the column.
+        half_width: f64, in 1e-300..=1e300;
+    }
 }
 
 /// A part of the settings in one line, as a file has it.
@@ -229,38 +216,30 @@ pub fn as_written(part: &impl Serialize) -> String {
 }
 
 impl StudySettings {
-    /// Appends what is wrong with the settings by themselves.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let runs = f64::from(self.runs);
-        Problem::unless_within(problems, format!("{at}.runs"), runs, 1.0..=1e7, "runs");
+    fn check_together(&self, check: &mut Checker<'_>) {
         if let PlanSettings::LatinHypercube { points } = self.plan {
-            let key = format!("{at}.plan.latin_hypercube.points");
-            Problem::unless_within(problems, key, f64::from(points), 2.0..=1e7, "points");
+            check.within("plan.latin_hypercube.points", points, 2.0..=1e7);
         }
-        for (name, variable) in &self.variables {
-            let key = format!("{at}.variables.{name}");
-            if !is_name(name) {
-                problems.push(bad_name(key.clone(), name));
+        for name in self.variables.keys() {
+            check_name(&format!("variables.{name}"), name, check);
+        }
+        for name in self.events.keys() {
+            let key = format!("events.{name}");
+            check_name(&key, name, check);
+            if self.variables.contains_key(name) {
+                check.problem(
+                    &key,
+                    "is the name of a variable too",
+                    "give the event a name of its own: both are columns of the results",
+                );
             }
-            variable.check(&key, problems);
         }
-        for name in self.events.keys().filter(|name| !is_name(name)) {
-            problems.push(bad_name(format!("{at}.events.{name}"), name));
-        }
-        for name in (self.events.keys()).filter(|name| self.variables.contains_key(*name)) {
-            problems.push(Problem::new(
-                format!("{at}.events.{name}"),
-                "is the name of a variable too",
-                "give the event a name of its own: both are columns of the results",
-            ));
-        }
-        self.check_keys(at, problems);
-        self.check_groups(at, problems);
-        self.stop.check(&format!("{at}.stop"), problems);
+        self.check_keys(check);
+        self.check_groups(check);
     }
 
     /// A key that two variables set would be what the last of them says.
-    fn check_keys(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_keys(&self, check: &mut Checker<'_>) {
         let mut seen: Vec<(&str, &str)> = Vec::new();
         for (name, variable) in &self.variables {
             for key in &variable.keys {
@@ -276,19 +255,18 @@ impl StudySettings {
                         continue;
                     }
                 };
-                problems.push(Problem::new(
-                    format!("{at}.variables.{name}.keys"),
+                check.problem(
+                    &format!("variables.{name}.keys"),
                     why,
                     "let each variable set keys of its own",
-                ));
+                );
             }
         }
     }
 
-    fn check_groups(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_groups(&self, check: &mut Checker<'_>) {
         let mut seen = BTreeSet::new();
         for (k, group) in self.correlated.iter().enumerate() {
-            let key = format!("{at}.correlated[{k}]");
             for name in &group.variables {
                 let variable = self.variables.get(name);
                 let why = match variable {
@@ -301,21 +279,19 @@ impl StudySettings {
                     Some(_) if !seen.insert(name) => "stands in two groups, or twice in one",
                     Some(_) => continue,
                 };
-                problems.push(Problem::new(
-                    format!("{key}.variables"),
+                check.problem(
+                    &format!("correlated[{k}].variables"),
                     format!("`{name}` {why}"),
                     "correlate independent drawn variables, each in one group",
-                ));
+                );
             }
-            if super::copula::lower(&group.matrix, group.variables.len()).is_none() {
-                problems.push(Problem::new(
-                    format!("{key}.matrix"),
-                    format!(
-                        "is no matrix of correlations of {} variables",
-                        group.variables.len()
-                    ),
+            let count = group.variables.len();
+            if super::copula::lower(&group.matrix, count).is_none() {
+                check.problem(
+                    &format!("correlated[{k}].matrix"),
+                    format!("is no matrix of correlations of {count} variables"),
                     "give a symmetric, positive definite matrix with 1 on its diagonal",
-                ));
+                );
             }
         }
     }
@@ -334,63 +310,46 @@ fn is_name(name: &str) -> bool {
         && name.len() > 1
 }
 
-fn bad_name(key: String, name: &str) -> Problem {
-    Problem::new(
-        key,
-        format!("`{name}` cannot be a column's name"),
-        "use at least two small letters, digits and `_`, beginning with a letter",
-    )
-}
-
-impl VariableSettings {
-    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.from.check(&format!("{at}.from"), problems);
-        for (name, value) in [("scale", self.scale), ("offset", self.offset)] {
-            let key = format!("{at}.{name}");
-            Problem::unless_within(problems, key, value, -1e12..=1e12, "");
-        }
-        if self.is_rescaled() && !self.from.is_of_numbers() {
-            problems.push(Problem::new(
-                format!("{at}.scale"),
-                "acts on numbers, and these values are none",
-                "leave `scale` and `offset` out",
-            ));
-        }
-        if let Some(propose) = &self.propose {
-            let key = format!("{at}.propose");
-            propose.check(&key, problems);
-            if !(self.from.has_density() && propose.has_density()) {
-                problems.push(Problem::new(
-                    key,
-                    "can only stand for a distribution with a density, and be one",
-                    "use uniform, log_uniform, normal, log_normal or triangular for both",
-                ));
-            } else if !propose.covers(&self.from) {
-                problems.push(Problem::new(
-                    key,
-                    "does not reach all values that `from` has",
-                    "widen it: what it never proposes would be missing from every figure",
-                ));
-            } else if !propose.bounds_weights_of(&self.from) {
-                problems.push(Problem::new(
-                    key,
-                    "falls off so fast that the weights have no variance, and no figure an error",
-                    "give it at least 0.71 of the sigma of `from`, and no corners where `from` has some",
-                ));
-            }
-        }
+fn check_name(key: &str, name: &str, check: &mut Checker<'_>) {
+    if !is_name(name) {
+        check.problem(
+            key,
+            format!("`{name}` cannot be a column's name"),
+            "use at least two small letters, digits and `_`, beginning with a letter",
+        );
     }
 }
 
-impl StopSettings {
-    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        if let Some(after_s) = self.after_s {
-            let key = format!("{at}.after_s");
-            Problem::unless_within(problems, key, after_s, 1e-3..=1e9, "s");
+impl VariableSettings {
+    fn check_together(&self, check: &mut Checker<'_>) {
+        if self.is_rescaled() && !self.from.is_of_numbers() {
+            check.problem(
+                "scale",
+                "acts on numbers, and these values are none",
+                "leave `scale` and `offset` out",
+            );
         }
-        if let Some(when) = &self.when {
-            let key = format!("{at}.when.half_width");
-            Problem::unless_within(problems, key, when.half_width, 1e-300..=1e300, "");
+        let Some(propose) = &self.propose else {
+            return;
+        };
+        if !(self.from.has_density() && propose.has_density()) {
+            check.problem(
+                "propose",
+                "can only stand for a distribution with a density, and be one",
+                "use uniform, log_uniform, normal, log_normal or triangular for both",
+            );
+        } else if !propose.covers(&self.from) {
+            check.problem(
+                "propose",
+                "does not reach all values that `from` has",
+                "widen it: what it never proposes would be missing from every figure",
+            );
+        } else if !propose.bounds_weights_of(&self.from) {
+            check.problem(
+                "propose",
+                "falls off so fast that the weights have no variance, and no figure an error",
+                "give it at least 0.71 of the sigma of `from`, and no corners where `from` has some",
+            );
         }
     }
 }

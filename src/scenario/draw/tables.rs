@@ -1,7 +1,7 @@
 //! Tables of measured values that variables are drawn from.
 
 use super::settings::{Distribution, StudySettings};
-use crate::track::Problem;
+use crate::settings::Problem;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;

@@ -7,7 +7,7 @@ use super::settings::{Distribution, PlanSettings, StudySettings};
 use super::tables::Tables;
 use crate::scenario::build::{overridden, read};
 use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
-use crate::track::{FileError, Problem, read_toml};
+use crate::settings::{FileError, Problem, read_toml};
 use nalgebra::DMatrix;
 use std::path::{Path, PathBuf};
 use toml::Value;

@@ -3,7 +3,8 @@
 
 use crate::scenario::Scenario;
 use crate::session::{Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, run};
-use crate::track::{Tunnel, read_toml};
+use crate::settings::read_toml;
+use crate::track::Tunnel;
 use crate::twin::render::View;
 
 /// Exposures and gains as pairs are drawn, as their frames say, and by how much fixes are off the

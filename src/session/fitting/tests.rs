@@ -3,7 +3,8 @@
 
 use super::*;
 use crate::bus::{SimTime, TrainCommand};
-use crate::track::{Tunnel, read_toml};
+use crate::settings::read_toml;
+use crate::track::Tunnel;
 use crate::twin::sensors::{ExposureMode, Output};
 
 const TUNNEL: &str = include_str!("../../../tunnels/chengdu_line1.toml");

@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
-use crate::track::{Tunnel, read_toml};
+use crate::settings::read_toml;
+use crate::track::Tunnel;
 
 const TUNNEL: &str = include_str!("../../../tunnels/chengdu_line1.toml");
 const SCENARIO: &str = r#"

@@ -249,7 +249,8 @@ impl StripeReader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::uid::{Uid, Waveform};
+    use crate::track::uid::Uid;
+    use crate::track::waveform::Waveform;
 
     const SHUTTER: Shutter = Shutter {
         line_time_s: 22.2e-6,

@@ -5,7 +5,7 @@ use crate::bus::{
     CameraModel, DistortionCoefficients, Frame, Intrinsics, RigCalibration, Shutter, SimTime,
     StereoPair,
 };
-use crate::track::uid::Waveform;
+use crate::track::waveform::Waveform;
 use crate::track::{LampSite, Tunnel};
 use image::GrayImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};

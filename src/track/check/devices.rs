@@ -1,11 +1,10 @@
 //! Wayside devices, balises, base stations and stations of a tunnel file.
 
-use super::{LONGEST_M, free_standing, on_line};
+use super::{free_standing, on_line};
+use crate::settings::{Problem, did_you_mean};
 use crate::track::Tunnel;
-use crate::track::document::did_you_mean;
 use crate::track::file::{TunnelFile, WaysideEntry};
 use crate::track::furniture::{Balise, BaseStation, WaysideSite};
-use crate::track::problem::Problem;
 use crate::track::section::OutlinePoint;
 
 /// Balises as written.
@@ -42,8 +41,6 @@ pub(super) fn wayside(
     let mut sites = Vec::with_capacity(file.wayside.len());
     for (k, w) in file.wayside.iter().enumerate() {
         let key = |name: &str| format!("wayside[{k}].{name}");
-        Problem::unless_within(problems, key("yaw_deg"), w.yaw_deg, -360.0..=360.0, "deg");
-        Problem::unless_within(problems, key("pitch_deg"), w.pitch_deg, -90.0..=90.0, "deg");
         if on_line(key("chainage_m"), w.chainage_m, tunnel, problems) {
             let place = [OutlinePoint::new(w.lateral_m, w.height_m)];
             free_standing(
@@ -93,7 +90,7 @@ fn check_balise(key: &str, w: &WaysideEntry, tunnel: &Tunnel, problems: &mut Vec
     }
 }
 
-/// Chainages on the line, reaches, and names that are there twice.
+/// Chainages on the line, and names that are there twice.
 pub(super) fn check(file: &TunnelFile, tunnel: &Tunnel, problems: &mut Vec<Problem>) {
     for (k, b) in file.balises.iter().enumerate() {
         on_line(
@@ -110,8 +107,6 @@ pub(super) fn check(file: &TunnelFile, tunnel: &Tunnel, problems: &mut Vec<Probl
             tunnel,
             problems,
         );
-        let key = format!("base_stations[{k}].reach_m");
-        Problem::unless_within(problems, key, b.reach_m, 1.0..=LONGEST_M, "m");
     }
     for (k, s) in file.stations.iter().enumerate() {
         on_line(

@@ -1,18 +1,15 @@
 //! Lamps of a tunnel file: from a row and single entries to surveyed sites.
 
 use super::{free_standing, on_line};
-use crate::track::file::{LampEntry, LampRow, TunnelFile};
+use crate::settings::Problem;
+use crate::track::file::{LAST_LAMP, LampEntry, LampRow, TunnelFile};
 use crate::track::furniture::LampSite;
-use crate::track::problem::Problem;
 use crate::track::section::OutlinePoint;
 use crate::track::uid::Uid;
 use crate::track::{TrackPoint, Tunnel};
 use nalgebra::{Unit, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-
-/// Lamp numbers have 10 bits.
-const MOST_LAMPS: usize = 1024;
 
 /// A lamp and its place among the file's `[[lamp]]` entries; none for a lamp of the row.
 type Placed = (Option<usize>, LampSite);
@@ -24,7 +21,6 @@ pub(super) fn place(
     problems: &mut Vec<Problem>,
 ) -> Vec<LampSite> {
     let common = file.lamps.clone().unwrap_or_default();
-    check_common(&common, problems);
     let row = match &file.lamps {
         Some(row) => row_entries(row, tunnel, problems),
         None => Vec::new(),
@@ -32,15 +28,6 @@ pub(super) fn place(
     let row = row.iter().map(|entry| (None, site(&common, entry, tunnel)));
     let mut placed: Vec<Placed> = row.collect();
     for (k, entry) in file.lamp.iter().enumerate() {
-        let number = f64::from(entry.number);
-        let largest = (MOST_LAMPS - 1) as f64;
-        Problem::unless_within(
-            problems,
-            format!("lamp[{k}].number"),
-            number,
-            0.0..=largest,
-            "",
-        );
         if on_line(
             format!("lamp[{k}].chainage_m"),
             entry.chainage_m,
@@ -57,34 +44,9 @@ pub(super) fn place(
     sites
 }
 
-fn check_common(row: &LampRow, problems: &mut Vec<Problem>) {
-    for (name, value, low, high, unit) in [
-        ("aim_yaw_deg", row.aim_yaw_deg, -90.0, 90.0, "deg"),
-        ("aim_pitch_deg", row.aim_pitch_deg, -90.0, 90.0, "deg"),
-        ("diameter_m", row.diameter_m, 0.01, 2.0, "m"),
-        ("power_w", row.power_w, 0.01, 10_000.0, "W"),
-        (
-            "efficacy_lm_per_w",
-            row.efficacy_lm_per_w,
-            1.0,
-            700.0,
-            "lm/W",
-        ),
-        ("beam_deg", row.beam_deg, 5.0, 170.0, "deg"),
-        ("chip_us", row.chip_us, 1.0, 10_000.0, "us"),
-        ("lateral_m", row.lateral_m, -60.0, 60.0, "m"),
-        ("height_m", row.height_m, -1.0, 30.0, "m"),
-    ] {
-        Problem::unless_within(problems, format!("lamps.{name}"), value, low..=high, unit);
-    }
-}
-
 /// The row as single lamps; none where its numbers make no sense.
 fn row_entries(row: &LampRow, tunnel: &Tunnel, problems: &mut Vec<Problem>) -> Vec<LampEntry> {
-    let before = problems.len();
     let to_m = row.to_m.unwrap_or(tunnel.alignment.length_m());
-    let spacings = 0.1..=10_000.0;
-    Problem::unless_within(problems, "lamps.spacing_m", row.spacing_m, spacings, "m");
     on_line("lamps.from_m", row.from_m, tunnel, problems);
     on_line("lamps.to_m", to_m, tunnel, problems);
     if to_m < row.from_m {
@@ -94,20 +56,20 @@ fn row_entries(row: &LampRow, tunnel: &Tunnel, problems: &mut Vec<Problem>) -> V
             "let the row end further up the line",
         ));
     }
-    if problems.len() > before {
+    let wrong = ["lamps.spacing_m", "lamps.from_m", "lamps.to_m"];
+    if problems.iter().any(|p| wrong.contains(&p.key.as_str())) {
         return Vec::new();
     }
     // The last lamp may stand at the end in spite of rounding.
     let count = ((to_m - row.from_m) / row.spacing_m + 1e-9).floor() + 1.0;
-    if f64::from(row.first_number) + count > MOST_LAMPS as f64 {
+    if f64::from(row.first_number) + count > f64::from(LAST_LAMP) + 1.0 {
         problems.push(Problem::new(
             "lamps.spacing_m",
             format!(
-                "{count} lamps from number {} need numbers over {}",
+                "{count} lamps from number {} need numbers over {LAST_LAMP}",
                 row.first_number,
-                MOST_LAMPS - 1
             ),
-            format!("a line has at most {MOST_LAMPS} lamps: space them wider, or shorten the row"),
+            "number them from lower on, space them wider, or shorten the row",
         ));
         return Vec::new();
     }

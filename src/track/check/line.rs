@@ -1,36 +1,17 @@
 //! Plan and profile of a tunnel file.
 
-use super::{LONGEST_M, SAME_M};
+use super::SAME_M;
+use crate::settings::Problem;
 use crate::track::alignment::{Alignment, Grade, PlanElement};
-use crate::track::file::{PlanEntry, PlanKind, TunnelFile};
-use crate::track::problem::Problem;
+use crate::track::file::{LONGEST_M, PlanEntry, PlanKind, TunnelFile};
 use crate::track::section::Side;
 use nalgebra::Point3;
-
-/// Largest cant on metro lines (GB 50157).
-const LARGEST_CANT_MM: f64 = 120.0;
-/// Steepest grade that is taken for a railway's.
-const STEEPEST_PERMILLE: f64 = 60.0;
 
 pub(super) fn alignment(file: &TunnelFile, problems: &mut Vec<Problem>) -> Alignment {
     let elements = plan(file, problems);
     let length_m = elements.iter().map(|e| e.length_m).sum();
     let grades = grades(file, length_m, problems);
     let start = &file.start;
-    for (key, value) in [
-        ("start.east_m", start.east_m),
-        ("start.north_m", start.north_m),
-        ("start.up_m", start.up_m),
-    ] {
-        Problem::unless_within(problems, key, value, -1e7..=1e7, "m");
-    }
-    Problem::unless_within(
-        problems,
-        "start.heading_deg",
-        start.heading_deg,
-        -360.0..=360.0,
-        "deg",
-    );
     Alignment::new(
         Point3::new(start.east_m, start.north_m, start.up_m),
         start.heading_deg.to_radians(),
@@ -99,8 +80,6 @@ fn plan(file: &TunnelFile, problems: &mut Vec<Problem>) -> Vec<PlanElement> {
 
 /// Curvature and cant of an element that has its own; none for a clothoid.
 fn bend(k: usize, entry: &PlanEntry, problems: &mut Vec<Problem>) -> Option<Bend> {
-    let key = format!("plan[{k}].length_m");
-    Problem::unless_within(problems, key, entry.length_m, 0.001..=LONGEST_M, "m");
     match entry.kind {
         PlanKind::Arc => Some(arc(k, entry, problems)),
         PlanKind::Straight => {
@@ -151,13 +130,6 @@ fn arc(k: usize, entry: &PlanEntry, problems: &mut Vec<Problem>) -> Bend {
         problems.push(Problem::new(key("turn"), "is missing", remedy));
     }
     let cant_mm = entry.cant_mm.unwrap_or(0.0);
-    Problem::unless_within(
-        problems,
-        key("cant_mm"),
-        cant_mm,
-        0.0..=LARGEST_CANT_MM,
-        "mm",
-    );
     let sign = match entry.turn {
         Some(Side::Right) => -1.0,
         _ => 1.0,
@@ -177,25 +149,10 @@ fn grades(file: &TunnelFile, length_m: f64, problems: &mut Vec<Problem>) -> Vec<
         })
         .collect();
     for (k, g) in file.grades.iter().enumerate() {
-        let key = |name: &str| format!("grades[{k}].{name}");
-        Problem::unless_within(
-            problems,
-            key("grade_permille"),
-            g.grade_permille,
-            -STEEPEST_PERMILLE..=STEEPEST_PERMILLE,
-            "permille",
-        );
-        Problem::unless_within(
-            problems,
-            key("vertical_radius_m"),
-            g.vertical_radius_m,
-            0.0..=1e6,
-            "m",
-        );
         let wrong_start = k == 0 && g.from_m.abs() > SAME_M;
         if wrong_start || !g.from_m.is_finite() {
             problems.push(Problem::new(
-                key("from_m"),
+                format!("grades[{k}].from_m"),
                 format!("the first grade begins at {} m", g.from_m),
                 "begin it at 0 m",
             ));

@@ -5,19 +5,17 @@ mod lamps;
 mod line;
 mod sections;
 
+use super::Tunnel;
 use super::file::TunnelFile;
 use super::gauge::Gauge;
-use super::problem::{FileError, Problem};
 use super::section::OutlinePoint;
-use super::{Tunnel, read_toml};
+use crate::settings::{FileError, Problem, Settings, read_toml};
 
 /// Chainages closer than this are the same place.
 const SAME_M: f64 = 1e-6;
-/// No line is longer: chainages stay exact to a nanometre.
-const LONGEST_M: f64 = 1e6;
 
 impl Tunnel {
-    /// Reads and checks the text of a tunnel file. [`super::locate`] finds the keys of the
+    /// Reads and checks the text of a tunnel file. [`locate`](crate::settings::locate) finds the keys of the
     /// problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         Self::from_file(&read_toml(text)?)
@@ -36,12 +34,7 @@ impl Tunnel {
 }
 
 fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
-    if file.name.trim().is_empty() {
-        problems.push(Problem::new("name", "is empty", "give the tunnel a name"));
-    }
-    let line_number = f64::from(file.line_number);
-    Problem::unless_within(problems, "line_number", line_number, 0.0..=15.0, "");
-    Problem::unless_within(problems, "ambient_lx", file.ambient_lx, 0.0..=1e5, "lx");
+    file.check("", problems);
     let alignment = line::alignment(file, problems);
     let sections = sections::sections(&file.sections, alignment.length_m(), problems);
     let mut tunnel = Tunnel {
@@ -250,7 +243,7 @@ mod tests {
         let found = problems(&text);
         assert_eq!(found.len(), 4, "{found:#?}");
         for p in &found {
-            assert!(crate::track::locate(&text, &p.key).is_some());
+            assert!(crate::settings::locate(&text, &p.key).is_some());
         }
         assert!(found.iter().any(|p| p.remedy == "did you mean \"B1110\"?"));
     }

@@ -1,9 +1,9 @@
 //! Cross-sections of a tunnel file.
 
 use super::SAME_M;
+use crate::settings::{Checker, Problem};
 use crate::track::file::{SectionEntry, SectionKind};
 use crate::track::gauge::Gauge;
-use crate::track::problem::Problem;
 use crate::track::section::{CrossSection, PlatformShape, SectionRange, Side};
 use std::ops::RangeInclusive;
 
@@ -165,8 +165,8 @@ impl<'a> Reader<'a> {
         self.asked.push(name);
         let given = self.lengths.iter().find(|(n, _)| *n == name);
         let value = given.and_then(|(_, v)| *v).unwrap_or(default_m);
-        let key = format!("sections[{}].{name}", self.k);
-        Problem::unless_within(self.problems, key, value, range, "m");
+        let at = format!("sections[{}]", self.k);
+        Checker::new(&at, self.problems).within(name, value, range);
         value
     }
 

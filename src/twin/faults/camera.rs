@@ -3,52 +3,51 @@
 
 use super::check_times;
 use crate::bus::SimTime;
-use crate::track::Problem;
+use crate::settings::{Checker, settings};
 use crate::twin::random::Stream;
 use image::GrayImage;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// A fault of one camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CameraFaultSettings {
-    /// Whose: `rig` (both eyes), `left` or `right` (one of them), or the name of a wayside device.
-    pub camera: String,
-    /// What is wrong with it.
-    pub fault: CameraFaultKind,
-    /// Since when, s. Default 0.
-    #[serde(default)]
-    pub from_s: f64,
-    /// Until when, s. Default: to the end.
-    #[serde(default)]
-    pub to_s: Option<f64>,
+settings! {
+    /// A fault of one camera.
+    pub struct CameraFaultSettings {
+        /// Whose: `rig` (both eyes), `left` or `right` (one of them), or the name of a wayside
+        /// device.
+        camera: String;
+        /// What is wrong with it.
+        fault: CameraFaultKind, nested;
+        /// Since when, s. Default 0.
+        #[serde(default)]
+        from_s: f64, in 0.0..=86_400.0;
+        /// Until when, s. Default: to the end.
+        to_s: Option<f64>;
+    }
+    also check_stretch
 }
 
-/// What may be wrong with a camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum CameraFaultKind {
-    /// Its frame grabber is stuck: the image before comes again and again, with new numbers and
-    /// times.
-    Freeze,
-    /// Frames are lost; the numbers of the others show the gap. Where one eye's image is lost the
-    /// pair comes without it.
-    Drop {
-        /// This share of them, 0 to 1, each drawn from the seed. Default 1: all.
-        #[serde(default = "all")]
-        share: f64,
-        /// Only those with these numbers. Default: any.
-        #[serde(default)]
-        frames: Option<Vec<u32>>,
-    },
-    /// Its sensor is dead: every pixel is 0.
-    Dead,
-    /// Images come late, in their order.
-    Late {
-        /// By so much more than `stack.latency_ms`, ms.
-        by_ms: f64,
-    },
+settings! {
+    /// What may be wrong with a camera.
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    pub enum CameraFaultKind {
+        /// Its frame grabber is stuck: the image before comes again and again, with new numbers and
+        /// times.
+        Freeze,
+        /// Frames are lost; the numbers of the others show the gap. Where one eye's image is lost
+        /// the pair comes without it.
+        Drop {
+            /// This share of them, 0 to 1, each drawn from the seed.
+            #[serde(default = "all")]
+            share: f64, in 0.0..=1.0;
+            /// Only those with these numbers. Default: any.
+            frames: Option<Vec<u32>>;
+        },
+        /// Its sensor is dead: every pixel is 0.
+        Dead,
+        /// Images come late, in their order.
+        Late {
+            /// By so much more than `stack.latency_ms`, ms.
+            by_ms: f64, in 0.0..=MAX_LATE_MS;
+        },
+    }
 }
 
 fn all() -> f64 {
@@ -59,17 +58,8 @@ fn all() -> f64 {
 const MAX_LATE_MS: f64 = 5000.0;
 
 impl CameraFaultSettings {
-    pub(super) fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        check_times(at, self.from_s, self.to_s, problems);
-        let mut within = |key: &str, value: f64, most: f64, unit: &str| {
-            let key = format!("{at}.fault.{key}");
-            Problem::unless_within(problems, key, value, 0.0..=most, unit);
-        };
-        match self.fault {
-            CameraFaultKind::Drop { share, .. } => within("share", share, 1.0, ""),
-            CameraFaultKind::Late { by_ms } => within("by_ms", by_ms, MAX_LATE_MS, "ms"),
-            CameraFaultKind::Freeze | CameraFaultKind::Dead => {}
-        }
+    fn check_stretch(&self, check: &mut Checker<'_>) {
+        check_times(self.from_s, self.to_s, check);
     }
 
     /// Images come as much later as this at most.
@@ -178,7 +168,7 @@ impl CameraOutput {
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
-    use crate::track::read_toml;
+    use crate::settings::read_toml;
     use crate::twin::faults::FaultSettings;
     use image::Luma;
 

@@ -2,69 +2,66 @@
 
 use super::check_times;
 use crate::bus::SimTime;
-use crate::track::uid::Ripple;
-use crate::track::{Checker, Problem, Tunnel};
+use crate::settings::{Checker, settings};
+use crate::track::Tunnel;
+use crate::track::waveform::Ripple;
 use crate::twin::lights::{LampChange, LampLight};
 use crate::twin::random::Stream;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// A fault of some lamps. Which: those that have one of the numbers, stand in the stretch, and are
-/// in the share drawn from these; where none of the three is given, all.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LampFaultSettings {
-    /// Numbers of the lamps (the second part of their UID). Default: any.
-    #[serde(default)]
-    pub numbers: Option<Vec<u16>>,
-    /// Only from this chainage on, m. Default: from the line's beginning.
-    #[serde(default)]
-    pub from_m: Option<f64>,
-    /// Only up to this chainage, m. Default: to the line's end.
-    #[serde(default)]
-    pub to_m: Option<f64>,
-    /// This share of them, 0 to 1, drawn from the seed: of n lamps, the whole number nearest to
-    /// share x n. Default 1: all.
-    #[serde(default = "all")]
-    pub share: f64,
-    /// What is wrong with them.
-    pub fault: LampFaultKind,
-    /// Since when, s. Default 0.
-    #[serde(default)]
-    pub from_s: f64,
-    /// Until when, s. Default: to the end.
-    #[serde(default)]
-    pub to_s: Option<f64>,
+settings! {
+    /// A fault of some lamps. Which: those that have one of the numbers, stand in the stretch, and are
+    /// in the share drawn from these; where none of the three is given, all.
+    pub struct LampFaultSettings {
+        /// Numbers of the lamps (the second part of their UID). Default: any.
+        numbers: Option<Vec<u16>>;
+        /// Only from this chainage on, m. Default: from the line's beginning.
+        from_m: Option<f64>, in -1e6..=1e6;
+        /// Only up to this chainage, m. Default: to the line's end.
+        to_m: Option<f64>, in -1e6..=1e6;
+        /// This share of them, 0 to 1, drawn from the seed: of n lamps, the whole number nearest to
+        /// share x n. Default 1: all.
+        #[serde(default = "all")]
+        share: f64, in 0.0..=1.0;
+        /// What is wrong with them.
+        fault: LampFaultKind, nested;
+        /// Since when, s. Default 0.
+        #[serde(default)]
+        from_s: f64, in 0.0..=86_400.0;
+        /// Until when, s. Default: to the end.
+        to_s: Option<f64>;
+    }
+    also check_stretches
 }
 
 fn all() -> f64 {
     1.0
 }
 
-/// What may be wrong with a lamp.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum LampFaultKind {
-    /// It is out.
-    Dead,
-    /// It has aged, or is dirty.
-    Dim {
-        /// Its light as a share of a good lamp's, 0 to 1.
-        level: f64,
-    },
-    /// Its driver lets the mains through: its light swells and sinks by a sine.
-    Flicker {
-        /// By this share of the mean, 0 to 1. Default 0.5.
-        #[serde(default = "half")]
-        depth: f64,
-        /// So often a second, Hz: twice the mains frequency. Default 100.
-        #[serde(default = "twice_the_mains")]
-        frequency_hz: f64,
-        /// Phase at time 0, deg. Default: one of its own for each lamp, drawn from the seed, as lamps
-        /// hang on three phases and long cables.
-        #[serde(default)]
-        phase_deg: Option<f64>,
-    },
+settings! {
+    /// What may be wrong with a lamp.
+    #[derive(Copy)]
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    pub enum LampFaultKind {
+        /// It is out.
+        Dead,
+        /// It has aged, or is dirty.
+        Dim {
+            /// Its light as a share of a good lamp's, 0 to 1.
+            level: f64, in 0.0..=1.0;
+        },
+        /// Its driver lets the mains through: its light swells and sinks by a sine.
+        Flicker {
+            /// By this share of the mean, 0 to 1.
+            #[serde(default = "half")]
+            depth: f64, in 0.0..=1.0;
+            /// So often a second, Hz: twice the mains frequency.
+            #[serde(default = "twice_the_mains")]
+            frequency_hz: f64, in 1.0..=2000.0;
+            /// Phase at time 0, deg. Default: one of its own for each lamp, drawn from the seed, as
+            /// lamps hang on three phases and long cables.
+            phase_deg: Option<f64>, in -360.0..=360.0;
+        },
+    }
 }
 
 fn half() -> f64 {
@@ -76,65 +73,44 @@ fn twice_the_mains() -> f64 {
 }
 
 impl LampFaultSettings {
-    pub(super) fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        check_times(at, self.from_s, self.to_s, problems);
-        let mut check = Checker::new(at, problems);
-        check.within("share", self.share, 0.0..=1.0, "");
-        for (key, place) in [("from_m", self.from_m), ("to_m", self.to_m)] {
-            if let Some(place_m) = place {
-                check.within(key, place_m, -1e6..=1e6, "m");
-            }
-        }
-        match self.fault {
-            LampFaultKind::Dead => {}
-            LampFaultKind::Dim { level } => check.within("fault.level", level, 0.0..=1.0, ""),
-            LampFaultKind::Flicker {
-                depth,
-                frequency_hz,
-                phase_deg,
-            } => {
-                check.within("fault.depth", depth, 0.0..=1.0, "");
-                check.within("fault.frequency_hz", frequency_hz, 1.0..=2000.0, "Hz");
-                let phase_deg = phase_deg.unwrap_or(0.0);
-                check.within("fault.phase_deg", phase_deg, -360.0..=360.0, "deg");
-            }
-        }
+    fn check_stretches(&self, check: &mut Checker<'_>) {
+        check_times(self.from_s, self.to_s, check);
         if let (Some(from_m), Some(to_m)) = (self.from_m, self.to_m)
             && from_m > to_m
         {
-            problems.push(Problem::new(
-                format!("{at}.to_m"),
+            check.problem(
+                "to_m",
                 format!("the stretch ends at {to_m} m, before it begins at {from_m} m"),
                 "give from_m <= to_m",
-            ));
+            );
         }
     }
 
     /// A fault that strikes nothing is a slip of the pen.
-    pub(super) fn check_in(&self, tunnel: &Tunnel, at: &str, problems: &mut Vec<Problem>) {
+    pub(super) fn check_in(&self, tunnel: &Tunnel, check: &mut Checker<'_>, at: &str) {
         let Some(first) = tunnel.lamps.first() else {
-            problems.push(Problem::new(
+            check.problem(
                 at,
                 format!("tunnel `{}` has no lamps", tunnel.name),
                 "take this out, or choose a tunnel with lamps",
-            ));
+            );
             return;
         };
         let has = |number: u16| tunnel.lamps.iter().any(|l| l.uid.lamp == number);
         let missing = (self.numbers.iter().flatten()).find(|number| !has(**number));
         if let Some(number) = missing {
             let last = tunnel.lamps.last().unwrap_or(first);
-            problems.push(Problem::new(
-                format!("{at}.numbers"),
+            check.problem(
+                &format!("{at}.numbers"),
                 format!("tunnel `{}` has no lamp {number}", tunnel.name),
                 format!("its lamps are {} to {}", first.uid.lamp, last.uid.lamp),
-            ));
+            );
         } else if self.candidates(tunnel).next().is_none() {
-            problems.push(Problem::new(
-                format!("{at}.from_m"),
+            check.problem(
+                &format!("{at}.from_m"),
                 "there is no such lamp in the stretch",
                 "widen it, or take it out",
-            ));
+            );
         }
     }
 
@@ -238,7 +214,7 @@ fn with((level, ripple): (f64, Ripple), fault: LampFaultKind, own_rad: f64) -> (
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
-    use crate::track::read_toml;
+    use crate::settings::read_toml;
     use crate::twin::faults::FaultSettings;
 
     fn line() -> Tunnel {

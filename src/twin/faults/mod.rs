@@ -2,7 +2,8 @@
 //! dead or deliver late.
 //!
 //! ```
-//! use metrotwin::track::{Tunnel, read_toml};
+//! use metrotwin::settings::read_toml;
+//! use metrotwin::track::Tunnel;
 //! use metrotwin::twin::faults::FaultSettings;
 //!
 //! let faults: FaultSettings = read_toml(r#"
@@ -22,7 +23,7 @@
 //!     lamps = { from_m = 5.0 }
 //! ")?;
 //! assert_eq!(faults.lamps[0].chosen(0, &tunnel, 1).count(), 22);
-//! # Ok::<(), metrotwin::track::FileError>(())
+//! # Ok::<(), metrotwin::settings::FileError>(())
 //! ```
 //!
 //! Every fault has a stretch of time in which it acts; by default that is the whole run. What is
@@ -40,54 +41,36 @@ mod lamp;
 pub use camera::{CameraFaultKind, CameraFaultSettings, CameraFaults, CameraOutput};
 pub use lamp::{LampFaultKind, LampFaultSettings, age};
 
-use crate::track::{Problem, Tunnel};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::settings::{Checker, settings};
+use crate::track::Tunnel;
 
-/// All faults of a scenario.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct FaultSettings {
-    /// Of the tunnel's lamps. Default: none.
-    pub lamps: Vec<LampFaultSettings>,
-    /// Of the cameras. Default: none.
-    pub cameras: Vec<CameraFaultSettings>,
+settings! {
+    /// All faults of a scenario.
+    pub struct FaultSettings {
+        /// Of the tunnel's lamps. Default: none.
+        lamps: Vec<LampFaultSettings> = Vec::new(), nested;
+        /// Of the cameras. Default: none.
+        cameras: Vec<CameraFaultSettings> = Vec::new(), nested;
+    }
 }
 
 impl FaultSettings {
-    /// Appends what is wrong by itself.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+    /// Adds what does not fit the tunnel.
+    pub fn check_in(&self, tunnel: &Tunnel, check: &mut Checker<'_>) {
         for (k, lamp) in self.lamps.iter().enumerate() {
-            lamp.check(&format!("{at}.lamps[{k}]"), problems);
-        }
-        for (k, camera) in self.cameras.iter().enumerate() {
-            camera.check(&format!("{at}.cameras[{k}]"), problems);
-        }
-    }
-
-    /// Appends what does not fit the tunnel.
-    pub fn check_in(&self, tunnel: &Tunnel, at: &str, problems: &mut Vec<Problem>) {
-        for (k, lamp) in self.lamps.iter().enumerate() {
-            lamp.check_in(tunnel, &format!("{at}.lamps[{k}]"), problems);
+            lamp.check_in(tunnel, check, &format!("lamps[{k}]"));
         }
     }
 }
 
 /// A stretch of time must be one.
-fn check_times(at: &str, from_s: f64, to_s: Option<f64>, problems: &mut Vec<Problem>) {
-    Problem::unless_within(
-        problems,
-        format!("{at}.from_s"),
-        from_s,
-        0.0..=86_400.0,
-        "s",
-    );
+fn check_times(from_s: f64, to_s: Option<f64>, check: &mut Checker<'_>) {
     if let Some(to_s) = to_s.filter(|to_s| from_s.is_finite() && (to_s.is_nan() || *to_s <= from_s))
     {
-        problems.push(Problem::new(
-            format!("{at}.to_s"),
+        check.problem(
+            "to_s",
             format!("it ends at {to_s} s, and begins at {from_s} s"),
             format!("give a time after {from_s} s, or take it out: the fault then stays"),
-        ));
+        );
     }
 }

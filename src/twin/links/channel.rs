@@ -1,49 +1,52 @@
 //! One way for messages: they take time, are lost, and come in order or not.
 
 use crate::bus::{Message, SimTime};
-use crate::track::{Checker, Problem};
+use crate::settings::{Checker, settings};
 use crate::twin::random::Stream;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A stretch of time without radio.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Outage {
-    /// Begins, seconds after the scenario's start.
-    pub from_s: f64,
-    /// Ends.
-    pub to_s: f64,
+settings! {
+    /// A stretch of time without radio.
+    #[derive(Copy)]
+    pub struct Outage {
+        /// Begins, seconds after the scenario's start.
+        from_s: f64;
+        /// Ends.
+        to_s: f64;
+    }
+    also check_order
 }
 
-/// The radio between trains, wayside devices and control centre (GSM-R class).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RadioSettings {
-    /// From sending to reception, milliseconds (IEEE 1474.1: 500 to 2000). Default 500.
-    pub latency_ms: f64,
-    /// A message may take longer by up to this, milliseconds, drawn evenly for each. Default 0.
-    pub jitter_ms: f64,
-    /// Messages of one sender to one receiver arrive in the order in which they were sent. Default
-    /// true.
-    pub in_order: bool,
-    /// Probability that a message is lost, 0 to 1. Default 0.
-    pub loss: f64,
-    /// Times without any radio. Default none.
-    pub outages: Vec<Outage>,
-}
-
-impl Default for RadioSettings {
-    fn default() -> Self {
-        Self {
-            latency_ms: 500.0,
-            jitter_ms: 0.0,
-            in_order: true,
-            loss: 0.0,
-            outages: Vec::new(),
+impl Outage {
+    fn check_order(&self, check: &mut Checker<'_>) {
+        if self.from_s.is_nan() || self.to_s.is_nan() || self.from_s >= self.to_s {
+            check.problem(
+                "to_s",
+                format!(
+                    "ends at {} s, before it begins at {} s",
+                    self.to_s, self.from_s
+                ),
+                "give from_s < to_s",
+            );
         }
     }
+}
+
+settings! {
+    /// The radio between trains, wayside devices and control centre (GSM-R class).
+    pub struct RadioSettings {
+        /// From sending to reception, milliseconds (IEEE 1474.1: 500 to 2000).
+        latency_ms: f64 = 500.0;
+        /// A message may take longer by up to this, milliseconds, drawn evenly for each.
+        jitter_ms: f64 = 0.0, in 0.0..=60_000.0;
+        /// Messages of one sender to one receiver arrive in the order in which they were sent.
+        in_order: bool = true;
+        /// Probability that a message is lost, 0 to 1.
+        loss: f64 = 0.0, in 0.0..=1.0;
+        /// Times without any radio. Default: none.
+        outages: Vec<Outage> = Vec::new(), nested;
+    }
+    also check_latency
 }
 
 impl RadioSettings {
@@ -55,29 +58,13 @@ impl RadioSettings {
         }
     }
 
-    /// Appends what is wrong, with keys below `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_latency(&self, check: &mut Checker<'_>) {
         if !(self.latency_ms >= 0.0 && self.latency_ms.is_finite()) {
-            problems.push(Problem::new(
-                format!("{at}.latency_ms"),
+            check.problem(
+                "latency_ms",
                 format!("{} ms cannot be a latency", self.latency_ms),
                 "give 0 or more milliseconds",
-            ));
-        }
-        let mut check = Checker::new(at, problems);
-        check.within("jitter_ms", self.jitter_ms, 0.0..=60_000.0, "ms");
-        check.within("loss", self.loss, 0.0..=1.0, "");
-        for (k, outage) in self.outages.iter().enumerate() {
-            if outage.from_s.is_nan() || outage.to_s.is_nan() || outage.from_s >= outage.to_s {
-                problems.push(Problem::new(
-                    format!("{at}.outages[{k}]"),
-                    format!(
-                        "ends at {} s, before it begins at {} s",
-                        outage.to_s, outage.from_s
-                    ),
-                    "give from_s < to_s",
-                ));
-            }
+            );
         }
     }
 }

@@ -14,7 +14,7 @@
 //! (2005) 992-1000, whose table has `dry` and `wet`. A film of crushed leaves leaves 0.02 to 0.06
 //! (RSSB, "Low adhesion" research reports); its other parameters are those of `wet`.
 
-use crate::track::{Checker, Problem, key_below};
+use crate::settings::{Checker, settings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_4};
@@ -38,33 +38,31 @@ pub enum RailState {
     LeafFilm,
 }
 
-/// A stretch of line with rail heads of its own.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct RailZone {
-    /// Chainage where it begins, m.
-    pub from_m: f64,
-    /// Chainage where it ends, m.
-    pub to_m: f64,
-    /// State of the rail heads.
-    pub rail: RailState,
+settings! {
+    /// A stretch of line with rail heads of its own.
+    #[derive(Copy)]
+    pub struct RailZone {
+        /// Chainage where it begins, m.
+        from_m: f64, in -1e6..=1e6;
+        /// Chainage where it ends, m.
+        to_m: f64, in -1e6..=1e6;
+        /// State of the rail heads.
+        rail: RailState;
+    }
+    also check_order
 }
 
 impl RailZone {
-    /// Appends what is wrong; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("from_m", self.from_m, -1e6..=1e6, "m");
-        check.within("to_m", self.to_m, -1e6..=1e6, "m");
+    fn check_order(&self, check: &mut Checker<'_>) {
         if self.to_m < self.from_m {
-            problems.push(Problem::new(
-                key_below(at, "to_m"),
+            check.problem(
+                "to_m",
                 format!(
                     "it ends at {} m, before it begins at {} m",
                     self.to_m, self.from_m
                 ),
                 "swap the two",
-            ));
+            );
         }
     }
 }
@@ -127,6 +125,7 @@ impl Adhesion {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     /// Fails where the slope at the origin is not Kalker's times (kA + kS)/2, or a force exceeds
     /// the friction, or does not fall behind its largest value.

@@ -15,7 +15,8 @@
 //! wheel on one dipped rail lowers the middle of the axle by half of it, and rolls it.
 
 use super::deviation::Deviation;
-use crate::track::{CANT_BASE_M, Checker, Problem};
+use crate::settings::{Checker, settings};
+use crate::track::CANT_BASE_M;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
@@ -33,109 +34,69 @@ pub enum Side {
     Right,
 }
 
-/// What is wrong with the running surface.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum DefectShape {
-    /// A rail joint that hangs: a cusp.
-    Joint {
-        /// Depth, metres.
-        depth_m: f64,
-        /// From its bottom to either end, metres.
-        half_length_m: f64,
-    },
-    /// A weld, or the gap of a crossing, ground hollow: a smooth dip.
-    Dip {
-        /// Depth, metres.
-        depth_m: f64,
-        /// From its bottom to either end, metres.
-        half_length_m: f64,
-    },
-    /// Waves of one length.
-    Corrugation {
-        /// Half of the height from trough to crest, metres.
-        amplitude_m: f64,
-        /// Metres.
-        wavelength_m: f64,
-        /// From the defect's chainage to the last wave, metres.
-        length_m: f64,
-    },
-    /// A slab that lies lower than its neighbours (or, where the depth is negative, higher).
-    Slab {
-        /// Metres.
-        depth_m: f64,
-        /// Of the slab with both ramps, metres.
-        length_m: f64,
-        /// Over which the level changes, at either end, metres.
-        ramp_m: f64,
-    },
+settings! {
+    /// What is wrong with the running surface.
+    #[derive(Copy)]
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    pub enum DefectShape {
+        /// A rail joint that hangs: a cusp.
+        Joint {
+            /// Depth, metres.
+            depth_m: f64, in -0.05..=0.05;
+            /// From its bottom to either end, metres.
+            half_length_m: f64, in 0.05..=10.0;
+        },
+        /// A weld, or the gap of a crossing, ground hollow: a smooth dip.
+        Dip {
+            /// Depth, metres.
+            depth_m: f64, in -0.05..=0.05;
+            /// From its bottom to either end, metres.
+            half_length_m: f64, in 0.05..=10.0;
+        },
+        /// Waves of one length.
+        Corrugation {
+            /// Half of the height from trough to crest, metres.
+            amplitude_m: f64, in 0.0..=1e-3;
+            // A train at 160 km/h takes 4 steps of 1 ms over it.
+            /// Metres.
+            wavelength_m: f64, in 0.18..=10.0;
+            /// From the defect's chainage to the last wave, metres: two waves at least.
+            length_m: f64, in 0.36..=1e5;
+        },
+        /// A slab that lies lower than its neighbours (or, where the depth is negative, higher).
+        Slab {
+            /// Metres.
+            depth_m: f64, in -0.05..=0.05;
+            /// Of the slab with both ramps, metres.
+            length_m: f64, in 1.0..=1e5;
+            /// Over which the level changes, at either end, metres.
+            ramp_m: f64, in 0.5..=100.0;
+        },
+    }
+    also check_length
 }
 
-/// A defect at a place, or one that comes back every so many metres.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct DefectSettings {
-    /// Its shape.
-    pub shape: DefectShape,
-    /// Chainage of the (first) defect, metres: its bottom, or where it begins.
-    pub chainage_m: f64,
-    /// The rail.
-    #[serde(default)]
-    pub side: Side,
-    /// It comes back after this many metres: the length of a rail. Default: only once.
-    #[serde(default)]
-    pub every_m: Option<f64>,
-    /// How many there are, where they come back. Default: 1.
-    #[serde(default = "one")]
-    pub count: u32,
+settings! {
+    /// A defect at a place, or one that comes back every so many metres.
+    #[derive(Copy)]
+    pub struct DefectSettings {
+        /// Its shape.
+        shape: DefectShape, nested;
+        /// Chainage of the (first) defect, metres: its bottom, or where it begins.
+        chainage_m: f64, in -1e6..=1e6;
+        /// The rail.
+        #[serde(default)]
+        side: Side;
+        /// It comes back after this many metres: the length of a rail. Default: only once.
+        every_m: Option<f64>, in 0.1..=1e5;
+        /// How many there are, where they come back.
+        #[serde(default = "one")]
+        count: u32, in 1.0..=1e5;
+    }
 }
 
 fn one() -> u32 {
     1
-}
-
-impl DefectSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("chainage_m", self.chainage_m, -1e6..=1e6, "m");
-        check.within("count", f64::from(self.count), 1.0..=1e5, "");
-        if let Some(every_m) = self.every_m {
-            check.within("every_m", every_m, 0.1..=1e5, "m");
-        }
-        match self.shape {
-            DefectShape::Joint {
-                depth_m,
-                half_length_m,
-            }
-            | DefectShape::Dip {
-                depth_m,
-                half_length_m,
-            } => {
-                check.within("shape.depth_m", depth_m, -0.05..=0.05, "m");
-                check.within("shape.half_length_m", half_length_m, 0.05..=10.0, "m");
-            }
-            DefectShape::Slab {
-                depth_m,
-                length_m,
-                ramp_m,
-            } => {
-                check.within("shape.depth_m", depth_m, -0.05..=0.05, "m");
-                check.within("shape.ramp_m", ramp_m, 0.5..=100.0, "m");
-                check.within("shape.length_m", length_m, 2.0 * ramp_m..=1e5, "m");
-            }
-            DefectShape::Corrugation {
-                amplitude_m,
-                wavelength_m,
-                length_m,
-            } => {
-                check.within("shape.amplitude_m", amplitude_m, 0.0..=1e-3, "m");
-                // A train at 160 km/h takes 4 steps of 1 ms over it.
-                check.within("shape.wavelength_m", wavelength_m, 0.18..=10.0, "m");
-                check.within("shape.length_m", length_m, 2.0 * wavelength_m..=1e5, "m");
-            }
-        }
-    }
 }
 
 /// One defect where it is, with the depth of each rail's share.
@@ -204,6 +165,22 @@ fn repeated(settings: &DefectSettings) -> impl Iterator<Item = Defect> + '_ {
 }
 
 impl DefectShape {
+    /// Both ends of it must find room.
+    fn check_length(&self, check: &mut Checker<'_>) {
+        let (end_m, length_m) = match *self {
+            Self::Joint { .. } | Self::Dip { .. } => return,
+            Self::Corrugation {
+                wavelength_m,
+                length_m,
+                ..
+            } => (wavelength_m, length_m),
+            Self::Slab {
+                ramp_m, length_m, ..
+            } => (ramp_m, length_m),
+        };
+        check.within("length_m", length_m, 2.0 * end_m..=1e5);
+    }
+
     /// Where it begins, from its chainage on, and how long it is.
     fn extent_m(&self) -> (f64, f64) {
         match *self {

@@ -1,7 +1,7 @@
 //! Why the world could not be made, or could not go on.
 
 use crate::bus::{SimTime, TrainId};
-use crate::track::Problem;
+use crate::settings::Problem;
 
 /// Why the world could not be made, or could not go on.
 #[derive(Debug, thiserror::Error)]

@@ -18,7 +18,8 @@
 mod tests;
 
 use super::deviation::Deviation;
-use crate::track::{CANT_BASE_M, Checker, Problem};
+use crate::settings::{Checker, settings};
+use crate::track::CANT_BASE_M;
 use crate::twin::random::Stream;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -49,35 +50,23 @@ pub enum IrregularityClass {
     Fra6,
 }
 
-/// How uneven the track is.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct IrregularitySettings {
-    /// Which spectrum.
-    pub class: IrregularityClass,
-    /// Shortest wavelength, metres.
-    pub shortest_m: f64,
-    /// Longest wavelength, metres.
-    pub longest_m: f64,
-}
-
-impl Default for IrregularitySettings {
-    fn default() -> Self {
-        Self {
-            class: IrregularityClass::GermanLow,
-            shortest_m: 1.0,
-            longest_m: 80.0,
-        }
+settings! {
+    /// How uneven the track is.
+    #[derive(Copy)]
+    pub struct IrregularitySettings {
+        /// Which spectrum.
+        class: IrregularityClass = IrregularityClass::GermanLow;
+        /// Shortest wavelength, metres.
+        shortest_m: f64 = 1.0, in 0.5..=100.0;
+        /// Longest wavelength, metres.
+        longest_m: f64 = 80.0, in 1.0..=300.0;
     }
+    also check_order
 }
 
 impl IrregularitySettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("shortest_m", self.shortest_m, 0.5..=100.0, "m");
-        let longest = self.longest_m;
-        check.within("longest_m", longest, 2.0 * self.shortest_m..=300.0, "m");
+    fn check_order(&self, check: &mut Checker<'_>) {
+        check.within("longest_m", self.longest_m, 2.0 * self.shortest_m..=300.0);
     }
 }
 

@@ -102,7 +102,7 @@ pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
-pub use settings::{PhysicsSettings, TrackSettings, TrainSettings, train_key};
+pub use settings::{PhysicsSettings, STEP_S, TrackSettings, TrainSettings, train_key};
 pub use train_truth::TrainState;
 pub use truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
@@ -112,6 +112,7 @@ pub use wheelset::{WheelExtremes, WheelForces};
 pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand, TrainId};
+use crate::settings::Settings;
 use crate::track::{Direction, Tunnel};
 use carrier::Carrier;
 use directed_track::DirectedTrack;

@@ -1,79 +1,82 @@
 //! Obstacles as a scenario writes them, and the single things that come of one entry.
 
 use super::shape::ObstacleShape;
-use crate::track::{Checker, Problem, key_below};
+use crate::settings::{Checker, settings};
 use crate::twin::geometry::Shape;
 use crate::twin::random::Stream;
 use nalgebra::{UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// One obstacle, or several alike.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ObstacleSettings {
-    /// Name, for the summary; several are called `name 1`, `name 2` and so on.
-    pub name: String,
-    /// Shape and size: `body = { shape = "box", size_m = [0.4, 0.25, 0.25] }`, `cylinder` with
-    /// `diameter_m` and `height_m`, `sphere` or `rock` with `diameter_m`, or `mesh` with `file`
-    /// and `scale`.
-    pub body: ObstacleShape,
-    /// Mass, kilograms.
-    pub mass_kg: f64,
-    /// Coulomb friction; of a contact, the mean of both sides counts (concrete 0.6, train 0.3).
-    pub friction: f64,
-    /// Restitution, 0 to 1; of a contact, the mean of both sides counts (concrete 0, train 0.1).
-    pub restitution: f64,
-    /// Rolling resistance: the force that keeps it rolling evenly, over its weight. A steel drum on
-    /// concrete has some 0.01, a rock 0.1 or more.
-    pub rolling_resistance: f64,
-    /// Share of light reflected, 0 to 1.
-    pub albedo: f64,
-    /// Temperature of its surface, degrees Celsius.
-    pub temperature_c: f64,
-    /// Chainage of its centre, metres.
-    pub chainage_m: f64,
-    /// Left of the centreline, metres.
-    pub lateral_m: f64,
-    /// Height of its lowest point above top of rail when it appears, metres.
-    pub height_m: f64,
-    /// Turned about the vertical, to the left, degrees; after `pitch_deg` and `roll_deg`.
-    pub yaw_deg: f64,
-    /// Turned about its width, front end up, degrees; after `roll_deg`.
-    pub pitch_deg: f64,
-    /// Turned about its length, left side up, degrees.
-    pub roll_deg: f64,
-    /// When it appears, seconds.
-    pub appears_s: f64,
-    /// Velocity when it appears: up the line, to the left, up, m/s. Held, it has none.
-    pub velocity_mps: [f64; 3],
-    /// Spin when it appears, about the axes up the line, to the left and up, rad/s. Held, it has
-    /// none.
-    pub spin_rad_s: [f64; 3],
-    /// Until then it is fixed to the lining (a panel, a luminaire), seconds; then it comes loose.
-    /// The train tears it off earlier where it hits it. Default: it is not fixed.
-    pub held_until_s: Option<f64>,
-    /// One of its edges stays fixed for longer, so that it swings about it first.
-    pub hinge: Option<HingeSettings>,
-    /// How many there are, 1 to 500. Of several, each is turned about the vertical at random, and
-    /// rocks differ in shape.
-    pub count: u32,
-    /// How far their places are spread to either side of the given one: along, across, up, metres.
-    pub spread_m: [f64; 3],
-    /// How far their sizes are spread to either side of the given one, as a share of it, 0 to 0.9;
-    /// `mass_kg` is that of the given size, and goes with the volume.
-    pub size_spread: f64,
+settings! {
+    /// One obstacle, or several alike.
+    pub struct ObstacleSettings {
+        /// Name, for the summary; several are called `name 1`, `name 2` and so on.
+        name: String = "box".to_owned();
+        /// Shape and size: `body = { shape = "box", size_m = [0.4, 0.25, 0.25] }`, `cylinder` with
+        /// `diameter_m` and `height_m`, `sphere` or `rock` with `diameter_m`, or `mesh` with `file`
+        /// and `scale`.
+        body: ObstacleShape = ObstacleShape::Box { size_m: [0.3; 3] }, nested;
+        /// Mass, kilograms.
+        mass_kg: f64 = 10.0, in 0.01..=1e5;
+        /// Coulomb friction; of a contact, the mean of both sides counts (concrete 0.6, train 0.3).
+        friction: f64 = 0.6, in 0.0..=2.0;
+        /// Restitution, 0 to 1; of a contact, the mean of both sides counts (concrete 0, train
+        /// 0.1).
+        restitution: f64 = 0.2, in 0.0..=1.0;
+        /// Rolling resistance: the force that keeps it rolling evenly, over its weight. A steel
+        /// drum on concrete has some 0.01, a rock 0.1 or more.
+        rolling_resistance: f64 = 0.02, in 0.0..=1.0;
+        /// Share of light reflected, 0 to 1.
+        albedo: f64 = 0.3, in 0.0..=1.0;
+        /// Temperature of its surface, degrees Celsius.
+        temperature_c: f64 = 20.0, in -50.0..=1500.0;
+        /// Chainage of its centre, metres.
+        chainage_m: f64 = 0.0, in -1e6..=1e6;
+        /// Left of the centreline, metres.
+        lateral_m: f64 = 0.0, in -10.0..=10.0;
+        /// Height of its lowest point above top of rail when it appears, metres.
+        height_m: f64 = 0.5, in -1.0..=10.0;
+        /// Turned about the vertical, to the left, degrees; after `pitch_deg` and `roll_deg`.
+        yaw_deg: f64 = 0.0, in -360.0..=360.0;
+        /// Turned about its width, front end up, degrees; after `roll_deg`.
+        pitch_deg: f64 = 0.0, in -360.0..=360.0;
+        /// Turned about its length, left side up, degrees.
+        roll_deg: f64 = 0.0, in -360.0..=360.0;
+        /// When it appears, seconds.
+        appears_s: f64 = 0.0, in 0.0..=1e6;
+        /// Velocity when it appears: up the line, to the left, up, m/s. Held, it has none.
+        velocity_mps: [f64; 3] = [0.0; 3], in -50.0..=50.0;
+        /// Spin when it appears, about the axes up the line, to the left and up, rad/s. Held, it
+        /// has none.
+        spin_rad_s: [f64; 3] = [0.0; 3], in -100.0..=100.0;
+        /// Until then it is fixed to the lining (a panel, a luminaire), seconds; then it comes
+        /// loose. The train tears it off earlier where it hits it. Default: it is not fixed.
+        held_until_s: Option<f64> = None, in 0.0..=1e6;
+        /// One of its edges stays fixed for longer, so that it swings about it first.
+        hinge: Option<HingeSettings> = None, nested;
+        /// How many there are, 1 to 500. Of several, each is turned about the vertical at random,
+        /// and rocks differ in shape.
+        count: u32 = 1, in 1.0..=500.0;
+        /// How far their places are spread to either side of the given one: along, across, up,
+        /// metres.
+        spread_m: [f64; 3] = [0.0; 3], in 0.0..=50.0;
+        /// How far their sizes are spread to either side of the given one, as a share of it, 0 to
+        /// 0.9; `mass_kg` is that of the given size, and goes with the volume.
+        size_spread: f64 = 0.0, in 0.0..=0.9;
+    }
+    also check_together
 }
 
-/// What holds a thing that has come loose otherwise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct HingeSettings {
-    /// The edge (of the box around it) that it swings about.
-    pub edge: HingeEdge,
-    /// Until when, seconds. Default: until the train hits it.
-    #[serde(default)]
-    pub until_s: Option<f64>,
+settings! {
+    /// What holds a thing that has come loose otherwise.
+    #[derive(Copy)]
+    pub struct HingeSettings {
+        /// The edge (of the box around it) that it swings about.
+        edge: HingeEdge;
+        /// Until when, seconds. Default: until the train hits it.
+        until_s: Option<f64>, in 0.0..=1e6;
+    }
 }
 
 /// An edge, before the thing is turned.
@@ -90,37 +93,6 @@ pub enum HingeEdge {
     Back,
 }
 
-impl Default for ObstacleSettings {
-    fn default() -> Self {
-        Self {
-            name: "box".to_owned(),
-            body: ObstacleShape::Box {
-                size_m: [0.3, 0.3, 0.3],
-            },
-            mass_kg: 10.0,
-            friction: 0.6,
-            restitution: 0.2,
-            rolling_resistance: 0.02,
-            albedo: 0.3,
-            temperature_c: 20.0,
-            chainage_m: 0.0,
-            lateral_m: 0.0,
-            height_m: 0.5,
-            yaw_deg: 0.0,
-            pitch_deg: 0.0,
-            roll_deg: 0.0,
-            appears_s: 0.0,
-            velocity_mps: [0.0; 3],
-            spin_rad_s: [0.0; 3],
-            held_until_s: None,
-            hinge: None,
-            count: 1,
-            spread_m: [0.0; 3],
-            size_spread: 0.0,
-        }
-    }
-}
-
 /// How much of the room that they are spread over several things may fill: well below the 0.38
 /// where balls placed at random jam.
 const FILL: f64 = 0.2;
@@ -128,65 +100,27 @@ const FILL: f64 = 0.2;
 const DRAWS: u64 = 400;
 
 impl ObstacleSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.body.check(at, problems);
-        let mut check = Checker::new(at, problems);
-        check.within("mass_kg", self.mass_kg, 0.01..=1e5, "kg");
-        check.within("friction", self.friction, 0.0..=2.0, "");
-        check.within("restitution", self.restitution, 0.0..=1.0, "");
-        check.within("rolling_resistance", self.rolling_resistance, 0.0..=1.0, "");
-        check.within("albedo", self.albedo, 0.0..=1.0, "");
-        check.within("temperature_c", self.temperature_c, -50.0..=1500.0, "deg C");
-        check.within("chainage_m", self.chainage_m, -1e6..=1e6, "m");
-        check.within("lateral_m", self.lateral_m, -10.0..=10.0, "m");
-        check.within("height_m", self.height_m, -1.0..=10.0, "m");
-        check.within("yaw_deg", self.yaw_deg, -360.0..=360.0, "deg");
-        check.within("pitch_deg", self.pitch_deg, -360.0..=360.0, "deg");
-        check.within("roll_deg", self.roll_deg, -360.0..=360.0, "deg");
-        check.within("appears_s", self.appears_s, 0.0..=1e6, "s");
-        for v in self.velocity_mps {
-            check.within("velocity_mps", v, -50.0..=50.0, "m/s");
-        }
-        for w in self.spin_rad_s {
-            check.within("spin_rad_s", w, -100.0..=100.0, "rad/s");
-        }
-        check.within("count", f64::from(self.count), 1.0..=500.0, "");
-        for spread in self.spread_m {
-            check.within("spread_m", spread, 0.0..=50.0, "m");
-        }
-        check.within("size_spread", self.size_spread, 0.0..=0.9, "");
-        self.check_hold(at, problems);
-        self.check_room(at, problems);
+    fn check_together(&self, check: &mut Checker<'_>) {
+        self.check_hold(check);
+        self.check_room(check);
     }
 
-    fn check_hold(&self, at: &str, problems: &mut Vec<Problem>) {
-        let key = |key| key_below(at, key);
-        let Some(held_s) = self.held_until_s else {
-            if self.hinge.is_some() {
-                problems.push(Problem::new(
-                    key("hinge"),
-                    "it is not fixed to anything that it could swing from",
-                    "give held_until_s too; 0 to let it swing at once",
-                ));
-            }
-            return;
-        };
-        Problem::unless_within(
-            problems,
-            key("held_until_s"),
-            held_s,
-            self.appears_s..=1e6,
-            "s",
-        );
-        if let Some(until_s) = self.hinge.and_then(|hinge| hinge.until_s) {
-            let range = held_s..=1e6;
-            Problem::unless_within(problems, key("hinge.until_s"), until_s, range, "s");
+    fn check_hold(&self, check: &mut Checker<'_>) {
+        if let Some(held_s) = self.held_until_s {
+            check.within("held_until_s", held_s, self.appears_s..=1e6);
+            let swings_until_s = self.hinge.and_then(|hinge| hinge.until_s);
+            check.within("hinge.until_s", swings_until_s, held_s..=1e6);
+        } else if self.hinge.is_some() {
+            check.problem(
+                "hinge",
+                "it is not fixed to anything that it could swing from",
+                "give held_until_s too; 0 to let it swing at once",
+            );
         }
     }
 
     /// Several things need room beside each other.
-    fn check_room(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_room(&self, check: &mut Checker<'_>) {
         if self.count < 2 {
             return;
         }
@@ -197,14 +131,14 @@ impl ObstacleSettings {
         let room_m3: f64 = self.spread_m.iter().map(|s| 2.0 * s + size_m).product();
         let most = (FILL * room_m3 / size_m.powi(3)).floor();
         if f64::from(self.count) > most {
-            problems.push(Problem::new(
-                key_below(at, "count"),
+            check.problem(
+                "count",
                 format!(
                     "{} of {size_m:.2} m do not find room in {room_m3:.2} m^3",
                     self.count
                 ),
                 format!("spread them wider with spread_m, or have {most:.0} at most"),
-            ));
+            );
         }
     }
 
@@ -281,6 +215,7 @@ pub(super) struct Piece {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
 
     /// Fails where several things share a place or a size, leave their room, or depend on the
     /// order of entries alone and not on the run.

@@ -1,55 +1,59 @@
 //! What an obstacle looks like: the shape as a scenario writes it, and as physics and renderers
 //! take it.
 
-use crate::track::{Checker, Problem, key_below};
+use crate::settings::{Checker, settings};
 use crate::twin::geometry::{Hull, Shape};
 use crate::twin::random::Stream;
 use nalgebra::{Point3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// Shape of an obstacle with its size.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
-pub enum ObstacleShape {
-    /// A box: length along the line, width across, height, metres.
-    Box {
-        /// Length, width and height, metres.
-        size_m: [f64; 3],
-    },
-    /// A cylinder: upright, or lying with `roll_deg = 90` (its axis across the line, so that it
-    /// rolls along) or `pitch_deg = 90` (its axis along the line).
-    Cylinder {
-        /// Diameter, metres.
-        diameter_m: f64,
-        /// Height, metres.
-        height_m: f64,
-    },
-    /// A ball.
-    Sphere {
-        /// Diameter, metres.
-        diameter_m: f64,
-    },
-    /// A rock: a body with some twenty corners and flat faces that no other obstacle of the
-    /// scenario shares.
-    Rock {
-        /// Diameter of the ball about its centre of mass that holds it, metres.
-        diameter_m: f64,
-    },
-    /// The convex hull of a mesh from a file.
-    Mesh {
-        /// Wavefront OBJ file; a relative path counts from the scenario's folder. Its x axis is
-        /// the length, y the width to the left, z up.
-        file: String,
-        /// Metres that a unit of the file stands for. Default 1.
-        #[serde(default = "one")]
-        scale: f64,
-        /// What the file holds, unscaled; whoever reads the scenario puts it here.
-        #[serde(skip)]
-        hull: Option<Arc<Hull>>,
-    },
+settings! {
+    /// Shape of an obstacle with its size.
+    #[serde(tag = "shape", rename_all = "snake_case")]
+    pub enum ObstacleShape {
+        /// A box: length along the line, width across, height, metres.
+        Box {
+            /// Length, width and height, metres.
+            size_m: [f64; 3], in SIZE_M;
+        },
+        /// A cylinder: upright, or lying with `roll_deg = 90` (its axis across the line, so that it
+        /// rolls along) or `pitch_deg = 90` (its axis along the line).
+        Cylinder {
+            /// Diameter, metres.
+            diameter_m: f64, in SIZE_M;
+            /// Height, metres.
+            height_m: f64, in SIZE_M;
+        },
+        /// A ball.
+        Sphere {
+            /// Diameter, metres.
+            diameter_m: f64, in SIZE_M;
+        },
+        /// A rock: a body with some twenty corners and flat faces that no other obstacle of the
+        /// scenario shares.
+        Rock {
+            /// Diameter of the ball about its centre of mass that holds it, metres.
+            diameter_m: f64, in SIZE_M;
+        },
+        /// The convex hull of a mesh from a file.
+        Mesh {
+            /// Wavefront OBJ file; a relative path counts from the scenario's folder. Its x axis is
+            /// the length, y the width to the left, z up.
+            file: String;
+            /// Metres that a unit of the file stands for.
+            #[serde(default = "one")]
+            scale: f64;
+            /// What the file holds, unscaled; whoever reads the scenario puts it here.
+            #[serde(skip)]
+            hull: Option<Arc<Hull>>;
+        },
+    }
+    also check_mesh
 }
+
+/// Smallest and largest extent.
+const SIZE_M: RangeInclusive<f64> = 0.01..=10.0;
 
 fn one() -> f64 {
     1.0
@@ -96,45 +100,35 @@ impl ObstacleShape {
         scaled
     }
 
-    /// Appends what is wrong; `at` is the dotted key that leads here.
-    pub(super) fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let sizes_m = match self {
-            Self::Box { size_m } => *size_m,
-            Self::Cylinder {
-                diameter_m,
-                height_m,
-            } => [*diameter_m, *diameter_m, *height_m],
-            Self::Sphere { diameter_m } | Self::Rock { diameter_m } => [*diameter_m; 3],
-            Self::Mesh { file, scale, hull } => match hull {
-                Some(hull) => {
-                    check_corners(&key_below(at, "body"), file, hull, problems);
-                    (hull.half_extents_m() * 2.0 * *scale).into()
-                }
-                None => {
-                    problems.push(Problem::new(
-                        key_below(at, "body"),
-                        format!("the mesh {file} has not been read"),
-                        "load the scenario from its file, or give the hull",
-                    ));
-                    return;
-                }
-            },
+    fn check_mesh(&self, check: &mut Checker<'_>) {
+        let Self::Mesh { file, scale, hull } = self else {
+            return;
         };
-        let mut check = Checker::new(at, problems);
-        for size in sizes_m {
-            check.within("body", size, 0.01..=10.0, "m");
+        let Some(hull) = hull else {
+            check.problem(
+                "file",
+                format!("the mesh {file} has not been read"),
+                "load the scenario from its file, or give the hull",
+            );
+            return;
+        };
+        let corners = hull.corners().len();
+        if corners > MAX_CORNERS {
+            check.problem(
+                "file",
+                format!("the hull of {file} has {corners} corners, more than {MAX_CORNERS}"),
+                "simplify the mesh: neither contacts nor pictures get better with more",
+            );
         }
-    }
-}
-
-fn check_corners(key: &str, file: &str, hull: &Hull, problems: &mut Vec<Problem>) {
-    let corners = hull.corners().len();
-    if corners > MAX_CORNERS {
-        problems.push(Problem::new(
-            key,
-            format!("the hull of {file} has {corners} corners, more than {MAX_CORNERS}"),
-            "simplify the mesh: neither contacts nor pictures get better with more",
-        ));
+        let sizes_m: [f64; 3] = (hull.half_extents_m() * 2.0 * *scale).into();
+        if let Some(size_m) = sizes_m.into_iter().find(|size_m| !SIZE_M.contains(size_m)) {
+            let (low, high) = SIZE_M.into_inner();
+            check.problem(
+                "scale",
+                format!("so scaled, {file} is {size_m} m long, wide or high: out of range"),
+                format!("scale it to measure {low} to {high} m each way"),
+            );
+        }
     }
 }
 

@@ -10,6 +10,7 @@
 use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
+use crate::settings::Settings;
 use crate::track::PlanElement;
 use testing::{TRAIN, line};
 use vehicle::{GRAVITY_MPS2, Vehicle};

@@ -1,8 +1,6 @@
 //! Dimensions, masses, springs and dampers of a car, as a file has them.
 
-use crate::track::{Checker, FileError, Problem, read_toml};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use crate::settings::{Checker, FileError, Settings, read_toml, settings};
 use std::sync::LazyLock;
 
 /// Sets that come with the program, by name.
@@ -21,127 +19,135 @@ const SHIPPED: [(&str, &str); 3] = [
     ),
 ];
 
-/// A vehicle file: one car. Heights are over top of rail with the car at rest; x is forward, y to
-/// the left, z up.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct VehicleFile {
-    /// Name of the set.
-    pub name: String,
-    /// Where its figures come from.
-    pub source: String,
+settings! {
+    /// A vehicle file: one car. Heights are over top of rail with the car at rest; x is forward, y to
+    /// the left, z up.
+    pub struct VehicleFile {
+        /// Name of the set.
+        name: String;
+        /// Where its figures come from.
+        source: String;
+        /// Car body with its load.
+        body: BodyFile, nested;
+        /// Each of the two bogies.
+        bogie: BogieFile, nested;
+        /// Each of the four wheelsets.
+        wheelset: WheelsetFile, nested;
+        /// Between wheelset and bogie.
+        primary: PrimaryFile, nested;
+        /// Between bogie and body.
+        secondary: SecondaryFile, nested;
+        /// Between cars.
+        coupler: CouplerFile, nested;
+    }
+    also check_bogies
+}
+
+settings! {
     /// Car body with its load.
-    pub body: BodyFile,
-    /// Each of the two bogies.
-    pub bogie: BogieFile,
-    /// Each of the four wheelsets.
-    pub wheelset: WheelsetFile,
-    /// Between wheelset and bogie.
-    pub primary: PrimaryFile,
-    /// Between bogie and body.
-    pub secondary: SecondaryFile,
-    /// Between cars.
-    pub coupler: CouplerFile,
+    #[derive(Copy)]
+    pub struct BodyFile {
+        /// Length over couplers, m.
+        length_m: f64, in 8.0..=30.0;
+        /// Width, m.
+        width_m: f64, in 2.0..=3.6;
+        /// Height of the roof, m.
+        height_m: f64, in 3.0..=5.0;
+        /// Height of the floor, m.
+        floor_m: f64, in 0.3..=1.5;
+        /// Mass, kg.
+        mass_kg: f64, in 5e3..=1e5;
+        /// Moments of inertia: roll, pitch, yaw, kg m^2.
+        inertia_kg_m2: [f64; 3], in 5e3..=1e7;
+        /// Height of the centre of gravity, m.
+        cg_m: f64, in 0.5..=3.0;
+    }
 }
 
-/// Car body with its load.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BodyFile {
-    /// Length over couplers, m.
-    pub length_m: f64,
-    /// Width, m.
-    pub width_m: f64,
-    /// Height of the roof, m.
-    pub height_m: f64,
-    /// Height of the floor, m.
-    pub floor_m: f64,
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Moments of inertia: roll, pitch, yaw, kg m^2.
-    pub inertia_kg_m2: [f64; 3],
-    /// Height of the centre of gravity, m.
-    pub cg_m: f64,
+settings! {
+    /// A bogie without wheelsets.
+    #[derive(Copy)]
+    pub struct BogieFile {
+        /// Mass, kg.
+        mass_kg: f64, in 500.0..=1e4;
+        /// Moments of inertia: roll, pitch, yaw, kg m^2.
+        inertia_kg_m2: [f64; 3], in 200.0..=2e4;
+        /// Height of the centre of gravity, m.
+        cg_m: f64, in 0.2..=1.0;
+        /// Distance of the two bogies' centres, m.
+        distance_m: f64, in 4.0..=30.0;
+        /// Distance of the two axles, m.
+        wheelbase_m: f64, in 1.2..=4.0;
+    }
 }
 
-/// A bogie without wheelsets.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BogieFile {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Moments of inertia: roll, pitch, yaw, kg m^2.
-    pub inertia_kg_m2: [f64; 3],
-    /// Height of the centre of gravity, m.
-    pub cg_m: f64,
-    /// Distance of the two bogies' centres, m.
-    pub distance_m: f64,
-    /// Distance of the two axles, m.
-    pub wheelbase_m: f64,
+settings! {
+    /// A wheelset.
+    #[derive(Copy)]
+    pub struct WheelsetFile {
+        /// Mass, kg.
+        mass_kg: f64, in 500.0..=4e3;
+        /// Moments of inertia: roll, about the axle, yaw, kg m^2.
+        inertia_kg_m2: [f64; 3], in 20.0..=4e3;
+        /// Radius of the wheels, m.
+        radius_m: f64, in 0.25..=0.7;
+        /// Effect of all rotating parts, motors and gears included, as a share of the car's mass.
+        rotating_mass_share: f64, in 0.01..=0.3;
+    }
 }
 
-/// A wheelset.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct WheelsetFile {
-    /// Mass, kg.
-    pub mass_kg: f64,
-    /// Moments of inertia: roll, about the axle, yaw, kg m^2.
-    pub inertia_kg_m2: [f64; 3],
-    /// Radius of the wheels, m.
-    pub radius_m: f64,
-    /// Effect of all rotating parts, motors and gears included, as a share of the car's mass.
-    pub rotating_mass_share: f64,
+settings! {
+    /// Springs and dampers of each axle box.
+    #[derive(Copy)]
+    pub struct PrimaryFile {
+        /// Along x, y, z, MN/m.
+        stiffness_mn_m: [f64; 3], in 0.1..=40.0;
+        /// Along x, y, z, kN s/m.
+        damping_kn_s_m: [f64; 3], in 0.0..=100.0;
+        /// Lateral distance of the two axle boxes, m.
+        base_m: f64, in 1.0..=2.6;
+    }
 }
 
-/// Springs and dampers of each axle box.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct PrimaryFile {
-    /// Along x, y, z, MN/m.
-    pub stiffness_mn_m: [f64; 3],
-    /// Along x, y, z, kN s/m.
-    pub damping_kn_s_m: [f64; 3],
-    /// Lateral distance of the two axle boxes, m.
-    pub base_m: f64,
+settings! {
+    /// Springs and dampers of each side of a bogie.
+    #[derive(Copy)]
+    pub struct SecondaryFile {
+        /// Along x, y, z, MN/m.
+        stiffness_mn_m: [f64; 3], in 0.02..=5.0;
+        /// Along x, y, z, kN s/m; along x it damps the bogie's yaw.
+        damping_kn_s_m: [f64; 3], in 0.0..=300.0;
+        /// Lateral distance of the two sides, m.
+        base_m: f64, in 1.0..=2.6;
+        /// Height at which the springs act, m.
+        height_m: f64, in 0.3..=1.5;
+        /// Roll bar of a bogie, MN m/rad.
+        roll_bar_mn_m_rad: f64, in 0.0..=10.0;
+        /// Traction rod of a bogie, along x: stiffness, MN/m.
+        traction_rod_mn_m: f64, in 0.5..=20.0;
+        /// And damping, kN s/m.
+        traction_rod_kn_s_m: f64, in 0.0..=200.0;
+        /// Way to the bump stops, up and down (of a side) and to the left and right (of a bogie),
+        /// m.
+        stop_play_m: f64, in 0.005..=0.2;
+        /// Stiffness of a bump stop, MN/m.
+        stop_mn_m: f64, in 0.0..=10.0;
+    }
 }
 
-/// Springs and dampers of each side of a bogie.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct SecondaryFile {
-    /// Along x, y, z, MN/m.
-    pub stiffness_mn_m: [f64; 3],
-    /// Along x, y, z, kN s/m; along x it damps the bogie's yaw.
-    pub damping_kn_s_m: [f64; 3],
-    /// Lateral distance of the two sides, m.
-    pub base_m: f64,
-    /// Height at which the springs act, m.
-    pub height_m: f64,
-    /// Roll bar of a bogie, MN m/rad.
-    pub roll_bar_mn_m_rad: f64,
-    /// Traction rod of a bogie, along x: stiffness, MN/m.
-    pub traction_rod_mn_m: f64,
-    /// And damping, kN s/m.
-    pub traction_rod_kn_s_m: f64,
-    /// Way to the bump stops, up and down (of a side) and to the left and right (of a bogie), m.
-    pub stop_play_m: f64,
-    /// Stiffness of a bump stop, MN/m.
-    pub stop_mn_m: f64,
-}
-
-/// Coupler between two cars.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CouplerFile {
-    /// Height, m.
-    pub height_m: f64,
-    /// Stiffness in pull and buff, MN/m.
-    pub stiffness_mn_m: f64,
-    /// Damping, kN s/m.
-    pub damping_kn_s_m: f64,
-    /// Free play between pull and buff, m.
-    pub slack_m: f64,
+settings! {
+    /// Coupler between two cars.
+    #[derive(Copy)]
+    pub struct CouplerFile {
+        /// Height, m.
+        height_m: f64, in 0.3..=1.5;
+        /// Stiffness in pull and buff, MN/m.
+        stiffness_mn_m: f64, in 0.5..=50.0;
+        /// Damping, kN s/m.
+        damping_kn_s_m: f64, in 0.0..=1e3;
+        /// Free play between pull and buff, m.
+        slack_m: f64, in 0.0..=0.1;
+    }
 }
 
 impl VehicleFile {
@@ -149,7 +155,7 @@ impl VehicleFile {
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let file: Self = read_toml(text)?;
         let mut problems = Vec::new();
-        file.check(&mut problems);
+        file.check("", &mut problems);
         match problems.is_empty() {
             true => Ok(file),
             false => Err(FileError::Problems(problems)),
@@ -177,98 +183,11 @@ impl VehicleFile {
         self.body.mass_kg + 2.0 * self.bogie.mass_kg + 4.0 * self.wheelset.mass_kg
     }
 
-    /// Appends what is wrong.
-    fn check(&self, problems: &mut Vec<Problem>) {
-        self.body.check(&mut Checker::new("body", problems));
-        // Both bogies' wheels must be under the body.
+    /// Both bogies' wheels must be under the body.
+    fn check_bogies(&self, check: &mut Checker<'_>) {
         let taken_m = self.bogie.wheelbase_m + 2.0 * self.wheelset.radius_m;
-        let longest_m = self.body.length_m - taken_m;
-        self.bogie
-            .check(&mut Checker::new("bogie", problems), longest_m);
-        self.wheelset.check(&mut Checker::new("wheelset", problems));
-        self.primary.check(&mut Checker::new("primary", problems));
-        self.secondary
-            .check(&mut Checker::new("secondary", problems));
-        self.coupler.check(&mut Checker::new("coupler", problems));
-    }
-}
-
-impl BodyFile {
-    fn check(&self, check: &mut Checker<'_>) {
-        check.within("length_m", self.length_m, 8.0..=30.0, "m");
-        check.within("width_m", self.width_m, 2.0..=3.6, "m");
-        check.within("height_m", self.height_m, 3.0..=5.0, "m");
-        check.within("floor_m", self.floor_m, 0.3..=1.5, "m");
-        check.within("mass_kg", self.mass_kg, 5e3..=1e5, "kg");
-        for j in self.inertia_kg_m2 {
-            check.within("inertia_kg_m2", j, 5e3..=1e7, "kg m^2");
-        }
-        check.within("cg_m", self.cg_m, 0.5..=3.0, "m");
-    }
-}
-
-impl BogieFile {
-    fn check(&self, check: &mut Checker<'_>, longest_m: f64) {
-        check.within("mass_kg", self.mass_kg, 500.0..=1e4, "kg");
-        for j in self.inertia_kg_m2 {
-            check.within("inertia_kg_m2", j, 200.0..=2e4, "kg m^2");
-        }
-        check.within("cg_m", self.cg_m, 0.2..=1.0, "m");
-        check.within("distance_m", self.distance_m, 4.0..=longest_m.max(4.0), "m");
-        check.within("wheelbase_m", self.wheelbase_m, 1.2..=4.0, "m");
-    }
-}
-
-impl WheelsetFile {
-    fn check(&self, check: &mut Checker<'_>) {
-        check.within("mass_kg", self.mass_kg, 500.0..=4e3, "kg");
-        for j in self.inertia_kg_m2 {
-            check.within("inertia_kg_m2", j, 20.0..=4e3, "kg m^2");
-        }
-        check.within("radius_m", self.radius_m, 0.25..=0.7, "m");
-        let share = self.rotating_mass_share;
-        check.within("rotating_mass_share", share, 0.01..=0.3, "");
-    }
-}
-
-impl PrimaryFile {
-    fn check(&self, check: &mut Checker<'_>) {
-        for k in self.stiffness_mn_m {
-            check.within("stiffness_mn_m", k, 0.1..=40.0, "MN/m");
-        }
-        for c in self.damping_kn_s_m {
-            check.within("damping_kn_s_m", c, 0.0..=100.0, "kN s/m");
-        }
-        check.within("base_m", self.base_m, 1.0..=2.6, "m");
-    }
-}
-
-impl SecondaryFile {
-    fn check(&self, check: &mut Checker<'_>) {
-        for k in self.stiffness_mn_m {
-            check.within("stiffness_mn_m", k, 0.02..=5.0, "MN/m");
-        }
-        for c in self.damping_kn_s_m {
-            check.within("damping_kn_s_m", c, 0.0..=300.0, "kN s/m");
-        }
-        check.within("base_m", self.base_m, 1.0..=2.6, "m");
-        check.within("height_m", self.height_m, 0.3..=1.5, "m");
-        let bar = self.roll_bar_mn_m_rad;
-        check.within("roll_bar_mn_m_rad", bar, 0.0..=10.0, "MN m/rad");
-        let rod = (self.traction_rod_mn_m, self.traction_rod_kn_s_m);
-        check.within("traction_rod_mn_m", rod.0, 0.5..=20.0, "MN/m");
-        check.within("traction_rod_kn_s_m", rod.1, 0.0..=200.0, "kN s/m");
-        check.within("stop_play_m", self.stop_play_m, 0.005..=0.2, "m");
-        check.within("stop_mn_m", self.stop_mn_m, 0.0..=10.0, "MN/m");
-    }
-}
-
-impl CouplerFile {
-    fn check(&self, check: &mut Checker<'_>) {
-        check.within("height_m", self.height_m, 0.3..=1.5, "m");
-        check.within("stiffness_mn_m", self.stiffness_mn_m, 0.5..=50.0, "MN/m");
-        check.within("damping_kn_s_m", self.damping_kn_s_m, 0.0..=1e3, "kN s/m");
-        check.within("slack_m", self.slack_m, 0.0..=0.1, "m");
+        let longest_m = (self.body.length_m - taken_m).max(4.0);
+        check.within("bogie.distance_m", self.bogie.distance_m, 4.0..=longest_m);
     }
 }
 

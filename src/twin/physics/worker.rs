@@ -2,124 +2,92 @@
 //! again.
 
 use super::obstacle::{ObstacleSettings, Piece};
-use crate::track::{Alignment, BED_M, Checker, Problem, TrackPoint, key_below};
+use crate::settings::{Checker, settings};
+use crate::track::{Alignment, BED_M, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// Where a worker is at a time; in between he walks straight and evenly.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Waypoint {
-    /// When, seconds.
-    pub time_s: f64,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-    /// Left of the centreline, metres.
-    pub lateral_m: f64,
-}
-
-/// One worker. He is there from his first waypoint to his last.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WorkerSettings {
-    /// Name.
-    pub name: String,
-    /// Height of the body, metres.
-    pub stature_m: f64,
-    /// Mass, kilograms.
-    pub mass_kg: f64,
-    /// Height of the ground he walks on above top of rail, metres: the track bed's where absent.
-    pub ground_m: f64,
-    /// Share of light that his clothes reflect, 0 to 1.
-    pub albedo: f64,
-    /// Where he is when.
-    pub path: Vec<Waypoint>,
-    /// What he carries, a single thing; place, motion, hold and `appears_s` of it are ignored.
-    pub carries: Option<ObstacleSettings>,
-    /// When he puts it down beside him, seconds, while he is there; never where absent.
-    pub puts_down_s: Option<f64>,
-    /// When he picks it up again, seconds, while he is there and it lies within 1.5 m of him;
-    /// never where absent.
-    pub picks_up_s: Option<f64>,
-}
-
-impl Default for WorkerSettings {
-    fn default() -> Self {
-        Self {
-            name: "worker".to_owned(),
-            stature_m: 1.75,
-            mass_kg: 80.0,
-            ground_m: BED_M,
-            albedo: 0.4,
-            path: Vec::new(),
-            carries: None,
-            puts_down_s: None,
-            picks_up_s: None,
-        }
+settings! {
+    /// Where a worker is at a time; in between he walks straight and evenly.
+    #[derive(Copy)]
+    pub struct Waypoint {
+        /// When, seconds.
+        time_s: f64, in 0.0..=1e6;
+        /// Chainage, metres.
+        chainage_m: f64, in -1e6..=1e6;
+        /// Left of the centreline, metres.
+        lateral_m: f64, in -10.0..=10.0;
     }
 }
 
+settings! {
+    /// One worker. He is there from his first waypoint to his last.
+    pub struct WorkerSettings {
+        /// Name.
+        name: String = "worker".to_owned();
+        /// Height of the body, metres.
+        stature_m: f64 = 1.75, in 1.0..=2.3;
+        /// Mass, kilograms.
+        mass_kg: f64 = 80.0, in 30.0..=200.0;
+        /// Height of the ground he walks on above top of rail, metres: the track bed's where
+        /// absent.
+        ground_m: f64 = BED_M, in -2.0..=2.0;
+        /// Share of light that his clothes reflect, 0 to 1.
+        albedo: f64 = 0.4, in 0.0..=1.0;
+        /// Where he is when.
+        path: Vec<Waypoint> = Vec::new(), nested;
+        /// What he carries, a single thing; place, motion, hold and `appears_s` of it are ignored.
+        carries: Option<ObstacleSettings> = None, nested;
+        /// When he puts it down beside him, seconds, while he is there; never where absent.
+        puts_down_s: Option<f64> = None;
+        /// When he picks it up again, seconds, while he is there and it lies within 1.5 m of him;
+        /// never where absent.
+        picks_up_s: Option<f64> = None;
+    }
+    also check_path
+}
+
 impl WorkerSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("stature_m", self.stature_m, 1.0..=2.3, "m");
-        check.within("mass_kg", self.mass_kg, 30.0..=200.0, "kg");
-        check.within("ground_m", self.ground_m, -2.0..=2.0, "m");
-        check.within("albedo", self.albedo, 0.0..=1.0, "");
-        if let Some(carried) = &self.carries {
-            carried.check(&key_below(at, "carries"), problems);
-        }
-        if self.path.is_empty() {
-            problems.push(Problem::new(
-                key_below(at, "path"),
+    fn check_path(&self, check: &mut Checker<'_>) {
+        let (Some(first), Some(last)) = (self.path.first(), self.path.last()) else {
+            check.problem(
+                "path",
                 "there is no waypoint",
                 "give at least one { time_s, chainage_m, lateral_m }",
-            ));
-        }
+            );
+            return;
+        };
         for (k, pair) in self.path.windows(2).enumerate() {
             let in_order = pair[1].time_s > pair[0].time_s;
             if !in_order {
-                problems.push(Problem::new(
-                    key_below(at, &format!("path[{}].time_s", k + 1)),
+                check.problem(
+                    &format!("path[{}].time_s", k + 1),
                     format!("{} s is not after {} s", pair[1].time_s, pair[0].time_s),
                     "put the waypoints in order of time",
-                ));
+                );
             }
         }
+        let (from_s, to_s) = (first.time_s, last.time_s);
         for (key, when) in [
             ("puts_down_s", self.puts_down_s),
             ("picks_up_s", self.picks_up_s),
         ] {
-            if let (Some(first), Some(last), Some(at_s)) =
-                (self.path.first(), self.path.last(), when)
-                && !(first.time_s..=last.time_s).contains(&at_s)
-            {
-                let (from_s, to_s) = (first.time_s, last.time_s);
-                problems.push(Problem::new(
-                    key_below(at, key),
+            if let Some(at_s) = when.filter(|at_s| !(from_s..=to_s).contains(at_s)) {
+                check.problem(
+                    key,
                     format!("he is on the line from {from_s} to {to_s} s, not at {at_s} s"),
                     format!("give {from_s} to {to_s} s, or let his path last longer"),
-                ));
+                );
             }
         }
         if let Some(up_s) = self.picks_up_s
             && !self.puts_down_s.is_some_and(|down_s| down_s < up_s)
         {
-            problems.push(Problem::new(
-                key_below(at, "picks_up_s"),
+            check.problem(
+                "picks_up_s",
                 "he has put nothing down by then",
                 "give an earlier puts_down_s, or take this out",
-            ));
-        }
-        for (k, p) in self.path.iter().enumerate() {
-            let at = key_below(at, &format!("path[{k}]"));
-            let mut check = Checker::new(&at, problems);
-            check.within("time_s", p.time_s, 0.0..=1e6, "s");
-            check.within("chainage_m", p.chainage_m, -1e6..=1e6, "m");
-            check.within("lateral_m", p.lateral_m, -10.0..=10.0, "m");
+            );
         }
     }
 }

@@ -42,7 +42,7 @@
 //! [`LampField::airlight_cd_m2`](super::lamp_field::LampField::airlight_cd_m2). Headlights' own beams in the mist, and
 //! the halo of lamps through it, are left out.
 
-use crate::track::uid::LightCurve;
+use crate::track::waveform::LightCurve;
 use crate::twin::air::Air;
 use crate::twin::lights::{Headlight, LampLight};
 use nalgebra::{Point3, Vector3};

@@ -38,7 +38,7 @@
 //! frame, smear of a CCD, crosstalk, interpolated colours (the mosaic is delivered).
 
 use super::RawImage;
-use crate::track::{Checker, Problem};
+use crate::settings::{Checker, settings};
 use image::GrayImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -63,52 +63,35 @@ pub const BLOOMING_REACH: usize = 32;
 /// How far a lens may blur: the standard deviation of its point spread, pixels.
 pub const BLUR_PX: std::ops::RangeInclusive<f64> = 0.0..=50.0;
 
-/// The glass in front of a sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LensSettings {
-    /// Focal length over the width of the entrance pupil. Default 1.4.
-    pub f_number: f64,
-    /// Share of the light that passes. Default 0.9.
-    pub transmission: f64,
-    /// Standard deviation of the point spread in focus, with which lamps are seen, pixels. Default 0.5.
-    pub blur_px: f64,
-    /// Distance in focus, m; nearer and farther things are blurred by the pupil's width, focal length
-    /// over f number. Default: none, all is in focus.
-    pub focus_m: Option<f64>,
-    /// Share of a lamp's light that near glare spreads around it. Default 0.02.
-    pub halo_share: f64,
-    /// Distance in which the near glare falls to 1/e, pixels. Default 12.
-    pub halo_px: f64,
-    /// Share of a lamp's light in the wide veil around it. Default 0.02.
-    pub veil_share: f64,
-    /// Width of the veil, pixels: half of its light lies within 1.73 times this. Default 20.
-    pub veil_px: f64,
-    /// How much of the natural vignetting, the fourth power of the cosine to the axis, is left:
-    /// 1 all, 0 none. Default 1.
-    pub vignetting: f64,
-    /// Share of the glass that lies under specks of dirt, which take 30 to 80 % of the light in
-    /// the middle of their soft shadows. Default 0.
-    pub dirt_share: f64,
-    /// Share of the picture that something on the glass covers, from one side. Default 0.
-    pub occluded_share: f64,
-}
-
-impl Default for LensSettings {
-    fn default() -> Self {
-        Self {
-            f_number: 1.4,
-            transmission: 0.9,
-            blur_px: 0.5,
-            focus_m: None,
-            halo_share: 0.02,
-            halo_px: 12.0,
-            veil_share: 0.02,
-            veil_px: 20.0,
-            vignetting: 1.0,
-            dirt_share: 0.0,
-            occluded_share: 0.0,
-        }
+settings! {
+    /// The glass in front of a sensor.
+    #[derive(Copy)]
+    pub struct LensSettings {
+        /// Focal length over the width of the entrance pupil.
+        f_number: f64 = 1.4, in 0.5..=64.0;
+        /// Share of the light that passes.
+        transmission: f64 = 0.9, in 1e-3..=1.0;
+        /// Standard deviation of the point spread in focus, with which lamps are seen, pixels.
+        blur_px: f64 = 0.5, in BLUR_PX;
+        /// Distance in focus, m; nearer and farther things are blurred by the pupil's width, focal
+        /// length over f number. Default: none, all is in focus.
+        focus_m: Option<f64> = None, in 0.2..=1e6;
+        /// Share of a lamp's light that near glare spreads around it.
+        halo_share: f64 = 0.02, in 0.0..=0.5;
+        /// Distance in which the near glare falls to 1/e, pixels.
+        halo_px: f64 = 12.0, in 0.1..=1e3;
+        /// Share of a lamp's light in the wide veil around it.
+        veil_share: f64 = 0.02, in 0.0..=0.5;
+        /// Width of the veil, pixels: half of its light lies within 1.73 times this.
+        veil_px: f64 = 20.0, in 0.1..=1e4;
+        /// How much of the natural vignetting, the fourth power of the cosine to the axis, is left:
+        /// 1 all, 0 none.
+        vignetting: f64 = 1.0, in 0.0..=1.0;
+        /// Share of the glass that lies under specks of dirt, which take 30 to 80 % of the light in
+        /// the middle of their soft shadows.
+        dirt_share: f64 = 0.0, in 0.0..=1.0;
+        /// Share of the picture that something on the glass covers, from one side.
+        occluded_share: f64 = 0.0, in 0.0..=1.0;
     }
 }
 
@@ -132,24 +115,6 @@ impl LensSettings {
     /// Illuminance of the sensor on the axis under a scene of 1 cd/m^2.
     pub fn lux_per_cd_m2(&self) -> f64 {
         0.25 * PI * self.transmission / self.f_number.powi(2)
-    }
-
-    /// Appends what is wrong, with keys below `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("f_number", self.f_number, 0.5..=64.0, "");
-        check.within("transmission", self.transmission, 1e-3..=1.0, "");
-        check.within("blur_px", self.blur_px, BLUR_PX, "px");
-        if let Some(focus_m) = self.focus_m {
-            check.within("focus_m", focus_m, 0.2..=1e6, "m");
-        }
-        check.within("halo_share", self.halo_share, 0.0..=0.5, "");
-        check.within("halo_px", self.halo_px, 0.1..=1e3, "px");
-        check.within("veil_share", self.veil_share, 0.0..=0.5, "");
-        check.within("veil_px", self.veil_px, 0.1..=1e4, "px");
-        check.within("vignetting", self.vignetting, 0.0..=1.0, "");
-        check.within("dirt_share", self.dirt_share, 0.0..=1.0, "");
-        check.within("occluded_share", self.occluded_share, 0.0..=1.0, "");
     }
 }
 
@@ -176,69 +141,49 @@ impl Pattern {
     }
 }
 
-/// From photons to digital numbers.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct SensorSettings {
-    /// Electrons a photon. Default 0.6.
-    pub quantum_efficiency: f64,
-    /// Most electrons that a pixel holds. At a gain of 0 dB they are full scale. Default 10500.
-    pub full_well_e: f64,
-    /// Share of the charge over the full well that spills into the pixels above and below; the
-    /// rest goes down the drain. It spills no farther than 32 pixels. Default 0, as in CMOS
-    /// sensors with an anti-blooming drain.
-    pub blooming: f64,
-    /// Gain before the converter, dB. Default 3.3.
-    pub gain_db: f64,
-    /// Digital number of darkness, on the scale of 8 bits. Default 4.
-    pub black_level_grey: f64,
-    /// Bits of the converter: 8, 10 or 12. Images of eight bits have the upper ones, the lower
-    /// are dropped. Default 8.
-    pub bits: u8,
-    /// Read noise, electrons. Default 6.
-    pub read_noise_e: f64,
-    /// Dark current, electrons a second. Default 20.
-    pub dark_current_e_per_s: f64,
-    /// Standard deviation of the pixels' offsets (DSNU1288), electrons. Default 2.
-    pub dsnu_e: f64,
-    /// Standard deviation of the pixels' gains over their mean (PRNU1288). Default 0.01.
-    pub prnu: f64,
-    /// Share of pixels that leak. Default 1e-4.
-    pub hot_pixel_share: f64,
-    /// What they leak in the mean, electrons a second. Default 500.
-    pub hot_pixel_e_per_s: f64,
-    /// Colours: `grey` or `rggb`, of which the mosaic is delivered. Default `grey`.
-    pub pattern: Pattern,
-    /// Light of a white LED that passes the red, green and blue filter. Default [0.3, 0.45, 0.22].
-    pub channel_response: [f64; 3],
-    /// Gains of the red, green and blue pixels before the converter. Default [1.5, 1, 2.05], which
-    /// makes white LEDs white.
-    pub white_balance: [f64; 3],
-    /// Draw noise from frame to frame. Default true.
-    pub noise: bool,
-}
-
-impl Default for SensorSettings {
-    fn default() -> Self {
-        Self {
-            quantum_efficiency: 0.6,
-            full_well_e: 10_500.0,
-            blooming: 0.0,
-            gain_db: 3.3,
-            black_level_grey: 4.0,
-            bits: 8,
-            read_noise_e: 6.0,
-            dark_current_e_per_s: 20.0,
-            dsnu_e: 2.0,
-            prnu: 0.01,
-            hot_pixel_share: 1e-4,
-            hot_pixel_e_per_s: 500.0,
-            pattern: Pattern::Grey,
-            channel_response: [0.3, 0.45, 0.22],
-            white_balance: [1.5, 1.0, 2.05],
-            noise: true,
-        }
+settings! {
+    /// From photons to digital numbers.
+    #[derive(Copy)]
+    pub struct SensorSettings {
+        /// Electrons a photon.
+        quantum_efficiency: f64 = 0.6, in 1e-3..=1.0;
+        // The adapter's signal ends at 65504 e, the largest number in half precision.
+        /// Most electrons that a pixel holds. At a gain of 0 dB they are full scale.
+        full_well_e: f64 = 10_500.0, in 10.0..=6e4;
+        /// Share of the charge over the full well that spills into the pixels above and below; the
+        /// rest goes down the drain. It spills no farther than 32 pixels. Default 0, as in CMOS
+        /// sensors with an anti-blooming drain.
+        blooming: f64 = 0.0, in 0.0..=1.0;
+        /// Gain before the converter, dB.
+        gain_db: f64 = 3.3, in -20.0..=60.0;
+        /// Digital number of darkness, on the scale of 8 bits.
+        black_level_grey: f64 = 4.0, in 0.0..=255.0;
+        /// Bits of the converter: 8, 10 or 12. Images of eight bits have the upper ones, the lower
+        /// are dropped.
+        bits: u8 = 8;
+        /// Read noise, electrons.
+        read_noise_e: f64 = 6.0, in 0.0..=1e3;
+        /// Dark current, electrons a second.
+        dark_current_e_per_s: f64 = 20.0, in 0.0..=1e6;
+        /// Standard deviation of the pixels' offsets (DSNU1288), electrons.
+        dsnu_e: f64 = 2.0, in 0.0..=1e3;
+        /// Standard deviation of the pixels' gains over their mean (PRNU1288).
+        prnu: f64 = 0.01, in 0.0..=0.2;
+        /// Share of pixels that leak.
+        hot_pixel_share: f64 = 1e-4, in 0.0..=1.0;
+        /// What they leak in the mean, electrons a second.
+        hot_pixel_e_per_s: f64 = 500.0, in 0.0..=1e6;
+        /// Colours: `grey` or `rggb`, of which the mosaic is delivered.
+        pattern: Pattern = Pattern::Grey;
+        /// Light of a white LED that passes the red, green and blue filter.
+        channel_response: [f64; 3] = [0.3, 0.45, 0.22], in 0.0..=1.0;
+        /// Gains of the red, green and blue pixels before the converter. Default [1.5, 1, 2.05],
+        /// which makes white LEDs white.
+        white_balance: [f64; 3] = [1.5, 1.0, 2.05], in 0.1..=10.0;
+        /// Draw noise from frame to frame.
+        noise: bool = true;
     }
+    also check_bits
 }
 
 impl SensorSettings {
@@ -296,43 +241,13 @@ impl SensorSettings {
         u32::from(self.bits).clamp(8, 16) - 8
     }
 
-    /// Appends what is wrong, with keys below `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_bits(&self, check: &mut Checker<'_>) {
         if ![8, 10, 12].contains(&self.bits) {
-            problems.push(Problem::new(
-                format!("{at}.bits"),
+            check.problem(
+                "bits",
                 format!("no converter here has {} bits", self.bits),
                 "give 8, 10 or 12",
-            ));
-        }
-        let mut check = Checker::new(at, problems);
-        check.within(
-            "quantum_efficiency",
-            self.quantum_efficiency,
-            1e-3..=1.0,
-            "",
-        );
-        // The adapter's signal ends at 65504 e, the largest number in half precision.
-        check.within("full_well_e", self.full_well_e, 10.0..=6e4, "e");
-        check.within("blooming", self.blooming, 0.0..=1.0, "");
-        check.within("gain_db", self.gain_db, -20.0..=60.0, "dB");
-        check.within("black_level_grey", self.black_level_grey, 0.0..=255.0, "");
-        check.within("read_noise_e", self.read_noise_e, 0.0..=1e3, "e");
-        let leaks = [
-            ("dark_current_e_per_s", self.dark_current_e_per_s),
-            ("hot_pixel_e_per_s", self.hot_pixel_e_per_s),
-        ];
-        for (key, value) in leaks {
-            check.within(key, value, 0.0..=1e6, "e/s");
-        }
-        check.within("dsnu_e", self.dsnu_e, 0.0..=1e3, "e");
-        check.within("prnu", self.prnu, 0.0..=0.2, "");
-        check.within("hot_pixel_share", self.hot_pixel_share, 0.0..=1.0, "");
-        for response in self.channel_response {
-            check.within("channel_response", response, 0.0..=1.0, "");
-        }
-        for gain in self.white_balance {
-            check.within("white_balance", gain, 0.1..=10.0, "");
+            );
         }
     }
 }
@@ -350,6 +265,7 @@ pub fn upper_bits(raw: &RawImage, spare_bits: u32) -> GrayImage {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
     use std::f64::consts::FRAC_1_SQRT_2;
 
     /// Standard normal distribution function, by the series of its integral.
@@ -436,13 +352,13 @@ mod tests {
         assert_eq!(
             keys,
             [
-                "sensor.bits",
                 "sensor.full_well_e",
                 "sensor.blooming",
                 "sensor.prnu",
-                "sensor.channel_response"
+                "sensor.channel_response",
+                "sensor.bits"
             ]
         );
-        assert!(problems[0].to_string().contains("give 8, 10 or 12"));
+        assert!(problems[4].to_string().contains("give 8, 10 or 12"));
     }
 }

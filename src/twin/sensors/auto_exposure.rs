@@ -29,7 +29,7 @@
 //! assert!(control.now().exposure_s > first.exposure_s);
 //! ```
 
-use crate::track::{Checker, Problem};
+use crate::settings::{Checker, settings};
 use crate::twin::render::{SensorSettings, View};
 use image::GrayImage;
 use schemars::JsonSchema;
@@ -51,43 +51,29 @@ pub enum ExposureMode {
     Auto,
 }
 
-/// Automatic exposure and gain of a camera, which start as written in its other settings.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ExposureSettings {
-    /// `fixed` or `auto`. Default `fixed`.
-    pub mode: ExposureMode,
-    /// Share of the pixels that is to be darker than the target: 0.5 for the median, 0.99 to keep
-    /// lamps from clipping; 0 for the mean of all pixels instead. Default 0.
-    pub percentile: f64,
-    /// Grey level over black to reach. Default 80.
-    pub target_grey: f64,
-    /// Shortest exposure, us. Default 10.
-    pub min_exposure_us: f64,
-    /// Longest exposure, us; so exposed, all rows must close within a frame, and images are delivered
-    /// when such a frame would be over. A rig that reads blinking lamps needs less than their chip
-    /// time. Default: the exposure that the camera begins with.
-    pub max_exposure_us: Option<f64>,
-    /// Least gain, dB. Default 0.
-    pub min_gain_db: f64,
-    /// Most gain, dB. Default 24.
-    pub max_gain_db: f64,
-    /// Share of an error that is left after a frame, 0 to 0.95. Default 0.5.
-    pub damping: f64,
-}
-
-impl Default for ExposureSettings {
-    fn default() -> Self {
-        Self {
-            mode: ExposureMode::Fixed,
-            percentile: 0.0,
-            target_grey: 80.0,
-            min_exposure_us: 10.0,
-            max_exposure_us: None,
-            min_gain_db: 0.0,
-            max_gain_db: 24.0,
-            damping: 0.5,
-        }
+settings! {
+    /// Automatic exposure and gain of a camera, which start as written in its other settings.
+    #[derive(Copy)]
+    pub struct ExposureSettings {
+        /// `fixed` or `auto`.
+        mode: ExposureMode = ExposureMode::Fixed;
+        /// Share of the pixels that is to be darker than the target: 0.5 for the median, 0.99 to
+        /// keep lamps from clipping; 0 for the mean of all pixels instead.
+        percentile: f64 = 0.0, in 0.0..=1.0;
+        /// Grey level over black to reach.
+        target_grey: f64 = 80.0, in 1.0..=250.0;
+        /// Shortest exposure, us.
+        min_exposure_us: f64 = 10.0, in 0.1..=1e7;
+        /// Longest exposure, us; so exposed, all rows must close within a frame, and images are
+        /// delivered when such a frame would be over. A rig that reads blinking lamps needs less
+        /// than their chip time. Default: the exposure that the camera begins with.
+        max_exposure_us: Option<f64> = None, in 0.1..=1e7;
+        /// Least gain, dB.
+        min_gain_db: f64 = 0.0, in -20.0..=60.0;
+        /// Most gain, dB.
+        max_gain_db: f64 = 24.0, in -20.0..=60.0;
+        /// Share of an error that is left after a frame, 0 to 0.95.
+        damping: f64 = 0.5, in 0.0..=0.95;
     }
 }
 
@@ -100,25 +86,12 @@ impl ExposureSettings {
         }
     }
 
-    /// Appends what is wrong, with keys below `at`, for a camera that begins with an exposure of
-    /// `exposure_us`. Whether the longest one fits into a frame, the camera knows.
-    pub fn check(&self, at: &str, exposure_us: f64, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("percentile", self.percentile, 0.0..=1.0, "");
-        check.within("target_grey", self.target_grey, 1.0..=250.0, "");
-        check.within("min_exposure_us", self.min_exposure_us, 0.1..=1e7, "us");
-        if let Some(longest_us) = self.max_exposure_us {
-            check.within("max_exposure_us", longest_us, 0.1..=1e7, "us");
+    /// Limits that an automatic control needs, of a camera that begins with `exposure_us`. Whether the
+    /// longest exposure fits into a frame, the camera knows.
+    pub fn check_limits(&self, exposure_us: f64, check: &mut Checker<'_>) {
+        if self.mode == ExposureMode::Fixed {
+            return;
         }
-        check.within("min_gain_db", self.min_gain_db, -20.0..=60.0, "dB");
-        check.within("max_gain_db", self.max_gain_db, -20.0..=60.0, "dB");
-        check.within("damping", self.damping, 0.0..=0.95, "");
-        if self.mode == ExposureMode::Auto {
-            self.check_limits(at, exposure_us, problems);
-        }
-    }
-
-    fn check_limits(&self, at: &str, exposure_us: f64, problems: &mut Vec<Problem>) {
         let most_us = self.max_exposure_us.unwrap_or(exposure_us);
         let limits = [
             ("exposure_us", self.min_exposure_us, most_us, "us"),
@@ -126,11 +99,11 @@ impl ExposureSettings {
         ];
         for (key, low, high, unit) in limits {
             if low > high {
-                problems.push(Problem::new(
-                    format!("{at}.min_{key}"),
+                check.problem(
+                    &format!("min_{key}"),
                     format!("{low} {unit} is more than the most, {high} {unit}"),
                     format!("give {high} {unit} or less, or raise max_{key}"),
-                ));
+                );
             }
         }
     }
@@ -253,6 +226,7 @@ impl AutoExposure {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
     use crate::twin::random::Stream;
     use std::collections::VecDeque;
 
@@ -381,7 +355,8 @@ mod tests {
     fn bad_limits_are_refused() {
         let keys = |settings: ExposureSettings, exposure_us: f64| {
             let mut problems = Vec::new();
-            settings.check("exposure", exposure_us, &mut problems);
+            settings.check("exposure", &mut problems);
+            settings.check_limits(exposure_us, &mut Checker::new("exposure", &mut problems));
             problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
         };
         assert_eq!(keys(auto(), 30.0), [""; 0]);

@@ -8,13 +8,15 @@ use super::{ClockSettings, ExposureSettings};
 use crate::bus::{
     CameraModel, DistortionCoefficients, Intrinsics, Shutter, SimTime, WaysideCalibration,
 };
-use crate::track::{Checker, Problem, TrackPoint, Tunnel, WaysideSite};
+use crate::settings::{Checker, settings};
+use crate::track::{TrackPoint, Tunnel, WaysideSite};
 use crate::twin::random::Stream;
 use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::de::{DeserializeOwned, Error};
 use serde::{Deserialize, Deserializer, Serialize};
+use std::ops::RangeInclusive;
 
 /// Which row of a rolling shutter opens first.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -34,8 +36,8 @@ pub struct Trigger {
     jitter_us: f64,
 }
 
-/// Widest texture that every graphics adapter has.
-const MOST_SIDE_PX: u32 = 8192;
+/// Columns and rows: at most the widest texture that every graphics adapter has.
+pub(super) const SIDE_PX: RangeInclusive<f64> = 16.0..=8192.0;
 
 /// Draws farther off than this many standard deviations are held there.
 const MOST_SIGMAS: f64 = 4.0;
@@ -105,58 +107,44 @@ impl Optics {
         }
     }
 
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        positive(
-            problems,
-            at,
-            "focal_length_mm",
-            self.focal_length_mm,
-            "mm",
-            3.9,
-        );
-        positive(problems, at, "pixel_um", self.pixel_um, "um", 3.75);
-        positive(problems, at, "exposure_us", self.exposure_us, "us", 30.0);
-        positive(problems, at, self.rate_key, self.frames_per_s, "1/s", 30.0);
-        let mut check = Checker::new(at, problems);
-        for (key, value) in [("width_px", self.width_px), ("height_px", self.height_px)] {
-            check.within(key, f64::from(value), 16.0..=f64::from(MOST_SIDE_PX), "px");
-        }
+    pub fn check(&self, check: &mut Checker<'_>) {
+        check.positive("focal_length_mm", self.focal_length_mm, 3.9);
+        check.positive("pixel_um", self.pixel_um, 3.75);
+        check.positive("exposure_us", self.exposure_us, 30.0);
+        check.positive(self.rate_key, self.frames_per_s, 30.0);
         if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
-            problems.push(Problem::new(
-                format!("{at}.line_time_us"),
+            check.problem(
+                "line_time_us",
                 format!(
                     "a row cannot open {} us after the one before",
                     self.line_time_us
                 ),
                 "give the time from row to row in us, 0 for a global shutter",
-            ));
+            );
         }
-        self.check_frame_time(at, problems);
-        self.check_lens(at, problems);
+        self.check_frame_time(check);
+        self.check_lens(check);
     }
 
     /// Principal point and distortion.
-    pub fn check_lens(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
+    pub fn check_lens(&self, check: &mut Checker<'_>) {
         let size_px = [self.width_px, self.height_px].map(f64::from);
         let keys = ["principal_u_px", "principal_v_px"];
         for ((key, value), size_px) in keys.into_iter().zip(self.principal_px).zip(size_px) {
-            check.within(key, value, -0.5 * size_px..=0.5 * size_px, "px");
+            check.within(key, value, -0.5 * size_px..=0.5 * size_px);
         }
-        let at = format!("{at}.distortion");
-        let mut check = Checker::new(&at, problems);
         let DistortionCoefficients { k1, k2, k3, p1, p2 } = self.distortion;
         for (key, value) in [("k1", k1), ("k2", k2), ("k3", k3)] {
-            check.within(key, value, -10.0..=10.0, "");
+            check.within(&format!("distortion.{key}"), value, -10.0..=10.0);
         }
         for (key, value) in [("p1", p1), ("p2", p2)] {
-            check.within(key, value, -0.2..=0.2, "");
+            check.within(&format!("distortion.{key}"), value, -0.2..=0.2);
         }
-        self.check_reach(&at, problems);
+        self.check_reach("distortion", check);
     }
 
     /// The polynomial must hold all over the picture.
-    fn check_reach(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_reach(&self, key: &str, check: &mut Checker<'_>) {
         let lens = self.camera().intrinsics;
         let (right, bottom) = (
             f64::from(self.width_px) - 1.0,
@@ -176,8 +164,8 @@ impl Optics {
         let middle = Point2::new(lens.cx_px, lens.cy_px);
         let rim_px = rim.map_or(0.0, |p| (p - middle).norm());
         let corner_px = (Point2::new(u, v) - middle).norm();
-        problems.push(Problem::new(
-            at,
+        check.problem(
+            key,
             format!(
                 "it turns back at r = {reach:.3} ({:.1} deg off the axis), which is seen \
                  {rim_px:.0} px from the principal point, inside the picture: pixel ({u}, {v}) is \
@@ -186,33 +174,33 @@ impl Optics {
             ),
             "take coefficients that were fitted out to the corners, or a longer focal length or \
              fewer pixels",
-        ));
+        );
     }
 
     /// Whether nothing is wrong.
     fn is_sound(&self) -> bool {
         let mut problems = Vec::new();
-        self.check("", &mut problems);
+        self.check(&mut Checker::new("", &mut problems));
         problems.is_empty()
     }
 
-    /// What the errors under the key `at` spoil of a camera that is sound by its sheet.
-    pub fn check_actual(&self, sheet: &Self, at: &str, problems: &mut Vec<Problem>) {
+    /// What the errors of calibration spoil of a camera that is sound by its sheet.
+    pub fn check_actual(&self, sheet: &Self, check: &mut Checker<'_>) {
         if !sheet.is_sound() {
             return;
         }
-        self.check_reach(at, problems);
+        self.check_reach("calibration_error", check);
         let (span_us, frame_us) = (self.span_us(), 1e6 / self.frames_per_s);
         if span_us > frame_us {
-            problems.push(Problem::new(
-                format!("{at}.line_time_us"),
+            check.problem(
+                "calibration_error.line_time_us",
                 format!(
                     "the line time is really {} us, in which {} rows take {span_us:.0} us, but a \
                      frame lasts {frame_us:.0} us",
                     self.line_time_us, self.height_px
                 ),
                 "give a smaller error",
-            ));
+            );
         }
     }
 
@@ -224,16 +212,15 @@ impl Optics {
         }
     }
 
-    /// A control may lengthen the exposure, its settings being under the key `at`: what holds for
-    /// the written one holds for the longest.
-    pub fn check_control(&self, control: &ExposureSettings, at: &str, problems: &mut Vec<Problem>) {
-        control.check(at, self.exposure_us, problems);
+    /// A control may lengthen the exposure: what holds for the written one holds for the longest.
+    pub fn check_control(&self, control: &ExposureSettings, check: &mut Checker<'_>) {
+        control.check_limits(self.exposure_us, &mut check.below("exposure_control"));
         let longest = self.exposed_longest(control);
         let (span_us, frame_us) = (longest.span_us(), 1e6 / self.frames_per_s);
         // Of a written one that is too long, the camera's own check tells.
         if self.span_us() <= frame_us && span_us > frame_us {
-            problems.push(Problem::new(
-                format!("{at}.max_exposure_us"),
+            check.problem(
+                "exposure_control.max_exposure_us",
                 format!(
                     "exposed for {} us, {} rows of {} us take {span_us:.0} us, but a frame lasts \
                      {frame_us:.0} us at {} {}",
@@ -248,7 +235,7 @@ impl Optics {
                     (frame_us - span_us + longest.exposure_us).floor(),
                     self.rate_key
                 ),
-            ));
+            );
         }
     }
 
@@ -262,7 +249,7 @@ impl Optics {
     }
 
     /// The last row must close before the next frame's first one opens.
-    fn check_frame_time(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_frame_time(&self, check: &mut Checker<'_>) {
         let frame_us = 1e6 / self.frames_per_s;
         if !(frame_us.is_finite() && frame_us > 0.0) {
             return;
@@ -270,8 +257,8 @@ impl Optics {
         let span_us = self.span_us();
         let read_us = span_us - self.exposure_us;
         if self.exposure_us > frame_us {
-            problems.push(Problem::new(
-                format!("{at}.exposure_us"),
+            check.problem(
+                "exposure_us",
                 format!(
                     "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {}",
                     self.exposure_us, self.frames_per_s, self.rate_key
@@ -281,13 +268,13 @@ impl Optics {
                     (frame_us - read_us).max(0.0),
                     self.rate_key
                 ),
-            ));
+            );
             return;
         }
         if span_us > frame_us {
             let fits = ((frame_us - self.exposure_us) / self.line_time_us).floor() + 1.0;
-            problems.push(Problem::new(
-                format!("{at}.height_px"),
+            check.problem(
+                "height_px",
                 format!(
                     "{} rows of {} us take {span_us:.0} us, but a frame lasts {frame_us:.0} us at {} {}",
                     self.height_px, self.line_time_us, self.frames_per_s, self.rate_key
@@ -297,54 +284,57 @@ impl Optics {
                     (frame_us - read_us).max(0.0),
                     self.rate_key
                 ),
-            ));
+            );
         }
     }
 }
 
-/// The camera of a wayside device. Where it hangs and looks is in the tunnel file.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WaysideCameraSettings {
-    /// Focal length, mm. Default 4.1 (1093 px: 83 deg across).
-    pub focal_length_mm: f64,
-    /// Width and height of a pixel, um. Default 3.75.
-    pub pixel_um: f64,
-    /// Columns. Default 1920.
-    pub width_px: u32,
-    /// Rows. Default 1080.
-    pub height_px: u32,
-    /// Principal point right of the picture's middle, px. Default 0.
-    pub principal_u_px: f64,
-    /// Principal point below the picture's middle, px. Default 0.
-    pub principal_v_px: f64,
-    /// Distortion of the lens, as OpenCV has it. Default: none.
-    pub distortion: DistortionCoefficients,
-    /// Time from the opening of a row to the opening of the next, us. Default 14.8.
-    pub line_time_us: f64,
-    /// Whether rows are read downwards or upwards. Default "down".
-    pub read_out: ReadOut,
-    /// How long every row collects light, us. Default 16000.
-    pub exposure_us: f64,
-    /// Frames a second. Default 10.
-    pub frames_per_s: f64,
-    /// Standard deviation of a frame's true start about the one that it says, us, drawn anew for
-    /// each; held at four times that. Default 0.
-    pub frame_jitter_us: f64,
-    /// By how much the device really differs from the calibration that the stack is given.
-    /// Default: not at all.
-    pub calibration_error: WaysideError,
-    /// The glass. What is left out is as with the rig, but `f_number`, whose default is 1.0.
-    #[serde(deserialize_with = "wayside_lens")]
-    pub lens: LensSettings,
-    /// From photons to digital numbers. What is left out is as with the rig, but `gain_db`, whose default
-    /// is 9.4.
-    #[serde(deserialize_with = "wayside_sensor")]
-    pub sensor: SensorSettings,
-    /// Exposure and gain that follow the light. Default: fixed.
-    pub exposure_control: ExposureSettings,
-    /// Its clock.
-    pub clock: ClockSettings,
+settings! {
+    /// The camera of a wayside device. Where it hangs and looks is in the tunnel file.
+    pub struct WaysideCameraSettings {
+        /// Focal length, mm. Default 4.1 (1093 px: 83 deg across).
+        focal_length_mm: f64 = 4.1;
+        /// Width and height of a pixel, um.
+        pixel_um: f64 = 3.75;
+        /// Columns.
+        width_px: u32 = 1920, in SIDE_PX;
+        /// Rows.
+        height_px: u32 = 1080, in SIDE_PX;
+        /// Principal point right of the picture's middle, px.
+        principal_u_px: f64 = 0.0;
+        /// Principal point below the picture's middle, px.
+        principal_v_px: f64 = 0.0;
+        /// Distortion of the lens, as OpenCV has it. Default: none.
+        distortion: DistortionCoefficients = DistortionCoefficients::default();
+        /// Time from the opening of a row to the opening of the next, us.
+        line_time_us: f64 = 14.8;
+        /// Whether rows are read downwards or upwards.
+        read_out: ReadOut = ReadOut::Down;
+        /// How long every row collects light, us.
+        exposure_us: f64 = 16_000.0;
+        /// Frames a second.
+        frames_per_s: f64 = 10.0;
+        /// Standard deviation of a frame's true start about the one that it says, us, drawn anew
+        /// for each; held at four times that.
+        frame_jitter_us: f64 = 0.0;
+        /// By how much the device really differs from the calibration that the stack is given.
+        /// Default: not at all.
+        calibration_error: WaysideError = WaysideError::default(), nested;
+        /// The glass. What is left out is as with the rig, but `f_number`, whose default is 1.0.
+        #[serde(deserialize_with = "wayside_lens")]
+        lens: LensSettings = LensSettings { f_number: 1.0, ..LensSettings::default() },
+            nested;
+        /// From photons to digital numbers. What is left out is as with the rig, but `gain_db`,
+        /// whose default is 9.4.
+        #[serde(deserialize_with = "wayside_sensor")]
+        sensor: SensorSettings = SensorSettings { gain_db: 9.4, ..SensorSettings::default() },
+            nested;
+        /// Exposure and gain that follow the light. Default: fixed.
+        exposure_control: ExposureSettings = ExposureSettings::default(), nested;
+        /// Its clock.
+        clock: ClockSettings = ClockSettings::default(), nested;
+    }
+    also check_together
 }
 
 fn wayside_lens<'de, D: Deserializer<'de>>(input: D) -> Result<LensSettings, D::Error> {
@@ -367,61 +357,32 @@ where
     whole.try_into().map_err(Error::custom)
 }
 
-impl Default for WaysideCameraSettings {
-    fn default() -> Self {
-        Self {
-            focal_length_mm: 4.1,
-            pixel_um: 3.75,
-            width_px: 1920,
-            height_px: 1080,
-            principal_u_px: 0.0,
-            principal_v_px: 0.0,
-            distortion: DistortionCoefficients::default(),
-            line_time_us: 14.8,
-            read_out: ReadOut::Down,
-            exposure_us: 16_000.0,
-            frames_per_s: 10.0,
-            frame_jitter_us: 0.0,
-            calibration_error: WaysideError::default(),
-            lens: LensSettings {
-                f_number: 1.0,
-                ..LensSettings::default()
-            },
-            sensor: SensorSettings {
-                gain_db: 9.4,
-                ..SensorSettings::default()
-            },
-            exposure_control: ExposureSettings::default(),
-            clock: ClockSettings::default(),
-        }
+settings! {
+    /// What survey and calibration of a wayside device got wrong: the true value less the calibrated
+    /// one. A lidar in the same housing is off by the same.
+    #[derive(Copy)]
+    pub struct WaysideError {
+        /// Focal length, mm.
+        focal_length_mm: f64 = 0.0;
+        /// Principal point, px to the right.
+        principal_u_px: f64 = 0.0, in -100.0..=100.0;
+        /// Principal point, px down.
+        principal_v_px: f64 = 0.0, in -100.0..=100.0;
+        /// Distortion of r^2.
+        k1: f64 = 0.0, in -1.0..=1.0;
+        /// Line time, us.
+        line_time_us: f64 = 0.0;
+        /// Yaw, deg, left positive.
+        yaw_deg: f64 = 0.0, in -45.0..=45.0;
+        /// Pitch, deg, up positive.
+        pitch_deg: f64 = 0.0, in -45.0..=45.0;
+        /// Place along the line, m.
+        chainage_m: f64 = 0.0, in -1.0..=1.0;
+        /// Place across the line, m to the left.
+        lateral_m: f64 = 0.0, in -0.5..=0.5;
+        /// Place in height, m.
+        height_m: f64 = 0.0, in -0.5..=0.5;
     }
-}
-
-/// What survey and calibration of a wayside device got wrong: the true value less the calibrated
-/// one. A lidar in the same housing is off by the same.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct WaysideError {
-    /// Focal length, mm. Default 0.
-    pub focal_length_mm: f64,
-    /// Principal point, px to the right. Default 0.
-    pub principal_u_px: f64,
-    /// Principal point, px down. Default 0.
-    pub principal_v_px: f64,
-    /// Distortion of r^2. Default 0.
-    pub k1: f64,
-    /// Line time, us. Default 0.
-    pub line_time_us: f64,
-    /// Yaw, deg, left positive. Default 0.
-    pub yaw_deg: f64,
-    /// Pitch, deg, up positive. Default 0.
-    pub pitch_deg: f64,
-    /// Place along the line, m. Default 0.
-    pub chainage_m: f64,
-    /// Place across the line, m to the left. Default 0.
-    pub lateral_m: f64,
-    /// Place in height, m. Default 0.
-    pub height_m: f64,
 }
 
 impl WaysideCameraSettings {
@@ -487,36 +448,20 @@ impl WaysideCameraSettings {
         }
     }
 
-    /// Appends what is wrong.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.optics().check(at, problems);
-        self.clock.check(&format!("{at}.clock"), problems);
-        check_jitter(at, self.frame_jitter_us, self.frames_per_s, problems);
-        self.sensor.check(&format!("{at}.sensor"), problems);
-        self.lens.check(&format!("{at}.lens"), problems);
-        let control = format!("{at}.exposure_control");
-        (self.optics()).check_control(&self.exposure_control, &control, problems);
+    fn check_together(&self, check: &mut Checker<'_>) {
+        self.optics().check(check);
+        check_jitter(self.frame_jitter_us, self.frames_per_s, check);
+        self.optics().check_control(&self.exposure_control, check);
         let error = self.calibration_error;
-        let at = format!("{at}.calibration_error");
-        let mut check = Checker::new(&at, problems);
-        let mut within = |key: &str, value: f64, unit: &str, most: f64| {
-            check.within(key, value, -most..=most, unit);
-        };
-        let half_focal = 0.5 * self.focal_length_mm.abs();
-        let half_line = 0.5 * self.line_time_us.abs();
-        within("focal_length_mm", error.focal_length_mm, "mm", half_focal);
-        within("principal_u_px", error.principal_u_px, "px", 100.0);
-        within("principal_v_px", error.principal_v_px, "px", 100.0);
-        within("k1", error.k1, "", 1.0);
-        within("line_time_us", error.line_time_us, "us", half_line);
-        within("yaw_deg", error.yaw_deg, "deg", 45.0);
-        within("pitch_deg", error.pitch_deg, "deg", 45.0);
-        within("chainage_m", error.chainage_m, "m", 1.0);
-        within("lateral_m", error.lateral_m, "m", 0.5);
-        within("height_m", error.height_m, "m", 0.5);
+        let half_mm = 0.5 * self.focal_length_mm.abs();
+        let key = "calibration_error.focal_length_mm";
+        check.within(key, error.focal_length_mm, -half_mm..=half_mm);
+        let half_us = 0.5 * self.line_time_us.abs();
+        let key = "calibration_error.line_time_us";
+        check.within(key, error.line_time_us, -half_us..=half_us);
         let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
         let actual = longest(self.actual_camera().optics());
-        actual.check_actual(&longest(self.optics()), &at, problems);
+        actual.check_actual(&longest(self.optics()), check);
     }
 
     /// From the start of a frame to the closing of its last row, with the longest exposure that it
@@ -588,30 +533,11 @@ fn axes(columns: Matrix3<f64>) -> Isometry3<f64> {
     )
 }
 
-/// Complains about jitter that would let frames overtake each other.
-pub(super) fn check_jitter(at: &str, jitter_us: f64, rate_hz: f64, problems: &mut Vec<Problem>) {
+/// Jitter must not let frames overtake each other.
+pub(super) fn check_jitter(jitter_us: f64, rate_hz: f64, check: &mut Checker<'_>) {
     let most_us = 1e6 / (2.0 * MOST_SIGMAS * rate_hz);
     if most_us.is_finite() && most_us > 0.0 {
-        let mut check = Checker::new(at, problems);
-        check.within("frame_jitter_us", jitter_us, 0.0..=most_us.floor(), "us");
-    }
-}
-
-/// Complains unless a number is greater than 0; `usual` is one that is.
-pub(super) fn positive(
-    problems: &mut Vec<Problem>,
-    at: &str,
-    key: &str,
-    value: f64,
-    unit: &str,
-    usual: f64,
-) {
-    if !(value.is_finite() && value > 0.0) {
-        problems.push(Problem::new(
-            format!("{at}.{key}"),
-            format!("{value} {unit} is not greater than 0"),
-            format!("give a positive number of {unit}, usually {usual}"),
-        ));
+        check.within("frame_jitter_us", jitter_us, 0.0..=most_us.floor());
     }
 }
 
@@ -619,6 +545,7 @@ pub(super) fn positive(
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+    use crate::settings::{Problem, Settings};
 
     /// A table with one key that takes the rig's sensor and glass for the rest.
     #[test]

@@ -8,88 +8,49 @@
 
 use super::ClockSettings;
 use crate::bus::{LidarReturn, LidarScan, SimTime};
-use crate::track::{Checker, Problem, Tunnel};
+use crate::settings::{Checker, settings};
+use crate::track::Tunnel;
 use crate::twin::geometry::{Body, Solid, TunnelCaster};
 use crate::twin::random::Stream;
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Isometry3, Point3, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// The lidar of a wayside device. Angles count from its axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LidarSettings {
-    /// Beams, one above the other. Default 16.
-    pub channels: u32,
-    /// Elevation of the lowest beam, deg. Default -15.
-    pub lowest_deg: f64,
-    /// Elevation of the highest beam, deg. Default 15.
-    pub highest_deg: f64,
-    /// Sector in which echoes are reported, to either side of the axis, deg. Default 60.
-    pub half_sector_deg: f64,
-    /// Turn from shot to shot, deg. Default 0.2.
-    pub step_deg: f64,
-    /// Turns of the head a second, one scan each; a frame goes with the latest scan that was
-    /// complete when the frame's last row closed. Default 10.
-    pub rate_hz: f64,
-    /// Standard deviation of a range, m. Default 0.02.
-    pub range_noise_m: f64,
-    /// Nearest range, m. Default 0.5.
-    pub min_range_m: f64,
-    /// Longest range, m. Default 120.
-    pub max_range_m: f64,
-    /// Reflectance that, met square, is just seen at the longest range; darker or slanted surfaces
-    /// are lost earlier. 0 to lose none. Default 0.1.
-    pub threshold_reflectance: f64,
-    /// Its clock.
-    pub clock: ClockSettings,
-}
-
-impl Default for LidarSettings {
-    fn default() -> Self {
-        Self {
-            channels: 16,
-            lowest_deg: -15.0,
-            highest_deg: 15.0,
-            half_sector_deg: 60.0,
-            step_deg: 0.2,
-            rate_hz: 10.0,
-            range_noise_m: 0.02,
-            min_range_m: 0.5,
-            max_range_m: 120.0,
-            threshold_reflectance: 0.1,
-            clock: ClockSettings::default(),
-        }
+settings! {
+    /// The lidar of a wayside device. Angles count from its axis.
+    pub struct LidarSettings {
+        /// Beams, one above the other.
+        channels: u32 = 16, in 1.0..=256.0;
+        /// Elevation of the lowest beam, deg.
+        lowest_deg: f64 = -15.0, in -89.0..=89.0;
+        /// Elevation of the highest beam, deg.
+        highest_deg: f64 = 15.0, in -89.0..=89.0;
+        /// Sector in which echoes are reported, to either side of the axis, deg.
+        half_sector_deg: f64 = 60.0, in 0.0..=180.0;
+        /// Turn from shot to shot, deg.
+        step_deg: f64 = 0.2, in 0.01..=10.0;
+        /// Turns of the head a second, one scan each; a frame goes with the latest scan that was
+        /// complete when the frame's last row closed.
+        rate_hz: f64 = 10.0, in 0.1..=100.0;
+        /// Standard deviation of a range, m.
+        range_noise_m: f64 = 0.02, in 0.0..=1.0;
+        /// Nearest range, m.
+        min_range_m: f64 = 0.5, in 0.0..=500.0;
+        /// Longest range, m.
+        max_range_m: f64 = 120.0, in 1.0..=500.0;
+        /// Reflectance that, met square, is just seen at the longest range; darker or slanted
+        /// surfaces are lost earlier. 0 to lose none.
+        threshold_reflectance: f64 = 0.1, in 0.0..=1.0;
+        /// Its clock.
+        clock: ClockSettings = ClockSettings::default(), nested;
     }
+    also check_order
 }
 
 impl LidarSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.clock.check(&format!("{at}.clock"), problems);
-        let mut check = Checker::new(at, problems);
-        check.within("channels", f64::from(self.channels), 1.0..=256.0, "beams");
-        check.within("lowest_deg", self.lowest_deg, -89.0..=89.0, "deg");
-        check.within(
-            "highest_deg",
-            self.highest_deg,
-            self.lowest_deg..=89.0,
-            "deg",
-        );
-        check.within("half_sector_deg", self.half_sector_deg, 0.0..=180.0, "deg");
-        check.within("step_deg", self.step_deg, 0.01..=10.0, "deg");
-        check.within("rate_hz", self.rate_hz, 0.1..=100.0, "Hz");
-        check.within("range_noise_m", self.range_noise_m, 0.0..=1.0, "m");
-        check.within("min_range_m", self.min_range_m, 0.0..=self.max_range_m, "m");
-        check.within("max_range_m", self.max_range_m, 1.0..=500.0, "m");
-        check.within(
-            "threshold_reflectance",
-            self.threshold_reflectance,
-            0.0..=1.0,
-            "of 1",
-        );
+    fn check_order(&self, check: &mut Checker<'_>) {
+        check.within("highest_deg", self.highest_deg, self.lowest_deg..=89.0);
+        check.within("min_range_m", self.min_range_m, 0.0..=self.max_range_m);
     }
 
     fn elevation_rad(&self, channel: u32) -> f64 {
@@ -245,6 +206,7 @@ impl Lidar {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::Settings;
     use crate::twin::geometry::Shape;
     use crate::twin::render::sample;
 
@@ -412,7 +374,7 @@ mod tests {
         };
         bad.check("wayside[0].lidar", &mut problems);
         let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
-        let expected = ["channels", "highest_deg", "step_deg"];
+        let expected = ["channels", "step_deg", "highest_deg"];
         assert_eq!(keys, expected.map(|k| format!("wayside[0].lidar.{k}")));
     }
 }

@@ -16,73 +16,37 @@
 
 use super::ClockSettings;
 use crate::bus::{OdometerSample, SimTime, TrainId};
-use crate::track::{Checker, Problem};
+use crate::settings::settings;
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Without an edge for this long, the wheelset stands.
 const STANDSTILL_S: f64 = 0.5;
 
-/// The odometer: pulses of one wheelset, turned into distance with the radius that the box was
-/// told.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct OdometerSettings {
-    /// Samples a second.
-    pub rate_hz: f64,
-    /// The wheelset that it counts, from the head; 1 is the leading one.
-    pub axle: u32,
-    /// Pulses a turn of the wheel.
-    pub pulses_per_turn: u32,
-    /// Two channels, a quarter pulse apart, tell which way the wheel turns; with one channel every
-    /// pulse counts as forward.
-    pub two_channels: bool,
-    /// Radius that the box was told, metres.
-    pub wheel_radius_m: f64,
-    /// What the radius has lost since by wear, metres. The box then says too much.
-    pub worn_m: f64,
-    /// One sigma of how well it was measured, as a share; the wear comes on top.
-    pub radius_error_share: f64,
-    /// Its clock.
-    pub clock: ClockSettings,
-}
-
-impl Default for OdometerSettings {
-    fn default() -> Self {
-        Self {
-            rate_hz: 50.0,
-            axle: 1,
-            pulses_per_turn: 128,
-            two_channels: true,
-            wheel_radius_m: 0.43,
-            worn_m: 0.0,
-            radius_error_share: 0.003,
-            clock: ClockSettings::default(),
-        }
-    }
-}
-
-impl OdometerSettings {
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.clock.check(&format!("{at}.clock"), problems);
-        let mut check = Checker::new(at, problems);
-        check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
-        check.within("axle", f64::from(self.axle), 1.0..=64.0, "");
-        let pulses = f64::from(self.pulses_per_turn);
-        check.within("pulses_per_turn", pulses, 1.0..=1e5, "pulses");
-        check.within("wheel_radius_m", self.wheel_radius_m, 0.2..=0.7, "m");
+settings! {
+    /// The odometer: pulses of one wheelset, turned into distance with the radius that the box was
+    /// told.
+    #[derive(Copy)]
+    pub struct OdometerSettings {
+        /// Samples a second.
+        rate_hz: f64 = 50.0, in 1.0..=1000.0;
+        /// The wheelset that it counts, from the head; 1 is the leading one.
+        axle: u32 = 1, in 1.0..=64.0;
+        /// Pulses a turn of the wheel.
+        pulses_per_turn: u32 = 128, in 1.0..=1e5;
+        /// Two channels, a quarter pulse apart, tell which way the wheel turns; with one channel
+        /// every pulse counts as forward.
+        two_channels: bool = true;
+        /// Radius that the box was told, metres.
+        wheel_radius_m: f64 = 0.43, in 0.2..=0.7;
         // A metro wheel has about 35 mm to lose.
-        check.within("worn_m", self.worn_m, 0.0..=0.05, "m");
-        check.within(
-            "radius_error_share",
-            self.radius_error_share,
-            0.0..=0.05,
-            "",
-        );
+        /// What the radius has lost since by wear, metres. The box then says too much.
+        worn_m: f64 = 0.0, in 0.0..=0.05;
+        /// One sigma of how well it was measured, as a share; the wear comes on top.
+        radius_error_share: f64 = 0.003, in 0.0..=0.05;
+        /// Its clock.
+        clock: ClockSettings = ClockSettings::default(), nested;
     }
 }
 

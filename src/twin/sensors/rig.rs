@@ -24,163 +24,131 @@
 //! of the lenses it misses of both alike. Both eyes share the jitter of the trigger, and one line
 //! time: it does not drift. Nothing changes with temperature or vibration.
 
-use super::camera::{Optics, ReadOut, check_jitter, most_jitter_s, mounted, positive};
+use super::camera::{Optics, ReadOut, SIDE_PX, check_jitter, most_jitter_s, mounted};
 use super::{ClockSettings, ExposureSettings};
 use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration};
-use crate::track::{Checker, LampSite, Problem, Tunnel};
+use crate::settings::{Checker, settings};
+use crate::track::{LampSite, Tunnel};
 use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
-/// The stereo rig on the train head: where it is mounted, what it sees, when.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RigSettings {
-    /// Focal length of the left eye, mm. Default 3.9 (1040 px).
-    pub focal_length_mm: f64,
-    /// Width and height of a pixel, um. Default 3.75.
-    pub pixel_um: f64,
-    /// Columns of either eye's image. Default 1280.
-    pub width_px: u32,
-    /// Rows of either eye's image. Default 720.
-    pub height_px: u32,
-    /// Left eye's principal point right of the picture's middle, px. Default 0.
-    pub principal_u_px: f64,
-    /// Left eye's principal point below the picture's middle, px. Default 0.
-    pub principal_v_px: f64,
-    /// Distortion of the left eye's lens, as OpenCV has it. Default: none.
-    pub distortion: DistortionCoefficients,
-    /// By how much the right eye differs from the left one. Default: not at all.
-    pub right: RightEye,
-    /// Distance between the eyes, mm; the right eye sits that far along the left eye's right hand
-    /// axis. Default 120.
-    pub baseline_mm: f64,
-    /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
-    /// Default 22.2.
-    pub line_time_us: f64,
-    /// Whether rows are read downwards or upwards, in both eyes. Default "down".
-    pub read_out: ReadOut,
-    /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in the shipped tunnels)
-    /// it blurs the stripes away. Default 30.
-    pub exposure_us: f64,
-    /// Pairs of images a second. Default 30.
-    pub pairs_per_s: f64,
-    /// By how much later than the left eye the right one is triggered, us; negative: earlier. Its
-    /// frames say so. Default 0.
-    pub trigger_offset_us: f64,
-    /// Standard deviation of a pair's true start about the one that its frames say, us, drawn anew
-    /// for each and the same for both eyes; held at four times that. Default 0.
-    pub frame_jitter_us: f64,
-    /// Left eye, m ahead of the train head (negative: behind the windscreen). Default -0.5.
-    pub forward_m: f64,
-    /// Left eye, m to the left of the centreline. Default 1.0.
-    pub lateral_m: f64,
-    /// Left eye, m above top of rail. Default 1.7.
-    pub height_m: f64,
-    /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
-    /// Default 39.
-    pub yaw_deg: f64,
-    /// Tilt of the optical axis, deg, up positive. Default 22.
-    pub pitch_deg: f64,
-    /// By how much the mount really differs from the calibration that the stack is given.
-    /// Default: not at all.
-    pub calibration_error: RigError,
-    /// The glass of either eye.
-    pub lens: LensSettings,
-    /// From photons to digital numbers.
-    pub sensor: SensorSettings,
-    /// Exposure and gain that follow the light. Default: fixed.
-    pub exposure_control: ExposureSettings,
-    /// Its clock.
-    pub clock: ClockSettings,
+settings! {
+    /// The stereo rig on the train head: where it is mounted, what it sees, when.
+    pub struct RigSettings {
+        /// Focal length of the left eye, mm. Default 3.9 (1040 px).
+        focal_length_mm: f64 = 3.9;
+        /// Width and height of a pixel, um.
+        pixel_um: f64 = 3.75;
+        /// Columns of either eye's image.
+        width_px: u32 = 1280, in SIDE_PX;
+        /// Rows of either eye's image.
+        height_px: u32 = 720, in SIDE_PX;
+        /// Left eye's principal point right of the picture's middle, px.
+        principal_u_px: f64 = 0.0;
+        /// Left eye's principal point below the picture's middle, px.
+        principal_v_px: f64 = 0.0;
+        /// Distortion of the left eye's lens, as OpenCV has it. Default: none.
+        distortion: DistortionCoefficients = DistortionCoefficients::default();
+        /// By how much the right eye differs from the left one. Default: not at all.
+        right: RightEye = RightEye::default(), nested;
+        /// Distance between the eyes, mm; the right eye sits that far along the left eye's right
+        /// hand axis.
+        baseline_mm: f64 = 120.0;
+        /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
+        line_time_us: f64 = 22.2;
+        /// Whether rows are read downwards or upwards, in both eyes.
+        read_out: ReadOut = ReadOut::Down;
+        /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in
+        /// the shipped tunnels) it blurs the stripes away.
+        exposure_us: f64 = 30.0;
+        /// Pairs of images a second.
+        pairs_per_s: f64 = 30.0;
+        /// By how much later than the left eye the right one is triggered, us; negative: earlier.
+        /// Its frames say so.
+        trigger_offset_us: f64 = 0.0, in MOST_OFFSET_US;
+        /// Standard deviation of a pair's true start about the one that its frames say, us, drawn
+        /// anew for each and the same for both eyes; held at four times that.
+        frame_jitter_us: f64 = 0.0;
+        /// Left eye, m ahead of the train head (negative: behind the windscreen).
+        forward_m: f64 = -0.5, in -5.0..=5.0;
+        /// Left eye, m to the left of the centreline.
+        lateral_m: f64 = 1.0, in -2.0..=2.0;
+        /// Left eye, m above top of rail.
+        height_m: f64 = 1.7;
+        /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
+        yaw_deg: f64 = 39.0, in -180.0..=180.0;
+        /// Tilt of the optical axis, deg, up positive.
+        pitch_deg: f64 = 22.0, in -89.0..=89.0;
+        /// By how much the mount really differs from the calibration that the stack is given.
+        /// Default: not at all.
+        calibration_error: RigError = RigError::default(), nested;
+        /// The glass of either eye.
+        lens: LensSettings = LensSettings::default(), nested;
+        /// From photons to digital numbers.
+        sensor: SensorSettings = SensorSettings::default(), nested;
+        /// Exposure and gain that follow the light. Default: fixed.
+        exposure_control: ExposureSettings = ExposureSettings::default(), nested;
+        /// Its clock.
+        clock: ClockSettings = ClockSettings::default(), nested;
+    }
+    also check_together
 }
 
-impl Default for RigSettings {
-    fn default() -> Self {
-        Self {
-            focal_length_mm: 3.9,
-            pixel_um: 3.75,
-            width_px: 1280,
-            height_px: 720,
-            principal_u_px: 0.0,
-            principal_v_px: 0.0,
-            distortion: DistortionCoefficients::default(),
-            right: RightEye::default(),
-            baseline_mm: 120.0,
-            line_time_us: 22.2,
-            read_out: ReadOut::Down,
-            exposure_us: 30.0,
-            pairs_per_s: 30.0,
-            trigger_offset_us: 0.0,
-            frame_jitter_us: 0.0,
-            forward_m: -0.5,
-            lateral_m: 1.0,
-            height_m: 1.7,
-            yaw_deg: 39.0,
-            pitch_deg: 22.0,
-            calibration_error: RigError::default(),
-            lens: LensSettings::default(),
-            sensor: SensorSettings::default(),
-            exposure_control: ExposureSettings::default(),
-            clock: ClockSettings::default(),
-        }
+settings! {
+    /// By how much the right eye differs from the left, as the calibration sheet has it: its value less
+    /// the left eye's.
+    #[derive(Copy)]
+    pub struct RightEye {
+        /// Focal length, mm.
+        focal_length_mm: f64 = 0.0;
+        /// Principal point, px to the right.
+        principal_u_px: f64 = 0.0;
+        /// Principal point, px down.
+        principal_v_px: f64 = 0.0;
+        /// Coefficients of distortion.
+        distortion: DistortionCoefficients = DistortionCoefficients::default();
+        /// Turn of its optical axis in the left eye's frame, deg, to the left: positive where the
+        /// eyes converge.
+        yaw_deg: f64 = 0.0, in -20.0..=20.0;
+        /// Tilt of its optical axis in the left eye's frame, deg, up positive.
+        pitch_deg: f64 = 0.0, in -20.0..=20.0;
+        /// Turn about its optical axis, deg, clockwise as it looks.
+        roll_deg: f64 = 0.0, in -20.0..=20.0;
     }
 }
 
-/// By how much the right eye differs from the left, as the calibration sheet has it: its value less
-/// the left eye's.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RightEye {
-    /// Focal length, mm. Default 0.
-    pub focal_length_mm: f64,
-    /// Principal point, px to the right. Default 0.
-    pub principal_u_px: f64,
-    /// Principal point, px down. Default 0.
-    pub principal_v_px: f64,
-    /// Coefficients of distortion. Default 0.
-    pub distortion: DistortionCoefficients,
-    /// Turn of its optical axis in the left eye's frame, deg, to the left: positive where the eyes
-    /// converge. Default 0.
-    pub yaw_deg: f64,
-    /// Tilt of its optical axis in the left eye's frame, deg, up positive. Default 0.
-    pub pitch_deg: f64,
-    /// Turn about its optical axis, deg, clockwise as it looks. Default 0.
-    pub roll_deg: f64,
-}
-
-/// What a calibration got wrong: the true value less the calibrated one.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct RigError {
-    /// Focal length, mm. Default 0.
-    pub focal_length_mm: f64,
-    /// Principal point of both eyes, px to the right. Default 0.
-    pub principal_u_px: f64,
-    /// Principal point of both eyes, px down. Default 0.
-    pub principal_v_px: f64,
-    /// Distortion of r^2 of both lenses. Default 0.
-    pub k1: f64,
-    /// Blur of both lenses, px (`lens.blur_px`); the sum is 0 to 50. Default 0.
-    pub blur_px: f64,
-    /// Line time, us. Default 0.
-    pub line_time_us: f64,
-    /// How much later the right eye is triggered than its frames say, us. Default 0.
-    pub trigger_offset_us: f64,
-    /// Baseline, mm. Default 0.
-    pub baseline_mm: f64,
-    /// Yaw, deg. Default 0.
-    pub yaw_deg: f64,
-    /// Pitch, deg. Default 0.
-    pub pitch_deg: f64,
-    /// Yaw of the right eye against the left, deg, positive where the eyes converge more than the
-    /// sheet has it. Default 0.
-    pub vergence_deg: f64,
-    /// Pitch of the right eye against the left, deg, up positive. Default 0.
-    pub right_pitch_deg: f64,
-    /// Roll of the right eye against the left, deg, clockwise as it looks. Default 0.
-    pub right_roll_deg: f64,
+settings! {
+    /// What a calibration got wrong: the true value less the calibrated one.
+    #[derive(Copy)]
+    pub struct RigError {
+        /// Focal length, mm.
+        focal_length_mm: f64 = 0.0;
+        /// Principal point of both eyes, px to the right.
+        principal_u_px: f64 = 0.0, in -100.0..=100.0;
+        /// Principal point of both eyes, px down.
+        principal_v_px: f64 = 0.0, in -100.0..=100.0;
+        /// Distortion of r^2 of both lenses.
+        k1: f64 = 0.0, in -1.0..=1.0;
+        /// Blur of both lenses, px (`lens.blur_px`); the sum is 0 to 50.
+        blur_px: f64 = 0.0;
+        /// Line time, us.
+        line_time_us: f64 = 0.0;
+        /// How much later the right eye is triggered than its frames say, us.
+        trigger_offset_us: f64 = 0.0, in MOST_OFFSET_US;
+        /// Baseline, mm.
+        baseline_mm: f64 = 0.0;
+        /// Yaw, deg.
+        yaw_deg: f64 = 0.0, in -45.0..=45.0;
+        /// Pitch, deg.
+        pitch_deg: f64 = 0.0, in -45.0..=45.0;
+        /// Yaw of the right eye against the left, deg, positive where the eyes converge more than
+        /// the sheet has it.
+        vergence_deg: f64 = 0.0, in -5.0..=5.0;
+        /// Pitch of the right eye against the left, deg, up positive.
+        right_pitch_deg: f64 = 0.0, in -5.0..=5.0;
+        /// Roll of the right eye against the left, deg, clockwise as it looks.
+        right_roll_deg: f64 = 0.0, in -5.0..=5.0;
+    }
 }
 
 impl RigSettings {
@@ -267,77 +235,52 @@ impl RigSettings {
         )
     }
 
-    /// Appends what is wrong.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.optics().check(at, problems);
-        self.clock.check(&format!("{at}.clock"), problems);
+    fn check_together(&self, check: &mut Checker<'_>) {
+        self.optics().check(check);
         self.right
-            .check(&format!("{at}.right"), &self.optics(), problems);
-        self.lens.check(&format!("{at}.lens"), problems);
-        let control = format!("{at}.exposure_control");
-        (self.optics()).check_control(&self.exposure_control, &control, problems);
-        self.sensor.check(&format!("{at}.sensor"), problems);
-        positive(problems, at, "baseline_mm", self.baseline_mm, "mm", 120.0);
-        positive(problems, at, "height_m", self.height_m, "m", 1.7);
-        check_jitter(at, self.frame_jitter_us, self.pairs_per_s, problems);
-        let mut check = Checker::new(at, problems);
-        let offset_us = self.trigger_offset_us;
-        check.within("trigger_offset_us", offset_us, MOST_OFFSET_US, "us");
-        check.within("forward_m", self.forward_m, -5.0..=5.0, "m");
-        check.within("lateral_m", self.lateral_m, -2.0..=2.0, "m");
-        check.within("yaw_deg", self.yaw_deg, -180.0..=180.0, "deg");
-        check.within("pitch_deg", self.pitch_deg, -89.0..=89.0, "deg");
-        self.check_errors(&format!("{at}.calibration_error"), problems);
+            .check_eye(&self.optics(), &mut check.below("right"));
+        self.optics().check_control(&self.exposure_control, check);
+        check.positive("baseline_mm", self.baseline_mm, 120.0);
+        check.positive("height_m", self.height_m, 1.7);
+        check_jitter(self.frame_jitter_us, self.pairs_per_s, check);
+        self.check_errors(&mut check.below("calibration_error"));
+        self.check_built(check);
     }
 
-    fn check_errors(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_errors(&self, check: &mut Checker<'_>) {
         let error = self.calibration_error;
-        let mut check = Checker::new(at, problems);
-        let mut within = |key: &str, value: f64, unit: &str, most: f64| {
-            check.within(key, value, -most..=most, unit);
-        };
-        let half_focal = 0.5 * self.focal_length_mm.abs();
-        let half_line = 0.5 * self.line_time_us.abs();
-        let half_baseline = 0.5 * self.baseline_mm.abs();
-        within("focal_length_mm", error.focal_length_mm, "mm", half_focal);
-        within("principal_u_px", error.principal_u_px, "px", 100.0);
-        within("principal_v_px", error.principal_v_px, "px", 100.0);
-        within("k1", error.k1, "", 1.0);
-        within("line_time_us", error.line_time_us, "us", half_line);
-        let most_us = *MOST_OFFSET_US.end();
-        within("trigger_offset_us", error.trigger_offset_us, "us", most_us);
-        within("baseline_mm", error.baseline_mm, "mm", half_baseline);
-        within("yaw_deg", error.yaw_deg, "deg", 45.0);
-        within("pitch_deg", error.pitch_deg, "deg", 45.0);
-        within("vergence_deg", error.vergence_deg, "deg", 5.0);
-        within("right_pitch_deg", error.right_pitch_deg, "deg", 5.0);
-        within("right_roll_deg", error.right_roll_deg, "deg", 5.0);
-        self.check_blur(at, problems);
-        self.check_built(at, problems);
-    }
-
-    /// The lens with its error must blur as a lens can.
-    fn check_blur(&self, at: &str, problems: &mut Vec<Problem>) {
-        let (sheet_px, error_px) = (self.lens.blur_px, self.calibration_error.blur_px);
-        let (least_px, most_px) = BLUR_PX.into_inner();
+        for (key, error, calibrated) in [
+            (
+                "focal_length_mm",
+                error.focal_length_mm,
+                self.focal_length_mm,
+            ),
+            ("line_time_us", error.line_time_us, self.line_time_us),
+            ("baseline_mm", error.baseline_mm, self.baseline_mm),
+        ] {
+            let half = 0.5 * calibrated.abs();
+            check.within(key, error, -half..=half);
+        }
+        // The lens with its error must blur as a lens can.
+        let (sheet_px, (least_px, most_px)) = (self.lens.blur_px, BLUR_PX.into_inner());
         if BLUR_PX.contains(&sheet_px) {
-            let range_px = least_px - sheet_px..=most_px - sheet_px;
-            Checker::new(at, problems).within("blur_px", error_px, range_px, "px");
+            check.within(
+                "blur_px",
+                error.blur_px,
+                least_px - sheet_px..=most_px - sheet_px,
+            );
         }
     }
 
     /// Both eyes as they really are. What holds for both is said once.
-    fn check_built(&self, at: &str, problems: &mut Vec<Problem>) {
+    fn check_built(&self, check: &mut Checker<'_>) {
         let built = self.as_built();
         let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
-        let found = problems.len();
         for (actual, sheet) in [
             (built.optics(), self.optics()),
             (built.right_optics(), self.right_optics()),
         ] {
-            if problems.len() == found {
-                longest(actual).check_actual(&longest(sheet), at, problems);
-            }
+            longest(actual).check_actual(&longest(sheet), check);
         }
     }
 
@@ -387,23 +330,10 @@ impl RightEye {
         }
     }
 
-    fn check(&self, at: &str, left: &Optics, problems: &mut Vec<Problem>) {
-        let half_focal = 0.5 * left.focal_length_mm.abs();
-        let mut check = Checker::new(at, problems);
-        check.within(
-            "focal_length_mm",
-            self.focal_length_mm,
-            -half_focal..=half_focal,
-            "mm",
-        );
-        for (key, value) in [
-            ("yaw_deg", self.yaw_deg),
-            ("pitch_deg", self.pitch_deg),
-            ("roll_deg", self.roll_deg),
-        ] {
-            check.within(key, value, -20.0..=20.0, "deg");
-        }
-        self.optics(left).check_lens(at, problems);
+    fn check_eye(&self, left: &Optics, check: &mut Checker<'_>) {
+        let half_mm = 0.5 * left.focal_length_mm.abs();
+        check.within("focal_length_mm", self.focal_length_mm, -half_mm..=half_mm);
+        self.optics(left).check_lens(check);
     }
 }
 
@@ -484,6 +414,7 @@ fn sees(
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
+    use crate::settings::{Problem, Settings};
 
     fn bench() -> Tunnel {
         Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml")).unwrap()

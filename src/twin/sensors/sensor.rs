@@ -2,12 +2,10 @@
 
 use super::Exposed;
 use crate::bus::{Content, Frame, SimTime, Ticker};
-use crate::track::{Checker, Problem};
+use crate::settings::settings;
 use crate::twin::physics::World;
 use crate::twin::render::View;
 use image::GrayImage;
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 /// A sensor at its mount on a train or a wayside post.
 pub trait Sensor {
@@ -92,24 +90,18 @@ pub enum SensorError {
     Images(usize, usize),
 }
 
-/// How far a sensor's clock is off.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ClockSettings {
-    /// By how much it is fast at the start, ms. Default 0.
-    pub offset_ms: f64,
-    /// By how much it gains, millionths. A quartz without compensation has 20 to 50. Default 0.
-    pub drift_ppm: f64,
+settings! {
+    /// How far a sensor's clock is off.
+    #[derive(Copy)]
+    pub struct ClockSettings {
+        /// By how much it is fast at the start, ms.
+        offset_ms: f64 = 0.0, in -100.0..=100.0;
+        /// By how much it gains, millionths. A quartz without compensation has 20 to 50.
+        drift_ppm: f64 = 0.0, in -1000.0..=1000.0;
+    }
 }
 
 impl ClockSettings {
-    /// Appends what is wrong, with keys below `at`.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        let mut check = Checker::new(at, problems);
-        check.within("offset_ms", self.offset_ms, -100.0..=100.0, "ms");
-        check.within("drift_ppm", self.drift_ppm, -1000.0..=1000.0, "ppm");
-    }
-
     /// What the clock shows at a time.
     pub fn local(&self, time: SimTime) -> SimTime {
         if self.is_exact() {

@@ -2,7 +2,7 @@
 
 use super::Cut;
 use crate::scenario::draw::Distribution;
-use crate::track::Problem;
+use crate::settings::{Problem, Settings};
 
 /// A truncated distribution must leave this much of the whole.
 const LEAST_SHARE: f64 = 1e-12;
@@ -12,14 +12,15 @@ const MOST_STEPS: u32 = 100_000;
 /// What is wrong, and what to do about it.
 type Flaw = (String, &'static str);
 
-impl Distribution {
-    /// Appends what is wrong.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+impl Settings for Distribution {
+    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
         if let Some((what, remedy)) = self.flaw() {
             problems.push(Problem::new(at, what, remedy));
         }
     }
+}
 
+impl Distribution {
     fn flaw(&self) -> Option<Flaw> {
         match self {
             Self::Uniform { min, max } => order(*min, *max),

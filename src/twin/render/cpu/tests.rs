@@ -2,7 +2,8 @@
 use super::*;
 use crate::bus::Intrinsics;
 use crate::bus::{Shutter, SimTime};
-use crate::track::uid::{ChipFrame, Ripple, Uid, Waveform};
+use crate::track::uid::{ChipFrame, Uid};
+use crate::track::waveform::{Ripple, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
 };

@@ -21,13 +21,11 @@
 
 use super::ClockSettings;
 use crate::bus::{ImuSample, TrainId};
-use crate::track::{Checker, Problem};
+use crate::settings::settings;
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
 use errors::{Errors, Triad, normals};
 use nalgebra::{Matrix3, UnitQuaternion, Vector3};
-use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
 
 mod errors;
 
@@ -43,81 +41,57 @@ const G_MPS2: f64 = 9.806_65;
 const GYRO_LSB_DEG_S: f64 = 0.02 / 65536.0;
 const ACCEL_LSB_MG: f64 = 0.8 / 65536.0;
 
-/// The inertial unit. Defaults are typical values of the ADIS16488's data sheet; sigmas are one
-/// sigma, each axis or unit drawn for itself.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct ImuSettings {
-    /// Samples a second.
-    pub rate_hz: f64,
-    /// Where it is in the vehicle frame (forward, left, up from the head at top of rail), metres.
-    pub position_m: [f64; 3],
-    /// Sigma of its true place about that, each way, metres.
-    pub position_error_m: f64,
-    /// Sigma of its true attitude about the vehicle's, about each axis: what is left of
-    /// the part's misalignment (1 deg, axis to frame) after commissioning, degrees.
-    pub attitude_error_deg: f64,
-    /// Sigma of the gyroscopes' bias at turn-on, degrees a second.
-    pub gyro_turn_on_deg_s: f64,
-    /// How long the gyroscopes were averaged at standstill before the run to take their bias out,
-    /// seconds; 0 for not at all.
-    pub gyro_null_s: f64,
-    /// In-run bias stability of the gyroscopes: the floor of their Allan deviation, degrees an
-    /// hour.
-    pub gyro_bias_deg_h: f64,
-    /// Angle random walk, degrees a square root of an hour.
-    pub angle_random_walk_deg_sqrt_h: f64,
-    /// Sigma of the gyroscopes' scale, as a share.
-    pub gyro_scale_share: f64,
-    /// Sigma of the lean of one gyroscope's axis towards another's, degrees.
-    pub gyro_skew_deg: f64,
-    /// Sigma of the bias that an acceleration along any axis makes, degrees a second a g.
-    pub gyro_per_g_deg_s: f64,
-    /// Range of the gyroscopes, degrees a second.
-    pub gyro_range_deg_s: f64,
-    /// Sigma of the accelerometers' bias at turn-on, thousandths of g.
-    pub accel_turn_on_mg: f64,
-    /// In-run bias stability of the accelerometers: the floor of their Allan deviation,
-    /// thousandths of g.
-    pub accel_bias_mg: f64,
-    /// Velocity random walk, m/s a square root of an hour.
-    pub velocity_random_walk_mps_sqrt_h: f64,
-    /// Sigma of the accelerometers' scale, as a share.
-    pub accel_scale_share: f64,
-    /// Sigma of the lean of one accelerometer's axis towards another's, degrees.
-    pub accel_skew_deg: f64,
-    /// Range of the accelerometers, g.
-    pub accel_range_g: f64,
-    /// Round to the steps of the sensor's 32-bit outputs.
-    pub quantise: bool,
-    /// Its clock.
-    pub clock: ClockSettings,
-}
-
-impl Default for ImuSettings {
-    fn default() -> Self {
-        Self {
-            rate_hz: 200.0,
-            position_m: [-1.0, 0.0, 1.2],
-            position_error_m: 0.01,
-            attitude_error_deg: 0.1,
-            gyro_turn_on_deg_s: 0.2,
-            gyro_null_s: 30.0,
-            gyro_bias_deg_h: 6.25,
-            angle_random_walk_deg_sqrt_h: 0.3,
-            gyro_scale_share: 0.01 / 3.0,
-            gyro_skew_deg: 0.05,
-            gyro_per_g_deg_s: 0.009,
-            gyro_range_deg_s: 450.0,
-            accel_turn_on_mg: 16.0,
-            accel_bias_mg: 0.1,
-            velocity_random_walk_mps_sqrt_h: 0.029,
-            accel_scale_share: 0.005 / 3.0,
-            accel_skew_deg: 0.035,
-            accel_range_g: 18.0,
-            quantise: true,
-            clock: ClockSettings::default(),
-        }
+settings! {
+    /// The inertial unit. Defaults are typical values of the ADIS16488's data sheet; sigmas are one
+    /// sigma, each axis or unit drawn for itself.
+    #[derive(Copy)]
+    pub struct ImuSettings {
+        // The data sheet's fastest is 2460 a second; the physics steps a thousand times.
+        /// Samples a second.
+        rate_hz: f64 = 200.0, in 1.0..=1000.0;
+        /// Where it is in the vehicle frame (forward, left, up from the head at top of rail),
+        /// metres.
+        position_m: [f64; 3] = [-1.0, 0.0, 1.2], in -30.0..=10.0;
+        /// Sigma of its true place about that, each way, metres.
+        position_error_m: f64 = 0.01, in 0.0..=1.0;
+        /// Sigma of its true attitude about the vehicle's, about each axis: what is left of
+        /// the part's misalignment (1 deg, axis to frame) after commissioning, degrees.
+        attitude_error_deg: f64 = 0.1, in 0.0..=10.0;
+        /// Sigma of the gyroscopes' bias at turn-on, degrees a second.
+        gyro_turn_on_deg_s: f64 = 0.2, in 0.0..=1e3;
+        /// How long the gyroscopes were averaged at standstill before the run to take their bias
+        /// out, seconds; 0 for not at all.
+        gyro_null_s: f64 = 30.0, in 0.0..=600.0;
+        /// In-run bias stability of the gyroscopes: the floor of their Allan deviation, degrees an
+        /// hour.
+        gyro_bias_deg_h: f64 = 6.25, in 0.0..=1e5;
+        /// Angle random walk, degrees a square root of an hour.
+        angle_random_walk_deg_sqrt_h: f64 = 0.3, in 0.0..=1e3;
+        /// Sigma of the gyroscopes' scale, as a share.
+        gyro_scale_share: f64 = 0.01 / 3.0, in 0.0..=0.2;
+        /// Sigma of the lean of one gyroscope's axis towards another's, degrees.
+        gyro_skew_deg: f64 = 0.05, in 0.0..=10.0;
+        /// Sigma of the bias that an acceleration along any axis makes, degrees a second a g.
+        gyro_per_g_deg_s: f64 = 0.009, in 0.0..=10.0;
+        /// Range of the gyroscopes, degrees a second.
+        gyro_range_deg_s: f64 = 450.0, in 1.0..=1e5;
+        /// Sigma of the accelerometers' bias at turn-on, thousandths of g.
+        accel_turn_on_mg: f64 = 16.0, in 0.0..=1e4;
+        /// In-run bias stability of the accelerometers: the floor of their Allan deviation,
+        /// thousandths of g.
+        accel_bias_mg: f64 = 0.1, in 0.0..=1e4;
+        /// Velocity random walk, m/s a square root of an hour.
+        velocity_random_walk_mps_sqrt_h: f64 = 0.029, in 0.0..=1e3;
+        /// Sigma of the accelerometers' scale, as a share.
+        accel_scale_share: f64 = 0.005 / 3.0, in 0.0..=0.2;
+        /// Sigma of the lean of one accelerometer's axis towards another's, degrees.
+        accel_skew_deg: f64 = 0.035, in 0.0..=10.0;
+        /// Range of the accelerometers, g.
+        accel_range_g: f64 = 18.0, in 1.5..=1e4;
+        /// Round to the steps of the sensor's 32-bit outputs.
+        quantise: bool = true;
+        /// Its clock.
+        clock: ClockSettings = ClockSettings::default(), nested;
     }
 }
 
@@ -142,42 +116,6 @@ impl ImuSettings {
             quantise: false,
             ..Self::default()
         }
-    }
-
-    /// Appends what is wrong with these settings; `at` is the dotted key that leads here.
-    pub fn check(&self, at: &str, problems: &mut Vec<Problem>) {
-        self.clock.check(&format!("{at}.clock"), problems);
-        let mut check = Checker::new(at, problems);
-        // The data sheet's fastest is 2460 a second; the physics steps a thousand times.
-        check.within("rate_hz", self.rate_hz, 1.0..=1000.0, "Hz");
-        for p in self.position_m {
-            check.within("position_m", p, -30.0..=10.0, "m");
-        }
-        let (arw, vrw) = (
-            self.angle_random_walk_deg_sqrt_h,
-            self.velocity_random_walk_mps_sqrt_h,
-        );
-        for (key, value, most, unit) in [
-            ("position_error_m", self.position_error_m, 1.0, "m"),
-            ("attitude_error_deg", self.attitude_error_deg, 10.0, "deg"),
-            ("gyro_turn_on_deg_s", self.gyro_turn_on_deg_s, 1e3, "deg/s"),
-            ("gyro_null_s", self.gyro_null_s, 600.0, "s"),
-            ("gyro_bias_deg_h", self.gyro_bias_deg_h, 1e5, "deg/h"),
-            ("angle_random_walk_deg_sqrt_h", arw, 1e3, "deg/sqrt(h)"),
-            ("gyro_scale_share", self.gyro_scale_share, 0.2, ""),
-            ("gyro_skew_deg", self.gyro_skew_deg, 10.0, "deg"),
-            ("gyro_per_g_deg_s", self.gyro_per_g_deg_s, 10.0, "deg/s"),
-            ("accel_turn_on_mg", self.accel_turn_on_mg, 1e4, "mg"),
-            ("accel_bias_mg", self.accel_bias_mg, 1e4, "mg"),
-            ("velocity_random_walk_mps_sqrt_h", vrw, 1e3, "m/s/sqrt(h)"),
-            ("accel_scale_share", self.accel_scale_share, 0.2, ""),
-            ("accel_skew_deg", self.accel_skew_deg, 10.0, "deg"),
-        ] {
-            check.within(key, value, 0.0..=most, unit);
-        }
-        let turn = self.gyro_range_deg_s;
-        check.within("gyro_range_deg_s", turn, 1.0..=1e5, "deg/s");
-        check.within("accel_range_g", self.accel_range_g, 1.5..=1e4, "g");
     }
 
     fn gyro(&self) -> Errors {

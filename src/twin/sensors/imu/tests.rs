@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::bus::SimTime;
+use crate::settings::Settings;
 use nalgebra::{Isometry3, Translation3};
 
 /// A body that turns about the world's z with rate w + a t, its origin on a straight way.

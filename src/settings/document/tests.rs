@@ -1,0 +1,133 @@
+use super::*;
+use serde::Deserialize;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Root {
+    name: String,
+    #[serde(default)]
+    lamps: Lamps,
+    #[serde(default)]
+    obstacles: Vec<Obstacle>,
+    #[serde(default)]
+    renderer: Renderer,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+struct Lamps {
+    spacing_m: f64,
+    chip_us: f64,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Obstacle {
+    mass_kg: f64,
+    #[serde(default)]
+    shape: Option<Shape>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
+enum Shape {
+    Sphere { radius_m: f64 },
+    Box { size_m: [f64; 3] },
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum Renderer {
+    #[default]
+    Auto,
+    Cpu,
+}
+
+fn problems(text: &str) -> Vec<Problem> {
+    match read_toml::<Root>(text) {
+        Err(FileError::Problems(problems)) => problems,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Provokes: stopping at the first fault, a wrong path, a suggestion that does not help.
+#[test]
+fn all_faults_are_told_in_one_go() {
+    let text = r#"
+        name = "x"
+        colour = 3
+        renderer = "cpuu"
+
+        [lamps]
+        spacing_mm = 10.0
+        chip_us = "45"
+
+        [[obstacles]]
+        mass_kg = 1.0
+
+        [[obstacles]]
+        mass_g = 1.0
+        mass_kg = 2.0
+        shape = { kind = "sphere", radius_m = 1.0, radios_m = 1.0 }
+    "#;
+    let found = problems(text);
+    let told = |key: &str, part: &str| {
+        assert!(
+            found
+                .iter()
+                .any(|p| p.key == key && p.to_string().contains(part)),
+            "{key}, {part}: {found:#?}"
+        );
+    };
+    told("colour", "keys that may stand here: name");
+    told("renderer", "did you mean `cpu`?");
+    told("lamps.spacing_mm", "did you mean `spacing_m`?");
+    told("lamps.chip_us", "give a number");
+    told("obstacles[1].mass_g", "did you mean `mass_kg`?");
+    told("obstacles[1].shape.radios_m", "did you mean `radius_m`?");
+    assert_eq!(found.len(), 6, "{found:#?}");
+}
+
+/// Provokes: a missing key told without its path, or told again because its wrong value was
+/// taken out.
+#[test]
+fn missing_keys_have_their_path() {
+    let found = problems("name = 'x'\n[[obstacles]]\nmass_kg = 1\n[[obstacles]]\n");
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].key, "obstacles[1].mass_kg");
+    let found = problems("name = 3\n");
+    assert_eq!(found.len(), 1, "{found:?}");
+    assert_eq!(found[0].key, "name");
+    assert_eq!(problems("")[0].key, "name");
+}
+
+#[test]
+fn broken_text_is_told_with_its_place() {
+    match read_toml::<Root>("name = 'x'\nlamps = [1,\n") {
+        Err(FileError::Syntax { span, .. }) => assert!(span.unwrap().start >= 19),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Provokes: spans of the wrong entry of an array, or of nothing where a key is missing.
+#[test]
+fn keys_are_found_in_the_text() {
+    let text = "name = 'x'\n[lamps]\nspacing_m = 10.0\n[[obstacles]]\nmass_kg = 1.5\n[[obstacles]]\nmass_kg = 2.5\n";
+    let at = |key: &str| &text[locate(text, key).unwrap()];
+    assert_eq!(at("lamps.spacing_m"), "10.0");
+    assert_eq!(at("obstacles[1].mass_kg"), "2.5");
+    assert_eq!(at("lamps.chip_us"), "lamps");
+    assert!(at("obstacles[0].shape").starts_with("[[obstacles]]"));
+    assert_eq!(at("lamps (lamp 7)"), at("nothing"));
+    assert!(locate("a = [", "a").is_none());
+}
+
+#[test]
+fn suggestions_are_near_or_none() {
+    let known = ["spacing_m", "height_m", "power_w"].map(str::to_owned);
+    assert_eq!(did_you_mean("spacing_mm", &known), Some("spacing_m"));
+    assert_eq!(did_you_mean("spacing", &known), Some("spacing_m"));
+    assert_eq!(did_you_mean("power_kw", &known), Some("power_w"));
+    assert_eq!(did_you_mean("hieght_m", &known), Some("height_m"));
+    assert_eq!(did_you_mean("colour", &known), None);
+}

@@ -1,0 +1,152 @@
+//! What is wrong with a file, in terms of its own keys.
+
+use super::unit::of_key;
+use super::{Numbers, Settings};
+use std::fmt;
+use std::ops::{Range, RangeInclusive};
+use std::path::PathBuf;
+
+/// One wrong value: where, what, and what would be right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Problem {
+    /// Dotted path of the key, as in the file: `lamps.spacing_m`, `obstacles[2].mass_kg`.
+    /// [`locate`](super::locate) finds it in the text.
+    pub key: String,
+    /// What is wrong, with the numbers and their units.
+    pub what: String,
+    /// What would be right.
+    pub remedy: String,
+}
+
+impl Problem {
+    /// A problem at `key`.
+    pub fn new(key: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self {
+            key: key.into(),
+            what: what.into(),
+            remedy: remedy.into(),
+        }
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}; {}", self.key, self.what, self.remedy)
+    }
+}
+
+/// Dotted key of `key` below `at`, which is empty for the whole file.
+pub fn key_below(at: &str, key: &str) -> String {
+    if at.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{at}.{key}")
+    }
+}
+
+/// Checks one part of a file.
+///
+/// ```
+/// use metrotwin::settings::Checker;
+///
+/// let mut problems = Vec::new();
+/// let mut check = Checker::new("train", &mut problems);
+/// check.within("start_s", -1.0, 0.0..=60.0);
+/// assert_eq!(problems[0].to_string(), "train.start_s: -1 s is out of range; give 0 to 60 s");
+/// ```
+#[derive(Debug)]
+pub struct Checker<'a> {
+    at: String,
+    problems: &'a mut Vec<Problem>,
+}
+
+impl<'a> Checker<'a> {
+    /// Of what stands under the dotted key `at`; adds to `problems`.
+    pub fn new(at: &str, problems: &'a mut Vec<Problem>) -> Self {
+        Self {
+            at: at.to_owned(),
+            problems,
+        }
+    }
+
+    /// Dotted key of one of its keys.
+    pub fn key(&self, key: &str) -> String {
+        key_below(&self.at, key)
+    }
+
+    /// Adds a problem, unless the key has one: the first is to be solved before others can be told
+    /// from what follows of it.
+    pub fn problem(&mut self, key: &str, what: impl Into<String>, remedy: impl Into<String>) {
+        let key = self.key(key);
+        if self.problems.iter().all(|p| p.key != key) {
+            self.problems.push(Problem::new(key, what, remedy));
+        }
+    }
+
+    /// Adds a problem unless all numbers under a key lie in a range (one that is no number never
+    /// does).
+    pub fn within(&mut self, key: &str, numbers: impl Numbers, range: RangeInclusive<f64>) {
+        let Some(value) = numbers.first_outside(&range) else {
+            return;
+        };
+        let (low, high) = range.into_inner();
+        let unit = of_key(key);
+        let space = if unit.is_empty() { "" } else { " " };
+        self.problem(
+            key,
+            format!("{value}{space}{unit} is out of range"),
+            format!("give {low} to {high}{space}{unit}"),
+        );
+    }
+
+    /// Adds a problem unless a number is greater than 0; `usual` is one that is.
+    pub fn positive(&mut self, key: &str, value: f64, usual: f64) {
+        if !(value.is_finite() && value > 0.0) {
+            let unit = of_key(key);
+            self.problem(
+                key,
+                format!("{value} {unit} is not greater than 0"),
+                format!("give a positive number of {unit}, usually {usual}"),
+            );
+        }
+    }
+
+    /// Of what stands below one of its keys.
+    pub fn below(&mut self, key: &str) -> Checker<'_> {
+        Checker::new(&self.key(key), self.problems)
+    }
+
+    /// Adds what is wrong with the settings under a key.
+    pub fn nested(&mut self, key: &str, settings: &impl Settings) {
+        settings.check(&self.key(key), self.problems);
+    }
+}
+
+/// Why a tunnel or scenario file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum FileError {
+    /// It cannot be read at all.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        source: std::io::Error,
+    },
+    /// It is not TOML.
+    #[error("not TOML: {message}")]
+    Syntax {
+        /// What the parser says.
+        message: String,
+        /// Where, in bytes.
+        span: Option<Range<usize>>,
+    },
+    /// Its values are wrong: all of them, in the order found.
+    #[error("{}", lines(.0))]
+    Problems(Vec<Problem>),
+}
+
+fn lines(problems: &[Problem]) -> String {
+    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
+    lines.join("\n")
+}

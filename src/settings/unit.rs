@@ -1,0 +1,77 @@
+//! Units, which the names of keys end with.
+
+/// Endings of keys, and the unit as messages have it.
+const UNITS: [(&str, &str); 44] = [
+    ("_c", "deg C"),
+    ("_cd", "cd"),
+    ("_db", "dB"),
+    ("_deg", "deg"),
+    ("_deg_h", "deg/h"),
+    ("_deg_s", "deg/s"),
+    ("_deg_sqrt_h", "deg/sqrt(h)"),
+    ("_e", "e"),
+    ("_e_per_s", "e/s"),
+    ("_g", "g"),
+    ("_ghz", "GHz"),
+    ("_hz", "Hz"),
+    ("_kg", "kg"),
+    ("_kg_m2", "kg m^2"),
+    ("_kg_per_m", "kg/m"),
+    ("_kmh", "km/h"),
+    ("_kn_s_m", "kN s/m"),
+    ("_lm_per_w", "lm/W"),
+    ("_lx", "lx"),
+    ("_m", "m"),
+    ("_mg", "mg"),
+    ("_mm", "mm"),
+    ("_mn_m", "MN/m"),
+    ("_mn_m_rad", "MN m/rad"),
+    ("_mps", "m/s"),
+    ("_mps2", "m/s^2"),
+    ("_mps3", "m/s^3"),
+    ("_mps_sqrt_h", "m/s/sqrt(h)"),
+    ("_ms", "ms"),
+    ("_n", "N"),
+    ("_per_m", "1/m"),
+    ("_per_s", "1/s"),
+    ("_permille", "permille"),
+    ("_px", "px"),
+    ("_rad_s", "rad/s"),
+    ("_rows", "rows"),
+    ("_s", "s"),
+    ("_um", "um"),
+    ("_us", "us"),
+    ("_w", "W"),
+    ("cars", "cars"),
+    ("runs", "runs"),
+    ("points", "points"),
+    ("trains", "trains"),
+];
+
+/// The unit of a key; empty for a number without one.
+pub(super) fn of_key(key: &str) -> &'static str {
+    let fitting = UNITS.iter().filter(|(ending, _)| key.ends_with(ending));
+    let longest = fitting.max_by_key(|(ending, _)| ending.len());
+    longest.map_or("", |(_, unit)| unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fails where a shorter ending wins over a longer one, or a plain word is taken for a unit.
+    #[test]
+    fn the_longest_ending_counts() {
+        for (key, unit) in [
+            ("spacing_m", "m"),
+            ("secondary.stiffness_mn_m", "MN/m"),
+            ("angle_random_walk_deg_sqrt_h", "deg/sqrt(h)"),
+            ("dark_current_e_per_s", "e/s"),
+            ("pairs_per_s", "1/s"),
+            ("blooming", ""),
+            ("gate_share", ""),
+        ] {
+            assert_eq!(of_key(key), unit, "{key}");
+        }
+    }
+}
