@@ -121,6 +121,13 @@ pub enum Content {
     Protection(ProtectionReport),
     /// What the train is to do.
     Command(TrainCommand),
+    /// Values of a sensor or an equipment of the user's own, by name.
+    Values {
+        /// What they are, with the unit.
+        name: String,
+        /// The values.
+        values: Vec<f64>,
+    },
 }
 
 impl Message {

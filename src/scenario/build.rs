@@ -272,9 +272,17 @@ impl Scenario {
         self.first()?.rig.as_ref()
     }
 
-    /// The map of the line that the stack is given.
+    /// The map of the line that the stack is given: its lamps as surveyed, and the wayside devices that
+    /// are in use.
     pub fn map(&self) -> Arc<Tunnel> {
-        Arc::new(self.survey.map(&self.tunnel, self.seed))
+        let mut map = self.survey.map(&self.tunnel, self.seed);
+        let in_use = |name: &str| {
+            self.wayside
+                .iter()
+                .any(|post| post.calibration.name == name)
+        };
+        map.wayside.retain(|site| in_use(&site.name));
+        Arc::new(map)
     }
 
     fn put_together(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {

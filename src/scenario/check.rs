@@ -5,7 +5,8 @@ use super::file::{ScenarioFile, WaysidePostSettings};
 use crate::settings::{Checker, did_you_mean};
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::TrainSettings;
-use crate::twin::sensors::{RigSettings, ever_sees};
+use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
+use std::borrow::Cow;
 
 impl ScenarioFile {
     /// What needs no tunnel.
@@ -56,8 +57,16 @@ pub(super) fn in_tunnel(
     check_obstacles(file, tunnel, check);
     check_cables(file, tunnel, check);
     check_workers(file, tunnel, check);
-    if let Some(rig) = &file.rig {
-        check_view(rig, tunnel, check);
+    let directions: Vec<Direction> = file.trains().map(|train| train.direction).collect();
+    let others = file.onboard.iter().enumerate();
+    let others = others.filter_map(|(k, onboard)| {
+        let rig = onboard.rig.as_ref()?;
+        Some((format!("onboard[{k}].rig"), usize::from(onboard.train), rig))
+    });
+    let first = file.rig.iter().map(|rig| ("rig".to_owned(), 0, rig));
+    for (at, train, rig) in first.chain(others) {
+        let direction = directions.get(train).copied().unwrap_or_default();
+        check_view(&at, rig, direction, tunnel, check);
     }
     let posts = file.wayside.iter().enumerate();
     posts
@@ -436,31 +445,63 @@ fn in_the_open(
     open
 }
 
-fn check_view(rig: &RigSettings, tunnel: &Tunnel, check: &mut Checker<'_>) {
+/// A rig must see lamps on the way that its train runs.
+fn check_view(
+    at: &str,
+    rig: &RigSettings,
+    direction: Direction,
+    tunnel: &Tunnel,
+    check: &mut Checker<'_>,
+) {
     if tunnel.lamps.is_empty() {
         check.problem(
-            "rig",
+            at,
             format!("tunnel `{}` has no lamps to see", tunnel.name),
             "choose a tunnel with lamps, or take out [rig]",
         );
         return;
     }
-    let calibration = rig.calibration();
-    if !tunnel
-        .lamps
-        .iter()
-        .any(|lamp| ever_sees(&calibration, tunnel, lamp))
-    {
-        check.problem(
-            "rig.yaw_deg",
-            format!(
-                "turned {} deg to the left and {} deg up, the rig never sees a whole lamp with \
-                 both eyes",
-                rig.yaw_deg, rig.pitch_deg
-            ),
-            "turn it towards the lamps; the reference rig has yaw_deg = 39, pitch_deg = 22",
-        );
+    let way = match direction {
+        Direction::Up => Cow::Borrowed(tunnel),
+        Direction::Down => Cow::Owned(tunnel.reversed()),
+    };
+    let sees = |rig: &RigSettings| {
+        let calibration = rig.calibration();
+        (way.lamps.iter()).any(|lamp| ever_sees(&calibration, &way, lamp))
+    };
+    if sees(rig) {
+        return;
     }
+    let mirrored = RigSettings {
+        side: match rig.side {
+            MountSide::Left => MountSide::Right,
+            MountSide::Right => MountSide::Left,
+        },
+        ..rig.clone()
+    };
+    if sees(&mirrored) {
+        check.problem(
+            &format!("{at}.side"),
+            "all lamps are on the other side of a train that runs this way",
+            format!(
+                "give \"{}\"",
+                if mirrored.side == MountSide::Left {
+                    "left"
+                } else {
+                    "right"
+                }
+            ),
+        );
+        return;
+    }
+    check.problem(
+        &format!("{at}.yaw_deg"),
+        format!(
+            "turned {} deg to the left and {} deg up, the rig never sees a whole lamp with both eyes",
+            rig.yaw_deg, rig.pitch_deg
+        ),
+        "turn it towards the lamps; the reference rig has yaw_deg = 39, pitch_deg = 22",
+    );
 }
 
 fn place(

@@ -4,9 +4,6 @@
 //! be read from its stripes before there is a fix. The rig goes on to the next point when it has
 //! its fixes, or after [`LIMIT_S`] without.
 
-use super::costs::Observers;
-use super::scheduler::Session;
-use super::{Event, SessionError};
 use crate::bus::SimTime;
 use crate::scenario::BenchSettings;
 
@@ -15,7 +12,7 @@ const LIMIT_S: f64 = 5.0;
 
 /// The points of a bench.
 pub struct Bench {
-    settings: BenchSettings,
+    fixes_per_point: usize,
     /// Chainages of the head at the points to come, the next one last.
     to_come_m: Vec<f64>,
     /// Where the rig stands now, and since when.
@@ -24,44 +21,51 @@ pub struct Bench {
     wanted: usize,
 }
 
+/// What the rig does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Move {
+    /// It stays where it is.
+    Stay,
+    /// It goes to its next point.
+    To {
+        /// Chainage of the head there.
+        head_m: f64,
+        /// Chainage of the point that it leaves without all of its fixes.
+        given_up_m: Option<f64>,
+    },
+    /// It was at its last point.
+    Over,
+}
+
 impl Bench {
     /// Before the first point.
     pub fn new(settings: &BenchSettings) -> Self {
         let mut to_come_m: Vec<f64> = settings.heads_m().collect();
         to_come_m.reverse();
         Self {
-            settings: *settings,
+            fixes_per_point: settings.fixes_per_point as usize,
             to_come_m,
             at: None,
             wanted: 0,
         }
     }
 
-    /// Moves the rig to its next point where it has its fixes, or waits no longer; whether it was at
-    /// the last one.
-    pub fn go_on(
-        &mut self,
-        session: &mut Session<'_>,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<bool, SessionError> {
-        let now = session.world.time();
-        let fixes = session.fixes();
-        if let Some((head_m, since)) = self.at {
-            if fixes < self.wanted && now.since(since) <= LIMIT_S {
-                return Ok(false);
-            }
-            if fixes < self.wanted {
-                let text = format!("no more fixes with the head at {head_m} m: gone on");
-                observers.show(&Event::Note(now, &text))?;
-            }
+    /// What to do with so many fixes since the first point.
+    pub fn next(&mut self, now: SimTime, fixes: usize) -> Move {
+        let missing = fixes < self.wanted;
+        let stays = |(_, since): &(f64, SimTime)| missing && now.since(*since) <= LIMIT_S;
+        if self.at.as_ref().is_some_and(stays) {
+            return Move::Stay;
         }
         let Some(head_m) = self.to_come_m.pop() else {
-            return Ok(true);
+            return Move::Over;
         };
-        session.place_rig(head_m);
-        self.wanted = fixes + self.settings.fixes_per_point as usize;
-        self.at = Some((head_m, now));
-        Ok(false)
+        let left = self.at.replace((head_m, now)).filter(|_| missing);
+        self.wanted = fixes + self.fixes_per_point;
+        Move::To {
+            head_m,
+            given_up_m: left.map(|(left_m, _)| left_m),
+        }
     }
 }
 

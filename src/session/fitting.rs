@@ -1,6 +1,8 @@
 //! What sensors and equipment trains and wayside posts carry, as the scenario has it.
 //!
 //! A sensor or an equipment of a new kind is one line here.
+//!
+#![doc = include_str!("../../docs/extending.md")]
 
 use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
 use crate::scenario::{Onboard, OnboardEquipment, Scenario, WaysidePost};

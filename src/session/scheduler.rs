@@ -1,7 +1,7 @@
 //! The loop of a session: every step the world moves, sensors sample, links deliver, images that are
 //! due are read out, equipment works, and what it commands acts on the trains.
 
-use super::bench::Bench;
+use super::bench::{Bench, Move};
 use super::costs::{Costs, Observers};
 use super::fitting::{Fitted, Fitting, Maps, Mounted, onboard_equipment};
 use super::imaging::{Imaging, Pending};
@@ -32,7 +32,7 @@ const BODIES_HZ: f64 = 10.0;
 pub struct Session<'s> {
     scenario: &'s Scenario,
     /// All that is true.
-    pub(super) world: World,
+    world: World,
     sensors: Vec<Mounted>,
     equipment: Vec<Fitted>,
     links: Links,
@@ -198,12 +198,16 @@ impl<'s> Session<'s> {
 
     /// A bench goes on to its next point where it is done with one; whether it was the last.
     fn bench_is_over(&mut self, observers: &mut Observers<'_, '_>) -> Result<bool, SessionError> {
-        let Some(mut bench) = self.bench.take() else {
-            return Ok(false);
-        };
-        let over = bench.go_on(self, observers)?;
-        self.bench = Some(bench);
-        Ok(over)
+        let (now, fixes) = (self.world.time(), self.fixes());
+        let next = self.bench.as_mut().map(|bench| bench.next(now, fixes));
+        if let Some(Move::To { head_m, given_up_m }) = next {
+            if let Some(left_m) = given_up_m {
+                let text = format!("no more fixes with the head at {left_m} m: gone on");
+                observers.show(&Event::Note(now, &text))?;
+            }
+            self.place_rig(head_m);
+        }
+        Ok(next == Some(Move::Over))
     }
 
     fn step(&mut self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
@@ -549,7 +553,7 @@ impl<'s> Session<'s> {
     }
 
     /// Fixes of the rig of a bench so far, by the first of its methods.
-    pub(super) fn fixes(&self) -> usize {
+    fn fixes(&self) -> usize {
         let onboard = self.scenario.onboard.first();
         let method = onboard.and_then(|onboard| onboard.led.methods.first());
         let score = self.trains.get(&TrainId::default()).zip(method);
@@ -557,7 +561,7 @@ impl<'s> Session<'s> {
     }
 
     /// Puts the rig of a bench at a point. Its equipment starts anew.
-    pub(super) fn place_rig(&mut self, head_m: f64) {
+    fn place_rig(&mut self, head_m: f64) {
         self.world.place_carrier(head_m);
         let maps = Maps::new(self.scenario);
         for onboard in &self.scenario.onboard {

@@ -5,8 +5,8 @@
 
 use super::{Protection, ProtectionSettings};
 use crate::bus::{
-    Content, DangerLevel, Message, Node, ObstacleWarning, PositionFix, ProtectionReport, Receiver,
-    SimTime, Ticker, TrainReport,
+    Content, DangerLevel, Message, Node, ObstacleWarning, PositionEstimate, PositionFix,
+    ProtectionReport, Receiver, SimTime, Ticker, TrainReport, Via,
 };
 use crate::stack::Equipment;
 use crate::track::{Direction, Route, Tunnel};
@@ -57,15 +57,15 @@ impl TrainProtection {
         });
     }
 
-    fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
+    /// A warning with distances of the route.
+    fn on_route(&self, warning: &ObstacleWarning) -> ObstacleWarning {
         let (from_chainage_m, to_chainage_m) =
             (self.route).stretch_m(warning.from_chainage_m, warning.to_chainage_m);
-        let warning = ObstacleWarning {
+        ObstacleWarning {
             from_chainage_m,
             to_chainage_m,
             ..warning.clone()
-        };
-        self.protection.on_warning(&warning, received);
+        }
     }
 
     /// Another train is an obstacle from its tail to its head, each as far out as its position may be
@@ -91,7 +91,8 @@ impl TrainProtection {
             to_chainage_m,
             blind: false,
         };
-        self.on_warning(&warning, received);
+        let warning = self.on_route(&warning);
+        self.protection.on_warning(&warning, received);
     }
 
     /// With the chainages of the track.
@@ -119,7 +120,16 @@ impl Equipment for TrainProtection {
             }
             Content::BalisePassed(name) => self.protection.on_balise(name, message.valid_at),
             Content::Warning(warning) => {
-                self.on_warning(warning, message.received_at);
+                let warning = self.on_route(warning);
+                if message.via == Via::Radio {
+                    self.protection.on_heartbeat(&warning, message.received_at);
+                } else {
+                    self.protection.on_warning(&warning, message.received_at);
+                }
+            }
+            Content::Heartbeat(state) => {
+                let state = self.on_route(state);
+                (self.protection).on_heartbeat(&state, message.received_at);
             }
             Content::Train(report) if report.track == self.route.track => {
                 self.on_train(&message.sender, report, message.received_at);
@@ -147,8 +157,17 @@ impl Equipment for TrainProtection {
             };
             Message::to(Receiver::All, self.node.clone(), now, Content::Train(train))
         });
+        let estimate = self.protection.estimate(now, self.route.direction);
+        let estimate = estimate.map(|estimate| {
+            own(Content::Position(PositionEstimate {
+                track: self.route.track,
+                s_m: self.route.chainage_m(estimate.s_m),
+                ..estimate
+            }))
+        });
         let command = own(Content::Command(report.command));
         let report = own(Content::Protection(report));
-        [report, command].into_iter().chain(position).collect()
+        let own = [report, command].into_iter().chain(estimate);
+        own.chain(position).collect()
     }
 }

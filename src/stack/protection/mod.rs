@@ -51,7 +51,8 @@
 //!
 //! A high danger ends the authority; a low one only tells the driver. Where the permitted speed
 //! has come down to walking pace, the brake stops and holds the train until the device clears the
-//! warning. Warnings outlive silence of the radio. With no position the train is restricted to
+//! warning. Warnings outlive silence of the radio; a "clear" does not: where a device of the map has
+//! not been heard for `radio_timeout_s`, its stretch counts as occupied. With no position the train is restricted to
 //! `restricted_kmh`, and any high danger stops it; with no odometer it stops at once.
 //!
 //! # What it does not do
@@ -75,10 +76,10 @@ pub use equipment::TrainProtection;
 pub use settings::ProtectionSettings;
 
 use crate::bus::{
-    BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, PositionFix, ProtectionReport,
-    SimTime, TrainCommand,
+    BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, PositionEstimate, PositionFix,
+    PositionSource, ProtectionReport, SimTime, TrainCommand,
 };
-use crate::track::Tunnel;
+use crate::track::{Direction, TrackId, Tunnel};
 use curve::Grades;
 use display::{Ahead, Situation};
 use monitor::BrakeMonitor;
@@ -86,6 +87,9 @@ use obstacles::Obstacles;
 use position::{Estimate, Position};
 use std::sync::Arc;
 use supervision::Supervisor;
+
+/// The odometer's stated speed error is so many standard deviations.
+const SPEED_ERROR_SIGMAS: f64 = 3.0;
 
 /// The protection of one train.
 #[derive(Clone, Debug)]
@@ -107,7 +111,7 @@ impl Protection {
         Self {
             grades: Grades::new(&map, settings),
             position: Position::new(settings),
-            obstacles: Obstacles::default(),
+            obstacles: Obstacles::new(settings, &map),
             supervisor: Supervisor::new(settings),
             monitor: BrakeMonitor::new(settings),
             brake: BrakeDemand::None,
@@ -120,7 +124,7 @@ impl Protection {
     /// Takes a position from the positioning stack. The caller passes the fixes of one method;
     /// they may come late.
     pub fn on_fix(&mut self, fix: &PositionFix) {
-        self.position.on_fix(fix.time, fix.chainage_m, fix.sigma_m);
+        self.position.on_fix(fix);
     }
 
     /// Takes a sample of the odometer.
@@ -144,8 +148,35 @@ impl Protection {
         self.obstacles.on_warning(warning, received);
     }
 
+    /// Takes a heartbeat of a device, received by radio: it is alive, and this still holds.
+    pub fn on_heartbeat(&mut self, state: &ObstacleWarning, received: SimTime) {
+        self.obstacles.on_heard(&state.device, received);
+        self.obstacles.on_warning(state, received);
+    }
+
+    /// Position and speed on the route, as the protection takes them to be.
+    pub fn estimate(&self, time: SimTime, direction: Direction) -> Option<PositionEstimate> {
+        let Estimate {
+            chainage_m,
+            sigma_m,
+            source,
+        } = self.position.at(time)?;
+        let speed_sigma_mps = self.settings.speed_error_kmh / 3.6 / SPEED_ERROR_SIGMAS;
+        Some(PositionEstimate {
+            time,
+            track: TrackId::default(),
+            direction,
+            s_m: chainage_m,
+            v_mps: self.position.speed_mps().unwrap_or(0.0),
+            covariance: [[sigma_m.powi(2), 0.0], [0.0, speed_sigma_mps.powi(2)]],
+            protection_level_m: None,
+            sources: vec![source, PositionSource::Odometer],
+        })
+    }
+
     /// Decides; called 10 times a second.
     pub fn cycle(&mut self, time: SimTime) -> ProtectionReport {
+        self.obstacles.lapse(time);
         let train = self.position.at(time);
         let speed = self.position.speed_mps();
         let speed_mps = speed.unwrap_or(0.0);

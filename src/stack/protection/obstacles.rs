@@ -1,10 +1,13 @@
-//! What the devices along the line have said.
+//! What the devices along the line have said, and whether they are heard.
 //!
 //! The last word of each device counts, in the order of issue: by balise and by radio messages
 //! come late, twice, or not at all. A warning stays in force until its own device clears it;
-//! silence clears nothing.
+//! silence clears nothing. A device of the map that has not been heard by radio for too long takes
+//! back its "clear": the stretch that it watches counts as occupied until it is heard again.
 
+use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
+use crate::track::Tunnel;
 
 /// The last word of one device.
 #[derive(Clone, Debug)]
@@ -13,12 +16,77 @@ struct Notice {
     received: SimTime,
 }
 
+/// A device that the map has.
+#[derive(Clone, Debug)]
+struct Device {
+    name: String,
+    watched_m: (f64, f64),
+    /// By radio.
+    heard: Option<SimTime>,
+}
+
 #[derive(Clone, Debug, Default)]
 pub(super) struct Obstacles {
     notices: Vec<Notice>,
+    devices: Vec<Device>,
+    silent_after_s: f64,
+    since: Option<SimTime>,
 }
 
 impl Obstacles {
+    /// With the devices of a map.
+    pub fn new(settings: &ProtectionSettings, map: &Tunnel) -> Self {
+        let reach_m = settings.device_reach_m;
+        let devices = map.wayside.iter().map(|site| Device {
+            name: site.name.clone(),
+            watched_m: (site.chainage_m - reach_m, site.chainage_m + reach_m),
+            heard: None,
+        });
+        Self {
+            devices: devices.collect(),
+            silent_after_s: settings.radio_timeout_s,
+            ..Self::default()
+        }
+    }
+
+    /// A device was heard by radio.
+    pub fn on_heard(&mut self, device: &str, received: SimTime) {
+        let known = self.devices.iter_mut().find(|d| d.name == device);
+        known.into_iter().for_each(|d| d.heard = Some(received));
+    }
+
+    /// Time passes: the stretches of devices that are silent count as occupied.
+    pub fn lapse(&mut self, now: SimTime) {
+        let since = *self.since.get_or_insert(now);
+        for device in &self.devices {
+            if now.since(device.heard.unwrap_or(since)) <= self.silent_after_s {
+                continue;
+            }
+            let known = self.notices.iter_mut();
+            let mut known = known.filter(|n| n.warning.device == device.name);
+            let occupied = |issued: SimTime, number: u32| ObstacleWarning {
+                device: device.name.clone(),
+                number,
+                issued,
+                danger: DangerLevel::High,
+                from_chainage_m: device.watched_m.0,
+                to_chainage_m: device.watched_m.1,
+                blind: true,
+            };
+            match known.next() {
+                Some(notice) if notice.warning.danger == DangerLevel::None => {
+                    // Whatever the device says next is newer.
+                    notice.warning = occupied(notice.warning.issued, notice.warning.number);
+                }
+                Some(_) => {}
+                None => self.notices.push(Notice {
+                    warning: occupied(SimTime::from_nanos(i64::MIN), 0),
+                    received: since,
+                }),
+            }
+        }
+    }
+
     pub fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
         let ends = [warning.from_chainage_m, warning.to_chainage_m];
         if warning.danger != DangerLevel::None && ends.iter().any(|x| !x.is_finite()) {

@@ -8,7 +8,7 @@
 //! train is not where it was thought to be: the last of them is taken.
 
 use super::ProtectionSettings;
-use crate::bus::{OdometerSample, SimTime};
+use crate::bus::{OdometerSample, PositionFix, PositionSource, SimTime};
 use std::collections::VecDeque;
 
 /// Odometer samples remembered, for fixes that come late.
@@ -24,6 +24,7 @@ struct Anchor {
     chainage_m: f64,
     sigma_m: f64,
     odometer_m: f64,
+    source: PositionSource,
 }
 
 impl Anchor {
@@ -32,6 +33,7 @@ impl Anchor {
         Estimate {
             chainage_m: self.chainage_m + run_m,
             sigma_m: self.sigma_m.hypot(drift * run_m),
+            source: self.source,
         }
     }
 }
@@ -41,6 +43,8 @@ impl Anchor {
 pub(super) struct Estimate {
     pub chainage_m: f64,
     pub sigma_m: f64,
+    /// The last source besides the odometer.
+    pub source: PositionSource,
 }
 
 #[derive(Clone, Debug)]
@@ -66,6 +70,7 @@ impl Position {
                 chainage_m,
                 sigma_m: settings.initial_sigma_m,
                 odometer_m: 0.0,
+                source: PositionSource::Setting,
             }),
             refused: 0,
             refused_anchor: None,
@@ -91,7 +96,8 @@ impl Position {
     }
 
     /// A position that may be wrong (from the lamps).
-    pub fn on_fix(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
+    pub fn on_fix(&mut self, fix: &PositionFix) {
+        let (time, chainage_m, sigma_m) = (fix.time, fix.chainage_m, fix.sigma_m);
         if !(chainage_m.is_finite() && sigma_m.is_finite() && sigma_m >= 0.0) {
             return;
         }
@@ -99,6 +105,7 @@ impl Position {
             chainage_m,
             sigma_m: sigma_m.max(self.floor_m),
             odometer_m: self.odometer_at(time),
+            source: PositionSource::Lamp(fix.method),
         };
         let Some(anchor) = self.anchor else {
             self.anchor = Some(fix);
@@ -116,6 +123,7 @@ impl Position {
             chainage_m: predicted.chainage_m + gain * off_m,
             sigma_m: (p * r / (p + r)).sqrt().max(self.floor_m),
             odometer_m: fix.odometer_m,
+            source: fix.source,
         });
     }
 
@@ -126,6 +134,7 @@ impl Position {
             chainage_m,
             sigma_m,
             odometer_m,
+            source: PositionSource::Balise,
         });
     }
 
@@ -196,6 +205,7 @@ impl Position {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
+    use super::super::tests::fix;
     use super::*;
 
     fn driven(settings: &ProtectionSettings, seconds: f64, speed_mps: f64) -> Position {
@@ -230,7 +240,7 @@ mod tests {
     fn a_late_fix_is_carried() {
         let mut p = driven(&ProtectionSettings::default(), 20.0, 20.0);
         assert_eq!(p.at(SimTime::from_secs(20.0)), None);
-        p.on_fix(SimTime::from_secs(19.01), 700.0, 0.4);
+        p.on_fix(&fix(SimTime::from_secs(19.01), 700.0, 0.4));
         let e = p.at(SimTime::from_secs(20.0)).unwrap();
         assert!((e.chainage_m - 719.8).abs() < 1e-9);
     }
@@ -240,19 +250,19 @@ mod tests {
     fn fixes_are_gated() {
         let mut p = driven(&ProtectionSettings::default(), 1.0, 0.0);
         let t = SimTime::from_secs(1.0);
-        p.on_fix(t, 100.0, 2.0);
-        p.on_fix(t, 103.0, 1.0);
+        p.on_fix(&fix(t, 100.0, 2.0));
+        p.on_fix(&fix(t, 103.0, 1.0));
         let e = p.at(t).unwrap();
         assert!((e.chainage_m - 102.4).abs() < 1e-9);
         assert!((e.sigma_m - 0.8f64.sqrt()).abs() < 1e-9);
         for _ in 0..4 {
-            p.on_fix(t, 160.0, 1.0);
+            p.on_fix(&fix(t, 160.0, 1.0));
         }
         assert!((p.at(t).unwrap().chainage_m - 102.4).abs() < 1e-9);
-        p.on_fix(t, 160.0, 1.0);
+        p.on_fix(&fix(t, 160.0, 1.0));
         assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
         // Not a number changes nothing.
-        p.on_fix(t, f64::NAN, 1.0);
+        p.on_fix(&fix(t, f64::NAN, 1.0));
         assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
     }
 }

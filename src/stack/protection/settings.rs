@@ -59,9 +59,11 @@ settings! {
         emergency_margin_kmh: f64 = 7.5, in 0.5..=30.0;
         /// Without odometer samples for this long, the emergency brake is applied, s.
         odometer_timeout_s: f64 = 1.0, in 0.1..=30.0;
-        /// A device whose warning was not refreshed for this long is shown as silent, s (its
-        /// warning stays in force).
+        /// A device that has not been heard by radio for this long is silent, s: a warning of it stays
+        /// in force, and where it had said that the track is clear, its stretch counts as occupied.
         radio_timeout_s: f64 = 5.0, in 0.1..=600.0;
+        /// How far along the line to either side of it a device of the map watches, m.
+        device_reach_m: f64 = 80.0, in 5.0..=500.0;
     }
     also check_order
 }

@@ -53,7 +53,7 @@ fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> Ob
     }
 }
 
-fn fix(time: SimTime, chainage_m: f64, sigma_m: f64) -> PositionFix {
+pub(super) fn fix(time: SimTime, chainage_m: f64, sigma_m: f64) -> PositionFix {
     PositionFix {
         time,
         method: Method::Paper,
@@ -473,4 +473,53 @@ fn nonsense_changes_nothing() {
     let r = b.cycle(0.0, 0.0);
     assert_eq!(r.command.brake, BrakeDemand::Service);
     assert!((r.position_m.unwrap() - 1000.0).abs() < 1e-9);
+}
+
+/// A device of the map that is silent watches nothing: its stretch counts as occupied when its last
+/// heartbeat is too old, and is free again with the next one. A warning of it stays.
+#[test]
+fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
+    let mut map = Tunnel::clone(&map(0.0));
+    map.wayside.push(crate::track::WaysideSite {
+        name: "W1".into(),
+        chainage_m: 1800.0,
+        lateral_m: -2.0,
+        height_m: 3.0,
+        yaw_rad: 3.0,
+        pitch_rad: 0.0,
+        balise: "B7".into(),
+    });
+    let settings = ProtectionSettings {
+        initial_chainage_m: Some(1000.0),
+        ..ProtectionSettings::default()
+    };
+    let mut protection = Protection::new(&settings, Arc::new(map));
+    let end_m = |protection: &mut Protection, time_s: f64| {
+        let time = SimTime::from_secs(time_s);
+        protection.on_odometer(&OdometerSample {
+            time,
+            distance_m: 0.0,
+            speed_mps: 0.0,
+        });
+        protection.cycle(time).authority_end_m
+    };
+    let clear = |number: u32, time_s: f64| {
+        let issued = SimTime::from_secs(time_s);
+        warning(number, issued, DangerLevel::None, 1790.0)
+    };
+    assert_eq!(end_m(&mut protection, 0.0), None);
+    assert_eq!(end_m(&mut protection, 5.0), None);
+    let watched = Some(1800.0 - 80.0 - settings.safety_distance_m);
+    assert_eq!(end_m(&mut protection, 5.1), watched);
+    protection.on_heartbeat(&clear(0, 5.1), SimTime::from_secs(5.6));
+    assert_eq!(end_m(&mut protection, 10.6), None);
+    assert_eq!(end_m(&mut protection, 10.7), watched);
+    // By balise one cannot tell whether the device is alive.
+    protection.on_warning(&clear(1, 9.0), SimTime::from_secs(10.7));
+    assert_eq!(end_m(&mut protection, 10.8), watched);
+    let danger = warning(2, SimTime::from_secs(11.0), DangerLevel::High, 1790.0);
+    protection.on_heartbeat(&danger, SimTime::from_secs(11.5));
+    let obstacle = Some(1790.0 - settings.safety_distance_m);
+    assert_eq!(end_m(&mut protection, 11.6), obstacle);
+    assert_eq!(end_m(&mut protection, 60.0), obstacle);
 }

@@ -1,5 +1,5 @@
 //! When a device speaks: on a change of danger, when it goes blind or sees again, again and again
-//! while either lasts, once when it is over.
+//! while either lasts, once when it is over; and a heartbeat, which says the same once more.
 
 use super::WaysideSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime, WaysideReport};
@@ -13,6 +13,8 @@ pub(super) struct Announcer {
     danger: DangerLevel,
     blind: bool,
     last: SimTime,
+    /// Of the last frame that was seen, if any.
+    seen: Option<SimTime>,
     extent_m: (f64, f64),
 }
 
@@ -25,6 +27,7 @@ impl Announcer {
             danger: DangerLevel::None,
             blind: false,
             last: SimTime::ZERO,
+            seen: None,
             extent_m: (0.0, 0.0),
         }
     }
@@ -39,6 +42,7 @@ impl Announcer {
         if report.learning && !report.blind {
             return None;
         }
+        self.seen = Some(report.time);
         let changed = (report.danger, report.blind) != (self.danger, self.blind);
         let due = report.danger != DangerLevel::None
             && report.time.since(self.last) >= self.refresh_s - 1e-6;
@@ -56,15 +60,24 @@ impl Announcer {
         self.last = report.time;
         let number = self.number;
         self.number += 1;
-        Some(ObstacleWarning {
+        Some(self.warning(number, report.time))
+    }
+
+    /// What holds since the last frame; `None` before the device has seen one.
+    pub fn heartbeat(&self) -> Option<ObstacleWarning> {
+        Some(self.warning(self.number.saturating_sub(1), self.seen?))
+    }
+
+    fn warning(&self, number: u32, issued: SimTime) -> ObstacleWarning {
+        ObstacleWarning {
             device: self.device.clone(),
             number,
-            issued: report.time,
-            danger: report.danger,
+            issued,
+            danger: self.danger,
             from_chainage_m: self.extent_m.0,
             to_chainage_m: self.extent_m.1,
-            blind: report.blind,
-        })
+            blind: self.blind,
+        }
     }
 }
 

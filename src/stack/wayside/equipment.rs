@@ -15,8 +15,8 @@ const WATCH_HZ: f64 = 10.0;
 /// A train that has not reported for this long may be anywhere.
 const REPORT_LIFE_S: f64 = 5.0;
 
-/// Takes frames, sweeps and the reports of trains; says a [`Content::Wayside`] a frame, and warns
-/// trains by radio and through its balise.
+/// Takes frames, sweeps and the reports of trains; says a [`Content::Wayside`] a frame, warns trains
+/// by radio and through its balise, and sends heartbeats while it sees.
 #[derive(Debug)]
 pub struct WaysideDetection {
     node: Node,
@@ -27,6 +27,8 @@ pub struct WaysideDetection {
     scan: Option<LidarScan>,
     trains: BTreeMap<TrainId, TrainReport>,
     watch: Ticker,
+    heartbeat_s: f64,
+    last_heartbeat: Option<SimTime>,
     messages: Vec<Message>,
 }
 
@@ -47,6 +49,8 @@ impl WaysideDetection {
             scan: None,
             trains: BTreeMap::new(),
             watch: Ticker::new(WATCH_HZ),
+            heartbeat_s: settings.heartbeat_s,
+            last_heartbeat: None,
             messages: Vec::new(),
         }
     }
@@ -71,6 +75,20 @@ impl WaysideDetection {
                 .push(Message::to(receiver, self.node.clone(), now, content));
         }
     }
+
+    /// The trains are to know that the device is alive and sees.
+    fn beat(&mut self, now: SimTime) {
+        let due = |last: SimTime| now.since(last) >= self.heartbeat_s - 1e-6;
+        if !self.last_heartbeat.is_none_or(due) {
+            return;
+        }
+        if let Some(state) = self.detector.heartbeat() {
+            self.last_heartbeat = Some(now);
+            let content = Content::Heartbeat(state);
+            let to_trains = Message::to(Receiver::Trains, self.node.clone(), now, content);
+            self.messages.push(to_trains);
+        }
+    }
 }
 
 impl Equipment for WaysideDetection {
@@ -85,6 +103,9 @@ impl Equipment for WaysideDetection {
                 let trains = self.trains(now);
                 let report = self.detector.on_frame(frame, self.scan.as_ref(), &trains);
                 self.warn(&report, now);
+                if report.camera.is_good() {
+                    self.beat(now);
+                }
                 self.messages.push(Message {
                     valid_at: report.time,
                     ..Message::own(self.node.clone(), now, Content::Wayside(report))

@@ -303,6 +303,11 @@ impl WaysideDetector {
         self.announcer.message(report, self.sight.watched_m())
     }
 
+    /// What a heartbeat says: the state of the last report; `None` before the reference is learnt.
+    pub fn heartbeat(&self) -> Option<ObstacleWarning> {
+        self.announcer.heartbeat()
+    }
+
     fn learn(&mut self, grey: &[u8]) {
         self.reference.learn(grey, &self.settings);
         if self.reference.ready() {

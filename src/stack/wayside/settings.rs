@@ -46,6 +46,9 @@ settings! {
         train_length_m: f64 = 118.0, in 5.0..=500.0;
         /// While an obstacle is there, its warning is sent again after this time, s.
         refresh_s: f64 = 1.0, in 0.05..=60.0;
+        /// A heartbeat is sent after each frame that comes this long after the last one, s. Trains take
+        /// silence for an occupied track.
+        heartbeat_s: f64 = 1.0, in 0.05..=60.0;
         /// When no good frame has come for this long, the stretch that the camera watches counts as
         /// occupied, s.
         blind_after_s: f64 = 1.0, in 0.1..=60.0;

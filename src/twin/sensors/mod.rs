@@ -19,7 +19,7 @@ pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-pub use rig::{RigError, RigSettings, RightEye, ever_sees, visible_interval};
+pub use rig::{MountSide, RigError, RigSettings, RightEye, ever_sees, visible_interval};
 pub use sensor::{
     Capture, ClockSettings, FrameHeader, Output, Periodic, Sample, Sensor, SensorError,
 };

@@ -31,6 +31,19 @@ use crate::settings::{Checker, settings};
 use crate::track::{LampSite, Tunnel};
 use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// The side of a train on which a rig looks out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum MountSide {
+    /// To the left of the running direction.
+    #[default]
+    Left,
+    /// To its right.
+    Right,
+}
 
 settings! {
     /// The stereo rig on the train head: where it is mounted, what it sees, when.
@@ -69,6 +82,8 @@ settings! {
         /// Standard deviation of a pair's true start about the one that its frames say, us, drawn
         /// anew for each and the same for both eyes; held at four times that.
         frame_jitter_us: f64 = 0.0;
+        /// The side of the train that it is made for: `right` mirrors `lateral_m` and `yaw_deg`.
+        side: MountSide = MountSide::Left;
         /// Left eye, m ahead of the train head (negative: behind the windscreen).
         forward_m: f64 = -0.5, in -5.0..=5.0;
         /// Left eye, m to the left of the centreline.
@@ -154,13 +169,17 @@ settings! {
 impl RigSettings {
     /// The calibration sheet, which the stack gets.
     pub fn calibration(&self) -> RigCalibration {
+        let mirror = match self.side {
+            MountSide::Left => 1.0,
+            MountSide::Right => -1.0,
+        };
         RigCalibration {
             left: self.optics().camera(),
             right: self.right_optics().camera(),
             left_from_right: self.left_from_right(),
             vehicle_from_left: mounted(
-                Vector3::new(self.forward_m, self.lateral_m, self.height_m),
-                self.yaw_deg.to_radians(),
+                Vector3::new(self.forward_m, mirror * self.lateral_m, self.height_m),
+                mirror * self.yaw_deg.to_radians(),
                 self.pitch_deg.to_radians(),
             ),
         }

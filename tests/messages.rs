@@ -1,0 +1,128 @@
+//! Everything that travels on the bus can be written down and read back.
+
+#![cfg(feature = "twin")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use metrotwin::bus::{Content, Message, Node};
+use metrotwin::scenario::{Scenario, ScenarioFile};
+use metrotwin::session::{
+    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, run,
+};
+use metrotwin::settings::read_toml;
+use metrotwin::track::Tunnel;
+use std::collections::BTreeSet;
+
+/// Two trains with all sensors, a wayside device with a lidar, all cameras of few pixels.
+const SMALL: &str = r#"
+    name = "small"
+    tunnel = "given"
+    duration_s = 3.0
+    train = { cars = 1, start_chainage_m = 1300.0, start_speed_kmh = 60.0, cruise_speed_kmh = 60.0 }
+    stack = { protection = { initial_chainage_m = 1300.0 } }
+    doppler = {}
+    [[other_trains]]
+    cars = 1
+    start_chainage_m = 1200.0
+    start_speed_kmh = 60.0
+    [[onboard]]
+    train = 1
+    protection = { initial_chainage_m = 1200.0 }
+    [rig]
+    pairs_per_s = 10.0
+    width_px = 64
+    height_px = 36
+    pixel_um = 75.0
+    [[wayside]]
+    device = "W1530"
+    lidar = { step_deg = 5.0 }
+    camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
+"#;
+
+/// Kinds of content that were written and read back.
+#[derive(Default)]
+struct Copied(BTreeSet<String>);
+
+impl Copied {
+    fn copy(&mut self, message: &Message) {
+        let text = serde_json::to_string(message).unwrap();
+        let again: Message = serde_json::from_str(&text).unwrap();
+        assert_eq!(&again, message);
+        let kind = format!("{:?}", message.content);
+        let end = kind.find(|c: char| !c.is_alphanumeric()).unwrap();
+        self.0.insert(kind[..end].to_owned());
+    }
+}
+
+impl Observer for Copied {
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+        for train in opening.trains {
+            let rig = train.rig.map(Content::RigCalibration);
+            let device = Content::WaysideCalibration(opening.wayside[0].clone());
+            for content in rig.into_iter().chain([device]) {
+                self.copy(&Message::own(
+                    Node::Train(train.id),
+                    Default::default(),
+                    content,
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        let own = |node, time, content| Message::own(node, time, content);
+        match event {
+            Event::Message(_, message) => self.copy(message),
+            Event::Pair(id, pair, report, _) => {
+                let (node, time) = (Node::Train(*id), report.time);
+                self.copy(&own(node.clone(), time, Content::Pair((*pair).clone())));
+                self.copy(&own(node, time, Content::Led((*report).clone())));
+            }
+            Event::Wayside(_, frame, report) => {
+                let (node, time) = (Node::Post("W1530".into()), report.time);
+                self.copy(&own(node.clone(), time, Content::Frame((*frame).clone())));
+                self.copy(&own(node, time, Content::Wayside((*report).clone())));
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn close(&mut self) -> Result<(), ObserverError> {
+        Ok(())
+    }
+}
+
+/// A field that is skipped, written in another form than it is read, or loses digits.
+#[test]
+fn every_message_is_read_back_as_it_was_written() {
+    let tunnel = Tunnel::from_toml(include_str!("../tunnels/chengdu_line1.toml")).unwrap();
+    let file: ScenarioFile = read_toml(SMALL).unwrap();
+    let scenario = Scenario::new(file, tunnel).unwrap();
+    let options = RunOptions {
+        renderer: RendererChoice::Cpu,
+        ..RunOptions::default()
+    };
+    let mut copied = Copied::default();
+    run(&scenario, &options, &mut [&mut copied]).unwrap();
+    let kinds = [
+        "Command",
+        "Doppler",
+        "Frame",
+        "Heartbeat",
+        "Imu",
+        "Led",
+        "Odometer",
+        "Pair",
+        "Position",
+        "Protection",
+        "RigCalibration",
+        "Scan",
+        "Train",
+        "Wayside",
+        "WaysideCalibration",
+    ];
+    for kind in kinds {
+        assert!(copied.0.contains(kind), "no {kind} in {:?}", copied.0);
+    }
+}
