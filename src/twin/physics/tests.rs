@@ -7,6 +7,9 @@
     reason = "tests may panic, compare bytes, and say what they measured"
 )]
 
+mod directions;
+mod obstacles;
+
 use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
@@ -24,6 +27,10 @@ fn straight() -> Arc<Tunnel> {
 
 /// One train on perfect track.
 fn settings(train: TrainSettings) -> PhysicsSettings {
+    on_even_track(vec![train])
+}
+
+fn on_even_track(trains: Vec<TrainSettings>) -> PhysicsSettings {
     PhysicsSettings {
         track: TrackSettings {
             irregularity: IrregularitySettings {
@@ -32,7 +39,7 @@ fn settings(train: TrainSettings) -> PhysicsSettings {
             },
             ..TrackSettings::default()
         },
-        trains: vec![train],
+        trains,
         ..PhysicsSettings::default()
     }
 }
