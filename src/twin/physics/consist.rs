@@ -32,7 +32,7 @@ const HOLD_PER_S: f64 = 50.0;
 /// The train.
 #[derive(Clone)]
 pub(super) struct Consist {
-    id: TrainId,
+    pub id: TrainId,
     pub vehicle: Vehicle,
     pub settings: TrainSettings,
     pub wheelsets: Vec<Wheelset>,

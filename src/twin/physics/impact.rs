@@ -134,7 +134,7 @@ impl Impacts {
             bodies
                 .zip(&consist.colliders)
                 .map(|(body, collider)| CarBox {
-                    train: train.id,
+                    train: consist.id,
                     collider: *collider,
                     body: *body,
                     before: Motion::default(),

@@ -53,8 +53,6 @@ mod damage;
 mod defect;
 mod deviation;
 mod directed_track;
-#[cfg(test)]
-mod direction_tests;
 mod driver;
 mod energy;
 mod entity;
@@ -72,8 +70,6 @@ mod settings;
 mod shape;
 mod stability;
 mod surroundings;
-#[cfg(test)]
-mod surroundings_tests;
 mod suspension;
 #[cfg(test)]
 mod testing;

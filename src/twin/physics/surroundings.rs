@@ -78,7 +78,10 @@ impl Surroundings {
         });
         let mut surroundings = Self {
             walkers: walkers.collect(),
-            trains: trains.iter().map(|train| train_name(train.id)).collect(),
+            trains: trains
+                .iter()
+                .map(|train| train_name(train.consist.id))
+                .collect(),
             obstacles: Vec::new(),
             cables: Vec::new(),
             ground: Ground::default(),

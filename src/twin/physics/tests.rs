@@ -7,6 +7,9 @@
     reason = "tests may panic, compare bytes, and say what they measured"
 )]
 
+mod directions;
+mod obstacles;
+
 use super::history::History;
 use super::*;
 use crate::bus::BrakeDemand;
@@ -25,6 +28,10 @@ fn straight() -> Arc<Tunnel> {
 
 /// One train on perfect track.
 fn settings(train: TrainSettings) -> PhysicsSettings {
+    on_even_track(vec![train])
+}
+
+fn on_even_track(trains: Vec<TrainSettings>) -> PhysicsSettings {
     PhysicsSettings {
         track: TrackSettings {
             irregularity: IrregularitySettings {
@@ -33,7 +40,7 @@ fn settings(train: TrainSettings) -> PhysicsSettings {
             },
             ..TrackSettings::default()
         },
-        trains: vec![train],
+        trains,
         ..PhysicsSettings::default()
     }
 }

@@ -31,7 +31,6 @@ const CAR_ALBEDO: f64 = 0.5;
 /// A train under way.
 #[derive(Clone)]
 pub(super) struct Train {
-    pub id: TrainId,
     pub track: Arc<DirectedTrack>,
     pub consist: Consist,
     pub history: History,
@@ -56,7 +55,6 @@ impl Train {
         };
         let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
         Self {
-            id,
             consist: Consist::new(world, &track, &settings, head_m, id),
             track,
             history: History::new(history_steps),

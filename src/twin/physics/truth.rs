@@ -88,13 +88,14 @@ impl World {
         let mut owned = self.surroundings.draw(&self.rapier, line, now_s);
         // The order may decide pixels: the first train comes last.
         let trains = self.trains.iter().skip(1).chain(self.trains.first());
-        for train in trains.filter(|train| Some(train.id) != without) {
-            let name = self.surroundings.train_name(train.id);
+        for train in trains.filter(|train| Some(train.consist.id) != without) {
+            let id = train.consist.id;
+            let name = self.surroundings.train_name(id);
             let cars = train.consist.boxes().count();
             for (k, body) in train.bodies().into_iter().enumerate() {
                 // After the cars come the lenses on the leading one.
                 let car = if k < cars { k } else { 0 };
-                let owner = BodyOwner::Car(train.id, car);
+                let owner = BodyOwner::Car(id, car);
                 owned.push((body, BodyLabel { owner, name }));
             }
         }

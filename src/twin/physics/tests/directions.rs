@@ -1,33 +1,6 @@
 //! Trains that run down the line, and several of them, against those that run up, and closed forms.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::float_cmp,
-    clippy::print_stderr,
-    reason = "tests may panic, compare bytes, and say what they measured"
-)]
-
-use super::testing::{TRAIN, line};
 use super::*;
-use crate::bus::BrakeDemand;
-use crate::track::PlanElement;
-use vehicle::GRAVITY_MPS2;
-
-/// Trains on perfect track.
-fn settings(trains: Vec<TrainSettings>) -> PhysicsSettings {
-    let irregularity = IrregularitySettings {
-        class: IrregularityClass::None,
-        ..IrregularitySettings::default()
-    };
-    PhysicsSettings {
-        track: TrackSettings {
-            irregularity,
-            ..TrackSettings::default()
-        },
-        trains,
-        ..PhysicsSettings::default()
-    }
-}
 
 fn run(world: &mut World, seconds: f64) {
     for _ in 0..(seconds * 1000.0).round() as usize {
@@ -71,8 +44,8 @@ fn down_the_line_is_up_the_reversed_line() {
         ..down.clone()
     };
     let reversed = Arc::new(tunnel.reversed());
-    let mut a = World::new(tunnel, &settings(vec![down]), 1, 0).unwrap();
-    let mut b = World::new(reversed, &settings(vec![up]), 1, 0).unwrap();
+    let mut a = World::new(tunnel, &on_even_track(vec![down]), 1, 0).unwrap();
+    let mut b = World::new(reversed, &on_even_track(vec![up]), 1, 0).unwrap();
     for _ in 0..90 {
         run(&mut a, 1.0);
         run(&mut b, 1.0);
@@ -111,7 +84,7 @@ fn a_grade_is_felt_by_the_way_of_the_run() {
         coasting(Direction::Up, 1000.0),
         coasting(Direction::Down, 2000.0),
     ];
-    let mut world = World::new(tunnel, &settings(trains), 1, 0).unwrap();
+    let mut world = World::new(tunnel, &on_even_track(trains), 1, 0).unwrap();
     for _ in 0..5000 {
         for train in &mut world.trains {
             let (track, effort) = (&train.track, driver::Effort::default());
@@ -145,9 +118,8 @@ fn trains_are_asked_by_number() {
         cars: 1,
         ..TrainSettings::default()
     };
-    let settings = settings((0..8).map(train).collect());
-    let tunnel = line(&[PlanElement::straight(3000.0)], 0.0);
-    let mut world = World::new(tunnel, &settings, 1, 0).unwrap();
+    let settings = on_even_track((0..8).map(train).collect());
+    let mut world = World::new(straight(), &settings, 1, 0).unwrap();
     let brake = TrainCommand {
         brake: BrakeDemand::Emergency,
         permitted_speed_mps: 0.0,

@@ -1,23 +1,8 @@
 //! Obstacles, cables, workers and what the train does to them, against closed forms.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::float_cmp,
-    clippy::print_stderr,
-    reason = "tests may panic, compare bytes, and say what they measured"
-)]
-
 use super::*;
-use crate::bus::BrakeDemand;
-use crate::track::{BED_M, PlanElement};
+use crate::track::BED_M;
 use nalgebra::{Point3, Vector3};
-use testing::TRAIN;
-use vehicle::{GRAVITY_MPS2, Vehicle};
-
-/// A straight line of 3 km without walls, 5 m over zero.
-fn straight() -> Arc<Tunnel> {
-    testing::line(&[PlanElement::straight(3000.0)], 0.0)
-}
 
 fn without_train() -> PhysicsSettings {
     PhysicsSettings {
@@ -36,18 +21,7 @@ fn with_car() -> PhysicsSettings {
         davis_c_per_m: 0.0,
         ..TrainSettings::default()
     };
-    let irregularity = IrregularitySettings {
-        class: IrregularityClass::None,
-        ..IrregularitySettings::default()
-    };
-    PhysicsSettings {
-        track: TrackSettings {
-            irregularity,
-            ..TrackSettings::default()
-        },
-        trains: vec![train],
-        ..PhysicsSettings::default()
-    }
+    settings(train)
 }
 
 fn run(world: &mut World, seconds: f64) {
@@ -71,6 +45,7 @@ fn run_into(world: &mut World) -> Impact {
     run(world, 0.06);
     world.impacts().first().unwrap().clone()
 }
+
 /// Boxes, balls and cylinders fall on the bed and come to rest there, not in it.
 #[test]
 fn obstacles_come_to_rest_on_the_bed() {
