@@ -136,11 +136,8 @@ impl<F: Settings + Serialize + DeserializeOwned + JsonSchema> Ranges<F> {
                 "{}",
                 place.key
             );
-            let step = if place.schema["type"] == "integer" {
-                1.0
-            } else {
-                0.0
-            };
+            let whole = place.schema["type"] == "integer";
+            let step = f64::from(u8::from(whole));
             let range = format!("give {low} to {high}");
             let refuses = |value: f64| {
                 let problems = self.problems_with(place, value);
@@ -154,6 +151,7 @@ impl<F: Settings + Serialize + DeserializeOwned + JsonSchema> Ranges<F> {
                 assert!(!refuses(inside), "{} = {inside} is refused", place.key);
                 assert!(refuses(outside), "{} = {outside} is taken", place.key);
             }
+            assert!(whole || refuses(f64::NAN), "{} takes NaN", place.key);
         }
         places.len()
     }

@@ -44,26 +44,19 @@ impl<N: Numbers> Numbers for &N {
 pub fn put_range(range: RangeInclusive<f64>) -> impl FnMut(&mut Schema) {
     let (low, high) = range.into_inner();
     move |schema| {
-        let Some(schema) = schema.as_object_mut() else {
+        let place = schema.get("items").map_or("", |_| "/items");
+        let numbers = schema.pointer_mut(place).and_then(|n| n.as_object_mut());
+        let Some(numbers) = numbers else {
             return;
         };
-        let schema = match schema.contains_key("items") {
-            true => schema
-                .get_mut("items")
-                .and_then(|items| items.as_object_mut()),
-            false => Some(schema),
-        };
-        let Some(schema) = schema else {
-            return;
-        };
-        let format = schema.get("format").and_then(|format| format.as_str());
+        let format = numbers.get("format").and_then(|format| format.as_str());
         let whole = format.is_some_and(|format| format.starts_with("uint"));
         for (key, limit) in [("minimum", low), ("maximum", high)] {
             let limit = match whole {
                 true => (limit as u64).into(),
                 false => limit.into(),
             };
-            schema.insert(key.to_owned(), limit);
+            numbers.insert(key.to_owned(), limit);
         }
     }
 }

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
 settings! {
-    /// What varies from run to run, how often, and what is asked of it. `metrotwin run` ignores it and
-    /// runs the scenario as it stands.
+    /// What varies from run to run, how often, and what is asked of it. `metrotwin run` ignores it
+    /// and runs the scenario as it stands.
     pub struct StudySettings {
         /// All draws follow from it, and each run's own seed. Studies with the same seed meet the
         /// same chances, run by run, and can be compared in pairs.

@@ -80,25 +80,3 @@ impl LedSettings {
         );
     }
 }
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test may panic")]
-mod tests {
-    use super::*;
-    use crate::settings::Settings;
-
-    #[test]
-    fn defaults_are_in_order_and_nonsense_is_named() {
-        let mut problems = Vec::new();
-        LedSettings::default().check("positioning", &mut problems);
-        assert!(problems.is_empty(), "{problems:?}");
-        let wrong = LedSettings {
-            gate_share: 0.5,
-            rear_pivot_m: f64::NAN,
-            ..LedSettings::default()
-        };
-        wrong.check("positioning", &mut problems);
-        let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
-        assert_eq!(keys, ["positioning.gate_share", "positioning.rear_pivot_m"]);
-    }
-}

@@ -15,8 +15,8 @@ use crate::settings::{FileError, Problem, Settings, read_toml};
 const SAME_M: f64 = 1e-6;
 
 impl Tunnel {
-    /// Reads and checks the text of a tunnel file. [`locate`](crate::settings::locate) finds the keys of the
-    /// problems in the text again.
+    /// Reads and checks the text of a tunnel file. [`locate`](crate::settings::locate) finds the
+    /// keys of the problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         Self::from_file(&read_toml(text)?)
     }

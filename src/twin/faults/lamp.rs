@@ -9,8 +9,8 @@ use crate::twin::lights::{LampChange, LampLight};
 use crate::twin::random::Stream;
 
 settings! {
-    /// A fault of some lamps. Which: those that have one of the numbers, stand in the stretch, and are
-    /// in the share drawn from these; where none of the three is given, all.
+    /// A fault of some lamps. Which: those that have one of the numbers, stand in the stretch, and
+    /// are in the share drawn from these; where none of the three is given, all.
     pub struct LampFaultSettings {
         /// Numbers of the lamps (the second part of their UID). Default: any.
         numbers: Option<Vec<u16>>;

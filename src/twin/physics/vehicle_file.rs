@@ -20,8 +20,8 @@ const SHIPPED: [(&str, &str); 3] = [
 ];
 
 settings! {
-    /// A vehicle file: one car. Heights are over top of rail with the car at rest; x is forward, y to
-    /// the left, z up.
+    /// A vehicle file: one car. Heights are over top of rail with the car at rest; x is forward, y
+    /// to the left, z up.
     pub struct VehicleFile {
         /// Name of the set.
         name: String;

@@ -358,8 +358,8 @@ where
 }
 
 settings! {
-    /// What survey and calibration of a wayside device got wrong: the true value less the calibrated
-    /// one. A lidar in the same housing is off by the same.
+    /// What survey and calibration of a wayside device got wrong: the true value less the
+    /// calibrated one. A lidar in the same housing is off by the same.
     #[derive(Copy)]
     pub struct WaysideError {
         /// Focal length, mm.

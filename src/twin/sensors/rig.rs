@@ -110,8 +110,8 @@ settings! {
 }
 
 settings! {
-    /// By how much the right eye differs from the left, as the calibration sheet has it: its value less
-    /// the left eye's.
+    /// By how much the right eye differs from the left, as the calibration sheet has it: its value
+    /// less the left eye's.
     #[derive(Copy)]
     pub struct RightEye {
         /// Focal length, mm.

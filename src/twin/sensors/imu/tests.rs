@@ -2,7 +2,6 @@
 
 use super::*;
 use crate::bus::SimTime;
-use crate::settings::Settings;
 use nalgebra::{Isometry3, Translation3};
 
 /// A body that turns about the world's z with rate w + a t, its origin on a straight way.
@@ -112,25 +111,4 @@ fn ranges_are_those_of_the_part() {
     let (gyro, accel) = imu.measure(&Vector3::repeat(100.0), &Vector3::repeat(-1e4), 0.005);
     assert!((gyro.max().to_degrees() - 450.0).abs() < 1e-3);
     assert!((accel.min() / G_MPS2 + 18.0).abs() < 1e-6);
-}
-
-/// Every size has a bound: a negative one, or none at all, is named with its key.
-#[test]
-fn wrong_settings_are_named() {
-    let settings = ImuSettings {
-        gyro_skew_deg: -1.0,
-        accel_turn_on_mg: f64::NAN,
-        rate_hz: 2460.0,
-        ..ImuSettings::default()
-    };
-    let mut problems = Vec::new();
-    settings.check("imu", &mut problems);
-    let keys: Vec<_> = problems.iter().map(|p| p.key.as_str()).collect();
-    assert_eq!(
-        keys,
-        ["imu.rate_hz", "imu.gyro_skew_deg", "imu.accel_turn_on_mg"]
-    );
-    problems.clear();
-    ImuSettings::default().check("imu", &mut problems);
-    assert!(problems.is_empty(), "{problems:?}");
 }
