@@ -65,15 +65,9 @@ override OTHERS: bool = true;
 @group(0) @binding(5) var<uniform> blockers: array<Blocker, MAX_BLOCKERS>;
 @group(0) @binding(6) var<uniform> slabs: array<Slab, MAX_SLABS>;
 
-const MAX_WORDS: u32 = 16384u;
-const MAX_SOURCES: u32 = 128u;
-const MAX_BLOCKERS: u32 = 512u;
-const MAX_SLABS: u32 = 1024u;
-const PLACES: u32 = 16u;
 const ALL: u32 = 0xffffu;
 // Cosine and sine of the golden angle.
 const GOLDEN: vec2f = vec2f(-0.73736888, 0.67549029);
-const OFFSET_M: f32 = 1e-3;
 const FAR: f32 = 1e9;
 
 struct Varying {

@@ -1,9 +1,4 @@
-//! Constants of the image model that both renderers hold to, and the one place where the shaders
-//! get theirs from: [`wgsl`].
-
-use super::gloss::MIRROR_REACH_M;
-use crate::twin::lights::HEADLIGHT_RADIUS_M;
-use std::fmt::Write;
+//! Constants of the image model that both renderers hold to.
 
 /// A pixel sees no surface at a flatter angle than this sine (of the ray to the surface).
 pub const MIN_SINE: f64 = 0.05;
@@ -19,17 +14,3 @@ pub const FAINT_E: f64 = 1.5;
 pub const GLARE_STEP_PX: f64 = 4.0;
 /// Signals are followed up to this many times the full well.
 pub const SATURATION: f64 = 4.0;
-
-/// The constants that the shaders need, as WGSL declarations to stand in front of every shader.
-pub fn wgsl() -> String {
-    let mut text = String::from("// Written by twin/render/constants.rs.\n");
-    // Writing to a String cannot fail.
-    for (name, value) in [
-        ("GLARE_STEP_PX", GLARE_STEP_PX),
-        ("MIRROR_REACH_M", MIRROR_REACH_M),
-        ("HEADLIGHT_RADIUS_M", HEADLIGHT_RADIUS_M),
-    ] {
-        let _ = writeln!(text, "const {name}: f32 = {value:?};");
-    }
-    text
-}

@@ -9,9 +9,9 @@ use super::spread::Spread;
 use crate::twin::geometry::{Solid, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
-use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, Source};
+use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
 use crate::twin::render::image_bounds::ImageBounds;
-use crate::twin::render::photometry::{Shining, headlights_lx};
+use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
@@ -164,10 +164,10 @@ impl<'a> RowRays<'a> {
             let lamp = &scene.lit.lamps.lamps()[*k];
             let near = (lamp.centre - place).norm_squared() < MIRROR_REACH_M * MIRROR_REACH_M;
             let share = lamp.duty() * (1.0 + self.blinking.flicker[*k]);
-            near.then(|| Source::lamp(lamp, share, air, place))
+            near.then(|| MirroredLight::lamp(lamp, share, air, place))
         });
         let headlights = self.context.job.headlights.iter();
-        let headlights = headlights.map(|light| Source::headlight(light, air, place));
+        let headlights = headlights.map(|light| MirroredLight::headlight(light, air, place));
         lamps
             .chain(headlights)
             .map(|source| gloss.luminance_cd_m2(&facing, &to_eye, &source))
@@ -200,7 +200,7 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    pub fn luminances(&self, lamps: &[&Shining], spread: &Spread, buffers: &mut RowBuffers) {
+    pub fn luminances(&self, lamps: &[&BlinkingLamp], spread: &Spread, buffers: &mut RowBuffers) {
         self.draw_tunnel(buffers);
         let view = self.view;
         for blocker in &self.blockers {

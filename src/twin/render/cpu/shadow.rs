@@ -10,25 +10,25 @@ use super::cast_scene::CastScene;
 use crate::twin::geometry::{Body, Solid};
 use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
 use crate::twin::render::constants::SIGHT_M;
-use crate::twin::render::disc::disc_places;
-use crate::twin::render::photometry::{LAMP_REACH_M, OFFSET_M, Shining};
+use crate::twin::render::disc::{DISC_PLACES, disc_places};
+use crate::twin::render::photometry::{BlinkingLamp, LAMP_REACH_M, OFFSET_M};
 use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
 
 /// A light with the places on its disc.
-pub(super) struct Source<'a> {
+pub(super) struct ShadowLight<'a> {
     kind: Kind<'a>,
     centre: Point3<f64>,
     axis: Vector3<f64>,
     radius_m: f64,
     reach_m: f64,
-    places: [Point3<f64>; 16],
+    places: [Point3<f64>; DISC_PLACES],
 }
 
 enum Kind<'a> {
-    Lamp(&'a Shining),
+    Lamp(&'a BlinkingLamp),
     Headlight(&'a Headlight),
 }
 
@@ -42,7 +42,7 @@ pub(super) struct Blocker<'a> {
 /// The lights and bodies of a job that may make shadows in a view.
 #[derive(Default)]
 pub(super) struct Shades<'a> {
-    sources: Vec<Source<'a>>,
+    sources: Vec<ShadowLight<'a>>,
     bodies: Vec<(&'a Body, f64)>,
     first_segment: usize,
     /// What falls on segment k of those in sight: `falling[begins[k]..begins[k + 1]]`.
@@ -72,8 +72,8 @@ struct Shadow {
     nearest_m: f64,
 }
 
-impl<'a> Source<'a> {
-    pub fn lamp(lamp: &'a Shining) -> Self {
+impl<'a> ShadowLight<'a> {
+    pub fn lamp(lamp: &'a BlinkingLamp) -> Self {
         let (axis, radius_m) = (lamp.facing.into_inner(), lamp.radius_m);
         let kind = Kind::Lamp(lamp);
         Self::new(kind, lamp.centre, axis, radius_m, LAMP_REACH_M)
@@ -153,7 +153,7 @@ impl<'a> Blocker<'a> {
     }
 
     /// Whether the ball around it reaches into the cone from a point to a light's disc.
-    fn may_hide(&self, from: &Point3<f64>, source: &Source<'_>) -> bool {
+    fn may_hide(&self, from: &Point3<f64>, source: &ShadowLight<'_>) -> bool {
         let (to, off) = (source.centre - from, self.centre - from);
         let share = (off.dot(&to) / to.norm_squared()).clamp(0.0, 1.0);
         let reach = self.radius_m + source.radius_m * share;
@@ -169,8 +169,8 @@ impl<'a> Shades<'a> {
         }
         let in_sight = scene.tunnel.segments_about(segment, SIGHT_M);
         let bodies: Vec<_> = job.bodies.iter().map(|b| (b, ball_m(b))).collect();
-        let lamps = scene.lit.lamps.lamps().iter().map(Source::lamp);
-        let headlights = job.headlights.iter().map(Source::headlight);
+        let lamps = scene.lit.lamps.lamps().iter().map(ShadowLight::lamp);
+        let headlights = job.headlights.iter().map(ShadowLight::headlight);
         let sources: Vec<_> = lamps.chain(headlights).collect();
         let shadows = shadows(&sources, &bodies, job, view);
         let mut shades = Self {
@@ -276,7 +276,7 @@ impl<'a> Shades<'a> {
 
 impl Shadow {
     /// Whether the shadow of its ball may meet another, whose centre is `to` away from the light.
-    fn may_fall_on(&self, to: &Vector3<f64>, radius_m: f64, source: &Source<'_>) -> bool {
+    fn may_fall_on(&self, to: &Vector3<f64>, radius_m: f64, source: &ShadowLight<'_>) -> bool {
         let distance = to.norm();
         distance - radius_m < source.reach_m
             && distance + radius_m > self.nearest_m
@@ -286,7 +286,12 @@ impl Shadow {
 }
 
 /// All bodies that are in the light of something, wherever they go while a view is exposed.
-fn shadows(sources: &[Source<'_>], bodies: &[(&Body, f64)], job: &Job, view: &View) -> Vec<Shadow> {
+fn shadows(
+    sources: &[ShadowLight<'_>],
+    bodies: &[(&Body, f64)],
+    job: &Job,
+    view: &View,
+) -> Vec<Shadow> {
     let shutter = &view.camera.shutter;
     let last_row = f64::from(view.camera.intrinsics.height_px.saturating_sub(1));
     let ends = [0.0, last_row].map(|row| shutter.row_mid(view.start, row).since(job.time));

@@ -54,6 +54,7 @@ mod mesh;
 mod passes;
 mod pipeline;
 mod render_pass;
+mod shaders;
 mod shadows;
 mod smear;
 mod spread;
@@ -65,7 +66,7 @@ mod view;
 mod view_buffers;
 
 pub use adapter::adapters;
-pub use pipeline::shader_source;
+pub use shaders::shader_source;
 
 use super::lit_scene::LitScene;
 use super::pixel_map::{MapCache, MapKey};
@@ -88,9 +89,6 @@ use target::{ReadBack, Target};
 use textures::Textures;
 use view::Framed;
 use view_buffers::{ViewBuffers, ViewData};
-
-/// Largest number in half precision.
-const BRIGHTEST_E: f64 = 65_504.0;
 
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
 pub struct GpuRenderer {
@@ -225,7 +223,7 @@ impl GpuRenderer {
         let beyond_m = std::f64::consts::SQRT_2 * chunks::AHEAD_M;
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         let data = ViewData {
-            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
+            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(layout::BRIGHTEST_E),
             constants,
             poses: &view.poses,
             list: &view.list,

@@ -1,8 +1,8 @@
-//! Shaders and the pipelines made of them.
+//! The pipelines of the passes.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
+use super::shaders::shader_source;
 use crate::twin::render::sensor::BLOOMING_REACH;
-use crate::twin::render::{constants, pixel_map};
 use std::mem::{offset_of, size_of};
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -14,44 +14,6 @@ pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Four raw pixels a texel.
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
-
-/// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 10] = [
-    ("common", include_str!("../../../../shaders/common.wgsl")),
-    ("rows", include_str!("../../../../shaders/rows.wgsl")),
-    (
-        "background",
-        include_str!("../../../../shaders/background.wgsl"),
-    ),
-    ("gloss", include_str!("../../../../shaders/gloss.wgsl")),
-    ("blend", include_str!("../../../../shaders/blend.wgsl")),
-    ("focus", include_str!("../../../../shaders/focus.wgsl")),
-    ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
-    ("glare", include_str!("../../../../shaders/glare.wgsl")),
-    ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
-    ("shadows", include_str!("../../../../shaders/shadows.wgsl")),
-];
-
-/// The complete source of `shaders/<name>.wgsl`: constants, what it shares with others, and the file.
-pub fn shader_source(name: &str) -> Option<String> {
-    let text = |name: &str| {
-        FILES
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, text)| *text)
-    };
-    let before: &[&str] = match name {
-        "common" => &[],
-        "background" | "gloss" => &["common", "rows"],
-        _ => &["common"],
-    };
-    let mut source = constants::wgsl() + &pixel_map::wgsl();
-    for shared in before {
-        source.push_str(text(shared)?);
-    }
-    source.push_str(text(name)?);
-    Some(source)
-}
 
 /// Tunnel and bodies.
 #[derive(Clone)]

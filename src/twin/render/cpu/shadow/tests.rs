@@ -19,11 +19,11 @@ fn headlight() -> Headlight {
 }
 
 /// A lamp of 0.25 m at (0, 0, 5) that looks down.
-fn lamp() -> Shining {
+fn lamp() -> BlinkingLamp {
     let mut lamp = sample::scene().lamps.remove(0);
     lamp.centre = Point3::new(0.0, 0.0, 5.0);
     lamp.facing = -Vector3::z_axis();
-    Shining::new(lamp)
+    BlinkingLamp::new(lamp)
 }
 
 fn body(shape: Shape, at: Point3<f64>) -> Body {
@@ -36,7 +36,7 @@ fn body(shape: Shape, at: Point3<f64>) -> Body {
     }
 }
 
-fn share_at(source: &Source<'_>, x_m: f64, bodies: &[Body]) -> f64 {
+fn share_at(source: &ShadowLight<'_>, x_m: f64, bodies: &[Body]) -> f64 {
     let blockers: Vec<_> = (bodies.iter())
         .map(|b| Blocker::at(b, ball_m(b), 0.0))
         .collect();
@@ -63,7 +63,7 @@ fn covered(big: f64, r: f64, d: f64) -> f64 {
 #[test]
 fn a_sphere_hides_the_lens_of_two_circles() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     for radius_m in [0.03, 0.06, 0.2] {
         let ball = [body(Shape::Sphere(radius_m), Point3::new(0.0, 0.0, 2.0))];
         let (mut worst, mut bias, mut edges) = (0.0f64, 0.0, 0);
@@ -88,7 +88,7 @@ fn a_sphere_hides_the_lens_of_two_circles() {
 #[test]
 fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     // Its edge is at x = 0; everything beyond is covered.
     let board = [body(
         Shape::Box(Vector3::new(3.0, 3.0, 0.01)),
@@ -115,7 +115,7 @@ fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
 #[test]
 fn bodies_do_not_shade_their_own_lit_side() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     for shape in [
         Shape::Sphere(0.5),
         Shape::Box(Vector3::new(0.4, 0.3, 0.5)),
@@ -158,7 +158,7 @@ fn a_train_throws_no_shadow_by_its_own_light() {
         ..body(shape, at)
     };
     let headlight = headlight();
-    let sources = [Source::headlight(&headlight)];
+    let sources = [ShadowLight::headlight(&headlight)];
     let thrown =
         |body: &Body| shadows(&sources, &[(body, ball_m(body))], &job, &job.views[0]).len();
     let car = moving(
