@@ -1,5 +1,5 @@
 // Shadows of bodies, laid over the finished background: a factor on the light of every pixel in the
-// tiles where some may fall. What is hidden is defined in twin/render/light.rs: straight lines from
+// tiles where some may fall. What is hidden is defined in twin/render/photometry.rs: straight lines from
 // the surface to 16 places on a light's disc, cut by a body or not.
 
 struct Corner {
@@ -223,7 +223,7 @@ fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -
     return mask;
 }
 
-// Illuminance by a light: twin/render/light.rs.
+// Illuminance by a light: twin/render/photometry.rs.
 fn irradiance_lx(p: vec3f, n: vec3f, source: Source) -> f32 {
     let d = p - source.position_m;
     let square = max(dot(d, d), 1e-4);

@@ -139,7 +139,7 @@ impl CpuRenderer {
         let kept = still.then(|| self.keep(&view.camera, pose));
         let lamps = self.scene.lamps_by_distance(&pose);
         let segment = (self.scene.tunnel).segment_of(&Point3::from(pose.translation.vector), None);
-        let context = ViewContext::new(&self.scene, job, view, segment);
+        let context = ViewContext::new(&self.scene, job, view, segment, !self.every_ray);
         let corners = |row: &RowExposure, corners: &mut [f64]| {
             RowRays::new(&self.scene, &context, view, row, KnownTunnel::Unknown).corners(corners);
         };

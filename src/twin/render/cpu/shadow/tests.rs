@@ -1,10 +1,13 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+use super::lists::shadows;
 use super::*;
 use crate::bus::SimTime;
 use crate::twin::geometry::Shape;
+use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::sample;
 use nalgebra::{Isometry3, UnitQuaternion};
+use std::f64::consts::PI;
 
 /// A headlight at (0, 0, 5) that looks down.
 fn headlight() -> Headlight {
@@ -193,7 +196,8 @@ fn segments_know_every_shadow_that_falls_on_them() {
     let eye = Point3::from(pose.translation.vector);
     let caster = &renderer.scene.tunnel;
     let segment = caster.segment_of(&eye, None);
-    let shades = Shades::new(&renderer.scene, &job, view, segment);
+    let [quick, oracle] =
+        [true, false].map(|quick| BodyShadows::new(&renderer.scene, &job, view, segment, quick));
     let (mut shaded, mut lights) = (0, 0);
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
@@ -203,21 +207,20 @@ fn segments_know_every_shadow_that_falls_on_them() {
         };
         let at = caster.surface_at(&eye, &ray, &hit);
         let after_s = view.camera.shutter.row_mid(view.start, v).since(job.time);
-        let blockers = shades.blockers(after_s);
-        let seen = shades.hidden_lx(
-            hit.segment as usize,
-            (&at.position, &at.normal),
-            (&blockers, &Blinking::default()),
-            &renderer.scene,
-        );
-        let all = shades.sources.iter().map(|source| {
-            let lux = source.irradiance_lx(&at.position, &at.normal);
-            lux * source.hidden_share(&at.position, &at.normal, blockers.iter())
-        });
-        let all: f64 = all.sum();
-        assert!((seen - all).abs() < 1e-9, "{u} {v}: {seen} {all}");
+        let blockers = oracle.blockers(after_s);
+        let hidden_lx = |shadows: &BodyShadows<'_>| {
+            shadows.hidden_lx(
+                hit.segment as usize,
+                (&at.position, &at.normal),
+                &blockers,
+                &Blinking::default(),
+            )
+        };
+        let (listed, all) = (hidden_lx(&quick), hidden_lx(&oracle));
+        assert!((listed - all).abs() < 1e-9, "{u} {v}: {listed} {all}");
         shaded += usize::from(all > 0.0);
-        lights += shades.falling_on(hit.segment as usize).len();
+        let lists = quick.lists.as_ref().unwrap();
+        lights += lists.falling_on(hit.segment as usize).count();
     }
     assert!(shaded > 50, "{shaded}");
     // And are spared the rest of 61 lights.
