@@ -6,6 +6,8 @@ pub const MIN_SINE: f64 = 0.05;
 pub const SIGHT_M: f64 = 160.0;
 /// Lamps are seen up to this distance.
 pub const LAMP_SIGHT_M: f64 = 80.0;
+/// Surfaces nearer than a lamp's disc by less than this do not hide it: it may be flush with its wall.
+pub const FLUSH_M: f64 = 0.01;
 /// Reflectance of a lamp's disc while it is off.
 pub const DARK_DISC_ALBEDO: f64 = 0.3;
 /// Glare of a lamp is followed to where a part of it has fallen to this many electrons.

@@ -21,7 +21,6 @@ use super::{Pattern, View};
 use crate::bus::Intrinsics;
 use crate::twin::random::{Stream, pcg4d};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 /// Step of the gain: 16 bits reach from 0 to 2.
@@ -33,8 +32,8 @@ pub const HOT: u32 = 1 << 16;
 /// The level lies above this many bits.
 pub const LEVEL_SHIFT: u32 = 17;
 const LEVEL_MAX: f64 = 16_383.0;
-/// Cameras whose maps are kept.
-const KEPT: usize = 8;
+/// Cameras whose maps a renderer keeps.
+pub const KEPT_MAPS: usize = 8;
 
 /// All that a map depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,7 +63,7 @@ impl MapKey {
     }
 
     /// Makes the map.
-    fn make_map(&self) -> PixelMap {
+    pub fn make_map(&self) -> PixelMap {
         let camera = &self.camera;
         let shade = Shade::new(&self.lens, camera, branch(self.stream, 1));
         let pixels = branch(self.stream, 2);
@@ -143,34 +142,6 @@ impl Dark {
             self.hot_step_e
         };
         signal_e * gain + self.base_e + level * step_e
-    }
-}
-
-/// What a renderer makes of the maps of the cameras that it has drawn lately.
-pub struct MapCache<T> {
-    kept: VecDeque<(MapKey, T)>,
-}
-
-impl<T> Default for MapCache<T> {
-    fn default() -> Self {
-        Self {
-            kept: VecDeque::new(),
-        }
-    }
-}
-
-impl<T: Clone> MapCache<T> {
-    /// What belongs to a camera, made now if it is new.
-    pub fn get(&mut self, key: MapKey, make: impl FnOnce(PixelMap) -> T) -> T {
-        if let Some((_, made)) = self.kept.iter().find(|(k, _)| *k == key) {
-            return made.clone();
-        }
-        if self.kept.len() >= KEPT {
-            self.kept.pop_front();
-        }
-        let made = make(key.make_map());
-        self.kept.push_back((key, made.clone()));
-        made
     }
 }
 

@@ -8,7 +8,7 @@
 use super::spread::Spread;
 use crate::twin::lights::LampLight;
 use crate::twin::render::View;
-use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
+use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, FLUSH_M, LAMP_SIGHT_M};
 use crate::twin::render::photometry::BlinkingLamp;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::PI;
@@ -17,8 +17,6 @@ use std::f64::consts::PI;
 const STEP_PX: f64 = 0.1;
 /// Most instants of a slice.
 const MOST_INSTANTS: f64 = 256.0;
-/// Surfaces nearer than a disc by less than this do not hide it: it may be flush with its wall.
-const FLUSH_M: f64 = 0.01;
 /// Lamps that come nearer to the camera's plane than this are not drawn.
 const NEAREST_M: f64 = 0.1;
 /// A lens's distortion changes the size of a disc by no more than this factor.

@@ -68,8 +68,9 @@ mod view_buffers;
 pub use adapter::adapters;
 pub use shaders::shader_source;
 
+use super::cache::Cache;
 use super::lit_scene::LitScene;
-use super::pixel_map::{MapCache, MapKey};
+use super::pixel_map::{KEPT_MAPS, MapKey};
 use super::scene::{Job, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::Intrinsics;
@@ -98,7 +99,7 @@ pub struct GpuRenderer {
     chunks: Chunks,
     textures: Textures,
     bodies: BodyBuffers,
-    maps: MapCache<wgpu::TextureView>,
+    maps: Cache<MapKey, wgpu::TextureView>,
     views: Vec<Prepared>,
     targets: Vec<Target>,
     backdrops: Backdrops,
@@ -136,7 +137,7 @@ impl GpuRenderer {
             textures: Textures::new(&gpu, &scene.paintings),
             scene,
             bodies: BodyBuffers::new(&gpu),
-            maps: MapCache::default(),
+            maps: Cache::new(KEPT_MAPS),
             views: Vec::new(),
             targets: Vec::new(),
             backdrops: Backdrops::default(),
@@ -173,8 +174,8 @@ impl GpuRenderer {
         }
         buffers.draw_lamps(gpu, pipelines, encoder, target);
         buffers.draw_glare(gpu, pipelines, encoder, target);
-        let map = (self.maps).get(MapKey::new(framed.view), |map| {
-            target::map_texture(gpu, &map, target.size_px)
+        let map = (self.maps).get(MapKey::new(framed.view), |key| {
+            target::map_texture(gpu, &key.make_map(), target.size_px)
         });
         let develop = Develop {
             raw: job.raw,
@@ -182,7 +183,7 @@ impl GpuRenderer {
         };
         let sensor = pipelines.sensor(&gpu.device, develop);
         target.copy_signal(encoder);
-        buffers.draw_sensor(gpu, sensor, encoder, (target, &map), job.raw);
+        buffers.draw_sensor(gpu, sensor, encoder, (target, map), job.raw);
         let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
         let back = spare.map_or_else(
             || ReadBack::new(&gpu.device, target.size_px, job.raw),

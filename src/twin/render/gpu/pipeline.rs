@@ -78,47 +78,31 @@ impl Pipelines {
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
         let (focus, shadows) = (shader("focus"), shader("shadows"));
-        let flat = |shader, entries, target| {
-            let stage = Stage {
-                shader,
-                entries,
-                buffers: &[],
-                depth: None,
-                target,
-                constants: &[],
-            };
-            pipeline(device, stage)
+        let flat = |shader: &_, entries: [&str; 2], target, constants: &[(&str, f64)]| {
+            flat_pipeline(device, shader, entries, target, constants)
         };
+        let flags = [0.0, 1.0];
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Self {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             gloss: shader("gloss"),
-            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
-            focus: [false, true].map(|down| {
-                let stage = Stage {
-                    shader: &focus,
-                    entries: ["whole", "focus"],
-                    buffers: &[],
-                    depth: None,
-                    target: target(SIGNAL, None),
-                    constants: &[("DOWN", f64::from(u8::from(down)))],
-                };
-                pipeline(device, stage)
+            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
+            focus: flags.map(|down| {
+                let target = target(SIGNAL, None);
+                flat(&focus, ["whole", "focus"], target, &[("DOWN", down)])
             }),
-            shadows: [false, true].map(|others| {
-                let stage = Stage {
-                    shader: &shadows,
-                    entries: ["tile_corner", "shade"],
-                    buffers: &[],
-                    depth: None,
-                    target: target(SIGNAL, Some(FADE)),
-                    constants: &[("OTHERS", f64::from(u8::from(others)))],
-                };
-                pipeline(device, stage)
+            shadows: flags.map(|others| {
+                let target = target(SIGNAL, Some(FADE));
+                flat(
+                    &shadows,
+                    ["tile_corner", "shade"],
+                    target,
+                    &[("OTHERS", others)],
+                )
             }),
-            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
-            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over)),
+            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over), &[]),
+            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over), &[]),
             sensors: [const { None }; 4],
             sensor: shader("sensor"),
         }
@@ -155,17 +139,30 @@ impl Pipelines {
                 ("develop", PACKED)
             };
             let reach = if develop.blooming { BLOOMING_REACH } else { 0 };
-            let stage = Stage {
-                shader: &self.sensor,
-                entries: ["whole", entry],
-                buffers: &[],
-                depth: None,
-                target: target(format, None),
-                constants: &[("BLOOMING_REACH", reach as f64)],
-            };
-            pipeline(device, stage)
+            let reach = [("BLOOMING_REACH", reach as f64)];
+            let target = target(format, None);
+            flat_pipeline(device, &self.sensor, ["whole", entry], target, &reach)
         })
     }
+}
+
+/// Draws rectangles, without buffers or depth.
+fn flat_pipeline(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    entries: [&str; 2],
+    target: wgpu::ColorTargetState,
+    constants: &[(&str, f64)],
+) -> wgpu::RenderPipeline {
+    let stage = Stage {
+        shader,
+        entries,
+        buffers: &[],
+        depth: None,
+        target,
+        constants,
+    };
+    pipeline(device, stage)
 }
 
 /// Draws surfaces into the depth buffer, or adds to those that are there.
@@ -214,43 +211,26 @@ fn surface(
 }
 
 /// The source's share is the blend constant, the rest is what was there.
-const SHARE: wgpu::BlendState = {
-    let mix = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::Constant,
-        dst_factor: wgpu::BlendFactor::OneMinusConstant,
-        operation: wgpu::BlendOperation::Add,
-    };
-    wgpu::BlendState {
-        color: mix,
-        alpha: mix,
-    }
-};
-
+const SHARE: wgpu::BlendState = sum_of(
+    wgpu::BlendFactor::Constant,
+    wgpu::BlendFactor::OneMinusConstant,
+);
 /// Adds the source times the blend constant.
-const ADD: wgpu::BlendState = {
-    let add = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::Constant,
-        dst_factor: wgpu::BlendFactor::One,
-        operation: wgpu::BlendOperation::Add,
-    };
-    wgpu::BlendState {
-        color: add,
-        alpha: add,
-    }
-};
-
+const ADD: wgpu::BlendState = sum_of(wgpu::BlendFactor::Constant, wgpu::BlendFactor::One);
 /// Keeps the share in the alpha of what is there, and adds the source.
-const FADE: wgpu::BlendState = {
-    let fade = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::One,
-        dst_factor: wgpu::BlendFactor::SrcAlpha,
+const FADE: wgpu::BlendState = sum_of(wgpu::BlendFactor::One, wgpu::BlendFactor::SrcAlpha);
+
+const fn sum_of(src_factor: wgpu::BlendFactor, dst_factor: wgpu::BlendFactor) -> wgpu::BlendState {
+    let sum = wgpu::BlendComponent {
+        src_factor,
+        dst_factor,
         operation: wgpu::BlendOperation::Add,
     };
     wgpu::BlendState {
-        color: fade,
-        alpha: fade,
+        color: sum,
+        alpha: sum,
     }
-};
+}
 
 const fn attribute(
     format: wgpu::VertexFormat,
