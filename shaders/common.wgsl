@@ -1,12 +1,7 @@
 // What every shader shares: the view, and the hash. Prepended to each of the other files, after
-// the constants written by twin/render/surface.rs.
+// the constants written by twin/render/gpu/shaders.rs.
 
 const PI: f32 = 3.14159265;
-// Depth is reversed: 1 at this optical depth, 0 at infinity.
-const NEAR_M: f32 = 0.05;
-// The largest number of half precision, in which signals are kept.
-const BRIGHTEST_E: f32 = 65504.0;
-const MAX_HEADLIGHTS: u32 = 16u;
 
 struct Headlight {
     // Relative to the view's reference point.

@@ -1,5 +1,5 @@
 // Shadows of bodies, laid over the finished background: a factor on the light of every pixel in the
-// tiles where some may fall. What is hidden is defined in twin/render/light.rs: straight lines from
+// tiles where some may fall. What is hidden is defined in twin/render/photometry.rs: straight lines from
 // the surface to 16 places on a light's disc, cut by a body or not.
 
 struct Corner {
@@ -65,15 +65,9 @@ override OTHERS: bool = true;
 @group(0) @binding(5) var<uniform> blockers: array<Blocker, MAX_BLOCKERS>;
 @group(0) @binding(6) var<uniform> slabs: array<Slab, MAX_SLABS>;
 
-const MAX_WORDS: u32 = 16384u;
-const MAX_SOURCES: u32 = 136u;
-const MAX_BLOCKERS: u32 = 512u;
-const MAX_SLABS: u32 = 1024u;
-const PLACES: u32 = 16u;
 const ALL: u32 = 0xffffu;
 // Cosine and sine of the golden angle.
 const GOLDEN: vec2f = vec2f(-0.73736888, 0.67549029);
-const OFFSET_M: f32 = 1e-3;
 const FAR: f32 = 1e9;
 
 struct Varying {
@@ -229,7 +223,7 @@ fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -
     return mask;
 }
 
-// Illuminance by a light: twin/render/light.rs.
+// Illuminance by a light: twin/render/photometry.rs.
 fn irradiance_lx(p: vec3f, n: vec3f, source: Source) -> f32 {
     let d = p - source.position_m;
     let square = max(dot(d, d), 1e-4);

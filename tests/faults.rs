@@ -8,6 +8,9 @@
     reason = "a test fails by panicking"
 )]
 
+mod common;
+
+use common::{Make, cpu, gpu};
 use metrotwin::bus::{CameraFault, Content, DangerLevel, Intrinsics, Node, SimTime};
 use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{
@@ -17,8 +20,6 @@ use metrotwin::settings::read_toml;
 use metrotwin::track::Tunnel;
 use metrotwin::twin::faults::{FaultSettings, age};
 use metrotwin::twin::lights::LampLight;
-use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{Job, Renderer, Scene, sample};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -310,7 +311,7 @@ fn draw(renderer: &mut dyn Renderer, time_s: f64) -> image::GrayImage {
 
 /// A lamp that fails during a run darkens its disc and what it lit, as if it had never been lit; one
 /// that comes back is as good as new. Fails where light that was computed before is kept.
-fn lamps_fail_in_time(new: &dyn Fn(Scene) -> Box<dyn Renderer>) {
+fn lamps_fail_in_time(new: Make) {
     let good = draw(new(lamps("")).as_mut(), 0.0);
     let out = "lamps = [{ share = 0.5, fault = { kind = 'dead' } }]";
     let dark = draw(new(lamps(out)).as_mut(), 0.0);
@@ -325,14 +326,12 @@ fn lamps_fail_in_time(new: &dyn Fn(Scene) -> Box<dyn Renderer>) {
 
 #[test]
 fn lamps_fail_in_time_in_the_plain_renderer() {
-    lamps_fail_in_time(&|scene| Box::new(CpuRenderer::oracle(scene)));
+    lamps_fail_in_time(cpu);
 }
 
 #[test]
 fn lamps_fail_in_time_on_the_gpu() {
-    lamps_fail_in_time(&|scene| {
-        Box::new(GpuRenderer::new(scene).expect("install a Vulkan driver: mesa-vulkan-drivers"))
-    });
+    lamps_fail_in_time(gpu);
 }
 
 /// Half the light is half the light: of all lamps dimmed to one half, ambient light left out, every
@@ -346,9 +345,9 @@ fn dim_lamps_give_as_much_less() {
         scene.tunnel = tunnel.into();
         scene
     };
-    let whole = draw(&mut CpuRenderer::oracle(scene("")), 0.0);
+    let whole = draw(cpu(scene("")).as_mut(), 0.0);
     let text = "lamps = [{ fault = { kind = 'dim', level = 0.5 } }]";
-    let half = draw(&mut CpuRenderer::oracle(scene(text)), 0.0);
+    let half = draw(cpu(scene(text)).as_mut(), 0.0);
     let black = sample::wayside_job(&sample::tunnel(), 100.0).views[0]
         .sensor
         .black_level_grey;

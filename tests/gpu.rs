@@ -9,7 +9,7 @@
 
 mod common;
 
-use common::{dark_scene, draw, gpu};
+use common::{dark_scene, draw, gpu, quick};
 use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
@@ -17,7 +17,7 @@ use metrotwin::twin::air::Air;
 use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{Job, Pattern, Renderer, Scene, SensorSettings, View, sample};
+use metrotwin::twin::render::{Job, Pattern, SensorSettings, View, sample};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
@@ -200,44 +200,6 @@ fn moving_bodies_are_where_they_belong() {
     balls_are_in_place(view, centre, along * -SPEED_MPS, "passing ball");
 }
 
-/// Provokes stripes shifted by a row, wrong chips, lost precision late in a run.
-#[test]
-fn stripes_are_the_waveform() {
-    for start_s in [0.0, 3600.0] {
-        let mut lamp = sample::scene().lamps[10].clone();
-        let mut view = sample::rig_view(&sample::tunnel(), 102.0, 0.0);
-        view.start = SimTime::from_secs(start_s);
-        plain(&mut view, lamp.luminance_cd_m2);
-        lamp.waveform.phase_s = 0.000_123;
-        let pose = view.motion.poses[0].inverse();
-        let lens = view.camera.intrinsics;
-        let c = pose * lamp.centre;
-        let pixel = lens.project(&c).unwrap();
-        let n = pose.rotation * lamp.facing.into_inner();
-        let exponent = lamp.exponent - 1.0;
-        let shutter = view.camera.shutter;
-        let waveform = lamp.waveform;
-        let job = Job {
-            views: vec![view.clone()],
-            ..Job::default()
-        };
-        let image = &draw(&mut *gpu(dark_scene(vec![lamp])), &job)[0];
-        let (column, middle) = (pixel.x.round() as u32, pixel.y.round() as u32);
-        let mut levels = (0, 0);
-        for row in middle - 20..=middle + 20 {
-            let open = shutter.row_open(view.start, f64::from(row)).secs();
-            let share = waveform.on_share(open, open + shutter.exposure_s);
-            let ray = lens.ray(f64::from(column), f64::from(row)).normalize();
-            let right = 200.0 * (-n.dot(&ray)).powf(exponent) * share;
-            let found = f64::from(image.get_pixel(column, row)[0]);
-            assert!((found - right).abs() < 0.7, "row {row}: {found} {right}");
-            levels.0 += u32::from(share < 0.01);
-            levels.1 += u32::from(share > 0.99);
-        }
-        assert!(levels.0 > 5 && levels.1 > 5, "no stripes: {levels:?}");
-    }
-}
-
 /// Provokes anything that depends on time, order or what was drawn before.
 #[test]
 fn same_job_same_bytes() {
@@ -305,57 +267,6 @@ fn a_flooded_deep_well_is_white() {
     assert!(white > 1000 && 100 * grey < white, "{grey} of {white}");
 }
 
-/// Provokes noise of the wrong size, a pattern in it, and the same noise in every frame.
-#[test]
-fn noise_is_that_of_the_sensor() {
-    let mut view = sample::rig_view(&sample::tunnel(), 100.0, 0.0);
-    view.lens.halo_share = 0.0;
-    view.lens.vignetting = 0.0;
-    even(&mut view.sensor);
-    let luminance_cd_m2 = 100.0 / view.grey_per_cd_m2();
-    let eye = view.motion.poses[0];
-    let around = Body {
-        shape: Shape::Box(Vector3::repeat(3.0)),
-        luminance_cd_m2,
-        ..ball(Point3::from(eye.translation.vector), Vector3::zeros())
-    };
-    let job = Job {
-        bodies: vec![around],
-        views: vec![view.clone(), view.clone()],
-        ..Job::default()
-    };
-    let mut job = job;
-    job.views[1].noise.frame = 1;
-    let images = draw(&mut *gpu(dark_scene(Vec::new())), &job);
-    let sensor = view.sensor;
-    let mean = sensor.black_level_grey + 100.0;
-    let gain = sensor.grey_per_e();
-    let variance = 100.0 * gain + (gain * sensor.read_noise_e).powi(2) + 1.0 / 12.0;
-    let noise = |k: usize, x: u32, y: u32| f64::from(images[k].get_pixel(x, y)[0]) - mean;
-    let (width, height) = images[0].dimensions();
-    let product = |k: usize, dx: u32, dy: u32, m: usize| {
-        let mut sum = 0.0;
-        for y in 0..height - dy {
-            for x in 0..width - dx {
-                sum += noise(k, x, y) * noise(m, x + dx, y + dy);
-            }
-        }
-        sum / f64::from((height - dy) * (width - dx))
-    };
-    // 0.9 million pixels: a mean is known to 0.0017 grey levels, a variance to 0.15 %, a
-    // correlation to 0.001; five times that is allowed.
-    let sum: f64 = images[0].pixels().map(|p| f64::from(p[0]) - mean).sum();
-    assert!((sum / f64::from(width * height)).abs() < 0.01);
-    assert!((product(0, 0, 0, 0) / variance - 1.0).abs() < 0.01);
-    for (dx, dy) in [(1, 0), (2, 0), (3, 0), (4, 0), (0, 1), (1, 1)] {
-        assert!(
-            (product(0, dx, dy, 0) / variance).abs() < 0.006,
-            "{dx} {dy}"
-        );
-    }
-    assert!((product(0, 0, 0, 1) / variance).abs() < 0.006);
-}
-
 /// Provokes a panic instead of an error.
 #[test]
 fn collecting_nothing_is_an_error() {
@@ -388,8 +299,4 @@ fn another_scene_is_as_good_as_new() {
             assert!(equal, "{name} draws something of the first scene");
         }
     }
-}
-
-fn quick(scene: Scene) -> Box<dyn Renderer> {
-    Box::new(CpuRenderer::quick(scene))
 }

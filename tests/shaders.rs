@@ -7,7 +7,6 @@
 )]
 #![cfg(feature = "twin")]
 
-use metrotwin::twin::render::constants;
 use metrotwin::twin::render::gpu::{layout, shader_source};
 use std::mem::{offset_of, size_of};
 
@@ -25,7 +24,8 @@ fn parse(name: &str) -> naga::Module {
     module
 }
 
-/// Provokes a shader that only a GPU would refuse, and one that no pass uses.
+/// Provokes a shader that only a GPU would refuse, one that no pass uses, and one that declares a
+/// constant again that Rust writes.
 #[test]
 fn every_file_validates() {
     let mut files = 0;
@@ -36,44 +36,6 @@ fn every_file_validates() {
         files += 1;
     }
     assert!(files > 0, "no shaders found");
-}
-
-/// Provokes a constant that a shader spells out with a value of its own.
-#[test]
-fn constants_have_one_source() {
-    for (file, name, ours) in [
-        ("common", "MAX_HEADLIGHTS", layout::MAX_HEADLIGHTS),
-        ("shadows", "MAX_WORDS", layout::MAX_WORDS),
-        ("shadows", "MAX_SOURCES", layout::MAX_SOURCES),
-        ("shadows", "MAX_BLOCKERS", layout::MAX_BLOCKERS),
-        ("shadows", "MAX_SLABS", layout::MAX_SLABS),
-    ] {
-        assert_eq!(constant(file, name), ours as u32, "{name}");
-    }
-    let from_rust = constants::wgsl();
-    for name in ["GLARE_STEP_PX"] {
-        assert!(from_rust.contains(&format!("const {name}")));
-        for file in ["common", "background", "blend", "lamps", "glare", "sensor"] {
-            let times = shader_source(file)
-                .unwrap()
-                .matches(&format!("const {name}"))
-                .count();
-            assert_eq!(times, 1, "{name} in {file}");
-        }
-    }
-}
-
-fn constant(file: &str, name: &str) -> u32 {
-    let module = parse(file);
-    let (_, c) = module
-        .constants
-        .iter()
-        .find(|(_, c)| c.name.as_deref() == Some(name))
-        .unwrap();
-    match module.global_expressions[c.init] {
-        naga::Expression::Literal(naga::Literal::U32(x)) => x,
-        ref other => panic!("{name}: {other:?}"),
-    }
 }
 
 /// Holds a struct of a shader against a list of (member, offset) and a size.

@@ -16,7 +16,7 @@ use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
 use metrotwin::twin::geometry::{Body, Hull, Shape};
 use metrotwin::twin::lights::Headlight;
-use metrotwin::twin::render::photometry::Shining;
+use metrotwin::twin::render::photometry::BlinkingLamp;
 use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::f64::consts::PI;
@@ -133,7 +133,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
             continue;
         }
         let p = foot * at;
-        let lamp_lx = Shining::new(lamp.clone()).irradiance_lx(&p, &Vector3::z());
+        let lamp_lx = BlinkingLamp::new(lamp.clone()).irradiance_lx(&p, &Vector3::z());
         let ambient = scene.tunnel.ambient_lx / (scene.tunnel.ambient_lx + lamp_lx);
         let hidden = (1.0 - left / light) / (1.0 - ambient);
         // A pixel of two millimetres, and places that do not reach the rim of the disc.

@@ -26,6 +26,11 @@ pub fn cpu(scene: Scene) -> Box<dyn Renderer> {
     Box::new(CpuRenderer::oracle(scene))
 }
 
+/// The plain renderer with few rays where it is dark.
+pub fn quick(scene: Scene) -> Box<dyn Renderer> {
+    Box::new(CpuRenderer::quick(scene))
+}
+
 /// The renderer on the graphics adapter, which must be there.
 pub fn gpu(scene: Scene) -> Box<dyn Renderer> {
     match GpuRenderer::new(scene) {

@@ -3,12 +3,19 @@
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 
-/// 16 places on a disc, each for a sixteenth of its area.
-pub fn disc_places(centre: &Point3<f64>, axis: &Vector3<f64>, radius_m: f64) -> [Point3<f64>; 16] {
-    let mut places = [*centre; 16];
+/// Places on a light's disc from which shadows are counted.
+pub const DISC_PLACES: usize = 16;
+
+/// Places on a light's disc, each for the same share of its area.
+pub fn disc_places(
+    centre: &Point3<f64>,
+    axis: &Vector3<f64>,
+    radius_m: f64,
+) -> [Point3<f64>; DISC_PLACES] {
+    let mut places = [*centre; DISC_PLACES];
     for (place, point) in places
         .iter_mut()
-        .zip(disc_points(centre, axis, radius_m, 16))
+        .zip(disc_points(centre, axis, radius_m, DISC_PLACES))
     {
         *place = point;
     }

@@ -71,7 +71,12 @@ impl Gloss {
     }
 
     /// Luminance that a surface mirrors of a source to an eye.
-    pub fn luminance_cd_m2(&self, facing: &Facing, to_eye: &Vector3<f64>, source: &Source) -> f64 {
+    pub fn luminance_cd_m2(
+        &self,
+        facing: &Facing,
+        to_eye: &Vector3<f64>,
+        source: &MirroredLight,
+    ) -> f64 {
         let distance_m = source.away.norm();
         if distance_m <= 1e-3 {
             return 0.0;
@@ -151,7 +156,7 @@ impl Facing {
 
 /// What is mirrored, from a place of the surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Source {
+pub struct MirroredLight {
     /// From the place to the source.
     pub away: Vector3<f64>,
     /// Towards the place, what the air takes on the way taken off.
@@ -160,7 +165,7 @@ pub struct Source {
     pub radius_m: f64,
 }
 
-impl Source {
+impl MirroredLight {
     /// A lamp from a place, with its light as a share of that of a good one that stays on.
     pub fn lamp(lamp: &LampLight, share: f64, air: &Air, place: &Point3<f64>) -> Self {
         let away = lamp.centre - place;
@@ -206,11 +211,11 @@ mod tests {
 
     /// Light mirrored to an eye, by the plain law for every point of the disc, without what the disc's
     /// size adds: 4,000 small sources.
-    fn by_points(gloss: &Gloss, to_eye: &Vector3<f64>, source: &Source) -> f64 {
+    fn by_points(gloss: &Gloss, to_eye: &Vector3<f64>, source: &MirroredLight) -> f64 {
         let axis = source.away.normalize();
         disc_points(&source.away.into(), &axis, source.radius_m, 4000)
             .map(|place| {
-                let point = Source {
+                let point = MirroredLight {
                     away: place.coords,
                     intensity_cd: source.intensity_cd / 4000.0,
                     radius_m: 0.0,
@@ -227,7 +232,7 @@ mod tests {
         let mut worst: f64 = 0.0;
         for gloss in [RAIL, WATER] {
             for (angle, distance_m) in [(0.5f64, 3.0), (1.0, 4.0), (1.3, 8.0)] {
-                let source = Source {
+                let source = MirroredLight {
                     away: Vector3::new(angle.sin(), 0.0, angle.cos()) * distance_m,
                     intensity_cd: 1000.0,
                     radius_m: 0.125,
@@ -273,7 +278,7 @@ mod tests {
         for (i, j) in (100..650).flat_map(|i| (-150..=150).map(move |j| (i, j))) {
             let place = Point3::new(step_m * f64::from(i), step_m * f64::from(j), 0.0);
             let to_eye = eye - place;
-            let source = Source {
+            let source = MirroredLight {
                 away: lamp - place,
                 intensity_cd,
                 radius_m,

@@ -14,7 +14,7 @@ const BEND: f64 = 0.1;
 #[derive(Clone, Copy)]
 pub enum ImageBounds {
     /// Behind the camera.
-    Beside,
+    Behind,
     /// In this rectangle.
     Around(Point2<f64>, Point2<f64>),
     /// Anywhere: a part of it is beside the camera.
@@ -26,7 +26,7 @@ impl ImageBounds {
     pub fn of(corners: [Point3<f64>; 8], camera: &Intrinsics, pose: &Isometry3<f64>) -> Self {
         let corners = corners.map(|c| pose.inverse_transform_point(&c));
         if corners.iter().all(|c| c.z <= 0.0) {
-            return Self::Beside;
+            return Self::Behind;
         }
         let mut low = Point2::new(f64::INFINITY, f64::INFINITY);
         let mut high = -low;
@@ -51,7 +51,7 @@ impl ImageBounds {
     /// Around both.
     pub fn with(self, other: Self) -> Self {
         match (self, other) {
-            (Self::Beside, one) | (one, Self::Beside) => one,
+            (Self::Behind, one) | (one, Self::Behind) => one,
             (Self::Around(a, b), Self::Around(c, d)) => Self::Around(a.inf(&c), b.sup(&d)),
             _ => Self::Everywhere,
         }
@@ -60,7 +60,7 @@ impl ImageBounds {
     /// Columns of row `v` in an image of that width.
     pub fn columns(&self, v: usize, width: usize) -> Range<usize> {
         match self {
-            Self::Beside => 0..0,
+            Self::Behind => 0..0,
             Self::Everywhere => 0..width,
             Self::Around(low, high) => {
                 if (v as f64) < low.y || v as f64 > high.y {

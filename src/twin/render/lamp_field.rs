@@ -1,6 +1,6 @@
 //! The lamps of a scene and their light at a place.
 
-use super::photometry::{LAMP_REACH_M, Shining};
+use super::photometry::{BlinkingLamp, LAMP_REACH_M};
 use crate::track::{TrackPoint, Tunnel};
 use crate::twin::air::Air;
 use crate::twin::lights::LampLight;
@@ -14,7 +14,7 @@ pub const AIRLIGHT_REACH_M: f64 = 20.0;
 /// The lamps of a scene, found by place: cells of a plan grid list the lamps that reach them.
 #[derive(Clone, Debug)]
 pub struct LampField {
-    lamps: Vec<Shining>,
+    lamps: Vec<BlinkingLamp>,
     air: Air,
     /// Cell and lamp, sorted, so that the lamps of a cell are one run.
     reach: Vec<((i32, i32), u32)>,
@@ -40,19 +40,19 @@ impl LampField {
         }
         reach.sort_unstable();
         Self {
-            lamps: lamps.iter().cloned().map(Shining::new).collect(),
+            lamps: lamps.iter().cloned().map(BlinkingLamp::new).collect(),
             air,
             reach,
         }
     }
 
     /// All lamps, in the order given.
-    pub fn lamps(&self) -> &[Shining] {
+    pub fn lamps(&self) -> &[BlinkingLamp] {
         &self.lamps
     }
 
     /// Those that may reach a place, in the order given.
-    pub fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = &Shining> {
+    pub fn near(&self, p: &Point3<f64>) -> impl Iterator<Item = &BlinkingLamp> {
         self.indices_near(p).map(|k| &self.lamps[k])
     }
 

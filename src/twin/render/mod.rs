@@ -1,6 +1,7 @@
 //! From the world to 8-bit images: a wgpu renderer, and a plain one beside it as oracle and
 //! fall-back. Both draw the same [`Scene`] through the same [`View`].
 
+mod cache;
 pub mod constants;
 pub mod cpu;
 pub mod disc;

@@ -56,13 +56,13 @@ pub const OFFSET_M: f64 = 1e-3;
 
 /// A lamp with its light in time worked out once: that takes longer than any use of it.
 #[derive(Clone, Debug)]
-pub struct Shining {
+pub struct BlinkingLamp {
     lamp: LampLight,
     curve: LightCurve,
     duty: f64,
 }
 
-impl Deref for Shining {
+impl Deref for BlinkingLamp {
     type Target = LampLight;
 
     fn deref(&self) -> &LampLight {
@@ -70,7 +70,7 @@ impl Deref for Shining {
     }
 }
 
-impl Shining {
+impl BlinkingLamp {
     /// Of a lamp.
     pub fn new(lamp: LampLight) -> Self {
         let curve = lamp.curve();
@@ -157,8 +157,8 @@ pub(super) mod tests {
     use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion};
     use std::f64::consts::{PI, TAU};
 
-    fn lamp(centre: Point3<f64>, facing: Vector3<f64>) -> Shining {
-        Shining::new(light(centre, facing))
+    fn lamp(centre: Point3<f64>, facing: Vector3<f64>) -> BlinkingLamp {
+        BlinkingLamp::new(light(centre, facing))
     }
 
     /// A lamp of the usual kind.

@@ -21,9 +21,7 @@ use super::{Pattern, View};
 use crate::bus::Intrinsics;
 use crate::twin::random::{Stream, pcg4d};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
-use std::fmt::Write;
 
 /// Step of the gain: 16 bits reach from 0 to 2.
 pub const GAIN_STEP: f64 = 1.0 / 32_768.0;
@@ -32,10 +30,10 @@ pub const LEVEL_STEP: f64 = 1.0 / 1024.0;
 /// Flags a hot pixel.
 pub const HOT: u32 = 1 << 16;
 /// The level lies above this many bits.
-const LEVEL_SHIFT: u32 = 17;
+pub const LEVEL_SHIFT: u32 = 17;
 const LEVEL_MAX: f64 = 16_383.0;
-/// Cameras whose maps are kept.
-const KEPT: usize = 8;
+/// Cameras whose maps a renderer keeps.
+pub const KEPT_MAPS: usize = 8;
 
 /// All that a map depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,8 +62,8 @@ impl MapKey {
         }
     }
 
-    /// Draws the map.
-    pub fn draw(&self) -> PixelMap {
+    /// Makes the map.
+    pub fn make_map(&self) -> PixelMap {
         let camera = &self.camera;
         let shade = Shade::new(&self.lens, camera, branch(self.stream, 1));
         let pixels = branch(self.stream, 2);
@@ -145,44 +143,6 @@ impl Dark {
         };
         signal_e * gain + self.base_e + level * step_e
     }
-}
-
-/// What a renderer makes of the maps of the cameras that it has drawn lately.
-pub struct MapCache<T> {
-    kept: VecDeque<(MapKey, T)>,
-}
-
-impl<T> Default for MapCache<T> {
-    fn default() -> Self {
-        Self {
-            kept: VecDeque::new(),
-        }
-    }
-}
-
-impl<T: Clone> MapCache<T> {
-    /// What belongs to a camera, made now if it is new.
-    pub fn get(&mut self, key: MapKey, make: impl FnOnce(PixelMap) -> T) -> T {
-        if let Some((_, made)) = self.kept.iter().find(|(k, _)| *k == key) {
-            return made.clone();
-        }
-        if self.kept.len() >= KEPT {
-            self.kept.pop_front();
-        }
-        let made = make(key.draw());
-        self.kept.push_back((key, made.clone()));
-        made
-    }
-}
-
-/// The constants that the shader needs to read a word.
-pub fn wgsl() -> String {
-    let mut text = String::from("// Written by twin/render/pixel_map.rs.\n");
-    // Writing to a String cannot fail.
-    let _ = writeln!(text, "const GAIN_STEP: f32 = {GAIN_STEP:?};");
-    let _ = writeln!(text, "const HOT: u32 = {HOT}u;");
-    let _ = writeln!(text, "const LEVEL_SHIFT: u32 = {LEVEL_SHIFT}u;");
-    text
 }
 
 /// A stream of its own for the same camera.

@@ -2,7 +2,7 @@
 
 use super::lamps::RowExposure;
 use crate::twin::render::View;
-use crate::twin::render::photometry::Shining;
+use crate::twin::render::photometry::BlinkingLamp;
 
 /// Light that changes by less than a level of 255 shows no bands.
 const BAND: f64 = 0.004;
@@ -18,14 +18,14 @@ pub(super) struct Blinking {
 
 impl Blinking {
     /// All lamps give their mean.
-    pub fn steady(lamps: &[Shining]) -> Self {
+    pub fn steady(lamps: &[BlinkingLamp]) -> Self {
         Self {
             flicker: vec![0.0; lamps.len()],
             shows: false,
         }
     }
 
-    pub fn new(lamps: &[Shining], asked: &[usize], view: &View, row: &RowExposure) -> Self {
+    pub fn new(lamps: &[BlinkingLamp], asked: &[usize], view: &View, row: &RowExposure) -> Self {
         let Self { mut flicker, .. } = Self::steady(lamps);
         for k in asked {
             let lamp = &lamps[*k];

@@ -6,7 +6,7 @@ use crate::twin::geometry::{SurfacePoint, TunnelCaster, TunnelHit};
 use crate::twin::render::constants::{LAMP_SIGHT_M, MIN_SINE, SIGHT_M};
 use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::lit_scene::LitScene;
-use crate::twin::render::photometry::Shining;
+use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::{Scene, View};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
@@ -79,7 +79,7 @@ impl CastScene {
             return Vec::new();
         };
         let reach_m = SIGHT_M + MIRROR_REACH_M;
-        let away_m = |lamp: &Shining| (lamp.centre.coords - pose.translation.vector).norm();
+        let away_m = |lamp: &BlinkingLamp| (lamp.centre.coords - pose.translation.vector).norm();
         let lamps = self.lit.lamps.lamps().iter().enumerate();
         lamps
             .filter(|(_, lamp)| away_m(lamp) < reach_m)
@@ -88,9 +88,9 @@ impl CastScene {
     }
 
     /// Lamps that may be seen, the farthest first so that nearer ones are drawn over them.
-    pub fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<&Shining> {
+    pub fn lamps_by_distance(&self, pose: &Isometry3<f64>) -> Vec<&BlinkingLamp> {
         let eye = Point3::from(pose.translation.vector);
-        let away = |lamp: &Shining| (lamp.centre - eye).norm();
+        let away = |lamp: &BlinkingLamp| (lamp.centre - eye).norm();
         // Through a frame a train moves by a few metres.
         let reach = LAMP_SIGHT_M + 20.0;
         let mut lamps: Vec<_> = self

@@ -8,8 +8,8 @@
 use super::spread::Spread;
 use crate::twin::lights::LampLight;
 use crate::twin::render::View;
-use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
-use crate::twin::render::photometry::Shining;
+use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, FLUSH_M, LAMP_SIGHT_M};
+use crate::twin::render::photometry::BlinkingLamp;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::PI;
 
@@ -17,8 +17,6 @@ use std::f64::consts::PI;
 const STEP_PX: f64 = 0.1;
 /// Most instants of a slice.
 const MOST_INSTANTS: f64 = 256.0;
-/// Surfaces nearer than a disc by less than this do not hide it: it may be flush with its wall.
-const FLUSH_M: f64 = 0.01;
 /// Lamps that come nearer to the camera's plane than this are not drawn.
 const NEAREST_M: f64 = 0.1;
 /// A lens's distortion changes the size of a disc by no more than this factor.
@@ -65,7 +63,7 @@ impl RowExposure {
     }
 
     /// Mean light of a lamp in a part of the slice.
-    pub fn light(&self, view: &View, lamp: &Shining, from: f64, to: f64) -> f64 {
+    pub fn light(&self, view: &View, lamp: &BlinkingLamp, from: f64, to: f64) -> f64 {
         let at = |share: f64| view.start.plus(self.open_s + share * self.span_s).secs();
         lamp.share(at(from), at(to))
     }
@@ -156,7 +154,7 @@ impl Passing<'_> {
 /// Puts the disc of a lamp over the row's luminances, where nothing is nearer than it at
 /// `depth_of(u)`.
 pub(super) fn draw_disc(
-    lamp: &Shining,
+    lamp: &BlinkingLamp,
     view: &View,
     spread: &Spread,
     row: &RowExposure,
@@ -228,7 +226,7 @@ fn disc_reach_px(view: &View, disc: &Disc) -> f64 {
 
 /// Adds the glare of a lamp to the row's luminances.
 pub(super) fn add_glare(
-    lamp: &Shining,
+    lamp: &BlinkingLamp,
     view: &View,
     row: &RowExposure,
     haze: Haze,

@@ -51,10 +51,11 @@ mod shadow;
 mod smear;
 mod spread;
 
-use super::pixel_map::{MapCache, MapKey, PixelMap};
+use super::cache::Cache;
+use super::pixel_map::{KEPT_MAPS, MapKey, PixelMap};
 use super::upper_bits;
 use super::{Backend, Job, RawImage, RenderError, Renderer, Scene, View};
-use crate::bus::CameraModel;
+use crate::bus::Intrinsics;
 use cast_scene::{CastScene, TunnelPixel};
 use dim::DimView;
 use image::GrayImage;
@@ -65,7 +66,6 @@ use row::{KnownTunnel, RowBuffers, RowRays, ViewContext};
 use sensor::Sensor;
 use spread::Spread;
 use std::collections::VecDeque;
-use std::sync::Arc;
 
 /// Cameras that stand still and whose view of the tunnel is kept.
 const KEPT_VIEWS: usize = 4;
@@ -76,8 +76,9 @@ pub struct CpuRenderer {
     every_ray: bool,
     /// Of a row's exposure, where they are given.
     slices: Option<usize>,
-    kept: VecDeque<KeptView>,
-    maps: MapCache<Arc<PixelMap>>,
+    /// The tunnel through all pixels of cameras that stand still.
+    kept: Cache<(Intrinsics, Isometry3<f64>), Vec<TunnelPixel>>,
+    maps: Cache<MapKey, PixelMap>,
     finished: VecDeque<FinishedJob>,
 }
 
@@ -86,13 +87,6 @@ struct FinishedJob {
     raw: bool,
     /// With the bits that an image of eight does not have.
     images: Vec<(RawImage, u32)>,
-}
-
-/// The tunnel through all pixels of a camera that stands still.
-struct KeptView {
-    camera: CameraModel,
-    pose: Isometry3<f64>,
-    ground: Vec<TunnelPixel>,
 }
 
 impl CpuRenderer {
@@ -117,8 +111,8 @@ impl CpuRenderer {
             scene: CastScene::new(scene),
             every_ray,
             slices: None,
-            kept: VecDeque::new(),
-            maps: MapCache::default(),
+            kept: Cache::new(KEPT_VIEWS),
+            maps: Cache::new(KEPT_MAPS),
             finished: VecDeque::new(),
         }
     }
@@ -136,17 +130,20 @@ impl CpuRenderer {
         };
         // Through a wide pupil every point looks from a place of its own.
         let still = view.motion.poses.len() == 1 && pupil::is_small(view);
-        let kept = still.then(|| self.keep(&view.camera, pose));
+        let kept = still.then(|| {
+            let all_pixels = |_: &_| self.scene.all_pixels(camera, &pose);
+            self.kept.get((*camera, pose), all_pixels)
+        });
         let lamps = self.scene.lamps_by_distance(&pose);
         let segment = (self.scene.tunnel).segment_of(&Point3::from(pose.translation.vector), None);
-        let context = ViewContext::new(&self.scene, job, view, segment);
+        let context = ViewContext::new(&self.scene, job, view, segment, !self.every_ray);
         let corners = |row: &RowExposure, corners: &mut [f64]| {
             RowRays::new(&self.scene, &context, view, row, KnownTunnel::Unknown).corners(corners);
         };
         let dim = (!still && !self.every_ray && pupil::is_small(view))
             .then(|| DimView::new(view, corners));
-        let known = match (kept.and_then(|k| self.kept.get(k)), &dim) {
-            (Some(kept), _) => KnownTunnel::Kept(&kept.ground),
+        let known = match (kept, &dim) {
+            (Some(kept), _) => KnownTunnel::Kept(kept),
             (None, Some(dim)) => KnownTunnel::Dim(dim),
             (None, None) => KnownTunnel::Unknown,
         };
@@ -173,30 +170,13 @@ impl CpuRenderer {
                     }
                 }
             });
-        let map = (self.maps).get(MapKey::new(view), Arc::new);
+        let map = (self.maps).get(MapKey::new(view), MapKey::make_map);
         let sensor = Sensor {
             view,
-            map: &map,
+            map,
             signals_e: &signals_e,
         };
         sensor.develop()
-    }
-
-    /// Index of the kept view of a still camera, finished now if it is new.
-    fn keep(&mut self, camera: &CameraModel, pose: Isometry3<f64>) -> usize {
-        let same = |k: &KeptView| k.camera.intrinsics == camera.intrinsics && k.pose == pose;
-        if let Some(k) = self.kept.iter().position(same) {
-            return k;
-        }
-        if self.kept.len() >= KEPT_VIEWS {
-            self.kept.pop_front();
-        }
-        self.kept.push_back(KeptView {
-            camera: *camera,
-            pose,
-            ground: self.scene.all_pixels(&camera.intrinsics, &pose),
-        });
-        self.kept.len() - 1
     }
 }
 

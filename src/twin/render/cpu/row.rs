@@ -4,14 +4,14 @@ use super::blinking::Blinking;
 use super::cast_scene::{CastScene, RayDifferential, TunnelPixel};
 use super::dim::{CELL_PX, DimView};
 use super::lamps::{self, Haze, RowExposure};
-use super::shadow::{Blocker, Shades};
+use super::shadow::{Blocker, BodyShadows};
 use super::spread::Spread;
 use crate::twin::geometry::{Solid, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
-use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, Source};
+use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
 use crate::twin::render::image_bounds::ImageBounds;
-use crate::twin::render::photometry::{Shining, headlights_lx};
+use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
@@ -19,7 +19,7 @@ use std::f64::consts::PI;
 /// What a view adds to the tunnel.
 pub(super) struct ViewContext<'a> {
     job: &'a Job,
-    shades: Shades<'a>,
+    shadows: BodyShadows<'a>,
     airlight_cd_m2: f64,
     /// Segment of the first pose.
     segment: usize,
@@ -63,11 +63,17 @@ pub(super) struct RowRays<'a> {
 }
 
 impl<'a> ViewContext<'a> {
-    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, segment: usize) -> Self {
+    pub fn new(
+        scene: &'a CastScene,
+        job: &'a Job,
+        view: &View,
+        segment: usize,
+        quick: bool,
+    ) -> Self {
         let s_m = scene.tunnel.chainage_m(segment);
         Self {
             job,
-            shades: Shades::new(scene, job, view, segment),
+            shadows: BodyShadows::new(scene, job, view, segment, quick),
             airlight_cd_m2: scene.lit.airlight_cd_m2(s_m),
             segment,
             lamps: scene.lamps_about(view),
@@ -91,7 +97,7 @@ impl<'a> RowRays<'a> {
             view,
             row,
             segment: scene.tunnel.segment_of(&eye, Some(context.segment)),
-            blockers: context.shades.blockers(mid.since(context.job.time)),
+            blockers: context.shadows.blockers(mid.since(context.job.time)),
             blinking: Blinking::new(scene.lit.lamps.lamps(), &context.lamps, view, row),
             eye,
             known,
@@ -126,9 +132,9 @@ impl<'a> RowRays<'a> {
         let Some(hit) = &ground.hit else {
             return (ground.luminance, f64::INFINITY);
         };
-        let ViewContext { job, shades, .. } = self.context;
+        let ViewContext { job, shadows, .. } = self.context;
         let (mut luminance, segment) = (ground.luminance, hit.segment as usize);
-        let lit_by_job = !job.headlights.is_empty() || !shades.leave_alone(segment);
+        let lit_by_job = !job.headlights.is_empty() || !shadows.leave_alone(segment);
         let level = self.scene.tunnel.is_level(hit);
         if lit_by_job || level || self.blinking.shows {
             let at = (self.scene.tunnel).surface_at(&self.eye, &self.ray(u), hit);
@@ -141,14 +147,14 @@ impl<'a> RowRays<'a> {
     /// What a job's headlights and bodies change in the illuminance of a surface, and the blinking of
     /// lamps.
     fn by_job_lx(&self, segment: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-        let (scene, ViewContext { job, shades, .. }) = (self.scene, self.context);
+        let (scene, ViewContext { job, shadows, .. }) = (self.scene, self.context);
         let blinking_lx = if self.blinking.shows {
             (scene.lit.lamps).flickering_lx(p, n, &self.blinking.flicker)
         } else {
             0.0
         };
         blinking_lx + headlights_lx(&job.headlights, &scene.lit.air, p, n)
-            - shades.hidden_lx(segment, (p, n), (&self.blockers, &self.blinking), scene)
+            - shadows.hidden_lx(segment, (p, n), &self.blockers, &self.blinking)
     }
 
     /// Luminance of what the tunnel's surface mirrors.
@@ -164,10 +170,10 @@ impl<'a> RowRays<'a> {
             let lamp = &scene.lit.lamps.lamps()[*k];
             let near = (lamp.centre - place).norm_squared() < MIRROR_REACH_M * MIRROR_REACH_M;
             let share = lamp.duty() * (1.0 + self.blinking.flicker[*k]);
-            near.then(|| Source::lamp(lamp, share, air, place))
+            near.then(|| MirroredLight::lamp(lamp, share, air, place))
         });
         let headlights = self.context.job.headlights.iter();
-        let headlights = headlights.map(|light| Source::headlight(light, air, place));
+        let headlights = headlights.map(|light| MirroredLight::headlight(light, air, place));
         lamps
             .chain(headlights)
             .map(|source| gloss.luminance_cd_m2(&facing, &to_eye, &source))
@@ -200,7 +206,7 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    pub fn luminances(&self, lamps: &[&Shining], spread: &Spread, buffers: &mut RowBuffers) {
+    pub fn luminances(&self, lamps: &[&BlinkingLamp], spread: &Spread, buffers: &mut RowBuffers) {
         self.draw_tunnel(buffers);
         let view = self.view;
         for blocker in &self.blockers {

@@ -1,7 +1,6 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
-use crate::bus::Intrinsics;
-use crate::bus::{Shutter, SimTime};
+use crate::bus::{CameraModel, Shutter, SimTime};
 use crate::track::uid::{ChipFrame, Uid};
 use crate::track::waveform::{Ripple, Waveform};
 use crate::track::{
@@ -9,14 +8,12 @@ use crate::track::{
 };
 use crate::twin::air::Air;
 use crate::twin::geometry::{Body, Shape};
-use crate::twin::lights::Headlight;
-use crate::twin::lights::LampLight;
+use crate::twin::lights::{Headlight, LampLight};
 use crate::twin::random::Stream;
 use crate::twin::reflectance::Wet;
 use crate::twin::render::paint::Painting;
 use crate::twin::render::{CameraMotion, LensSettings, NoiseKey, SensorSettings, sample};
-use nalgebra::Vector3;
-use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion};
+use nalgebra::{Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use std::sync::Arc;
 

@@ -10,7 +10,7 @@ use super::textures;
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::paint;
-use crate::twin::render::photometry::{Shining, headlights_lx};
+use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -214,7 +214,7 @@ impl DrawList {
     }
 
     /// Lists the lamps that what mirrors may show, where anything does.
-    fn mirror(&mut self, framed: &Framed<'_>, lamps: &[Shining]) {
+    fn mirror(&mut self, framed: &Framed<'_>, lamps: &[BlinkingLamp]) {
         self.mirrored.clear();
         if self.calls.iter().all(|call| call.glossy.is_empty()) {
             return;
@@ -245,7 +245,7 @@ impl DrawList {
     fn shares_of(
         &mut self,
         framed: &Framed<'_>,
-        lamps: &[Shining],
+        lamps: &[BlinkingLamp],
         lamp: usize,
         asked: Range<u32>,
     ) -> u32 {

@@ -10,7 +10,7 @@ use super::view::{Framed, single};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
 use crate::twin::render::lit_scene::LitScene;
-use crate::twin::render::photometry::Shining;
+use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::scene::View;
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use std::f64::consts::{PI, TAU};
@@ -133,7 +133,7 @@ impl LampTable {
         self.glares.clear();
         self.glare_rows.clear();
         let from = framed.reference();
-        let mut near: Vec<(f64, &Shining)> = (scene.lamps.lamps().iter())
+        let mut near: Vec<(f64, &BlinkingLamp)> = (scene.lamps.lamps().iter())
             .map(|lamp| ((lamp.centre - from).norm(), lamp))
             .filter(|(d, _)| *d < LAMP_SIGHT_M)
             .collect();
@@ -372,14 +372,14 @@ impl LampBounds {
 /// A lamp and the times at which rows see it.
 struct Exposed<'a> {
     view: &'a View,
-    lamp: &'a Shining,
+    lamp: &'a BlinkingLamp,
     start_s: f64,
     /// Share of its light that the air lets through.
     clear: f64,
 }
 
 impl<'a> Exposed<'a> {
-    fn new(view: &'a View, lamp: &'a Shining, clear: f64) -> Self {
+    fn new(view: &'a View, lamp: &'a BlinkingLamp, clear: f64) -> Self {
         Self {
             clear,
             view,

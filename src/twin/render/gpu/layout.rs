@@ -6,6 +6,11 @@ use bytemuck::{Pod, Zeroable};
 /// Headlights beyond this many do not light a view; the nearest ones do.
 pub const MAX_HEADLIGHTS: usize = 16;
 
+/// The largest number of half precision, in which signals are kept.
+pub const BRIGHTEST_E: f64 = 65_504.0;
+/// Depth is reversed: 1 at this optical depth, 0 at infinity. What is nearer is not seen.
+pub const NEAR_M: f64 = 0.05;
+
 /// Numbers in the lists of a view's shadows.
 pub const MAX_WORDS: usize = 16384;
 /// Lights that may throw shadows in a view: the nearest.

@@ -54,6 +54,7 @@ mod mesh;
 mod passes;
 mod pipeline;
 mod render_pass;
+mod shaders;
 mod shadows;
 mod smear;
 mod spread;
@@ -65,10 +66,11 @@ mod view;
 mod view_buffers;
 
 pub use adapter::adapters;
-pub use pipeline::shader_source;
+pub use shaders::shader_source;
 
+use super::cache::Cache;
 use super::lit_scene::LitScene;
-use super::pixel_map::{MapCache, MapKey};
+use super::pixel_map::{KEPT_MAPS, MapKey};
 use super::scene::{Job, Scene};
 use super::{Backend, RawImage, RenderError, Renderer};
 use crate::bus::Intrinsics;
@@ -89,9 +91,6 @@ use textures::Textures;
 use view::Framed;
 use view_buffers::{ViewBuffers, ViewData};
 
-/// Largest number in half precision.
-const BRIGHTEST_E: f64 = 65_504.0;
-
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
 pub struct GpuRenderer {
     gpu: Gpu,
@@ -100,7 +99,7 @@ pub struct GpuRenderer {
     chunks: Chunks,
     textures: Textures,
     bodies: BodyBuffers,
-    maps: MapCache<wgpu::TextureView>,
+    maps: Cache<MapKey, wgpu::TextureView>,
     views: Vec<Prepared>,
     targets: Vec<Target>,
     backdrops: Backdrops,
@@ -138,7 +137,7 @@ impl GpuRenderer {
             textures: Textures::new(&gpu, &scene.paintings),
             scene,
             bodies: BodyBuffers::new(&gpu),
-            maps: MapCache::default(),
+            maps: Cache::new(KEPT_MAPS),
             views: Vec::new(),
             targets: Vec::new(),
             backdrops: Backdrops::default(),
@@ -175,8 +174,8 @@ impl GpuRenderer {
         }
         buffers.draw_lamps(gpu, pipelines, encoder, target);
         buffers.draw_glare(gpu, pipelines, encoder, target);
-        let map = (self.maps).get(MapKey::new(framed.view), |map| {
-            target::map_texture(gpu, &map, target.size_px)
+        let map = (self.maps).get(MapKey::new(framed.view), |key| {
+            target::map_texture(gpu, &key.make_map(), target.size_px)
         });
         let develop = Develop {
             raw: job.raw,
@@ -184,7 +183,7 @@ impl GpuRenderer {
         };
         let sensor = pipelines.sensor(&gpu.device, develop);
         target.copy_signal(encoder);
-        buffers.draw_sensor(gpu, sensor, encoder, (target, &map), job.raw);
+        buffers.draw_sensor(gpu, sensor, encoder, (target, map), job.raw);
         let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
         let back = spare.map_or_else(
             || ReadBack::new(&gpu.device, target.size_px, job.raw),
@@ -225,7 +224,7 @@ impl GpuRenderer {
         let beyond_m = std::f64::consts::SQRT_2 * chunks::AHEAD_M;
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         let data = ViewData {
-            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
+            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(layout::BRIGHTEST_E),
             constants,
             poses: &view.poses,
             list: &view.list,

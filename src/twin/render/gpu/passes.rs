@@ -40,7 +40,7 @@ impl ViewBuffers {
         encoder: &mut wgpu::CommandEncoder,
         target: &Target,
     ) {
-        if self.lamp_count == 0 {
+        if self.lamps.count == 0 {
             return;
         }
         let resources = [
@@ -51,7 +51,7 @@ impl ViewBuffers {
             TextureView(&target.layers.depth),
         ];
         let mut pass = begin(encoder, &target.layers.signal, KEEP, None);
-        let all = 0..self.lamp_count;
+        let all = 0..self.lamps.count;
         draw_rectangles(&mut pass, &gpu.device, &pipelines.discs, &resources, all);
     }
 
@@ -64,7 +64,7 @@ impl ViewBuffers {
         target: &Target,
     ) {
         let mut pass = begin(encoder, &target.glare, BLACK, None);
-        if self.glare_count == 0 {
+        if self.glares.count == 0 {
             return;
         }
         let resources = [
@@ -72,7 +72,7 @@ impl ViewBuffers {
             self.glares.binding(),
             self.glare_rows.binding(),
         ];
-        let all = 0..self.glare_count;
+        let all = 0..self.glares.count;
         draw_rectangles(&mut pass, &gpu.device, &pipelines.glare, &resources, all);
     }
 

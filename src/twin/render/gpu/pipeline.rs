@@ -1,8 +1,8 @@
-//! Shaders and the pipelines made of them.
+//! The pipelines of the passes.
 
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
+use super::shaders::shader_source;
 use crate::twin::render::sensor::BLOOMING_REACH;
-use crate::twin::render::{constants, pixel_map};
 use std::mem::{offset_of, size_of};
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -14,44 +14,6 @@ pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Four raw pixels a texel.
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
-
-/// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 10] = [
-    ("common", include_str!("../../../../shaders/common.wgsl")),
-    ("rows", include_str!("../../../../shaders/rows.wgsl")),
-    (
-        "background",
-        include_str!("../../../../shaders/background.wgsl"),
-    ),
-    ("gloss", include_str!("../../../../shaders/gloss.wgsl")),
-    ("blend", include_str!("../../../../shaders/blend.wgsl")),
-    ("focus", include_str!("../../../../shaders/focus.wgsl")),
-    ("lamps", include_str!("../../../../shaders/lamps.wgsl")),
-    ("glare", include_str!("../../../../shaders/glare.wgsl")),
-    ("sensor", include_str!("../../../../shaders/sensor.wgsl")),
-    ("shadows", include_str!("../../../../shaders/shadows.wgsl")),
-];
-
-/// The complete source of `shaders/<name>.wgsl`: constants, what it shares with others, and the file.
-pub fn shader_source(name: &str) -> Option<String> {
-    let text = |name: &str| {
-        FILES
-            .iter()
-            .find(|(n, _)| *n == name)
-            .map(|(_, text)| *text)
-    };
-    let before: &[&str] = match name {
-        "common" => &[],
-        "background" | "gloss" => &["common", "rows"],
-        _ => &["common"],
-    };
-    let mut source = constants::wgsl() + &pixel_map::wgsl();
-    for shared in before {
-        source.push_str(text(shared)?);
-    }
-    source.push_str(text(name)?);
-    Some(source)
-}
 
 /// Tunnel and bodies.
 #[derive(Clone)]
@@ -116,47 +78,31 @@ impl Pipelines {
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
         let (focus, shadows) = (shader("focus"), shader("shadows"));
-        let flat = |shader, entries, target| {
-            let stage = Stage {
-                shader,
-                entries,
-                buffers: &[],
-                depth: None,
-                target,
-                constants: &[],
-            };
-            pipeline(device, stage)
+        let flat = |shader: &_, entries: [&str; 2], target, constants: &[(&str, f64)]| {
+            flat_pipeline(device, shader, entries, target, constants)
         };
+        let flags = [0.0, 1.0];
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Self {
             backgrounds: vec![None; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             gloss: shader("gloss"),
-            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE))),
-            focus: [false, true].map(|down| {
-                let stage = Stage {
-                    shader: &focus,
-                    entries: ["whole", "focus"],
-                    buffers: &[],
-                    depth: None,
-                    target: target(SIGNAL, None),
-                    constants: &[("DOWN", f64::from(u8::from(down)))],
-                };
-                pipeline(device, stage)
+            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
+            focus: flags.map(|down| {
+                let target = target(SIGNAL, None);
+                flat(&focus, ["whole", "focus"], target, &[("DOWN", down)])
             }),
-            shadows: [false, true].map(|others| {
-                let stage = Stage {
-                    shader: &shadows,
-                    entries: ["tile_corner", "shade"],
-                    buffers: &[],
-                    depth: None,
-                    target: target(SIGNAL, Some(FADE)),
-                    constants: &[("OTHERS", f64::from(u8::from(others)))],
-                };
-                pipeline(device, stage)
+            shadows: flags.map(|others| {
+                let target = target(SIGNAL, Some(FADE));
+                flat(
+                    &shadows,
+                    ["tile_corner", "shade"],
+                    target,
+                    &[("OTHERS", others)],
+                )
             }),
-            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over)),
-            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over)),
+            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over), &[]),
+            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over), &[]),
             sensors: [const { None }; 4],
             sensor: shader("sensor"),
         }
@@ -193,17 +139,30 @@ impl Pipelines {
                 ("develop", PACKED)
             };
             let reach = if develop.blooming { BLOOMING_REACH } else { 0 };
-            let stage = Stage {
-                shader: &self.sensor,
-                entries: ["whole", entry],
-                buffers: &[],
-                depth: None,
-                target: target(format, None),
-                constants: &[("BLOOMING_REACH", reach as f64)],
-            };
-            pipeline(device, stage)
+            let reach = [("BLOOMING_REACH", reach as f64)];
+            let target = target(format, None);
+            flat_pipeline(device, &self.sensor, ["whole", entry], target, &reach)
         })
     }
+}
+
+/// Draws rectangles, without buffers or depth.
+fn flat_pipeline(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    entries: [&str; 2],
+    target: wgpu::ColorTargetState,
+    constants: &[(&str, f64)],
+) -> wgpu::RenderPipeline {
+    let stage = Stage {
+        shader,
+        entries,
+        buffers: &[],
+        depth: None,
+        target,
+        constants,
+    };
+    pipeline(device, stage)
 }
 
 /// Draws surfaces into the depth buffer, or adds to those that are there.
@@ -252,43 +211,26 @@ fn surface(
 }
 
 /// The source's share is the blend constant, the rest is what was there.
-const SHARE: wgpu::BlendState = {
-    let mix = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::Constant,
-        dst_factor: wgpu::BlendFactor::OneMinusConstant,
-        operation: wgpu::BlendOperation::Add,
-    };
-    wgpu::BlendState {
-        color: mix,
-        alpha: mix,
-    }
-};
-
+const SHARE: wgpu::BlendState = sum_of(
+    wgpu::BlendFactor::Constant,
+    wgpu::BlendFactor::OneMinusConstant,
+);
 /// Adds the source times the blend constant.
-const ADD: wgpu::BlendState = {
-    let add = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::Constant,
-        dst_factor: wgpu::BlendFactor::One,
-        operation: wgpu::BlendOperation::Add,
-    };
-    wgpu::BlendState {
-        color: add,
-        alpha: add,
-    }
-};
-
+const ADD: wgpu::BlendState = sum_of(wgpu::BlendFactor::Constant, wgpu::BlendFactor::One);
 /// Keeps the share in the alpha of what is there, and adds the source.
-const FADE: wgpu::BlendState = {
-    let fade = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::One,
-        dst_factor: wgpu::BlendFactor::SrcAlpha,
+const FADE: wgpu::BlendState = sum_of(wgpu::BlendFactor::One, wgpu::BlendFactor::SrcAlpha);
+
+const fn sum_of(src_factor: wgpu::BlendFactor, dst_factor: wgpu::BlendFactor) -> wgpu::BlendState {
+    let sum = wgpu::BlendComponent {
+        src_factor,
+        dst_factor,
         operation: wgpu::BlendOperation::Add,
     };
     wgpu::BlendState {
-        color: fade,
-        alpha: fade,
+        color: sum,
+        alpha: sum,
     }
-};
+}
 
 const fn attribute(
     format: wgpu::VertexFormat,

@@ -11,7 +11,7 @@ use crate::twin::render::gloss::Gloss;
 use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::paint::Painting;
-use crate::twin::render::photometry::Shining;
+use crate::twin::render::photometry::BlinkingLamp;
 use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -53,7 +53,7 @@ pub struct ChunkSide {
 /// What all strips of a chunk share.
 struct Site<'a> {
     scene: &'a LitScene,
-    lamp: Option<&'a Shining>,
+    lamp: Option<&'a BlinkingLamp>,
     near: Vec<TrackPoint>,
     key: ChunkKey,
     origin: Point3<f64>,
@@ -107,8 +107,8 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
 
 /// The lamp that throws most light at a place, whatever the surface there.
 fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
-    let towards = |lamp: &Shining| (lamp.centre - p).try_normalize(1e-9);
-    let light = |lamp: &Shining| towards(lamp).map_or(0.0, |n| lamp.irradiance_lx(p, &n));
+    let towards = |lamp: &BlinkingLamp| (lamp.centre - p).try_normalize(1e-9);
+    let light = |lamp: &BlinkingLamp| towards(lamp).map_or(0.0, |n| lamp.irradiance_lx(p, &n));
     let lamps = field.lamps().iter().enumerate();
     lamps
         .map(|(k, lamp)| (k, light(lamp)))

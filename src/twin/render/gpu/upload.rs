@@ -6,6 +6,8 @@ use super::target::texture;
 /// A buffer that grows with what is written to it.
 pub struct Upload {
     pub(super) buffer: wgpu::Buffer,
+    /// So many items were written last.
+    pub(super) count: u32,
     usage: wgpu::BufferUsages,
 }
 
@@ -15,12 +17,14 @@ impl Upload {
         let usage = usage | wgpu::BufferUsages::COPY_DST;
         Self {
             buffer: allocate(gpu, usage, size as u64),
+            count: 0,
             usage,
         }
     }
 
     /// Takes effect before anything submitted later, and after anything submitted before.
     pub fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
+        self.count = items.len() as u32;
         let bytes: &[u8] = bytemuck::cast_slice(items);
         if bytes.is_empty() {
             return;

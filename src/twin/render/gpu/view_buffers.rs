@@ -26,14 +26,10 @@ pub struct ViewBuffers {
     pub rows: Upload,
     /// Instants of the rows.
     pub instants: Upload,
-    /// Number of discs.
-    pub lamp_count: u32,
     /// Lamps' glare.
     pub glares: Upload,
     /// Rows of the glare.
     pub glare_rows: Upload,
-    /// Number of lamps with glare.
-    pub glare_count: u32,
     /// Shadows of bodies.
     pub shadows: ShadowBuffers,
     /// Signal where nothing is drawn: of the air before what is too far away.
@@ -69,10 +65,8 @@ impl ViewBuffers {
             lamps: Upload::new(gpu, storage, size_of::<Lamp>()),
             rows: Upload::new(gpu, storage, size_of::<LampRow>()),
             instants: Upload::new(gpu, storage, size_of::<Instant>()),
-            lamp_count: 0,
             glares: Upload::new(gpu, storage, size_of::<Glare>()),
             glare_rows: Upload::new(gpu, storage, size_of::<GlareRow>()),
-            glare_count: 0,
             shadows: ShadowBuffers::new(gpu),
             beyond_e: 0.0,
         }
@@ -90,10 +84,8 @@ impl ViewBuffers {
         self.lamps.write(gpu, &table.lamps);
         self.rows.write(gpu, &table.rows);
         self.instants.write(gpu, &table.instants);
-        self.lamp_count = table.lamps.len() as u32;
         self.glares.write(gpu, &table.glares);
         self.glare_rows.write(gpu, &table.glare_rows);
-        self.glare_count = table.glares.len() as u32;
         self.shadows.write(gpu, data.shadows);
         self.beyond_e = data.beyond_e;
     }

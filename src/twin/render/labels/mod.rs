@@ -25,7 +25,8 @@ mod whole;
 pub use projection::{Projection, Seen};
 pub use whole::{Whole, whole};
 
-use super::constants::{LAMP_SIGHT_M, SIGHT_M};
+use super::cache::Cache;
+use super::constants::{FLUSH_M, LAMP_SIGHT_M, SIGHT_M};
 use super::image_bounds::ImageBounds;
 use crate::bus::{CameraModel, Intrinsics};
 use crate::twin::geometry::{Body, Solid, TunnelCaster};
@@ -33,12 +34,9 @@ use crate::twin::lights::LampLight;
 use crate::twin::render::{Job, Scene};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
 use rayon::prelude::*;
-use std::collections::VecDeque;
 
 /// Views of cameras that stand still, and rays of lenses, that are kept.
 const KEPT: usize = 8;
-/// Surfaces nearer than a lamp's disc by less than this do not hide it: it may be flush.
-pub const FLUSH_M: f64 = 0.01;
 
 /// What a pixel shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,21 +63,10 @@ pub struct Labels {
 pub struct Labeller {
     tunnel: TunnelCaster,
     lamps: Vec<LampLight>,
-    still: VecDeque<StillView>,
-    lenses: VecDeque<Lens>,
-}
-
-/// Depth of the tunnel through every pixel of a camera that stands still.
-struct StillView {
-    camera: CameraModel,
-    pose: Isometry3<f64>,
-    depth_m: Vec<f64>,
-}
-
-/// Directions of all pixels, at depth 1: a lens with distortion is costly to invert.
-struct Lens {
-    camera: Intrinsics,
-    rays: Vec<[f64; 2]>,
+    /// Depth of the tunnel through every pixel of cameras that stand still.
+    still: Cache<(CameraModel, Isometry3<f64>), Vec<f64>>,
+    /// Directions of all pixels, at depth 1: a lens with distortion is costly to invert.
+    lenses: Cache<Intrinsics, Vec<[f64; 2]>>,
 }
 
 /// One row's rays.
@@ -107,25 +94,27 @@ impl Labeller {
         Self {
             tunnel: TunnelCaster::new(&scene.tunnel),
             lamps: scene.lamps.clone(),
-            still: VecDeque::new(),
-            lenses: VecDeque::new(),
+            still: Cache::new(KEPT),
+            lenses: Cache::new(KEPT),
         }
     }
 
     /// What every pixel shows.
     pub fn look(&mut self, job: &Job, projection: &Projection<'_>) -> Labels {
         let camera = projection.view.camera.intrinsics;
-        let lens = self.keep_lens(&camera);
-        let still =
-            (projection.view.motion.poses.len() == 1).then(|| self.keep_still(projection, lens));
-        let this = &*self;
+        let rays = self.lenses.get(camera, all_rays);
         let width = camera.width_px as usize;
+        let (tunnel, lamps) = (&self.tunnel, &self.lamps);
+        let still = projection.view.motion.poses.len() == 1;
+        let kept = still.then(|| {
+            let key = (projection.view.camera, projection.pose(0.0));
+            (self.still).get(key, |(_, pose)| all_depths(tunnel, *pose, rays, width))
+        });
         let size = width * camera.height_px as usize;
         let mut labels = Labels {
             depth_m: vec![f64::INFINITY; size],
             surface: vec![Surface::Nothing; size],
         };
-        let kept = still.map(|k| &this.still[k].depth_m);
         let rows = (labels.depth_m.par_chunks_mut(width.max(1)))
             .zip(labels.surface.par_chunks_mut(width.max(1)))
             .enumerate();
@@ -133,19 +122,19 @@ impl Labeller {
             let row = Row {
                 v,
                 pose: projection.pose(v as f64),
-                rays: &this.lenses[lens].rays[v * width..(v + 1) * width],
+                rays: &rays[v * width..(v + 1) * width],
             };
             match kept {
                 Some(kept) => depth_m.copy_from_slice(&kept[v * width..(v + 1) * width]),
-                None => this.cast_tunnel(&row, depth_m),
+                None => cast_tunnel(tunnel, &row, depth_m),
             }
             for (depth, surface) in depth_m.iter().zip(surface.iter_mut()) {
                 if depth.is_finite() {
                     *surface = Surface::Tunnel;
                 }
             }
-            this.put_bodies(job, projection, &row, depth_m, surface);
-            this.put_lamps(projection, &row, depth_m, surface);
+            put_bodies(job, projection, &row, depth_m, surface);
+            put_lamps(lamps, projection, &row, depth_m, surface);
         });
         labels
     }
@@ -185,8 +174,7 @@ impl Labeller {
         same: impl Fn(u16) -> Option<usize> + Sync,
     ) -> Vec<[f32; 2]> {
         let camera = projection.view.camera.intrinsics;
-        let lens = self.keep_lens(&camera);
-        let rays = &self.lenses[lens].rays;
+        let rays = self.lenses.get(camera, all_rays);
         let width = camera.width_px as usize;
         let (a, b) = (projection.view, next.view);
         let still = a.motion.poses.len() == 1 && (a.camera, &a.motion) == (b.camera, &b.motion);
@@ -221,117 +209,96 @@ impl Labeller {
         });
         flow
     }
+}
 
-    fn keep_lens(&mut self, camera: &Intrinsics) -> usize {
-        if let Some(k) = self.lenses.iter().position(|l| l.camera == *camera) {
-            return k;
-        }
-        if self.lenses.len() >= KEPT {
-            self.lenses.pop_front();
-        }
-        let width = camera.width_px as usize;
-        let rays = (0..width * camera.height_px as usize)
-            .into_par_iter()
-            .with_min_len(width.max(1))
-            .map(|k| {
-                let ray = camera.ray((k % width) as f64, (k / width) as f64);
-                [ray.x, ray.y]
-            });
-        self.lenses.push_back(Lens {
-            camera: *camera,
-            rays: rays.collect(),
+fn all_rays(camera: &Intrinsics) -> Vec<[f64; 2]> {
+    let width = camera.width_px as usize;
+    let rays = (0..width * camera.height_px as usize)
+        .into_par_iter()
+        .with_min_len(width.max(1))
+        .map(|k| {
+            let ray = camera.ray((k % width) as f64, (k / width) as f64);
+            [ray.x, ray.y]
         });
-        self.lenses.len() - 1
+    rays.collect()
+}
+
+fn all_depths(
+    tunnel: &TunnelCaster,
+    pose: Isometry3<f64>,
+    rays: &[[f64; 2]],
+    width: usize,
+) -> Vec<f64> {
+    let mut depth_m = vec![f64::INFINITY; rays.len()];
+    let rows = depth_m.par_chunks_mut(width.max(1)).enumerate();
+    rows.for_each(|(v, depth_m)| {
+        let rays = &rays[v * width..(v + 1) * width];
+        cast_tunnel(tunnel, &Row { v, pose, rays }, depth_m);
+    });
+    depth_m
+}
+
+fn cast_tunnel(tunnel: &TunnelCaster, row: &Row<'_>, depth_m: &mut [f64]) {
+    let eye = row.eye();
+    let segment = tunnel.segment_of(&eye, None);
+    for (u, depth_m) in depth_m.iter_mut().enumerate() {
+        let ray = row.ray(u);
+        if let Some(hit) = tunnel.cast(segment, &eye, &ray, SIGHT_M / ray.norm()) {
+            *depth_m = hit.t;
+        }
     }
+}
 
-    fn keep_still(&mut self, projection: &Projection<'_>, lens: usize) -> usize {
-        let (camera, pose) = (projection.view.camera, projection.pose(0.0));
-        let same = |k: &StillView| k.camera == camera && k.pose == pose;
-        if let Some(k) = self.still.iter().position(same) {
-            return k;
-        }
-        let width = camera.intrinsics.width_px as usize;
-        let rays = &self.lenses[lens].rays;
-        let mut depth_m = vec![f64::INFINITY; rays.len()];
-        let rows = depth_m.par_chunks_mut(width.max(1)).enumerate();
-        rows.for_each(|(v, depth_m)| {
-            let rays = &rays[v * width..(v + 1) * width];
-            self.cast_tunnel(&Row { v, pose, rays }, depth_m);
-        });
-        if self.still.len() >= KEPT {
-            self.still.pop_front();
-        }
-        self.still.push_back(StillView {
-            camera,
-            pose,
-            depth_m,
-        });
-        self.still.len() - 1
-    }
-
-    fn cast_tunnel(&self, row: &Row<'_>, depth_m: &mut [f64]) {
-        let eye = row.eye();
-        let segment = self.tunnel.segment_of(&eye, None);
-        for (u, depth_m) in depth_m.iter_mut().enumerate() {
+fn put_bodies(
+    job: &Job,
+    projection: &Projection<'_>,
+    row: &Row<'_>,
+    depth_m: &mut [f64],
+    surface: &mut [Surface],
+) {
+    let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
+    for (k, body) in job.bodies.iter().enumerate() {
+        let solid = Solid::at(body, after_s);
+        let camera = &projection.view.camera.intrinsics;
+        let bounds = ImageBounds::of(solid.corners(), camera, &row.pose);
+        for u in bounds.columns(row.v, row.rays.len()) {
             let ray = row.ray(u);
-            if let Some(hit) = self.tunnel.cast(segment, &eye, &ray, SIGHT_M / ray.norm()) {
-                *depth_m = hit.t;
+            if let Some((t, _)) = solid.cast(&eye, &ray)
+                && t < depth_m[u]
+                && t * ray.norm() < SIGHT_M
+            {
+                depth_m[u] = t;
+                surface[u] = Surface::Body(k as u16);
             }
         }
     }
+}
 
-    fn put_bodies(
-        &self,
-        job: &Job,
-        projection: &Projection<'_>,
-        row: &Row<'_>,
-        depth_m: &mut [f64],
-        surface: &mut [Surface],
-    ) {
-        let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
-        for (k, body) in job.bodies.iter().enumerate() {
-            let solid = Solid::at(body, after_s);
-            let camera = &projection.view.camera.intrinsics;
-            let bounds = ImageBounds::of(solid.corners(), camera, &row.pose);
-            for u in bounds.columns(row.v, row.rays.len()) {
-                let ray = row.ray(u);
-                if let Some((t, _)) = solid.cast(&eye, &ray)
-                    && t < depth_m[u]
-                    && t * ray.norm() < SIGHT_M
-                {
-                    depth_m[u] = t;
-                    surface[u] = Surface::Body(k as u16);
-                }
-            }
+fn put_lamps(
+    lamps: &[LampLight],
+    projection: &Projection<'_>,
+    row: &Row<'_>,
+    depth_m: &mut [f64],
+    surface: &mut [Surface],
+) {
+    let eye = row.eye();
+    for (k, lamp) in lamps.iter().enumerate() {
+        let way = lamp.centre - eye;
+        if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
+            continue;
         }
-    }
-
-    fn put_lamps(
-        &self,
-        projection: &Projection<'_>,
-        row: &Row<'_>,
-        depth_m: &mut [f64],
-        surface: &mut [Surface],
-    ) {
-        let eye = row.eye();
-        for (k, lamp) in self.lamps.iter().enumerate() {
-            let way = lamp.centre - eye;
-            if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
-                continue;
-            }
-            let camera = &projection.view.camera.intrinsics;
-            let corners = ImageBounds::cube(&lamp.centre, lamp.radius_m);
-            let bounds = ImageBounds::of(corners, camera, &row.pose);
-            for u in bounds.columns(row.v, row.rays.len()) {
-                let ray = row.ray(u);
-                let t = lamp.facing.dot(&way) / lamp.facing.dot(&ray);
-                if t > 0.0
-                    && (ray * t - way).norm_squared() <= lamp.radius_m * lamp.radius_m
-                    && t - FLUSH_M <= depth_m[u]
-                {
-                    depth_m[u] = t;
-                    surface[u] = Surface::Lamp(k as u16);
-                }
+        let camera = &projection.view.camera.intrinsics;
+        let corners = ImageBounds::cube(&lamp.centre, lamp.radius_m);
+        let bounds = ImageBounds::of(corners, camera, &row.pose);
+        for u in bounds.columns(row.v, row.rays.len()) {
+            let ray = row.ray(u);
+            let t = lamp.facing.dot(&way) / lamp.facing.dot(&ray);
+            if t > 0.0
+                && (ray * t - way).norm_squared() <= lamp.radius_m * lamp.radius_m
+                && t - FLUSH_M <= depth_m[u]
+            {
+                depth_m[u] = t;
+                surface[u] = Surface::Lamp(k as u16);
             }
         }
     }

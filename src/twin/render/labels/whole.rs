@@ -31,7 +31,7 @@ pub fn whole(bodies: &[&Body], projection: &Projection<'_>) -> Option<Whole> {
     let (width, height) = (f64::from(camera.width_px), f64::from(camera.height_px));
     let mid = 0.5 * (height - 1.0);
     let (pose, after_s) = (projection.pose(mid), projection.after_s(mid));
-    let mut around = ImageBounds::Beside;
+    let mut around = ImageBounds::Behind;
     for body in bodies {
         let bounds = ImageBounds::of(Solid::at(body, after_s).corners(), camera, &pose);
         around = around.with(bounds);

@@ -1,10 +1,13 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
+use super::lists::shadows;
 use super::*;
 use crate::bus::SimTime;
 use crate::twin::geometry::Shape;
+use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::sample;
 use nalgebra::{Isometry3, UnitQuaternion};
+use std::f64::consts::PI;
 
 /// A headlight at (0, 0, 5) that looks down.
 fn headlight() -> Headlight {
@@ -19,11 +22,11 @@ fn headlight() -> Headlight {
 }
 
 /// A lamp of 0.25 m at (0, 0, 5) that looks down.
-fn lamp() -> Shining {
+fn lamp() -> BlinkingLamp {
     let mut lamp = sample::scene().lamps.remove(0);
     lamp.centre = Point3::new(0.0, 0.0, 5.0);
     lamp.facing = -Vector3::z_axis();
-    Shining::new(lamp)
+    BlinkingLamp::new(lamp)
 }
 
 fn body(shape: Shape, at: Point3<f64>) -> Body {
@@ -36,7 +39,7 @@ fn body(shape: Shape, at: Point3<f64>) -> Body {
     }
 }
 
-fn share_at(source: &Source<'_>, x_m: f64, bodies: &[Body]) -> f64 {
+fn share_at(source: &ShadowLight<'_>, x_m: f64, bodies: &[Body]) -> f64 {
     let blockers: Vec<_> = (bodies.iter())
         .map(|b| Blocker::at(b, ball_m(b), 0.0))
         .collect();
@@ -63,7 +66,7 @@ fn covered(big: f64, r: f64, d: f64) -> f64 {
 #[test]
 fn a_sphere_hides_the_lens_of_two_circles() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     for radius_m in [0.03, 0.06, 0.2] {
         let ball = [body(Shape::Sphere(radius_m), Point3::new(0.0, 0.0, 2.0))];
         let (mut worst, mut bias, mut edges) = (0.0f64, 0.0, 0);
@@ -88,7 +91,7 @@ fn a_sphere_hides_the_lens_of_two_circles() {
 #[test]
 fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     // Its edge is at x = 0; everything beyond is covered.
     let board = [body(
         Shape::Box(Vector3::new(3.0, 3.0, 0.01)),
@@ -115,7 +118,7 @@ fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
 #[test]
 fn bodies_do_not_shade_their_own_lit_side() {
     let lamp = lamp();
-    let source = Source::lamp(&lamp);
+    let source = ShadowLight::lamp(&lamp);
     for shape in [
         Shape::Sphere(0.5),
         Shape::Box(Vector3::new(0.4, 0.3, 0.5)),
@@ -158,7 +161,7 @@ fn a_train_throws_no_shadow_by_its_own_light() {
         ..body(shape, at)
     };
     let headlight = headlight();
-    let sources = [Source::headlight(&headlight)];
+    let sources = [ShadowLight::headlight(&headlight)];
     let thrown =
         |body: &Body| shadows(&sources, &[(body, ball_m(body))], &job, &job.views[0]).len();
     let car = moving(
@@ -193,7 +196,8 @@ fn segments_know_every_shadow_that_falls_on_them() {
     let eye = Point3::from(pose.translation.vector);
     let caster = &renderer.scene.tunnel;
     let segment = caster.segment_of(&eye, None);
-    let shades = Shades::new(&renderer.scene, &job, view, segment);
+    let [quick, oracle] =
+        [true, false].map(|quick| BodyShadows::new(&renderer.scene, &job, view, segment, quick));
     let (mut shaded, mut lights) = (0, 0);
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
@@ -203,21 +207,20 @@ fn segments_know_every_shadow_that_falls_on_them() {
         };
         let at = caster.surface_at(&eye, &ray, &hit);
         let after_s = view.camera.shutter.row_mid(view.start, v).since(job.time);
-        let blockers = shades.blockers(after_s);
-        let seen = shades.hidden_lx(
-            hit.segment as usize,
-            (&at.position, &at.normal),
-            (&blockers, &Blinking::default()),
-            &renderer.scene,
-        );
-        let all = shades.sources.iter().map(|source| {
-            let lux = source.irradiance_lx(&at.position, &at.normal);
-            lux * source.hidden_share(&at.position, &at.normal, blockers.iter())
-        });
-        let all: f64 = all.sum();
-        assert!((seen - all).abs() < 1e-9, "{u} {v}: {seen} {all}");
+        let blockers = oracle.blockers(after_s);
+        let hidden_lx = |shadows: &BodyShadows<'_>| {
+            shadows.hidden_lx(
+                hit.segment as usize,
+                (&at.position, &at.normal),
+                &blockers,
+                &Blinking::default(),
+            )
+        };
+        let (listed, all) = (hidden_lx(&quick), hidden_lx(&oracle));
+        assert!((listed - all).abs() < 1e-9, "{u} {v}: {listed} {all}");
         shaded += usize::from(all > 0.0);
-        lights += shades.falling_on(hit.segment as usize).len();
+        let lists = quick.lists.as_ref().unwrap();
+        lights += lists.falling_on(hit.segment as usize).count();
     }
     assert!(shaded > 50, "{shaded}");
     // And are spared the rest of 61 lights.

@@ -6,7 +6,7 @@ use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;
-use crate::twin::render::photometry::{LAMP_REACH_M, Shining};
+use crate::twin::render::photometry::{BlinkingLamp, LAMP_REACH_M};
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -61,7 +61,7 @@ pub struct Cast {
 }
 
 impl<'j> Light<'j> {
-    fn lamp(lamp: &Shining) -> Self {
+    fn lamp(lamp: &BlinkingLamp) -> Self {
         Self {
             centre: lamp.centre,
             axis: lamp.facing.into_inner(),
@@ -140,9 +140,9 @@ impl Cast {
 /// The lights about a camera.
 pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &LampField) -> Vec<Light<'j>> {
     let eye = framed.reference();
-    let away_m = |lamp: &Shining| (lamp.centre - eye).norm();
+    let away_m = |lamp: &BlinkingLamp| (lamp.centre - eye).norm();
     let lamps = field.lamps().iter();
-    let mut lamps: Vec<&Shining> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
+    let mut lamps: Vec<&BlinkingLamp> = lamps.filter(|lamp| away_m(lamp) < FAR_M).collect();
     lamps.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
     lamps.truncate(MAX_SOURCES - MAX_HEADLIGHTS);
     let headlights = framed.nearest(&job.headlights);

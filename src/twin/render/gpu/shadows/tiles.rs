@@ -2,6 +2,7 @@
 
 use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
 use crate::twin::geometry::Body;
+use crate::twin::render::gpu::layout::NEAR_M;
 use crate::twin::render::gpu::view::Framed;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -9,8 +10,6 @@ use nalgebra::{Isometry3, Point3, Vector3};
 pub const TILE_PX: u32 = 32;
 /// Cells of a tunnel's surface are no longer and wider than this.
 const CELL_M: f64 = 1.0;
-/// What is nearer than this in optical depth is not seen.
-const NEAR_M: f64 = 0.05;
 /// A border for what bends between the corners of a cell.
 const BORDER_PX: f64 = 2.0;
 /// Cells that reach behind the camera are looked at in so many points each way.
@@ -30,7 +29,7 @@ pub struct Cell {
 
 /// A rectangle of the picture.
 #[derive(Clone, Copy)]
-struct Bounds {
+struct TileBounds {
     low_px: [f64; 2],
     high_px: [f64; 2],
 }
@@ -180,7 +179,7 @@ impl Eyes {
     }
 }
 
-impl Bounds {
+impl TileBounds {
     const NONE: Self = Self {
         low_px: [f64::INFINITY; 2],
         high_px: [f64::NEG_INFINITY; 2],
@@ -262,15 +261,15 @@ impl Marks {
 
     /// Adds numbers to all tiles that show a cell.
     pub fn add_cell(&mut self, framed: &Framed<'_>, eyes: &Eyes, cell: &Cell, numbers: &[u64]) {
-        self.add(&Bounds::of_cell(framed, eyes, cell), numbers);
+        self.add(&TileBounds::of_cell(framed, eyes, cell), numbers);
     }
 
     /// Adds numbers to all tiles that show a body.
     pub fn add_body(&mut self, framed: &Framed<'_>, eyes: &Eyes, body: &Body, numbers: &[u64]) {
-        self.add(&Bounds::of_body(framed, eyes, body), numbers);
+        self.add(&TileBounds::of_body(framed, eyes, body), numbers);
     }
 
-    fn add(&mut self, bounds: &Bounds, numbers: &[u64]) {
+    fn add(&mut self, bounds: &TileBounds, numbers: &[u64]) {
         let range = |k: usize, count: u32| {
             let tile = |px: f64| (px / f64::from(TILE_PX)).floor();
             let first = tile(bounds.low_px[k] + 0.5 - BORDER_PX).max(0.0);
