@@ -4,8 +4,9 @@
 //! builder draws random ids (two recordings of one run would differ) and cannot say which entity a
 //! 3-D view follows.
 
+use super::files::failed;
 use super::images::WaysidePaths;
-use super::stream::{SIM_TIME, Stream, failed};
+use super::stream::{SIM_TIME, Stream};
 use super::{Contents, images, plots, scene, texts};
 use crate::session::ObserverError;
 use rerun::external::re_sdk_types::blueprint::archetypes::{

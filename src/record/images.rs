@@ -3,10 +3,11 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
+use super::files::failed;
 use super::palette;
 use super::scene::ui;
 use super::slug;
-use super::stream::{Stream, failed};
+use super::stream::Stream;
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
     StereoPair, WaysideReport,

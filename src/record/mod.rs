@@ -29,6 +29,7 @@
 
 mod blueprint;
 pub mod dataset;
+mod files;
 mod images;
 mod moving;
 mod palette;
@@ -39,7 +40,7 @@ mod stream;
 mod tables;
 mod texts;
 
-pub(crate) use stream::write_whole;
+pub(crate) use files::write_whole;
 pub use tables::FixTable;
 
 use crate::bus::SimTime;

@@ -1,8 +1,9 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
+use super::files::failed;
 use super::palette;
 use super::scene::{HEAD, Scene, turn, ui};
-use super::stream::{Stream, failed};
+use super::stream::Stream;
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
 use crate::session::{ObserverError, Opening};

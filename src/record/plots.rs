@@ -1,6 +1,7 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
-use super::stream::{Stream, failed};
+use super::files::failed;
+use super::stream::Stream;
 use super::{Contents, palette, slug};
 use crate::bus::{
     DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,

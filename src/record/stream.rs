@@ -5,6 +5,7 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
+use super::files::{failed, finish, make_folder_of, part_name};
 use crate::bus::SimTime;
 use crate::session::ObserverError;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
@@ -13,9 +14,7 @@ use rerun::{
     ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder,
     SerializedComponentColumn, StoreId, StoreKind, TimeCell, TimeColumn,
 };
-use std::error::Error;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Simulated time since the scenario's start.
@@ -68,9 +67,7 @@ impl Stream {
             .batcher_config(ChunkBatcherConfig::NEVER);
         let (rerun, file) = match target {
             Target::File(path) => {
-                if let Some(folder) = path.parent() {
-                    fs::create_dir_all(folder).map_err(failed("making the recording's folder"))?;
-                }
+                make_folder_of(path)?;
                 (builder.save(part_name(path)), Some(path.clone()))
             }
             Target::Viewer(url) => (builder.connect_grpc_opts(url.as_str()), None),
@@ -170,34 +167,8 @@ impl Stream {
         self.flush()?;
         self.rerun.finalize_deferred_sinks();
         match self.file {
-            Some(path) => fs::rename(part_name(&path), &path)
-                .map_err(failed("giving the recording its final name")),
+            Some(path) => finish(&path),
             None => Ok(()),
         }
-    }
-}
-
-/// Writes under a temporary name and renames, so that a file is whole or not there.
-pub(crate) fn write_whole(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    let part = part_name(path);
-    fs::write(&part, content)?;
-    fs::rename(&part, path)
-}
-
-/// Name of a file while it is written.
-pub(super) fn part_name(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    PathBuf::from(name)
-}
-
-/// Turns an error into an observer's, saying what was being done.
-pub(super) fn failed<E: Into<Box<dyn Error + Send + Sync>>>(
-    what: impl Into<String>,
-) -> impl FnOnce(E) -> ObserverError {
-    let what = what.into();
-    move |source| ObserverError {
-        what,
-        source: source.into(),
     }
 }

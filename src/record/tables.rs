@@ -1,9 +1,9 @@
 //! Tables for other programs.
 
-use super::stream::{failed, part_name};
-use crate::bus::{Identity, Method};
+use super::files::{broken, finish, make_folder_of, part_name};
 use crate::session::{Event, Observer, ObserverError, Opening};
-use std::fs::{self, File};
+use std::fmt::Debug;
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -28,15 +28,12 @@ impl FixTable {
     }
 }
 
-const WHAT: &str = "writing the table of fixes";
-
 impl Observer for FixTable {
     fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        if let Some(folder) = self.path.parent() {
-            fs::create_dir_all(folder).map_err(failed("making the folder of the table"))?;
-        }
-        let mut rows = BufWriter::new(File::create(part_name(&self.path)).map_err(failed(WHAT))?);
-        writeln!(rows, "{HEADER}").map_err(failed(WHAT))?;
+        make_folder_of(&self.path)?;
+        let file = File::create(part_name(&self.path)).map_err(broken(&self.path))?;
+        let mut rows = BufWriter::new(file);
+        writeln!(rows, "{HEADER}").map_err(broken(&self.path))?;
         self.rows = Some(rows);
         Ok(())
     }
@@ -51,9 +48,9 @@ impl Observer for FixTable {
                 rows,
                 "{:.9},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
                 fix.time.secs(),
-                method_name(fix.method),
+                name(fix.method),
                 fix.uid,
-                identity_name(fix.identity),
+                name(fix.identity),
                 fix.chainage_m,
                 true_m,
                 fix.chainage_m - true_m,
@@ -62,7 +59,7 @@ impl Observer for FixTable {
                 lamp.y,
                 lamp.z,
             )
-            .map_err(failed(WHAT))?;
+            .map_err(broken(&self.path))?;
         }
         Ok(())
     }
@@ -71,23 +68,11 @@ impl Observer for FixTable {
         let Some(mut rows) = self.rows.take() else {
             return Ok(());
         };
-        rows.flush().map_err(failed(WHAT))?;
-        fs::rename(part_name(&self.path), &self.path).map_err(failed(WHAT))
+        rows.flush().map_err(broken(&self.path))?;
+        finish(&self.path)
     }
 }
 
-fn method_name(method: Method) -> &'static str {
-    match method {
-        Method::Paper => "paper",
-        Method::Mono => "mono",
-    }
-}
-
-fn identity_name(identity: Identity) -> &'static str {
-    match identity {
-        Identity::Decoded => "decoded",
-        Identity::Joined => "joined",
-        Identity::Followed => "followed",
-        Identity::Predicted => "predicted",
-    }
+fn name(variant: impl Debug) -> String {
+    format!("{variant:?}").to_lowercase()
 }

@@ -6,7 +6,7 @@
     reason = "tests stop at the first thing that is not as expected"
 )]
 
-use super::stream::part_name;
+use super::files::part_name;
 use super::trial::{Size, play};
 use super::{FixTable, Recording};
 use crate::bus::{
