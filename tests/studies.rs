@@ -3,7 +3,7 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use metrotwin::study::{MANIFEST, Row, read_rows};
+use metrotwin::study::{MANIFEST, Row, Study, read_rows};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -167,7 +167,7 @@ fn a_study_stops_at_the_same_run() {
     };
     let (one, three) = (run("1"), run("3"));
     same(&one, &three);
-    let rows = metrotwin::study::rows(&one).unwrap();
+    let rows = Study::open(&one).unwrap().rows().unwrap();
     assert!(
         (30..200).contains(&rows.len()) && rows.len().is_multiple_of(10),
         "{} rows",
@@ -536,7 +536,7 @@ fn val_a_rare_event_is_estimated() {
             .unwrap(),
     );
     let template = Template::load(Path::new(file)).unwrap();
-    let digest = Digest::of(&template, &read_rows(&base).unwrap()).unwrap();
+    let digest = Digest::of(&template, &read_rows(&base).unwrap());
     let found = digest.events[0].weighted.unwrap();
     let truth = 1.0e-5;
     assert!((found.rate.value / truth - 1.0).abs() < 0.3, "{found:?}");

@@ -26,6 +26,7 @@
 
 mod compare;
 mod digest;
+mod folder;
 mod journal;
 mod manifest;
 mod measures;
@@ -42,15 +43,16 @@ mod worker;
 
 pub use compare::{Comparison, compare};
 pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES};
+pub use folder::Study;
 pub use journal::read as read_rows;
-pub use manifest::{Drawn, INPUTS, MANIFEST, Manifest, Shard};
+pub use manifest::{INPUTS, MANIFEST, Manifest, Shard};
 pub use measures::{Fixes, MEASURES, Measure, measure};
 pub use merge::merge;
-pub use report::{REPORT, report, rows};
+pub use report::{REPORT, report};
 pub use row::{Row, Status};
 pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
 pub use slurm::{Submission, Submitted};
-pub use worker::{Desk, serve, template_of};
+pub use worker::{ScenarioRunner, serve};
 
 use crate::record;
 use crate::scenario::ScenarioError;
@@ -70,7 +72,7 @@ pub enum StudyError {
         /// What the system says.
         source: io::Error,
     },
-    /// A row that is none.
+    /// A line that is no row.
     #[error(
         "{}, line {line}: {why}; it was written by another program or version: choose another folder",
         path.display()
@@ -99,7 +101,7 @@ pub enum StudyError {
         /// What differs.
         what: String,
     },
-    /// Somebody is at it.
+    /// Another process runs it.
     #[error("another `study run` is at work in {}", .0.display())]
     Busy(PathBuf),
     /// There is no study in a folder.

@@ -117,26 +117,26 @@ impl Row {
     /// A list of numbers.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let list = self.figures.get(name).and_then(Value::as_array);
-        list.iter()
-            .flat_map(|l| l.iter())
+        list.into_iter()
+            .flatten()
             .filter_map(Value::as_f64)
             .collect()
     }
 
     /// The first thing in which two rows of one run differ; wall times may.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let said = |what: &str, a: &dyn fmt::Debug, b: &dyn fmt::Debug| {
+        let differ = |what: &str, a: &dyn fmt::Debug, b: &dyn fmt::Debug| {
             Some(format!("{what}: {a:?} and {b:?}"))
         };
         if self.status != other.status {
-            return said("status", &self.status, &other.status);
+            return differ("status", &self.status, &other.status);
         }
         if self.reason != other.reason {
-            return said("reason", &self.reason, &other.reason);
+            return differ("reason", &self.reason, &other.reason);
         }
         let drawn = |row: &Self| (row.index, row.seed, row.rejected, row.ln_weight.to_bits());
         if drawn(self) != drawn(other) || self.values != other.values {
-            return said("drawn", &self.values, &other.values);
+            return differ("drawn", &self.values, &other.values);
         }
         let compared = MEASURES.iter().filter(|m| !m.is_wall_time());
         let differs = |name: &&str| self.figures.get(*name) != other.figures.get(*name);

@@ -1,9 +1,8 @@
 //! The process that runs scenarios for a study: indexes in, rows out.
 
-use super::manifest::{INPUTS, Manifest};
 use super::measures::Fixes;
 use super::pool::READY;
-use super::{Row, Status, StudyError};
+use super::{Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
 use crate::scenario::draw::{Draw, Template};
 use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
@@ -14,14 +13,6 @@ use std::path::Path;
 use std::sync::mpsc::channel;
 use std::thread;
 
-/// The study that a folder holds, from the copies of its inputs.
-pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
-    let manifest = Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
-    let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
-    template.settings.runs = (manifest.runs / template.cells()) as u32;
-    Ok((manifest, template))
-}
-
 /// Answers every index with a row, a line each, until the input ends; then the process ends too.
 pub fn serve(
     folder: &Path,
@@ -29,8 +20,8 @@ pub fn serve(
     input: impl BufRead + Send + 'static,
     mut output: impl Write,
 ) -> Result<(), StudyError> {
-    let (_, template) = template_of(folder)?;
-    let mut desk = Desk::new(renderer);
+    let template = Study::open(folder)?.template;
+    let mut runner = ScenarioRunner::new(renderer);
     let failed = |source| StudyError::file(Path::new("the worker's pipe"), source);
     writeln!(output, "{READY}")
         .and_then(|()| output.flush())
@@ -41,7 +32,7 @@ pub fn serve(
             .trim()
             .parse()
             .map_err(|e| failed(io::Error::other(e)))?;
-        let row = serde_json::to_string(&desk.run(&template, index));
+        let row = serde_json::to_string(&runner.run(&template, index));
         let row = row.map_err(|e| failed(e.into()))?;
         writeln!(output, "{row}")
             .and_then(|()| output.flush())
@@ -68,12 +59,12 @@ fn lines_while_wanted(
 }
 
 /// Runs one scenario after the other, with one renderer.
-pub struct Desk {
+pub struct ScenarioRunner {
     choice: RendererChoice,
     renderer: Option<Box<dyn Renderer>>,
 }
 
-impl Desk {
+impl ScenarioRunner {
     /// Before the first run.
     pub fn new(choice: RendererChoice) -> Self {
         Self {
@@ -90,11 +81,11 @@ impl Desk {
         };
         let run = AssertUnwindSafe(|| self.run_drawn(template, &draw));
         catch_unwind(run).unwrap_or_else(|panic| {
-            // Who knows what state it is in.
+            // Its state may be broken.
             self.renderer = None;
-            let said = panic.downcast_ref::<String>().map(String::as_str);
-            let said = said.or_else(|| panic.downcast_ref::<&str>().copied());
-            let reason = format!("panic: {}", said.unwrap_or("without a word"));
+            let message = panic.downcast_ref::<String>().map(String::as_str);
+            let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
+            let reason = format!("panic: {}", message.unwrap_or("without a word"));
             Row::without_figures(&draw, Status::Failed, reason)
         })
     }

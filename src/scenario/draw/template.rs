@@ -9,6 +9,7 @@ use crate::scenario::build::{overridden, read};
 use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
 use crate::track::{FileError, Problem, read_toml};
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -32,6 +33,8 @@ pub struct Template {
     pub(super) groups: Vec<(Vec<usize>, DMatrix<f64>)>,
     pub(super) tables: Tables,
     pub(super) conditions: Vec<Condition>,
+    /// What counts as an event, by name.
+    pub events: BTreeMap<String, Condition>,
 }
 
 impl Template {
@@ -57,6 +60,7 @@ impl Template {
         let folder = path.parent().unwrap_or(Path::new(""));
         let tables = Tables::read(&settings, folder, &mut problems);
         let conditions = conditions(&settings, &mut problems);
+        let events = events(&settings, &mut problems);
         check_keys(path, &text, &settings, &tables, &mut problems);
         let coordinates = coordinates(&settings);
         if settings.plan == PlanSettings::Sobol && coordinates.len() > MOST_SOBOL {
@@ -104,6 +108,7 @@ impl Template {
             coordinates,
             tables,
             conditions,
+            events,
             file,
             settings,
             text,
@@ -194,6 +199,21 @@ fn conditions(settings: &StudySettings, problems: &mut Vec<Problem>) -> Vec<Cond
         }
     }
     conditions
+}
+
+fn events(settings: &StudySettings, problems: &mut Vec<Problem>) -> BTreeMap<String, Condition> {
+    let mut events = BTreeMap::new();
+    for (name, text) in &settings.events {
+        match Condition::parse(text) {
+            Ok(condition) => _ = events.insert(name.clone(), condition),
+            Err(error) => problems.push(Problem::new(
+                format!("study.events.{name}"),
+                error.to_string(),
+                "`metrotwin study figures` lists what may be named, and the signs",
+            )),
+        }
+    }
+    events
 }
 
 /// Every key that a variable sets must be there, and take a value of its kind.

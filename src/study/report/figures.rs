@@ -4,9 +4,9 @@ use super::axis::Axis;
 use super::plot::{Layers, Plot};
 use crate::record::parquet::Kind;
 use crate::scenario::draw::{Condition, Distribution, Template};
-use crate::study::digest::is_weighed;
+use crate::study::digest::is_weighted;
 use crate::study::stats::{mean, quantile, rank_correlation, rate};
-use crate::study::table::{events, unit_of};
+use crate::study::table::unit_of;
 use crate::study::{Digest, FigureDigest, Measure, Row};
 use serde_json::Value;
 
@@ -90,22 +90,22 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
     let names = template.settings.variables.keys();
     let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
     // Weighed runs lie where they were proposed, not where nature has them: only maps show that.
-    let weighed = is_weighed(template);
+    let weighted = is_weighted(template);
     let mut plots = Vec::new();
-    for (name, condition) in events(template).unwrap_or_default() {
-        let told = || complete.iter().filter_map(|r| r.happened(&condition));
+    for (name, condition) in &template.events {
+        let happened = || complete.iter().filter_map(|r| r.happened(condition));
         // What never happened, or always, depends on nothing.
-        if told().all(|h| h) || !told().any(|h| h) {
+        if happened().all(|h| h) || !happened().any(|h| h) {
             continue;
         }
-        let groups = inputs.iter().filter(|_| !weighed);
-        plots.extend(groups.filter_map(|i| event_plot(i, &name, &condition, &complete)));
-        plots.extend(event_map(&inputs, &name, &condition, &complete));
+        let groups = inputs.iter().filter(|_| !weighted);
+        plots.extend(groups.filter_map(|i| event_plot(i, name, condition, &complete)));
+        plots.extend(event_map(&inputs, name, condition, &complete));
     }
     for figure in digest
         .figures
         .iter()
-        .filter(|f| is_worth_plotting(f.measure) && !weighed)
+        .filter(|f| is_worth_plotting(f.measure) && !weighted)
     {
         plots.extend(distribution(figure.measure, &complete));
         plots.extend(convergence(figure.measure, &complete));
@@ -115,7 +115,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
             .filter(|i| strongest.contains(&i.name) || !i.axis.names.is_empty());
         plots.extend(shown.filter_map(|i| figure_plot(i, figure.measure, &complete)));
     }
-    for method in ["paper", "mono"].into_iter().filter(|_| !weighed) {
+    for method in ["paper", "mono"].into_iter().filter(|_| !weighted) {
         plots.extend(error_by_range(method, &complete));
     }
     plots
@@ -189,8 +189,8 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
     order.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     let [x, y] = [order.first()?, order.get(1)?];
     let of = |wanted: bool| {
-        let told = rows.iter().filter(|r| r.happened(event) == Some(wanted));
-        told.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
+        let runs = rows.iter().filter(|r| r.happened(event) == Some(wanted));
+        runs.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
             .collect::<Vec<_>>()
     };
     let layers = Layers {

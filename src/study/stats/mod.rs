@@ -24,6 +24,7 @@ pub use sample::{mean, quantile};
 pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};
 pub use weight::{Weighted, effective_runs, weighted_mean, weighted_rate};
 
+use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::fmt;
 
@@ -61,6 +62,13 @@ impl fmt::Display for Estimate {
             0
         };
         write!(f, "{value:.digits$} ({low:.digits$} to {high:.digits$})")
+    }
+}
+
+/// As it is shown.
+impl Serialize for Estimate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 
