@@ -525,7 +525,7 @@ fn generated_scenarios_stand_by_themselves() {
 /// sigma is 4 % (checked below by its interval); the bound of 30 % is the one that users were promised.
 #[test]
 fn val_a_rare_event_is_estimated() {
-    use metrotwin::scenario::draw::Template;
+    use metrotwin::scenario::sampling::Template;
     use metrotwin::study::Digest;
     let base = folder("rare");
     let out = base.to_str().unwrap();

@@ -2,7 +2,7 @@
 
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
-use crate::scenario::draw::{Template, as_written};
+use crate::scenario::sampling::{Template, as_written};
 use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;

@@ -4,7 +4,7 @@ use super::fault::Failure;
 use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
 use crate::record::{self, FixTable, Recording};
-use crate::scenario::draw::Draw;
+use crate::scenario::sampling::Sample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RunOptions, Summary};
 use crate::study::{self, Fixes, Row, Study, StudyError};
@@ -90,8 +90,8 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     } else {
         print(&table::of(&summary, &out))?;
     }
-    if let Some((draw, row)) = &task.of_study {
-        compare(draw, row, &summary, &fixes)?;
+    if let Some((sample, row)) = &task.of_study {
+        compare(sample, row, &summary, &fixes)?;
     }
     match &summary.end {
         End::Complete => Ok(()),
@@ -113,7 +113,7 @@ struct Task {
     /// Where its results go.
     out: PathBuf,
     /// A study's draw, and its row.
-    of_study: Option<(Draw, Row)>,
+    of_study: Option<(Sample, Row)>,
 }
 
 fn task(args: &RunArgs) -> Result<Task, Failure> {
@@ -151,17 +151,17 @@ fn from_study(folder: &Path, index: u64) -> Result<Task, Failure> {
                 "give the index of one of its rows",
             )
         })?;
-    let draw = template.draw(index).map_err(StudyError::from)?;
+    let sample = template.sample(index).map_err(StudyError::from)?;
     Ok(Task {
-        scenario: template.scenario(&draw)?,
+        scenario: template.scenario(&sample)?,
         out: folder.join(format!("run-{index:06}")),
-        of_study: Some((draw, row)),
+        of_study: Some((sample, row)),
     })
 }
 
 /// Says whether a run came out as it did in its study.
-fn compare(draw: &Draw, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
-    match row.difference(&Row::of(draw, summary, fixes)) {
+fn compare(sample: &Sample, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
+    match row.difference(&Row::of(sample, summary, fixes)) {
         None => {
             eprintln!("equal to its row in the study, in every figure");
             Ok(())

@@ -4,7 +4,7 @@ use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::Template;
+use crate::scenario::sampling::Template;
 use crate::study::stats::Estimate;
 use crate::study::{
     self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
@@ -263,11 +263,11 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
         "{} pairs of runs; second less first, intervals of 95 %\n",
         found.pairs
     );
-    if found.drawn_otherwise > 0 {
+    if found.sampled_otherwise > 0 {
         text += &format!(
             "{} of them were not drawn alike: their differences scatter as if there were no pairs (weighted \
              runs have none)\n",
-            found.drawn_otherwise
+            found.sampled_otherwise
         );
     }
     for (name, unit, difference) in &found.differences {

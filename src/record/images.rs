@@ -4,8 +4,7 @@
 //! an image moves by half a pixel.
 
 use super::files::failed;
-use super::palette;
-use super::scene::ui;
+use super::palette::{self, ui};
 use super::slug;
 use super::stream::Stream;
 use crate::bus::{
@@ -144,7 +143,7 @@ impl Images {
             if keep {
                 self.jpeg(stream, &format!("{path}/image"), &frame.image)?;
             }
-            draw_spots(stream, path, spots)?;
+            log_spots(stream, path, spots)?;
         }
         Ok(())
     }
@@ -174,7 +173,7 @@ impl Images {
                 png(stream, &paths.binary, binary)?;
             }
         }
-        draw_obstacles(stream, &paths.camera, report, image.height())
+        log_obstacles(stream, &paths.camera, report, image.height())
     }
 
     fn brighten(&mut self, difference: &GrayImage) {
@@ -208,7 +207,7 @@ fn png(stream: &Stream, path: &str, image: &GrayImage) -> Result<(), ObserverErr
 }
 
 /// Boxes of lamps, with names where they have one, fitted ellipses and centres.
-fn draw_spots(stream: &Stream, path: &str, spots: &[Spot]) -> Result<(), ObserverError> {
+fn log_spots(stream: &Stream, path: &str, spots: &[Spot]) -> Result<(), ObserverError> {
     let unnamed = spots.iter().filter(|spot| spot.uid.is_none());
     let boxes = boxes(unnamed.map(|spot| spot.bounds)).with_colors([palette::UNNAMED]);
     stream.log(&format!("{path}/unnamed"), &boxes)?;
@@ -236,7 +235,7 @@ fn draw_spots(stream: &Stream, path: &str, spots: &[Spot]) -> Result<(), Observe
 }
 
 /// Boxes of obstacles with what is known of them, and of the other regions found.
-fn draw_obstacles(
+fn log_obstacles(
     stream: &Stream,
     path: &str,
     report: &WaysideReport,

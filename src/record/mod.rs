@@ -196,7 +196,7 @@ impl Open {
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
         let scene = Scene::new(opening.tunnel);
-        scene.draw(&stream, opening, settings)?;
+        scene.log(&stream, opening, settings)?;
         Ok(Self {
             moving: Moving::open(&stream, opening)?,
             plots: Plots::open(&stream, &contents)?,
@@ -237,7 +237,7 @@ impl Open {
             Event::Exposure(_) => return Ok(()),
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
-                self.plots.taken(RIG_CAMERA, &pair.left);
+                self.plots.exposure(RIG_CAMERA, &pair.left);
                 Texts::dark_lamps(stream, report)?;
                 self.images.pair(stream, pair, report)?;
                 self.moving.fixes(stream, scene, report)?;
@@ -250,12 +250,12 @@ impl Open {
                 let device = (index, name.as_str());
                 let time = frame.start;
                 self.plots.wayside(index, report);
-                self.plots.taken(name, frame);
+                self.plots.exposure(name, frame);
                 self.texts.wayside(stream, device, report)?;
                 self.images.wayside(stream, device, frame, report)?;
                 stream.at(time);
                 self.moving
-                    .obstacles(stream, scene, device, &report.obstacles)?;
+                    .obstacles(stream, scene, name, &report.obstacles)?;
                 time
             }
             Event::Protection(report) => {
@@ -319,5 +319,3 @@ fn slug(name: &str) -> String {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod trial;

@@ -6,8 +6,9 @@
     reason = "tests stop at the first thing that is not as expected"
 )]
 
+pub(super) mod session;
+
 use super::files::part_name;
-use super::trial::{Size, play};
 use super::{FixTable, Recording};
 use crate::bus::{
     DangerLevel, Delivery, DopplerSample, ObstacleWarning, OdometerSample, SimTime, Via,
@@ -20,14 +21,14 @@ use rerun::components::Name;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
+use session::{Extent, play};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-const SMALL: Size = Size {
+const SMALL: Extent = Extent {
     duration_s: 3.0,
-    shrink: 8,
     wayside: true,
     cars: 2,
 };
@@ -52,10 +53,10 @@ impl Drop for Folder {
     }
 }
 
-fn record(path: &Path, size: Size) {
+fn record(path: &Path, extent: Extent) {
     play(
         &mut Recording::to_file(path, &RecordSettings::default()),
-        size,
+        extent,
     );
 }
 
@@ -173,14 +174,14 @@ fn all_rows_of_an_entity_hold_the_same_components() {
 #[test]
 fn the_layout_leaves_out_what_is_missing() {
     let folder = Folder::new("layout");
-    let bench = Size {
+    let bench = Extent {
         wayside: false,
         cars: 0,
         ..SMALL
     };
-    let names = |size: Size, name: &str| {
+    let names = |extent: Extent, name: &str| {
         let path = folder.file(name);
-        record(&path, size);
+        record(&path, extent);
         let rows = chunks(&path, StoreKind::Blueprint);
         let views = rows.iter().filter(|chunk| {
             let path = chunk.entity_path().to_string();
@@ -223,33 +224,39 @@ fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
     }
 }
 
+/// A warning that comes by radio at once.
+fn delivery(device: &str, t_s: f64, danger: DangerLevel) -> Delivery {
+    let time = SimTime::from_secs(t_s);
+    Delivery {
+        received: time,
+        via: Via::Radio,
+        warning: ObstacleWarning {
+            device: device.into(),
+            number: 1,
+            issued: time,
+            danger,
+            from_chainage_m: 100.0,
+            to_chainage_m: 101.0,
+            blind: false,
+        },
+    }
+}
+
 /// A device repeats its warning every second; the log filled up with it.
 #[test]
-fn regress_the_log_tells_a_repeated_warning_once() {
+fn regress_the_log_has_a_repeated_warning_once() {
     let folder = Folder::new("repeated");
     let path = folder.file("run.rrd");
     let mut recording = Recording::to_file(&path, &RecordSettings::default());
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     recording.open(&bare("repeated", &tunnel)).unwrap();
     for number in 0..6 {
         let cleared = number == 5;
-        let delivery = Delivery {
-            received: SimTime::from_secs(f64::from(number)),
-            via: Via::Radio,
-            warning: ObstacleWarning {
-                device: "W1".into(),
-                number,
-                issued: SimTime::from_secs(f64::from(number)),
-                danger: if cleared {
-                    DangerLevel::None
-                } else {
-                    DangerLevel::High
-                },
-                from_chainage_m: 100.0,
-                to_chainage_m: 101.0,
-                blind: false,
-            },
+        let danger = match cleared {
+            true => DangerLevel::None,
+            false => DangerLevel::High,
         };
+        let delivery = delivery("W1", f64::from(number), danger);
         recording.observe(&Event::Delivery(&delivery)).unwrap();
     }
     recording.close().unwrap();
@@ -266,7 +273,7 @@ fn regress_the_log_tells_a_repeated_warning_once() {
 #[test]
 fn sensors_of_motion_become_series() {
     let folder = Folder::new("motion");
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     for radar in [true, false] {
         let path = folder.file(if radar { "with.rrd" } else { "without.rrd" });
         let mut recording = Recording::to_file(&path, &RecordSettings::default());
@@ -314,7 +321,7 @@ fn an_impossible_file_is_an_error() {
     let blocked = folder.file("file");
     fs::write(&blocked, "not a folder").unwrap();
     let mut recording = Recording::to_file(&blocked.join("run.rrd"), &RecordSettings::default());
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     let error = recording.open(&bare("impossible", &tunnel)).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
     // Closing what never opened is nothing to fail at.
@@ -336,7 +343,7 @@ fn fixes_become_rows() {
     for row in rows {
         assert_eq!(row.len(), columns);
         let number = |k: usize| row[k].parse::<f64>().unwrap();
-        assert!(["paper", "mono"].contains(&row[1]) && row[2].starts_with("2-"));
+        assert!(["paper", "mono"].contains(&row[1]) && row[2].starts_with("1-"));
         assert!((number(4) - number(5) - number(6)).abs() < 2e-6);
         assert!(number(10) > 0.0, "the lamp is in front of the camera");
     }

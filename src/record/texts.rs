@@ -9,7 +9,6 @@ use crate::bus::{
 use crate::session::{ObserverError, Opening};
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 /// The log.
 pub(super) const EVENTS: &str = "events";
@@ -60,31 +59,18 @@ impl Texts {
         camera: &str,
         fault: Option<CameraFault>,
     ) -> Result<(), ObserverError> {
-        match fault {
-            Some(fault) => log(
-                stream,
-                time,
-                TextLogLevel::ERROR,
-                &format!("camera {camera}: {fault}"),
-            ),
-            None => log(
-                stream,
-                time,
-                TextLogLevel::INFO,
-                &format!("camera {camera} sees again"),
-            ),
-        }
+        let (level, text) = match fault {
+            Some(fault) => (TextLogLevel::ERROR, format!("camera {camera}: {fault}")),
+            None => (TextLogLevel::INFO, format!("camera {camera} sees again")),
+        };
+        log(stream, time, level, &text)
     }
 
     /// Lamps have gone by without shining.
     pub(super) fn dark_lamps(stream: &Stream, report: &LedReport) -> Result<(), ObserverError> {
         for uid in &report.dark {
-            log(
-                stream,
-                report.time,
-                TextLogLevel::WARN,
-                &format!("lamp {uid} is dark"),
-            )?;
+            let text = format!("lamp {uid} is dark");
+            log(stream, report.time, TextLogLevel::WARN, &text)?;
         }
         Ok(())
     }
@@ -106,26 +92,17 @@ impl Texts {
             return Ok(());
         }
         let delay_s = delivery.received.since(warning.issued);
-        let (level, what) = match warning.danger {
-            DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
-            danger if warning.blind => (
-                level(danger),
-                format!(
-                    "track not watched, km {:.4} to {:.4}",
-                    warning.from_chainage_m / 1000.0,
-                    warning.to_chainage_m / 1000.0,
-                ),
-            ),
-            danger => (
-                level(danger),
-                format!(
-                    "danger {}, km {:.4} to {:.4}",
-                    danger_name(danger),
-                    warning.from_chainage_m / 1000.0,
-                    warning.to_chainage_m / 1000.0,
-                ),
-            ),
+        let stretch = format!(
+            "km {:.4} to {:.4}",
+            warning.from_chainage_m / 1000.0,
+            warning.to_chainage_m / 1000.0
+        );
+        let what = match warning.danger {
+            DangerLevel::None => "all clear".to_owned(),
+            _ if warning.blind => format!("track not watched, {stretch}"),
+            danger => format!("danger {}, {stretch}", danger_name(danger)),
         };
+        let level = level(warning.danger);
         let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
         log(stream, delivery.received, level, &text)
     }
@@ -146,14 +123,8 @@ impl Texts {
         }
         let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
         for o in &report.obstacles {
-            // Writing to a String cannot fail.
-            let _ = write!(
-                text,
-                "; {:.2} x {:.2} m at km {:.4}",
-                o.width_m,
-                o.height_m,
-                o.from_chainage_m / 1000.0
-            );
+            let km = o.from_chainage_m / 1000.0;
+            text += &format!("; {:.2} x {:.2} m at km {km:.4}", o.width_m, o.height_m);
         }
         log(stream, report.time, level(report.danger), &text)
     }
@@ -200,10 +171,7 @@ fn markdown(display: &DriverDisplay) -> String {
     let (lamp, meaning) = palette::driver_lamp(display.lamp);
     let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.1} m"));
     let power = if display.power { "on" } else { "off" };
-    let (position, distance) = (
-        metres(display.position_m),
-        metres(display.distance_to_obstacle_m),
-    );
+    let [position, distance] = [display.position_m, display.distance_to_obstacle_m].map(metres);
     let text = &display.text;
     format!(
         "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\

@@ -16,7 +16,7 @@ pub struct Comparison {
     pub pairs: usize,
     /// Of these, how many were not drawn alike: then pairs are no pairs, and weighted runs, whose weights
     /// are then two, have no differences.
-    pub drawn_otherwise: usize,
+    pub sampled_otherwise: usize,
     /// Name, unit, and mean difference of each figure and event that differs in some run.
     pub differences: Vec<(String, String, Estimate)>,
     /// The first thing in which they are not the same, value by value, wall times aside.
@@ -36,7 +36,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let alike = |a: &Row, b: &Row| {
         a.seed == b.seed && a.values == b.values && a.ln_weight.to_bits() == b.ln_weight.to_bits()
     };
-    let drawn_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
+    let sampled_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
 
     let weighted = is_weighted(&a.template) || is_weighted(&b.template);
     let mut differences = Vec::new();
@@ -46,7 +46,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
         let both: Vec<(f64, f64)> = both.collect();
         let estimate = if weighted {
-            weighted_mean(&both).filter(|_| drawn_otherwise == 0)
+            weighted_mean(&both).filter(|_| sampled_otherwise == 0)
         } else {
             mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>())
         };
@@ -71,7 +71,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     Ok(Comparison {
         rows: rows_a.len(),
         pairs: pairs.len(),
-        drawn_otherwise,
+        sampled_otherwise,
         differences,
         first_difference: lengths.or_else(|| together.find_map(row)),
     })

@@ -6,7 +6,7 @@ use super::stats::{
 };
 use super::{MEASURES, Measure, Row};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Distribution, Template};
+use crate::scenario::sampling::{Distribution, Template};
 use serde::Serialize;
 use std::collections::BTreeSet;
 

@@ -2,7 +2,7 @@
 
 use super::stop::Precision;
 use super::{INPUTS, Manifest, Row, StudyError, journal};
-use crate::scenario::draw::Template;
+use crate::scenario::sampling::Template;
 use std::path::{Path, PathBuf};
 
 /// The study that a folder holds, from the copies of its inputs.

@@ -2,7 +2,7 @@
 //! folder were made with; and shards.
 
 use super::{StudyError, write_whole};
-use crate::scenario::draw::{Inputs, Template, sha256};
+use crate::scenario::sampling::{Inputs, Template, sha256};
 use crate::session::RendererChoice;
 use crate::twin::render::Backend;
 use crate::twin::render::gpu;

@@ -2,7 +2,7 @@
 
 use super::journal::{self, JOURNAL, Journal};
 use super::{INPUTS, Manifest, Row, Shard, Status, Study, StudyError, table, write_whole};
-use crate::scenario::draw::Inputs;
+use crate::scenario::sampling::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};

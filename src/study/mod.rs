@@ -2,7 +2,7 @@
 //! they come to, with how sure that is.
 //!
 //! ```no_run
-//! use metrotwin::scenario::draw::Template;
+//! use metrotwin::scenario::sampling::Template;
 //! use metrotwin::study::{Options, run};
 //!
 //! let template = Template::load("scenarios/studies/led_accuracy.toml".as_ref())?;
@@ -13,7 +13,7 @@
 //!
 //! # How it goes
 //!
-//! Run k depends on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
+//! Run k depends on the study's seed and k alone ([`scenario::sampling`](crate::scenario::sampling)), so rows are
 //! the same for one worker and many, for shards on other machines, and for a study that was killed and
 //! resumed. Workers are processes of their own, one a core: a software graphics driver starts threads
 //! of its own, and two processes with one each do more than one with two; and a driver that
@@ -56,7 +56,7 @@ pub use worker::{ScenarioRunner, serve};
 
 use crate::record;
 use crate::scenario::ScenarioError;
-use crate::scenario::draw::{ConditionError, DrawError};
+use crate::scenario::sampling::{ConditionError, SampleError};
 use crate::session::ObserverError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -115,7 +115,7 @@ pub enum StudyError {
     Slurm(String),
     /// No run can be drawn.
     #[error(transparent)]
-    Draw(#[from] DrawError),
+    Sample(#[from] SampleError),
     /// An event that cannot be worked out.
     #[error("study.events: {0}")]
     Event(#[from] ConditionError),

@@ -1,7 +1,7 @@
 //! Workers: processes that each run one scenario after the other.
 
 use super::{Row, Status, StudyError};
-use crate::scenario::draw::Template;
+use crate::scenario::sampling::Template;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};
@@ -110,11 +110,11 @@ impl Pool<'_> {
                     running = Some(worker);
                     row
                 }
-                Err(error) => match template.draw(index) {
-                    Ok(draw) => {
-                        Row::without_figures(&draw, Status::Crashed, worker.end_reason(&error))
+                Err(error) => match template.sample(index) {
+                    Ok(sample) => {
+                        Row::without_figures(&sample, Status::Crashed, worker.end_reason(&error))
                     }
-                    Err(error) => Row::undrawn(index, &error),
+                    Err(error) => Row::not_sampled(index, &error),
                 },
             });
             if rows.send(row).is_err() {

@@ -1,7 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
-use crate::scenario::draw::{Draw, DrawError};
+use crate::scenario::sampling::{Sample, SampleError};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -63,32 +63,35 @@ impl Row {
     }
 
     /// Of a run for which nothing could be drawn.
-    pub fn undrawn(index: u64, error: &DrawError) -> Self {
-        let draw = Draw {
+    pub fn not_sampled(index: u64, error: &SampleError) -> Self {
+        let sample = Sample {
             index,
-            ..Draw::default()
+            ..Sample::default()
         };
-        Self::without_figures(&draw, Status::Invalid, error.to_string())
+        Self::without_figures(&sample, Status::Invalid, error.to_string())
     }
 
     /// Of a run that has no figures.
-    pub fn without_figures(draw: &Draw, status: Status, reason: String) -> Self {
+    pub fn without_figures(sample: &Sample, status: Status, reason: String) -> Self {
         let json = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
-        let values = draw.values.iter().map(|(name, v)| (name.clone(), json(v)));
+        let values = sample
+            .values
+            .iter()
+            .map(|(name, v)| (name.clone(), json(v)));
         Self {
-            index: draw.index,
-            seed: draw.seed,
+            index: sample.index,
+            seed: sample.seed,
             status,
             reason: Some(reason),
-            rejected: draw.rejected,
-            ln_weight: draw.ln_weight,
+            rejected: sample.rejected,
+            ln_weight: sample.ln_weight,
             values: values.collect(),
             figures: Map::new(),
         }
     }
 
     /// Of a run that has come to an end.
-    pub fn of(draw: &Draw, summary: &Summary, fixes: &Fixes) -> Self {
+    pub fn of(sample: &Sample, summary: &Summary, fixes: &Fixes) -> Self {
         let (status, reason) = match &summary.end {
             End::Complete => (Status::Complete, None),
             End::Interrupted => (Status::Failed, Some("broken off".to_owned())),
@@ -104,7 +107,7 @@ impl Row {
         Self {
             reason,
             figures: figures.collect(),
-            ..Self::without_figures(draw, status, String::new())
+            ..Self::without_figures(sample, status, String::new())
         }
     }
 

@@ -4,7 +4,7 @@ use super::journal::{self, Journal};
 use super::pool::{Next, Pool};
 use super::stop::Precision;
 use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table};
-use crate::scenario::draw::{Inputs, MOST_RUNS, Template};
+use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
 use std::fs;
@@ -56,7 +56,7 @@ const TABLE_EVERY: Duration = Duration::from_secs(60);
 pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, StudyError> {
     // The first run of each combination of swept values.
     for cell in 0..template.cells().min(MOST_CHECKED) {
-        template.draw(cell)?;
+        template.sample(cell)?;
     }
     table::check_names(template)?;
     if template.runs() > MOST_RUNS {

@@ -7,7 +7,7 @@ use super::digest::is_weighted;
 use super::stats::{Estimate, mean, rate};
 use super::{Measure, Row, StudyError, measure};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Condition, Template};
+use crate::scenario::sampling::{Condition, Template};
 
 /// Runs between two looks.
 const EVERY: usize = 10;

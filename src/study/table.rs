@@ -2,7 +2,7 @@
 
 use super::{MEASURES, Row, Status, StudyError, measure};
 use crate::record::parquet::{Column, Kind, Table, column};
-use crate::scenario::draw::{Condition, ConditionError, Template, VariableSettings};
+use crate::scenario::sampling::{Condition, ConditionError, Template, VariableSettings};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::measures::Fixes;
 use super::pool::READY;
 use super::{Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
-use crate::scenario::draw::{Draw, Template};
+use crate::scenario::sampling::{Sample, Template};
 use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
 use crate::twin::render::Renderer;
 use std::io::{self, BufRead, Write};
@@ -75,30 +75,30 @@ impl ScenarioRunner {
 
     /// Runs one run of a study, without a recording.
     pub fn run(&mut self, template: &Template, index: u64) -> Row {
-        let draw = match template.draw(index) {
-            Ok(draw) => draw,
-            Err(error) => return Row::undrawn(index, &error),
+        let sample = match template.sample(index) {
+            Ok(sample) => sample,
+            Err(error) => return Row::not_sampled(index, &error),
         };
-        let run = AssertUnwindSafe(|| self.run_drawn(template, &draw));
+        let run = AssertUnwindSafe(|| self.run_sample(template, &sample));
         catch_unwind(run).unwrap_or_else(|panic| {
             // Its state may be broken.
             self.renderer = None;
             let message = panic.downcast_ref::<String>().map(String::as_str);
             let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
             let reason = format!("panic: {}", message.unwrap_or("without a word"));
-            Row::without_figures(&draw, Status::Failed, reason)
+            Row::without_figures(&sample, Status::Failed, reason)
         })
     }
 
-    fn run_drawn(&mut self, template: &Template, draw: &Draw) -> Row {
-        let without = |status, reason| Row::without_figures(draw, status, reason);
-        let scenario = match template.scenario(draw) {
+    fn run_sample(&mut self, template: &Template, sample: &Sample) -> Row {
+        let without = |status, reason| Row::without_figures(sample, status, reason);
+        let scenario = match template.scenario(sample) {
             Ok(scenario) => scenario,
             Err(error) => return without(Status::Invalid, error.to_string()),
         };
         let mut fixes = Fixes::default();
         match self.session(&scenario, &mut fixes) {
-            Ok(summary) => Row::of(draw, &summary, &fixes),
+            Ok(summary) => Row::of(sample, &summary, &fixes),
             Err(error) => {
                 self.renderer = None;
                 without(Status::Failed, error.to_string())

@@ -53,7 +53,7 @@ pub use plan::{LabelKind, LabelKinds, Plan, UnknownLabel};
 use crate::record::files::{broken, failed, write_whole};
 use crate::record::parquet::{Column, Table};
 use crate::scenario::Scenario;
-use crate::scenario::draw::sha256;
+use crate::scenario::sampling::sha256;
 use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
 use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;

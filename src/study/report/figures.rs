@@ -3,7 +3,7 @@
 use super::axis::Axis;
 use super::plot::{Layers, Plot};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Condition, Distribution, Template};
+use crate::scenario::sampling::{Condition, Distribution, Template};
 use crate::study::digest::is_weighted;
 use crate::study::stats::{mean, quantile, rank_correlation, rate};
 use crate::study::table::unit_of;

@@ -1,7 +1,7 @@
 //! The page as HTML: what the template `page.html` shows.
 
 use super::plot::Plot;
-use crate::scenario::draw::{StudySettings, as_written};
+use crate::scenario::sampling::{StudySettings, as_written};
 use crate::study::{Digest, Manifest, Row, Study};
 use minijinja::value::Serde;
 use minijinja::{Environment, Error};

@@ -1,7 +1,7 @@
 //! Distributions that are none.
 
 use super::Cut;
-use crate::scenario::draw::Distribution;
+use crate::scenario::sampling::Distribution;
 use crate::track::Problem;
 
 /// A truncated distribution must leave this much of the whole.
