@@ -58,14 +58,14 @@ fn report_on(path: &Path) -> Result<String, Failure> {
     } else if has(&VEHICLE_KEYS) {
         Ok(report::vehicle(&scenario::parse_vehicle(path, &text)?))
     } else {
-        let mut said = report::scenario(&Scenario::from_text(path, &text, &[])?);
+        let mut lines = report::scenario(&Scenario::from_text(path, &text, &[])?);
         if has(&["study"]) {
             let template = Template::load(path)?;
             study::check(&template, false)?;
-            said += &report::study(&template);
-            said += &invalid_draws(&template);
+            lines += &report::study(&template);
+            lines += &invalid_draws(&template);
         }
-        Ok(said)
+        Ok(lines)
     }
 }
 

@@ -14,7 +14,7 @@ pub(super) enum Failure {
     Input(Report),
     /// A run failed: exit code 1.
     Run(anyhow::Error),
-    /// Said already: exit code 2.
+    /// Printed already: exit code 2.
     Reported,
 }
 

@@ -343,7 +343,7 @@ fn conclude(out: &Path, whole: bool) -> Result<(), Failure> {
 fn reasons(rows: &[Row]) -> Vec<(&str, usize)> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for row in rows.iter().filter(|row| !row.is_complete()) {
-        // What was drawn differs from run to run; what is wrong with it is said first.
+        // What is wrong stands on the first line; the values on the others differ from run to run.
         let reason = row.reason.as_deref().unwrap_or_default();
         *counts
             .entry(reason.lines().next().unwrap_or_default())

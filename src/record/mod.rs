@@ -53,6 +53,7 @@ use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
 use scene::Scene;
 use std::path::Path;
+use std::rc::Rc;
 use stream::{Stream, Target};
 use texts::Texts;
 
@@ -174,7 +175,7 @@ struct Open {
     first_camera: Option<Isometry3<f64>>,
     laid_out: bool,
     flush_at: SimTime,
-    scene: Scene,
+    scene: Rc<Scene>,
     moving: Moving,
     images: Images,
     plots: Plots,
@@ -195,16 +196,16 @@ impl Open {
             protection: opening.protection,
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
-        let scene = Scene::new(opening.tunnel);
+        let scene = Rc::new(Scene::new(opening.tunnel));
         scene.log(&stream, opening, settings)?;
         Ok(Self {
-            moving: Moving::open(&stream, opening)?,
-            plots: Plots::open(&stream, &contents)?,
+            moving: Moving::open(stream.clone(), scene.clone(), opening)?,
+            plots: Plots::open(stream.clone(), &contents)?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
             flush_at: SimTime::ZERO.plus(stream.batch_s()),
-            images: Images::new(settings, devices),
-            texts: Texts::open(&stream, opening)?,
+            images: Images::new(stream.clone(), settings, devices),
+            texts: Texts::open(stream.clone(), opening)?,
             stream,
             contents,
             scene,
@@ -212,10 +213,9 @@ impl Open {
     }
 
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        let (stream, scene) = (&self.stream, &self.scene);
         let time = match *event {
             Event::Train(train, left) => {
-                self.moving.train(scene, train, left);
+                self.moving.train(train, left);
                 self.plots.train(train);
                 let head = train.world_from_vehicle;
                 self.lay_out(Some(&head))?;
@@ -230,7 +230,7 @@ impl Open {
                 sample.time
             }
             Event::Bodies(time, bodies) => {
-                self.moving.bodies(stream, scene, time, bodies)?;
+                self.moving.bodies(time, bodies)?;
                 time
             }
             // Its images come when they reach the stack.
@@ -238,9 +238,9 @@ impl Open {
             Event::Pair(pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
                 self.plots.exposure(RIG_CAMERA, &pair.left);
-                Texts::dark_lamps(stream, report)?;
-                self.images.pair(stream, pair, report)?;
-                self.moving.fixes(stream, scene, report)?;
+                self.texts.dark_lamps(report)?;
+                self.images.pair(pair, report)?;
+                self.moving.fixes(report)?;
                 report.time
             }
             Event::Wayside(index, frame, report) => {
@@ -251,29 +251,28 @@ impl Open {
                 let time = frame.start;
                 self.plots.wayside(index, report);
                 self.plots.exposure(name, frame);
-                self.texts.wayside(stream, device, report)?;
-                self.images.wayside(stream, device, frame, report)?;
-                stream.at(time);
-                self.moving
-                    .obstacles(stream, scene, name, &report.obstacles)?;
+                self.texts.wayside(device, report)?;
+                self.images.wayside(device, frame, report)?;
+                self.stream.at(time);
+                self.moving.obstacles(name, &report.obstacles)?;
                 time
             }
             Event::Protection(report) => {
                 self.plots.protection(report);
-                self.texts.protection(stream, report)?;
-                self.texts.display(stream, report.time, &report.display)?;
+                self.texts.protection(report)?;
+                self.texts.display(report.time, &report.display)?;
                 report.time
             }
             Event::Camera(time, camera, fault) => {
-                Texts::camera(stream, time, camera, fault)?;
+                self.texts.camera(time, camera, fault)?;
                 time
             }
             Event::Delivery(delivery) => {
-                self.texts.delivery(stream, delivery)?;
+                self.texts.delivery(delivery)?;
                 delivery.received
             }
             Event::Note(time, text) => {
-                Texts::note(stream, time, text)?;
+                self.texts.note(time, text)?;
                 time
             }
         };
@@ -299,8 +298,8 @@ impl Open {
     fn flush(&mut self) -> Result<(), ObserverError> {
         self.lay_out(None)?;
         self.stream.flush()?;
-        self.moving.flush(&self.stream)?;
-        self.plots.flush(&self.stream)
+        self.moving.flush()?;
+        self.plots.flush()
     }
 
     fn close(mut self) -> Result<(), ObserverError> {

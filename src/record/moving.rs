@@ -17,6 +17,7 @@ use rerun::{
     Mesh3D, Points3D, Transform3D,
 };
 use std::collections::BTreeSet;
+use std::rc::Rc;
 
 const SIGHT: &str = "world/estimate/sight";
 
@@ -61,6 +62,8 @@ impl Poses {
 
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
+    stream: Stream,
+    scene: Rc<Scene>,
     /// Both eyes, where there is a rig.
     rig: Option<(RigCalibration, [Poses; 2])>,
     /// The head, then the cars; empty where there is neither train nor rig.
@@ -74,7 +77,11 @@ pub(super) struct Moving {
 
 impl Moving {
     /// Draws the train, and makes ready for its motion.
-    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+    pub(super) fn open(
+        stream: Stream,
+        scene: Rc<Scene>,
+        opening: &Opening<'_>,
+    ) -> Result<Self, ObserverError> {
         let half = opening.car_half_extents_m.map(|x| x as f32);
         for car in 0..opening.cars {
             let body = Boxes3D::from_half_sizes([[half.x, half.y, half.z]])
@@ -98,6 +105,8 @@ impl Moving {
             stream.log_static(HEAD, &[&mast as &dyn AsComponents, &tip])?;
         }
         Ok(Self {
+            stream,
+            scene,
             rig: opening.rig.map(|rig| (*rig, eyes.map(Poses::of))),
             train,
             left: None,
@@ -107,39 +116,33 @@ impl Moving {
     }
 
     /// Keeps the train's pose for the next flush.
-    pub(super) fn train(
-        &mut self,
-        scene: &Scene,
-        truth: &TrainState,
-        world_from_left: Option<&Isometry3<f64>>,
-    ) {
+    pub(super) fn train(&mut self, truth: &TrainState, world_from_left: Option<&Isometry3<f64>>) {
         let head_and_cars =
             std::iter::once(&truth.world_from_vehicle).chain(&truth.world_from_cars);
         for (poses, pose) in self.train.iter_mut().zip(head_and_cars) {
-            poses.push(scene, truth.time, pose);
+            poses.push(&self.scene, truth.time, pose);
         }
         if let (Some(left), Some((rig, eyes))) = (world_from_left, &mut self.rig) {
             let right = left * rig.left_from_right;
             for (poses, pose) in eyes.iter_mut().zip([*left, right]) {
-                poses.push(scene, truth.time, &pose);
+                poses.push(&self.scene, truth.time, &pose);
             }
         }
         self.left = world_from_left.copied();
     }
 
     /// Sends the poses kept.
-    pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result<(), ObserverError> {
         let eyes = self.rig.iter_mut().flat_map(|(_, eyes)| eyes);
         self.train
             .iter_mut()
             .chain(eyes)
-            .try_for_each(|poses| poses.flush(stream))
+            .try_for_each(|poses| poses.flush(&self.stream))
     }
 
     /// Logs things of which there may be none: an empty row takes the last ones away, once.
     fn log(
         &mut self,
-        stream: &Stream,
         path: &str,
         any: bool,
         things: &dyn AsComponents,
@@ -149,32 +152,27 @@ impl Moving {
             self.shown.insert(path.to_owned());
         }
         if any || were_there {
-            stream.log(path, things)?;
+            self.stream.log(path, things)?;
         }
         Ok(())
     }
 
     /// Shows obstacles, workers and whatever else is solid.
-    pub(super) fn bodies(
-        &mut self,
-        stream: &Stream,
-        scene: &Scene,
-        time: SimTime,
-        bodies: &[Body],
-    ) -> Result<(), ObserverError> {
-        stream.at(time);
-        let hulls = Hulls::of(scene, bodies);
+    pub(super) fn bodies(&mut self, time: SimTime, bodies: &[Body]) -> Result<(), ObserverError> {
+        self.stream.at(time);
+        let scene = self.scene.clone();
+        let hulls = Hulls::of(&scene, bodies);
         let (path, any) = ("world/bodies/hulls", !hulls.triangles.is_empty());
-        self.log(stream, path, any, &hulls.mesh())?;
+        self.log(path, any, &hulls.mesh())?;
 
-        let solids = |is_kind: fn(&Shape) -> bool| Solids::of(scene, bodies, is_kind);
+        let solids = |is_kind: fn(&Shape) -> bool| Solids::of(&scene, bodies, is_kind);
         let s = solids(|shape| matches!(shape, Shape::Box(_)));
         let any = !s.sizes.is_empty();
         let boxes = Boxes3D::from_centers_and_half_sizes(s.places, s.sizes)
             .with_quaternions(s.turns)
             .with_colors(s.colours)
             .with_fill_mode(FillMode::Solid);
-        self.log(stream, "world/bodies/boxes", any, &boxes)?;
+        self.log("world/bodies/boxes", any, &boxes)?;
 
         let s = solids(|shape| matches!(shape, Shape::Cylinder(..)));
         let (any, [radii, lengths]) = (!s.sizes.is_empty(), s.radii_and_lengths());
@@ -183,14 +181,14 @@ impl Moving {
             .with_quaternions(s.turns)
             .with_colors(s.colours)
             .with_fill_mode(FillMode::Solid);
-        self.log(stream, "world/bodies/cylinders", any, &cylinders)?;
+        self.log("world/bodies/cylinders", any, &cylinders)?;
 
         let s = solids(|shape| matches!(shape, Shape::Sphere(_)));
         let any = !s.sizes.is_empty();
         let spheres = Ellipsoids3D::from_centers_and_half_sizes(s.places, s.sizes)
             .with_colors(s.colours)
             .with_fill_mode(FillMode::Solid);
-        self.log(stream, "world/bodies/spheres", any, &spheres)?;
+        self.log("world/bodies/spheres", any, &spheres)?;
 
         let s = solids(|shape| matches!(shape, Shape::Capsule(..)));
         let (any, [radii, lengths]) = (!s.sizes.is_empty(), s.radii_and_lengths());
@@ -199,38 +197,33 @@ impl Moving {
             .with_quaternions(s.turns)
             .with_colors(s.colours)
             .with_fill_mode(FillMode::Solid);
-        self.log(stream, "world/bodies/capsules", any, &capsules)
+        self.log("world/bodies/capsules", any, &capsules)
     }
 
     /// Marks where the stack takes the train to be, and the lamp that it looked at.
-    pub(super) fn fixes(
-        &mut self,
-        stream: &Stream,
-        scene: &Scene,
-        report: &LedReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn fixes(&mut self, report: &LedReport) -> Result<(), ObserverError> {
         for fix in &report.fixes {
-            stream.at_frame(fix.time, report.number);
+            self.stream.at_frame(fix.time, report.number);
             let (name, colour) = palette::method(fix.method);
             let height_m = match fix.method {
                 Method::Paper => 10.8,
                 Method::Mono => 12.0,
             };
             let path = format!("world/estimate/{name}");
-            let place = Transform3D::from_translation(scene.local(&fix.position));
-            stream.log(&path, &place)?;
+            let place = Transform3D::from_translation(self.scene.local(&fix.position));
+            self.stream.log(&path, &place)?;
             // Drawn with the first fix: before it, there is nothing to show.
             if !self.masts.contains(&fix.method) {
                 self.masts.push(fix.method);
                 let (mast, tip) = mast(height_m, name, colour);
                 let mast = [&mast as &dyn AsComponents, &tip];
-                stream.log(&format!("{path}/mast"), &mast)?;
+                self.stream.log(&format!("{path}/mast"), &mast)?;
             }
         }
         let seen = report.fixes.first().and_then(|fix| {
-            let lamp = scene.lamp(fix.uid)?;
-            let eye = scene.place(&self.left?);
-            Some((fix, [eye, scene.local(lamp)]))
+            let lamp = self.scene.lamp(fix.uid)?;
+            let eye = self.scene.place(&self.left?);
+            Some((fix, [eye, self.scene.local(lamp)]))
         });
         let label = seen.map(|(fix, _)| format!("lamp {}", fix.uid));
         let colour = seen.map(|(fix, _)| palette::identity(fix.identity));
@@ -238,32 +231,29 @@ impl Moving {
             .with_radii([ui(1.5)])
             .with_colors(colour)
             .with_labels(label);
-        stream.at_frame(report.time, report.number);
-        self.log(stream, SIGHT, seen.is_some(), &sight)
+        self.stream.at_frame(report.time, report.number);
+        self.log(SIGHT, seen.is_some(), &sight)
     }
 
     /// Shows where a wayside device takes obstacles to be. The time must have been set.
     pub(super) fn obstacles(
         &mut self,
-        stream: &Stream,
-        scene: &Scene,
         device: &str,
         obstacles: &[DetectedObstacle],
     ) -> Result<(), ObserverError> {
         let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
         for o in obstacles {
-            let frame = scene
-                .alignment()
-                .at(0.5 * (o.from_chainage_m + o.to_chainage_m));
+            let alignment = self.scene.alignment();
+            let frame = alignment.at(0.5 * (o.from_chainage_m + o.to_chainage_m));
             let foot = TrackPoint {
                 s_m: frame.s_m,
                 l_m: o.lateral_m,
                 h_m: 0.0,
             };
-            let centre = scene.alignment().world_from_track(foot);
+            let centre = alignment.world_from_track(foot);
             let centre = Point3::new(centre.x, centre.y, o.position.z + 0.5 * o.height_m);
             let length_m = (o.to_chainage_m - o.from_chainage_m).abs();
-            places.push(scene.local(&centre));
+            places.push(self.scene.local(&centre));
             sizes.push([length_m, o.width_m, o.height_m].map(|x| (0.5 * x) as f32));
             turns.push(turn(&frame.world_from_line()));
         }
@@ -272,7 +262,7 @@ impl Moving {
             .with_colors(obstacles.iter().map(|o| palette::danger(o.danger)))
             .with_labels(obstacles.iter().map(images::danger_label));
         let path = format!("world/estimate/obstacles/{}", slug(device));
-        self.log(stream, &path, !obstacles.is_empty(), &boxes)
+        self.log(&path, !obstacles.is_empty(), &boxes)
     }
 }
 

@@ -8,8 +8,7 @@ use crate::bus::{
     WaysideReport,
 };
 use crate::session::ObserverError;
-use crate::twin::physics::{TrainState, WheelForces};
-use ValueOf::{Odometer, Protection, Radar, Train};
+use crate::twin::physics::TrainState;
 use palette::rgb;
 use rerun::external::re_sdk_types::blueprint::components::Corner2D;
 use rerun::{Color, Scalars, SeriesLines};
@@ -39,12 +38,13 @@ pub(super) struct PlotGroup {
     pub(super) origin: &'static str,
     /// Where the legend covers least.
     pub(super) legend: Corner2D,
-    lines: &'static [Curve],
+    /// The series that are the same in every run.
+    curves: &'static [Curve],
 }
 
 impl PlotGroup {
-    fn path_of(&self, line: &Curve) -> String {
-        format!("{}/{}", self.origin, line.path)
+    fn path_of(&self, curve: &Curve) -> String {
+        format!("{}/{}", self.origin, curve.path)
     }
 }
 
@@ -57,7 +57,7 @@ struct Curve {
     value: ValueOf,
 }
 
-/// What a line's values are taken from.
+/// What a curve's values are taken from.
 #[derive(Clone, Copy)]
 enum ValueOf {
     Train(fn(&TrainState) -> Option<f64>),
@@ -66,241 +66,67 @@ enum ValueOf {
     Protection(fn(&ProtectionReport) -> Option<f64>),
 }
 
-const fn curve(
-    path: &'static str,
-    name: &'static str,
-    colour: Color,
-    width: f32,
-    value: ValueOf,
-) -> Curve {
-    Curve {
-        path,
-        name,
-        colour,
-        width,
-        value,
-    }
+/// Groups of curves, each with its path, name, colour, width and values.
+macro_rules! groups {
+    ($($group:ident: $title:literal, $origin:literal, $legend:ident {
+        $($path:literal, $name:literal, $colour:ident, $width:literal, $of:ident $value:expr;)*
+    })*) => {
+        $(const $group: PlotGroup = PlotGroup {
+            title: $title,
+            origin: $origin,
+            legend: Corner2D::$legend,
+            curves: &[$(Curve {
+                path: $path,
+                name: $name,
+                colour: $colour,
+                width: $width,
+                value: ValueOf::$of($value),
+            }),*],
+        };)*
+
+        const GROUPS: &[PlotGroup] = &[$($group),*];
+    };
 }
 
-const SPEED: PlotGroup = PlotGroup {
-    title: "Speed, km/h",
-    origin: "plots/speed",
-    legend: Corner2D::LeftBottom,
-    lines: &[
-        curve(
-            "emergency",
-            "emergency",
-            RED,
-            1.5,
-            Protection(|r| Some(r.emergency_mps * KMH)),
-        ),
-        curve(
-            "service",
-            "service",
-            ORANGE,
-            1.5,
-            Protection(|r| Some(r.service_mps * KMH)),
-        ),
-        curve(
-            "permitted",
-            "permitted",
-            YELLOW,
-            1.5,
-            Protection(|r| Some(r.permitted_mps * KMH)),
-        ),
-        curve(
-            "odometer",
-            "odometer",
-            BLUE,
-            1.0,
-            Odometer(|s| Some(s.speed_mps * KMH)),
-        ),
-        curve(
-            "radar",
-            "radar",
-            VIOLET,
-            1.0,
-            Radar(|s| s.speed_mps.map(|v| v * KMH)),
-        ),
-        curve(
-            "estimated",
-            "estimated",
-            GREEN,
-            2.0,
-            Protection(|r| Some(r.speed_mps * KMH)),
-        ),
-        curve(
-            "true",
-            "true",
-            WHITE,
-            2.0,
-            Train(|t| Some(t.speed_mps * KMH)),
-        ),
-    ],
-};
-
-const VIBRATION: PlotGroup = PlotGroup {
-    title: "Floor acceleration, m/s²",
-    origin: "plots/vibration",
-    legend: Corner2D::RightTop,
-    lines: &[
-        curve(
-            "vertical",
-            "vertical",
-            BLUE,
-            1.0,
-            Train(|t| Some(t.floor_accel_mps2.z)),
-        ),
-        curve(
-            "lateral",
-            "lateral",
-            ORANGE,
-            1.0,
-            Train(|t| Some(t.floor_accel_mps2.y)),
-        ),
-    ],
-};
-
-const SUSPENSION: PlotGroup = PlotGroup {
-    title: "Suspension travel, mm",
-    origin: "plots/suspension",
-    legend: Corner2D::RightTop,
-    lines: &[
-        curve(
-            "primary",
-            "primary, first axle",
-            CYAN,
-            1.0,
-            Train(|t| Some(t.primary_travel_m * MM)),
-        ),
-        curve(
-            "secondary",
-            "secondary over it",
-            OLIVE,
-            1.5,
-            Train(|t| Some(t.secondary_travel_m * MM)),
-        ),
-    ],
-};
-
-const WHEELS: PlotGroup = PlotGroup {
-    title: "Wheel forces, first axle, kN",
-    origin: "plots/wheels",
-    legend: Corner2D::RightTop,
-    lines: &[
-        curve(
-            "left",
-            "normal, left",
-            BLUE,
-            1.0,
-            Train(|t| Some(first_axle(t)?.normal_n[0] / KN)),
-        ),
-        curve(
-            "right",
-            "normal, right",
-            ORANGE,
-            1.0,
-            Train(|t| Some(first_axle(t)?.normal_n[1] / KN)),
-        ),
-        curve(
-            "lateral",
-            "lateral",
-            OLIVE,
-            1.0,
-            Train(|t| Some(first_axle(t)?.lateral_n / KN)),
-        ),
-        curve(
-            "along",
-            "along",
-            WHITE,
-            1.0,
-            Train(|t| Some(first_axle(t)?.along_n / KN)),
-        ),
-    ],
-};
-
-const SLIP: PlotGroup = PlotGroup {
-    title: "Slip of the wheels, m/s",
-    origin: "plots/slip",
-    legend: Corner2D::LeftTop,
-    lines: &[
-        curve(
-            "most",
-            "most of all axles",
-            ORANGE,
-            1.0,
-            Train(most_slip_mps),
-        ),
-        curve(
-            "first",
-            "first axle",
-            BLUE,
-            1.0,
-            Train(|t| Some(first_axle(t)?.slip_mps)),
-        ),
-    ],
-};
-
-const COUPLERS: PlotGroup = PlotGroup {
-    title: "Pull of the couplers, kN",
-    origin: "plots/couplers",
-    legend: Corner2D::RightTop,
-    lines: &[
-        curve(
-            "first",
-            "first",
-            BLUE,
-            1.0,
-            Train(|t| Some(t.couplers_n.first()? / KN)),
-        ),
-        curve(
-            "last",
-            "last",
-            ORANGE,
-            1.0,
-            Train(|t| Some(t.couplers_n.last()? / KN)),
-        ),
-    ],
-};
-
-const DISTANCE: PlotGroup = PlotGroup {
-    title: "Distance to obstacle, m",
-    origin: "plots/distance",
-    legend: Corner2D::LeftBottom,
-    lines: &[curve(
-        "display",
-        "driver's display",
-        WHITE,
-        2.0,
-        Protection(|r| r.display.distance_to_obstacle_m),
-    )],
-};
-
-/// All whose lines are the same in every run.
-const GROUPS: [PlotGroup; 7] = [
-    SPEED, VIBRATION, SUSPENSION, WHEELS, SLIP, COUPLERS, DISTANCE,
-];
-
-const ERROR: PlotGroup = PlotGroup {
-    title: "Position error and ±2σ, m",
-    origin: "plots/position_error",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
-
-const EXPOSURE: PlotGroup = PlotGroup {
-    title: "Exposure, µs",
-    origin: "plots/exposure",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
-
-const GAIN: PlotGroup = PlotGroup {
-    title: "Gain, dB",
-    origin: "plots/gain",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
+groups! {
+    SPEED: "Speed, km/h", "plots/speed", LeftBottom {
+        "emergency", "emergency", RED, 1.5, Protection |r| Some(r.emergency_mps * KMH);
+        "service", "service", ORANGE, 1.5, Protection |r| Some(r.service_mps * KMH);
+        "permitted", "permitted", YELLOW, 1.5, Protection |r| Some(r.permitted_mps * KMH);
+        "odometer", "odometer", BLUE, 1.0, Odometer |s| Some(s.speed_mps * KMH);
+        "radar", "radar", VIOLET, 1.0, Radar |s| Some(s.speed_mps? * KMH);
+        "estimated", "estimated", GREEN, 2.0, Protection |r| Some(r.speed_mps * KMH);
+        "true", "true", WHITE, 2.0, Train |t| Some(t.speed_mps * KMH);
+    }
+    VIBRATION: "Floor acceleration, m/s²", "plots/vibration", RightTop {
+        "vertical", "vertical", BLUE, 1.0, Train |t| Some(t.floor_accel_mps2.z);
+        "lateral", "lateral", ORANGE, 1.0, Train |t| Some(t.floor_accel_mps2.y);
+    }
+    SUSPENSION: "Suspension travel, mm", "plots/suspension", RightTop {
+        "primary", "primary, first axle", CYAN, 1.0, Train |t| Some(t.primary_travel_m * MM);
+        "secondary", "secondary over it", OLIVE, 1.5, Train |t| Some(t.secondary_travel_m * MM);
+    }
+    WHEELS: "Wheel forces, first axle, kN", "plots/wheels", RightTop {
+        "left", "normal, left", BLUE, 1.0, Train |t| Some(t.wheels.first()?.normal_n[0] / KN);
+        "right", "normal, right", ORANGE, 1.0, Train |t| Some(t.wheels.first()?.normal_n[1] / KN);
+        "lateral", "lateral", OLIVE, 1.0, Train |t| Some(t.wheels.first()?.lateral_n / KN);
+        "along", "along", WHITE, 1.0, Train |t| Some(t.wheels.first()?.along_n / KN);
+    }
+    SLIP: "Slip of the wheels, m/s", "plots/slip", LeftTop {
+        "most", "most of all axles", ORANGE, 1.0, Train most_slip_mps;
+        "first", "first axle", BLUE, 1.0, Train |t| Some(t.wheels.first()?.slip_mps);
+    }
+    COUPLERS: "Pull of the couplers, kN", "plots/couplers", RightTop {
+        "first", "first", BLUE, 1.0, Train |t| Some(t.couplers_n.first()? / KN);
+        "last", "last", ORANGE, 1.0, Train |t| Some(t.couplers_n.last()? / KN);
+    }
+    DISTANCE: "Distance to obstacle, m", "plots/distance", LeftBottom {
+        "display", "driver's display", WHITE, 2.0, Protection |r| r.display.distance_to_obstacle_m;
+    }
+    ERROR: "Position error and ±2σ, m", "plots/position_error", RightTop {}
+    EXPOSURE: "Exposure, µs", "plots/exposure", RightTop {}
+    GAIN: "Gain, dB", "plots/gain", RightTop {}
+}
 
 /// Of wayside devices or cameras, in turn.
 const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
@@ -308,14 +134,10 @@ const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
 /// What the rig is called among cameras; both eyes are exposed alike.
 pub(super) const RIG_CAMERA: &str = "rig";
 
-fn first_axle(train: &TrainState) -> Option<&WheelForces> {
-    train.wheels.first()
-}
-
 fn most_slip_mps(train: &TrainState) -> Option<f64> {
-    first_axle(train)?;
     let slips = train.wheels.iter().map(|w| w.slip_mps);
-    Some(slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a }))
+    let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    train.wheels.first().map(|_| most)
 }
 
 /// The plots of a run by panes; plots of one pane are its tabs.
@@ -358,7 +180,8 @@ struct Series {
 
 /// The series of a recording.
 pub(super) struct Plots {
-    lines: Vec<(String, ValueOf)>,
+    stream: Stream,
+    curves: Vec<(String, ValueOf)>,
     series: BTreeMap<String, Series>,
     /// Names of the wayside devices.
     devices: Vec<String>,
@@ -366,48 +189,50 @@ pub(super) struct Plots {
 
 impl Plots {
     /// Names and colours the series.
-    pub(super) fn open(stream: &Stream, contents: &Contents) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self, ObserverError> {
         for group in panes(contents).iter().flatten() {
-            let is_there = |line: &&Curve| contents.radar || !matches!(line.value, Radar(_));
-            for line in group.lines.iter().filter(is_there) {
-                let path = group.path_of(line);
-                style(stream, &path, line.name, line.colour, line.width)?;
+            let is_there =
+                |curve: &&Curve| contents.radar || !matches!(curve.value, ValueOf::Radar(_));
+            for curve in group.curves.iter().filter(is_there) {
+                let path = group.path_of(curve);
+                style(&stream, &path, curve.name, curve.colour, curve.width)?;
             }
         }
         for method in Method::ALL.into_iter().filter(|_| contents.rig) {
             let (name, colour) = palette::method(method);
             let [error, upper, lower] = error_paths(method);
-            style(stream, &error, name, colour, 1.5)?;
+            style(&stream, &error, name, colour, 1.5)?;
             // One entry of the legend for both.
             for bound in [upper, lower] {
-                style(stream, &bound, &format!("{name} 2σ"), faint(colour), 1.0)?;
+                style(&stream, &bound, &format!("{name} 2σ"), faint(colour), 1.0)?;
             }
         }
         for (name, colour) in contents.devices.iter().zip(DEVICE_COLOURS.iter().cycle()) {
             let [line, formula] = distance_paths(name);
-            style(stream, &line, name, *colour, 1.5)?;
+            style(&stream, &line, name, *colour, 1.5)?;
             let formula_name = format!("{name}, formula");
-            style(stream, &formula, &formula_name, faint(*colour), 1.5)?;
+            style(&stream, &formula, &formula_name, faint(*colour), 1.5)?;
         }
         for (camera, colour) in contents.cameras().zip(DEVICE_COLOURS.iter().cycle()) {
             for path in exposure_paths(camera) {
-                style(stream, &path, camera, *colour, 1.5)?;
+                style(&stream, &path, camera, *colour, 1.5)?;
             }
         }
-        let lines = GROUPS.iter().flat_map(|group| {
-            let lines = group.lines.iter();
-            lines.map(|line| (group.path_of(line), line.value))
+        let curves = GROUPS.iter().flat_map(|group| {
+            let curves = group.curves.iter();
+            curves.map(|curve| (group.path_of(curve), curve.value))
         });
         Ok(Self {
-            lines: lines.collect(),
+            stream,
+            curves: curves.collect(),
             series: BTreeMap::new(),
             devices: contents.devices.clone(),
         })
     }
 
-    /// Takes the values of all lines that `of` knows.
-    fn push_lines(&mut self, time: SimTime, of: impl Fn(ValueOf) -> Option<Option<f64>>) {
-        for (path, value) in &self.lines {
+    /// Takes the values of all curves that `of` knows.
+    fn push_curves(&mut self, time: SimTime, of: impl Fn(ValueOf) -> Option<Option<f64>>) {
+        for (path, value) in &self.curves {
             if let Some(value) = of(*value) {
                 push_or_gap(&mut self.series, path, time, value);
             }
@@ -416,32 +241,32 @@ impl Plots {
 
     /// The train as it really is.
     pub(super) fn train(&mut self, truth: &TrainState) {
-        self.push_lines(truth.time, |value| match value {
-            Train(of) => Some(of(truth)),
+        self.push_curves(truth.time, |value| match value {
+            ValueOf::Train(of) => Some(of(truth)),
             _ => None,
         });
     }
 
     /// Speed of the wheels.
     pub(super) fn odometer(&mut self, sample: &OdometerSample) {
-        self.push_lines(sample.time, |value| match value {
-            Odometer(of) => Some(of(sample)),
+        self.push_curves(sample.time, |value| match value {
+            ValueOf::Odometer(of) => Some(of(sample)),
             _ => None,
         });
     }
 
     /// Speed over ground, where it is measured.
     pub(super) fn doppler(&mut self, sample: &DopplerSample) {
-        self.push_lines(sample.time, |value| match value {
-            Radar(of) => Some(of(sample)),
+        self.push_curves(sample.time, |value| match value {
+            ValueOf::Radar(of) => Some(of(sample)),
             _ => None,
         });
     }
 
     /// What the protection holds the speed against.
     pub(super) fn protection(&mut self, report: &ProtectionReport) {
-        self.push_lines(report.time, |value| match value {
-            Protection(of) => Some(of(report)),
+        self.push_curves(report.time, |value| match value {
+            ValueOf::Protection(of) => Some(of(report)),
             _ => None,
         });
     }
@@ -481,7 +306,7 @@ impl Plots {
     }
 
     /// Sends the values kept.
-    pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result<(), ObserverError> {
         for (path, series) in &mut self.series {
             if series.times_ns.is_empty() {
                 continue;
@@ -489,7 +314,7 @@ impl Plots {
             let columns = Scalars::new(series.values.drain(..))
                 .columns_of_unit_batches()
                 .map_err(failed(path.as_str()))?;
-            stream.columns(path, &series.times_ns, columns)?;
+            self.stream.columns(path, &series.times_ns, columns)?;
             series.times_ns.clear();
         }
         Ok(())

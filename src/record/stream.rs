@@ -23,7 +23,7 @@ pub(super) const SIM_TIME: &str = "sim_time";
 pub(super) const FRAME: &str = "frame";
 
 /// How long a viewer may take to answer before the recording gives up on it.
-const VIEWER_PATIENCE: Duration = Duration::from_secs(10);
+const VIEWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Where a recording goes.
 #[derive(Clone, Debug)]
@@ -37,10 +37,11 @@ pub(super) enum Target {
 /// Simulated time between batches of a file. The sdk keeps some kilobytes of index a batch in
 /// memory until the file's end: with batches of one second, long runs grow without bound.
 const FILE_BATCH_S: f64 = 10.0;
-/// Simulated time between batches to a viewer, where somebody waits for them.
+/// Simulated time between batches to a viewer, which shows them as they come.
 const VIEWER_BATCH_S: f64 = 1.0;
 
-/// An open stream.
+/// An open stream; clones of it are the same one.
+#[derive(Clone)]
 pub(super) struct Stream {
     rerun: RecordingStream,
     file: Option<PathBuf>,
@@ -58,7 +59,7 @@ impl Stream {
                 application.clone(),
                 format!("{scenario}-seed-{seed}"),
             ),
-            // A viewer would mix two runs under one id, and nobody compares what it was sent.
+            // A viewer would mix two runs under one id.
             Target::Viewer(_) => StoreId::random(StoreKind::Recording, application.clone()),
         };
         let builder = RecordingStreamBuilder::from_store_id(&id)
@@ -154,7 +155,7 @@ impl Stream {
     pub(super) fn flush(&self) -> Result<(), ObserverError> {
         let flushed = match self.file {
             Some(_) => self.rerun.flush_blocking(),
-            None => self.rerun.flush_with_timeout(VIEWER_PATIENCE),
+            None => self.rerun.flush_with_timeout(VIEWER_TIMEOUT),
         };
         flushed.map_err(failed(match self.file {
             Some(_) => "writing the recording",

@@ -17,6 +17,7 @@ pub(super) const DISPLAY: &str = "display";
 
 /// Turns what happens into words; says again only what changed.
 pub(super) struct Texts {
+    stream: Stream,
     brake: BrakeDemand,
     /// Of each wayside device, with the number of its obstacles.
     danger: Vec<(DangerLevel, usize)>,
@@ -28,7 +29,7 @@ pub(super) struct Texts {
 
 impl Texts {
     /// Begins the log with what is run.
-    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
         let tunnel = opening.tunnel;
         let text = format!(
             "{}, seed {}: {:.0} m of line, {} lamps, {} balises",
@@ -38,23 +39,25 @@ impl Texts {
             tunnel.lamps.len(),
             tunnel.balises.len(),
         );
-        Self::note(stream, SimTime::ZERO, &text)?;
-        Ok(Self {
+        let texts = Self {
+            stream,
             brake: BrakeDemand::None,
             danger: vec![(DangerLevel::None, 0); opening.wayside.len()],
             sent: BTreeMap::new(),
             shown: String::new(),
-        })
+        };
+        texts.note(SimTime::ZERO, &text)?;
+        Ok(texts)
     }
 
     /// Anything.
-    pub(super) fn note(stream: &Stream, time: SimTime, text: &str) -> Result<(), ObserverError> {
-        log(stream, time, TextLogLevel::INFO, text)
+    pub(super) fn note(&self, time: SimTime, text: &str) -> Result<(), ObserverError> {
+        self.log(time, TextLogLevel::INFO, text)
     }
 
     /// The stack says that a camera has failed, or is well again.
     pub(super) fn camera(
-        stream: &Stream,
+        &self,
         time: SimTime,
         camera: &str,
         fault: Option<CameraFault>,
@@ -63,24 +66,20 @@ impl Texts {
             Some(fault) => (TextLogLevel::ERROR, format!("camera {camera}: {fault}")),
             None => (TextLogLevel::INFO, format!("camera {camera} sees again")),
         };
-        log(stream, time, level, &text)
+        self.log(time, level, &text)
     }
 
     /// Lamps have gone by without shining.
-    pub(super) fn dark_lamps(stream: &Stream, report: &LedReport) -> Result<(), ObserverError> {
+    pub(super) fn dark_lamps(&self, report: &LedReport) -> Result<(), ObserverError> {
         for uid in &report.dark {
             let text = format!("lamp {uid} is dark");
-            log(stream, report.time, TextLogLevel::WARN, &text)?;
+            self.log(report.time, TextLogLevel::WARN, &text)?;
         }
         Ok(())
     }
 
     /// A message reached the train. Devices repeat theirs; the log does not.
-    pub(super) fn delivery(
-        &mut self,
-        stream: &Stream,
-        delivery: &Delivery,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn delivery(&mut self, delivery: &Delivery) -> Result<(), ObserverError> {
         let warning = &delivery.warning;
         let via = match delivery.via {
             Via::Balise => "balise",
@@ -104,13 +103,12 @@ impl Texts {
         };
         let level = level(warning.danger);
         let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
-        log(stream, delivery.received, level, &text)
+        self.log(delivery.received, level, &text)
     }
 
     /// A wayside device changed its mind about the danger, or about how many things lie there.
     pub(super) fn wayside(
         &mut self,
-        stream: &Stream,
         device: (usize, &str),
         report: &WaysideReport,
     ) -> Result<(), ObserverError> {
@@ -126,15 +124,11 @@ impl Texts {
             let km = o.from_chainage_m / 1000.0;
             text += &format!("; {:.2} x {:.2} m at km {km:.4}", o.width_m, o.height_m);
         }
-        log(stream, report.time, level(report.danger), &text)
+        self.log(report.time, level(report.danger), &text)
     }
 
     /// The protection changed its demand.
-    pub(super) fn protection(
-        &mut self,
-        stream: &Stream,
-        report: &ProtectionReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn protection(&mut self, report: &ProtectionReport) -> Result<(), ObserverError> {
         if self.brake == report.command.brake {
             return Ok(());
         }
@@ -146,13 +140,12 @@ impl Texts {
         };
         let speed_kmh = report.speed_mps * 3.6;
         let text = format!("{what} at {speed_kmh:.1} km/h");
-        log(stream, report.time, level, &text)
+        self.log(report.time, level, &text)
     }
 
     /// What the driver sees, when it changed.
     pub(super) fn display(
         &mut self,
-        stream: &Stream,
         time: SimTime,
         display: &DriverDisplay,
     ) -> Result<(), ObserverError> {
@@ -160,10 +153,22 @@ impl Texts {
         if text == self.shown {
             return Ok(());
         }
-        stream.at(time);
-        stream.log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
+        self.stream.at(time);
+        self.stream
+            .log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
         self.shown = text;
         Ok(())
+    }
+
+    fn log(&self, time: SimTime, level: &'static str, text: &str) -> Result<(), ObserverError> {
+        let colour = match level {
+            TextLogLevel::ERROR => palette::danger(DangerLevel::High),
+            TextLogLevel::WARN => palette::danger(DangerLevel::Low),
+            _ => Color::from_rgb(210, 215, 220),
+        };
+        let line = TextLog::new(text).with_level(level).with_color(colour);
+        self.stream.at(time);
+        self.stream.log(EVENTS, &line)
     }
 }
 
@@ -193,22 +198,4 @@ fn level(danger: DangerLevel) -> &'static str {
         DangerLevel::Low => TextLogLevel::WARN,
         DangerLevel::High => TextLogLevel::ERROR,
     }
-}
-
-fn log(
-    stream: &Stream,
-    time: SimTime,
-    level: &'static str,
-    text: &str,
-) -> Result<(), ObserverError> {
-    stream.at(time);
-    let colour = match level {
-        TextLogLevel::ERROR => palette::danger(DangerLevel::High),
-        TextLogLevel::WARN => palette::danger(DangerLevel::Low),
-        _ => Color::from_rgb(210, 215, 220),
-    };
-    stream.log(
-        EVENTS,
-        &TextLog::new(text).with_level(level).with_color(colour),
-    )
 }

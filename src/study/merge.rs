@@ -47,7 +47,7 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
             missing.join(", ")
         ));
     }
-    // Nobody runs there meanwhile: the journal is locked.
+    // The journal is locked, so that no study runs there meanwhile.
     let (_journal, there) = Journal::open(folder)?;
     let kept = Manifest::read(folder)?;
     check_free(folder, kept.as_ref(), first, &there)?;

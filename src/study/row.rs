@@ -21,18 +21,6 @@ pub enum Status {
     Crashed,
 }
 
-impl Status {
-    /// As in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Complete => "complete",
-            Self::Failed => "failed",
-            Self::Invalid => "invalid",
-            Self::Crashed => "crashed",
-        }
-    }
-}
-
 /// A run's inputs and figures. Names of values are those of the study's variables, names of figures
 /// those of [`MEASURES`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

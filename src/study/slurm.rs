@@ -121,17 +121,22 @@ impl Submission {
             _ => StudyError::Slurm(format!("sbatch: {e}")),
         }
         })?;
-        let said = String::from_utf8_lossy(&output.stdout);
+        let stdout = String::from_utf8_lossy(&output.stdout);
         if !output.status.success() {
             let why = String::from_utf8_lossy(&output.stderr);
-            let why = format!("{} {}", why.trim(), said.trim());
+            let why = format!("{} {}", why.trim(), stdout.trim());
             return Err(StudyError::Slurm(format!(
                 "sbatch {}: {why}",
                 script.display()
             )));
         }
         // `id` or `id;cluster`.
-        Ok(said.trim().split(';').next().unwrap_or_default().to_owned())
+        Ok(stdout
+            .trim()
+            .split(';')
+            .next()
+            .unwrap_or_default()
+            .to_owned())
     }
 }
 

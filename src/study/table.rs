@@ -152,8 +152,8 @@ fn cell(kind: Kind, value: &Value) -> Value {
     }
 }
 
-/// The unit of a variable: what its own name ends on tells, or the key that it sets as it is drawn. One
-/// that is rescaled to a key with a unit has another, which nobody said.
+/// The unit of a variable: that of its own name's end, else that of the key that it sets. Where it is
+/// rescaled to a key with a unit, its own unit is unknown.
 pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
     let of_key = variable.keys.first().and_then(|key| unit_in(key));
     match (unit_in(name), of_key) {
@@ -163,7 +163,7 @@ pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
     }
 }
 
-/// The unit that the end of a key tells.
+/// The unit by the end of a key.
 fn unit_in(key: &str) -> Option<&'static str> {
     let last = key.rsplit('.').next().unwrap_or(key);
     let last = last.split('[').next().unwrap_or(last);

@@ -41,8 +41,8 @@ pub fn serve(
     Ok(())
 }
 
-/// The lines of the input. Whoever asks closes it after the last row; when it ends before, nobody waits
-/// for the run at hand any more, as after a kill, and the process ends with it.
+/// The lines of the input. The pool closes it after the last row. When it ends before, as after a kill,
+/// no row is wanted any more, and the process ends.
 fn lines_while_wanted(
     input: impl BufRead + Send + 'static,
 ) -> impl Iterator<Item = io::Result<String>> {

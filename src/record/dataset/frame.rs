@@ -1,5 +1,5 @@
-//! What a frame's row says of its camera: when, from where, through which lens; and its rows, each
-//! with its own time and pose.
+//! Rows of the tables of frames (when, from where, through which lens) and of image rows, each with
+//! its own time and pose.
 
 use crate::record::parquet::table_rows;
 use crate::record::slug;

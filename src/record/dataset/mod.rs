@@ -101,7 +101,7 @@ pub struct DataSet<'a> {
     complete: bool,
 }
 
-/// What is said of the whole set.
+/// What holds for the whole set.
 struct About {
     scenario: String,
     description: String,

@@ -71,7 +71,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// A table's own keys first, then the tables below it, as TOML wants it.
+    /// A table's own keys first, then the tables below it, in TOML's order.
     fn table(&self, text: &mut String, table: &Table, schema: &Json, path: &str) {
         let (below, own): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         for (key, value) in own {
@@ -122,8 +122,8 @@ impl Writer {
     }
 
     fn comment(&self, text: &mut String, property: Option<&Json>) {
-        let said = property.and_then(|p| p.get("description")?.as_str());
-        for line in said.iter().flat_map(|s| wrapped(s)) {
+        let meaning = property.and_then(|p| p.get("description")?.as_str());
+        for line in meaning.iter().flat_map(|s| wrapped(s)) {
             _ = writeln!(text, "# {line}");
         }
     }

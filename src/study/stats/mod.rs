@@ -41,7 +41,7 @@ pub struct Estimate {
     pub n: usize,
 }
 
-/// To the digits that the interval tells; very small ones in powers of ten.
+/// With as many digits as the width of the interval allows; very small ones in powers of ten.
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let half = 0.5 * (self.high - self.low);
