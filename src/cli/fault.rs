@@ -1,6 +1,6 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
-use crate::scenario::{Override, ScenarioError};
+use crate::scenario::{Override, ScenarioError, is_within};
 use crate::track::{FileError, Problem, locate};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report};
 use std::fmt;
@@ -183,12 +183,7 @@ impl Fault {
 
 /// One of the keys lies at or below the other.
 fn touches(a: &str, b: &str) -> bool {
-    let below = |outer: &str, inner: &str| {
-        inner
-            .strip_prefix(outer)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-    };
-    below(a, b) || below(b, a)
+    is_within(b, a) || is_within(a, b)
 }
 
 #[cfg(test)]

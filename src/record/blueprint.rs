@@ -4,11 +4,10 @@
 //! builder draws random ids (two recordings of one run would differ) and cannot say which entity a
 //! 3-D view follows.
 
-use super::files::failed;
+use super::files::{Result, failed};
 use super::images::WaysidePaths;
 use super::stream::{SIM_TIME, Stream};
 use super::{Contents, images, plots, scene, texts};
-use crate::session::ObserverError;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
     TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
@@ -56,11 +55,7 @@ impl Pane {
 }
 
 /// Sends the layout for what this run has.
-pub(super) fn send(
-    stream: &Stream,
-    contents: &Contents,
-    eye: ([f32; 3], [f32; 3]),
-) -> Result<(), ObserverError> {
+pub(super) fn send(stream: &Stream, contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Result {
     let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
     let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
         .enabled(true)

@@ -6,6 +6,9 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
+/// What observers give.
+pub(super) type Result<T = (), E = ObserverError> = std::result::Result<T, E>;
+
 /// Name of a file while it is written.
 pub(super) fn part_name(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
@@ -21,12 +24,12 @@ pub(crate) fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
 }
 
 /// Gives a file that has been written its name.
-pub(super) fn finish(path: &Path) -> Result<(), ObserverError> {
+pub(super) fn finish(path: &Path) -> Result {
     fs::rename(part_name(path), path).map_err(broken(path))
 }
 
 /// Makes the folder of a file.
-pub(super) fn make_folder_of(path: &Path) -> Result<(), ObserverError> {
+pub(super) fn make_folder_of(path: &Path) -> Result {
     let made = path.parent().map_or(Ok(()), fs::create_dir_all);
     made.map_err(failed(format!("making the folder of {}", path.display())))
 }

@@ -3,7 +3,7 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
-use super::files::failed;
+use super::files::{Result, failed};
 use super::palette::{self, ui};
 use super::slug;
 use super::stream::Stream;
@@ -12,7 +12,6 @@ use crate::bus::{
     StereoPair, WaysideReport,
 };
 use crate::scenario::RecordSettings;
-use crate::session::ObserverError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder};
 use jpeg_encoder::{ColorType, Encoder};
@@ -126,11 +125,7 @@ impl Images {
     }
 
     /// A pair of the train's cameras.
-    pub(super) fn pair(
-        &mut self,
-        pair: &StereoPair,
-        report: &LedReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn pair(&mut self, pair: &StereoPair, report: &LedReport) -> Result {
         let keep = self.stereo.due(pair.left.start);
         if !keep && !self.every_frame {
             return Ok(());
@@ -155,7 +150,7 @@ impl Images {
         device: (usize, &str),
         frame: &Frame,
         report: &WaysideReport,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let (start, image) = (frame.start, &frame.image);
         let keep = self.wayside.get_mut(device.0).is_some_and(|r| r.due(start));
         if !keep && !self.every_frame {
@@ -183,7 +178,7 @@ impl Images {
         }
     }
 
-    fn jpeg(&self, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
+    fn jpeg(&self, path: &str, image: &GrayImage) -> Result {
         // 65535 pixels a side is the limit of JPEG itself.
         let (Ok(width), Ok(height)) = (image.width().try_into(), image.height().try_into()) else {
             return self.png(path, image);
@@ -196,7 +191,7 @@ impl Images {
         self.stream.log(path, &encoded)
     }
 
-    fn png(&self, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
+    fn png(&self, path: &str, image: &GrayImage) -> Result {
         let mut bytes = Vec::new();
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
             .write_image(image, image.width(), image.height(), ExtendedColorType::L8)
@@ -206,7 +201,7 @@ impl Images {
     }
 
     /// Boxes of lamps, with names where they have one, fitted ellipses and centres.
-    fn log_spots(&self, path: &str, spots: &[Spot]) -> Result<(), ObserverError> {
+    fn log_spots(&self, path: &str, spots: &[Spot]) -> Result {
         let unnamed = spots.iter().filter(|spot| spot.uid.is_none());
         let boxes = boxes_of(unnamed.map(|spot| spot.bounds)).with_colors([palette::UNNAMED]);
         self.stream.log(&format!("{path}/unnamed"), &boxes)?;
@@ -234,12 +229,7 @@ impl Images {
     }
 
     /// Boxes of obstacles with what is known of them, and of the other regions found.
-    fn log_obstacles(
-        &self,
-        path: &str,
-        report: &WaysideReport,
-        height_px: u32,
-    ) -> Result<(), ObserverError> {
+    fn log_obstacles(&self, path: &str, report: &WaysideReport, height_px: u32) -> Result {
         let is_obstacle =
             |bounds: PixelBox| report.obstacles.iter().any(|o| o.blob.bounds == bounds);
         let others = report.blobs.iter().map(|blob| blob.bounds);

@@ -46,6 +46,7 @@ pub use tables::FixTable;
 use crate::bus::SimTime;
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, ObserverError, Opening};
+use files::Result;
 use images::Images;
 use moving::Moving;
 use nalgebra::Isometry3;
@@ -123,20 +124,20 @@ impl Recording {
 }
 
 impl Observer for Recording {
-    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+    fn open(&mut self, opening: &Opening<'_>) -> Result {
         let stream = Stream::open(&self.target, opening.scenario, opening.seed)?;
         self.open = Some(Open::new(stream, opening, &self.settings)?);
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         match &mut self.open {
             Some(open) => open.observe(event),
             None => Ok(()),
         }
     }
 
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         match self.open.take() {
             Some(open) => open.close(),
             None => Ok(()),
@@ -183,11 +184,7 @@ struct Open {
 }
 
 impl Open {
-    fn new(
-        stream: Stream,
-        opening: &Opening<'_>,
-        settings: &RecordSettings,
-    ) -> Result<Self, ObserverError> {
+    fn new(stream: Stream, opening: &Opening<'_>, settings: &RecordSettings) -> Result<Self> {
         let devices = opening.wayside.len();
         let contents = Contents {
             rig: opening.rig.is_some(),
@@ -212,7 +209,7 @@ impl Open {
         })
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         let time = match *event {
             Event::Train(train, left) => {
                 self.moving.train(train, left);
@@ -284,7 +281,7 @@ impl Open {
     }
 
     /// Sends the layout, once: with the first truth, which says where to look.
-    fn lay_out(&mut self, head: Option<&Isometry3<f64>>) -> Result<(), ObserverError> {
+    fn lay_out(&mut self, head: Option<&Isometry3<f64>>) -> Result {
         if self.laid_out {
             return Ok(());
         }
@@ -295,14 +292,14 @@ impl Open {
 
     /// Rows first, then columns: each batch is cut before the next begins, so that the order in
     /// the file does not depend on threads.
-    fn flush(&mut self) -> Result<(), ObserverError> {
+    fn flush(&mut self) -> Result {
         self.lay_out(None)?;
         self.stream.flush()?;
         self.moving.flush()?;
         self.plots.flush()
     }
 
-    fn close(mut self) -> Result<(), ObserverError> {
+    fn close(mut self) -> Result {
         self.flush()?;
         self.stream.finish()
     }

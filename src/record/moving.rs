@@ -1,12 +1,12 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
-use super::files::failed;
+use super::files::{Result, failed};
 use super::palette::{self, ui};
 use super::scene::{HEAD, Scene, turn};
 use super::stream::Stream;
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use crate::track::TrackPoint;
 use crate::twin::physics::TrainState;
 use crate::twin::render::{Body, Hull, Shape};
@@ -45,7 +45,7 @@ impl Poses {
         self.turns.push(turn(pose));
     }
 
-    fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    fn flush(&mut self, stream: &Stream) -> Result {
         if self.times_ns.is_empty() {
             return Ok(());
         }
@@ -77,11 +77,7 @@ pub(super) struct Moving {
 
 impl Moving {
     /// Draws the train, and makes ready for its motion.
-    pub(super) fn open(
-        stream: Stream,
-        scene: Rc<Scene>,
-        opening: &Opening<'_>,
-    ) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, scene: Rc<Scene>, opening: &Opening<'_>) -> Result<Self> {
         let half = opening.car_half_extents_m.map(|x| x as f32);
         for car in 0..opening.cars {
             let body = Boxes3D::from_half_sizes([[half.x, half.y, half.z]])
@@ -132,7 +128,7 @@ impl Moving {
     }
 
     /// Sends the poses kept.
-    pub(super) fn flush(&mut self) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result {
         let eyes = self.rig.iter_mut().flat_map(|(_, eyes)| eyes);
         self.train
             .iter_mut()
@@ -141,12 +137,7 @@ impl Moving {
     }
 
     /// Logs things of which there may be none: an empty row takes the last ones away, once.
-    fn log(
-        &mut self,
-        path: &str,
-        any: bool,
-        things: &dyn AsComponents,
-    ) -> Result<(), ObserverError> {
+    fn log(&mut self, path: &str, any: bool, things: &dyn AsComponents) -> Result {
         let were_there = self.shown.remove(path);
         if any {
             self.shown.insert(path.to_owned());
@@ -158,7 +149,7 @@ impl Moving {
     }
 
     /// Shows obstacles, workers and whatever else is solid.
-    pub(super) fn bodies(&mut self, time: SimTime, bodies: &[Body]) -> Result<(), ObserverError> {
+    pub(super) fn bodies(&mut self, time: SimTime, bodies: &[Body]) -> Result {
         self.stream.at(time);
         let scene = self.scene.clone();
         let hulls = Hulls::of(&scene, bodies);
@@ -201,7 +192,7 @@ impl Moving {
     }
 
     /// Marks where the stack takes the train to be, and the lamp that it looked at.
-    pub(super) fn fixes(&mut self, report: &LedReport) -> Result<(), ObserverError> {
+    pub(super) fn fixes(&mut self, report: &LedReport) -> Result {
         for fix in &report.fixes {
             self.stream.at_frame(fix.time, report.number);
             let (name, colour) = palette::method(fix.method);
@@ -236,11 +227,7 @@ impl Moving {
     }
 
     /// Shows where a wayside device takes obstacles to be. The time must have been set.
-    pub(super) fn obstacles(
-        &mut self,
-        device: &str,
-        obstacles: &[DetectedObstacle],
-    ) -> Result<(), ObserverError> {
+    pub(super) fn obstacles(&mut self, device: &str, obstacles: &[DetectedObstacle]) -> Result {
         let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
         for o in obstacles {
             let alignment = self.scene.alignment();

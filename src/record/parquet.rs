@@ -1,8 +1,7 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
 //! description. Rows are anything that serialises to an object with the columns' names.
 
-use super::files::{broken, finish, part_name};
-use crate::session::ObserverError;
+use super::files::{Result, broken, finish, part_name};
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::json::ReaderBuilder;
 use arrow::json::reader::Decoder;
@@ -163,7 +162,7 @@ pub struct Table {
 
 impl Table {
     /// Begins a file; it gets its name in [`Self::close`].
-    pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self, ObserverError> {
+    pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self> {
         let fields = columns.iter().map(|c| {
             let about = [("unit", &c.unit), ("meaning", &c.meaning)];
             let about = about.map(|(key, text)| (key.to_owned(), text.clone().into_owned()));
@@ -186,7 +185,7 @@ impl Table {
     }
 
     /// One more row: an object with a value for each column; what it lacks is null.
-    pub fn push(&mut self, row: &impl Serialize) -> Result<(), ObserverError> {
+    pub fn push(&mut self, row: &impl Serialize) -> Result {
         let added = self.rows.serialize(slice::from_ref(row));
         added.map_err(broken(&self.path))?;
         if self.rows.len() >= BATCH_ROWS {
@@ -195,7 +194,7 @@ impl Table {
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), ObserverError> {
+    fn flush(&mut self) -> Result {
         match self.rows.flush().map_err(broken(&self.path))? {
             Some(batch) => self.writer.write(&batch).map_err(broken(&self.path)),
             None => Ok(()),
@@ -203,7 +202,7 @@ impl Table {
     }
 
     /// Writes the rest and gives the file its name.
-    pub fn close(mut self) -> Result<(), ObserverError> {
+    pub fn close(mut self) -> Result {
         self.flush()?;
         self.writer.close().map_err(broken(&self.path))?;
         finish(&self.path)

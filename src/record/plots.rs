@@ -1,13 +1,12 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
-use super::files::failed;
+use super::files::{Result, failed};
 use super::stream::Stream;
 use super::{Contents, palette, slug};
 use crate::bus::{
     DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,
     WaysideReport,
 };
-use crate::session::ObserverError;
 use crate::twin::physics::TrainState;
 use palette::rgb;
 use rerun::external::re_sdk_types::blueprint::components::Corner2D;
@@ -189,7 +188,7 @@ pub(super) struct Plots {
 
 impl Plots {
     /// Names and colours the series.
-    pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self> {
         for group in panes(contents).iter().flatten() {
             let is_there =
                 |curve: &&Curve| contents.radar || !matches!(curve.value, ValueOf::Radar(_));
@@ -306,7 +305,7 @@ impl Plots {
     }
 
     /// Sends the values kept.
-    pub(super) fn flush(&mut self) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result {
         for (path, series) in &mut self.series {
             if series.times_ns.is_empty() {
                 continue;
@@ -360,13 +359,7 @@ fn faint(colour: Color) -> Color {
     Color::from_rgb(r / 2, g / 2, b / 2)
 }
 
-fn style(
-    stream: &Stream,
-    path: &str,
-    name: &str,
-    colour: Color,
-    width: f32,
-) -> Result<(), ObserverError> {
+fn style(stream: &Stream, path: &str, name: &str, colour: Color, width: f32) -> Result {
     let style = SeriesLines::new()
         .with_names([name])
         .with_colors([colour])

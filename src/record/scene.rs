@@ -1,10 +1,11 @@
 //! What stands still in the 3-D view: tunnel, rails, lamps, balises, wayside cameras.
 
+use super::files::Result;
 use super::images::{WaysidePaths, pinhole};
 use super::palette::{self, ui};
 use super::stream::Stream;
 use crate::scenario::RecordSettings;
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use crate::track::uid::Uid;
 use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -76,7 +77,7 @@ impl Scene {
         stream: &Stream,
         opening: &Opening<'_>,
         settings: &RecordSettings,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         stream.log_static("world", &ViewCoordinates::RIGHT_HAND_Z_UP())?;
         self.log_tunnel(stream, opening.tunnel, settings.ring_step_m)?;
         self.log_lamps_and_balises(stream, opening.tunnel)?;
@@ -95,12 +96,7 @@ impl Scene {
         Ok(())
     }
 
-    fn log_tunnel(
-        &self,
-        stream: &Stream,
-        tunnel: &Tunnel,
-        ring_step_m: f64,
-    ) -> Result<(), ObserverError> {
+    fn log_tunnel(&self, stream: &Stream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
         let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
         let mut mesh = Sweep::default();
         for range in &tunnel.sections {
@@ -121,7 +117,7 @@ impl Scene {
         stream.log_static("world/rails", &rails)
     }
 
-    fn log_lamps_and_balises(&self, stream: &Stream, tunnel: &Tunnel) -> Result<(), ObserverError> {
+    fn log_lamps_and_balises(&self, stream: &Stream, tunnel: &Tunnel) -> Result {
         let lamps = &tunnel.lamps;
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))

@@ -5,9 +5,8 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
-use super::files::{failed, finish, make_folder_of, part_name};
+use super::files::{Result, failed, finish, make_folder_of, part_name};
 use crate::bus::SimTime;
-use crate::session::ObserverError;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::ChunkBatcherConfig;
 use rerun::{
@@ -50,7 +49,7 @@ pub(super) struct Stream {
 
 impl Stream {
     /// Opens the stream of one run. A file is written beside its final name until [`Self::finish`].
-    pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self, ObserverError> {
+    pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self> {
         // Viewers keep one layout an application, and each scenario has its own.
         let application = ApplicationId::new_or_unknown(format!("metrotwin-{scenario}"));
         let id = match target {
@@ -107,16 +106,12 @@ impl Stream {
     }
 
     /// One row.
-    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result<(), ObserverError> {
+    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result {
         self.rerun.log(path, what).map_err(failed(path))
     }
 
     /// What holds for the whole run.
-    pub(super) fn log_static(
-        &self,
-        path: &str,
-        what: &dyn AsComponents,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn log_static(&self, path: &str, what: &dyn AsComponents) -> Result {
         self.rerun.log_static(path, what).map_err(failed(path))
     }
 
@@ -126,7 +121,7 @@ impl Stream {
         path: &str,
         times_ns: &[i64],
         columns: impl IntoIterator<Item = SerializedComponentColumn>,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let times = TimeColumn::new_duration_nanos(SIM_TIME, times_ns.iter().copied());
         self.rerun
             .send_columns(path, [times], columns)
@@ -152,7 +147,7 @@ impl Stream {
     }
 
     /// Cuts the batches here and passes them on.
-    pub(super) fn flush(&self) -> Result<(), ObserverError> {
+    pub(super) fn flush(&self) -> Result {
         let flushed = match self.file {
             Some(_) => self.rerun.flush_blocking(),
             None => self.rerun.flush_with_timeout(VIEWER_TIMEOUT),
@@ -164,7 +159,7 @@ impl Stream {
     }
 
     /// Ends the stream; a file gets its index and its final name.
-    pub(super) fn finish(self) -> Result<(), ObserverError> {
+    pub(super) fn finish(self) -> Result {
         self.flush()?;
         self.rerun.finalize_deferred_sinks();
         match self.file {

@@ -1,7 +1,7 @@
 //! Tables for other programs.
 
-use super::files::{broken, finish, make_folder_of, part_name};
-use crate::session::{Event, Observer, ObserverError, Opening};
+use super::files::{Result, broken, finish, make_folder_of, part_name};
+use crate::session::{Event, Observer, Opening};
 use std::fmt::Debug;
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -29,7 +29,7 @@ impl FixTable {
 }
 
 impl Observer for FixTable {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
+    fn open(&mut self, _: &Opening<'_>) -> Result {
         make_folder_of(&self.path)?;
         let file = File::create(part_name(&self.path)).map_err(broken(&self.path))?;
         let mut rows = BufWriter::new(file);
@@ -38,7 +38,7 @@ impl Observer for FixTable {
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         let (Some(rows), Event::Pair(_, report, true_chainages_m)) = (&mut self.rows, event) else {
             return Ok(());
         };
@@ -64,7 +64,7 @@ impl Observer for FixTable {
         Ok(())
     }
 
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         let Some(mut rows) = self.rows.take() else {
             return Ok(());
         };

@@ -1,12 +1,13 @@
 //! The event log and the driver's display.
 
+use super::files::Result;
 use super::palette;
 use super::stream::Stream;
 use crate::bus::{
     BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, LedReport, ProtectionReport,
     SimTime, Via, WaysideReport,
 };
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
 use std::collections::BTreeMap;
 
@@ -29,7 +30,7 @@ pub(super) struct Texts {
 
 impl Texts {
     /// Begins the log with what is run.
-    pub(super) fn open(stream: Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, opening: &Opening<'_>) -> Result<Self> {
         let tunnel = opening.tunnel;
         let text = format!(
             "{}, seed {}: {:.0} m of line, {} lamps, {} balises",
@@ -51,17 +52,12 @@ impl Texts {
     }
 
     /// Anything.
-    pub(super) fn note(&self, time: SimTime, text: &str) -> Result<(), ObserverError> {
+    pub(super) fn note(&self, time: SimTime, text: &str) -> Result {
         self.log(time, TextLogLevel::INFO, text)
     }
 
     /// The stack says that a camera has failed, or is well again.
-    pub(super) fn camera(
-        &self,
-        time: SimTime,
-        camera: &str,
-        fault: Option<CameraFault>,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn camera(&self, time: SimTime, camera: &str, fault: Option<CameraFault>) -> Result {
         let (level, text) = match fault {
             Some(fault) => (TextLogLevel::ERROR, format!("camera {camera}: {fault}")),
             None => (TextLogLevel::INFO, format!("camera {camera} sees again")),
@@ -70,7 +66,7 @@ impl Texts {
     }
 
     /// Lamps have gone by without shining.
-    pub(super) fn dark_lamps(&self, report: &LedReport) -> Result<(), ObserverError> {
+    pub(super) fn dark_lamps(&self, report: &LedReport) -> Result {
         for uid in &report.dark {
             let text = format!("lamp {uid} is dark");
             self.log(report.time, TextLogLevel::WARN, &text)?;
@@ -79,7 +75,7 @@ impl Texts {
     }
 
     /// A message reached the train. Devices repeat theirs; the log does not.
-    pub(super) fn delivery(&mut self, delivery: &Delivery) -> Result<(), ObserverError> {
+    pub(super) fn delivery(&mut self, delivery: &Delivery) -> Result {
         let warning = &delivery.warning;
         let via = match delivery.via {
             Via::Balise => "balise",
@@ -107,11 +103,7 @@ impl Texts {
     }
 
     /// A wayside device changed its mind about the danger, or about how many things lie there.
-    pub(super) fn wayside(
-        &mut self,
-        device: (usize, &str),
-        report: &WaysideReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn wayside(&mut self, device: (usize, &str), report: &WaysideReport) -> Result {
         let Some(danger) = self.danger.get_mut(device.0) else {
             return Ok(());
         };
@@ -128,7 +120,7 @@ impl Texts {
     }
 
     /// The protection changed its demand.
-    pub(super) fn protection(&mut self, report: &ProtectionReport) -> Result<(), ObserverError> {
+    pub(super) fn protection(&mut self, report: &ProtectionReport) -> Result {
         if self.brake == report.command.brake {
             return Ok(());
         }
@@ -144,11 +136,7 @@ impl Texts {
     }
 
     /// What the driver sees, when it changed.
-    pub(super) fn display(
-        &mut self,
-        time: SimTime,
-        display: &DriverDisplay,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn display(&mut self, time: SimTime, display: &DriverDisplay) -> Result {
         let text = markdown(display);
         if text == self.shown {
             return Ok(());
@@ -160,7 +148,7 @@ impl Texts {
         Ok(())
     }
 
-    fn log(&self, time: SimTime, level: &'static str, text: &str) -> Result<(), ObserverError> {
+    fn log(&self, time: SimTime, level: &'static str, text: &str) -> Result {
         let colour = match level {
             TextLogLevel::ERROR => palette::danger(DangerLevel::High),
             TextLogLevel::WARN => palette::danger(DangerLevel::Low),

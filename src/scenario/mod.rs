@@ -45,5 +45,6 @@ pub mod schema;
 pub use build::{Scenario, ScenarioError, WaysidePost};
 pub(crate) use build::{parse_tunnel, parse_vehicle, read};
 pub use file::{BenchSettings, ScenarioFile, StackSettings, WaysidePostSettings};
+pub(crate) use overrides::is_within;
 pub use overrides::{Override, OverrideError};
 pub use recording::RecordSettings;

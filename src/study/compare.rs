@@ -3,7 +3,7 @@
 
 use super::digest::is_weighted;
 use super::stats::{Estimate, mean, weighted_mean};
-use super::{MEASURES, Row, Study, StudyError};
+use super::{MEASURES, Result, Row, Study};
 use crate::record::parquet::Kind;
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub struct Comparison {
 }
 
 /// Compares the studies of two folders.
-pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
+pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
     let (a, b) = (Study::open(a)?, Study::open(b)?);
     let (rows_a, rows_b) = (a.rows()?, b.rows()?);
     let of_b = |row: &Row| rows_b.binary_search_by_key(&row.index, |r| r.index).ok();

@@ -1,7 +1,7 @@
 //! A study's folder, opened once for all that is asked of it.
 
 use super::stop::Precision;
-use super::{INPUTS, Manifest, Row, StudyError, journal};
+use super::{INPUTS, Manifest, Result, Row, StudyError, journal};
 use crate::scenario::sampling::Template;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ pub struct Study {
 
 impl Study {
     /// Opens a folder that `study run` or `study merge` has written.
-    pub fn open(folder: &Path) -> Result<Self, StudyError> {
+    pub fn open(folder: &Path) -> Result<Self> {
         let manifest =
             Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
         let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
@@ -31,7 +31,7 @@ impl Study {
     }
 
     /// The rows that count, in order.
-    pub fn rows(&self) -> Result<Vec<Row>, StudyError> {
+    pub fn rows(&self) -> Result<Vec<Row>> {
         let mut rows = journal::read(&self.folder)?;
         if let Some(precision) = Precision::of(&self.template)? {
             precision.truncate(&mut rows);

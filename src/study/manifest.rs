@@ -1,7 +1,7 @@
 //! The manifest `study.json`: SHA-256 of every input and of the program, and the renderer, that the rows of a
 //! folder were made with; and shards.
 
-use super::{StudyError, write_whole};
+use super::{Result, StudyError, write_whole};
 use crate::scenario::sampling::{Inputs, Template, sha256};
 use crate::session::RendererChoice;
 use crate::twin::render::Backend;
@@ -85,7 +85,7 @@ pub struct Manifest {
 }
 
 /// What draws the images on this machine, by a choice.
-fn renderer_of(choice: RendererChoice) -> Result<Backend, StudyError> {
+fn renderer_of(choice: RendererChoice) -> Result<Backend> {
     let plain = || Backend {
         backend: "cpu".into(),
         adapter: "plain renderer".into(),
@@ -104,11 +104,7 @@ fn program_hash() -> std::io::Result<String> {
 
 impl Manifest {
     /// Of a study about to be run here.
-    pub fn of(
-        template: &Template,
-        choice: RendererChoice,
-        shard: Option<Shard>,
-    ) -> Result<Self, StudyError> {
+    pub fn of(template: &Template, choice: RendererChoice, shard: Option<Shard>) -> Result<Self> {
         let unreadable = |source| StudyError::file(&template.path, source);
         let inputs = Inputs::of(template).map_err(unreadable)?;
         Ok(Self {
@@ -123,7 +119,7 @@ impl Manifest {
     }
 
     /// Reads that of a folder; `None` where there is none.
-    pub fn read(folder: &Path) -> Result<Option<Self>, StudyError> {
+    pub fn read(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(MANIFEST);
         let text = match fs::read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -136,7 +132,7 @@ impl Manifest {
     }
 
     /// Writes it into a folder, whole or not at all.
-    pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
+    pub fn write(&self, folder: &Path) -> Result {
         let path = folder.join(MANIFEST);
         let text = serde_json::to_string_pretty(self);
         let text = text.map_err(|e| StudyError::file(&path, e.into()))? + "\n";

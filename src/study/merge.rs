@@ -1,7 +1,7 @@
 //! Shards put together.
 
 use super::journal::{self, JOURNAL, Journal};
-use super::{INPUTS, Manifest, Row, Shard, Status, Study, StudyError, table, write_whole};
+use super::{INPUTS, Manifest, Result, Row, Shard, Status, Study, StudyError, table, write_whole};
 use crate::scenario::sampling::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 /// Makes one study of all shards below a folder, in that folder, and gives its rows. Nothing is written
 /// unless every shard is there, whole, and of the same study.
-pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
+pub fn merge(folder: &Path) -> Result<Vec<Row>> {
     let shards = shards(folder)?;
     let Some((first_path, first)) = shards.first() else {
         return wrong(format!("{} has no folder shard-I-of-N", folder.display()));
@@ -63,17 +63,12 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
     write(folder, first_path, &merged, rows)
 }
 
-fn wrong<T>(what: String) -> Result<T, StudyError> {
+fn wrong<T>(what: String) -> Result<T> {
     Err(StudyError::Shards(what))
 }
 
 /// A folder that holds another study is left alone.
-fn check_free(
-    folder: &Path,
-    kept: Option<&Manifest>,
-    merged: &Manifest,
-    rows: &[Row],
-) -> Result<(), StudyError> {
+fn check_free(folder: &Path, kept: Option<&Manifest>, merged: &Manifest, rows: &[Row]) -> Result {
     let what = match kept {
         None => (!rows.is_empty()).then(|| "rows without a manifest".to_owned()),
         Some(kept) => kept.difference(merged),
@@ -83,7 +78,7 @@ fn check_free(
 }
 
 /// Folders of shards, with their manifests.
-fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
+fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
     let failed = |e| StudyError::file(folder, e);
     let mut shards = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
@@ -103,7 +98,7 @@ fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
     Ok(shards)
 }
 
-fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result<(), StudyError> {
+fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result {
     let wanted = (0..runs).filter(|k| shard.holds(*k)).count();
     if let Some(row) = rows.iter().find(|row| !shard.holds(row.index)) {
         let (path, index) = (path.display(), row.index);
@@ -119,12 +114,7 @@ fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result<(),
     Ok(())
 }
 
-fn write(
-    folder: &Path,
-    shard: &Path,
-    manifest: &Manifest,
-    mut rows: Vec<Row>,
-) -> Result<Vec<Row>, StudyError> {
+fn write(folder: &Path, shard: &Path, manifest: &Manifest, mut rows: Vec<Row>) -> Result<Vec<Row>> {
     // Sorting keeps the last of a run's rows: one that crashed gives way to any other.
     rows.sort_by_key(|row| row.status != Status::Crashed);
     journal::sort(&mut rows);

@@ -61,6 +61,8 @@ use crate::session::ObserverError;
 use std::io;
 use std::path::{Path, PathBuf};
 
+type Result<T = (), E = StudyError> = std::result::Result<T, E>;
+
 /// Why a study cannot begin or go on. Rows written before are kept.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
@@ -110,7 +112,7 @@ pub enum StudyError {
     /// Shards that are not a whole.
     #[error("{0}")]
     Shards(String),
-    /// What Slurm says.
+    /// An error of Slurm's.
     #[error("{0}")]
     Slurm(String),
     /// No run can be drawn.
@@ -119,9 +121,9 @@ pub enum StudyError {
     /// An event that cannot be worked out.
     #[error("study.events: {0}")]
     Event(#[from] ConditionError),
-    /// A name that cannot be used.
-    #[error("{0} {1}")]
-    Name(String, String),
+    /// A name or number that cannot be used.
+    #[error("{0}")]
+    Unusable(String),
     /// A name that no interval can be had of.
     #[error("study.stop.when.of: `{0}` is no event of this study and no single figure of a run")]
     NoFigure(String),
@@ -148,7 +150,7 @@ impl StudyError {
     }
 }
 
-fn write_whole(path: &Path, content: &[u8]) -> Result<(), StudyError> {
+fn write_whole(path: &Path, content: &[u8]) -> Result {
     record::write_whole(path, content).map_err(|source| StudyError::file(path, source))
 }
 

@@ -1,6 +1,6 @@
 //! Workers: processes that each run one scenario after the other.
 
-use super::{Row, Status, StudyError};
+use super::{Result, Row, Status, StudyError};
 use crate::scenario::sampling::Template;
 use std::collections::VecDeque;
 use std::fs::{self, File};
@@ -55,8 +55,8 @@ impl Pool<'_> {
         &self,
         template: &Template,
         todo: impl IntoIterator<Item = u64>,
-        mut next: impl FnMut(Option<Row>) -> Result<Next, StudyError>,
-    ) -> Result<(), StudyError> {
+        mut next: impl FnMut(Option<Row>) -> Result<Next>,
+    ) -> Result {
         let todo = Mutex::new(todo.into_iter().collect::<VecDeque<_>>());
         let halt = AtomicBool::new(false);
         let (rows, arriving) = channel();
@@ -97,7 +97,7 @@ impl Pool<'_> {
         number: usize,
         template: &Template,
         mut next_index: impl FnMut() -> Option<u64>,
-        rows: &Sender<Result<Row, StudyError>>,
+        rows: &Sender<Result<Row>>,
     ) {
         let mut running = None;
         while let Some(index) = next_index() {

@@ -3,7 +3,7 @@
 use super::journal::{self, Journal};
 use super::pool::{Next, Pool};
 use super::stop::Precision;
-use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table};
+use super::{INPUTS, Manifest, Result, Row, Shard, Status, StudyError, table};
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
@@ -53,18 +53,17 @@ const MOST_CHECKED: u64 = 1000;
 const TABLE_EVERY: Duration = Duration::from_secs(60);
 
 /// Says what can be wrong with all runs before the first; gives the precision at which to stop.
-pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, StudyError> {
+pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> {
     // The first run of each combination of swept values.
     for cell in 0..template.cells().min(MOST_CHECKED) {
         template.sample(cell)?;
     }
     table::check_names(template)?;
     if template.runs() > MOST_RUNS {
-        let what = format!(
-            "has {} runs, more than {MOST_RUNS}; ask for fewer",
-            template.runs()
-        );
-        return Err(StudyError::Name("the study".into(), what));
+        let runs = template.runs();
+        return Err(StudyError::Unusable(format!(
+            "the study has {runs} runs, more than {MOST_RUNS}; ask for fewer"
+        )));
     }
     let precision = Precision::of(template)?;
     if precision.is_some() && in_shards {
@@ -79,11 +78,7 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, 
 
 /// Runs what a folder lacks of a study, and gives all its rows in the order of their indexes. The
 /// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
-pub fn run(
-    template: &Template,
-    folder: &Path,
-    options: &Options<'_>,
-) -> Result<Vec<Row>, StudyError> {
+pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<Vec<Row>> {
     let precision = check(template, options.shard.is_some())?;
     let manifest = Manifest::of(template, options.renderer, options.shard)?;
     fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
@@ -122,7 +117,7 @@ fn prepare(
     folder: &Path,
     options: &Options<'_>,
     manifest: &Manifest,
-) -> Result<(Journal, Vec<Row>), StudyError> {
+) -> Result<(Journal, Vec<Row>)> {
     let kept = Manifest::read(folder)?;
     if let Some(what) = kept.as_ref().and_then(|kept| another_part(kept, manifest)) {
         return Err(another(folder, what));
@@ -168,11 +163,7 @@ fn another(folder: &Path, what: String) -> StudyError {
     StudyError::Other { path, what }
 }
 
-fn pool<'a>(
-    folder: &'a Path,
-    manifest: &Manifest,
-    options: &Options<'_>,
-) -> Result<Pool<'a>, StudyError> {
+fn pool<'a>(folder: &'a Path, manifest: &Manifest, options: &Options<'_>) -> Result<Pool<'a>> {
     let cores = available_parallelism().map_or(1, usize::from);
     // What the manifest says, and nothing else where that fails.
     let is_plain = manifest.renderer.backend == "cpu";
@@ -231,7 +222,7 @@ impl Collector<'_> {
         self.rows
     }
 
-    fn next(&mut self, row: Option<Row>) -> Result<Next, StudyError> {
+    fn next(&mut self, row: Option<Row>) -> Result<Next> {
         let has_come = row.is_some();
         row.map_or(Ok(()), |row| self.add(row))?;
         self.show_progress();
@@ -248,7 +239,7 @@ impl Collector<'_> {
         })
     }
 
-    fn add(&mut self, row: Row) -> Result<(), StudyError> {
+    fn add(&mut self, row: Row) -> Result {
         self.journal.add(&row)?;
         self.rows.push(row);
         if self.table_written.elapsed() > TABLE_EVERY {

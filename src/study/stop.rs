@@ -5,7 +5,7 @@
 
 use super::digest::is_weighted;
 use super::stats::{Estimate, mean, rate};
-use super::{Measure, Row, StudyError, measure};
+use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
 
@@ -34,14 +34,14 @@ fn can_be_known(measure: &Measure) -> bool {
 
 impl Precision {
     /// What a study asks for.
-    pub fn of(template: &Template) -> Result<Option<Self>, StudyError> {
+    pub fn of(template: &Template) -> Result<Option<Self>> {
         let Some(when) = &template.settings.stop.when else {
             return Ok(None);
         };
         if is_weighted(template) {
-            return Err(StudyError::Name(
-                "study.stop.when".into(),
-                "does not go with `propose`: weighted figures have other intervals; leave one of them out"
+            return Err(StudyError::Unusable(
+                "study.stop.when does not go with `propose`: weighted figures have other intervals; leave \
+                 one of them out"
                     .into(),
             ));
         }

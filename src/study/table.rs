@@ -1,6 +1,6 @@
 //! Rows as a table in Parquet.
 
-use super::{MEASURES, Row, Status, StudyError, measure};
+use super::{MEASURES, Result, Row, Status, StudyError, measure};
 use crate::record::parquet::{Column, Kind, Table, column};
 use crate::scenario::sampling::{Condition, ConditionError, Template, VariableSettings};
 use serde::Serialize;
@@ -49,7 +49,7 @@ struct Cells<'a> {
 }
 
 /// Whether events name what there is, and no name stands for two columns.
-pub fn check_names(template: &Template) -> Result<(), StudyError> {
+pub fn check_names(template: &Template) -> Result {
     let settings = &template.settings;
     let known = |name: &str| settings.variables.contains_key(name) || measure(name).is_some();
     for condition in template.events.values() {
@@ -63,10 +63,9 @@ pub fn check_names(template: &Template) -> Result<(), StudyError> {
     let mut names = settings.variables.keys().chain(settings.events.keys());
     match names.find(is_taken) {
         None => Ok(()),
-        Some(name) => Err(StudyError::Name(
-            format!("study: `{name}`"),
-            "is a column of every study; give the variable or event a name of its own".into(),
-        )),
+        Some(name) => Err(StudyError::Unusable(format!(
+            "study: `{name}` is a column of every study; give the variable or event a name of its own"
+        ))),
     }
 }
 
@@ -78,7 +77,7 @@ impl Row {
 }
 
 /// Writes all rows, in order.
-pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result<(), StudyError> {
+pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result {
     let variables = template.settings.variables.iter().map(|(name, variable)| {
         let keys = variable.keys.join(", ");
         let meaning = format!("drawn: {}", if keys.is_empty() { name } else { &keys });

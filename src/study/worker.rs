@@ -2,7 +2,7 @@
 
 use super::measures::Fixes;
 use super::pool::READY;
-use super::{Row, Status, Study, StudyError};
+use super::{Result, Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Sample, Template};
 use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
@@ -19,7 +19,7 @@ pub fn serve(
     renderer: RendererChoice,
     input: impl BufRead + Send + 'static,
     mut output: impl Write,
-) -> Result<(), StudyError> {
+) -> Result {
     let template = Study::open(folder)?.template;
     let mut runner = ScenarioRunner::new(renderer);
     let failed = |source| StudyError::file(Path::new("the worker's pipe"), source);

@@ -1,7 +1,6 @@
 //! Files of a data set.
 
-use crate::record::files::{broken, finish, part_name, write_whole};
-use crate::session::ObserverError;
+use crate::record::files::{Result, broken, finish, part_name, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
 use std::fs::{self, File};
@@ -51,10 +50,7 @@ pub fn clear(folder: &Path) -> io::Result<()> {
 }
 
 /// A picture of 8 or 16 bits as PNG, without loss.
-pub(super) fn write_png<T, C>(
-    path: &Path,
-    image: &ImageBuffer<Luma<T>, C>,
-) -> Result<(), ObserverError>
+pub(super) fn write_png<T, C>(path: &Path, image: &ImageBuffer<Luma<T>, C>) -> Result
 where
     Luma<T>: PixelWithColorType<Subpixel = T>,
     T: image::Primitive,
@@ -74,7 +70,7 @@ pub(super) fn write_npy(
     path: &Path,
     shape: &[usize],
     numbers: impl Iterator<Item = f32>,
-) -> Result<(), ObserverError> {
+) -> Result {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     let shape = shape.join(", ");
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}");

@@ -50,11 +50,11 @@ mod take;
 pub use files::{clear, is_empty};
 pub use plan::{LabelKind, LabelKinds, Plan, UnknownLabel};
 
-use crate::record::files::{broken, failed, write_whole};
+use crate::record::files::{Result, broken, failed, write_whole};
 use crate::record::parquet::{Column, Table};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::sha256;
-use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
+use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};
 use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::cpu::Labeller;
@@ -204,12 +204,7 @@ impl<'a> DataSet<'a> {
         rig.map(str::to_owned).chain(devices).collect()
     }
 
-    fn table(
-        &self,
-        label: LabelKind,
-        name: &str,
-        columns: &[Column],
-    ) -> Result<Option<Table>, ObserverError> {
+    fn table(&self, label: LabelKind, name: &str, columns: &[Column]) -> Result<Option<Table>> {
         let wanted = self.plan.has(label);
         wanted
             .then(|| Table::create(self.out.join(name), columns))
@@ -246,12 +241,7 @@ impl<'a> DataSet<'a> {
 
     /// Takes the frame of these images, if it is wanted. Frames before it whose images have not come
     /// are lost.
-    fn images(
-        &mut self,
-        source: Source,
-        number: u32,
-        images: &[&GrayImage],
-    ) -> Result<(), ObserverError> {
+    fn images(&mut self, source: Source, number: u32, images: &[&GrayImage]) -> Result {
         let is_lost = |f: &ExposedFrame| f.source == source && f.number < number;
         self.waiting.retain(|frame| !is_lost(frame));
         let is_own = |f: &ExposedFrame| f.source == source && f.number == number;
@@ -272,12 +262,12 @@ impl<'a> DataSet<'a> {
         }
     }
 
-    fn write(&self, name: &str, text: &str) -> Result<(), ObserverError> {
+    fn write(&self, name: &str, text: &str) -> Result {
         let path = self.out.join(name);
         write_whole(&path, text.as_bytes()).map_err(broken(&path))
     }
 
-    fn write_json(&self, name: &str, value: &serde_json::Value) -> Result<(), ObserverError> {
+    fn write_json(&self, name: &str, value: &serde_json::Value) -> Result {
         let text = serde_json::to_string_pretty(value).map_err(failed("writing JSON"))?;
         self.write(name, &format!("{text}\n"))
     }
@@ -314,7 +304,7 @@ impl<'a> DataSet<'a> {
 const EYES: [&str; 2] = ["left", "right"];
 
 impl Observer for DataSet<'_> {
-    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+    fn open(&mut self, opening: &Opening<'_>) -> Result {
         let camera = |name: &str, source, view, chainage_m| Camera {
             name: name.to_owned(),
             source,
@@ -353,7 +343,7 @@ impl Observer for DataSet<'_> {
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         match *event {
             Event::Exposure(exposure) => self.expose(exposure),
             Event::Pair(pair, ..) => {
@@ -370,7 +360,7 @@ impl Observer for DataSet<'_> {
     }
 
     /// Also of a run that was broken off: what has been taken is a whole, smaller set.
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         let Some(tables) = self.tables.take() else {
             return Ok(());
         };

@@ -2,13 +2,13 @@
 
 use super::clean::clean;
 use super::coco::Annotation;
-use super::files::{write_npy, write_png};
+use super::files::{Result, write_npy, write_png};
 use super::frame::{FrameName, FrameRow, ImageRow};
 use super::lamps::LampRow;
 use super::obstacles::{self, ObstacleRow};
 use super::{DataSet, ExposedFrame, LabelKind};
 use crate::record::files::failed;
-use crate::session::{ObserverError, Source};
+use crate::session::Source;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::cpu::{Labels, Sight};
 use crate::twin::render::{Job, RawImage, View, upper_bits};
@@ -53,15 +53,11 @@ impl Frame<'_> {
     }
 }
 
-type Write<'a> = Box<dyn Fn() -> Result<(), ObserverError> + Sync + 'a>;
+type Write<'a> = Box<dyn Fn() -> Result + Sync + 'a>;
 
 impl DataSet<'_> {
     /// Writes down a frame of all cameras that it is wanted of.
-    pub(super) fn take(
-        &mut self,
-        exposed: &ExposedFrame,
-        images: &[&GrayImage],
-    ) -> Result<(), ObserverError> {
+    pub(super) fn take(&mut self, exposed: &ExposedFrame, images: &[&GrayImage]) -> Result {
         let wanted = |k: &usize| {
             let camera = &self.cameras[*k];
             camera.wanted && camera.source == exposed.source
@@ -79,7 +75,7 @@ impl DataSet<'_> {
     }
 
     /// Raw and clean pictures of some views.
-    fn render(&mut self, job: &Job, views: &[usize]) -> Result<Vec<Pictures>, ObserverError> {
+    fn render(&mut self, job: &Job, views: &[usize]) -> Result<Vec<Pictures>> {
         let [raw, clear] = [LabelKind::Raw, LabelKind::Clean].map(|kind| self.plan.has(kind));
         let mut all: Vec<View> = Vec::new();
         for view in views.iter().filter_map(|k| job.views.get(*k)) {
@@ -113,7 +109,7 @@ impl DataSet<'_> {
         exposed: &ExposedFrame,
         image: &GrayImage,
         pictures: &Pictures,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let camera = &self.cameras[k];
         let job = &exposed.job;
         let sight = Sight::new(&job.views[camera.view], job.time);
@@ -155,7 +151,7 @@ impl DataSet<'_> {
     }
 
     /// The flow from the camera's last frame to this one.
-    fn write_flow(&mut self, k: usize, frame: &Frame<'_>) -> Result<(), ObserverError> {
+    fn write_flow(&mut self, k: usize, frame: &Frame<'_>) -> Result {
         let (Some(last), Some(labels)) = (self.cameras[k].last.take(), &frame.labels) else {
             return Ok(());
         };
@@ -186,7 +182,7 @@ impl DataSet<'_> {
         row: &mut FrameRow,
         image: &GrayImage,
         pictures: &Pictures,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let labels = |kind| frame.labels.as_ref().filter(|_| self.plan.has(kind));
         let (depth, mask) = (labels(LabelKind::Depth), labels(LabelKind::Mask));
         let name = &frame.name;
@@ -218,7 +214,7 @@ impl DataSet<'_> {
         writes.par_iter().try_for_each(|write| write())
     }
 
-    fn push_tables(&mut self, k: usize, frame: &Frame<'_>) -> Result<(), ObserverError> {
+    fn push_tables(&mut self, k: usize, frame: &Frame<'_>) -> Result {
         let Some(tables) = &mut self.tables else {
             return Ok(());
         };

@@ -6,6 +6,7 @@ use super::plan::RunNumber;
 use super::settings::{Distribution, VariableSettings};
 use super::template::{Template, table_coordinate};
 use crate::scenario::build::overridden;
+use crate::scenario::overrides::lookup;
 use crate::scenario::{Override, Scenario, ScenarioError, ScenarioFile};
 use crate::twin::random::Stream;
 use std::collections::BTreeMap;
@@ -170,7 +171,7 @@ impl Template {
                 document = Some(self.document(sample)?);
             }
             let value_of = |name: &str| {
-                let key = || lookup(document.as_ref()?, name);
+                let key = || number(lookup(document.as_ref()?, name)?);
                 sample.number(name).or_else(key).map(Some).ok_or(())
             };
             if condition.holds(value_of)? != Some(true) {
@@ -251,22 +252,5 @@ fn number(value: &Value) -> Option<f64> {
         Value::Float(x) => Some(*x),
         Value::Boolean(x) => Some(f64::from(*x)),
         _ => None,
-    }
-}
-
-/// A number or flag of a document by its dotted key.
-fn lookup(document: &Table, key: &str) -> Option<f64> {
-    let (first, rest) = key.split_once('.').unwrap_or((key, ""));
-    let (name, mut indexes) = first.split_once('[').unwrap_or((first, ""));
-    let mut value = document.get(name)?;
-    while !indexes.is_empty() {
-        let (index, rest) = indexes.split_once(']')?;
-        value = value.as_array()?.get(index.parse::<usize>().ok()?)?;
-        indexes = rest.strip_prefix('[').unwrap_or(rest);
-    }
-    if rest.is_empty() {
-        number(value)
-    } else {
-        lookup(value.as_table()?, rest)
     }
 }

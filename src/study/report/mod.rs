@@ -6,7 +6,7 @@ mod figures;
 mod page;
 mod plot;
 
-use super::{Digest, Row, Study, StudyError, write_whole};
+use super::{Digest, Result, Row, Study, StudyError, write_whole};
 use std::fs;
 use std::io;
 use std::path::PathBuf;
@@ -17,7 +17,7 @@ pub const REPORT: &str = "report.html";
 pub const PLOTS: &str = "plots";
 
 /// Writes the page of a study's rows and its plots into the study's folder; gives the page's path.
-pub fn report(study: &Study, digest: &Digest, rows: &[Row]) -> Result<PathBuf, StudyError> {
+pub fn report(study: &Study, digest: &Digest, rows: &[Row]) -> Result<PathBuf> {
     let plots = figures::all(&study.template, digest, rows);
     let beside = study.folder.join(PLOTS);
     fs::create_dir_all(&beside).map_err(|e| StudyError::file(&beside, e))?;
