@@ -4,9 +4,9 @@
 //! builder draws random ids (two recordings of one run would differ) and cannot say which entity a
 //! 3-D view follows.
 
-use super::files::{Result, failed};
 use super::images::WaysidePaths;
 use super::stream::{SIM_TIME, Stream};
+use super::whole_files::{Result, failed};
 use super::{Contents, images, plots, scene, texts};
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,

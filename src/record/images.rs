@@ -3,10 +3,10 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
-use super::files::{Result, failed};
 use super::palette::{self, ui};
 use super::slug;
 use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
     StereoPair, WaysideReport,

@@ -29,7 +29,6 @@
 
 mod blueprint;
 pub mod dataset;
-mod files;
 mod images;
 mod moving;
 mod palette;
@@ -39,14 +38,14 @@ mod scene;
 mod stream;
 mod tables;
 mod texts;
+mod whole_files;
 
-pub(crate) use files::write_whole;
 pub use tables::FixTable;
+pub(crate) use whole_files::write_whole;
 
 use crate::bus::SimTime;
 use crate::scenario::RecordSettings;
-use crate::session::{Event, Observer, ObserverError, Opening};
-use files::Result;
+use crate::session::{Event, Observer, Opening};
 use images::Images;
 use moving::Moving;
 use nalgebra::Isometry3;
@@ -57,6 +56,7 @@ use std::path::Path;
 use std::rc::Rc;
 use stream::{Stream, Target};
 use texts::Texts;
+use whole_files::Result;
 
 /// Why there is no viewer.
 #[derive(Debug, thiserror::Error)]

@@ -1,9 +1,9 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
-use super::files::{Result, failed};
 use super::palette::{self, ui};
 use super::scene::{HEAD, Scene, turn};
 use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
 use crate::session::Opening;

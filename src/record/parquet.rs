@@ -1,7 +1,7 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
 //! description. Rows are anything that serialises to an object with the columns' names.
 
-use super::files::{Result, broken, finish, part_name};
+use super::whole_files::{Result, broken, finish, part_name};
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::json::ReaderBuilder;
 use arrow::json::reader::Decoder;

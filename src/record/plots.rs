@@ -1,7 +1,7 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
-use super::files::{Result, failed};
 use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use super::{Contents, palette, slug};
 use crate::bus::{
     DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,

@@ -1,9 +1,9 @@
 //! What stands still in the 3-D view: tunnel, rails, lamps, balises, wayside cameras.
 
-use super::files::Result;
 use super::images::{WaysidePaths, pinhole};
 use super::palette::{self, ui};
 use super::stream::Stream;
+use super::whole_files::Result;
 use crate::scenario::RecordSettings;
 use crate::session::Opening;
 use crate::track::uid::Uid;

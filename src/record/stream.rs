@@ -5,7 +5,7 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
-use super::files::{Result, failed, finish, make_folder_of, part_name};
+use super::whole_files::{Result, failed, finish, make_folder_of, part_name};
 use crate::bus::SimTime;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::ChunkBatcherConfig;

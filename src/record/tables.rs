@@ -1,6 +1,6 @@
 //! Tables for other programs.
 
-use super::files::{Result, broken, finish, make_folder_of, part_name};
+use super::whole_files::{Result, broken, finish, make_folder_of, part_name};
 use crate::session::{Event, Observer, Opening};
 use std::fmt::Debug;
 use std::fs::File;

@@ -8,7 +8,7 @@
 
 pub(super) mod session;
 
-use super::files::part_name;
+use super::whole_files::part_name;
 use super::{FixTable, Recording};
 use crate::bus::{
     DangerLevel, Delivery, DopplerSample, ObstacleWarning, OdometerSample, SimTime, Via,

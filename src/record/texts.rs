@@ -1,8 +1,8 @@
 //! The event log and the driver's display.
 
-use super::files::Result;
 use super::palette;
 use super::stream::Stream;
+use super::whole_files::Result;
 use crate::bus::{
     BrakeDemand, CameraFault, DangerLevel, Delivery, DriverDisplay, LedReport, ProtectionReport,
     SimTime, Via, WaysideReport,

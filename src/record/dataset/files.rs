@@ -1,6 +1,6 @@
 //! Files of a data set.
 
-use crate::record::files::{Result, broken, finish, part_name, write_whole};
+use crate::record::whole_files::{Result, broken, finish, part_name, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
 use std::fs::{self, File};

@@ -50,8 +50,8 @@ mod take;
 pub use files::{clear, is_empty};
 pub use plan::{LabelKind, LabelKinds, Plan, UnknownLabel};
 
-use crate::record::files::{Result, broken, failed, write_whole};
 use crate::record::parquet::{Column, Table};
+use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::sha256;
 use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};

@@ -2,12 +2,12 @@
 
 use super::clean::clean;
 use super::coco::Annotation;
-use super::files::{Result, write_npy, write_png};
+use super::files::{write_npy, write_png};
 use super::frame::{FrameName, FrameRow, ImageRow};
 use super::lamps::LampRow;
 use super::obstacles::{self, ObstacleRow};
 use super::{DataSet, ExposedFrame, LabelKind};
-use crate::record::files::failed;
+use crate::record::whole_files::{Result, failed};
 use crate::session::Source;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::cpu::{Labels, Sight};
