@@ -102,7 +102,7 @@ impl Texts {
         self.log(delivery.received, level, &text)
     }
 
-    /// A wayside device changed its mind about the danger, or about how many things lie there.
+    /// The danger that a wayside device sees, or the number of things there, has changed.
     pub(super) fn wayside(&mut self, device: (usize, &str), report: &WaysideReport) -> Result {
         let Some(danger) = self.danger.get_mut(device.0) else {
             return Ok(());
