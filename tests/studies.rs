@@ -3,7 +3,7 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use metrotwin::study::{MANIFEST, Row, read_rows};
+use metrotwin::study::{MANIFEST, Row, Study, read_rows};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -20,20 +20,28 @@ fn folder(name: &str) -> PathBuf {
     path
 }
 
-fn metrotwin(args: &[&str]) -> Command {
+/// The program with arguments that have no spaces.
+fn metrotwin(line: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
-    command.args(args);
+    command.args(line.split_whitespace());
     command
 }
 
-fn study(out: &Path, more: &[&str]) -> Output {
+fn run(line: &str) -> Output {
+    metrotwin(line).output().unwrap()
+}
+
+fn study(out: &Path, more: &str) -> Output {
     study_of(Path::new(SMALL), out, more)
 }
 
-fn study_of(file: &Path, out: &Path, more: &[&str]) -> Output {
-    let [file, out] = [file, out].map(|p| p.to_str().unwrap());
-    let args = ["study", "run", file, "--renderer", "cpu", "--out", out];
-    metrotwin(&[&args, more].concat()).output().unwrap()
+fn study_of(file: &Path, out: &Path, more: &str) -> Output {
+    run(&study_line(file, out, more))
+}
+
+fn study_line(file: &Path, out: &Path, more: &str) -> String {
+    let [file, out] = [file, out].map(Path::display);
+    format!("study run {file} --renderer cpu --out {out} {more}")
 }
 
 /// A copy of the small study below a folder, at the same depth, with something changed.
@@ -51,7 +59,7 @@ fn changed(base: &Path, from: &str, to: &str) -> PathBuf {
     path
 }
 
-fn said(output: &Output) -> String {
+fn printed(output: &Output) -> String {
     let streams = [&output.stdout, &output.stderr];
     streams
         .map(|s| String::from_utf8_lossy(s).into_owned())
@@ -59,16 +67,22 @@ fn said(output: &Output) -> String {
 }
 
 fn succeeds(output: &Output) {
-    assert!(output.status.success(), "{}", said(output));
+    assert!(output.status.success(), "{}", printed(output));
+}
+
+fn says(output: &Output, what: &str) {
+    let printed = printed(output);
+    assert!(printed.contains(what), "no `{what}` in: {printed}");
+}
+
+fn refuses(output: &Output, what: &str) {
+    assert_eq!(output.status.code(), Some(2), "{}", printed(output));
+    says(output, what);
 }
 
 fn same(a: &Path, b: &Path) {
-    let [a, b] = [a, b].map(|p| p.to_str().unwrap());
-    succeeds(
-        &metrotwin(&["study", "compare", a, b, "--same"])
-            .output()
-            .unwrap(),
-    );
+    let [a, b] = [a, b].map(Path::display);
+    succeeds(&run(&format!("study compare {a} {b} --same")));
 }
 
 /// Order of workers that reaches a row, a shard that draws otherwise, rows lost or doubled by a kill, a
@@ -77,7 +91,7 @@ fn same(a: &Path, b: &Path) {
 fn rows_are_the_same_however_they_came() {
     let base = folder("however");
     let one = base.join("one");
-    succeeds(&study(&one, &["--jobs", "1"]));
+    succeeds(&study(&one, "--jobs 1"));
     let rows = read_rows(&one).unwrap();
     assert_eq!(rows.len(), 12);
     assert!(rows.iter().all(|row| row.reason.is_none()), "{:?}", rows[0]);
@@ -87,32 +101,21 @@ fn rows_are_the_same_however_they_came() {
     );
 
     let two = base.join("two");
-    succeeds(&study(&two, &["--jobs", "2"]));
+    succeeds(&study(&two, "--jobs 2"));
     same(&one, &two);
 
     let shards = base.join("shards");
     for k in 1..=4 {
         let folder = shards.join(format!("shard-{k}-of-4"));
-        succeeds(&study(&folder, &["--shard", &format!("{k}/4")]));
+        succeeds(&study(&folder, &format!("--shard {k}/4")));
     }
-    let folder = shards.to_str().unwrap();
-    succeeds(&metrotwin(&["study", "merge", folder]).output().unwrap());
+    succeeds(&run(&format!("study merge {}", shards.display())));
     same(&one, &shards);
 
     let killed = base.join("killed");
     for _ in 0..3 {
-        let out = killed.to_str().unwrap();
-        let args = [
-            "study",
-            "run",
-            SMALL,
-            "--renderer",
-            "cpu",
-            "--out",
-            out,
-            "--resume",
-        ];
-        let mut child = metrotwin(&args)
+        let line = study_line(Path::new(SMALL), &killed, "--resume");
+        let mut child = metrotwin(&line)
             .stdout(Stdio::null())
             .stderr(Stdio::null())
             .spawn()
@@ -129,26 +132,15 @@ fn rows_are_the_same_however_they_came() {
         child.wait().unwrap();
     }
     assert!(read_rows(&killed).unwrap().len() >= 2);
-    succeeds(&study(&killed, &["--resume"]));
+    succeeds(&study(&killed, "--resume"));
     same(&one, &killed);
 
-    let folder = one.to_str().unwrap();
-    let args = [
-        "run",
-        "--from-study",
-        folder,
-        "--index",
-        "5",
-        "--renderer",
-        "cpu",
-    ];
-    let replay = metrotwin(&args).output().unwrap();
+    let one_text = one.display();
+    let replay = run(&format!(
+        "run --from-study {one_text} --index 5 --renderer cpu"
+    ));
     succeeds(&replay);
-    assert!(
-        said(&replay).contains("equal to its row in the study"),
-        "{}",
-        said(&replay)
-    );
+    says(&replay, "equal to its row in the study");
     assert!(one.join("run-000005/recording.rrd").exists());
     fs::remove_dir_all(base).ok();
 }
@@ -160,14 +152,14 @@ fn a_study_stops_at_the_same_run() {
     let base = folder("stops");
     let stop = "duration_s = 0.2\n[study.stop.when]\nof = \"run_m\"\nhalf_width = 0.2\n";
     let file = changed(&base, "duration_s = 1.5", stop);
-    let run = |jobs: &str| {
+    let study_with = |jobs: &str| {
         let out = base.join(jobs);
-        succeeds(&study_of(&file, &out, &["--runs", "100", "--jobs", jobs]));
+        succeeds(&study_of(&file, &out, &format!("--runs 100 --jobs {jobs}")));
         out
     };
-    let (one, three) = (run("1"), run("3"));
+    let (one, three) = (study_with("1"), study_with("3"));
     same(&one, &three);
-    let rows = metrotwin::study::rows(&one).unwrap();
+    let rows = Study::open(&one).unwrap().rows().unwrap();
     assert!(
         (30..200).contains(&rows.len()) && rows.len().is_multiple_of(10),
         "{} rows",
@@ -184,17 +176,13 @@ fn a_study_stops_in_time() {
     let base = folder("in_time");
     let file = changed(&base, "[study]", "[study.stop]\nafter_s = 0.5\n\n[study]");
     let out = base.join("out");
-    let runs = |more: &[&str]| {
-        succeeds(&study_of(
-            &file,
-            &out,
-            &[&["--runs", "5000"], more].concat(),
-        ));
+    let runs = |more: &str| {
+        succeeds(&study_of(&file, &out, &format!("--runs 5000 {more}")));
         read_rows(&out).unwrap().len()
     };
-    let first = runs(&[]);
+    let first = runs("");
     assert!((1..10_000).contains(&first), "{first}");
-    let second = runs(&["--resume"]);
+    let second = runs("--resume");
     assert!((first + 1..10_000).contains(&second), "{first}, {second}");
     fs::remove_dir_all(base).ok();
 }
@@ -206,20 +194,16 @@ fn a_run_that_takes_too_long_is_given_up() {
     let base = folder("hung");
     let (out, whole) = (base.join("out"), base.join("whole"));
     // No run of 1500 steps and a start of the process is that short.
-    succeeds(&study(&out, &["--runs", "1", "--run-limit-s", "0.001"]));
+    succeeds(&study(&out, "--runs 1 --run-limit-s 0.001"));
     let rows = read_rows(&out).unwrap();
     assert_eq!(rows.len(), 2);
     for row in &rows {
         assert_eq!(row.status, metrotwin::study::Status::Crashed);
-        assert!(
-            row.reason
-                .as_ref()
-                .unwrap()
-                .contains("no word from it for 0.001 s")
-        );
+        let reason = row.reason.as_ref().unwrap();
+        assert!(reason.contains("no word from it for 0.001 s"), "{reason}");
     }
-    succeeds(&study(&out, &["--runs", "1", "--resume"]));
-    succeeds(&study(&whole, &["--runs", "1"]));
+    succeeds(&study(&out, "--runs 1 --resume"));
+    succeeds(&study(&whole, "--runs 1"));
     same(&out, &whole);
     fs::remove_dir_all(base).ok();
 }
@@ -228,9 +212,9 @@ fn a_run_that_takes_too_long_is_given_up() {
 #[test]
 fn a_study_can_be_extended() {
     let base = folder("extended");
-    succeeds(&study(&base, &["--runs", "2"]));
+    succeeds(&study(&base, "--runs 2"));
     let few = read_rows(&base).unwrap();
-    succeeds(&study(&base, &["--runs", "3", "--resume"]));
+    succeeds(&study(&base, "--runs 3 --resume"));
     let more = read_rows(&base).unwrap();
     assert_eq!((few.len(), more.len()), (4, 6));
     assert!(few.iter().zip(&more).all(|(a, b)| a == b));
@@ -242,26 +226,23 @@ fn a_study_can_be_extended() {
 fn wrong_studies_are_refused() {
     let base = folder("refused");
     let done = base.join("done");
-    succeeds(&study(&done, &["--runs", "1"]));
+    succeeds(&study(&done, "--runs 1"));
     let journal = fs::read(done.join("rows.jsonl")).unwrap();
     let refused = |output: Output, what: &str| {
-        assert_eq!(output.status.code(), Some(2), "{what}: {}", said(&output));
-        assert!(
-            said(&output).contains(what),
-            "no word of `{what}`: {}",
-            said(&output)
-        );
+        refuses(&output, what);
         assert_eq!(fs::read(done.join("rows.jsonl")).unwrap(), journal);
     };
-    refused(study(&done, &["--runs", "1"]), "--resume");
+    refused(study(&done, "--runs 1"), "--resume");
     refused(
-        study(&done, &["--shard", "1/2", "--resume"]),
+        study(&done, "--shard 1/2 --resume"),
         "the whole of it, not shard 1/2",
     );
 
-    let run = |path: &Path, out: &Path| study_of(path, out, &["--resume"]);
     let other = changed(&base.join("other"), "median = 60.0", "median = 61.0");
-    refused(run(&other, &done), "small.toml has changed");
+    refused(
+        study_of(&other, &done, "--resume"),
+        "small.toml has changed",
+    );
     for (name, from, to, what) in [
         (
             "name",
@@ -322,7 +303,8 @@ fn wrong_studies_are_refused() {
         ("condition", "speed_kmh < 75", "speed_kmh <", "no condition"),
     ] {
         let out = base.join("never");
-        refused(run(&changed(&base.join(name), from, to), &out), what);
+        let file = changed(&base.join(name), from, to);
+        refused(study_of(&file, &out, "--resume"), what);
         assert!(!out.join(MANIFEST).exists(), "{name} was begun");
     }
     fs::remove_dir_all(base).ok();
@@ -332,33 +314,23 @@ fn wrong_studies_are_refused() {
 #[test]
 fn shards_that_are_no_whole_are_not_merged() {
     let base = folder("shards");
-    let shard = |k: u32, more: &[&str]| {
+    let shard = |k: u32, more: &str| {
         let folder = base.join(format!("shard-{k}-of-2"));
-        succeeds(&study(
-            &folder,
-            &[&["--shard", &format!("{k}/2")], more].concat(),
-        ));
+        succeeds(&study(&folder, &format!("--shard {k}/2 {more}")));
         folder
     };
     let merge = |what: &str| {
-        let output = metrotwin(&["study", "merge", base.to_str().unwrap()])
-            .output()
-            .unwrap();
-        assert_eq!(output.status.code(), Some(2), "{}", said(&output));
-        assert!(
-            said(&output).contains(what),
-            "no word of `{what}`: {}",
-            said(&output)
-        );
+        let output = run(&format!("study merge {}", base.display()));
+        refuses(&output, what);
         assert!(!base.join(MANIFEST).exists());
     };
     merge("no folder shard-I-of-N");
-    shard(1, &["--runs", "2"]);
+    shard(1, "--runs 2");
     merge("shards 2/2 are missing");
-    let second = shard(2, &["--runs", "3"]);
+    let second = shard(2, "--runs 3");
     merge("its number of runs differs");
     fs::remove_dir_all(&second).unwrap();
-    let second = shard(2, &["--runs", "2"]);
+    let second = shard(2, "--runs 2");
     let rows = fs::read_to_string(second.join("rows.jsonl")).unwrap();
     let first = rows.lines().next().unwrap();
     fs::write(second.join("rows.jsonl"), format!("{first}\n")).unwrap();
@@ -377,25 +349,17 @@ fn shards_that_are_no_whole_are_not_merged() {
 fn a_merge_keeps_what_counts() {
     let base = folder("merge");
     let whole = base.join("whole");
-    succeeds(&study(&whole, &["--runs", "1"]));
+    succeeds(&study(&whole, "--runs 1"));
     let all = base.join("all");
     for (k, limit_s) in [("1/2", "3600"), ("2/2", "0.001")] {
         let out = all.join(format!("shard-{}", k.replace('/', "-of-")));
-        succeeds(&study(
-            &out,
-            &["--runs", "1", "--shard", k, "--run-limit-s", limit_s],
-        ));
+        let more = format!("--runs 1 --shard {k} --run-limit-s {limit_s}");
+        succeeds(&study(&out, &more));
     }
-    let merge = || {
-        succeeds(
-            &metrotwin(&["study", "merge", all.to_str().unwrap()])
-                .output()
-                .unwrap(),
-        )
-    };
+    let merge = || succeeds(&run(&format!("study merge {}", all.display())));
     merge();
     assert!(!read_rows(&all).unwrap().iter().all(Row::is_complete));
-    succeeds(&study(&all, &["--runs", "1", "--resume"]));
+    succeeds(&study(&all, "--runs 1 --resume"));
     let (shard, copy) = (all.join("shard-1-of-2"), all.join("shard-1-of-2.bak"));
     fs::create_dir(&copy).unwrap();
     for file in [MANIFEST, "rows.jsonl"] {
@@ -412,27 +376,18 @@ fn a_merge_keeps_what_counts() {
 fn no_worker_outlives_its_study() {
     let base = folder("orphans");
     let file = changed(&base, "duration_s = 1.5", "duration_s = 4000.0");
-    let [file, out] = [&file, &base.join("out")].map(|p| p.to_str().unwrap().to_owned());
-    let args = [
-        "study",
-        "run",
-        &file,
-        "--renderer",
-        "cpu",
-        "--jobs",
-        "1",
-        "--out",
-        &out,
-    ];
-    let mut child = metrotwin(&args).stderr(Stdio::null()).spawn().unwrap();
+    let out = base.join("out");
+    let line = study_line(&file, &out, "--jobs 1");
+    let mut child = metrotwin(&line).stderr(Stdio::null()).spawn().unwrap();
+    let out = out.display().to_string();
     let workers = || -> Vec<PathBuf> {
         let all = fs::read_dir("/proc")
             .unwrap()
             .filter_map(|e| Some(e.ok()?.path()));
         all.filter(|p| {
-            let said = fs::read(p.join("cmdline")).unwrap_or_default();
-            let said = String::from_utf8_lossy(&said);
-            said.contains("worker") && said.contains(&out)
+            let line = fs::read(p.join("cmdline")).unwrap_or_default();
+            let line = String::from_utf8_lossy(&line);
+            line.contains("worker") && line.contains(&out)
         })
         .collect()
     };
@@ -457,25 +412,18 @@ fn a_full_disk_loses_nothing() {
     let out = base.join("out");
     let program = env!("CARGO_BIN_EXE_metrotwin");
     // No file over 4 KiB: so full is the disk for the journal.
-    let line = format!(
-        "trap '' XFSZ; ulimit -f 4; exec '{program}' study run {SMALL} --renderer cpu --jobs 1 --out '{}'",
-        out.display()
-    );
+    let line = study_line(Path::new(SMALL), &out, "--jobs 1 --resume");
+    let line = format!("trap '' XFSZ; ulimit -f 4; exec '{program}' {line}");
     // The copies of the inputs are larger: they are there already.
-    succeeds(&study(&out, &["--runs", "1"]));
-    let line = line + " --resume";
+    succeeds(&study(&out, "--runs 1"));
     let output = Command::new("bash").args(["-c", &line]).output().unwrap();
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    assert!(
-        said(&output).contains("make room and give --resume"),
-        "{}",
-        said(&output)
-    );
+    assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
+    says(&output, "make room and give --resume");
     let kept = read_rows(&out).unwrap().len();
     assert!((2..12).contains(&kept), "{kept} rows");
-    succeeds(&study(&out, &["--resume"]));
+    succeeds(&study(&out, "--resume"));
     let whole = base.join("whole");
-    succeeds(&study(&whole, &[]));
+    succeeds(&study(&whole, ""));
     same(&out, &whole);
     fs::remove_dir_all(base).ok();
 }
@@ -484,17 +432,13 @@ fn a_full_disk_loses_nothing() {
 #[test]
 fn generated_scenarios_stand_by_themselves() {
     let base = folder("generate");
-    let generate = |out: &Path, n: &str| {
-        let out = out.to_str().unwrap();
-        succeeds(
-            &metrotwin(&["generate", SMALL, "-n", n, "--out", out])
-                .output()
-                .unwrap(),
-        );
+    let generate = |out: &Path, n: u32| {
+        let out = out.display();
+        succeeds(&run(&format!("generate {SMALL} -n {n} --out {out}")));
     };
     let (few, many) = (base.join("few"), base.join("many"));
-    generate(&few, "3");
-    generate(&many, "8");
+    generate(&few, 3);
+    generate(&many, 8);
     for k in 0..3 {
         let name = format!("small_{k:06}.toml");
         let [a, b] = [&few, &many].map(|f| fs::read_to_string(f.join(&name)).unwrap());
@@ -505,12 +449,7 @@ fn generated_scenarios_stand_by_themselves() {
             a.contains("# From the last row of a frame to the result, ms."),
             "{a}"
         );
-        let path = few.join(&name);
-        succeeds(
-            &metrotwin(&["check", path.to_str().unwrap()])
-                .output()
-                .unwrap(),
-        );
+        succeeds(&run(&format!("check {}", few.join(&name).display())));
     }
     let index = fs::read_to_string(many.join("index.csv")).unwrap();
     assert_eq!(index.lines().count(), 9);
@@ -525,18 +464,13 @@ fn generated_scenarios_stand_by_themselves() {
 /// sigma is 4 % (checked below by its interval); the bound of 30 % is the one that users were promised.
 #[test]
 fn val_a_rare_event_is_estimated() {
-    use metrotwin::scenario::draw::Template;
+    use metrotwin::scenario::sampling::Template;
     use metrotwin::study::Digest;
     let base = folder("rare");
-    let out = base.to_str().unwrap();
-    let file = "tests/studies/rare.toml";
-    succeeds(
-        &metrotwin(&["study", "run", file, "--renderer", "cpu", "--out", out])
-            .output()
-            .unwrap(),
-    );
-    let template = Template::load(Path::new(file)).unwrap();
-    let digest = Digest::of(&template, &read_rows(&base).unwrap()).unwrap();
+    let file = Path::new("tests/studies/rare.toml");
+    succeeds(&study_of(file, &base, ""));
+    let template = Template::load(file).unwrap();
+    let digest = Digest::of(&template, &read_rows(&base).unwrap());
     let found = digest.events[0].weighted.unwrap();
     let truth = 1.0e-5;
     assert!((found.rate.value / truth - 1.0).abs() < 0.3, "{found:?}");

@@ -2,7 +2,7 @@
 
 use super::fault::Failure;
 use super::{print, report};
-use crate::scenario::draw::Template;
+use crate::scenario::sampling::Template;
 use crate::scenario::{self, Scenario};
 use crate::study;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ const AFTER: &str = "\
 Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
 A file with any of [[plan]], [[sections]], [lamps] is a tunnel, one with [body] and [bogie] a
 vehicle, any other a scenario; of a scenario the files that it names are checked too, and of one with a
-[study] what it draws.
+[study] what it samples.
 
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
@@ -58,14 +58,14 @@ fn report_on(path: &Path) -> Result<String, Failure> {
     } else if has(&VEHICLE_KEYS) {
         Ok(report::vehicle(&scenario::parse_vehicle(path, &text)?))
     } else {
-        let mut said = report::scenario(&Scenario::from_text(path, &text, &[])?);
+        let mut lines = report::scenario(&Scenario::from_text(path, &text, &[])?);
         if has(&["study"]) {
             let template = Template::load(path)?;
             study::check(&template, false)?;
-            said += &report::study(&template);
-            said += &invalid_draws(&template);
+            lines += &report::study(&template);
+            lines += &invalid_draws(&template);
         }
-        Ok(said)
+        Ok(lines)
     }
 }
 
@@ -73,8 +73,8 @@ fn report_on(path: &Path) -> Result<String, Failure> {
 /// says so.
 fn invalid_draws(template: &Template) -> String {
     let looked = template.runs().min(MOST_DRAWN);
-    let wrong = |k: u64| match template.draw(k) {
-        Ok(draw) => template.scenario(&draw).err().map(|e| e.to_string()),
+    let wrong = |k: u64| match template.sample(k) {
+        Ok(sample) => template.scenario(&sample).err().map(|e| e.to_string()),
         Err(error) => Some(error.to_string()),
     };
     let wrong: Vec<String> = (0..looked).filter_map(wrong).collect();

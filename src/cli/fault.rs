@@ -1,9 +1,10 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
-use crate::scenario::{Override, ScenarioError};
+use crate::scenario::{Override, ScenarioError, is_within};
 use crate::settings::{FileError, Problem, locate};
-use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report, Severity};
+use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report};
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 
 /// Why a subcommand failed.
@@ -13,17 +14,15 @@ pub(super) enum Failure {
     Input(Report),
     /// A run failed: exit code 1.
     Run(anyhow::Error),
-    /// Said already: exit code 2.
+    /// Printed already: exit code 2.
     Reported,
 }
 
 impl Failure {
     pub(super) fn input(what: impl fmt::Display, remedy: impl fmt::Display) -> Self {
         Self::Input(Report::new(Fault {
-            what: what.to_string(),
             remedy: Some(remedy.to_string()),
-            place: None,
-            others: Vec::new(),
+            ..Fault::new(what)
         }))
     }
 
@@ -64,61 +63,35 @@ pub(super) fn set_style() {
 }
 
 /// One thing that is wrong, with its place, or a heading over several.
-#[derive(Debug, thiserror::Error)]
+#[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{what}")]
+#[diagnostic(severity(Error))]
 struct Fault {
     what: String,
+    #[help]
     remedy: Option<String>,
-    place: Option<Place>,
+    #[source_code]
+    file: Option<NamedSource<String>>,
+    #[label(collection)]
+    places: Vec<LabeledSpan>,
+    #[related]
     others: Vec<Fault>,
 }
 
-#[derive(Debug)]
-struct Place {
-    source: NamedSource<String>,
-    label: LabeledSpan,
-}
-
-impl Diagnostic for Fault {
-    fn severity(&self) -> Option<Severity> {
-        Some(Severity::Error)
-    }
-
-    fn help<'a>(&'a self) -> Option<Box<dyn fmt::Display + 'a>> {
-        self.remedy
-            .as_ref()
-            .map(|r| Box::new(r) as Box<dyn fmt::Display>)
-    }
-
-    fn source_code(&self) -> Option<&dyn miette::SourceCode> {
-        self.place
-            .as_ref()
-            .map(|p| &p.source as &dyn miette::SourceCode)
-    }
-
-    fn labels(&self) -> Option<Box<dyn Iterator<Item = LabeledSpan> + '_>> {
-        self.place.as_ref().map(|place| {
-            Box::new(std::iter::once(place.label.clone())) as Box<dyn Iterator<Item = _>>
-        })
-    }
-
-    fn related<'a>(&'a self) -> Option<Box<dyn Iterator<Item = &'a dyn Diagnostic> + 'a>> {
-        (!self.others.is_empty()).then(|| {
-            Box::new(self.others.iter().map(|f| f as &dyn Diagnostic))
-                as Box<dyn Iterator<Item = _>>
-        })
-    }
-}
-
 impl Fault {
+    fn new(what: impl fmt::Display) -> Self {
+        Self {
+            what: what.to_string(),
+            remedy: None,
+            file: None,
+            places: Vec::new(),
+            others: Vec::new(),
+        }
+    }
+
     fn of(error: ScenarioError) -> Self {
         match error {
-            ScenarioError::Override(error) => Self {
-                what: format!("--set {error}"),
-                remedy: None,
-                place: None,
-                others: Vec::new(),
-            },
+            ScenarioError::Override(error) => Self::new(format!("--set {error}")),
             ScenarioError::Overridden {
                 path,
                 overrides,
@@ -153,71 +126,64 @@ impl Fault {
     ) -> Self {
         let others = match source {
             FileError::Read { source, .. } => {
+                let remedy = "check the path; relative ones count from here";
                 return Self {
-                    what: format!("cannot read {}: {source}", path.display()),
-                    remedy: Some("check the path; relative ones count from here".to_owned()),
-                    place: None,
-                    others: Vec::new(),
+                    remedy: Some(remedy.to_owned()),
+                    ..Self::new(format!("cannot read {}: {source}", path.display()))
                 };
             }
-            FileError::Syntax { message, span } => vec![Self {
-                what: format!("this is not TOML: {message}"),
-                remedy: None,
-                place: span.and_then(|span| place(path, text, span, "here")),
-                others: Vec::new(),
-            }],
+            FileError::Syntax { message, span } => {
+                let fault = Self::new(format!("this is not TOML: {message}"));
+                vec![fault.at(path, text, span, "here")]
+            }
             FileError::Problems(problems) => {
                 let one = |problem| Self::of_problem(path, text, overrides, problem);
                 problems.into_iter().map(one).collect()
             }
         };
         Self {
-            what: heading,
-            remedy: None,
-            place: None,
             others,
+            ..Self::new(heading)
         }
     }
 
     fn of_problem(path: &Path, text: &str, overrides: &[Override], problem: Problem) -> Self {
         let Problem { key, what, remedy } = problem;
         // An overridden value is not in the file: pointing there would mislead.
-        let blamed = overrides.iter().find(|o| touches(&o.key, &key));
-        let (what, place) = match blamed {
-            Some(change) => (format!("{key}: {what} ({change})"), None),
+        let fault = match overrides.iter().find(|o| touches(&o.key, &key)) {
+            Some(change) => Self::new(format!("{key}: {what} ({change})")),
             None => {
                 let span = locate(text, &key).filter(|_| !text.is_empty());
-                let place = span.and_then(|span| place(path, text, span, &key));
-                (format!("{key}: {what}"), place)
+                Self::new(format!("{key}: {what}")).at(path, text, span, &key)
             }
         };
         Self {
-            what,
             remedy: Some(remedy),
-            place,
-            others: Vec::new(),
+            ..fault
         }
+    }
+
+    /// With its place in a file.
+    fn at(mut self, path: &Path, text: &str, span: Option<Range<usize>>, label: &str) -> Self {
+        let last = text.len().saturating_sub(1);
+        let span = span.map(|span| {
+            let start = span.start.min(last);
+            start..span.end.clamp(start, text.len())
+        });
+        if let Some(span) = span.filter(|span| text.get(span.clone()).is_some()) {
+            self.file = Some(NamedSource::new(
+                path.display().to_string(),
+                text.to_owned(),
+            ));
+            self.places = vec![LabeledSpan::at(span, label)];
+        }
+        self
     }
 }
 
 /// One of the keys lies at or below the other.
 fn touches(a: &str, b: &str) -> bool {
-    let below = |outer: &str, inner: &str| {
-        inner
-            .strip_prefix(outer)
-            .is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-    };
-    below(a, b) || below(b, a)
-}
-
-fn place(path: &Path, text: &str, span: std::ops::Range<usize>, label: &str) -> Option<Place> {
-    let last = text.len().saturating_sub(1);
-    let start = span.start.min(last);
-    let end = span.end.clamp(start, text.len());
-    text.get(start..end).map(|_| Place {
-        source: NamedSource::new(path.display().to_string(), text.to_owned()),
-        label: LabeledSpan::at(start..end, label),
-    })
+    is_within(b, a) || is_within(a, b)
 }
 
 #[cfg(test)]

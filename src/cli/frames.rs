@@ -2,8 +2,8 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
-use crate::record::dataset::{self, DataSet, Inputs, Parts, Plan};
+use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use crate::record::dataset::{self, DataSet, Inputs, LabelKinds, Plan};
 use crate::scenario::{self, Override, Scenario};
 use crate::session::{self, End, RunOptions, Summary};
 use std::path::{Path, PathBuf};
@@ -68,7 +68,7 @@ pub(super) struct FramesArgs {
     cameras: Vec<String>,
     /// What to write beside the images: all, none, or words from the list below
     #[arg(long, value_name = "WORD,...", default_value = "all")]
-    labels: Parts,
+    labels: LabelKinds,
     /// Write into a folder that is not empty; an earlier data set there is removed
     #[arg(long)]
     force: bool,
@@ -91,9 +91,10 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
             .map(|o| format!("{}={}", o.key, o.value))
             .collect(),
     };
-    let progress = Progress::new(plan.to_s.min(scenario.duration_s));
+    let progress = ProgressBar::new(RUN_BAR);
+    let to_s = plan.to_s.min(scenario.duration_s);
     let mut set = DataSet::new(&args.out, &scenario, plan, inputs, renderer, &STOP);
-    let show = |now_s| progress.show(now_s);
+    let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
         renderer: choice,
         stop: Some(&STOP),
@@ -148,7 +149,7 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<Plan, Failure> {
         to_s,
         limit: args.limit,
         cameras: args.cameras.clone(),
-        parts: args.labels.clone(),
+        labels: args.labels.clone(),
     })
 }
 

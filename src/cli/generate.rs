@@ -4,7 +4,7 @@ use super::fault::Failure;
 use super::print;
 use super::running::prepare;
 use crate::record;
-use crate::scenario::draw::{Draw, Inputs, Template};
+use crate::scenario::sampling::{Inputs, Sample, Template};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -39,9 +39,10 @@ pub(super) struct GenerateArgs {
 
 pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let template = Template::load(&args.scenario)?.with(args.seed, Some(args.number));
-    let draws = (0..u64::from(args.number)).map(|k| template.draw(k));
-    let draws = draws.collect::<Result<Vec<_>, _>>();
-    let draws = draws.map_err(|e| Failure::input(e, "ease the conditions under study.require"))?;
+    let samples = (0..u64::from(args.number)).map(|k| template.sample(k));
+    let samples = samples.collect::<Result<Vec<_>, _>>();
+    let samples =
+        samples.map_err(|e| Failure::input(e, "ease the conditions under study.require"))?;
     // Nothing is written unless all of them can be.
     let inputs = Inputs::of(&template).map_err(Failure::run)?;
     let place = |name: &str| match inputs.place_of(name) {
@@ -51,15 +52,15 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
             .into_owned(),
         None => name.to_owned(),
     };
-    let texts = draws.iter().map(|draw| template.text_of(draw, place));
+    let texts = samples.iter().map(|sample| template.text_of(sample, place));
     let texts = texts.collect::<Result<Vec<_>, _>>()?;
     prepare(&args.out)?;
-    write(&args.out, &template, &inputs, &draws, &texts)
+    write(&args.out, &template, &inputs, &samples, &texts)
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write the scenarios")))?;
-    let rejected: u64 = draws.iter().map(|d| u64::from(d.rejected)).sum();
+    let rejected: u64 = samples.iter().map(|d| u64::from(d.rejected)).sum();
     print(&format!(
         "{} scenarios in {}; {rejected} draws did not meet the conditions",
-        draws.len(),
+        samples.len(),
         args.out.display()
     ))
 }
@@ -68,7 +69,7 @@ fn write(
     out: &Path,
     template: &Template,
     inputs: &Inputs,
-    draws: &[Draw],
+    samples: &[Sample],
     texts: &[String],
 ) -> io::Result<()> {
     inputs.copy_to(&out.join("inputs"))?;
@@ -78,17 +79,17 @@ fn write(
         .into_iter()
         .chain(variables);
     index.write_record(head)?;
-    for (draw, text) in draws.iter().zip(texts) {
-        let file = format!("{}_{:06}.toml", template.file.name, draw.index);
+    for (sample, text) in samples.iter().zip(texts) {
+        let file = format!("{}_{:06}.toml", template.file.name, sample.index);
         record::write_whole(&out.join(&file), text.as_bytes())?;
         let about = [
-            draw.index.to_string(),
+            sample.index.to_string(),
             file,
-            draw.seed.to_string(),
-            draw.rejected.to_string(),
-            draw.ln_weight.exp().to_string(),
+            sample.seed.to_string(),
+            sample.rejected.to_string(),
+            sample.ln_weight.exp().to_string(),
         ];
-        let values = draw.values.iter().map(|(_, value)| match value {
+        let values = sample.values.iter().map(|(_, value)| match value {
             toml::Value::String(text) => text.clone(),
             other => other.to_string(),
         });

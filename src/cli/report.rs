@@ -2,7 +2,7 @@
 
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
-use crate::scenario::draw::{Template, as_written};
+use crate::scenario::sampling::{Template, as_written};
 use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
@@ -18,10 +18,9 @@ pub(super) fn tunnel(tunnel: &Tunnel) -> String {
         lowest = lowest.min(frame.slope * 1e3);
         steepest = steepest.max(frame.slope * 1e3);
     }
-    let plan = if tightest < 1e-9 {
-        "straight".to_owned()
-    } else {
-        format!("tightest radius {:.0} m", 1.0 / tightest)
+    let plan = match tightest < 1e-9 {
+        true => "straight".to_owned(),
+        false => format!("tightest radius {:.0} m", 1.0 / tightest),
     };
     let mut lines = vec![
         format!(
@@ -96,14 +95,13 @@ pub(super) fn vehicle(vehicle: &VehicleFile) -> String {
 
 /// What it runs, what the rig sees, how many images to expect.
 pub(super) fn scenario(scenario: &Scenario) -> String {
-    let mut lines = vec![format!(
-        "scenario `{}`: {}",
-        scenario.name, scenario.description
-    )];
-    lines.push(format!(
-        "{:.1} s on `{}`, seed {}",
-        scenario.duration_s, scenario.tunnel.name, scenario.seed
-    ));
+    let mut lines = vec![
+        format!("scenario `{}`: {}", scenario.name, scenario.description),
+        format!(
+            "{:.1} s on `{}`, seed {}",
+            scenario.duration_s, scenario.tunnel.name, scenario.seed
+        ),
+    ];
     for (k, train) in scenario.physics.trains.iter().enumerate() {
         let what = if k == 0 { "train" } else { "other train" };
         let stop = train
@@ -127,31 +125,23 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
     }
     if let Some(rig) = scenario.rig() {
         let calibration = rig.calibration();
-        lines.push(format!(
-            "rig: {}",
-            frames(&calibration.left, rig.pairs_per_s)
-        ));
-        lines.push(format!("rig: {}", view(&calibration, scenario)));
-        lines.push(format!(
-            "rig: {}",
-            stripes(&calibration.left, &scenario.tunnel)
-        ));
+        let rows = frames(&calibration.left, rig.pairs_per_s);
+        let stripes = stripes(&calibration.left, &scenario.tunnel);
         let pairs = images(scenario.duration_s, rig.pairs_per_s);
-        lines.push(format!("about {pairs:.0} pairs of images"));
+        lines.extend([
+            format!("rig: {rows}"),
+            format!("rig: {}", view(&calibration, scenario)),
+            format!("rig: {stripes}"),
+            format!("about {pairs:.0} pairs of images"),
+        ]);
     }
     for post in &scenario.wayside {
         let name = &post.calibration.name;
         let rate = post.camera.frames_per_s;
-        lines.push(format!(
-            "{name}: {}",
-            frames(&post.calibration.camera, rate)
-        ));
+        let rows = frames(&post.calibration.camera, rate);
         let count = images(scenario.duration_s, rate);
-        let lidar = if post.lidar.is_some() {
-            ", with lidar"
-        } else {
-            ""
-        };
+        let lidar = post.lidar.as_ref().map_or("", |_| ", with lidar");
+        lines.push(format!("{name}: {rows}"));
         lines.push(format!("{name}: about {count:.0} images{lidar}"));
     }
     let world = &scenario.physics;

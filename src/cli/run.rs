@@ -1,13 +1,13 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{Progress, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
 use crate::record::{self, FixTable, Recording};
-use crate::scenario::draw::Draw;
+use crate::scenario::sampling::Sample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RunOptions, Summary};
-use crate::study::{self, Fixes, Row, StudyError};
+use crate::study::{self, Fixes, Row, Study, StudyError};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -70,10 +70,10 @@ pub(super) struct RunArgs {
 }
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
-    let source = source(args)?;
-    let scenario = &source.scenario;
+    let task = task(args)?;
+    let scenario = &task.scenario;
     let live = live(args, scenario)?;
-    let out = args.out.clone().unwrap_or_else(|| source.out.clone());
+    let out = args.out.clone().unwrap_or_else(|| task.out.clone());
     prepare(&out)?;
 
     stop_on_ctrl_c();
@@ -90,8 +90,8 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     } else {
         print(&table::of(&summary, &out))?;
     }
-    if let Some((draw, row)) = &source.of_study {
-        compare(draw, row, &summary, &fixes)?;
+    if let Some((sample, row)) = &task.of_study {
+        compare(sample, row, &summary, &fixes)?;
     }
     match &summary.end {
         End::Complete => Ok(()),
@@ -108,22 +108,22 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
 }
 
 /// What is to be run.
-struct Source {
+struct Task {
     scenario: Scenario,
     /// Where its results go.
     out: PathBuf,
     /// A study's draw, and its row.
-    of_study: Option<(Draw, Row)>,
+    of_study: Option<(Sample, Row)>,
 }
 
-fn source(args: &RunArgs) -> Result<Source, Failure> {
+fn task(args: &RunArgs) -> Result<Task, Failure> {
     if let (Some(folder), Some(index)) = (&args.from_study, args.index) {
         return from_study(folder, index);
     }
     let path = args.scenario.as_deref().unwrap_or(Path::new(""));
     let mut scenario = Scenario::load(path, &args.overrides)?;
     scenario.seed = args.seed.unwrap_or(scenario.seed);
-    Ok(Source {
+    Ok(Task {
         out: Path::new("out").join(&scenario.name),
         scenario,
         of_study: None,
@@ -131,8 +131,10 @@ fn source(args: &RunArgs) -> Result<Source, Failure> {
 }
 
 /// From the copies of the inputs that the study keeps.
-fn from_study(folder: &Path, index: u64) -> Result<Source, Failure> {
-    let (manifest, template) = study::template_of(folder)?;
+fn from_study(folder: &Path, index: u64) -> Result<Task, Failure> {
+    let Study {
+        manifest, template, ..
+    } = Study::open(folder)?;
     if let Some(file) = manifest.changed_outside() {
         return Err(Failure::input(
             format!("{file} has changed since the study was run, or is gone"),
@@ -149,17 +151,17 @@ fn from_study(folder: &Path, index: u64) -> Result<Source, Failure> {
                 "give the index of one of its rows",
             )
         })?;
-    let draw = template.draw(index).map_err(StudyError::from)?;
-    Ok(Source {
-        scenario: template.scenario(&draw)?,
+    let sample = template.sample(index).map_err(StudyError::from)?;
+    Ok(Task {
+        scenario: template.scenario(&sample)?,
         out: folder.join(format!("run-{index:06}")),
-        of_study: Some((draw, row)),
+        of_study: Some((sample, row)),
     })
 }
 
 /// Says whether a run came out as it did in its study.
-fn compare(draw: &Draw, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
-    match row.difference(&Row::of(draw, summary, fixes)) {
+fn compare(sample: &Sample, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
+    match row.difference(&Row::of(sample, summary, fixes)) {
         None => {
             eprintln!("equal to its row in the study, in every figure");
             Ok(())
@@ -188,8 +190,8 @@ fn observed(
     observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));
 
-    let progress = Progress::new(scenario.duration_s);
-    let show = |now_s| progress.show(now_s);
+    let progress = ProgressBar::new(RUN_BAR);
+    let show = |now_s| progress.show_run(now_s, scenario.duration_s);
     let options = RunOptions {
         renderer: args.renderer.into(),
         stop: Some(&STOP),

@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use crate::session::RendererChoice;
 use clap::ValueEnum;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressStyle;
 use std::cell::Cell;
 use std::fs;
 use std::io;
@@ -74,34 +74,39 @@ fn probe(out: &Path) -> io::Result<()> {
     fs::remove_file(&probe)
 }
 
-/// How far a run is: a bar on a terminal, else a line for every tenth.
-pub(super) struct Progress {
-    bar: ProgressBar,
-    duration_s: f64,
-    tenths: Cell<u32>,
+/// How far something is: a bar on a terminal, else a line for every tenth.
+pub(super) struct ProgressBar {
+    bar: indicatif::ProgressBar,
+    tenths: Cell<u64>,
 }
 
-impl Progress {
-    /// Of a run that takes so much simulated time.
-    pub(super) fn new(duration_s: f64) -> Self {
-        let bar = ProgressBar::new(millis(duration_s));
-        let template = "{bar:40} {percent:>3} % of the run, {elapsed} so far, {eta} to go";
+impl ProgressBar {
+    pub(super) fn new(template: &str) -> Self {
+        let bar = indicatif::ProgressBar::new(0);
         Self {
             bar: match ProgressStyle::with_template(template) {
                 Ok(style) => bar.with_style(style),
                 Err(_) => bar,
             },
-            duration_s,
             tenths: Cell::new(0),
         }
     }
 
-    /// It has come to this simulated time.
-    pub(super) fn show(&self, now_s: f64) {
-        self.bar.set_position(millis(now_s));
-        let reached = (10.0 * now_s / self.duration_s).min(10.0) as u32;
+    /// Of a run that takes so much simulated time, and has come to this one.
+    pub(super) fn show_run(&self, now_s: f64, duration_s: f64) {
+        let [now, all] = [now_s.min(duration_s), duration_s].map(|s| (s * 1e3) as u64);
+        let percent = 10 * (10 * now / all.max(1));
+        self.show(now, all, "", || format!("{percent} % of the run"));
+    }
+
+    /// So many are done of all; `line` is for where there is no terminal.
+    pub(super) fn show(&self, done: u64, all: u64, message: &str, line: impl Fn() -> String) {
+        self.bar.set_length(all);
+        self.bar.set_position(done);
+        self.bar.set_message(message.to_owned());
+        let reached = 10 * done / all.max(1);
         if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
-            eprintln!("{} % of the run", 10 * reached);
+            eprintln!("{}", line());
         }
     }
 
@@ -111,6 +116,6 @@ impl Progress {
     }
 }
 
-fn millis(seconds: f64) -> u64 {
-    (seconds * 1e3) as u64
-}
+/// Of a run.
+pub(super) const RUN_BAR: &str =
+    "{bar:40} {percent:>3} % of the run, {elapsed} so far, {eta} to go";

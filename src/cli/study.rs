@@ -2,16 +2,15 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{RendererArg, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::Template;
+use crate::scenario::sampling::Template;
 use crate::study::stats::Estimate;
 use crate::study::{
-    self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, StudyError, Submission,
+    self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
+    Submission,
 };
 use clap::Subcommand;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::cell::Cell;
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -170,16 +169,14 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
     match &args.command {
         StudyCommand::Run(args) => run(args),
         StudyCommand::Merge(args) => {
-            let rows = study::merge(&args.folder)?;
-            conclude(
-                &args.folder,
-                &study::template_of(&args.folder)?.1,
-                &rows,
-                true,
-            )
+            study::merge(&args.folder)?;
+            conclude(&args.folder, true)
         }
         StudyCommand::Report(args) => {
-            let (page, digest) = study::report(&args.folder)?;
+            let study = Study::open(&args.folder)?;
+            let rows = study.rows()?;
+            let digest = Digest::of(&study.template, &rows);
+            let page = study::report(&study, &digest, &rows)?;
             print(&digest_text(&digest))?;
             print(&format!("report  {}", page.display()))
         }
@@ -210,8 +207,8 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     });
     prepare(&out)?;
     stop_on_ctrl_c();
-    let bar = Bar::new();
-    let show = |progress: &Progress| bar.show(progress);
+    let bar = ProgressBar::new("{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go");
+    let show = |progress: &Progress| show(&bar, progress);
     let options = Options {
         jobs: args.jobs.map_or(0, usize::from),
         resume: args.resume,
@@ -224,7 +221,7 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     let rows = study::run(&template, &out, &options);
     bar.finish();
     let rows = rows?;
-    conclude(&out, &template, &rows, args.shard.is_none())?;
+    conclude(&out, args.shard.is_none())?;
     let is_whole = args.shard.is_none() && rows.len() as u64 >= template.runs();
     if STOP.load(Ordering::Relaxed) && !is_whole {
         let what = format!("broken off with {} rows; --resume goes on", rows.len());
@@ -266,11 +263,11 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
         "{} pairs of runs; second less first, intervals of 95 %\n",
         found.pairs
     );
-    if found.drawn_otherwise > 0 {
+    if found.sampled_otherwise > 0 {
         text += &format!(
-            "{} of them were not drawn alike: their differences scatter as if there were no pairs (weighed \
+            "{} of them were not drawn alike: their differences scatter as if there were no pairs (weighted \
              runs have none)\n",
-            found.drawn_otherwise
+            found.sampled_otherwise
         );
     }
     for (name, unit, difference) in &found.differences {
@@ -322,18 +319,21 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
 }
 
 /// Prints what there is now; of a whole study, writes the report.
-fn conclude(out: &Path, template: &Template, rows: &[Row], whole: bool) -> Result<(), Failure> {
-    print(&digest_text(&Digest::of(template, rows)?))?;
-    let planned = template.runs();
+fn conclude(out: &Path, whole: bool) -> Result<(), Failure> {
+    let study = Study::open(out)?;
+    let rows = study.rows()?;
+    let digest = Digest::of(&study.template, &rows);
+    print(&digest_text(&digest))?;
+    let planned = study.template.runs();
     if whole && (rows.len() as u64) < planned {
         print(&format!("stopped after {} of {planned} runs", rows.len()))?;
     }
-    for (reason, count) in reasons(rows) {
+    for (reason, count) in reasons(&rows) {
         print(&format!("{count} not complete: {reason}"))?;
     }
     print(&format!("rows    {}", out.join("rows.parquet").display()))?;
     if whole {
-        let (page, _) = study::report(out)?;
+        let page = study::report(&study, &digest, &rows)?;
         print(&format!("report  {}", page.display()))?;
     }
     Ok(())
@@ -343,7 +343,7 @@ fn conclude(out: &Path, template: &Template, rows: &[Row], whole: bool) -> Resul
 fn reasons(rows: &[Row]) -> Vec<(&str, usize)> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for row in rows.iter().filter(|row| !row.is_complete()) {
-        // What was drawn differs from run to run; what is wrong with it is said first.
+        // What is wrong stands on the first line; the values on the others differ from run to run.
         let reason = row.reason.as_deref().unwrap_or_default();
         *counts
             .entry(reason.lines().next().unwrap_or_default())
@@ -361,11 +361,11 @@ fn digest_text(digest: &Digest) -> String {
         text += &format!("; {} draws did not meet the conditions", digest.rejected);
     }
     if let Some(n) = digest.effective_runs {
-        text += &format!("; worth {n:.1} unweighed ones");
+        text += &format!("; worth {n:.1} unweighted ones");
     }
     text += "\nintervals of 95 %\n";
     for event in &digest.events {
-        let said = match (&event.weighted, &event.rate) {
+        let rate = match (&event.weighted, &event.rate) {
             (Some(w), _) => format!(
                 "{}, from {} runs worth {:.1}",
                 w.rate, w.events, w.effective_events
@@ -373,17 +373,16 @@ fn digest_text(digest: &Digest) -> String {
             (None, Some(r)) => format!("{}, {} of {}", r.wilson, r.events, r.wilson.n),
             (None, None) => "unknown".into(),
         };
-        let untold = digest.complete.saturating_sub(event.told);
-        let untold = match untold {
+        let lacking = match digest.complete.saturating_sub(event.runs) {
             0 => String::new(),
             n => format!("; {n} runs lack what it asks for"),
         };
-        text += &format!("  {:<28} rate {said}{untold}\n", event.name);
+        text += &format!("  {:<28} rate {rate}{lacking}\n", event.name);
     }
     for figure in &digest.figures {
         let unit = figure.measure.unit;
-        let said = |e: Option<Estimate>| e.map_or("-".into(), |e| e.to_string());
-        let [mean, p95] = [figure.mean, figure.quantiles[2]].map(said);
+        let shown = |e: Option<Estimate>| e.map_or("-".into(), |e| e.to_string());
+        let [mean, p95] = [figure.mean, figure.quantiles[2]].map(shown);
         let some = if figure.runs < digest.complete {
             format!(", of {} runs", figure.runs)
         } else {
@@ -397,47 +396,19 @@ fn digest_text(digest: &Digest) -> String {
     text
 }
 
-/// How far a study is: a bar on a terminal, else a line for every tenth.
-struct Bar {
-    bar: ProgressBar,
-    tenths: Cell<u64>,
-}
-
-impl Bar {
-    fn new() -> Self {
-        let template = "{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go";
-        let bar = ProgressBar::new(0);
-        Self {
-            bar: match ProgressStyle::with_template(template) {
-                Ok(style) => bar.with_style(style),
-                Err(_) => bar,
-            },
-            tenths: Cell::new(0),
-        }
-    }
-
-    fn show(&self, progress: &Progress) {
-        let Progress {
-            done,
-            of,
-            failed,
-            per_minute,
-        } = *progress;
-        let said = format!("; {per_minute:.1} a minute, {failed} failed");
-        self.bar.set_length(of);
-        self.bar.set_position(done);
-        self.bar.set_message(said.clone());
-        let reached = 10 * done / of.max(1);
-        if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
-            let left = (of - done) as f64 / per_minute;
-            let left = left.is_finite().then(|| format!(", {left:.1} min to go"));
-            eprintln!("{done} of {of} runs{said}{}", left.unwrap_or_default());
-        }
-    }
-
-    fn finish(&self) {
-        self.bar.finish_and_clear();
-    }
+fn show(bar: &ProgressBar, progress: &Progress) {
+    let Progress {
+        done,
+        of,
+        failed,
+        per_minute,
+    } = *progress;
+    let rate = format!("; {per_minute:.1} a minute, {failed} failed");
+    bar.show(done, of, &rate, || {
+        let left = (of - done) as f64 / per_minute;
+        let left = left.is_finite().then(|| format!(", {left:.1} min to go"));
+        format!("{done} of {of} runs{rate}{}", left.unwrap_or_default())
+    });
 }
 
 impl From<StudyError> for Failure {

@@ -5,9 +5,9 @@
 //! 3-D view follows.
 
 use super::images::WaysidePaths;
-use super::stream::{SIM_TIME, Stream, failed};
+use super::stream::{SIM_TIME, Stream};
+use super::whole_files::{Result, failed};
 use super::{Contents, images, plots, scene, texts};
-use crate::session::ObserverError;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
     TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
@@ -20,6 +20,7 @@ use rerun::{
     AsComponents, Color, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId,
     StoreKind, datatypes,
 };
+use std::ops::Range;
 
 /// One pane, or several beside or above each other with their shares of the room.
 enum Node {
@@ -54,11 +55,7 @@ impl Pane {
 }
 
 /// Sends the layout for what this run has.
-pub(super) fn send(
-    stream: &Stream,
-    contents: &Contents,
-    eye: ([f32; 3], [f32; 3]),
-) -> Result<(), ObserverError> {
+pub(super) fn send(stream: &Stream, contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Result {
     let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
     let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
         .enabled(true)
@@ -78,19 +75,11 @@ pub(super) fn send(
 fn layout(contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Node {
     let mut right = Vec::new();
     if contents.rig {
-        right.push((
-            3.0,
-            row([
-                (
-                    1.0,
-                    Node::Pane(Pane::new("2D", "Left camera", images::LEFT)),
-                ),
-                (
-                    1.0,
-                    Node::Pane(Pane::new("2D", "Right camera", images::RIGHT)),
-                ),
-            ]),
-        ));
+        let eyes = [
+            (1.0, image("Left camera", images::LEFT)),
+            (1.0, image("Right camera", images::RIGHT)),
+        ];
+        right.push((3.0, row(eyes)));
     }
     if !contents.devices.is_empty() {
         let devices = contents.devices.iter();
@@ -121,29 +110,18 @@ fn column(parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
     Node::Split(ContainerKind::Vertical, parts.into_iter().collect())
 }
 
+fn image(name: impl Into<String>, origin: &str) -> Node {
+    Node::Pane(Pane::new("2D", name, origin))
+}
+
 fn wayside(name: &str, paths: &WaysidePaths) -> Node {
+    let found = [
+        (1.0, image("Difference", &paths.difference)),
+        (1.0, image("Binary", &paths.binary)),
+    ];
     row([
-        (
-            2.0,
-            Node::Pane(Pane::new(
-                "2D",
-                format!("{name}: camera"),
-                paths.camera.as_str(),
-            )),
-        ),
-        (
-            1.0,
-            column([
-                (
-                    1.0,
-                    Node::Pane(Pane::new("2D", "Difference", paths.difference.as_str())),
-                ),
-                (
-                    1.0,
-                    Node::Pane(Pane::new("2D", "Binary", paths.binary.as_str())),
-                ),
-            ]),
-        ),
+        (2.0, image(format!("{name}: camera"), &paths.camera)),
+        (1.0, column(found)),
     ])
 }
 
@@ -156,7 +134,7 @@ fn tabbed(nodes: impl IntoIterator<Item = Node>) -> Node {
     }
 }
 
-fn plot(group: &plots::Group) -> Node {
+fn plot(group: &plots::PlotGroup) -> Node {
     let legend = PlotLegend::new().with_corner(group.legend);
     // All of the run. Left alone, a plot scrolls with the time, and one of more than a minute opens
     // half empty.
@@ -278,13 +256,10 @@ fn node_path(node: &Node, id: [u8; 16]) -> String {
         Node::Pane(_) => "view",
         Node::Split(..) => "container",
     };
-    let hex: String = id.iter().map(|byte| format!("{byte:02x}")).collect();
-    let (a, b, c, d, e) = (
-        &hex[..8],
-        &hex[8..12],
-        &hex[12..16],
-        &hex[16..20],
-        &hex[20..],
-    );
-    format!("{kind}/{a}-{b}-{c}-{d}-{e}")
+    let hex = |part: Range<usize>| -> String {
+        let bytes = id[part].iter();
+        bytes.map(|byte| format!("{byte:02x}")).collect()
+    };
+    let parts = [0..4, 4..6, 6..8, 8..10, 10..16].map(hex);
+    format!("{kind}/{}", parts.join("-"))
 }

@@ -3,16 +3,15 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
-use super::palette;
-use super::scene::ui;
+use super::palette::{self, ui};
 use super::slug;
-use super::stream::{Stream, failed};
+use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
     StereoPair, WaysideReport,
 };
 use crate::scenario::RecordSettings;
-use crate::session::ObserverError;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder};
 use jpeg_encoder::{ColorType, Encoder};
@@ -62,7 +61,7 @@ pub(super) fn pinhole(intrinsics: &Intrinsics, depth_m: f32) -> Pinhole {
         .with_color(palette::CAMERA)
 }
 
-/// What is said of an obstacle wherever it is drawn.
+/// The label of an obstacle in space.
 pub(super) fn danger_label(o: &DetectedObstacle) -> String {
     let danger = match o.danger {
         DangerLevel::None => "clear",
@@ -72,7 +71,7 @@ pub(super) fn danger_label(o: &DetectedObstacle) -> String {
     format!("{:.1} m {danger}", o.near_range_m)
 }
 
-/// What is said of a danger in the image.
+/// The label of a danger in the image.
 fn obstacle_label(o: &DetectedObstacle) -> String {
     let range_and_danger = danger_label(o);
     format!("{range_and_danger}, {:.2} x {:.2} m", o.width_m, o.height_m)
@@ -102,6 +101,7 @@ impl Rate {
 
 /// The image part of a recording.
 pub(super) struct Images {
+    stream: Stream,
     quality: u8,
     gain: f64,
     every_frame: bool,
@@ -112,8 +112,9 @@ pub(super) struct Images {
 
 impl Images {
     /// For so many wayside devices.
-    pub(super) fn new(settings: &RecordSettings, devices: usize) -> Self {
+    pub(super) fn new(stream: Stream, settings: &RecordSettings, devices: usize) -> Self {
         Self {
+            stream,
             quality: settings.jpeg_quality,
             gain: settings.difference_gain,
             every_frame: settings.overlay_every_frame,
@@ -124,12 +125,7 @@ impl Images {
     }
 
     /// A pair of the train's cameras.
-    pub(super) fn pair(
-        &mut self,
-        stream: &Stream,
-        pair: &StereoPair,
-        report: &LedReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn pair(&mut self, pair: &StereoPair, report: &LedReport) -> Result {
         let keep = self.stereo.due(pair.left.start);
         if !keep && !self.every_frame {
             return Ok(());
@@ -139,11 +135,11 @@ impl Images {
             (RIGHT, &pair.right, &report.right),
         ];
         for (path, frame, spots) in eyes {
-            stream.at_frame(frame.start, frame.number);
+            self.stream.at_frame(frame.start, frame.number);
             if keep {
-                self.jpeg(stream, &format!("{path}/image"), &frame.image)?;
+                self.jpeg(&format!("{path}/image"), &frame.image)?;
             }
-            draw_spots(stream, path, spots)?;
+            self.log_spots(path, spots)?;
         }
         Ok(())
     }
@@ -151,29 +147,28 @@ impl Images {
     /// A frame of a wayside camera.
     pub(super) fn wayside(
         &mut self,
-        stream: &Stream,
         device: (usize, &str),
         frame: &Frame,
         report: &WaysideReport,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let (start, image) = (frame.start, &frame.image);
         let keep = self.wayside.get_mut(device.0).is_some_and(|r| r.due(start));
         if !keep && !self.every_frame {
             return Ok(());
         }
         let paths = WaysidePaths::new(device.1);
-        stream.at_frame(start, report.number);
+        self.stream.at_frame(start, report.number);
         if keep {
-            self.jpeg(stream, &format!("{}/image", paths.camera), image)?;
+            self.jpeg(&format!("{}/image", paths.camera), image)?;
             if let Some(difference) = &report.difference {
                 self.brighten(difference);
-                self.jpeg(stream, &paths.difference, &self.scaled)?;
+                self.jpeg(&paths.difference, &self.scaled)?;
             }
             if let Some(binary) = &report.binary {
-                png(stream, &paths.binary, binary)?;
+                self.png(&paths.binary, binary)?;
             }
         }
-        draw_obstacles(stream, &paths.camera, report, image.height())
+        self.log_obstacles(&paths.camera, report, image.height())
     }
 
     fn brighten(&mut self, difference: &GrayImage) {
@@ -183,82 +178,79 @@ impl Images {
         }
     }
 
-    fn jpeg(&self, stream: &Stream, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
+    fn jpeg(&self, path: &str, image: &GrayImage) -> Result {
         // 65535 pixels a side is the limit of JPEG itself.
         let (Ok(width), Ok(height)) = (image.width().try_into(), image.height().try_into()) else {
-            return png(stream, path, image);
+            return self.png(path, image);
         };
         let mut bytes = Vec::with_capacity(image.len() / 4);
         Encoder::new(&mut bytes, self.quality)
             .encode(image.as_raw(), width, height, ColorType::Luma)
             .map_err(failed(path))?;
         let encoded = EncodedImage::new(bytes).with_media_type(MediaType::jpeg());
-        stream.log(path, &encoded)
+        self.stream.log(path, &encoded)
     }
-}
 
-fn png(stream: &Stream, path: &str, image: &GrayImage) -> Result<(), ObserverError> {
-    let mut bytes = Vec::new();
-    PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
-        .write_image(image, image.width(), image.height(), ExtendedColorType::L8)
-        .map_err(failed(path))?;
-    let encoded = EncodedImage::new(bytes).with_media_type(MediaType::png());
-    stream.log(path, &encoded)
-}
+    fn png(&self, path: &str, image: &GrayImage) -> Result {
+        let mut bytes = Vec::new();
+        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
+            .write_image(image, image.width(), image.height(), ExtendedColorType::L8)
+            .map_err(failed(path))?;
+        let encoded = EncodedImage::new(bytes).with_media_type(MediaType::png());
+        self.stream.log(path, &encoded)
+    }
 
-/// Boxes of lamps, with names where they have one, fitted ellipses and centres.
-fn draw_spots(stream: &Stream, path: &str, spots: &[Spot]) -> Result<(), ObserverError> {
-    let unnamed = spots.iter().filter(|spot| spot.uid.is_none());
-    let boxes = boxes(unnamed.map(|spot| spot.bounds)).with_colors([palette::UNNAMED]);
-    stream.log(&format!("{path}/unnamed"), &boxes)?;
+    /// Boxes of lamps, with names where they have one, fitted ellipses and centres.
+    fn log_spots(&self, path: &str, spots: &[Spot]) -> Result {
+        let unnamed = spots.iter().filter(|spot| spot.uid.is_none());
+        let boxes = boxes_of(unnamed.map(|spot| spot.bounds)).with_colors([palette::UNNAMED]);
+        self.stream.log(&format!("{path}/unnamed"), &boxes)?;
 
-    let named = spots
-        .iter()
-        .filter_map(|spot| Some((spot.bounds, spot.uid?)));
-    let (bounds, names): (Vec<_>, Vec<_>) = named.unzip();
-    let boxes = self::boxes(bounds)
-        .with_colors(names.iter().map(|(_, how)| palette::identity(*how)))
-        .with_labels(names.iter().map(|(uid, _)| uid.to_string()));
-    stream.log(&format!("{path}/lamps"), &boxes)?;
+        let named = spots
+            .iter()
+            .filter_map(|spot| Some((spot.bounds, spot.uid?)));
+        let (bounds, names): (Vec<_>, Vec<_>) = named.unzip();
+        let boxes = boxes_of(bounds)
+            .with_colors(names.iter().map(|(_, how)| palette::identity(*how)))
+            .with_labels(names.iter().map(|(uid, _)| uid.to_string()));
+        self.stream.log(&format!("{path}/lamps"), &boxes)?;
 
-    let ellipses = spots.iter().filter_map(|spot| spot.ellipse.map(outline));
-    let ellipses = LineStrips2D::new(ellipses)
-        .with_radii([ui(1.0)])
-        .with_colors([palette::CAMERA]);
-    stream.log(&format!("{path}/ellipses"), &ellipses)?;
+        let ellipses = spots.iter().filter_map(|spot| spot.ellipse.map(outline));
+        let ellipses = LineStrips2D::new(ellipses)
+            .with_radii([ui(1.0)])
+            .with_colors([palette::CAMERA]);
+        self.stream.log(&format!("{path}/ellipses"), &ellipses)?;
 
-    let centres = spots.iter().map(|spot| pixel(spot.centre.x, spot.centre.y));
-    let centres = Points2D::new(centres)
-        .with_radii([ui(2.5)])
-        .with_colors([palette::TRUTH]);
-    stream.log(&format!("{path}/centres"), &centres)
-}
+        let centres = spots.iter().map(|spot| pixel(spot.centre.x, spot.centre.y));
+        let centres = Points2D::new(centres)
+            .with_radii([ui(2.5)])
+            .with_colors([palette::TRUTH]);
+        self.stream.log(&format!("{path}/centres"), &centres)
+    }
 
-/// Boxes of obstacles with what is known of them, and of the other regions found.
-fn draw_obstacles(
-    stream: &Stream,
-    path: &str,
-    report: &WaysideReport,
-    height_px: u32,
-) -> Result<(), ObserverError> {
-    let is_obstacle = |bounds: PixelBox| report.obstacles.iter().any(|o| o.blob.bounds == bounds);
-    let others = report.blobs.iter().map(|blob| blob.bounds);
-    let others = boxes(others.filter(|bounds| !is_obstacle(*bounds)));
-    stream.log(
-        &format!("{path}/blobs"),
-        &others.with_colors([palette::BLOB]),
-    )?;
+    /// Boxes of obstacles with what is known of them, and of the other regions found.
+    fn log_obstacles(&self, path: &str, report: &WaysideReport, height_px: u32) -> Result {
+        let is_obstacle =
+            |bounds: PixelBox| report.obstacles.iter().any(|o| o.blob.bounds == bounds);
+        let others = report.blobs.iter().map(|blob| blob.bounds);
+        let others = boxes_of(others.filter(|bounds| !is_obstacle(*bounds)));
+        self.stream.log(
+            &format!("{path}/blobs"),
+            &others.with_colors([palette::BLOB]),
+        )?;
 
-    let found = boxes(report.obstacles.iter().map(|o| o.blob.bounds))
-        .with_colors(report.obstacles.iter().map(|o| palette::danger(o.danger)));
-    stream.log(&format!("{path}/obstacles"), &found)?;
+        let found = boxes_of(report.obstacles.iter().map(|o| o.blob.bounds))
+            .with_colors(report.obstacles.iter().map(|o| palette::danger(o.danger)));
+        self.stream.log(&format!("{path}/obstacles"), &found)?;
 
-    let (places, dangers) = label_places(&report.obstacles, height_px);
-    let labels = Points2D::new(places)
-        .with_radii([ui(1.0)])
-        .with_colors(dangers.iter().map(|o| palette::danger(o.danger)))
-        .with_labels(dangers.iter().map(|o| obstacle_label(o)));
-    stream.log(&format!("{path}/obstacles/labels"), &labels)
+        let (places, dangers) = label_places(&report.obstacles, height_px);
+        let labels = Points2D::new(places)
+            .with_radii([ui(1.0)])
+            .with_colors(dangers.iter().map(|o| palette::danger(o.danger)))
+            .with_labels(dangers.iter().map(|o| obstacle_label(o)));
+        self.stream
+            .log(&format!("{path}/obstacles/labels"), &labels)
+    }
 }
 
 /// Where the labels of the dangers go: under the box, because labels of boxes are wrapped to their
@@ -284,7 +276,7 @@ fn label_places(
     (places.collect(), dangers)
 }
 
-fn boxes(bounds: impl IntoIterator<Item = PixelBox>) -> Boxes2D {
+fn boxes_of(bounds: impl IntoIterator<Item = PixelBox>) -> Boxes2D {
     let (centres, halves): (Vec<_>, Vec<_>) = bounds
         .into_iter()
         .map(|b| {

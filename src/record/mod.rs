@@ -38,13 +38,14 @@ mod scene;
 mod stream;
 mod tables;
 mod texts;
+mod whole_files;
 
-pub(crate) use stream::write_whole;
 pub use tables::FixTable;
+pub(crate) use whole_files::write_whole;
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;
-use crate::session::{Event, Observer, ObserverError, Opening};
+use crate::session::{Event, Observer, Opening};
 use images::Images;
 use moving::Moving;
 use nalgebra::Isometry3;
@@ -52,8 +53,10 @@ use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
 use scene::Scene;
 use std::path::Path;
+use std::rc::Rc;
 use stream::{Stream, Target};
 use texts::Texts;
+use whole_files::Result;
 
 /// Why there is no viewer.
 #[derive(Debug, thiserror::Error)]
@@ -121,20 +124,20 @@ impl Recording {
 }
 
 impl Observer for Recording {
-    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+    fn open(&mut self, opening: &Opening<'_>) -> Result {
         let stream = Stream::open(&self.target, opening.scenario, opening.seed)?;
         self.open = Some(Open::new(stream, opening, &self.settings)?);
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         match &mut self.open {
             Some(open) => open.observe(event),
             None => Ok(()),
         }
     }
 
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         match self.open.take() {
             Some(open) => open.close(),
             None => Ok(()),
@@ -173,7 +176,7 @@ struct Open {
     first_camera: Option<Isometry3<f64>>,
     laid_out: bool,
     flush_at: SimTime,
-    scene: Scene,
+    scene: Rc<Scene>,
     moving: Moving,
     images: Images,
     plots: Plots,
@@ -181,11 +184,7 @@ struct Open {
 }
 
 impl Open {
-    fn new(
-        stream: Stream,
-        opening: &Opening<'_>,
-        settings: &RecordSettings,
-    ) -> Result<Self, ObserverError> {
+    fn new(stream: Stream, opening: &Opening<'_>, settings: &RecordSettings) -> Result<Self> {
         let (devices, first) = (opening.wayside.len(), opening.first());
         let contents = Contents {
             rig: first.is_some_and(|train| train.rig.is_some()),
@@ -194,50 +193,47 @@ impl Open {
             protection: first.is_some_and(|train| train.protection),
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
-        let scene = Scene::new(opening.tunnel);
-        scene.draw(&stream, opening, settings)?;
+        let scene = Rc::new(Scene::new(opening.tunnel));
+        scene.log(&stream, opening, settings)?;
         Ok(Self {
-            moving: Moving::open(&stream, opening)?,
-            plots: Plots::open(&stream, &contents)?,
+            moving: Moving::open(stream.clone(), scene.clone(), opening)?,
+            plots: Plots::open(stream.clone(), &contents)?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
             flush_at: SimTime::ZERO.plus(stream.batch_s()),
-            images: Images::new(settings, devices),
-            texts: Texts::open(&stream, opening)?,
+            images: Images::new(stream.clone(), settings, devices),
+            texts: Texts::open(stream.clone(), opening)?,
             stream,
             contents,
             scene,
         })
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        let (stream, scene) = (&self.stream, &self.scene);
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         let time = match *event {
             // Panes show the first train.
             Event::Train(id, ..) | Event::Pair(id, ..) if id != TrainId::default() => return Ok(()),
             Event::Train(_, train, left) => {
-                self.moving.train(scene, train, left);
+                self.moving.train(train, left);
                 self.plots.train(train);
                 let head = train.world_from_vehicle;
                 self.lay_out(Some(&head))?;
                 train.time
             }
-            Event::Message(node, message) if *node == Node::Train(TrainId::default()) => {
-                self.message(message)?
-            }
-            Event::Message(..) => return Ok(()),
+            Event::Message(Node::Train(id), message) => self.message(*id, message)?,
+            Event::Message(..) | Event::Cost(..) => return Ok(()),
             Event::Bodies(time, bodies) => {
-                self.moving.bodies(stream, scene, time, bodies)?;
+                self.moving.bodies(time, bodies)?;
                 time
             }
             // Its images come when they reach the stack.
-            Event::Exposure(_) | Event::Cost(..) => return Ok(()),
+            Event::Exposure(_) => return Ok(()),
             Event::Pair(_, pair, report, true_chainages_m) => {
                 self.plots.fixes(report, true_chainages_m);
-                self.plots.taken(RIG_CAMERA, &pair.left);
-                Texts::dark_lamps(stream, report)?;
-                self.images.pair(stream, pair, report)?;
-                self.moving.fixes(stream, scene, report)?;
+                self.plots.exposure(RIG_CAMERA, &pair.left);
+                self.texts.dark_lamps(report)?;
+                self.images.pair(pair, report)?;
+                self.moving.fixes(report)?;
                 report.time
             }
             Event::Wayside(index, frame, report) => {
@@ -247,20 +243,19 @@ impl Open {
                 let device = (index, name.as_str());
                 let time = frame.start;
                 self.plots.wayside(index, report);
-                self.plots.taken(name, frame);
-                self.texts.wayside(stream, device, report)?;
-                self.images.wayside(stream, device, frame, report)?;
-                stream.at(time);
-                self.moving
-                    .obstacles(stream, scene, device, &report.obstacles)?;
+                self.plots.exposure(name, frame);
+                self.texts.wayside(device, report)?;
+                self.images.wayside(device, frame, report)?;
+                self.stream.at(time);
+                self.moving.obstacles(name, &report.obstacles)?;
                 time
             }
-            Event::Camera(time, _, camera, fault) => {
-                Texts::camera(stream, time, camera, fault)?;
+            Event::Camera(time, node, camera, fault) => {
+                self.texts.camera(time, node, camera, fault)?;
                 time
             }
             Event::Note(time, text) => {
-                Texts::note(stream, time, text)?;
+                self.texts.note(time, text)?;
                 time
             }
         };
@@ -271,25 +266,28 @@ impl Open {
         Ok(())
     }
 
-    /// A message of the first train's node, or one that arrived there; gives its time.
-    fn message(&mut self, message: &Message) -> Result<SimTime, ObserverError> {
-        let stream = &self.stream;
+    /// A message of a train's node, or one that arrived there; gives its time. Panes show the first
+    /// train, the log all.
+    fn message(&mut self, id: TrainId, message: &Message) -> Result<SimTime> {
+        let first = id == TrainId::default();
         match &message.content {
-            Content::Odometer(sample) => self.plots.odometer(sample),
-            Content::Doppler(sample) => self.plots.doppler(sample),
+            Content::Odometer(sample) if first => self.plots.odometer(sample),
+            Content::Doppler(sample) if first => self.plots.doppler(sample),
             Content::Protection(report) => {
-                self.plots.protection(report);
-                self.texts.protection(stream, report)?;
-                self.texts.display(stream, report.time, &report.display)?;
+                self.texts.protection(id, report)?;
+                if first {
+                    self.plots.protection(report);
+                    self.texts.display(report.time, &report.display)?;
+                }
             }
-            Content::Warning(warning) => self.texts.warning(stream, message, warning)?,
+            Content::Warning(warning) => self.texts.warning(id, message, warning)?,
             _ => {}
         }
         Ok(message.received_at)
     }
 
     /// Sends the layout, once: with the first truth, which says where to look.
-    fn lay_out(&mut self, head: Option<&Isometry3<f64>>) -> Result<(), ObserverError> {
+    fn lay_out(&mut self, head: Option<&Isometry3<f64>>) -> Result {
         if self.laid_out {
             return Ok(());
         }
@@ -300,14 +298,14 @@ impl Open {
 
     /// Rows first, then columns: each batch is cut before the next begins, so that the order in
     /// the file does not depend on threads.
-    fn flush(&mut self) -> Result<(), ObserverError> {
+    fn flush(&mut self) -> Result {
         self.lay_out(None)?;
         self.stream.flush()?;
-        self.moving.flush(&self.stream)?;
-        self.plots.flush(&self.stream)
+        self.moving.flush()?;
+        self.plots.flush()
     }
 
-    fn close(mut self) -> Result<(), ObserverError> {
+    fn close(mut self) -> Result {
         self.flush()?;
         self.stream.finish()
     }
@@ -323,5 +321,3 @@ fn slug(name: &str) -> String {
 
 #[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod trial;

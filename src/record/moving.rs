@@ -1,11 +1,12 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
-use super::palette;
-use super::scene::{HEAD, Scene, turn, ui};
-use super::stream::{Stream, failed};
+use super::palette::{self, ui};
+use super::scene::{HEAD, Scene, turn};
+use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use super::{images, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use crate::track::TrackPoint;
 use crate::twin::geometry::{Body, Hull, Shape};
 use crate::twin::physics::TrainState;
@@ -15,6 +16,8 @@ use rerun::{
     AsComponents, Boxes3D, Capsules3D, Color, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D,
     Mesh3D, Points3D, Transform3D,
 };
+use std::collections::BTreeSet;
+use std::rc::Rc;
 
 const SIGHT: &str = "world/estimate/sight";
 
@@ -42,7 +45,7 @@ impl Poses {
         self.turns.push(turn(pose));
     }
 
-    fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    fn flush(&mut self, stream: &Stream) -> Result {
         if self.times_ns.is_empty() {
             return Ok(());
         }
@@ -59,22 +62,22 @@ impl Poses {
 
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
+    stream: Stream,
+    scene: Rc<Scene>,
     /// Both eyes, where there is a rig.
     rig: Option<(RigCalibration, [Poses; 2])>,
     /// The head, then the cars; empty where there is neither train nor rig.
     train: Vec<Poses>,
     left: Option<Isometry3<f64>>,
-    /// Which kinds of bodies are on show.
-    shown: [bool; KINDS.len()],
-    hulls_shown: bool,
-    sight_shown: bool,
-    methods: Vec<Method>,
-    obstacles_shown: Vec<bool>,
+    /// Paths of what may be none, and is there.
+    shown: BTreeSet<String>,
+    /// Methods whose masts are drawn.
+    masts: Vec<Method>,
 }
 
 impl Moving {
     /// Draws the train, and makes ready for its motion.
-    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, scene: Rc<Scene>, opening: &Opening<'_>) -> Result<Self> {
         let first = opening.first();
         let half = first.map_or(Vector3::zeros(), |train| train.car_half_extents_m);
         let half = half.map(|x| x as f32);
@@ -102,153 +105,146 @@ impl Moving {
             stream.log_static(HEAD, &[&mast as &dyn AsComponents, &tip])?;
         }
         Ok(Self {
+            stream,
+            scene,
             rig: rig.map(|rig| (rig, eyes.map(Poses::of))),
             train,
             left: None,
-            shown: [false; KINDS.len()],
-            hulls_shown: false,
-            sight_shown: false,
-            methods: Vec::new(),
-            obstacles_shown: vec![false; opening.wayside.len()],
+            shown: BTreeSet::new(),
+            masts: Vec::new(),
         })
     }
 
     /// Keeps the train's pose for the next flush.
-    pub(super) fn train(
-        &mut self,
-        scene: &Scene,
-        truth: &TrainState,
-        world_from_left: Option<&Isometry3<f64>>,
-    ) {
+    pub(super) fn train(&mut self, truth: &TrainState, world_from_left: Option<&Isometry3<f64>>) {
         let head_and_cars =
             std::iter::once(&truth.world_from_vehicle).chain(&truth.world_from_cars);
         for (poses, pose) in self.train.iter_mut().zip(head_and_cars) {
-            poses.push(scene, truth.time, pose);
+            poses.push(&self.scene, truth.time, pose);
         }
         if let (Some(left), Some((rig, eyes))) = (world_from_left, &mut self.rig) {
             let right = left * rig.left_from_right;
             for (poses, pose) in eyes.iter_mut().zip([*left, right]) {
-                poses.push(scene, truth.time, &pose);
+                poses.push(&self.scene, truth.time, &pose);
             }
         }
         self.left = world_from_left.copied();
     }
 
     /// Sends the poses kept.
-    pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result {
         let eyes = self.rig.iter_mut().flat_map(|(_, eyes)| eyes);
         self.train
             .iter_mut()
             .chain(eyes)
-            .try_for_each(|poses| poses.flush(stream))
+            .try_for_each(|poses| poses.flush(&self.stream))
+    }
+
+    /// Logs things of which there may be none: an empty row takes the last ones away, once.
+    fn log(&mut self, path: &str, any: bool, things: &dyn AsComponents) -> Result {
+        let were_there = self.shown.remove(path);
+        if any {
+            self.shown.insert(path.to_owned());
+        }
+        if any || were_there {
+            self.stream.log(path, things)?;
+        }
+        Ok(())
     }
 
     /// Shows obstacles, workers and whatever else is solid.
-    pub(super) fn bodies(
-        &mut self,
-        stream: &Stream,
-        scene: &Scene,
-        time: SimTime,
-        bodies: &[Body],
-    ) -> Result<(), ObserverError> {
-        stream.at(time);
-        let mut groups: [Solids; KINDS.len()] = Default::default();
-        let mut hulls = Hulls::default();
-        for body in bodies {
-            if let Some(kind) = Kind::from(&body.shape) {
-                groups[kind as usize].push(scene, body);
-            } else if let Shape::Hull(hull) = &body.shape {
-                hulls.push(scene, body, hull);
-            }
-        }
-        // An empty mesh once, where there were hulls before.
-        let any = !hulls.triangles.is_empty();
-        if std::mem::replace(&mut self.hulls_shown, any) || any {
-            hulls.log(stream)?;
-        }
-        for ((kind, group), shown) in KINDS.into_iter().zip(groups).zip(&mut self.shown) {
-            let any = !group.sizes.is_empty();
-            // An empty row once, where there were some, takes the last ones away.
-            if any || *shown {
-                group.log(stream, kind)?;
-            }
-            *shown = any;
-        }
-        Ok(())
+    pub(super) fn bodies(&mut self, time: SimTime, bodies: &[Body]) -> Result {
+        self.stream.at(time);
+        let scene = self.scene.clone();
+        let hulls = Hulls::of(&scene, bodies);
+        let (path, any) = ("world/bodies/hulls", !hulls.triangles.is_empty());
+        self.log(path, any, &hulls.mesh())?;
+
+        let solids = |is_kind: fn(&Shape) -> bool| Solids::of(&scene, bodies, is_kind);
+        let s = solids(|shape| matches!(shape, Shape::Box(_)));
+        let any = !s.sizes.is_empty();
+        let boxes = Boxes3D::from_centers_and_half_sizes(s.places, s.sizes)
+            .with_quaternions(s.turns)
+            .with_colors(s.colours)
+            .with_fill_mode(FillMode::Solid);
+        self.log("world/bodies/boxes", any, &boxes)?;
+
+        let s = solids(|shape| matches!(shape, Shape::Cylinder(..)));
+        let (any, [radii, lengths]) = (!s.sizes.is_empty(), s.radii_and_lengths());
+        let cylinders = Cylinders3D::from_lengths_and_radii(lengths, radii)
+            .with_centers(s.places)
+            .with_quaternions(s.turns)
+            .with_colors(s.colours)
+            .with_fill_mode(FillMode::Solid);
+        self.log("world/bodies/cylinders", any, &cylinders)?;
+
+        let s = solids(|shape| matches!(shape, Shape::Sphere(_)));
+        let any = !s.sizes.is_empty();
+        let spheres = Ellipsoids3D::from_centers_and_half_sizes(s.places, s.sizes)
+            .with_colors(s.colours)
+            .with_fill_mode(FillMode::Solid);
+        self.log("world/bodies/spheres", any, &spheres)?;
+
+        let s = solids(|shape| matches!(shape, Shape::Capsule(..)));
+        let (any, [radii, lengths]) = (!s.sizes.is_empty(), s.radii_and_lengths());
+        let capsules = Capsules3D::from_lengths_and_radii(lengths, radii)
+            .with_translations(s.places)
+            .with_quaternions(s.turns)
+            .with_colors(s.colours)
+            .with_fill_mode(FillMode::Solid);
+        self.log("world/bodies/capsules", any, &capsules)
     }
 
     /// Marks where the stack takes the train to be, and the lamp that it looked at.
-    pub(super) fn fixes(
-        &mut self,
-        stream: &Stream,
-        scene: &Scene,
-        report: &LedReport,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn fixes(&mut self, report: &LedReport) -> Result {
         for fix in &report.fixes {
-            stream.at_frame(fix.time, report.number);
-            let (name, height_m) = match fix.method {
-                Method::Paper => ("paper", 10.8),
-                Method::Mono => ("mono", 12.0),
+            self.stream.at_frame(fix.time, report.number);
+            let (name, colour) = palette::method(fix.method);
+            let height_m = match fix.method {
+                Method::Paper => 10.8,
+                Method::Mono => 12.0,
             };
             let path = format!("world/estimate/{name}");
-            let place = Transform3D::from_translation(scene.local(&fix.position));
-            stream.log(&path, &place)?;
+            let place = Transform3D::from_translation(self.scene.local(&fix.position));
+            self.stream.log(&path, &place)?;
             // Drawn with the first fix: before it, there is nothing to show.
-            if !self.methods.contains(&fix.method) {
-                self.methods.push(fix.method);
-                let (mast, tip) = mast(height_m, name, palette::method(fix.method));
+            if !self.masts.contains(&fix.method) {
+                self.masts.push(fix.method);
+                let (mast, tip) = mast(height_m, name, colour);
                 let mast = [&mast as &dyn AsComponents, &tip];
-                stream.log(&format!("{path}/mast"), &mast)?;
+                self.stream.log(&format!("{path}/mast"), &mast)?;
             }
         }
         let seen = report.fixes.first().and_then(|fix| {
-            let lamp = scene.lamp(fix.uid)?;
-            let eye = scene.place(&self.left?);
-            Some((fix, [eye, scene.local(lamp)]))
+            let lamp = self.scene.lamp(fix.uid)?;
+            let eye = self.scene.place(&self.left?);
+            Some((fix, [eye, self.scene.local(lamp)]))
         });
-        if seen.is_some() || self.sight_shown {
-            let label = seen.map(|(fix, _)| format!("lamp {}", fix.uid));
-            let colour = seen.map(|(fix, _)| palette::identity(fix.identity));
-            let sight = LineStrips3D::new(seen.map(|(_, line)| line))
-                .with_radii([ui(1.5)])
-                .with_colors(colour)
-                .with_labels(label);
-            stream.at_frame(report.time, report.number);
-            stream.log(SIGHT, &sight)?;
-        }
-        self.sight_shown = seen.is_some();
-        Ok(())
+        let label = seen.map(|(fix, _)| format!("lamp {}", fix.uid));
+        let colour = seen.map(|(fix, _)| palette::identity(fix.identity));
+        let sight = LineStrips3D::new(seen.map(|(_, line)| line))
+            .with_radii([ui(1.5)])
+            .with_colors(colour)
+            .with_labels(label);
+        self.stream.at_frame(report.time, report.number);
+        self.log(SIGHT, seen.is_some(), &sight)
     }
 
     /// Shows where a wayside device takes obstacles to be. The time must have been set.
-    pub(super) fn obstacles(
-        &mut self,
-        stream: &Stream,
-        scene: &Scene,
-        device: (usize, &str),
-        obstacles: &[DetectedObstacle],
-    ) -> Result<(), ObserverError> {
-        let Some(shown) = self.obstacles_shown.get_mut(device.0) else {
-            return Ok(());
-        };
-        let before = std::mem::replace(shown, !obstacles.is_empty());
-        if obstacles.is_empty() && !before {
-            return Ok(());
-        }
+    pub(super) fn obstacles(&mut self, device: &str, obstacles: &[DetectedObstacle]) -> Result {
         let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
         for o in obstacles {
-            let frame = scene
-                .alignment()
-                .at(0.5 * (o.from_chainage_m + o.to_chainage_m));
+            let alignment = self.scene.alignment();
+            let frame = alignment.at(0.5 * (o.from_chainage_m + o.to_chainage_m));
             let foot = TrackPoint {
                 s_m: frame.s_m,
                 l_m: o.lateral_m,
                 h_m: 0.0,
             };
-            let centre = scene.alignment().world_from_track(foot);
+            let centre = alignment.world_from_track(foot);
             let centre = Point3::new(centre.x, centre.y, o.position.z + 0.5 * o.height_m);
             let length_m = (o.to_chainage_m - o.from_chainage_m).abs();
-            places.push(scene.local(&centre));
+            places.push(self.scene.local(&centre));
             sizes.push([length_m, o.width_m, o.height_m].map(|x| (0.5 * x) as f32));
             turns.push(turn(&frame.world_from_line()));
         }
@@ -256,10 +252,8 @@ impl Moving {
             .with_quaternions(turns)
             .with_colors(obstacles.iter().map(|o| palette::danger(o.danger)))
             .with_labels(obstacles.iter().map(images::danger_label));
-        stream.log(
-            &format!("world/estimate/obstacles/{}", slug(device.1)),
-            &boxes,
-        )
+        let path = format!("world/estimate/obstacles/{}", slug(device));
+        self.log(&path, !obstacles.is_empty(), &boxes)
     }
 }
 
@@ -286,32 +280,34 @@ fn mast(height_m: f32, name: &str, colour: Color) -> (LineStrips3D, Points3D) {
 struct Solids {
     places: Vec<[f32; 3]>,
     turns: Vec<RotationQuat>,
+    /// Half extents, or radius and length.
     sizes: Vec<[f32; 3]>,
     colours: Vec<Color>,
 }
 
-/// Shapes that rerun draws by their sizes.
-#[derive(Clone, Copy)]
-enum Kind {
-    Box,
-    Cylinder,
-    Sphere,
-    Capsule,
-}
-
-/// In the order in which they are counted.
-const KINDS: [Kind; 4] = [Kind::Box, Kind::Cylinder, Kind::Sphere, Kind::Capsule];
-
-impl Kind {
-    /// `None` of hulls, which are drawn by their corners.
-    fn from(shape: &Shape) -> Option<Self> {
-        match shape {
-            Shape::Box(_) => Some(Self::Box),
-            Shape::Cylinder(..) => Some(Self::Cylinder),
-            Shape::Sphere(_) => Some(Self::Sphere),
-            Shape::Capsule(..) => Some(Self::Capsule),
-            Shape::Hull(_) => None,
+impl Solids {
+    fn of(scene: &Scene, bodies: &[Body], is_kind: fn(&Shape) -> bool) -> Self {
+        let mut solids = Self::default();
+        for body in bodies.iter().filter(|body| is_kind(&body.shape)) {
+            let (size, shift_m) = match &body.shape {
+                Shape::Cylinder(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), 0.0),
+                // rerun's capsule starts at its origin, ours is centred on it.
+                Shape::Capsule(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), -half),
+                shape => (shape.half_extents_m(), 0.0),
+            };
+            let place = body.world_from_body * Point3::new(0.0, 0.0, shift_m);
+            solids.places.push(scene.local(&place));
+            solids.turns.push(turn(&body.world_from_body));
+            solids.sizes.push(size.map(|x| x as f32).into());
+            let shines = body.luminance_cd_m2 > 0.0;
+            let colours = [palette::BODY, palette::LAMP];
+            solids.colours.push(colours[usize::from(shines)]);
         }
+        solids
+    }
+
+    fn radii_and_lengths(&self) -> [Vec<f32>; 2] {
+        [0, 1].map(|k| self.sizes.iter().map(|size| size[k]).collect())
     }
 }
 
@@ -324,6 +320,16 @@ struct Hulls {
 }
 
 impl Hulls {
+    fn of(scene: &Scene, bodies: &[Body]) -> Self {
+        let mut hulls = Self::default();
+        for body in bodies {
+            if let Shape::Hull(hull) = &body.shape {
+                hulls.push(scene, body, hull);
+            }
+        }
+        hulls
+    }
+
     fn push(&mut self, scene: &Scene, body: &Body, hull: &Hull) {
         for face in hull.faces() {
             let first = self.corners.len() as u32;
@@ -339,68 +345,10 @@ impl Hulls {
         }
     }
 
-    fn log(self, stream: &Stream) -> Result<(), ObserverError> {
-        let mesh = Mesh3D::new(self.corners)
+    fn mesh(self) -> Mesh3D {
+        Mesh3D::new(self.corners)
             .with_vertex_normals(self.normals)
             .with_triangle_indices(self.triangles)
-            .with_albedo_factor(palette::BODY.0);
-        stream.log("world/bodies/hulls", &mesh)
-    }
-}
-
-impl Solids {
-    fn push(&mut self, scene: &Scene, body: &Body) {
-        let (size, shift_m) = match &body.shape {
-            Shape::Cylinder(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), 0.0),
-            // rerun's capsule starts at its origin, ours is centred on it.
-            Shape::Capsule(radius, half) => (Vector3::new(*radius, 2.0 * half, 0.0), -half),
-            shape => (shape.half_extents_m(), 0.0),
-        };
-        let place = body.world_from_body * Point3::new(0.0, 0.0, shift_m);
-        self.places.push(scene.local(&place));
-        self.turns.push(turn(&body.world_from_body));
-        self.sizes
-            .push([size.x as f32, size.y as f32, size.z as f32]);
-        self.colours.push(if body.luminance_cd_m2 > 0.0 {
-            palette::LAMP
-        } else {
-            palette::BODY
-        });
-    }
-
-    fn log(self, stream: &Stream, kind: Kind) -> Result<(), ObserverError> {
-        let (radii, lengths): (Vec<f32>, Vec<f32>) =
-            self.sizes.iter().map(|size| (size[0], size[1])).unzip();
-        match kind {
-            Kind::Box => stream.log(
-                "world/bodies/boxes",
-                &Boxes3D::from_centers_and_half_sizes(self.places, self.sizes)
-                    .with_quaternions(self.turns)
-                    .with_colors(self.colours)
-                    .with_fill_mode(FillMode::Solid),
-            ),
-            Kind::Cylinder => stream.log(
-                "world/bodies/cylinders",
-                &Cylinders3D::from_lengths_and_radii(lengths, radii)
-                    .with_centers(self.places)
-                    .with_quaternions(self.turns)
-                    .with_colors(self.colours)
-                    .with_fill_mode(FillMode::Solid),
-            ),
-            Kind::Sphere => stream.log(
-                "world/bodies/spheres",
-                &Ellipsoids3D::from_centers_and_half_sizes(self.places, self.sizes)
-                    .with_colors(self.colours)
-                    .with_fill_mode(FillMode::Solid),
-            ),
-            Kind::Capsule => stream.log(
-                "world/bodies/capsules",
-                &Capsules3D::from_lengths_and_radii(lengths, radii)
-                    .with_translations(self.places)
-                    .with_quaternions(self.turns)
-                    .with_colors(self.colours)
-                    .with_fill_mode(FillMode::Solid),
-            ),
-        }
+            .with_albedo_factor(palette::BODY.0)
     }
 }

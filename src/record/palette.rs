@@ -1,8 +1,8 @@
-//! Colours, the same for the same thing in every pane.
+//! Colours and widths, the same for the same thing in every pane.
 
 use crate::bus::{DangerLevel, Identity, Lamp, Method};
 use crate::track::Material;
-use rerun::Color;
+use rerun::{Color, Radius};
 
 /// As it really is.
 pub(super) const TRUTH: Color = rgb(240, 240, 240);
@@ -23,15 +23,16 @@ pub(super) const UNNAMED: Color = rgb(255, 150, 60);
 /// A region of a wayside image that is not (yet) an obstacle.
 pub(super) const BLOB: Color = rgb(130, 160, 190);
 
-const fn rgb(r: u8, g: u8, b: u8) -> Color {
+/// An opaque colour.
+pub(super) const fn rgb(r: u8, g: u8, b: u8) -> Color {
     Color(rerun::datatypes::Rgba32(u32::from_be_bytes([r, g, b, 255])))
 }
 
-/// Of an estimator.
-pub(super) fn method(method: Method) -> Color {
+/// Name and colour of an estimator.
+pub(super) fn method(method: Method) -> (&'static str, Color) {
     match method {
-        Method::Paper => rgb(255, 110, 180),
-        Method::Mono => rgb(255, 190, 70),
+        Method::Paper => ("paper", rgb(255, 110, 180)),
+        Method::Mono => ("mono", rgb(255, 190, 70)),
     }
 }
 
@@ -77,4 +78,9 @@ pub(super) fn material(material: Material, ring: usize) -> Color {
     } else {
         Color::from_rgb(r - r / 4, g - g / 4, b - b / 4)
     }
+}
+
+/// A width on the screen, whatever the distance.
+pub(super) fn ui(points: f32) -> Radius {
+    Radius::new_ui_points(points)
 }

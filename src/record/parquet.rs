@@ -1,21 +1,20 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
-//! description.
+//! description. Rows are anything that serialises to an object with the columns' names.
 
-use super::stream::{failed, part_name};
-use crate::session::ObserverError;
-use arrow::array::{
-    ArrayRef, BooleanBuilder, Float64Builder, Int64Builder, ListBuilder, RecordBatch, StringBuilder,
-};
+use super::whole_files::{Result, broken, finish, part_name};
 use arrow::datatypes::{DataType, Field, Schema};
+use arrow::json::ReaderBuilder;
+use arrow::json::reader::Decoder;
 use parquet::arrow::ArrowWriter;
 use parquet::basic::Compression;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::WriterProperties;
+use serde::Serialize;
 use serde_json::json;
 use std::borrow::Cow;
-use std::error::Error;
-use std::fs::{self, File};
-use std::path::{Path, PathBuf};
+use std::fs::File;
+use std::path::PathBuf;
+use std::slice;
 use std::sync::Arc;
 
 /// Rows that are kept in memory before they are written.
@@ -83,6 +82,67 @@ pub const fn column(
     }
 }
 
+/// The kind of column that a field of a row makes.
+pub(super) trait Cell {
+    const KIND: Kind;
+}
+
+macro_rules! cells {
+    ($($type:ty => $kind:ident),* $(,)?) => {
+        $(impl Cell for $type {
+            const KIND: Kind = Kind::$kind;
+        })*
+    };
+}
+
+cells! {
+    i64 => Int,
+    u32 => Int,
+    usize => Int,
+    f64 => Real,
+    bool => Flag,
+    String => Text,
+    &str => Text,
+    Vec<f64> => Reals,
+}
+
+impl<const N: usize> Cell for [f64; N] {
+    const KIND: Kind = Kind::Reals;
+}
+
+impl<T: Cell> Cell for Option<T> {
+    const KIND: Kind = T::KIND;
+}
+
+/// Declares the rows of a table. Each field is a column: its type is what the column holds, its
+/// documentation what it means, and behind it stands its unit.
+macro_rules! table_rows {
+    (
+        $(#[doc = $about:literal])*
+        struct $name:ident {
+            $($(#[doc = $meaning:literal])+ $field:ident: $type:ty, $unit:literal;)+
+        }
+    ) => {
+        $(#[doc = $about])*
+        #[derive(Clone, Debug, serde::Serialize)]
+        pub(super) struct $name {
+            $($(#[doc = $meaning])+ pub $field: $type,)+
+        }
+
+        impl $name {
+            pub(super) const COLUMNS: &[$crate::record::parquet::Column] = &[
+                $($crate::record::parquet::column(
+                    stringify!($field),
+                    <$type as $crate::record::parquet::Cell>::KIND,
+                    $unit,
+                    concat!($($meaning),+).trim_ascii(),
+                ),)+
+            ];
+        }
+    };
+}
+pub(super) use table_rows;
+
 /// Columns as a table in Markdown.
 pub fn describe(columns: &[Column]) -> String {
     let mut text = String::from("| column | type | unit | meaning |\n|---|---|---|---|\n");
@@ -93,108 +153,16 @@ pub fn describe(columns: &[Column]) -> String {
     text
 }
 
-/// What stands in one cell.
-#[derive(Clone, Debug, PartialEq)]
-#[allow(missing_docs, reason = "the names say it")]
-pub enum Value {
-    Int(i64),
-    Real(f64),
-    Text(String),
-    Flag(bool),
-    Reals(Vec<f64>),
-    Null,
-}
-
-macro_rules! value_from {
-    ($($from:ty => $make:expr),* $(,)?) => {
-        $(impl From<$from> for Value {
-            fn from(x: $from) -> Self {
-                $make(x)
-            }
-        })*
-    };
-}
-
-value_from! {
-    i64 => Value::Int,
-    u32 => |x| Value::Int(i64::from(x)),
-    f64 => Value::Real,
-    bool => Value::Flag,
-    String => Value::Text,
-    &str => |x: &str| Value::Text(x.to_owned()),
-    Vec<f64> => Value::Reals,
-}
-
-impl<T: Into<Value>> From<Option<T>> for Value {
-    fn from(x: Option<T>) -> Self {
-        x.map_or(Self::Null, Into::into)
-    }
-}
-
-enum Cells {
-    Int(Int64Builder),
-    Real(Float64Builder),
-    Text(StringBuilder),
-    Flag(BooleanBuilder),
-    Reals(ListBuilder<Float64Builder>),
-}
-
-impl Cells {
-    fn new(kind: Kind) -> Self {
-        match kind {
-            Kind::Int => Self::Int(Int64Builder::new()),
-            Kind::Real => Self::Real(Float64Builder::new()),
-            Kind::Text => Self::Text(StringBuilder::new()),
-            Kind::Flag => Self::Flag(BooleanBuilder::new()),
-            Kind::Reals => Self::Reals(ListBuilder::new(Float64Builder::new())),
-        }
-    }
-
-    /// Whether the value is of the column's kind.
-    fn push(&mut self, value: Value) -> bool {
-        match (self, value) {
-            (Self::Int(cells), Value::Int(x)) => cells.append_value(x),
-            (Self::Int(cells), Value::Null) => cells.append_null(),
-            (Self::Real(cells), Value::Real(x)) => cells.append_value(x),
-            (Self::Real(cells), Value::Null) => cells.append_null(),
-            (Self::Text(cells), Value::Text(x)) => cells.append_value(x),
-            (Self::Text(cells), Value::Null) => cells.append_null(),
-            (Self::Flag(cells), Value::Flag(x)) => cells.append_value(x),
-            (Self::Flag(cells), Value::Null) => cells.append_null(),
-            (Self::Reals(cells), Value::Reals(list)) => {
-                cells.values().append_slice(&list);
-                cells.append(true);
-            }
-            (Self::Reals(cells), Value::Null) => cells.append(false),
-            _ => return false,
-        }
-        true
-    }
-
-    fn finish(&mut self) -> ArrayRef {
-        match self {
-            Self::Int(cells) => Arc::new(cells.finish()),
-            Self::Real(cells) => Arc::new(cells.finish()),
-            Self::Text(cells) => Arc::new(cells.finish()),
-            Self::Flag(cells) => Arc::new(cells.finish()),
-            Self::Reals(cells) => Arc::new(cells.finish()),
-        }
-    }
-}
-
 /// A table on its way into a file.
 pub struct Table {
     path: PathBuf,
-    columns: Vec<Column>,
-    schema: Arc<Schema>,
+    rows: Decoder,
     writer: ArrowWriter<File>,
-    cells: Vec<Cells>,
-    rows: usize,
 }
 
 impl Table {
     /// Begins a file; it gets its name in [`Self::close`].
-    pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self, ObserverError> {
+    pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self> {
         let fields = columns.iter().map(|c| {
             let about = [("unit", &c.unit), ("meaning", &c.meaning)];
             let about = about.map(|(key, text)| (key.to_owned(), text.clone().into_owned()));
@@ -206,50 +174,38 @@ impl Table {
             .set_key_value_metadata(Some(vec![about(columns)]))
             .set_created_by(format!("metrotwin {}", env!("CARGO_PKG_VERSION")))
             .build();
+        let rows = ReaderBuilder::new(schema.clone()).with_strict_mode(true);
         let file = File::create(part_name(&path)).map_err(broken(&path))?;
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(settings));
+        let writer = ArrowWriter::try_new(file, schema, Some(settings));
         Ok(Self {
+            rows: rows.build_decoder().map_err(broken(&path))?,
             writer: writer.map_err(broken(&path))?,
-            columns: columns.to_vec(),
             path,
-            schema,
-            cells: columns.iter().map(|c| Cells::new(c.kind)).collect(),
-            rows: 0,
         })
     }
 
-    /// One more row, a value for each column.
-    pub fn push(&mut self, row: Vec<Value>) -> Result<(), ObserverError> {
-        let path = &self.path;
-        if row.len() != self.columns.len() {
-            let text = format!("{} values for {} columns", row.len(), self.columns.len());
-            return Err(broken(path)(text));
-        }
-        for ((cells, column), value) in self.cells.iter_mut().zip(&self.columns).zip(row) {
-            if !cells.push(value) {
-                return Err(broken(path)(format!("a wrong value for `{}`", column.name)));
-            }
-        }
-        self.rows += 1;
-        if self.rows >= BATCH_ROWS {
+    /// One more row: an object with a value for each column; what it lacks is null.
+    pub fn push(&mut self, row: &impl Serialize) -> Result {
+        let added = self.rows.serialize(slice::from_ref(row));
+        added.map_err(broken(&self.path))?;
+        if self.rows.len() >= BATCH_ROWS {
             self.flush()?;
         }
         Ok(())
     }
 
-    fn flush(&mut self) -> Result<(), ObserverError> {
-        self.rows = 0;
-        let arrays = self.cells.iter_mut().map(Cells::finish).collect();
-        let batch = RecordBatch::try_new(self.schema.clone(), arrays);
-        let batch = batch.map_err(broken(&self.path))?;
-        self.writer.write(&batch).map_err(broken(&self.path))
+    fn flush(&mut self) -> Result {
+        match self.rows.flush().map_err(broken(&self.path))? {
+            Some(batch) => self.writer.write(&batch).map_err(broken(&self.path)),
+            None => Ok(()),
+        }
     }
 
     /// Writes the rest and gives the file its name.
-    pub fn close(mut self) -> Result<(), ObserverError> {
+    pub fn close(mut self) -> Result {
         self.flush()?;
         self.writer.close().map_err(broken(&self.path))?;
-        fs::rename(part_name(&self.path), &self.path).map_err(broken(&self.path))
+        finish(&self.path)
     }
 }
 
@@ -258,10 +214,4 @@ fn about(columns: &[Column]) -> KeyValue {
     let column = |c: &Column| json!({"name": c.name, "unit": c.unit, "meaning": c.meaning});
     let list: Vec<_> = columns.iter().map(column).collect();
     KeyValue::new("columns".to_owned(), json!(list).to_string())
-}
-
-fn broken<E: Into<Box<dyn Error + Send + Sync>>>(
-    path: &Path,
-) -> impl FnOnce(E) -> ObserverError + use<E> {
-    failed(format!("writing {}", path.display()))
 }

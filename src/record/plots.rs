@@ -1,13 +1,14 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
-use super::stream::{Stream, failed};
+use super::stream::Stream;
+use super::whole_files::{Result, failed};
 use super::{Contents, palette, slug};
 use crate::bus::{
     DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,
     WaysideReport,
 };
-use crate::session::ObserverError;
 use crate::twin::physics::TrainState;
+use palette::rgb;
 use rerun::external::re_sdk_types::blueprint::components::Corner2D;
 use rerun::{Color, Scalars, SeriesLines};
 use std::collections::BTreeMap;
@@ -17,161 +18,129 @@ const MM: f64 = 1000.0;
 const US: f64 = 1e6;
 const KN: f64 = 1000.0;
 
+const WHITE: Color = rgb(240, 240, 240);
+const RED: Color = rgb(255, 70, 70);
+const ORANGE: Color = rgb(255, 170, 60);
+const YELLOW: Color = rgb(235, 225, 100);
+const GREEN: Color = rgb(90, 230, 120);
+const OLIVE: Color = rgb(170, 220, 130);
+const CYAN: Color = rgb(90, 200, 255);
+const BLUE: Color = rgb(120, 180, 255);
+const VIOLET: Color = rgb(220, 130, 255);
+
 /// Series that share a pane.
-pub(super) struct Group {
+#[derive(Clone, Copy)]
+pub(super) struct PlotGroup {
     /// What the pane shows, with its unit.
     pub(super) title: &'static str,
     /// Over its series.
     pub(super) origin: &'static str,
     /// Where the legend covers least.
     pub(super) legend: Corner2D,
-    lines: &'static [Line],
+    /// The series that are the same in every run.
+    curves: &'static [Curve],
 }
 
-struct Line {
-    path: &'static str,
-    name: &'static str,
-    rgb: (u8, u8, u8),
-    width: f32,
-}
-
-const fn line(path: &'static str, name: &'static str, rgb: (u8, u8, u8), width: f32) -> Line {
-    Line {
-        path,
-        name,
-        rgb,
-        width,
+impl PlotGroup {
+    fn path_of(&self, curve: &Curve) -> String {
+        format!("{}/{}", self.origin, curve.path)
     }
 }
 
-const EMERGENCY: Line = line("plots/speed/emergency", "emergency", (255, 70, 70), 1.5);
-const SERVICE: Line = line("plots/speed/service", "service", (255, 170, 60), 1.5);
-const PERMITTED: Line = line("plots/speed/permitted", "permitted", (235, 225, 100), 1.5);
-const ODOMETER: Line = line("plots/speed/odometer", "odometer", (120, 180, 255), 1.0);
-/// Of the trains that have one.
-const RADAR: Line = line("plots/speed/radar", "radar", (220, 130, 255), 1.0);
-const ESTIMATED: Line = line("plots/speed/estimated", "estimated", (90, 230, 120), 2.0);
-const TRUE: Line = line("plots/speed/true", "true", (240, 240, 240), 2.0);
+struct Curve {
+    /// Below the group's origin.
+    path: &'static str,
+    name: &'static str,
+    colour: Color,
+    width: f32,
+    value: ValueOf,
+}
 
-const SPEED: Group = Group {
-    title: "Speed, km/h",
-    origin: "plots/speed",
-    legend: Corner2D::LeftBottom,
-    lines: &[
-        EMERGENCY, SERVICE, PERMITTED, ODOMETER, RADAR, ESTIMATED, TRUE,
-    ],
-};
+/// What a curve's values are taken from.
+#[derive(Clone, Copy)]
+enum ValueOf {
+    Train(fn(&TrainState) -> Option<f64>),
+    Odometer(fn(&OdometerSample) -> Option<f64>),
+    Radar(fn(&DopplerSample) -> Option<f64>),
+    Protection(fn(&ProtectionReport) -> Option<f64>),
+}
 
-const FLOOR_VERTICAL: Line = line("plots/vibration/vertical", "vertical", (120, 180, 255), 1.0);
-const FLOOR_LATERAL: Line = line("plots/vibration/lateral", "lateral", (255, 170, 60), 1.0);
+/// Groups of curves, each with its path, name, colour, width and values.
+macro_rules! groups {
+    ($($group:ident: $title:literal, $origin:literal, $legend:ident {
+        $($path:literal, $name:literal, $colour:ident, $width:literal, $of:ident $value:expr;)*
+    })*) => {
+        $(const $group: PlotGroup = PlotGroup {
+            title: $title,
+            origin: $origin,
+            legend: Corner2D::$legend,
+            curves: &[$(Curve {
+                path: $path,
+                name: $name,
+                colour: $colour,
+                width: $width,
+                value: ValueOf::$of($value),
+            }),*],
+        };)*
 
-const VIBRATION: Group = Group {
-    title: "Floor acceleration, m/s²",
-    origin: "plots/vibration",
-    legend: Corner2D::RightTop,
-    lines: &[FLOOR_VERTICAL, FLOOR_LATERAL],
-};
+        const GROUPS: &[PlotGroup] = &[$($group),*];
+    };
+}
 
-const PRIMARY: Line = line(
-    "plots/suspension/primary",
-    "primary, first axle",
-    (90, 200, 255),
-    1.0,
-);
-const SECONDARY: Line = line(
-    "plots/suspension/secondary",
-    "secondary over it",
-    (170, 220, 130),
-    1.5,
-);
-
-const SUSPENSION: Group = Group {
-    title: "Suspension travel, mm",
-    origin: "plots/suspension",
-    legend: Corner2D::RightTop,
-    lines: &[PRIMARY, SECONDARY],
-};
-
-const LEFT: Line = line("plots/wheels/left", "normal, left", (120, 180, 255), 1.0);
-const RIGHT: Line = line("plots/wheels/right", "normal, right", (255, 170, 60), 1.0);
-const LATERAL: Line = line("plots/wheels/lateral", "lateral", (170, 220, 130), 1.0);
-const ALONG: Line = line("plots/wheels/along", "along", (240, 240, 240), 1.0);
-
-const WHEELS: Group = Group {
-    title: "Wheel forces, first axle, kN",
-    origin: "plots/wheels",
-    legend: Corner2D::RightTop,
-    lines: &[LEFT, RIGHT, LATERAL, ALONG],
-};
-
-const MOST_SLIP: Line = line("plots/slip/most", "most of all axles", (255, 170, 60), 1.0);
-const FIRST_SLIP: Line = line("plots/slip/first", "first axle", (120, 180, 255), 1.0);
-
-const SLIP: Group = Group {
-    title: "Slip of the wheels, m/s",
-    origin: "plots/slip",
-    legend: Corner2D::LeftTop,
-    lines: &[MOST_SLIP, FIRST_SLIP],
-};
-
-const FIRST_COUPLER: Line = line("plots/couplers/first", "first", (120, 180, 255), 1.0);
-const LAST_COUPLER: Line = line("plots/couplers/last", "last", (255, 170, 60), 1.0);
-
-const COUPLERS: Group = Group {
-    title: "Pull of the couplers, kN",
-    origin: "plots/couplers",
-    legend: Corner2D::RightTop,
-    lines: &[FIRST_COUPLER, LAST_COUPLER],
-};
-
-const DISPLAY: Line = line(
-    "plots/distance/display",
-    "driver's display",
-    (240, 240, 240),
-    2.0,
-);
-
-const DISTANCE: Group = Group {
-    title: "Distance to obstacle, m",
-    origin: "plots/distance",
-    legend: Corner2D::LeftBottom,
-    lines: &[DISPLAY],
-};
+groups! {
+    SPEED: "Speed, km/h", "plots/speed", LeftBottom {
+        "emergency", "emergency", RED, 1.5, Protection |r| Some(r.emergency_mps * KMH);
+        "service", "service", ORANGE, 1.5, Protection |r| Some(r.service_mps * KMH);
+        "permitted", "permitted", YELLOW, 1.5, Protection |r| Some(r.permitted_mps * KMH);
+        "odometer", "odometer", BLUE, 1.0, Odometer |s| Some(s.speed_mps * KMH);
+        "radar", "radar", VIOLET, 1.0, Radar |s| Some(s.speed_mps? * KMH);
+        "estimated", "estimated", GREEN, 2.0, Protection |r| Some(r.speed_mps * KMH);
+        "true", "true", WHITE, 2.0, Train |t| Some(t.speed_mps * KMH);
+    }
+    VIBRATION: "Floor acceleration, m/s²", "plots/vibration", RightTop {
+        "vertical", "vertical", BLUE, 1.0, Train |t| Some(t.floor_accel_mps2.z);
+        "lateral", "lateral", ORANGE, 1.0, Train |t| Some(t.floor_accel_mps2.y);
+    }
+    SUSPENSION: "Suspension travel, mm", "plots/suspension", RightTop {
+        "primary", "primary, first axle", CYAN, 1.0, Train |t| Some(t.primary_travel_m * MM);
+        "secondary", "secondary over it", OLIVE, 1.5, Train |t| Some(t.secondary_travel_m * MM);
+    }
+    WHEELS: "Wheel forces, first axle, kN", "plots/wheels", RightTop {
+        "left", "normal, left", BLUE, 1.0, Train |t| Some(t.wheels.first()?.normal_n[0] / KN);
+        "right", "normal, right", ORANGE, 1.0, Train |t| Some(t.wheels.first()?.normal_n[1] / KN);
+        "lateral", "lateral", OLIVE, 1.0, Train |t| Some(t.wheels.first()?.lateral_n / KN);
+        "along", "along", WHITE, 1.0, Train |t| Some(t.wheels.first()?.along_n / KN);
+    }
+    SLIP: "Slip of the wheels, m/s", "plots/slip", LeftTop {
+        "most", "most of all axles", ORANGE, 1.0, Train most_slip_mps;
+        "first", "first axle", BLUE, 1.0, Train |t| Some(t.wheels.first()?.slip_mps);
+    }
+    COUPLERS: "Pull of the couplers, kN", "plots/couplers", RightTop {
+        "first", "first", BLUE, 1.0, Train |t| Some(t.couplers_n.first()? / KN);
+        "last", "last", ORANGE, 1.0, Train |t| Some(t.couplers_n.last()? / KN);
+    }
+    DISTANCE: "Distance to obstacle, m", "plots/distance", LeftBottom {
+        "display", "driver's display", WHITE, 2.0, Protection |r| r.display.distance_to_obstacle_m;
+    }
+    ERROR: "Position error and ±2σ, m", "plots/position_error", RightTop {}
+    EXPOSURE: "Exposure, µs", "plots/exposure", RightTop {}
+    GAIN: "Gain, dB", "plots/gain", RightTop {}
+}
 
 /// Of wayside devices or cameras, in turn.
-const DEVICE_RGB: [(u8, u8, u8); 4] = [
-    (90, 200, 255),
-    (255, 170, 60),
-    (170, 220, 130),
-    (220, 130, 255),
-];
-
-const ERROR: Group = Group {
-    title: "Position error and ±2σ, m",
-    origin: "plots/position_error",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
-
-const EXPOSURE: Group = Group {
-    title: "Exposure, µs",
-    origin: "plots/exposure",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
-
-const GAIN: Group = Group {
-    title: "Gain, dB",
-    origin: "plots/gain",
-    legend: Corner2D::RightTop,
-    lines: &[],
-};
+const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
 
 /// What the rig is called among cameras; both eyes are exposed alike.
 pub(super) const RIG_CAMERA: &str = "rig";
 
+fn most_slip_mps(train: &TrainState) -> Option<f64> {
+    let slips = train.wheels.iter().map(|w| w.slip_mps);
+    let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
+    train.wheels.first().map(|_| most)
+}
+
 /// The plots of a run by panes; plots of one pane are its tabs.
-pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
+pub(super) fn panes(contents: &Contents) -> Vec<Vec<PlotGroup>> {
     let mut panes = Vec::new();
     if contents.train {
         panes.push(vec![SPEED]);
@@ -186,8 +155,7 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
         last.extend([EXPOSURE, GAIN]);
     }
     if contents.train {
-        let cameras = contents.rig || !contents.devices.is_empty();
-        match cameras {
+        match contents.cameras().count() > 0 {
             true => panes.push(vec![VIBRATION, SUSPENSION, WHEELS, SLIP, COUPLERS]),
             // There is room.
             false => panes.extend([
@@ -201,166 +169,143 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<Group>> {
 }
 
 /// Values of one series that wait to be sent.
+#[derive(Default)]
 struct Series {
     times_ns: Vec<i64>,
     values: Vec<f64>,
-    /// The last value said "nothing".
+    /// The last value was none.
     gap: bool,
 }
 
 /// The series of a recording.
 pub(super) struct Plots {
+    stream: Stream,
+    curves: Vec<(String, ValueOf)>,
     series: BTreeMap<String, Series>,
-    /// Distances by the wayside devices: along the line, and by the paper's formula.
-    devices: Vec<[String; 2]>,
+    /// Names of the wayside devices.
+    devices: Vec<String>,
 }
 
 impl Plots {
     /// Names and colours the series.
-    pub(super) fn open(stream: &Stream, contents: &Contents) -> Result<Self, ObserverError> {
-        for line in panes(contents)
-            .iter()
-            .flatten()
-            .flat_map(|group| group.lines)
-            .filter(|line| contents.radar || line.path != RADAR.path)
-        {
-            let (r, g, b) = line.rgb;
-            style(
-                stream,
-                line.path,
-                line.name,
-                Color::from_rgb(r, g, b),
-                line.width,
-            )?;
-        }
-        if contents.rig {
-            for method in Method::ALL {
-                let [error, upper, lower] = error_paths(method);
-                let name = error.rsplit('/').next().unwrap_or(error);
-                let colour = palette::method(method);
-                let [r, g, b, _] = colour.to_array();
-                let faint = Color::from_rgb(r / 2, g / 2, b / 2);
-                style(stream, error, name, colour, 1.5)?;
-                // One entry of the legend for both.
-                for bound in [upper, lower] {
-                    style(stream, bound, &format!("{name} 2σ"), faint, 1.0)?;
-                }
+    pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self> {
+        for group in panes(contents).iter().flatten() {
+            let is_there =
+                |curve: &&Curve| contents.radar || !matches!(curve.value, ValueOf::Radar(_));
+            for curve in group.curves.iter().filter(is_there) {
+                let path = group.path_of(curve);
+                style(&stream, &path, curve.name, curve.colour, curve.width)?;
             }
         }
-        let devices = contents.devices.iter();
-        let devices: Vec<_> = devices.map(|name| distance_paths(name)).collect();
-        for (k, ([line, formula], name)) in devices.iter().zip(&contents.devices).enumerate() {
-            let (r, g, b) = DEVICE_RGB[k % DEVICE_RGB.len()];
-            let faint = Color::from_rgb(r / 2, g / 2, b / 2);
-            style(stream, line, name, Color::from_rgb(r, g, b), 1.5)?;
-            style(stream, formula, &format!("{name}, formula"), faint, 1.5)?;
-        }
-        for (k, camera) in contents.cameras().enumerate() {
-            let (r, g, b) = DEVICE_RGB[k % DEVICE_RGB.len()];
-            for path in taken_paths(camera) {
-                style(stream, &path, camera, Color::from_rgb(r, g, b), 1.5)?;
+        for method in Method::ALL.into_iter().filter(|_| contents.rig) {
+            let (name, colour) = palette::method(method);
+            let [error, upper, lower] = error_paths(method);
+            style(&stream, &error, name, colour, 1.5)?;
+            // One entry of the legend for both.
+            for bound in [upper, lower] {
+                style(&stream, &bound, &format!("{name} 2σ"), faint(colour), 1.0)?;
             }
         }
+        for (name, colour) in contents.devices.iter().zip(DEVICE_COLOURS.iter().cycle()) {
+            let [line, formula] = distance_paths(name);
+            style(&stream, &line, name, *colour, 1.5)?;
+            let formula_name = format!("{name}, formula");
+            style(&stream, &formula, &formula_name, faint(*colour), 1.5)?;
+        }
+        for (camera, colour) in contents.cameras().zip(DEVICE_COLOURS.iter().cycle()) {
+            for path in exposure_paths(camera) {
+                style(&stream, &path, camera, *colour, 1.5)?;
+            }
+        }
+        let curves = GROUPS.iter().flat_map(|group| {
+            let curves = group.curves.iter();
+            curves.map(|curve| (group.path_of(curve), curve.value))
+        });
         Ok(Self {
+            stream,
+            curves: curves.collect(),
             series: BTreeMap::new(),
-            devices,
+            devices: contents.devices.clone(),
         })
     }
 
-    /// True speed and shaking.
-    pub(super) fn train(&mut self, truth: &TrainState) {
-        let t = truth.time;
-        self.push(&TRUE, t, truth.speed_mps * KMH);
-        self.push(&FLOOR_VERTICAL, t, truth.floor_accel_mps2.z);
-        self.push(&FLOOR_LATERAL, t, truth.floor_accel_mps2.y);
-        self.push(&PRIMARY, t, truth.primary_travel_m * MM);
-        self.push(&SECONDARY, t, truth.secondary_travel_m * MM);
-        self.wheels(truth);
-        for (line, pull) in [
-            (&FIRST_COUPLER, truth.couplers_n.first()),
-            (&LAST_COUPLER, truth.couplers_n.last()),
-        ] {
-            if let Some(pull_n) = pull {
-                self.push(line, t, pull_n / KN);
+    /// Takes the values of all curves that `of` knows.
+    fn push_curves(&mut self, time: SimTime, of: impl Fn(ValueOf) -> Option<Option<f64>>) {
+        for (path, value) in &self.curves {
+            if let Some(value) = of(*value) {
+                push_or_gap(&mut self.series, path, time, value);
             }
         }
     }
 
-    /// What the rails do to the first axle, and how the wheels slip.
-    fn wheels(&mut self, truth: &TrainState) {
-        let Some(first) = truth.wheels.first() else {
-            return;
-        };
-        let t = truth.time;
-        let slips = truth.wheels.iter().map(|w| w.slip_mps);
-        let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        let [left_n, right_n] = first.normal_n;
-        self.push(&LEFT, t, left_n / KN);
-        self.push(&RIGHT, t, right_n / KN);
-        self.push(&LATERAL, t, first.lateral_n / KN);
-        self.push(&ALONG, t, first.along_n / KN);
-        self.push(&FIRST_SLIP, t, first.slip_mps);
-        self.push(&MOST_SLIP, t, most);
+    /// The train as it really is.
+    pub(super) fn train(&mut self, truth: &TrainState) {
+        self.push_curves(truth.time, |value| match value {
+            ValueOf::Train(of) => Some(of(truth)),
+            _ => None,
+        });
     }
 
     /// Speed of the wheels.
     pub(super) fn odometer(&mut self, sample: &OdometerSample) {
-        let speed_kmh = sample.speed_mps * KMH;
-        self.push(&ODOMETER, sample.time, speed_kmh);
+        self.push_curves(sample.time, |value| match value {
+            ValueOf::Odometer(of) => Some(of(sample)),
+            _ => None,
+        });
     }
 
     /// Speed over ground, where it is measured.
     pub(super) fn doppler(&mut self, sample: &DopplerSample) {
-        let speed_kmh = sample.speed_mps.map(|v| v * KMH);
-        push_or_gap(&mut self.series, RADAR.path, sample.time, speed_kmh);
+        self.push_curves(sample.time, |value| match value {
+            ValueOf::Radar(of) => Some(of(sample)),
+            _ => None,
+        });
     }
 
     /// What the protection holds the speed against.
     pub(super) fn protection(&mut self, report: &ProtectionReport) {
-        let t = report.time;
-        self.push(&ESTIMATED, t, report.speed_mps * KMH);
-        self.push(&PERMITTED, t, report.permitted_mps * KMH);
-        self.push(&SERVICE, t, report.service_mps * KMH);
-        self.push(&EMERGENCY, t, report.emergency_mps * KMH);
-        push_or_gap(
-            &mut self.series,
-            DISPLAY.path,
-            t,
-            report.display.distance_to_obstacle_m,
-        );
+        self.push_curves(report.time, |value| match value {
+            ValueOf::Protection(of) => Some(of(report)),
+            _ => None,
+        });
     }
 
     /// How far each fix is from the truth at its time.
     pub(super) fn fixes(&mut self, report: &LedReport, true_chainages_m: &[f64]) {
         for (fix, true_m) in report.fixes.iter().zip(true_chainages_m) {
             let bound_m = 2.0 * fix.sigma_m;
-            let values_m = [fix.chainage_m - true_m, bound_m, -bound_m];
-            for (path, value_m) in error_paths(fix.method).into_iter().zip(values_m) {
-                push_or_gap(&mut self.series, path, fix.time, Some(value_m));
-            }
+            let values_m = [fix.chainage_m - true_m, bound_m, -bound_m].map(Some);
+            self.push(error_paths(fix.method), fix.time, values_m);
         }
     }
 
     /// How far a wayside device takes the train to be from the obstacle.
     pub(super) fn wayside(&mut self, device: usize, report: &WaysideReport) {
-        let Some([line, formula]) = self.devices.get(device) else {
-            return;
-        };
-        let t = report.time;
-        push_or_gap(&mut self.series, line, t, report.train_distance_exact_m);
-        push_or_gap(&mut self.series, formula, t, report.train_distance_m);
+        if let Some(name) = self.devices.get(device) {
+            let values_m = [report.train_distance_exact_m, report.train_distance_m];
+            self.push(distance_paths(name), report.time, values_m);
+        }
     }
 
     /// What a camera says it took a frame with.
-    pub(super) fn taken(&mut self, camera: &str, frame: &Frame) {
-        let values = [frame.exposure_s * US, frame.gain_db];
-        for (path, value) in taken_paths(camera).into_iter().zip(values) {
-            push_or_gap(&mut self.series, &path, frame.start, Some(value));
+    pub(super) fn exposure(&mut self, camera: &str, frame: &Frame) {
+        let values = [frame.exposure_s * US, frame.gain_db].map(Some);
+        self.push(exposure_paths(camera), frame.start, values);
+    }
+
+    fn push<const N: usize>(
+        &mut self,
+        paths: [String; N],
+        time: SimTime,
+        values: [Option<f64>; N],
+    ) {
+        for (path, value) in paths.iter().zip(values) {
+            push_or_gap(&mut self.series, path, time, value);
         }
     }
 
     /// Sends the values kept.
-    pub(super) fn flush(&mut self, stream: &Stream) -> Result<(), ObserverError> {
+    pub(super) fn flush(&mut self) -> Result {
         for (path, series) in &mut self.series {
             if series.times_ns.is_empty() {
                 continue;
@@ -368,28 +313,22 @@ impl Plots {
             let columns = Scalars::new(series.values.drain(..))
                 .columns_of_unit_batches()
                 .map_err(failed(path.as_str()))?;
-            stream.columns(path, &series.times_ns, columns)?;
+            self.stream.columns(path, &series.times_ns, columns)?;
             series.times_ns.clear();
         }
         Ok(())
-    }
-
-    fn push(&mut self, line: &Line, time: SimTime, value: f64) {
-        push_or_gap(&mut self.series, line.path, time, Some(value));
     }
 }
 
 /// A NaN breaks the line where there is nothing to plot; one is enough, and none at its start.
 fn push_or_gap(all: &mut BTreeMap<String, Series>, path: &str, time: SimTime, value: Option<f64>) {
-    let Some(series) = all.get_mut(path) else {
-        if let Some(value) = value {
-            let series = Series {
-                times_ns: vec![time.nanos()],
-                values: vec![value],
-                gap: false,
-            };
-            all.insert(path.to_owned(), series);
+    if !all.contains_key(path) {
+        if value.is_none() {
+            return;
         }
+        all.insert(path.to_owned(), Series::default());
+    }
+    let Some(series) = all.get_mut(path) else {
         return;
     };
     if value.is_some() || !series.gap {
@@ -399,43 +338,33 @@ fn push_or_gap(all: &mut BTreeMap<String, Series>, path: &str, time: SimTime, va
     series.gap = value.is_none();
 }
 
+/// Of the error and its bounds.
+fn error_paths(method: Method) -> [String; 3] {
+    let (name, _) = palette::method(method);
+    ["", "/upper", "/lower"].map(|end| format!("plots/position_error/{name}{end}"))
+}
+
+/// Of the distance along the line, and by the paper's formula.
 fn distance_paths(device: &str) -> [String; 2] {
     ["line", "formula"].map(|what| format!("plots/distance/{}/{what}", slug(device)))
 }
 
-/// Exposure and gain of a camera.
-fn taken_paths(camera: &str) -> [String; 2] {
+/// Of exposure and gain.
+fn exposure_paths(camera: &str) -> [String; 2] {
     ["exposure", "gain"].map(|what| format!("plots/{what}/{}", slug(camera)))
 }
 
-fn style(
-    stream: &Stream,
-    path: &str,
-    name: &str,
-    colour: Color,
-    width: f32,
-) -> Result<(), ObserverError> {
+fn faint(colour: Color) -> Color {
+    let [r, g, b, _] = colour.to_array();
+    Color::from_rgb(r / 2, g / 2, b / 2)
+}
+
+fn style(stream: &Stream, path: &str, name: &str, colour: Color, width: f32) -> Result {
     let style = SeriesLines::new()
         .with_names([name])
         .with_colors([colour])
         .with_widths([width]);
     stream.log_static(path, &style)
-}
-
-/// Paths of the error and its bounds.
-fn error_paths(method: Method) -> [&'static str; 3] {
-    match method {
-        Method::Paper => [
-            "plots/position_error/paper",
-            "plots/position_error/paper/upper",
-            "plots/position_error/paper/lower",
-        ],
-        Method::Mono => [
-            "plots/position_error/mono",
-            "plots/position_error/mono/upper",
-            "plots/position_error/mono/lower",
-        ],
-    }
 }
 
 #[cfg(test)]
@@ -447,8 +376,8 @@ mod tests {
     #[test]
     fn a_gap_is_one_nan() {
         let mut all = BTreeMap::new();
-        let said = [None, Some(1.0), None, None, Some(2.0), Some(3.0), None];
-        for (k, value) in said.into_iter().enumerate() {
+        let values = [None, Some(1.0), None, None, Some(2.0), Some(3.0), None];
+        for (k, value) in values.into_iter().enumerate() {
             push_or_gap(&mut all, "x", SimTime::from_secs(k as f64), value);
         }
         let series = &all["x"];

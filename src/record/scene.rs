@@ -1,16 +1,17 @@
 //! What stands still in the 3-D view: tunnel, rails, lamps, balises, wayside cameras.
 
 use super::images::{WaysidePaths, pinhole};
-use super::palette;
+use super::palette::{self, ui};
 use super::stream::Stream;
+use super::whole_files::Result;
 use crate::scenario::RecordSettings;
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use crate::track::uid::Uid;
 use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rerun::components::{MeshFaceRendering, RotationQuat};
 use rerun::{
-    AsComponents, Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion, Radius,
+    AsComponents, Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
     Transform3D, ViewCoordinates,
 };
 use std::collections::BTreeMap;
@@ -70,16 +71,16 @@ impl Scene {
         Transform3D::from_translation(self.place(pose)).with_quaternion(turn(pose))
     }
 
-    /// Draws all that stands still.
-    pub(super) fn draw(
+    /// Logs all that stands still.
+    pub(super) fn log(
         &self,
         stream: &Stream,
         opening: &Opening<'_>,
         settings: &RecordSettings,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         stream.log_static("world", &ViewCoordinates::RIGHT_HAND_Z_UP())?;
-        self.draw_tunnel(stream, opening.tunnel, settings.ring_step_m)?;
-        self.draw_furniture(stream, opening.tunnel)?;
+        self.log_tunnel(stream, opening.tunnel, settings.ring_step_m)?;
+        self.log_lamps_and_balises(stream, opening.tunnel)?;
         for device in opening.wayside {
             let paths = WaysidePaths::new(&device.name);
             let pose = self.transform(&device.world_from_camera);
@@ -95,12 +96,7 @@ impl Scene {
         Ok(())
     }
 
-    fn draw_tunnel(
-        &self,
-        stream: &Stream,
-        tunnel: &Tunnel,
-        ring_step_m: f64,
-    ) -> Result<(), ObserverError> {
+    fn log_tunnel(&self, stream: &Stream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
         let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
         let mut mesh = Sweep::default();
         for range in &tunnel.sections {
@@ -121,7 +117,7 @@ impl Scene {
         stream.log_static("world/rails", &rails)
     }
 
-    fn draw_furniture(&self, stream: &Stream, tunnel: &Tunnel) -> Result<(), ObserverError> {
+    fn log_lamps_and_balises(&self, stream: &Stream, tunnel: &Tunnel) -> Result {
         let lamps = &tunnel.lamps;
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))
@@ -228,15 +224,10 @@ impl Sweep {
     }
 }
 
-/// A line's width on the screen, whatever the distance.
-pub(super) fn ui(points: f32) -> Radius {
-    Radius::new_ui_points(points)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::trial::tunnel;
+    use crate::record::tests::session::tunnel;
     use crate::track::TrackPoint;
 
     /// The viewer hides what it sees from behind. A flipped triangle would hide the far wall and
@@ -247,8 +238,9 @@ mod tests {
         let scene = Scene::new(&tunnel);
         let mut sweep = Sweep::default();
         sweep.sweep(&scene, &tunnel.sections[0], 5.0);
-        // 29 edges, 80 stretches, two triangles each.
-        assert_eq!(sweep.triangles.len(), 29 * 80 * 2);
+        // 120 stretches, two triangles each.
+        let edges = tunnel.sections[0].section.edges().count();
+        assert_eq!(sweep.triangles.len(), edges * 120 * 2);
         let corner = |k: u32| Vector3::from(sweep.corners[k as usize]);
         for t in &sweep.triangles {
             let [a, b, c] = t.map(corner);

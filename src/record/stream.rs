@@ -5,17 +5,15 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
+use super::whole_files::{Result, failed, finish, make_folder_of, part_name};
 use crate::bus::SimTime;
-use crate::session::ObserverError;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::ChunkBatcherConfig;
 use rerun::{
     ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder,
     SerializedComponentColumn, StoreId, StoreKind, TimeCell, TimeColumn,
 };
-use std::error::Error;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// Simulated time since the scenario's start.
@@ -24,7 +22,7 @@ pub(super) const SIM_TIME: &str = "sim_time";
 pub(super) const FRAME: &str = "frame";
 
 /// How long a viewer may take to answer before the recording gives up on it.
-const VIEWER_PATIENCE: Duration = Duration::from_secs(10);
+const VIEWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Where a recording goes.
 #[derive(Clone, Debug)]
@@ -38,10 +36,11 @@ pub(super) enum Target {
 /// Simulated time between batches of a file. The sdk keeps some kilobytes of index a batch in
 /// memory until the file's end: with batches of one second, long runs grow without bound.
 const FILE_BATCH_S: f64 = 10.0;
-/// Simulated time between batches to a viewer, where somebody waits for them.
+/// Simulated time between batches to a viewer, which shows them as they come.
 const VIEWER_BATCH_S: f64 = 1.0;
 
-/// An open stream.
+/// An open stream; clones of it are the same one.
+#[derive(Clone)]
 pub(super) struct Stream {
     rerun: RecordingStream,
     file: Option<PathBuf>,
@@ -50,7 +49,7 @@ pub(super) struct Stream {
 
 impl Stream {
     /// Opens the stream of one run. A file is written beside its final name until [`Self::finish`].
-    pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self, ObserverError> {
+    pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self> {
         // Viewers keep one layout an application, and each scenario has its own.
         let application = ApplicationId::new_or_unknown(format!("metrotwin-{scenario}"));
         let id = match target {
@@ -59,7 +58,7 @@ impl Stream {
                 application.clone(),
                 format!("{scenario}-seed-{seed}"),
             ),
-            // A viewer would mix two runs under one id, and nobody compares what it was sent.
+            // A viewer would mix two runs under one id.
             Target::Viewer(_) => StoreId::random(StoreKind::Recording, application.clone()),
         };
         let builder = RecordingStreamBuilder::from_store_id(&id)
@@ -68,9 +67,7 @@ impl Stream {
             .batcher_config(ChunkBatcherConfig::NEVER);
         let (rerun, file) = match target {
             Target::File(path) => {
-                if let Some(folder) = path.parent() {
-                    fs::create_dir_all(folder).map_err(failed("making the recording's folder"))?;
-                }
+                make_folder_of(path)?;
                 (builder.save(part_name(path)), Some(path.clone()))
             }
             Target::Viewer(url) => (builder.connect_grpc_opts(url.as_str()), None),
@@ -109,16 +106,12 @@ impl Stream {
     }
 
     /// One row.
-    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result<(), ObserverError> {
+    pub(super) fn log(&self, path: &str, what: &dyn AsComponents) -> Result {
         self.rerun.log(path, what).map_err(failed(path))
     }
 
     /// What holds for the whole run.
-    pub(super) fn log_static(
-        &self,
-        path: &str,
-        what: &dyn AsComponents,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn log_static(&self, path: &str, what: &dyn AsComponents) -> Result {
         self.rerun.log_static(path, what).map_err(failed(path))
     }
 
@@ -128,7 +121,7 @@ impl Stream {
         path: &str,
         times_ns: &[i64],
         columns: impl IntoIterator<Item = SerializedComponentColumn>,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let times = TimeColumn::new_duration_nanos(SIM_TIME, times_ns.iter().copied());
         self.rerun
             .send_columns(path, [times], columns)
@@ -154,10 +147,10 @@ impl Stream {
     }
 
     /// Cuts the batches here and passes them on.
-    pub(super) fn flush(&self) -> Result<(), ObserverError> {
+    pub(super) fn flush(&self) -> Result {
         let flushed = match self.file {
             Some(_) => self.rerun.flush_blocking(),
-            None => self.rerun.flush_with_timeout(VIEWER_PATIENCE),
+            None => self.rerun.flush_with_timeout(VIEWER_TIMEOUT),
         };
         flushed.map_err(failed(match self.file {
             Some(_) => "writing the recording",
@@ -166,38 +159,12 @@ impl Stream {
     }
 
     /// Ends the stream; a file gets its index and its final name.
-    pub(super) fn finish(self) -> Result<(), ObserverError> {
+    pub(super) fn finish(self) -> Result {
         self.flush()?;
         self.rerun.finalize_deferred_sinks();
         match self.file {
-            Some(path) => fs::rename(part_name(&path), &path)
-                .map_err(failed("giving the recording its final name")),
+            Some(path) => finish(&path),
             None => Ok(()),
         }
-    }
-}
-
-/// Writes under a temporary name and renames, so that a file is whole or not there.
-pub(crate) fn write_whole(path: &Path, content: &[u8]) -> std::io::Result<()> {
-    let part = part_name(path);
-    fs::write(&part, content)?;
-    fs::rename(&part, path)
-}
-
-/// Name of a file while it is written.
-pub(super) fn part_name(path: &Path) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".part");
-    PathBuf::from(name)
-}
-
-/// Turns an error into an observer's, saying what was being done.
-pub(super) fn failed<E: Into<Box<dyn Error + Send + Sync>>>(
-    what: impl Into<String>,
-) -> impl FnOnce(E) -> ObserverError {
-    let what = what.into();
-    move |source| ObserverError {
-        what,
-        source: source.into(),
     }
 }

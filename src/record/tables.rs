@@ -1,9 +1,10 @@
 //! Tables for other programs.
 
-use super::stream::{failed, part_name};
-use crate::bus::{Identity, Method, TrainId};
-use crate::session::{Event, Observer, ObserverError, Opening};
-use std::fs::{self, File};
+use super::whole_files::{Result, broken, finish, make_folder_of, part_name};
+use crate::bus::TrainId;
+use crate::session::{Event, Observer, Opening};
+use std::fmt::Debug;
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -28,20 +29,17 @@ impl FixTable {
     }
 }
 
-const WHAT: &str = "writing the table of fixes";
-
 impl Observer for FixTable {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        if let Some(folder) = self.path.parent() {
-            fs::create_dir_all(folder).map_err(failed("making the folder of the table"))?;
-        }
-        let mut rows = BufWriter::new(File::create(part_name(&self.path)).map_err(failed(WHAT))?);
-        writeln!(rows, "{HEADER}").map_err(failed(WHAT))?;
+    fn open(&mut self, _: &Opening<'_>) -> Result {
+        make_folder_of(&self.path)?;
+        let file = File::create(part_name(&self.path)).map_err(broken(&self.path))?;
+        let mut rows = BufWriter::new(file);
+        writeln!(rows, "{HEADER}").map_err(broken(&self.path))?;
         self.rows = Some(rows);
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         let (Some(rows), Event::Pair(TrainId(0), _, report, true_chainages_m)) =
             (&mut self.rows, event)
         else {
@@ -53,9 +51,9 @@ impl Observer for FixTable {
                 rows,
                 "{:.9},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
                 fix.time.secs(),
-                method_name(fix.method),
+                name(fix.method),
                 fix.uid,
-                identity_name(fix.identity),
+                name(fix.identity),
                 fix.chainage_m,
                 true_m,
                 fix.chainage_m - true_m,
@@ -64,32 +62,20 @@ impl Observer for FixTable {
                 lamp.y,
                 lamp.z,
             )
-            .map_err(failed(WHAT))?;
+            .map_err(broken(&self.path))?;
         }
         Ok(())
     }
 
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         let Some(mut rows) = self.rows.take() else {
             return Ok(());
         };
-        rows.flush().map_err(failed(WHAT))?;
-        fs::rename(part_name(&self.path), &self.path).map_err(failed(WHAT))
+        rows.flush().map_err(broken(&self.path))?;
+        finish(&self.path)
     }
 }
 
-fn method_name(method: Method) -> &'static str {
-    match method {
-        Method::Paper => "paper",
-        Method::Mono => "mono",
-    }
-}
-
-fn identity_name(identity: Identity) -> &'static str {
-    match identity {
-        Identity::Decoded => "decoded",
-        Identity::Joined => "joined",
-        Identity::Followed => "followed",
-        Identity::Predicted => "predicted",
-    }
+fn name(variant: impl Debug) -> String {
+    format!("{variant:?}").to_lowercase()
 }

@@ -6,8 +6,9 @@
     reason = "tests stop at the first thing that is not as expected"
 )]
 
-use super::stream::part_name;
-use super::trial::{Size, play};
+pub(super) mod session;
+
+use super::whole_files::part_name;
 use super::{FixTable, Recording};
 use crate::bus::{
     Content, DangerLevel, DopplerSample, Message, Node, ObstacleWarning, OdometerSample, SimTime,
@@ -21,14 +22,14 @@ use rerun::components::Name;
 use rerun::external::re_log_encoding::DecoderApp;
 use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
+use session::{Extent, play};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs::{self, File};
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
-const SMALL: Size = Size {
+const SMALL: Extent = Extent {
     duration_s: 3.0,
-    shrink: 8,
     wayside: true,
     cars: 2,
 };
@@ -53,10 +54,10 @@ impl Drop for Folder {
     }
 }
 
-fn record(path: &Path, size: Size) {
+fn record(path: &Path, extent: Extent) {
     play(
         &mut Recording::to_file(path, &RecordSettings::default()),
-        size,
+        extent,
     );
 }
 
@@ -174,14 +175,14 @@ fn all_rows_of_an_entity_hold_the_same_components() {
 #[test]
 fn the_layout_leaves_out_what_is_missing() {
     let folder = Folder::new("layout");
-    let bench = Size {
+    let bench = Extent {
         wayside: false,
         cars: 0,
         ..SMALL
     };
-    let names = |size: Size, name: &str| {
+    let names = |extent: Extent, name: &str| {
         let path = folder.file(name);
-        record(&path, size);
+        record(&path, extent);
         let rows = chunks(&path, StoreKind::Blueprint);
         let views = rows.iter().filter(|chunk| {
             let path = chunk.entity_path().to_string();
@@ -209,13 +210,6 @@ fn the_layout_leaves_out_what_is_missing() {
     }
 }
 
-/// A message of the first train.
-fn observe(recording: &mut Recording, time: SimTime, content: Content) {
-    let node = Node::Train(TrainId(0));
-    let message = Message::own(node.clone(), time, content);
-    recording.observe(&Event::Message(&node, &message)).unwrap();
-}
-
 /// What a run without rig, train and devices opens with.
 fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
     Opening {
@@ -227,31 +221,42 @@ fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
     }
 }
 
+/// Hands a message of the first train to an observer.
+fn message(observer: &mut dyn Observer, time: SimTime, content: Content) {
+    let node = Node::Train(TrainId(0));
+    let message = Message::own(node.clone(), time, content);
+    observer.observe(&Event::Message(&node, &message)).unwrap();
+}
+
+/// A warning that comes at once.
+fn warning(device: &str, t_s: f64, danger: DangerLevel) -> Content {
+    Content::Warning(ObstacleWarning {
+        device: device.into(),
+        number: 1,
+        issued: SimTime::from_secs(t_s),
+        danger,
+        from_chainage_m: 100.0,
+        to_chainage_m: 101.0,
+        blind: false,
+    })
+}
+
 /// A device repeats its warning every second; the log filled up with it.
 #[test]
-fn regress_the_log_tells_a_repeated_warning_once() {
+fn regress_the_log_has_a_repeated_warning_once() {
     let folder = Folder::new("repeated");
     let path = folder.file("run.rrd");
     let mut recording = Recording::to_file(&path, &RecordSettings::default());
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     recording.open(&bare("repeated", &tunnel)).unwrap();
     for number in 0..6 {
         let cleared = number == 5;
-        let warning = ObstacleWarning {
-            device: "W1".into(),
-            number,
-            issued: SimTime::from_secs(f64::from(number)),
-            danger: if cleared {
-                DangerLevel::None
-            } else {
-                DangerLevel::High
-            },
-            from_chainage_m: 100.0,
-            to_chainage_m: 101.0,
-            blind: false,
+        let danger = match cleared {
+            true => DangerLevel::None,
+            false => DangerLevel::High,
         };
-        let issued = warning.issued;
-        observe(&mut recording, issued, Content::Warning(warning));
+        let time = SimTime::from_secs(number.into());
+        message(&mut recording, time, warning("W1", number.into(), danger));
     }
     recording.close().unwrap();
     let rows = chunks(&path, StoreKind::Recording);
@@ -267,7 +272,7 @@ fn regress_the_log_tells_a_repeated_warning_once() {
 #[test]
 fn sensors_of_motion_become_series() {
     let folder = Folder::new("motion");
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     for radar in [true, false] {
         let path = folder.file(if radar { "with.rrd" } else { "without.rrd" });
         let mut recording = Recording::to_file(&path, &RecordSettings::default());
@@ -291,13 +296,13 @@ fn sensors_of_motion_become_series() {
                 distance_m: f64::from(k),
                 speed_mps: 10.0,
             };
-            observe(&mut recording, time, Content::Odometer(odometer));
+            message(&mut recording, time, Content::Odometer(odometer));
             let doppler = DopplerSample {
                 time,
                 speed_mps: (k < 5).then_some(10.0),
             };
             if radar {
-                observe(&mut recording, time, Content::Doppler(doppler));
+                message(&mut recording, time, Content::Doppler(doppler));
             }
         }
         recording.close().unwrap();
@@ -322,7 +327,7 @@ fn an_impossible_file_is_an_error() {
     let blocked = folder.file("file");
     fs::write(&blocked, "not a folder").unwrap();
     let mut recording = Recording::to_file(&blocked.join("run.rrd"), &RecordSettings::default());
-    let tunnel = super::trial::tunnel();
+    let tunnel = session::tunnel();
     let error = recording.open(&bare("impossible", &tunnel)).unwrap_err();
     assert!(error.to_string().contains("folder"), "{error}");
     // Closing what never opened is nothing to fail at.
@@ -344,7 +349,7 @@ fn fixes_become_rows() {
     for row in rows {
         assert_eq!(row.len(), columns);
         let number = |k: usize| row[k].parse::<f64>().unwrap();
-        assert!(["paper", "mono"].contains(&row[1]) && row[2].starts_with("2-"));
+        assert!(["paper", "mono"].contains(&row[1]) && row[2].starts_with("1-"));
         assert!((number(4) - number(5) - number(6)).abs() < 2e-6);
         assert!(number(10) > 0.0, "the lamp is in front of the camera");
     }

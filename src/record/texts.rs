@@ -2,14 +2,14 @@
 
 use super::palette;
 use super::stream::Stream;
+use super::whole_files::Result;
 use crate::bus::{
-    BrakeDemand, CameraFault, DangerLevel, DriverDisplay, LedReport, Message, ObstacleWarning,
-    ProtectionReport, SimTime, Via, WaysideReport,
+    BrakeDemand, CameraFault, DangerLevel, DriverDisplay, LedReport, Message, Node,
+    ObstacleWarning, ProtectionReport, SimTime, TrainId, Via, WaysideReport,
 };
-use crate::session::{ObserverError, Opening};
+use crate::session::Opening;
 use rerun::{Color, TextDocument, TextLog, TextLogLevel};
 use std::collections::BTreeMap;
-use std::fmt::Write;
 
 /// The log.
 pub(super) const EVENTS: &str = "events";
@@ -18,18 +18,20 @@ pub(super) const DISPLAY: &str = "display";
 
 /// Turns what happens into words; says again only what changed.
 pub(super) struct Texts {
-    brake: BrakeDemand,
+    stream: Stream,
+    /// Of each train.
+    brake: BTreeMap<TrainId, BrakeDemand>,
     /// Of each wayside device, with the number of its obstacles.
     danger: Vec<(DangerLevel, usize)>,
-    /// What each device last sent each way.
-    sent: BTreeMap<(String, &'static str), DangerLevel>,
+    /// What each train last heard of each device each way.
+    heard: BTreeMap<(TrainId, String, &'static str), DangerLevel>,
     /// What the display shows.
     shown: String,
 }
 
 impl Texts {
     /// Begins the log with what is run.
-    pub(super) fn open(stream: &Stream, opening: &Opening<'_>) -> Result<Self, ObserverError> {
+    pub(super) fn open(stream: Stream, opening: &Opening<'_>) -> Result<Self> {
         let tunnel = opening.tunnel;
         let text = format!(
             "{}, seed {}: {:.0} m of line, {} lamps, {} balises",
@@ -39,105 +41,89 @@ impl Texts {
             tunnel.lamps.len(),
             tunnel.balises.len(),
         );
-        Self::note(stream, SimTime::ZERO, &text)?;
-        Ok(Self {
-            brake: BrakeDemand::None,
+        let texts = Self {
+            stream,
+            brake: BTreeMap::new(),
             danger: vec![(DangerLevel::None, 0); opening.wayside.len()],
-            sent: BTreeMap::new(),
+            heard: BTreeMap::new(),
             shown: String::new(),
-        })
+        };
+        texts.note(SimTime::ZERO, &text)?;
+        Ok(texts)
     }
 
     /// Anything.
-    pub(super) fn note(stream: &Stream, time: SimTime, text: &str) -> Result<(), ObserverError> {
-        log(stream, time, TextLogLevel::INFO, text)
+    pub(super) fn note(&self, time: SimTime, text: &str) -> Result {
+        self.log(time, TextLogLevel::INFO, text)
     }
 
     /// The stack says that a camera has failed, or is well again.
     pub(super) fn camera(
-        stream: &Stream,
+        &self,
         time: SimTime,
+        node: &Node,
         camera: &str,
         fault: Option<CameraFault>,
-    ) -> Result<(), ObserverError> {
-        match fault {
-            Some(fault) => log(
-                stream,
-                time,
-                TextLogLevel::ERROR,
-                &format!("camera {camera}: {fault}"),
-            ),
-            None => log(
-                stream,
-                time,
+    ) -> Result {
+        let of = match node {
+            Node::Train(id) => of_train(*id),
+            _ => String::new(),
+        };
+        let (level, text) = match fault {
+            Some(fault) => (TextLogLevel::ERROR, format!("{of}camera {camera}: {fault}")),
+            None => (
                 TextLogLevel::INFO,
-                &format!("camera {camera} sees again"),
+                format!("{of}camera {camera} sees again"),
             ),
-        }
+        };
+        self.log(time, level, &text)
     }
 
     /// Lamps have gone by without shining.
-    pub(super) fn dark_lamps(stream: &Stream, report: &LedReport) -> Result<(), ObserverError> {
+    pub(super) fn dark_lamps(&self, report: &LedReport) -> Result {
         for uid in &report.dark {
-            log(
-                stream,
-                report.time,
-                TextLogLevel::WARN,
-                &format!("lamp {uid} is dark"),
-            )?;
+            let text = format!("lamp {uid} is dark");
+            self.log(report.time, TextLogLevel::WARN, &text)?;
         }
         Ok(())
     }
 
-    /// A warning reached the train. Devices repeat theirs; the log does not.
+    /// A warning reached a train. Devices repeat theirs; the log does not.
     pub(super) fn warning(
         &mut self,
-        stream: &Stream,
+        id: TrainId,
         message: &Message,
         warning: &ObstacleWarning,
-    ) -> Result<(), ObserverError> {
+    ) -> Result {
         let via = match message.via {
             Via::Balise => "balise",
             Via::Radio => "radio",
             Via::Wire => "wire",
         };
         let (device, number) = (&warning.device, warning.number);
-        let before = self.sent.insert((device.clone(), via), warning.danger);
+        let before = (self.heard).insert((id, device.clone(), via), warning.danger);
         if before == Some(warning.danger) {
             return Ok(());
         }
         let delay_s = message.received_at.since(warning.issued);
-        let (level, what) = match warning.danger {
-            DangerLevel::None => (TextLogLevel::INFO, "all clear".to_owned()),
-            danger if warning.blind => (
-                level(danger),
-                format!(
-                    "track not watched, km {:.4} to {:.4}",
-                    warning.from_chainage_m / 1000.0,
-                    warning.to_chainage_m / 1000.0,
-                ),
-            ),
-            danger => (
-                level(danger),
-                format!(
-                    "danger {}, km {:.4} to {:.4}",
-                    danger_name(danger),
-                    warning.from_chainage_m / 1000.0,
-                    warning.to_chainage_m / 1000.0,
-                ),
-            ),
+        let stretch = format!(
+            "km {:.4} to {:.4}",
+            warning.from_chainage_m / 1000.0,
+            warning.to_chainage_m / 1000.0
+        );
+        let what = match warning.danger {
+            DangerLevel::None => "all clear".to_owned(),
+            _ if warning.blind => format!("track not watched, {stretch}"),
+            danger => format!("danger {}, {stretch}", danger_name(danger)),
         };
-        let text = format!("{device} #{number} by {via} ({delay_s:.2} s): {what}");
-        log(stream, message.received_at, level, &text)
+        let level = level(warning.danger);
+        let of = of_train(id);
+        let text = format!("{of}{device} #{number} by {via} ({delay_s:.2} s): {what}");
+        self.log(message.received_at, level, &text)
     }
 
-    /// A wayside device changed its mind about the danger, or about how many things lie there.
-    pub(super) fn wayside(
-        &mut self,
-        stream: &Stream,
-        device: (usize, &str),
-        report: &WaysideReport,
-    ) -> Result<(), ObserverError> {
+    /// The danger that a wayside device sees, or the number of things there, has changed.
+    pub(super) fn wayside(&mut self, device: (usize, &str), report: &WaysideReport) -> Result {
         let Some(danger) = self.danger.get_mut(device.0) else {
             return Ok(());
         };
@@ -147,53 +133,51 @@ impl Texts {
         }
         let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
         for o in &report.obstacles {
-            // Writing to a String cannot fail.
-            let _ = write!(
-                text,
-                "; {:.2} x {:.2} m at km {:.4}",
-                o.width_m,
-                o.height_m,
-                o.from_chainage_m / 1000.0
-            );
+            let km = o.from_chainage_m / 1000.0;
+            text += &format!("; {:.2} x {:.2} m at km {km:.4}", o.width_m, o.height_m);
         }
-        log(stream, report.time, level(report.danger), &text)
+        self.log(report.time, level(report.danger), &text)
     }
 
     /// The protection changed its demand.
-    pub(super) fn protection(
-        &mut self,
-        stream: &Stream,
-        report: &ProtectionReport,
-    ) -> Result<(), ObserverError> {
-        if self.brake == report.command.brake {
+    pub(super) fn protection(&mut self, id: TrainId, report: &ProtectionReport) -> Result {
+        let brake = report.command.brake;
+        if self.brake.insert(id, brake).unwrap_or_default() == brake {
             return Ok(());
         }
-        self.brake = report.command.brake;
-        let (level, what) = match self.brake {
+        let (level, what) = match brake {
             BrakeDemand::None => (TextLogLevel::INFO, "brake released"),
             BrakeDemand::Service => (TextLogLevel::WARN, "service brake"),
             BrakeDemand::Emergency => (TextLogLevel::ERROR, "emergency brake"),
         };
         let speed_kmh = report.speed_mps * 3.6;
-        let text = format!("{what} at {speed_kmh:.1} km/h");
-        log(stream, report.time, level, &text)
+        let of = of_train(id);
+        let text = format!("{of}{what} at {speed_kmh:.1} km/h");
+        self.log(report.time, level, &text)
     }
 
     /// What the driver sees, when it changed.
-    pub(super) fn display(
-        &mut self,
-        stream: &Stream,
-        time: SimTime,
-        display: &DriverDisplay,
-    ) -> Result<(), ObserverError> {
+    pub(super) fn display(&mut self, time: SimTime, display: &DriverDisplay) -> Result {
         let text = markdown(display);
         if text == self.shown {
             return Ok(());
         }
-        stream.at(time);
-        stream.log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
+        self.stream.at(time);
+        self.stream
+            .log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
         self.shown = text;
         Ok(())
+    }
+
+    fn log(&self, time: SimTime, level: &'static str, text: &str) -> Result {
+        let colour = match level {
+            TextLogLevel::ERROR => palette::danger(DangerLevel::High),
+            TextLogLevel::WARN => palette::danger(DangerLevel::Low),
+            _ => Color::from_rgb(210, 215, 220),
+        };
+        let line = TextLog::new(text).with_level(level).with_color(colour);
+        self.stream.at(time);
+        self.stream.log(EVENTS, &line)
     }
 }
 
@@ -201,15 +185,21 @@ fn markdown(display: &DriverDisplay) -> String {
     let (lamp, meaning) = palette::driver_lamp(display.lamp);
     let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.1} m"));
     let power = if display.power { "on" } else { "off" };
-    let (position, distance) = (
-        metres(display.position_m),
-        metres(display.distance_to_obstacle_m),
-    );
+    let [position, distance] = [display.position_m, display.distance_to_obstacle_m].map(metres);
     let text = &display.text;
     format!(
         "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\
          | Position | {position} |\n| Distance to obstacle | {distance} |\n"
     )
+}
+
+/// Whose a line of the log is, where it is not the first train's.
+fn of_train(id: TrainId) -> String {
+    if id == TrainId::default() {
+        String::new()
+    } else {
+        format!("{id}: ")
+    }
 }
 
 fn danger_name(danger: DangerLevel) -> &'static str {
@@ -226,22 +216,4 @@ fn level(danger: DangerLevel) -> &'static str {
         DangerLevel::Low => TextLogLevel::WARN,
         DangerLevel::High => TextLogLevel::ERROR,
     }
-}
-
-fn log(
-    stream: &Stream,
-    time: SimTime,
-    level: &'static str,
-    text: &str,
-) -> Result<(), ObserverError> {
-    stream.at(time);
-    let colour = match level {
-        TextLogLevel::ERROR => palette::danger(DangerLevel::High),
-        TextLogLevel::WARN => palette::danger(DangerLevel::Low),
-        _ => Color::from_rgb(210, 215, 220),
-    };
-    stream.log(
-        EVENTS,
-        &TextLog::new(text).with_level(level).with_color(colour),
-    )
 }

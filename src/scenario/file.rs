@@ -1,7 +1,7 @@
 //! A scenario as written.
 
 use super::RecordSettings;
-use super::draw::StudySettings;
+use super::sampling::StudySettings;
 use crate::settings::settings;
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;

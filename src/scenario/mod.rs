@@ -29,17 +29,17 @@
 //! `--set key=value` overrides are applied to the document before it is parsed ([`Override`]), so
 //! that they meet the same checks as the file.
 //!
-//! Distributions over any of its keys stand in the file too: [`draw`].
+//! Distributions over any of its keys stand in the file too: [`sampling`].
 //!
 //! What it does not do: many runs (studies), and anything that needs a clock or a renderer.
 
 mod build;
 mod check;
-pub mod draw;
 mod file;
 mod meshes;
 mod overrides;
 mod recording;
+pub mod sampling;
 pub mod schema;
 
 pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
@@ -48,5 +48,6 @@ pub use file::{
     BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
     WaysidePostSettings,
 };
+pub(crate) use overrides::is_within;
 pub use overrides::{Override, OverrideError};
 pub use recording::RecordSettings;

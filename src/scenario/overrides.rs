@@ -113,6 +113,24 @@ fn steps(key: &str) -> Option<Vec<Step>> {
     Some(steps)
 }
 
+/// What a document has under a dotted key.
+pub(super) fn lookup<'a>(document: &'a Table, key: &str) -> Option<&'a Value> {
+    let mut steps = steps(key)?.into_iter();
+    let Step::Key(first) = steps.next()? else {
+        return None;
+    };
+    steps.try_fold(document.get(&first)?, |place, step| match step {
+        Step::Key(name) => place.get(name),
+        Step::Index(index) => place.get(index),
+    })
+}
+
+/// Whether a dotted key is another one or lies below it.
+pub(crate) fn is_within(key: &str, other: &str) -> bool {
+    let rest = key.strip_prefix(other);
+    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+}
+
 impl Override {
     /// Sets the value, with the tables that lead to it where the document does not have them yet.
     pub fn apply(&self, document: &mut Table) -> Result<(), OverrideError> {

@@ -1,10 +1,9 @@
 //! Two studies held against each other, run by run: with the same seed and variables, run k of both
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
-use super::digest::is_weighed;
+use super::digest::is_weighted;
 use super::stats::{Estimate, mean, weighted_mean};
-use super::worker::template_of;
-use super::{MEASURES, Row, StudyError, report, table};
+use super::{MEASURES, Result, Row, Study};
 use crate::record::parquet::Kind;
 use std::path::Path;
 
@@ -15,9 +14,9 @@ pub struct Comparison {
     pub rows: usize,
     /// Runs that are complete in both, by their indexes.
     pub pairs: usize,
-    /// Of these, how many were not drawn alike: then pairs are no pairs, and weighed runs, whose weights
+    /// Of these, how many were not drawn alike: then pairs are no pairs, and weighted runs, whose weights
     /// are then two, have no differences.
-    pub drawn_otherwise: usize,
+    pub sampled_otherwise: usize,
     /// Name, unit, and mean difference of each figure and event that differs in some run.
     pub differences: Vec<(String, String, Estimate)>,
     /// The first thing in which they are not the same, value by value, wall times aside.
@@ -25,8 +24,9 @@ pub struct Comparison {
 }
 
 /// Compares the studies of two folders.
-pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
-    let (rows_a, rows_b) = (report::rows(a)?, report::rows(b)?);
+pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
+    let (a, b) = (Study::open(a)?, Study::open(b)?);
+    let (rows_a, rows_b) = (a.rows()?, b.rows()?);
     let of_b = |row: &Row| rows_b.binary_search_by_key(&row.index, |r| r.index).ok();
     let pairs = rows_a
         .iter()
@@ -36,19 +36,17 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     let alike = |a: &Row, b: &Row| {
         a.seed == b.seed && a.values == b.values && a.ln_weight.to_bits() == b.ln_weight.to_bits()
     };
-    let drawn_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
+    let sampled_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
 
-    let template = template_of(a)?.1;
-    let weighed = is_weighed(&template) || is_weighed(&template_of(b)?.1);
-    let events = table::events(&template)?;
+    let weighted = is_weighted(&a.template) || is_weighted(&b.template);
     let mut differences = Vec::new();
     let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
         let both = pairs
             .iter()
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
         let both: Vec<(f64, f64)> = both.collect();
-        let estimate = if weighed {
-            weighted_mean(&both).filter(|_| drawn_otherwise == 0)
+        let estimate = if weighted {
+            weighted_mean(&both).filter(|_| sampled_otherwise == 0)
         } else {
             mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>())
         };
@@ -56,7 +54,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
         let estimate = estimate.filter(|_| differs);
         differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
     };
-    for (name, condition) in &events {
+    for (name, condition) in &a.template.events {
         let happened = |row: &Row| row.happened(condition).map(f64::from);
         add(&format!("rate of {name}"), "1", &happened);
     }
@@ -73,7 +71,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison, StudyError> {
     Ok(Comparison {
         rows: rows_a.len(),
         pairs: pairs.len(),
-        drawn_otherwise,
+        sampled_otherwise,
         differences,
         first_difference: lengths.or_else(|| together.find_map(row)),
     })

@@ -4,16 +4,17 @@ use super::stats::{
     Estimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean, quantile,
     rank_correlation, rate, weighted_mean, weighted_rate,
 };
-use super::{MEASURES, Measure, Row, StudyError, table};
+use super::{MEASURES, Measure, Row};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Distribution, Template};
+use crate::scenario::sampling::{Distribution, Template};
+use serde::Serialize;
 use std::collections::BTreeSet;
 
 /// Quantiles that are shown.
 pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
 
 /// All figures of a study.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Digest {
     /// Rows there are.
     pub runs: usize,
@@ -21,7 +22,7 @@ pub struct Digest {
     pub complete: usize,
     /// Draws that did not meet the conditions.
     pub rejected: u64,
-    /// Kish's effective number of runs, where they are weighed.
+    /// Kish's effective number of runs, where they are weighted.
     pub effective_runs: Option<f64>,
     /// Events, in the order of their names.
     pub events: Vec<EventDigest>,
@@ -30,22 +31,22 @@ pub struct Digest {
 }
 
 /// An event.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct EventDigest {
     /// Its name.
     pub name: String,
     /// Its condition.
     pub condition: String,
-    /// Runs that have the figures to tell.
-    pub told: usize,
+    /// Runs that have the figures that it names.
+    pub runs: usize,
     /// How often it happened in these.
     pub rate: Option<Rate>,
-    /// The rate of the distributions that were asked for, where runs are weighed.
+    /// The rate of the distributions that were asked for, where runs are weighted.
     pub weighted: Option<Weighted>,
 }
 
 /// A figure.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct FigureDigest {
     /// Which.
     pub measure: &'static Measure,
@@ -61,7 +62,7 @@ pub struct FigureDigest {
 }
 
 /// A variable as the cause of a figure.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Driver {
     /// The variable.
     pub variable: String,
@@ -73,46 +74,44 @@ pub struct Driver {
 
 impl Digest {
     /// Of rows in order.
-    pub fn of(template: &Template, rows: &[Row]) -> Result<Self, StudyError> {
-        let weighed = is_weighed(template);
+    pub fn of(template: &Template, rows: &[Row]) -> Self {
+        let weighted = is_weighted(template);
         let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
         let ln_weights: Vec<f64> = complete.iter().map(|r| r.ln_weight).collect();
         // Weights have mean 1 by themselves only if no condition cut draws off and no run is missing.
         let cut_off = !template.settings.require.is_empty();
-        let events = table::events(template)?
-            .into_iter()
-            .map(|(name, condition)| {
-                let told = complete
-                    .iter()
-                    .filter_map(|r| Some((r.ln_weight, r.happened(&condition)?)));
-                let told: Vec<(f64, bool)> = told.collect();
-                let happened = told.iter().filter(|t| t.1).count() as u64;
-                EventDigest {
-                    name,
-                    condition: condition.text().to_owned(),
-                    told: told.len(),
-                    rate: rate(happened, told.len() as u64),
-                    weighted: weighed
-                        .then(|| weighted_rate(&told, cut_off || told.len() < rows.len()))
-                        .flatten(),
-                }
-            });
+        let events = template.events.iter().map(|(name, condition)| {
+            let known = complete
+                .iter()
+                .filter_map(|r| Some((r.ln_weight, r.happened(condition)?)));
+            let known: Vec<(f64, bool)> = known.collect();
+            let happened = known.iter().filter(|k| k.1).count() as u64;
+            EventDigest {
+                name: name.clone(),
+                condition: condition.text().to_owned(),
+                runs: known.len(),
+                rate: rate(happened, known.len() as u64),
+                weighted: weighted
+                    .then(|| weighted_rate(&known, cut_off || known.len() < rows.len()))
+                    .flatten(),
+            }
+        });
         let shown = MEASURES.iter().filter(|m| is_shown(m));
-        Ok(Self {
+        Self {
             runs: rows.len(),
             complete: complete.len(),
             rejected: rows.iter().map(|r| u64::from(r.rejected)).sum(),
-            effective_runs: weighed.then(|| effective_runs(&ln_weights)),
+            effective_runs: weighted.then(|| effective_runs(&ln_weights)),
             events: events.collect(),
             figures: shown
                 .filter_map(|m| FigureDigest::of(template, m, &complete))
                 .collect(),
-        })
+        }
     }
 }
 
 /// Whether runs carry weights.
-pub fn is_weighed(template: &Template) -> bool {
+pub fn is_weighted(template: &Template) -> bool {
     template
         .settings
         .variables
@@ -144,24 +143,24 @@ fn is_shown(measure: &Measure) -> bool {
 impl FigureDigest {
     /// `None` of a figure that no run has, or that is the same in all.
     fn of(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Option<Self> {
-        let told = rows
+        let known = rows
             .iter()
             .filter_map(|r| Some((r.ln_weight, r.number(measure.name)?)));
-        let told: Vec<(f64, f64)> = told.collect();
-        let first = told.first()?.1.to_bits();
-        if told.iter().all(|(_, x)| x.to_bits() == first) {
+        let known: Vec<(f64, f64)> = known.collect();
+        let first = known.first()?.1.to_bits();
+        if known.iter().all(|(_, x)| x.to_bits() == first) {
             return None;
         }
-        if is_weighed(template) {
+        if is_weighted(template) {
             return Some(Self {
                 measure,
-                runs: told.len(),
-                mean: weighted_mean(&told),
+                runs: known.len(),
+                mean: weighted_mean(&known),
                 quantiles: [None; QUANTILES.len()],
                 drivers: Vec::new(),
             });
         }
-        let mut sample: Vec<f64> = told.into_iter().map(|(_, x)| x).collect();
+        let mut sample: Vec<f64> = known.into_iter().map(|(_, x)| x).collect();
         let mean = mean(&sample);
         sample.sort_by(f64::total_cmp);
         let variables = template.settings.variables.keys();

@@ -1,8 +1,7 @@
 //! Rows on disk as they come: a line of JSON each, appended and synced, so that a kill at any moment
 //! loses at most the runs in flight. A last line that is torn is dropped.
 
-use super::Row;
-use super::StudyError;
+use super::{Result, Row, StudyError};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -19,7 +18,7 @@ pub struct Journal {
 
 impl Journal {
     /// Opens the journal of a folder, new or to go on with; gives the rows that it has.
-    pub fn open(folder: &Path) -> Result<(Self, Vec<Row>), StudyError> {
+    pub fn open(folder: &Path) -> Result<(Self, Vec<Row>)> {
         let path = folder.join(JOURNAL);
         let failed = |source| StudyError::file(&path, source);
         let mut file = OpenOptions::new()
@@ -44,7 +43,7 @@ impl Journal {
     }
 
     /// Adds a row. One that could not be written whole is taken away again.
-    pub fn add(&mut self, row: &Row) -> Result<(), StudyError> {
+    pub fn add(&mut self, row: &Row) -> Result {
         let mut line = serde_json::to_vec(row).map_err(io::Error::other);
         if let Ok(line) = &mut line {
             line.push(b'\n');
@@ -65,7 +64,7 @@ impl Journal {
 }
 
 /// The rows of a folder, in the order of their indexes; those that were run twice once.
-pub fn read(folder: &Path) -> Result<Vec<Row>, StudyError> {
+pub fn read(folder: &Path) -> Result<Vec<Row>> {
     let path = folder.join(JOURNAL);
     let text = std::fs::read(&path).map_err(|source| StudyError::file(&path, source))?;
     let (mut rows, _) = parse(&path, &text)?;
@@ -81,7 +80,7 @@ pub fn sort(rows: &mut Vec<Row>) {
 }
 
 /// The rows, and how many bytes hold them.
-fn parse(path: &Path, text: &[u8]) -> Result<(Vec<Row>, usize), StudyError> {
+fn parse(path: &Path, text: &[u8]) -> Result<(Vec<Row>, usize)> {
     let whole = text.iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
     let lines = text[..whole]
         .split(|b| *b == b'\n')

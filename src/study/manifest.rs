@@ -1,8 +1,8 @@
 //! The manifest `study.json`: SHA-256 of every input and of the program, and the renderer, that the rows of a
 //! folder were made with; and shards.
 
-use super::{StudyError, write_whole};
-use crate::scenario::draw::{Inputs, Template, sha256};
+use super::{Result, StudyError, write_whole};
+use crate::scenario::sampling::{Inputs, Template, sha256};
 use crate::session::RendererChoice;
 use crate::twin::render::{Backend, gpu};
 use serde::{Deserialize, Serialize};
@@ -78,39 +78,22 @@ pub struct Manifest {
     /// Number of runs, all shards together.
     pub runs: u64,
     /// What draws.
-    pub renderer: Drawn,
+    pub renderer: Backend,
     /// The part of the study that this folder holds; all of it where there is none.
     pub shard: Option<Shard>,
 }
 
-/// What draws the images.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Drawn {
-    /// `vulkan`, `metal`, `dx12` or `cpu`.
-    pub backend: String,
-    /// Name of the adapter.
-    pub adapter: String,
-}
-
-impl Drawn {
-    /// What a choice comes to on this machine.
-    pub fn by(choice: RendererChoice) -> Result<Self, StudyError> {
-        let plain = || Backend {
-            backend: "cpu".into(),
-            adapter: "plain renderer".into(),
-        };
-        let found = match choice {
-            RendererChoice::Cpu => plain(),
-            RendererChoice::Gpu => gpu::adapters()
-                .into_iter()
-                .next()
-                .ok_or(StudyError::NoAdapter)?,
-            RendererChoice::Auto => gpu::adapters().into_iter().next().unwrap_or_else(plain),
-        };
-        Ok(Self {
-            backend: found.backend,
-            adapter: found.adapter,
-        })
+/// What draws the images on this machine, by a choice.
+fn renderer_of(choice: RendererChoice) -> Result<Backend> {
+    let plain = || Backend {
+        backend: "cpu".into(),
+        adapter: "plain renderer".into(),
+    };
+    let adapter = || gpu::adapters().into_iter().next();
+    match choice {
+        RendererChoice::Cpu => Ok(plain()),
+        RendererChoice::Gpu => adapter().ok_or(StudyError::NoAdapter),
+        RendererChoice::Auto => Ok(adapter().unwrap_or_else(plain)),
     }
 }
 
@@ -120,11 +103,7 @@ fn program_hash() -> std::io::Result<String> {
 
 impl Manifest {
     /// Of a study about to be run here.
-    pub fn of(
-        template: &Template,
-        choice: RendererChoice,
-        shard: Option<Shard>,
-    ) -> Result<Self, StudyError> {
+    pub fn of(template: &Template, choice: RendererChoice, shard: Option<Shard>) -> Result<Self> {
         let unreadable = |source| StudyError::file(&template.path, source);
         let inputs = Inputs::of(template).map_err(unreadable)?;
         Ok(Self {
@@ -133,13 +112,13 @@ impl Manifest {
             study: inputs.study.clone(),
             inputs: inputs.hashes().map_err(unreadable)?,
             runs: template.runs(),
-            renderer: Drawn::by(choice)?,
+            renderer: renderer_of(choice)?,
             shard,
         })
     }
 
     /// Reads that of a folder; `None` where there is none.
-    pub fn read(folder: &Path) -> Result<Option<Self>, StudyError> {
+    pub fn read(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(MANIFEST);
         let text = match fs::read(&path) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
@@ -152,7 +131,7 @@ impl Manifest {
     }
 
     /// Writes it into a folder, whole or not at all.
-    pub fn write(&self, folder: &Path) -> Result<(), StudyError> {
+    pub fn write(&self, folder: &Path) -> Result {
         let path = folder.join(MANIFEST);
         let text = serde_json::to_string_pretty(self);
         let text = text.map_err(|e| StudyError::file(&path, e.into()))? + "\n";
@@ -175,11 +154,11 @@ impl Manifest {
     /// What differs between two of them, in words; shard and number of runs aside: a study may go on
     /// to more runs.
     pub fn difference(&self, now: &Self) -> Option<String> {
-        let said = |what: &str, a: &dyn fmt::Display, b: &dyn fmt::Display| {
+        let changed = |what: &str, a: &dyn fmt::Display, b: &dyn fmt::Display| {
             Some(format!("{what}: {a} then, {b} now"))
         };
         if self.study != now.study {
-            return said("file", &self.study.display(), &now.study.display());
+            return changed("file", &self.study.display(), &now.study.display());
         }
         for (file, hash) in &self.inputs {
             match now.inputs.get(file) {
@@ -192,13 +171,13 @@ impl Manifest {
             return Some(format!("{file} is a new input"));
         }
         if self.metrotwin != now.metrotwin {
-            return said("version of metrotwin", &self.metrotwin, &now.metrotwin);
+            return changed("version of metrotwin", &self.metrotwin, &now.metrotwin);
         }
         if self.program != now.program {
             return Some("the program is of another build".into());
         }
         if self.renderer != now.renderer {
-            return said("--renderer", &self.renderer.adapter, &now.renderer.adapter);
+            return changed("--renderer", &self.renderer.adapter, &now.renderer.adapter);
         }
         None
     }

@@ -8,20 +8,23 @@ use crate::session::{
 use Kind::{Flag, Int, Real, Reals};
 use Method::{Mono, Paper};
 use nalgebra::Vector3;
+use serde::Serialize;
 use serde_json::{Value, json};
 
 /// One figure.
-#[derive(Debug)]
+#[derive(Debug, Serialize)]
 pub struct Measure {
     /// Name of its column.
     pub name: &'static str,
     /// What its column holds.
+    #[serde(skip)]
     pub kind: Kind,
     /// Its unit; 1 of ratios and counts, `wall s` and the like of what depends on the machine.
     pub unit: &'static str,
     /// What it is.
     pub meaning: &'static str,
     /// Where it comes from; null where a run has none.
+    #[serde(skip)]
     pub of: fn(&Summary, &Fixes) -> Value,
 }
 

@@ -1,20 +1,18 @@
 //! Shards put together.
 
 use super::journal::{self, JOURNAL, Journal};
-use super::worker::template_of;
-use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table, write_whole};
-use crate::scenario::draw::Inputs;
+use super::{INPUTS, Manifest, Result, Row, Shard, Status, Study, StudyError, table, write_whole};
+use crate::scenario::sampling::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Makes one study of all shards below a folder, in that folder, and gives its rows. Nothing is written
 /// unless every shard is there, whole, and of the same study.
-pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
+pub fn merge(folder: &Path) -> Result<Vec<Row>> {
     let shards = shards(folder)?;
     let Some((first_path, first)) = shards.first() else {
-        let what = format!("{} has no folder shard-I-of-N", folder.display());
-        return Err(StudyError::Shards(what));
+        return wrong(format!("{} has no folder shard-I-of-N", folder.display()));
     };
     let mut found = BTreeMap::new();
     let mut rows = Vec::new();
@@ -22,12 +20,11 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
         let runs = (first.runs != manifest.runs).then(|| "its number of runs differs".to_owned());
         if let Some(what) = first.difference(manifest).or(runs) {
             let (a, b) = (first_path.display(), path.display());
-            let what = format!("{a} and {b} are not of one study: {what}");
-            return Err(StudyError::Shards(what));
+            return wrong(format!("{a} and {b} are not of one study: {what}"));
         }
-        let shard = manifest.shard.ok_or_else(|| {
-            StudyError::Shards(format!("{} is a whole study, not a shard", path.display()))
-        })?;
+        let Some(shard) = manifest.shard else {
+            return wrong(format!("{} is a whole study, not a shard", path.display()));
+        };
         let mut of_shard = journal::read(path)?;
         of_shard.retain(|row| row.index < manifest.runs);
         check_whole(path, shard, manifest.runs, &of_shard)?;
@@ -36,22 +33,21 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
     }
     let of = found.values().next().copied().unwrap_or(0);
     if found.values().any(|n| *n != of) {
-        let what = format!("{} holds shards of different numbers", folder.display());
-        return Err(StudyError::Shards(what));
+        let folder = folder.display();
+        return wrong(format!("{folder} holds shards of different numbers"));
     }
     let missing: Vec<String> = (1..=of)
         .filter(|k| !found.contains_key(k))
         .map(|k| format!("{k}/{of}"))
         .collect();
     if !missing.is_empty() {
-        let what = format!(
+        return wrong(format!(
             "{}: shards {} are missing; run them with --shard",
             folder.display(),
             missing.join(", ")
-        );
-        return Err(StudyError::Shards(what));
+        ));
     }
-    // Nobody runs there meanwhile: the journal is locked.
+    // The journal is locked, so that no study runs there meanwhile.
     let (_journal, there) = Journal::open(folder)?;
     let kept = Manifest::read(folder)?;
     check_free(folder, kept.as_ref(), first, &there)?;
@@ -67,13 +63,12 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>, StudyError> {
     write(folder, first_path, &merged, rows)
 }
 
+fn wrong<T>(what: String) -> Result<T> {
+    Err(StudyError::Shards(what))
+}
+
 /// A folder that holds another study is left alone.
-fn check_free(
-    folder: &Path,
-    kept: Option<&Manifest>,
-    merged: &Manifest,
-    rows: &[Row],
-) -> Result<(), StudyError> {
+fn check_free(folder: &Path, kept: Option<&Manifest>, merged: &Manifest, rows: &[Row]) -> Result {
     let what = match kept {
         None => (!rows.is_empty()).then(|| "rows without a manifest".to_owned()),
         Some(kept) => kept.difference(merged),
@@ -83,7 +78,7 @@ fn check_free(
 }
 
 /// Folders of shards, with their manifests.
-fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
+fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
     let failed = |e| StudyError::file(folder, e);
     let mut shards = Vec::new();
     for entry in fs::read_dir(folder).map_err(failed)? {
@@ -103,37 +98,27 @@ fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>, StudyError> {
     Ok(shards)
 }
 
-fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result<(), StudyError> {
+fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result {
     let wanted = (0..runs).filter(|k| shard.holds(*k)).count();
     if let Some(row) = rows.iter().find(|row| !shard.holds(row.index)) {
-        let what = format!(
-            "{}: run {} is not of shard {shard}",
-            path.display(),
-            row.index
-        );
-        return Err(StudyError::Shards(what));
+        let (path, index) = (path.display(), row.index);
+        return wrong(format!("{path}: run {index} is not of shard {shard}"));
     }
     if rows.len() < wanted {
-        let what = format!(
+        return wrong(format!(
             "{} has {} of {wanted} rows; finish it with --shard {shard} --resume",
             path.display(),
             rows.len()
-        );
-        return Err(StudyError::Shards(what));
+        ));
     }
     Ok(())
 }
 
-fn write(
-    folder: &Path,
-    shard: &Path,
-    manifest: &Manifest,
-    mut rows: Vec<Row>,
-) -> Result<Vec<Row>, StudyError> {
+fn write(folder: &Path, shard: &Path, manifest: &Manifest, mut rows: Vec<Row>) -> Result<Vec<Row>> {
     // Sorting keeps the last of a run's rows: one that crashed gives way to any other.
     rows.sort_by_key(|row| row.status != Status::Crashed);
     journal::sort(&mut rows);
-    let (_, template) = template_of(shard)?;
+    let template = Study::open(shard)?.template;
     let failed = |e| StudyError::file(folder, e);
     let inputs = Inputs::of(&template).map_err(failed)?;
     inputs.copy_to(&folder.join(INPUTS)).map_err(failed)?;

@@ -2,7 +2,7 @@
 //! they come to, with how sure that is.
 //!
 //! ```no_run
-//! use metrotwin::scenario::draw::Template;
+//! use metrotwin::scenario::sampling::Template;
 //! use metrotwin::study::{Options, run};
 //!
 //! let template = Template::load("scenarios/studies/led_accuracy.toml".as_ref())?;
@@ -13,7 +13,7 @@
 //!
 //! # How it goes
 //!
-//! Run k depends on the study's seed and k alone ([`scenario::draw`](crate::scenario::draw)), so rows are
+//! Run k depends on the study's seed and k alone ([`scenario::sampling`](crate::scenario::sampling)), so rows are
 //! the same for one worker and many, for shards on other machines, and for a study that was killed and
 //! resumed. Workers are processes of their own, one a core: a software graphics driver starts threads
 //! of its own, and two processes with one each do more than one with two; and a driver that
@@ -26,6 +26,7 @@
 
 mod compare;
 mod digest;
+mod folder;
 mod journal;
 mod manifest;
 mod measures;
@@ -42,22 +43,25 @@ mod worker;
 
 pub use compare::{Comparison, compare};
 pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES};
+pub use folder::Study;
 pub use journal::read as read_rows;
-pub use manifest::{Drawn, INPUTS, MANIFEST, Manifest, Shard};
+pub use manifest::{INPUTS, MANIFEST, Manifest, Shard};
 pub use measures::{Fixes, MEASURES, Measure, measure};
 pub use merge::merge;
-pub use report::{REPORT, report, rows};
+pub use report::{REPORT, report};
 pub use row::{Row, Status};
 pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
 pub use slurm::{Submission, Submitted};
-pub use worker::{Desk, serve, template_of};
+pub use worker::{ScenarioRunner, serve};
 
 use crate::record;
 use crate::scenario::ScenarioError;
-use crate::scenario::draw::{ConditionError, DrawError};
+use crate::scenario::sampling::{ConditionError, SampleError};
 use crate::session::ObserverError;
 use std::io;
 use std::path::{Path, PathBuf};
+
+type Result<T = (), E = StudyError> = std::result::Result<T, E>;
 
 /// Why a study cannot begin or go on. Rows written before are kept.
 #[derive(Debug, thiserror::Error)]
@@ -70,7 +74,7 @@ pub enum StudyError {
         /// What the system says.
         source: io::Error,
     },
-    /// A row that is none.
+    /// A line that is no row.
     #[error(
         "{}, line {line}: {why}; it was written by another program or version: choose another folder",
         path.display()
@@ -99,7 +103,7 @@ pub enum StudyError {
         /// What differs.
         what: String,
     },
-    /// Somebody is at it.
+    /// Another process runs it.
     #[error("another `study run` is at work in {}", .0.display())]
     Busy(PathBuf),
     /// There is no study in a folder.
@@ -108,18 +112,18 @@ pub enum StudyError {
     /// Shards that are not a whole.
     #[error("{0}")]
     Shards(String),
-    /// What Slurm says.
+    /// An error of Slurm's.
     #[error("{0}")]
     Slurm(String),
     /// No run can be drawn.
     #[error(transparent)]
-    Draw(#[from] DrawError),
+    Sample(#[from] SampleError),
     /// An event that cannot be worked out.
     #[error("study.events: {0}")]
     Event(#[from] ConditionError),
-    /// A name that cannot be used.
-    #[error("{0} {1}")]
-    Name(String, String),
+    /// A name or number that cannot be used.
+    #[error("{0}")]
+    Unusable(String),
     /// A name that no interval can be had of.
     #[error("study.stop.when.of: `{0}` is no event of this study and no single figure of a run")]
     NoFigure(String),
@@ -146,7 +150,7 @@ impl StudyError {
     }
 }
 
-fn write_whole(path: &Path, content: &[u8]) -> Result<(), StudyError> {
+fn write_whole(path: &Path, content: &[u8]) -> Result {
     record::write_whole(path, content).map_err(|source| StudyError::file(path, source))
 }
 

@@ -1,7 +1,7 @@
 //! Workers: processes that each run one scenario after the other.
 
-use super::{Row, Status, StudyError};
-use crate::scenario::draw::Template;
+use super::{Result, Row, Status, StudyError};
+use crate::scenario::sampling::Template;
 use std::collections::VecDeque;
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};
@@ -13,14 +13,15 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
 
-/// How often whoever waits for rows is asked whether to go on.
-const PATIENCE: Duration = Duration::from_millis(200);
-/// It reads the study's files before that: a machine that swaps may be slow, but not so slow.
+/// How long to wait for a row before asking whether to go on.
+const ASK_EVERY: Duration = Duration::from_millis(200);
+/// A worker reads the study's files before it is ready: a machine that swaps may be slow, but not so
+/// slow.
 const START_LIMIT: Duration = Duration::from_secs(300);
-/// What a worker says before its first row.
+/// The line that a worker writes before its first row.
 pub const READY: &str = "ready";
-/// Lines of a dead worker's messages that are kept as the reason.
-const LAST_WORDS: usize = 3;
+/// Lines at the end of a dead worker's log that are kept as the reason.
+const LOG_LINES: usize = 3;
 
 /// How workers are started.
 #[derive(Clone, Debug)]
@@ -37,22 +38,25 @@ pub struct Pool<'a> {
     pub run_limit: Duration,
 }
 
-/// What happens while workers are at it.
-pub trait Watch {
-    /// A row has come; `false` ends it all.
-    fn row(&mut self, row: Row) -> Result<bool, StudyError>;
-    /// Asked now and then; `false` begins no more runs.
-    fn go_on(&mut self) -> bool;
+/// How to go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Next {
+    /// As before.
+    GoOn,
+    /// Wait for the runs in flight.
+    BeginNoMore,
+    /// Their rows are not needed either.
+    End,
 }
 
 impl Pool<'_> {
-    /// Runs all indexes; rows come in the order in which they are done.
+    /// Runs all indexes. `next` gets each row when it is done, and is asked now and then without one.
     pub fn work(
         &self,
         template: &Template,
         todo: impl IntoIterator<Item = u64>,
-        watch: &mut impl Watch,
-    ) -> Result<(), StudyError> {
+        mut next: impl FnMut(Option<Row>) -> Result<Next>,
+    ) -> Result {
         let todo = Mutex::new(todo.into_iter().collect::<VecDeque<_>>());
         let halt = AtomicBool::new(false);
         let (rows, arriving) = channel();
@@ -60,27 +64,26 @@ impl Pool<'_> {
             for number in 1..=self.jobs {
                 let (todo, halt, rows) = (&todo, &halt, rows.clone());
                 scope.spawn(move || {
-                    let next = || {
+                    let next_index = || {
                         let halted = halt.load(Ordering::Relaxed);
                         let mut todo = todo.lock().unwrap_or_else(PoisonError::into_inner);
                         todo.pop_front().filter(|_| !halted)
                     };
-                    self.employ(number, template, next, &rows);
+                    self.run_worker(number, template, next_index, &rows);
                 });
             }
             drop(rows);
             let result = loop {
-                match arriving.recv_timeout(PATIENCE) {
-                    Ok(row) => match row.and_then(|row| watch.row(row)) {
-                        Ok(true) => {}
-                        Ok(false) => break Ok(()),
-                        Err(error) => break Err(error),
-                    },
-                    Err(RecvTimeoutError::Timeout) => {}
+                let row = match arriving.recv_timeout(ASK_EVERY) {
+                    Ok(row) => row.map(Some),
+                    Err(RecvTimeoutError::Timeout) => Ok(None),
                     Err(RecvTimeoutError::Disconnected) => break Ok(()),
-                }
-                if !watch.go_on() {
-                    halt.store(true, Ordering::Relaxed);
+                };
+                match row.and_then(&mut next) {
+                    Ok(Next::GoOn) => {}
+                    Ok(Next::BeginNoMore) => halt.store(true, Ordering::Relaxed),
+                    Ok(Next::End) => break Ok(()),
+                    Err(error) => break Err(error),
                 }
             };
             halt.store(true, Ordering::Relaxed);
@@ -88,36 +91,38 @@ impl Pool<'_> {
         })
     }
 
-    /// One worker after the other at one desk: a new one when the last has died.
-    fn employ(
+    /// Keeps one worker running: a new one is started when the last has died.
+    fn run_worker(
         &self,
         number: usize,
         template: &Template,
-        mut next: impl FnMut() -> Option<u64>,
-        rows: &Sender<Result<Row, StudyError>>,
+        mut next_index: impl FnMut() -> Option<u64>,
+        rows: &Sender<Result<Row>>,
     ) {
-        let mut worker = None;
-        while let Some(index) = next() {
-            let at_desk = match worker.take() {
-                Some(worker) => Ok(worker),
-                None => Worker::start(self, number).map_err(StudyError::Worker),
-            };
-            let row = at_desk.map(|mut of: Worker| match of.ask(index, self.run_limit) {
+        let mut running = None;
+        while let Some(index) = next_index() {
+            let worker = running
+                .take()
+                .map_or_else(|| Worker::start(self, number), Ok)
+                .map_err(StudyError::Worker);
+            let row = worker.map(|mut worker| match worker.ask(index, self.run_limit) {
                 Ok(row) => {
-                    worker = Some(of);
+                    running = Some(worker);
                     row
                 }
-                Err(error) => match template.draw(index) {
-                    Ok(draw) => Row::without_figures(&draw, Status::Crashed, of.obituary(&error)),
-                    Err(error) => Row::undrawn(index, &error),
+                Err(error) => match template.sample(index) {
+                    Ok(sample) => {
+                        Row::without_figures(&sample, Status::Crashed, worker.end_reason(&error))
+                    }
+                    Err(error) => Row::not_sampled(index, &error),
                 },
             });
             if rows.send(row).is_err() {
                 return;
             }
         }
-        if let Some(worker) = worker {
-            worker.dismiss();
+        if let Some(worker) = running {
+            worker.finish();
         }
     }
 }
@@ -162,13 +167,12 @@ impl Worker {
             lines,
             log,
         };
-        match worker.line(START_LIMIT) {
-            Ok(line) if line.trim() == READY => Ok(worker),
-            Ok(_) => Err(io::Error::other(
-                worker.obituary(&ErrorKind::InvalidData.into()),
-            )),
-            Err(error) => Err(io::Error::other(worker.obituary(&error))),
-        }
+        let error = match worker.line(START_LIMIT) {
+            Ok(line) if line.trim() == READY => return Ok(worker),
+            Ok(_) => ErrorKind::InvalidData.into(),
+            Err(error) => error,
+        };
+        Err(io::Error::other(worker.end_reason(&error)))
     }
 
     fn ask(&mut self, index: u64, limit: Duration) -> io::Result<Row> {
@@ -187,21 +191,22 @@ impl Worker {
         }
     }
 
-    /// Why it died.
-    fn obituary(mut self, error: &io::Error) -> String {
-        // It may only have said something wrong.
+    /// Ends it after an error, and says why it ended.
+    fn end_reason(mut self, error: &io::Error) -> String {
+        // It may still run, and only have written something wrong.
         self.child.kill().ok();
         let end = match self.child.wait() {
             Ok(status) if error.kind() == ErrorKind::UnexpectedEof => status.to_string(),
             _ => error.to_string(),
         };
-        let said = fs::read_to_string(&self.log).unwrap_or_default();
-        let lines: Vec<_> = said.lines().collect();
-        let last = lines[lines.len().saturating_sub(LAST_WORDS)..].join(" / ");
+        let log = fs::read_to_string(&self.log).unwrap_or_default();
+        let lines: Vec<_> = log.lines().collect();
+        let last = lines[lines.len().saturating_sub(LOG_LINES)..].join(" / ");
         format!("the worker ended ({end}): {last}")
     }
 
-    fn dismiss(mut self) {
+    /// Ends it after its last row; an empty log is removed.
+    fn finish(mut self) {
         drop(self.to);
         self.child.wait().ok();
         if fs::metadata(&self.log).is_ok_and(|log| log.len() == 0) {

@@ -1,7 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
-use crate::scenario::draw::{Draw, DrawError};
+use crate::scenario::sampling::{Sample, SampleError};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -19,18 +19,6 @@ pub enum Status {
     Invalid,
     /// The worker died, or was ended at the limit of a run; `--resume` tries it again.
     Crashed,
-}
-
-impl Status {
-    /// As in files.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Complete => "complete",
-            Self::Failed => "failed",
-            Self::Invalid => "invalid",
-            Self::Crashed => "crashed",
-        }
-    }
 }
 
 /// A run's inputs and figures. Names of values are those of the study's variables, names of figures
@@ -63,32 +51,35 @@ impl Row {
     }
 
     /// Of a run for which nothing could be drawn.
-    pub fn undrawn(index: u64, error: &DrawError) -> Self {
-        let draw = Draw {
+    pub fn not_sampled(index: u64, error: &SampleError) -> Self {
+        let sample = Sample {
             index,
-            ..Draw::default()
+            ..Sample::default()
         };
-        Self::without_figures(&draw, Status::Invalid, error.to_string())
+        Self::without_figures(&sample, Status::Invalid, error.to_string())
     }
 
     /// Of a run that has no figures.
-    pub fn without_figures(draw: &Draw, status: Status, reason: String) -> Self {
+    pub fn without_figures(sample: &Sample, status: Status, reason: String) -> Self {
         let json = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
-        let values = draw.values.iter().map(|(name, v)| (name.clone(), json(v)));
+        let values = sample
+            .values
+            .iter()
+            .map(|(name, v)| (name.clone(), json(v)));
         Self {
-            index: draw.index,
-            seed: draw.seed,
+            index: sample.index,
+            seed: sample.seed,
             status,
             reason: Some(reason),
-            rejected: draw.rejected,
-            ln_weight: draw.ln_weight,
+            rejected: sample.rejected,
+            ln_weight: sample.ln_weight,
             values: values.collect(),
             figures: Map::new(),
         }
     }
 
     /// Of a run that has come to an end.
-    pub fn of(draw: &Draw, summary: &Summary, fixes: &Fixes) -> Self {
+    pub fn of(sample: &Sample, summary: &Summary, fixes: &Fixes) -> Self {
         let (status, reason) = match &summary.end {
             End::Complete => (Status::Complete, None),
             End::Interrupted => (Status::Failed, Some("broken off".to_owned())),
@@ -104,7 +95,7 @@ impl Row {
         Self {
             reason,
             figures: figures.collect(),
-            ..Self::without_figures(draw, status, String::new())
+            ..Self::without_figures(sample, status, String::new())
         }
     }
 
@@ -117,26 +108,26 @@ impl Row {
     /// A list of numbers.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let list = self.figures.get(name).and_then(Value::as_array);
-        list.iter()
-            .flat_map(|l| l.iter())
+        list.into_iter()
+            .flatten()
             .filter_map(Value::as_f64)
             .collect()
     }
 
     /// The first thing in which two rows of one run differ; wall times may.
     pub fn difference(&self, other: &Self) -> Option<String> {
-        let said = |what: &str, a: &dyn fmt::Debug, b: &dyn fmt::Debug| {
+        let differ = |what: &str, a: &dyn fmt::Debug, b: &dyn fmt::Debug| {
             Some(format!("{what}: {a:?} and {b:?}"))
         };
         if self.status != other.status {
-            return said("status", &self.status, &other.status);
+            return differ("status", &self.status, &other.status);
         }
         if self.reason != other.reason {
-            return said("reason", &self.reason, &other.reason);
+            return differ("reason", &self.reason, &other.reason);
         }
         let drawn = |row: &Self| (row.index, row.seed, row.rejected, row.ln_weight.to_bits());
         if drawn(self) != drawn(other) || self.values != other.values {
-            return said("drawn", &self.values, &other.values);
+            return differ("drawn", &self.values, &other.values);
         }
         let compared = MEASURES.iter().filter(|m| !m.is_wall_time());
         let differs = |name: &&str| self.figures.get(*name) != other.figures.get(*name);

@@ -1,10 +1,10 @@
 //! Runs what a study still lacks.
 
 use super::journal::{self, Journal};
-use super::pool::{Pool, Watch};
+use super::pool::{Next, Pool};
 use super::stop::Precision;
-use super::{INPUTS, Manifest, Row, Shard, Status, StudyError, table};
-use crate::scenario::draw::{Inputs, MOST_RUNS, Template};
+use super::{INPUTS, Manifest, Result, Row, Shard, Status, StudyError, table};
+use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
 use std::fs;
@@ -24,11 +24,11 @@ pub struct Options<'a> {
     pub shard: Option<Shard>,
     /// Which renderer.
     pub renderer: RendererChoice,
-    /// A run that takes longer has hung: it is given up, as a row that says so. None of its own: an hour.
+    /// A run that takes longer has hung: it is given up, as a row that says so. Default: an hour.
     pub run_limit: Option<Duration>,
     /// Set from elsewhere to begin no more runs.
     pub stop: Option<&'a AtomicBool>,
-    /// Told how far it is, now and then.
+    /// Called now and then with how far the study is.
     pub progress: Option<&'a dyn Fn(&Progress)>,
 }
 
@@ -53,18 +53,17 @@ const MOST_CHECKED: u64 = 1000;
 const TABLE_EVERY: Duration = Duration::from_secs(60);
 
 /// Says what can be wrong with all runs before the first; gives the precision at which to stop.
-pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, StudyError> {
+pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> {
     // The first run of each combination of swept values.
     for cell in 0..template.cells().min(MOST_CHECKED) {
-        template.draw(cell)?;
+        template.sample(cell)?;
     }
     table::check_names(template)?;
     if template.runs() > MOST_RUNS {
-        let what = format!(
-            "has {} runs, more than {MOST_RUNS}; ask for fewer",
-            template.runs()
-        );
-        return Err(StudyError::Name("the study".into(), what));
+        let runs = template.runs();
+        return Err(StudyError::Unusable(format!(
+            "the study has {runs} runs, more than {MOST_RUNS}; ask for fewer"
+        )));
     }
     let precision = Precision::of(template)?;
     if precision.is_some() && in_shards {
@@ -79,19 +78,50 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>, 
 
 /// Runs what a folder lacks of a study, and gives all its rows in the order of their indexes. The
 /// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
-pub fn run(
-    template: &Template,
-    folder: &Path,
-    options: &Options<'_>,
-) -> Result<Vec<Row>, StudyError> {
+pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<Vec<Row>> {
     let precision = check(template, options.shard.is_some())?;
     let manifest = Manifest::of(template, options.renderer, options.shard)?;
     fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
+    let (journal, rows) = prepare(template, folder, options, &manifest)?;
+
+    let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
+    let is_wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k)) && !done.contains(k);
+    let lacking: Vec<u64> = (0..template.runs()).filter(is_wanted).collect();
+    let now = clock();
+    let mut collector = Collector {
+        template,
+        folder,
+        options,
+        journal,
+        precision,
+        begin: now,
+        table_written: now,
+        checked: 0,
+        before: rows.len() as u64,
+        of: (rows.len() + lacking.len()) as u64,
+        rows,
+    };
+    if !collector.is_precise() {
+        let next = |row| collector.next(row);
+        pool(folder, &manifest, options)?.work(template, lacking, next)?;
+    }
+    let rows = collector.into_rows();
+    table::write(folder, template, &rows)?;
+    Ok(rows)
+}
+
+/// Makes a folder ready for a study, or makes sure that it holds this one; gives the journal and the
+/// rows to keep.
+fn prepare(
+    template: &Template,
+    folder: &Path,
+    options: &Options<'_>,
+    manifest: &Manifest,
+) -> Result<(Journal, Vec<Row>)> {
     let kept = Manifest::read(folder)?;
-    check_same(folder, kept.as_ref(), &manifest)?;
-    // With fewer runs than it has, a study keeps those that it has.
-    let runs = kept.as_ref().map_or(0, |kept| kept.runs).max(manifest.runs);
-    let manifest = Manifest { runs, ..manifest };
+    if let Some(what) = kept.as_ref().and_then(|kept| another_part(kept, manifest)) {
+        return Err(another(folder, what));
+    }
     let (journal, mut rows) = Journal::open(folder)?;
     if kept.is_none() && !rows.is_empty() {
         return Err(another(folder, "rows without a manifest".into()));
@@ -107,46 +137,25 @@ pub fn run(
         let inputs = Inputs::of(template).map_err(unreadable)?;
         inputs.copy_to(&folder.join(INPUTS)).map_err(unreadable)?;
     }
+    // With fewer runs than it has, a study keeps those that it has.
+    let runs = kept.map_or(0, |kept| kept.runs).max(manifest.runs);
+    let manifest = Manifest {
+        runs,
+        ..manifest.clone()
+    };
     manifest.write(folder)?;
-
     // What crashed may have done so for want of memory: it is tried again.
     journal::sort(&mut rows);
     rows.retain(|row| row.status != Status::Crashed);
-    let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
-    let wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k));
-    let lacking: Vec<u64> = (0..template.runs())
-        .filter(wanted)
-        .filter(|k| !done.contains(k))
-        .collect();
-    let mut office = Office::new(
-        template,
-        folder,
-        options,
-        journal,
-        rows,
-        precision,
-        lacking.len(),
-    );
-    if !office.is_known_well_enough() {
-        pool(folder, &manifest, options)?.work(template, lacking, &mut office)?;
-    }
-    let rows = office.rows();
-    table::write(folder, template, &rows)?;
-    Ok(rows)
+    Ok((journal, rows))
 }
 
-fn check_same(folder: &Path, kept: Option<&Manifest>, now: &Manifest) -> Result<(), StudyError> {
-    let Some(kept) = kept else {
-        return Ok(());
-    };
-    let what = kept.difference(now).or_else(|| {
+/// What makes the study of a folder another one, or another part of it.
+fn another_part(kept: &Manifest, now: &Manifest) -> Option<String> {
+    kept.difference(now).or_else(|| {
         let part = |m: &Manifest| m.shard.map_or("the whole".into(), |s| format!("shard {s}"));
         (kept.shard != now.shard).then(|| format!("{} of it, not {}", part(kept), part(now)))
-    });
-    match what {
-        None => Ok(()),
-        Some(what) => Err(another(folder, what)),
-    }
+    })
 }
 
 fn another(folder: &Path, what: String) -> StudyError {
@@ -154,30 +163,21 @@ fn another(folder: &Path, what: String) -> StudyError {
     StudyError::Other { path, what }
 }
 
-fn pool<'a>(
-    folder: &'a Path,
-    manifest: &Manifest,
-    options: &Options<'_>,
-) -> Result<Pool<'a>, StudyError> {
+fn pool<'a>(folder: &'a Path, manifest: &Manifest, options: &Options<'_>) -> Result<Pool<'a>> {
     let cores = available_parallelism().map_or(1, usize::from);
-    let jobs = if options.jobs == 0 {
-        cores
-    } else {
-        options.jobs
-    };
+    // What the manifest says, and nothing else where that fails.
+    let is_plain = manifest.renderer.backend == "cpu";
+    let limit = Duration::from_secs_f64(RUN_LIMIT_S);
     Ok(Pool {
         program: std::env::current_exe().map_err(StudyError::Worker)?,
         folder,
-        // What the manifest says, and nothing else where that fails.
-        renderer: if manifest.renderer.backend == "cpu" {
-            "cpu"
+        renderer: if is_plain { "cpu" } else { "gpu" },
+        jobs: if options.jobs == 0 {
+            cores
         } else {
-            "gpu"
+            options.jobs
         },
-        jobs,
-        run_limit: options
-            .run_limit
-            .unwrap_or(Duration::from_secs_f64(RUN_LIMIT_S)),
+        run_limit: options.run_limit.unwrap_or(limit),
     })
 }
 
@@ -190,8 +190,8 @@ fn clock() -> Instant {
     Instant::now()
 }
 
-/// Takes in the rows.
-struct Office<'a> {
+/// Collects the rows, and says when there are enough.
+struct Collector<'a> {
     template: &'a Template,
     folder: &'a Path,
     options: &'a Options<'a>,
@@ -199,46 +199,22 @@ struct Office<'a> {
     rows: Vec<Row>,
     precision: Option<Precision>,
     begin: Instant,
-    tabled: Instant,
-    /// Rows that the precision has looked at.
-    looked: usize,
+    table_written: Instant,
+    /// Rows whose precision has been checked.
+    checked: usize,
     before: u64,
     of: u64,
 }
 
-impl<'a> Office<'a> {
-    fn new(
-        template: &'a Template,
-        folder: &'a Path,
-        options: &'a Options<'a>,
-        journal: Journal,
-        rows: Vec<Row>,
-        precision: Option<Precision>,
-        lacking: usize,
-    ) -> Self {
-        Self {
-            looked: 0,
-            before: rows.len() as u64,
-            of: (rows.len() + lacking) as u64,
-            template,
-            folder,
-            options,
-            journal,
-            rows,
-            precision,
-            begin: clock(),
-            tabled: clock(),
-        }
-    }
-
-    fn is_known_well_enough(&mut self) -> bool {
+impl Collector<'_> {
+    fn is_precise(&mut self) -> bool {
         journal::sort(&mut self.rows);
-        let (rows, looked) = (&self.rows, &mut self.looked);
-        (self.precision.as_ref()).is_some_and(|p| p.enough(rows, looked).is_some())
+        let (rows, checked) = (&self.rows, &mut self.checked);
+        (self.precision.as_ref()).is_some_and(|p| p.enough(rows, checked).is_some())
     }
 
     /// In order, up to where the study stops.
-    fn rows(mut self) -> Vec<Row> {
+    fn into_rows(mut self) -> Vec<Row> {
         journal::sort(&mut self.rows);
         if let Some(precision) = &self.precision {
             precision.truncate(&mut self.rows);
@@ -246,7 +222,35 @@ impl<'a> Office<'a> {
         self.rows
     }
 
-    fn progress(&self) {
+    fn next(&mut self, row: Option<Row>) -> Result<Next> {
+        let has_come = row.is_some();
+        row.map_or(Ok(()), |row| self.add(row))?;
+        self.show_progress();
+        if has_come && self.is_precise() {
+            return Ok(Next::End);
+        }
+        let after_s = self.template.settings.stop.after_s;
+        let is_late = after_s.is_some_and(|limit| self.begin.elapsed().as_secs_f64() > limit);
+        let is_stopped = self.options.stop.is_some_and(|s| s.load(Ordering::Relaxed));
+        Ok(if is_late || is_stopped {
+            Next::BeginNoMore
+        } else {
+            Next::GoOn
+        })
+    }
+
+    fn add(&mut self, row: Row) -> Result {
+        self.journal.add(&row)?;
+        self.rows.push(row);
+        if self.table_written.elapsed() > TABLE_EVERY {
+            journal::sort(&mut self.rows);
+            table::write(self.folder, self.template, &self.rows)?;
+            self.table_written = clock();
+        }
+        Ok(())
+    }
+
+    fn show_progress(&self) {
         let Some(show) = self.options.progress else {
             return;
         };
@@ -259,27 +263,5 @@ impl<'a> Office<'a> {
             failed: failed as u64,
             per_minute: (done - self.before) as f64 / minutes.max(1e-9),
         });
-    }
-}
-
-impl Watch for Office<'_> {
-    fn row(&mut self, row: Row) -> Result<bool, StudyError> {
-        self.journal.add(&row)?;
-        self.rows.push(row);
-        self.progress();
-        if self.tabled.elapsed() > TABLE_EVERY {
-            journal::sort(&mut self.rows);
-            table::write(self.folder, self.template, &self.rows)?;
-            self.tabled = clock();
-        }
-        Ok(!self.is_known_well_enough())
-    }
-
-    fn go_on(&mut self) -> bool {
-        self.progress();
-        let after_s = self.template.settings.stop.after_s;
-        let late = after_s.is_some_and(|limit| self.begin.elapsed().as_secs_f64() > limit);
-        let stopped = self.options.stop.is_some_and(|s| s.load(Ordering::Relaxed));
-        !late && !stopped
     }
 }

@@ -1,7 +1,7 @@
 //! A study as a Slurm job array: a task a shard, and a job that merges them when all have ended well.
 //! Slurm does the scheduling; here are only two scripts, which can be read before they are handed in.
 
-use super::{StudyError, write_whole};
+use super::{Result, StudyError, write_whole};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ impl Submission {
     }
 
     /// Writes both scripts, and gives their paths.
-    pub fn write(&self) -> Result<[PathBuf; 2], StudyError> {
+    pub fn write(&self) -> Result<[PathBuf; 2]> {
         let folder = self.scripts();
         fs::create_dir_all(&folder).map_err(|e| StudyError::file(&folder, e))?;
         let write = |name: &str, text: String| {
@@ -93,7 +93,7 @@ impl Submission {
     }
 
     /// Hands both in; `wait` comes back when the merge has ended.
-    pub fn submit(&self, wait: bool) -> Result<Submitted, StudyError> {
+    pub fn submit(&self, wait: bool) -> Result<Submitted> {
         let [array, merge] = self.write()?;
         let array = self.sbatch(&array, &[])?;
         let after = format!("--dependency=afterok:{array}");
@@ -104,7 +104,7 @@ impl Submission {
         Ok(Submitted { array, merge })
     }
 
-    fn sbatch(&self, script: &Path, options: &[&str]) -> Result<String, StudyError> {
+    fn sbatch(&self, script: &Path, options: &[&str]) -> Result<String> {
         let output = Command::new("sbatch")
             .arg("--parsable")
             .args(options)
@@ -121,17 +121,22 @@ impl Submission {
             _ => StudyError::Slurm(format!("sbatch: {e}")),
         }
         })?;
-        let said = String::from_utf8_lossy(&output.stdout);
+        let stdout = String::from_utf8_lossy(&output.stdout);
         if !output.status.success() {
             let why = String::from_utf8_lossy(&output.stderr);
-            let why = format!("{} {}", why.trim(), said.trim());
+            let why = format!("{} {}", why.trim(), stdout.trim());
             return Err(StudyError::Slurm(format!(
                 "sbatch {}: {why}",
                 script.display()
             )));
         }
         // `id` or `id;cluster`.
-        Ok(said.trim().split(';').next().unwrap_or_default().to_owned())
+        Ok(stdout
+            .trim()
+            .split(';')
+            .next()
+            .unwrap_or_default()
+            .to_owned())
     }
 }
 

@@ -1,14 +1,13 @@
 //! Stopping when a figure is known well enough, at the same run for any number of workers.
 //!
-//! An interval that was looked at again and again until it was short holds the truth somewhat less often
+//! An interval that was checked at again and again until it was short holds the truth somewhat less often
 //! than it says, the more so the skewer the figure is.
 
-use super::digest::is_weighed;
+use super::digest::is_weighted;
 use super::stats::{Estimate, mean, rate};
-use super::table::events;
-use super::{Measure, Row, StudyError, measure};
+use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Condition, Template};
+use crate::scenario::sampling::{Condition, Template};
 
 /// Runs between two looks.
 const EVERY: usize = 10;
@@ -35,22 +34,19 @@ fn can_be_known(measure: &Measure) -> bool {
 
 impl Precision {
     /// What a study asks for.
-    pub fn of(template: &Template) -> Result<Option<Self>, StudyError> {
+    pub fn of(template: &Template) -> Result<Option<Self>> {
         let Some(when) = &template.settings.stop.when else {
             return Ok(None);
         };
-        if is_weighed(template) {
-            return Err(StudyError::Name(
-                "study.stop.when".into(),
-                "does not go with `propose`: weighed figures have other intervals; leave one of them out"
+        if is_weighted(template) {
+            return Err(StudyError::Unusable(
+                "study.stop.when does not go with `propose`: weighted figures have other intervals; leave \
+                 one of them out"
                     .into(),
             ));
         }
-        let event = events(template)?
-            .into_iter()
-            .find(|(name, _)| *name == when.of);
-        let figure = match event {
-            Some((_, condition)) => Figure::Rate(condition),
+        let figure = match template.events.get(&when.of) {
+            Some(condition) => Figure::Rate(condition.clone()),
             None if measure(&when.of).is_some_and(can_be_known) => Figure::Mean(when.of.clone()),
             None => return Err(StudyError::NoFigure(when.of.clone())),
         };
@@ -61,13 +57,13 @@ impl Precision {
     }
 
     /// After how many of these rows, which are in order, the figure is known. Rows are looked at only
-    /// as far as none is missing. `looked` is how far earlier looks came, and found nothing.
-    pub fn enough(&self, rows: &[Row], looked: &mut usize) -> Option<usize> {
+    /// as far as none is missing. `checked` is how far earlier looks came, and found nothing.
+    pub fn enough(&self, rows: &[Row], checked: &mut usize) -> Option<usize> {
         let gap = rows.iter().zip(0u64..).position(|(row, k)| row.index != k);
         let whole = gap.unwrap_or(rows.len());
-        let looks = (AT_LEAST..=whole).step_by(EVERY).filter(|n| *n > *looked);
+        let looks = (AT_LEAST..=whole).step_by(EVERY).filter(|n| *n > *checked);
         let found = looks.into_iter().find(|n| self.is_known(&rows[..*n]));
-        *looked = whole;
+        *checked = whole;
         found
     }
 

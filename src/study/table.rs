@@ -1,45 +1,71 @@
 //! Rows as a table in Parquet.
 
-use super::{MEASURES, Row, StudyError, measure};
-use crate::record::parquet::{Column, Kind, Table, Value, column};
-use crate::scenario::draw::{Condition, ConditionError, Template, VariableSettings};
-use serde_json::Value as Json;
+use super::{MEASURES, Result, Row, Status, StudyError, measure};
+use crate::record::parquet::{Column, Kind, Table, column};
+use crate::scenario::sampling::{Condition, ConditionError, Template, VariableSettings};
+use serde::Serialize;
+use serde_json::{Map, Value};
 use std::path::Path;
 
 /// Name of the file in a study's folder.
 pub const TABLE: &str = "rows.parquet";
 
-/// Events of a study, parsed, by name.
-pub fn events(template: &Template) -> Result<Vec<(String, Condition)>, ConditionError> {
-    let known =
-        |name: &str| template.settings.variables.contains_key(name) || measure(name).is_some();
-    let events = template.settings.events.iter();
-    let parse = |(name, text): (&String, &String)| {
-        let condition = Condition::parse(text)?;
-        let unknown = condition.names().find(|n| !known(n)).map(str::to_owned);
-        match unknown {
-            Some(unknown) => Err(ConditionError::Unknown(text.clone(), unknown)),
-            None => Ok((name.clone(), condition)),
-        }
-    };
-    events.map(parse).collect()
+/// Columns that every table has, before what is drawn.
+const OWN: [Column; 6] = [
+    column("index", Kind::Int, "1", "which run"),
+    column("seed", Kind::Int, "1", "seed of its scenario"),
+    column(
+        "status",
+        Kind::Text,
+        "",
+        "complete, failed, invalid or crashed",
+    ),
+    column("reason", Kind::Text, "", "why, where it is not complete"),
+    column(
+        "rejected",
+        Kind::Int,
+        "1",
+        "draws before it that did not meet the conditions",
+    ),
+    column(
+        "weight",
+        Kind::Real,
+        "1",
+        "of importance sampling, 1 without",
+    ),
+];
+
+/// [`OWN`] columns, and the others by name.
+#[derive(Serialize)]
+struct Cells<'a> {
+    index: u64,
+    seed: u64,
+    status: Status,
+    reason: Option<&'a str>,
+    rejected: u32,
+    weight: f64,
+    #[serde(flatten)]
+    others: Map<String, Value>,
 }
 
-/// Columns that every table has, before what is drawn.
-const OWN: [&str; 6] = ["index", "seed", "status", "reason", "rejected", "weight"];
-
-/// Whether events can be told, and no name stands for two columns.
-pub fn check_names(template: &Template) -> Result<(), StudyError> {
-    events(template)?;
+/// Whether events name what there is, and no name stands for two columns.
+pub fn check_names(template: &Template) -> Result {
     let settings = &template.settings;
-    let taken = |name: &&String| OWN.contains(&name.as_str()) || measure(name).is_some();
+    let known = |name: &str| settings.variables.contains_key(name) || measure(name).is_some();
+    for condition in template.events.values() {
+        if let Some(name) = condition.names().find(|name| !known(name)) {
+            let text = condition.text().to_owned();
+            return Err(ConditionError::Unknown(text, name.to_owned()).into());
+        }
+    }
+    let is_taken =
+        |name: &&String| OWN.iter().any(|c| c.name == name.as_str()) || measure(name).is_some();
     let mut names = settings.variables.keys().chain(settings.events.keys());
-    match names.find(taken) {
+    match names.find(is_taken) {
         None => Ok(()),
-        Some(name) => Err(StudyError::Name(
-            format!("study: `{name}`"),
-            "is a column of every study; give the variable or event a name of its own".into(),
-        )),
+        Some(name) => Err(StudyError::Unusable(format!(
+            "study: `{name}` is a column of every study; give the variable or event a name of its own"
+        ))),
     }
 }
 
@@ -51,119 +77,82 @@ impl Row {
 }
 
 /// Writes all rows, in order.
-pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result<(), StudyError> {
-    let events = events(template)?;
-    let mut columns = vec![
-        column("index", Kind::Int, "1", "which run"),
-        column("seed", Kind::Int, "1", "seed of its scenario"),
-        column(
-            "status",
-            Kind::Text,
-            "",
-            "complete, failed, invalid or crashed",
-        ),
-        column("reason", Kind::Text, "", "why, where it is not complete"),
-        column(
-            "rejected",
-            Kind::Int,
-            "1",
-            "draws before it that did not meet the conditions",
-        ),
-        column(
-            "weight",
-            Kind::Real,
-            "1",
-            "of importance sampling, 1 without",
-        ),
-    ];
+pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result {
     let variables = template.settings.variables.iter().map(|(name, variable)| {
         let keys = variable.keys.join(", ");
-        let unit = unit_of(name, variable);
         let meaning = format!("drawn: {}", if keys.is_empty() { name } else { &keys });
         Column {
             name: name.clone().into(),
             kind: kind(rows.iter().filter_map(|r| r.values.get(name))),
-            unit: unit.into(),
+            unit: unit_of(name, variable).into(),
             meaning: meaning.into(),
         }
     });
-    columns.extend(variables);
-    let named = events.iter().map(|(name, condition)| Column {
+    let variables: Vec<_> = variables.collect();
+    let events = template.events.iter().map(|(name, condition)| Column {
         name: name.clone().into(),
         kind: Kind::Flag,
         unit: "1".into(),
         meaning: format!("event: {}", condition.text()).into(),
     });
-    columns.extend(named);
     let measures = MEASURES
         .iter()
         .map(|m| column(m.name, m.kind, m.unit, m.meaning));
-    let own = OWN.len();
-    let drawn = own + template.settings.variables.len();
-    columns.extend(measures);
+    let columns = OWN.into_iter().chain(variables.iter().cloned());
+    let columns: Vec<_> = columns.chain(events).chain(measures).collect();
 
     let mut table = Table::create(folder.join(TABLE), &columns)?;
     for row in rows {
-        let mut cells = vec![
-            (row.index as i64).into(),
-            (row.seed as i64).into(),
-            row.status.name().into(),
-            row.reason.clone().into(),
-            row.rejected.into(),
-            row.ln_weight.exp().into(),
-        ];
-        let variables = columns[own..drawn].iter();
-        cells.extend(variables.map(|c| cell(c.kind, row.values.get(&*c.name))));
-        cells.extend(events.iter().map(|(_, event)| row.happened(event).into()));
-        cells.extend(
-            MEASURES
-                .iter()
-                .map(|m| cell(m.kind, row.figures.get(m.name))),
-        );
-        table.push(cells)?;
+        let mut others = row.figures.clone();
+        for column in &variables {
+            if let Some(value) = row.values.get(&*column.name) {
+                others.insert(column.name.clone().into_owned(), cell(column.kind, value));
+            }
+        }
+        for (name, event) in &template.events {
+            others.insert(name.clone(), row.happened(event).into());
+        }
+        table.push(&Cells {
+            index: row.index,
+            seed: row.seed,
+            status: row.status,
+            reason: row.reason.as_deref(),
+            rejected: row.rejected,
+            weight: row.ln_weight.exp(),
+            others,
+        })?;
     }
     table.close()?;
     Ok(())
 }
 
 /// The kind that holds all values.
-fn kind<'a>(values: impl Iterator<Item = &'a Json> + Clone) -> Kind {
-    let all = |is: fn(&Json) -> bool| values.clone().all(is);
+fn kind<'a>(values: impl Iterator<Item = &'a Value> + Clone) -> Kind {
+    let all = |is: fn(&Value) -> bool| values.clone().all(is);
     if values.clone().next().is_none() {
         Kind::Real
-    } else if all(Json::is_i64) {
+    } else if all(Value::is_i64) {
         Kind::Int
-    } else if all(Json::is_number) {
+    } else if all(Value::is_number) {
         Kind::Real
-    } else if all(Json::is_boolean) {
+    } else if all(Value::is_boolean) {
         Kind::Flag
     } else {
         Kind::Text
     }
 }
 
-fn cell(kind: Kind, value: Option<&Json>) -> Value {
-    let Some(value) = value else {
-        return Value::Null;
-    };
-    match kind {
-        Kind::Int => value.as_i64().into(),
-        Kind::Real => value.as_f64().into(),
-        Kind::Flag => value.as_bool().into(),
-        Kind::Text => value
-            .as_str()
-            .map_or_else(|| value.to_string(), str::to_owned)
-            .into(),
-        Kind::Reals => {
-            let list = value.as_array();
-            list.map(|l| l.iter().filter_map(Json::as_f64).collect::<Vec<_>>())
-                .into()
-        }
+/// Among texts, what is none stands as it would in a file.
+fn cell(kind: Kind, value: &Value) -> Value {
+    match value {
+        Value::String(_) => value.clone(),
+        _ if kind == Kind::Text => value.to_string().into(),
+        _ => value.clone(),
     }
 }
 
-/// The unit of a variable: what its own name ends on tells, or the key that it sets as it is drawn. One
-/// that is rescaled to a key with a unit has another, which nobody said.
+/// The unit of a variable: that of its own name's end, else that of the key that it sets. Where it is
+/// rescaled to a key with a unit, its own unit is unknown.
 pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
     let of_key = variable.keys.first().and_then(|key| unit_in(key));
     match (unit_in(name), of_key) {
@@ -173,7 +162,7 @@ pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
     }
 }
 
-/// The unit that the end of a key tells.
+/// The unit by the end of a key.
 fn unit_in(key: &str) -> Option<&'static str> {
     let last = key.rsplit('.').next().unwrap_or(key);
     let last = last.split('[').next().unwrap_or(last);

@@ -1,11 +1,10 @@
 //! The process that runs scenarios for a study: indexes in, rows out.
 
-use super::manifest::{INPUTS, Manifest};
 use super::measures::Fixes;
 use super::pool::READY;
-use super::{Row, Status, StudyError};
+use super::{Result, Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
-use crate::scenario::draw::{Draw, Template};
+use crate::scenario::sampling::{Sample, Template};
 use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
 use crate::twin::render::Renderer;
 use std::io::{self, BufRead, Write};
@@ -14,23 +13,15 @@ use std::path::Path;
 use std::sync::mpsc::channel;
 use std::thread;
 
-/// The study that a folder holds, from the copies of its inputs.
-pub fn template_of(folder: &Path) -> Result<(Manifest, Template), StudyError> {
-    let manifest = Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
-    let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
-    template.settings.runs = (manifest.runs / template.cells()) as u32;
-    Ok((manifest, template))
-}
-
 /// Answers every index with a row, a line each, until the input ends; then the process ends too.
 pub fn serve(
     folder: &Path,
     renderer: RendererChoice,
     input: impl BufRead + Send + 'static,
     mut output: impl Write,
-) -> Result<(), StudyError> {
-    let (_, template) = template_of(folder)?;
-    let mut desk = Desk::new(renderer);
+) -> Result {
+    let template = Study::open(folder)?.template;
+    let mut runner = ScenarioRunner::new(renderer);
     let failed = |source| StudyError::file(Path::new("the worker's pipe"), source);
     writeln!(output, "{READY}")
         .and_then(|()| output.flush())
@@ -41,7 +32,7 @@ pub fn serve(
             .trim()
             .parse()
             .map_err(|e| failed(io::Error::other(e)))?;
-        let row = serde_json::to_string(&desk.run(&template, index));
+        let row = serde_json::to_string(&runner.run(&template, index));
         let row = row.map_err(|e| failed(e.into()))?;
         writeln!(output, "{row}")
             .and_then(|()| output.flush())
@@ -50,8 +41,8 @@ pub fn serve(
     Ok(())
 }
 
-/// The lines of the input. Whoever asks closes it after the last row; when it ends before, nobody waits
-/// for the run at hand any more, as after a kill, and the process ends with it.
+/// The lines of the input. The pool closes it after the last row. When it ends before, as after a kill,
+/// no row is wanted any more, and the process ends.
 fn lines_while_wanted(
     input: impl BufRead + Send + 'static,
 ) -> impl Iterator<Item = io::Result<String>> {
@@ -68,12 +59,12 @@ fn lines_while_wanted(
 }
 
 /// Runs one scenario after the other, with one renderer.
-pub struct Desk {
+pub struct ScenarioRunner {
     choice: RendererChoice,
     renderer: Option<Box<dyn Renderer>>,
 }
 
-impl Desk {
+impl ScenarioRunner {
     /// Before the first run.
     pub fn new(choice: RendererChoice) -> Self {
         Self {
@@ -84,30 +75,30 @@ impl Desk {
 
     /// Runs one run of a study, without a recording.
     pub fn run(&mut self, template: &Template, index: u64) -> Row {
-        let draw = match template.draw(index) {
-            Ok(draw) => draw,
-            Err(error) => return Row::undrawn(index, &error),
+        let sample = match template.sample(index) {
+            Ok(sample) => sample,
+            Err(error) => return Row::not_sampled(index, &error),
         };
-        let run = AssertUnwindSafe(|| self.run_drawn(template, &draw));
+        let run = AssertUnwindSafe(|| self.run_sample(template, &sample));
         catch_unwind(run).unwrap_or_else(|panic| {
-            // Who knows what state it is in.
+            // Its state may be broken.
             self.renderer = None;
-            let said = panic.downcast_ref::<String>().map(String::as_str);
-            let said = said.or_else(|| panic.downcast_ref::<&str>().copied());
-            let reason = format!("panic: {}", said.unwrap_or("without a word"));
-            Row::without_figures(&draw, Status::Failed, reason)
+            let message = panic.downcast_ref::<String>().map(String::as_str);
+            let message = message.or_else(|| panic.downcast_ref::<&str>().copied());
+            let reason = format!("panic: {}", message.unwrap_or("without a word"));
+            Row::without_figures(&sample, Status::Failed, reason)
         })
     }
 
-    fn run_drawn(&mut self, template: &Template, draw: &Draw) -> Row {
-        let without = |status, reason| Row::without_figures(draw, status, reason);
-        let scenario = match template.scenario(draw) {
+    fn run_sample(&mut self, template: &Template, sample: &Sample) -> Row {
+        let without = |status, reason| Row::without_figures(sample, status, reason);
+        let scenario = match template.scenario(sample) {
             Ok(scenario) => scenario,
             Err(error) => return without(Status::Invalid, error.to_string()),
         };
         let mut fixes = Fixes::default();
         match self.session(&scenario, &mut fixes) {
-            Ok(summary) => Row::of(draw, &summary, &fixes),
+            Ok(summary) => Row::of(sample, &summary, &fixes),
             Err(error) => {
                 self.renderer = None;
                 without(Status::Failed, error.to_string())

@@ -1,4 +1,4 @@
-"""Figures that src/study/stats/tests.rs and src/scenario/draw hold against: run with scipy 1.x.
+"""Figures that src/study/stats/tests.rs and src/scenario/sampling hold against: run with scipy 1.x.
 
     pip install scipy && python3 tests/studies/figures.py
 """

@@ -1,32 +1,39 @@
 //! Obstacles as COCO has them (<https://cocodataset.org/#format-data>): images, boxes, and masks
 //! as run lengths.
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 /// Categories, their ids counting from 1.
 pub(super) const CATEGORIES: [&str; 4] = ["obstacle", "cable", "worker", "train"];
 
 /// One thing in one picture.
+#[derive(Serialize)]
 pub(super) struct Annotation {
     pub id: i64,
     pub image_id: i64,
-    /// Index into [`CATEGORIES`].
-    pub category: usize,
-    pub mask: Mask,
-    /// Name and number of the instance, the same in all frames.
+    pub category_id: usize,
+    /// Left, top, width, height.
+    pub bbox: [usize; 4],
+    pub area: u32,
+    pub segmentation: Mask,
+    pub iscrowd: u8,
     pub name: String,
-    pub instance: u32,
+    /// The same in all frames.
+    pub instance_id: u32,
     pub visible_share: Option<f64>,
 }
 
 /// Pixels of one thing, as runs down the columns: first of those outside, then in, then out...
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub(super) struct Mask {
     /// Height and width.
     size: [usize; 2],
     counts: Vec<u32>,
     /// First column and row, and one after the last ones.
+    #[serde(skip)]
     bounds: Option<[usize; 4]>,
+    #[serde(skip)]
     area: u32,
 }
 
@@ -82,31 +89,18 @@ impl Mask {
 }
 
 /// The file's content.
-pub(super) fn document(info: Value, images: Vec<Value>, annotations: &[Annotation]) -> Value {
+pub(super) fn document(scenario: &str, images: &[Value], annotations: &[Annotation]) -> Value {
     let categories = (1..).zip(CATEGORIES);
     let categories = categories.map(|(id, name)| json!({"id": id, "name": name}));
     json!({
-        "info": info,
+        "info": {
+            "description": format!("metrotwin frames of {scenario}"),
+            "version": env!("CARGO_PKG_VERSION"),
+        },
         "images": images,
-        "annotations": annotations.iter().filter_map(annotation).collect::<Vec<_>>(),
+        "annotations": annotations,
         "categories": categories.collect::<Vec<_>>(),
     })
-}
-
-fn annotation(a: &Annotation) -> Option<Value> {
-    let [left, top, right, bottom] = a.mask.bounds?;
-    Some(json!({
-        "id": a.id,
-        "image_id": a.image_id,
-        "category_id": a.category + 1,
-        "bbox": [left, top, right - left, bottom - top],
-        "area": a.mask.area,
-        "segmentation": {"size": a.mask.size, "counts": a.mask.counts},
-        "iscrowd": 0,
-        "name": a.name,
-        "instance_id": a.instance,
-        "visible_share": a.visible_share,
-    }))
 }
 
 #[cfg(test)]

@@ -1,14 +1,12 @@
-//! Files of a data set: each is written under a temporary name and renamed when it is whole.
+//! Files of a data set.
 
-use crate::session::ObserverError;
+use crate::record::whole_files::{Result, broken, finish, part_name, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::ops::Deref;
-use std::path::{Path, PathBuf};
-
-use crate::record::stream::{failed, part_name as part_of};
+use std::path::Path;
 
 /// Files that a data set has, besides [`FOLDERS`].
 pub const FILES: [&str; 8] = [
@@ -42,7 +40,7 @@ pub fn clear(folder: &Path) -> io::Result<()> {
     };
     for name in FILES {
         let path = folder.join(name);
-        gone(fs::remove_file(part(&path)))?;
+        gone(fs::remove_file(part_name(&path)))?;
         gone(fs::remove_file(path))?;
     }
     for name in FOLDERS {
@@ -51,34 +49,8 @@ pub fn clear(folder: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Name of a file while it is written.
-pub(super) fn part(path: &Path) -> PathBuf {
-    part_of(path)
-}
-
-/// An error at a file.
-pub(super) fn broken<E: Into<Box<dyn std::error::Error + Send + Sync>>>(
-    path: &Path,
-) -> impl FnOnce(E) -> ObserverError + use<E> {
-    failed(format!("writing {}", path.display()))
-}
-
-/// Gives a file its name.
-pub(super) fn finish(path: &Path) -> Result<(), ObserverError> {
-    fs::rename(part(path), path).map_err(broken(path))
-}
-
-/// Writes a whole file.
-pub(super) fn write(path: &Path, content: &[u8]) -> Result<(), ObserverError> {
-    fs::write(part(path), content).map_err(broken(path))?;
-    finish(path)
-}
-
 /// A picture of 8 or 16 bits as PNG, without loss.
-pub(super) fn write_png<T, C>(
-    path: &Path,
-    image: &ImageBuffer<Luma<T>, C>,
-) -> Result<(), ObserverError>
+pub(super) fn write_png<T, C>(path: &Path, image: &ImageBuffer<Luma<T>, C>) -> Result
 where
     Luma<T>: PixelWithColorType<Subpixel = T>,
     T: image::Primitive,
@@ -89,7 +61,7 @@ where
     let encoder =
         PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::Adaptive);
     image.write_with_encoder(encoder).map_err(broken(path))?;
-    write(path, &bytes)
+    write_whole(path, &bytes).map_err(broken(path))
 }
 
 /// Numbers as numpy reads them: little-endian, rows first.
@@ -98,7 +70,7 @@ pub(super) fn write_npy(
     path: &Path,
     shape: &[usize],
     numbers: impl Iterator<Item = f32>,
-) -> Result<(), ObserverError> {
+) -> Result {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     let shape = shape.join(", ");
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}");
@@ -107,7 +79,7 @@ pub(super) fn write_npy(
     header += &" ".repeat(spaces);
     header.push('\n');
     let write = || -> io::Result<()> {
-        let mut file = BufWriter::with_capacity(1 << 18, File::create(part(path))?);
+        let mut file = BufWriter::with_capacity(1 << 18, File::create(part_name(path))?);
         file.write_all(b"\x93NUMPY\x01\x00")?;
         file.write_all(&(header.len() as u16).to_le_bytes())?;
         file.write_all(header.as_bytes())?;

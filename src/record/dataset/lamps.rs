@@ -1,8 +1,7 @@
 //! Lamps as the world has them and a camera sees them: outline, light row by row, phase of the
 //! code. Nothing here comes from the stack.
 
-use crate::record::parquet::Kind::{Int, Real, Reals, Text};
-use crate::record::parquet::{Column, Value, column};
+use crate::record::parquet::table_rows;
 use crate::track::LampSite;
 use crate::twin::lights::LampLight;
 use crate::twin::render::Job;
@@ -18,174 +17,150 @@ const PLACES: u32 = 64;
 /// Lamps nearer to the camera's plane than this are left out.
 const NEAREST_M: f64 = 0.1;
 
-pub(super) const COLUMNS: [Column; 27] = [
-    column("frame_id", Int, "", "the frame, as in frames.parquet"),
-    column("uid", Text, "", "name of the lamp on the air, line-lamp"),
-    column("line", Int, "", "line number, the first part of the name"),
-    column("lamp", Int, "", "lamp number, the second part of the name"),
-    column(
-        "chips",
-        Text,
-        "",
-        "one period of the signal, 1 on and 0 off, as sent",
-    ),
-    column(
-        "chip_s",
-        Real,
-        "s",
-        "length of a chip by the lamp's own clock",
-    ),
-    column(
-        "u_px",
-        Real,
-        "px",
-        "centre of the disc, in the row that sees it",
-    ),
-    column("v_px", Real, "px", "the same, row"),
-    column(
-        "outline_u_px",
-        Reals,
-        "px",
-        "64 places of the rim, each in the row that sees it: a polygon whose corners are on the outline",
-    ),
-    column("outline_v_px", Reals, "px", "the same, rows"),
-    column("depth_m", Real, "m", "of the centre along the optical axis"),
-    column("distance_m", Real, "m", "from the camera to the centre"),
-    column(
-        "off_normal_deg",
-        Real,
-        "deg",
-        "angle at the lamp between its normal and the camera",
-    ),
-    column("x_m", Real, "m", "centre in the world: east"),
-    column("y_m", Real, "m", "north"),
-    column("z_m", Real, "m", "up"),
-    column("radius_m", Real, "m", "of the disc"),
-    column("chainage_m", Real, "m", "of the lamp, as it really hangs"),
-    column(
-        "first_row",
-        Int,
-        "px",
-        "uppermost row of the image that its outline touches",
-    ),
-    column("last_row", Int, "px", "lowest one"),
-    column(
-        "first_column",
-        Int,
-        "px",
-        "leftmost column of the image that its outline touches",
-    ),
-    column("last_column", Int, "px", "rightmost one"),
-    column(
-        "chip",
-        Int,
-        "",
-        "chip that is being sent when first_row opens, counting from 0",
-    ),
-    column(
-        "chip_phase",
-        Real,
-        "",
-        "share of that chip that is over by then",
-    ),
-    column(
-        "chips_per_row",
-        Real,
-        "",
-        "chips from the opening of a row to that of the row below; negative where the sensor is read upwards",
-    ),
-    column(
-        "on_share",
-        Reals,
-        "",
-        "mean light in the exposure of each row from first_row to last_row, with rise, fall, mains ripple and ageing: 1 is a good lamp that is on throughout",
-    ),
-    column(
-        "visible_share",
-        Real,
-        "",
-        "share of the disc that is in the image and not hidden by anything",
-    ),
-];
-
-/// A row for each lamp whose disc is in the image at least in part.
-pub(super) fn rows(
-    frame_id: i64,
-    job: &Job,
-    sight: &Projection<'_>,
-    labeller: &Labeller,
-    sites: &[LampSite],
-) -> Vec<Vec<Value>> {
-    let lamps = labeller.lamps().iter().zip(sites);
-    lamps
-        .filter_map(|(lamp, site)| row(frame_id, job, sight, labeller, (lamp, site)))
-        .collect()
+table_rows! {
+    /// A row of `lamps.parquet`.
+    struct LampRow {
+        /// the frame, as in frames.parquet
+        frame_id: i64, "";
+        /// name of the lamp on the air, line-lamp
+        uid: String, "";
+        /// line number, the first part of the name
+        line: u32, "";
+        /// lamp number, the second part of the name
+        lamp: u32, "";
+        /// one period of the signal, 1 on and 0 off, as sent
+        chips: String, "";
+        /// length of a chip by the lamp's own clock
+        chip_s: f64, "s";
+        /// centre of the disc, in the row that sees it
+        u_px: f64, "px";
+        /// the same, row
+        v_px: f64, "px";
+        /// 64 places of the rim, each in the row that sees it: a polygon whose corners are on the
+        /// outline
+        outline_u_px: Vec<f64>, "px";
+        /// the same, rows
+        outline_v_px: Vec<f64>, "px";
+        /// of the centre along the optical axis
+        depth_m: f64, "m";
+        /// from the camera to the centre
+        distance_m: f64, "m";
+        /// angle at the lamp between its normal and the camera
+        off_normal_deg: f64, "deg";
+        /// centre in the world: east
+        x_m: f64, "m";
+        /// north
+        y_m: f64, "m";
+        /// up
+        z_m: f64, "m";
+        /// of the disc
+        radius_m: f64, "m";
+        /// of the lamp, as it really hangs
+        chainage_m: f64, "m";
+        /// uppermost row of the image that its outline touches
+        first_row: u32, "px";
+        /// lowest one
+        last_row: u32, "px";
+        /// leftmost column of the image that its outline touches
+        first_column: u32, "px";
+        /// rightmost one
+        last_column: u32, "px";
+        /// chip that is being sent when first_row opens, counting from 0
+        chip: i64, "";
+        /// share of that chip that is over by then
+        chip_phase: f64, "";
+        /// chips from the opening of a row to that of the row below; negative where the sensor is
+        /// read upwards
+        chips_per_row: f64, "";
+        /// mean light in the exposure of each row from first_row to last_row, with rise, fall,
+        /// mains ripple and ageing: 1 is a good lamp that is on throughout
+        on_share: Vec<f64>, "";
+        /// share of the disc that is in the image and not hidden by anything
+        visible_share: f64, "";
+    }
 }
 
-fn row(
-    frame_id: i64,
-    job: &Job,
-    sight: &Projection<'_>,
-    labeller: &Labeller,
-    (lamp, site): (&LampLight, &LampSite),
-) -> Option<Vec<Value>> {
-    let eye = |v: f64| Point3::from(sight.pose(v).translation.vector);
-    // The far ones first, and cheaply: a line has hundreds.
-    if (lamp.centre - eye(0.0)).norm() > LAMP_SIGHT_M + 1.0 {
-        return None;
+impl LampRow {
+    /// Of each lamp whose disc is in the image at least in part.
+    pub fn all(
+        frame_id: i64,
+        job: &Job,
+        sight: &Projection<'_>,
+        labeller: &Labeller,
+        sites: &[LampSite],
+    ) -> Vec<Self> {
+        let lamps = labeller.lamps().iter().zip(sites);
+        lamps
+            .filter_map(|(lamp, site)| Self::new(frame_id, job, sight, labeller, (lamp, site)))
+            .collect()
     }
-    let lamp = &lamp.at(job.time);
-    let centre = sight.of(&lamp.centre).filter(|c| c.depth_m > NEAREST_M)?;
-    let way = eye(centre.pixel.y) - lamp.centre;
-    let cos = lamp.facing.dot(&way) / way.norm();
-    if cos <= 0.0 || way.norm() > LAMP_SIGHT_M {
-        return None;
+
+    fn new(
+        frame_id: i64,
+        job: &Job,
+        sight: &Projection<'_>,
+        labeller: &Labeller,
+        (lamp, site): (&LampLight, &LampSite),
+    ) -> Option<Self> {
+        let eye = |v: f64| Point3::from(sight.pose(v).translation.vector);
+        // The far ones first, and cheaply: a line has hundreds.
+        if (lamp.centre - eye(0.0)).norm() > LAMP_SIGHT_M + 1.0 {
+            return None;
+        }
+        let lamp = &lamp.at(job.time);
+        let centre = sight.of(&lamp.centre).filter(|c| c.depth_m > NEAREST_M)?;
+        let way = eye(centre.pixel.y) - lamp.centre;
+        let cos = lamp.facing.dot(&way) / way.norm();
+        if cos <= 0.0 || way.norm() > LAMP_SIGHT_M {
+            return None;
+        }
+        let outline: Vec<Seen> = (0..CORNERS)
+            .map(|k| sight.of(&on_disc(lamp, 1.0, TAU * f64::from(k) / f64::from(CORNERS))))
+            .collect::<Option<_>>()?;
+        let (outline_u_px, outline_v_px): (Vec<f64>, Vec<f64>) =
+            outline.iter().map(|s| (s.pixel.x, s.pixel.y)).unzip();
+        let camera = &sight.view.camera;
+        let [first_column, last_column] = covered(&outline_u_px, camera.intrinsics.width_px)?;
+        let [first_row, last_row] = covered(&outline_v_px, camera.intrinsics.height_px)?;
+        let shutter = &camera.shutter;
+        let open_s = |v: u32| shutter.row_open(sight.view.start, f64::from(v)).secs();
+        let (wave, light) = (&lamp.waveform, lamp.curve());
+        let on_share = (first_row..=last_row).map(|v| {
+            let open_s = open_s(v);
+            lamp.level * light.mean(open_s, open_s + shutter.exposure_s)
+        });
+        let sent = (open_s(first_row) - wave.phase_s) / wave.chip_s;
+        let chips = (0..wave.frame.len).map(|k| if wave.frame.is_on(k) { '1' } else { '0' });
+        Some(Self {
+            frame_id,
+            uid: site.uid.to_string(),
+            line: site.uid.line.into(),
+            lamp: site.uid.lamp.into(),
+            chips: chips.collect(),
+            chip_s: wave.chip_s,
+            u_px: centre.pixel.x,
+            v_px: centre.pixel.y,
+            outline_u_px,
+            outline_v_px,
+            depth_m: centre.depth_m,
+            distance_m: way.norm(),
+            off_normal_deg: cos.min(1.0).acos().to_degrees(),
+            x_m: lamp.centre.x,
+            y_m: lamp.centre.y,
+            z_m: lamp.centre.z,
+            radius_m: lamp.radius_m,
+            chainage_m: site.chainage_m,
+            first_row,
+            last_row,
+            first_column,
+            last_column,
+            chip: sent.floor().rem_euclid(f64::from(wave.frame.len)) as i64,
+            chip_phase: sent - sent.floor(),
+            chips_per_row: shutter.row_step_s() / wave.chip_s,
+            on_share: on_share.collect(),
+            visible_share: visible_share(lamp, job, sight, labeller),
+        })
     }
-    let outline: Vec<Seen> = (0..CORNERS)
-        .map(|k| sight.of(&on_disc(lamp, 1.0, TAU * f64::from(k) / f64::from(CORNERS))))
-        .collect::<Option<_>>()?;
-    let (us, vs): (Vec<f64>, Vec<f64>) = outline.iter().map(|s| (s.pixel.x, s.pixel.y)).unzip();
-    let camera = &sight.view.camera;
-    let columns = covered(&us, camera.intrinsics.width_px)?;
-    let rows = covered(&vs, camera.intrinsics.height_px)?;
-    let shutter = &camera.shutter;
-    let open_s = |v: u32| shutter.row_open(sight.view.start, f64::from(v)).secs();
-    let (wave, light) = (&lamp.waveform, lamp.curve());
-    let on_share = (rows[0]..=rows[1]).map(|v| {
-        let open_s = open_s(v);
-        lamp.level * light.mean(open_s, open_s + shutter.exposure_s)
-    });
-    let sent = (open_s(rows[0]) - wave.phase_s) / wave.chip_s;
-    let chips = (0..wave.frame.len).map(|k| if wave.frame.is_on(k) { '1' } else { '0' });
-    Some(vec![
-        frame_id.into(),
-        site.uid.to_string().into(),
-        u32::from(site.uid.line).into(),
-        u32::from(site.uid.lamp).into(),
-        chips.collect::<String>().into(),
-        wave.chip_s.into(),
-        centre.pixel.x.into(),
-        centre.pixel.y.into(),
-        us.into(),
-        vs.into(),
-        centre.depth_m.into(),
-        way.norm().into(),
-        cos.min(1.0).acos().to_degrees().into(),
-        lamp.centre.x.into(),
-        lamp.centre.y.into(),
-        lamp.centre.z.into(),
-        lamp.radius_m.into(),
-        site.chainage_m.into(),
-        rows[0].into(),
-        rows[1].into(),
-        columns[0].into(),
-        columns[1].into(),
-        (sent.floor().rem_euclid(f64::from(wave.frame.len)) as i64).into(),
-        (sent - sent.floor()).into(),
-        (shutter.row_step_s() / wave.chip_s).into(),
-        on_share.collect::<Vec<_>>().into(),
-        visible_share(lamp, job, sight, labeller).into(),
-    ])
 }
 
 /// A place on the disc, at a share of its radius.
@@ -228,11 +203,7 @@ fn visible_share(lamp: &LampLight, job: &Job, sight: &Projection<'_>, labeller: 
 }
 
 #[cfg(test)]
-#[allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "a test fails by panicking"
-)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::super::clean::clean;
     use super::*;
@@ -255,28 +226,9 @@ mod tests {
     }
 
     /// What the table says of the lamps in a view of a job.
-    fn seen(scene: &Scene, job: &Job) -> Vec<Vec<Value>> {
+    fn seen(scene: &Scene, job: &Job) -> Vec<LampRow> {
         let sight = Projection::new(&job.views[0], job.time);
-        rows(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
-    }
-
-    fn value<'a>(row: &'a [Value], name: &str) -> &'a Value {
-        &row[COLUMNS.iter().position(|c| c.name == name).unwrap()]
-    }
-
-    fn real(row: &[Value], name: &str) -> f64 {
-        match value(row, name) {
-            Value::Real(x) => *x,
-            Value::Int(x) => *x as f64,
-            other => panic!("{name}: {other:?}"),
-        }
-    }
-
-    fn reals<'a>(row: &'a [Value], name: &str) -> &'a [f64] {
-        match value(row, name) {
-            Value::Reals(list) => list,
-            other => panic!("{name}: {other:?}"),
-        }
+        LampRow::all(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
     }
 
     /// Area and centroid of a polygon.
@@ -318,8 +270,8 @@ mod tests {
             let image = renderer.collect_raw().unwrap().remove(0);
             let sensor = &job.views[0].sensor;
             for row in seen(&scene, &job) {
-                let [u0, u1, v0, v1] = ["first_column", "last_column", "first_row", "last_row"]
-                    .map(|name| real(&row, name) as u32);
+                let (u0, u1) = (row.first_column, row.last_column);
+                let (v0, v1) = (row.first_row, row.last_row);
                 let whole = u0 > 3 && u1 < 1276 && v0 > 3 && v1 < 716;
                 if !whole || v1 - v0 < 25 {
                     continue;
@@ -334,8 +286,7 @@ mod tests {
                         most = most.max(dn);
                     }
                 }
-                let (us, vs) = (reals(&row, "outline_u_px"), reals(&row, "outline_v_px"));
-                let (area, centroid) = moments(us, vs);
+                let (area, centroid) = moments(&row.outline_u_px, &row.outline_v_px);
                 let off = [u_sum / light - centroid[0], v_sum / light - centroid[1]];
                 assert!(off[0].hypot(off[1]) < 0.03, "{s_m} m: {off:?}");
                 assert!(
@@ -369,14 +320,12 @@ mod tests {
             let lamps = seen(&scene, &job);
             assert!(!lamps.is_empty());
             for row in lamps {
-                let Value::Text(chips) = value(&row, "chips") else {
-                    panic!("chips are text");
-                };
-                let chips: Vec<f64> = chips.bytes().map(|b| f64::from(b - b'0')).collect();
-                let begin = real(&row, "chip") + real(&row, "chip_phase");
-                let open = exposure_s / real(&row, "chip_s");
-                for (k, share) in reals(&row, "on_share").iter().enumerate() {
-                    let from = begin + k as f64 * real(&row, "chips_per_row");
+                let chips = row.chips.bytes();
+                let chips: Vec<f64> = chips.map(|b| f64::from(b - b'0')).collect();
+                let begin = row.chip as f64 + row.chip_phase;
+                let open = exposure_s / row.chip_s;
+                for (k, share) in row.on_share.iter().enumerate() {
+                    let from = begin + k as f64 * row.chips_per_row;
                     let n = 2000;
                     let on = (0..n).map(|i| {
                         let x = from + open * (f64::from(i) + 0.5) / f64::from(n);
@@ -397,16 +346,14 @@ mod tests {
             views: vec![view(100.4)],
             ..Job::default()
         };
-        let largest = |rows: &[Vec<Value>]| {
-            let by_depth = |a: &&Vec<Value>, b: &&Vec<Value>| {
-                real(a, "depth_m").total_cmp(&real(b, "depth_m"))
-            };
-            rows.iter().min_by(by_depth).cloned().unwrap()
+        let nearest = |rows: Vec<LampRow>| {
+            let by_depth = |a: &LampRow, b: &LampRow| a.depth_m.total_cmp(&b.depth_m);
+            rows.into_iter().min_by(by_depth).unwrap()
         };
-        let free = largest(&seen(&scene, &job));
-        assert!((real(&free, "visible_share") - 1.0).abs() < 1e-9);
+        let free = nearest(seen(&scene, &job));
+        assert!((free.visible_share - 1.0).abs() < 1e-9);
         let pose = job.views[0].motion.poses[0];
-        let lamp = Point3::new(real(&free, "x_m"), real(&free, "y_m"), real(&free, "z_m"));
+        let lamp = Point3::new(free.x_m, free.y_m, free.z_m);
         let half_way = nalgebra::center(&lamp, &pose.translation.vector.into());
         job.bodies.push(Body {
             shape: Shape::Sphere(0.4),
@@ -415,6 +362,6 @@ mod tests {
             albedo: 0.5,
             luminance_cd_m2: 0.0,
         });
-        assert!(real(&largest(&seen(&scene, &job)), "visible_share").abs() < 1e-9);
+        assert!(nearest(seen(&scene, &job)).visible_share.abs() < 1e-9);
     }
 }

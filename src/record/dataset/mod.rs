@@ -48,26 +48,29 @@ mod readme;
 mod take;
 
 pub use files::{clear, is_empty};
-pub use plan::{NoSuchPart, Part, Parts, Plan};
+pub use plan::{LabelKind, LabelKinds, Plan, UnknownLabel};
 
-use super::stream::failed;
 use crate::bus::TrainId;
-use crate::record::parquet::{Column, Table, Value};
+use crate::record::parquet::{Column, Table};
+use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
-use crate::scenario::draw::sha256;
-use crate::session::{self, Event, Exposure, Observer, ObserverError, Opening, Source, TrainPoint};
+use crate::scenario::sampling::sha256;
+use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};
 use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::Labeller;
 use crate::twin::render::{Job, Renderer};
-use files::{FOLDERS, write};
+use files::FOLDERS;
+use frame::{FrameRow, ImageRow};
 use image::GrayImage;
+use lamps::LampRow;
+use obstacles::ObstacleRow;
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use take::Taken;
+use take::LastFrame;
 
 /// Where a data set comes from, to be written down with it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -90,16 +93,16 @@ pub struct DataSet<'a> {
     period_s: f64,
     cameras: Vec<Camera>,
     /// Frames whose images are on their way.
-    waiting: Vec<Shot>,
+    waiting: Vec<ExposedFrame>,
     tables: Option<Tables>,
-    frames: Vec<Vec<Value>>,
+    frames: Vec<FrameRow>,
     images: Vec<serde_json::Value>,
     annotations: Vec<coco::Annotation>,
     enough: &'a AtomicBool,
     complete: bool,
 }
 
-/// What is said of the whole set.
+/// What holds for the whole set.
 struct About {
     scenario: String,
     description: String,
@@ -131,11 +134,12 @@ struct Camera {
     /// No more are wanted.
     over: bool,
     /// The last frame, whose flow is still to come.
-    last: Option<Taken>,
+    last: Option<LastFrame>,
 }
 
 /// A frame that has been taken, until its images come.
-struct Shot {
+#[derive(Clone)]
+struct ExposedFrame {
     source: Source,
     number: u32,
     job: Arc<Job>,
@@ -195,20 +199,18 @@ impl<'a> DataSet<'a> {
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
         let bench = scenario.bench.is_some();
         let rides = bench || !scenario.physics.trains.is_empty();
-        let rig = scenario.rig().into_iter();
-        let rig = rig.filter(|_| rides).flat_map(|_| EYES);
+        let rig = scenario
+            .rig()
+            .into_iter()
+            .filter(|_| rides)
+            .flat_map(|_| EYES);
         let devices = scenario.wayside.iter().filter(|_| !bench);
         let devices = devices.map(|w| w.calibration.name.clone());
         rig.map(str::to_owned).chain(devices).collect()
     }
 
-    fn table(
-        &self,
-        part: Part,
-        name: &str,
-        columns: &[Column],
-    ) -> Result<Option<Table>, ObserverError> {
-        let wanted = self.plan.has(part);
+    fn table(&self, label: LabelKind, name: &str, columns: &[Column]) -> Result<Option<Table>> {
+        let wanted = self.plan.has(label);
         wanted
             .then(|| Table::create(self.out.join(name), columns))
             .transpose()
@@ -232,7 +234,7 @@ impl<'a> DataSet<'a> {
             camera.over |= self.plan.is_over(start, camera.taken);
         }
         if wanted {
-            self.waiting.push(Shot {
+            self.waiting.push(ExposedFrame {
                 source: exposure.source,
                 number: exposure.number,
                 job: Arc::new(exposure.job.clone()),
@@ -242,26 +244,19 @@ impl<'a> DataSet<'a> {
         }
     }
 
-    /// The frame of these images, if it is wanted. Frames before it whose images have not come are
-    /// lost.
-    fn delivered(&mut self, source: Source, number: u32) -> Option<Shot> {
-        let lost = |shot: &Shot| shot.source == source && shot.number < number;
-        self.waiting.retain(|shot| !lost(shot));
-        let own = |shot: &Shot| shot.source == source && shot.number == number;
-        let k = self.waiting.iter().position(own)?;
-        Some(self.waiting.remove(k))
-    }
-
-    fn images(
-        &mut self,
-        source: Source,
-        number: u32,
-        images: &[&GrayImage],
-    ) -> Result<(), ObserverError> {
-        let Some(shot) = self.delivered(source, number) else {
-            return Ok(());
-        };
-        self.take(&shot, images)
+    /// Takes the frame of these images, if it is wanted. Frames before it whose images have not come
+    /// are lost.
+    fn images(&mut self, source: Source, number: u32, images: &[&GrayImage]) -> Result {
+        let is_lost = |f: &ExposedFrame| f.source == source && f.number < number;
+        self.waiting.retain(|frame| !is_lost(frame));
+        let is_own = |f: &ExposedFrame| f.source == source && f.number == number;
+        match self.waiting.iter().position(is_own) {
+            Some(k) => {
+                let frame = self.waiting.remove(k);
+                self.take(&frame, images)
+            }
+            None => Ok(()),
+        }
     }
 
     /// Ends the run once all images that are wanted have come.
@@ -272,16 +267,21 @@ impl<'a> DataSet<'a> {
         }
     }
 
-    fn write_json(&self, name: &str, value: &serde_json::Value) -> Result<(), ObserverError> {
+    fn write(&self, name: &str, text: &str) -> Result {
+        let path = self.out.join(name);
+        write_whole(&path, text.as_bytes()).map_err(broken(&path))
+    }
+
+    fn write_json(&self, name: &str, value: &serde_json::Value) -> Result {
         let text = serde_json::to_string_pretty(value).map_err(failed("writing JSON"))?;
-        write(&self.out.join(name), format!("{text}\n").as_bytes())
+        self.write(name, &format!("{text}\n"))
     }
 
     fn meta(&self) -> serde_json::Value {
         let about = &self.about;
         let cameras = self.cameras.iter();
         let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
-        let parts = self.plan.parts.0.iter().map(|part| part.word());
+        let labels = self.plan.labels.0.iter().map(|label| label.word());
         let finite = |s: f64| s.is_finite().then_some(s);
         json!({
             "format": "metrotwin frames",
@@ -300,7 +300,7 @@ impl<'a> DataSet<'a> {
                 "from_s": self.plan.from_s,
                 "to_s": finite(self.plan.to_s),
                 "limit": self.plan.limit,
-                "labels": parts.collect::<Vec<_>>(),
+                "labels": labels.collect::<Vec<_>>(),
             },
         })
     }
@@ -312,7 +312,7 @@ const RIG: Source = Source::Rig(TrainId(0));
 const EYES: [&str; 2] = ["left", "right"];
 
 impl Observer for DataSet<'_> {
-    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+    fn open(&mut self, opening: &Opening<'_>) -> Result {
         let camera = |name: &str, source, view, chainage_m| Camera {
             name: name.to_owned(),
             source,
@@ -324,8 +324,7 @@ impl Observer for DataSet<'_> {
             over: false,
             last: None,
         };
-        let first = opening.first();
-        let rig = first.and_then(|train| train.rig);
+        let rig = opening.first().and_then(|train| train.rig);
         let eyes = rig.iter().flat_map(|_| EYES.iter().enumerate());
         let eyes = eyes.map(|(k, name)| camera(name, RIG, k, None));
         let devices = opening.wayside.iter().enumerate();
@@ -334,22 +333,26 @@ impl Observer for DataSet<'_> {
         self.cameras = eyes.chain(devices).collect();
         for camera in self.cameras.iter().filter(|c| c.wanted) {
             for folder in FOLDERS {
-                let part = folder.parse::<Parts>();
-                if folder == "images" || part.is_ok_and(|p| p.0.is_subset(&self.plan.parts.0)) {
+                let label = folder.parse::<LabelKinds>();
+                if folder == "images" || label.is_ok_and(|l| l.0.is_subset(&self.plan.labels.0)) {
                     let folder = self.out.join(folder).join(super::slug(&camera.name));
                     fs::create_dir_all(folder).map_err(failed("making a folder"))?;
                 }
             }
         }
         self.tables = Some(Tables {
-            rows: self.table(Part::Rows, "rows.parquet", &frame::ROWS)?,
-            lamps: self.table(Part::Lamps, "lamps.parquet", &lamps::COLUMNS)?,
-            obstacles: self.table(Part::Obstacles, "obstacles.parquet", &obstacles::COLUMNS)?,
+            rows: self.table(LabelKind::Rows, "rows.parquet", ImageRow::COLUMNS)?,
+            lamps: self.table(LabelKind::Lamps, "lamps.parquet", LampRow::COLUMNS)?,
+            obstacles: self.table(
+                LabelKind::Obstacles,
+                "obstacles.parquet",
+                ObstacleRow::COLUMNS,
+            )?,
         });
         Ok(())
     }
 
-    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+    fn observe(&mut self, event: &Event<'_>) -> Result {
         match *event {
             Event::Exposure(exposure) => self.expose(exposure),
             Event::Pair(TrainId(0), pair, ..) => {
@@ -366,7 +369,7 @@ impl Observer for DataSet<'_> {
     }
 
     /// Also of a run that was broken off: what has been taken is a whole, smaller set.
-    fn close(&mut self) -> Result<(), ObserverError> {
+    fn close(&mut self) -> Result {
         let Some(tables) = self.tables.take() else {
             return Ok(());
         };
@@ -376,27 +379,19 @@ impl Observer for DataSet<'_> {
         {
             table.close()?;
         }
-        let mut frames = Table::create(self.out.join("frames.parquet"), &frame::COLUMNS)?;
+        let mut frames = Table::create(self.out.join("frames.parquet"), FrameRow::COLUMNS)?;
         for row in &self.frames {
-            frames.push(row.clone())?;
+            frames.push(row)?;
         }
         frames.close()?;
         let meta = self.meta();
-        if self.plan.has(Part::Obstacles) {
-            let images = std::mem::take(&mut self.images);
-            let info = json!({"description": format!("metrotwin frames of {}", self.about.scenario),
-                "version": env!("CARGO_PKG_VERSION")});
-            self.write_json(
-                "coco.json",
-                &coco::document(info, images, &self.annotations),
-            )?;
+        if self.plan.has(LabelKind::Obstacles) {
+            let set = coco::document(&self.about.scenario, &self.images, &self.annotations);
+            self.write_json("coco.json", &set)?;
         }
         let text = readme::of(&self.about.scenario, &self.plan, &meta);
-        write(&self.out.join("README.md"), text.as_bytes())?;
-        write(
-            &self.out.join("scenario.toml"),
-            self.about.inputs.scenario.as_bytes(),
-        )?;
+        self.write("README.md", &text)?;
+        self.write("scenario.toml", &self.about.inputs.scenario)?;
         self.write_json("meta.json", &meta)
     }
 }

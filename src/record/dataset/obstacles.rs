@@ -2,8 +2,7 @@
 //! space, what is hidden.
 
 use super::coco::Mask;
-use crate::record::parquet::Kind::{Flag, Int, Real, Text};
-use crate::record::parquet::{Column, Value, column};
+use crate::record::parquet::table_rows;
 use crate::track::{Alignment, Gauge};
 use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, BodyOwner};
@@ -14,98 +13,84 @@ use image::{ImageBuffer, Luma};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
-pub(super) const COLUMNS: [Column; 35] = [
-    column("frame_id", Int, "", "the frame, as in frames.parquet"),
-    column(
-        "instance_id",
-        Int,
-        "",
-        "who it is, the same in all frames; the value of its pixels in mask/",
-    ),
-    column("name", Text, "", "as in the scenario"),
-    column(
-        "kind",
-        Text,
-        "",
-        "obstacle, cable, worker or train (one car)",
-    ),
-    column("visible_px", Int, "px", "pixels that show it"),
-    column(
-        "left_px",
-        Int,
-        "px",
-        "first column of the visible pixels; null where none",
-    ),
-    column("top_px", Int, "px", "first row"),
-    column("right_px", Int, "px", "last column + 1"),
-    column("bottom_px", Int, "px", "last row + 1"),
-    column(
-        "whole_left_px",
-        Real,
-        "px",
-        "the same of the whole thing, as if nothing hid it and the image had no frame; null where it reaches beside the camera",
-    ),
-    column("whole_top_px", Real, "px", "first row"),
-    column("whole_right_px", Real, "px", "last column + 1"),
-    column("whole_bottom_px", Real, "px", "last row + 1"),
-    column("whole_px", Real, "px", "pixels of the whole"),
-    column(
-        "visible_share",
-        Real,
-        "",
-        "of its pixels in the frame, those that nothing hides",
-    ),
-    column(
-        "truncation",
-        Real,
-        "",
-        "share of the whole that is out of the frame",
-    ),
-    column(
-        "camera_x_m",
-        Real,
-        "m",
-        "centre of the box in the camera's axes (right, down, forward), in the middle of the frame",
-    ),
-    column("camera_y_m", Real, "m", "down"),
-    column("camera_z_m", Real, "m", "forward: its depth"),
-    column(
-        "x_m",
-        Real,
-        "m",
-        "centre of the box in the world (east, north, up), in the middle of the frame",
-    ),
-    column("y_m", Real, "m", "north"),
-    column("z_m", Real, "m", "up"),
-    column(
-        "qx",
-        Real,
-        "",
-        "attitude of the box, world_from_box: of a single solid its own axes, of others (workers, cables) along the line, left, up",
-    ),
-    column("qy", Real, "", "the quaternion's y"),
-    column("qz", Real, "", "its z"),
-    column("qw", Real, "", "its real part"),
-    column("length_m", Real, "m", "of the box along its x"),
-    column("width_m", Real, "m", "along its y"),
-    column("height_m", Real, "m", "along its z"),
-    column("chainage_m", Real, "m", "of the box's centre"),
-    column("lateral_m", Real, "m", "left of the centreline"),
-    column("above_rail_m", Real, "m", "above top of rail"),
-    column("speed_mps", Real, "m/s", "of its fastest part"),
-    column(
-        "in_gauge",
-        Flag,
-        "",
-        "whether any of it is inside the structure gauge; null for trains",
-    ),
-    column(
-        "distance_m",
-        Real,
-        "m",
-        "from the camera to the box's centre",
-    ),
-];
+table_rows! {
+    /// A row of `obstacles.parquet`.
+    struct ObstacleRow {
+        /// the frame, as in frames.parquet
+        frame_id: i64, "";
+        /// who it is, the same in all frames; the value of its pixels in mask/
+        instance_id: u32, "";
+        /// as in the scenario
+        name: String, "";
+        /// obstacle, cable, worker or train (one car)
+        kind: &'static str, "";
+        /// pixels that show it
+        visible_px: u32, "px";
+        /// first column of the visible pixels; null where none
+        left_px: Option<usize>, "px";
+        /// first row
+        top_px: Option<usize>, "px";
+        /// last column + 1
+        right_px: Option<usize>, "px";
+        /// last row + 1
+        bottom_px: Option<usize>, "px";
+        /// the same of the whole thing, as if nothing hid it and the image had no frame; null where
+        /// it reaches beside the camera
+        whole_left_px: Option<f64>, "px";
+        /// first row
+        whole_top_px: Option<f64>, "px";
+        /// last column + 1
+        whole_right_px: Option<f64>, "px";
+        /// last row + 1
+        whole_bottom_px: Option<f64>, "px";
+        /// pixels of the whole
+        whole_px: Option<f64>, "px";
+        /// of its pixels in the frame, those that nothing hides
+        visible_share: Option<f64>, "";
+        /// share of the whole that is out of the frame
+        truncation: Option<f64>, "";
+        /// centre of the box in the camera's axes (right, down, forward), in the middle of the
+        /// frame
+        camera_x_m: f64, "m";
+        /// down
+        camera_y_m: f64, "m";
+        /// forward: its depth
+        camera_z_m: f64, "m";
+        /// centre of the box in the world (east, north, up), in the middle of the frame
+        x_m: f64, "m";
+        /// north
+        y_m: f64, "m";
+        /// up
+        z_m: f64, "m";
+        /// attitude of the box, world_from_box: of a single solid its own axes, of others (workers,
+        /// cables) along the line, left, up
+        qx: f64, "";
+        /// the quaternion's y
+        qy: f64, "";
+        /// its z
+        qz: f64, "";
+        /// its real part
+        qw: f64, "";
+        /// of the box along its x
+        length_m: f64, "m";
+        /// along its y
+        width_m: f64, "m";
+        /// along its z
+        height_m: f64, "m";
+        /// of the box's centre
+        chainage_m: f64, "m";
+        /// left of the centreline
+        lateral_m: f64, "m";
+        /// above top of rail
+        above_rail_m: f64, "m";
+        /// of its fastest part
+        speed_mps: f64, "m/s";
+        /// whether any of it is inside the structure gauge; null for trains
+        in_gauge: Option<bool>, "";
+        /// from the camera to the box's centre
+        distance_m: f64, "m";
+    }
+}
 
 /// All bodies of one owner.
 pub(super) struct Instance<'a> {
@@ -211,73 +196,67 @@ pub(super) fn picture(
     image
 }
 
-/// A row, and the share of the instance in the frame that nothing hides.
-pub(super) struct Sighting {
-    pub row: Vec<Value>,
-    pub visible_share: Option<f64>,
-}
-
-/// An instance's row, where any of it is in the frame.
-pub(super) fn row(
-    frame_id: i64,
-    job: &Job,
-    sight: &Projection<'_>,
-    line: (&Alignment, f64),
-    instance: &Instance<'_>,
-) -> Option<Sighting> {
-    let bodies: Vec<&Body> = instance.bodies.iter().map(|k| &job.bodies[*k]).collect();
-    let extent = whole(&bodies, sight);
-    let visible = instance.mask.area();
-    if visible == 0 && extent.is_none_or(|w| w.in_frame < 1.0) {
-        return None;
+impl ObstacleRow {
+    /// Of an instance of which any is in the frame.
+    pub fn new(
+        frame_id: i64,
+        job: &Job,
+        sight: &Projection<'_>,
+        line: (&Alignment, f64),
+        instance: &Instance<'_>,
+    ) -> Option<Self> {
+        let bodies: Vec<&Body> = instance.bodies.iter().map(|k| &job.bodies[*k]).collect();
+        let extent = whole(&bodies, sight);
+        let visible_px = instance.mask.area();
+        if visible_px == 0 && extent.is_none_or(|w| w.in_frame < 1.0) {
+            return None;
+        }
+        let edge = |k: usize| instance.mask.bounds().map(|b| b[k]);
+        let of_whole = |get: fn(&Whole) -> f64| extent.as_ref().map(get);
+        let space = Space::of(&bodies, sight, line);
+        let centre = space.pose.translation.vector;
+        let [qx, qy, qz, qw] = space.pose.rotation.coords.into();
+        let [chainage_m, lateral_m, above_rail_m] = space.on_line;
+        let speeds = bodies.iter().map(|b| b.velocity_mps.norm());
+        let is_car = matches!(instance.owner, BodyOwner::Car(..));
+        Some(Self {
+            frame_id,
+            instance_id: instance.id,
+            name: instance.name.to_owned(),
+            kind: super::coco::CATEGORIES[instance.category],
+            visible_px,
+            left_px: edge(0),
+            top_px: edge(1),
+            right_px: edge(2),
+            bottom_px: edge(3),
+            whole_left_px: of_whole(|w| w.low.x),
+            whole_top_px: of_whole(|w| w.low.y),
+            whole_right_px: of_whole(|w| w.high.x + 1.0),
+            whole_bottom_px: of_whole(|w| w.high.y + 1.0),
+            whole_px: of_whole(|w| w.pixels),
+            visible_share: visible_share(visible_px, extent.as_ref()),
+            truncation: of_whole(|w| 1.0 - w.in_frame / w.pixels),
+            camera_x_m: space.in_camera.x,
+            camera_y_m: space.in_camera.y,
+            camera_z_m: space.in_camera.z,
+            x_m: centre.x,
+            y_m: centre.y,
+            z_m: centre.z,
+            qx,
+            qy,
+            qz,
+            qw,
+            length_m: space.size_m.x,
+            width_m: space.size_m.y,
+            height_m: space.size_m.z,
+            chainage_m,
+            lateral_m,
+            above_rail_m,
+            speed_mps: speeds.fold(0.0, f64::max),
+            in_gauge: (!is_car).then_some(space.in_gauge),
+            distance_m: space.in_camera.coords.norm(),
+        })
     }
-    let bounds = instance.mask.bounds();
-    let bound = |k: usize| Value::from(bounds.map(|b| b[k] as i64));
-    let of_whole = |get: fn(&Whole) -> f64| Value::from(extent.as_ref().map(get));
-    let space = Space::of(&bodies, sight, line);
-    let (centre, attitude) = (space.pose.translation.vector, space.pose.rotation.coords);
-    let speeds = bodies.iter().map(|b| b.velocity_mps.norm());
-    let visible_share = visible_share(visible, extent.as_ref());
-    let row = vec![
-        frame_id.into(),
-        instance.id.into(),
-        instance.name.into(),
-        super::coco::CATEGORIES[instance.category].into(),
-        visible.into(),
-        bound(0),
-        bound(1),
-        bound(2),
-        bound(3),
-        of_whole(|w| w.low.x),
-        of_whole(|w| w.low.y),
-        of_whole(|w| w.high.x + 1.0),
-        of_whole(|w| w.high.y + 1.0),
-        of_whole(|w| w.pixels),
-        visible_share.into(),
-        of_whole(|w| 1.0 - w.in_frame / w.pixels),
-        space.in_camera.x.into(),
-        space.in_camera.y.into(),
-        space.in_camera.z.into(),
-        centre.x.into(),
-        centre.y.into(),
-        centre.z.into(),
-        attitude.x.into(),
-        attitude.y.into(),
-        attitude.z.into(),
-        attitude.w.into(),
-        space.size_m.x.into(),
-        space.size_m.y.into(),
-        space.size_m.z.into(),
-        space.on_line[0].into(),
-        space.on_line[1].into(),
-        space.on_line[2].into(),
-        speeds.fold(0.0, f64::max).into(),
-        (!matches!(instance.owner, BodyOwner::Car(..)))
-            .then_some(space.in_gauge)
-            .into(),
-        space.in_camera.coords.norm().into(),
-    ];
-    Some(Sighting { row, visible_share })
 }
 
 /// Of the pixels in the frame, those that show it.

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 /// What a frame comes with, besides its image and its row in `frames.parquet`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Part {
+pub enum LabelKind {
     /// Digital numbers of the converter.
     Raw,
     /// The image without flaws.
@@ -24,7 +24,7 @@ pub enum Part {
     Obstacles,
 }
 
-impl Part {
+impl LabelKind {
     /// All, with the words that name them.
     pub const ALL: [(&'static str, Self); 8] = [
         ("raw", Self::Raw),
@@ -39,12 +39,12 @@ impl Part {
 
     /// Its word.
     pub fn word(self) -> &'static str {
-        let named = Self::ALL.iter().find(|(_, part)| *part == self);
+        let named = Self::ALL.iter().find(|(_, label)| *label == self);
         named.map_or("", |(word, _)| word)
     }
 
     /// It needs the surface of every pixel.
-    fn by_rays(self) -> bool {
+    fn needs_rays(self) -> bool {
         matches!(
             self,
             Self::Depth | Self::Mask | Self::Flow | Self::Obstacles
@@ -52,40 +52,40 @@ impl Part {
     }
 }
 
-/// A word that is none of [`Part::ALL`].
+/// A word that is none of [`LabelKind::ALL`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there are no labels `{0}`; give raw, clean, depth, mask, flow, rows, lamps, obstacles, all or none"
 )]
-pub struct NoSuchPart(String);
+pub struct UnknownLabel(String);
 
-/// A list of parts as a user writes it: words between commas, or `all`, or `none`.
+/// A list of labels as a user writes it: words between commas, or `all`, or `none`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Parts(pub BTreeSet<Part>);
+pub struct LabelKinds(pub BTreeSet<LabelKind>);
 
-impl FromStr for Parts {
-    type Err = NoSuchPart;
+impl FromStr for LabelKinds {
+    type Err = UnknownLabel;
 
-    fn from_str(text: &str) -> Result<Self, NoSuchPart> {
+    fn from_str(text: &str) -> Result<Self, UnknownLabel> {
         match text.trim() {
             "all" => return Ok(Self::default()),
             "none" => return Ok(Self(BTreeSet::new())),
             _ => {}
         }
         let words = text.split(',').map(str::trim);
-        let part = |word: &str| {
-            let named = Part::ALL.iter().find(|(name, _)| *name == word);
+        let label = |word: &str| {
+            let named = LabelKind::ALL.iter().find(|(name, _)| *name == word);
             named
-                .map(|(_, part)| *part)
-                .ok_or_else(|| NoSuchPart(word.to_owned()))
+                .map(|(_, label)| *label)
+                .ok_or_else(|| UnknownLabel(word.to_owned()))
         };
-        words.map(part).collect::<Result<_, _>>().map(Self)
+        words.map(label).collect::<Result<_, _>>().map(Self)
     }
 }
 
-impl Default for Parts {
+impl Default for LabelKinds {
     fn default() -> Self {
-        Self(Part::ALL.iter().map(|(_, part)| *part).collect())
+        Self(LabelKind::ALL.iter().map(|(_, label)| *label).collect())
     }
 }
 
@@ -103,7 +103,7 @@ pub struct Plan {
     /// Names of the cameras; all where empty.
     pub cameras: Vec<String>,
     /// What of each.
-    pub parts: Parts,
+    pub labels: LabelKinds,
 }
 
 impl Default for Plan {
@@ -114,19 +114,19 @@ impl Default for Plan {
             to_s: f64::INFINITY,
             limit: None,
             cameras: Vec::new(),
-            parts: Parts::default(),
+            labels: LabelKinds::default(),
         }
     }
 }
 
 impl Plan {
-    /// Whether a part is wanted.
-    pub fn has(&self, part: Part) -> bool {
-        self.parts.0.contains(&part)
+    /// Whether a label is wanted.
+    pub fn has(&self, label: LabelKind) -> bool {
+        self.labels.0.contains(&label)
     }
 
     pub(super) fn needs_rays(&self) -> bool {
-        self.parts.0.iter().any(|part| part.by_rays())
+        self.labels.0.iter().any(|label| label.needs_rays())
     }
 
     pub(super) fn has_camera(&self, name: &str) -> bool {
@@ -151,19 +151,19 @@ impl Plan {
 mod tests {
     use super::*;
 
-    /// Fails where a part cannot be named, or a wrong word passes.
+    /// Fails where a label cannot be named, or a wrong word passes.
     #[test]
-    fn lists_of_parts() {
-        let parts = |text: &str| text.parse::<Parts>();
-        assert_eq!(parts("all").unwrap(), Parts::default());
-        assert!(parts("none").unwrap().0.is_empty());
-        for (word, part) in Part::ALL {
-            assert_eq!(parts(word).unwrap().0, BTreeSet::from([part]));
+    fn lists_of_labels() {
+        let labels = |text: &str| text.parse::<LabelKinds>();
+        assert_eq!(labels("all").unwrap(), LabelKinds::default());
+        assert!(labels("none").unwrap().0.is_empty());
+        for (word, part) in LabelKind::ALL {
+            assert_eq!(labels(word).unwrap().0, BTreeSet::from([part]));
             assert_eq!(part.word(), word);
         }
-        assert_eq!(parts("mask, depth").unwrap().0.len(), 2);
+        assert_eq!(labels("mask, depth").unwrap().0.len(), 2);
         assert!(
-            parts("mask,dept")
+            labels("mask,dept")
                 .unwrap_err()
                 .to_string()
                 .contains("`dept`")

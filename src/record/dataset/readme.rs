@@ -1,15 +1,18 @@
 //! The description that lies beside every data set.
 
-use super::{Part, Plan, frame, lamps, obstacles};
+use super::frame::{FrameRow, ImageRow};
+use super::lamps::LampRow;
+use super::obstacles::ObstacleRow;
+use super::{LabelKind, Plan};
 use crate::record::parquet::describe;
 
 const TEMPLATE: &str = include_str!("readme.md");
 
 /// The text for one set.
 pub(super) fn of(scenario: &str, plan: &Plan, meta: &serde_json::Value) -> String {
-    let missing: Vec<String> = Part::ALL
+    let missing: Vec<String> = LabelKind::ALL
         .iter()
-        .filter(|(_, part)| !plan.has(*part))
+        .filter(|(_, label)| !plan.has(*label))
         .map(|(word, _)| format!("`{word}`"))
         .collect();
     let missing = if missing.is_empty() {
@@ -35,10 +38,10 @@ pub(super) fn of(scenario: &str, plan: &Plan, meta: &serde_json::Value) -> Strin
         ("{version}", env!("CARGO_PKG_VERSION").to_owned()),
         ("{missing}", missing),
         ("{cameras}", cameras.join("\n")),
-        ("{frame columns}", describe(&frame::COLUMNS)),
-        ("{row columns}", describe(&frame::ROWS)),
-        ("{lamp columns}", describe(&lamps::COLUMNS)),
-        ("{obstacle columns}", describe(&obstacles::COLUMNS)),
+        ("{frame columns}", describe(FrameRow::COLUMNS)),
+        ("{row columns}", describe(ImageRow::COLUMNS)),
+        ("{lamp columns}", describe(LampRow::COLUMNS)),
+        ("{obstacle columns}", describe(ObstacleRow::COLUMNS)),
     ];
     text.into_iter()
         .fold(TEMPLATE.to_owned(), |all, (key, value)| {

@@ -3,18 +3,18 @@
 use super::clean::clean;
 use super::coco::Annotation;
 use super::files::{write_npy, write_png};
-use super::frame::{self, Name, Paths, text};
-use super::{DataSet, Part, Shot, lamps, obstacles};
-use crate::record::stream::failed;
-use crate::session::ObserverError;
+use super::frame::{FrameName, FrameRow, ImageRow};
+use super::lamps::LampRow;
+use super::obstacles::{self, ObstacleRow};
+use super::{DataSet, ExposedFrame, LabelKind};
+use crate::record::whole_files::{Result, failed};
+use crate::session::Source;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::{Labels, Projection};
 use crate::twin::render::{Job, RawImage, View, upper_bits};
 use image::GrayImage;
 use rayon::prelude::*;
 use serde_json::json;
-use std::path::Path;
-use std::sync::Arc;
 
 /// Frames of a camera are numbered within this.
 const FRAMES: i64 = 1_000_000;
@@ -22,57 +22,68 @@ const FRAMES: i64 = 1_000_000;
 const INSTANCES: i64 = 65_536;
 
 /// What is kept of a frame until the camera's next one is there, for the flow.
-pub(super) struct Taken {
-    /// Its row in `frames.parquet`.
+pub(super) struct LastFrame {
+    name: FrameName,
+    /// Place of its row among those of `frames.parquet`.
     row: usize,
-    view: usize,
-    job: Arc<Job>,
-    owners: Arc<[(BodyOwner, String)]>,
+    exposed: ExposedFrame,
     labels: Labels,
-    paths: Paths,
 }
 
 /// Pictures that the data set's own renderer draws of a view.
 #[derive(Default)]
-struct Drawn {
+struct Pictures {
     raw: Option<RawImage>,
     clean: Option<GrayImage>,
 }
 
-type Write<'a> = Box<dyn Fn() -> Result<(), ObserverError> + Sync + 'a>;
+/// A frame of one camera, and what its labels are made from.
+struct Frame<'a> {
+    name: FrameName,
+    exposed: &'a ExposedFrame,
+    sight: Projection<'a>,
+    labels: Option<Labels>,
+}
+
+impl Frame<'_> {
+    /// Rows and columns.
+    fn size(&self) -> [usize; 2] {
+        let camera = &self.sight.view.camera.intrinsics;
+        [camera.height_px, camera.width_px].map(|n| n as usize)
+    }
+}
+
+type Write<'a> = Box<dyn Fn() -> Result + Sync + 'a>;
 
 impl DataSet<'_> {
     /// Writes down a frame of all cameras that it is wanted of.
-    pub(super) fn take(&mut self, shot: &Shot, images: &[&GrayImage]) -> Result<(), ObserverError> {
+    pub(super) fn take(&mut self, exposed: &ExposedFrame, images: &[&GrayImage]) -> Result {
         let wanted = |k: &usize| {
             let camera = &self.cameras[*k];
-            camera.wanted && camera.source == shot.source
+            camera.wanted && camera.source == exposed.source
         };
         let cameras: Vec<usize> = (0..self.cameras.len()).filter(wanted).collect();
         let views = cameras.iter().map(|k| self.cameras[*k].view);
-        let drawn = self.draw(&shot.job, &views.collect::<Vec<_>>())?;
-        for (k, drawn) in cameras.into_iter().zip(drawn) {
+        let pictures = self.render(&exposed.job, &views.collect::<Vec<_>>())?;
+        for (k, pictures) in cameras.into_iter().zip(pictures) {
             let view = self.cameras[k].view;
-            if let (Some(image), true) = (images.get(view), view < shot.job.views.len()) {
-                self.take_view(k, shot, image, &drawn)?;
+            if let (Some(image), true) = (images.get(view), view < exposed.job.views.len()) {
+                self.take_view(k, exposed, image, &pictures)?;
             }
         }
         Ok(())
     }
 
     /// Raw and clean pictures of some views.
-    fn draw(&mut self, job: &Job, views: &[usize]) -> Result<Vec<Drawn>, ObserverError> {
+    fn render(&mut self, job: &Job, views: &[usize]) -> Result<Vec<Pictures>> {
+        let [raw, clear] = [LabelKind::Raw, LabelKind::Clean].map(|kind| self.plan.has(kind));
         let mut all: Vec<View> = Vec::new();
         for view in views.iter().filter_map(|k| job.views.get(*k)) {
-            if self.plan.has(Part::Raw) {
-                all.push(view.clone());
-            }
-            if self.plan.has(Part::Clean) {
-                all.push(clean(view, self.period_s));
-            }
+            all.extend(raw.then(|| view.clone()));
+            all.extend(clear.then(|| clean(view, self.period_s)));
         }
         if all.is_empty() {
-            return Ok(views.iter().map(|_| Drawn::default()).collect());
+            return Ok(views.iter().map(|_| Pictures::default()).collect());
         }
         let spare: Vec<u32> = all.iter().map(|view| view.sensor.spare_bits()).collect();
         let job = Job {
@@ -82,17 +93,12 @@ impl DataSet<'_> {
         };
         let broken = || failed("drawing a picture for the data set");
         self.renderer.submit(&job).map_err(broken())?;
-        let drawn = self.renderer.collect_raw().map_err(broken())?;
-        let mut drawn = drawn.into_iter().zip(spare);
-        let of_view = |_: &usize| Drawn {
-            raw: (self.plan.has(Part::Raw))
-                .then(|| drawn.next())
-                .flatten()
-                .map(|(raw, _)| raw),
-            clean: (self.plan.has(Part::Clean))
-                .then(|| drawn.next())
-                .flatten()
-                .map(|(raw, spare)| upper_bits(&raw, spare)),
+        let images = self.renderer.collect_raw().map_err(broken())?;
+        let mut images = images.into_iter().zip(spare);
+        let mut next = |wanted: bool| wanted.then(|| images.next()).flatten();
+        let of_view = |_: &usize| Pictures {
+            raw: next(raw).map(|(image, _)| image),
+            clean: next(clear).map(|(image, spare)| upper_bits(&image, spare)),
         };
         Ok(views.iter().map(of_view).collect())
     }
@@ -100,174 +106,150 @@ impl DataSet<'_> {
     fn take_view(
         &mut self,
         k: usize,
-        shot: &Shot,
+        exposed: &ExposedFrame,
         image: &GrayImage,
-        drawn: &Drawn,
-    ) -> Result<(), ObserverError> {
+        pictures: &Pictures,
+    ) -> Result {
         let camera = &self.cameras[k];
-        let (name, index) = (camera.name.clone(), camera.view);
-        let frame_id = FRAMES * k as i64 + i64::from(shot.number);
-        let paths = Paths::new(&name, shot.number);
-        let view = &shot.job.views[index];
-        let sight = Projection::new(view, shot.job.time);
-        let rays = self.plan.needs_rays();
-        let labels = rays.then(|| self.labeller.look(&shot.job, &sight));
-        if let Some(labels) = labels.as_ref().filter(|_| self.plan.has(Part::Flow)) {
-            self.write_flow(k, (shot, &sight), labels.depth_m.len(), frame_id)?;
-        }
-        let files = self.write_pictures(&paths, &sight, shot, image, drawn, labels.as_ref())?;
-        self.push_tables(frame_id, k, shot, &sight, labels.as_ref())?;
-
-        let left = matches!(shot.source, super::Source::Rig(_)).then(|| &shot.job.views[0]);
-        let camera = &view.camera.intrinsics;
-        self.images.push(json!({
-            "id": frame_id,
-            "file_name": files[0],
-            "width": camera.width_px,
-            "height": camera.height_px,
-            "camera": name,
-        }));
-        let about = &self.about;
-        let row = Name {
-            frame_id,
-            scenario: &about.scenario,
-            seed: about.seed,
-            camera: &name,
-            number: shot.number,
-            files,
+        let job = &exposed.job;
+        let sight = Projection::new(&job.views[camera.view], job.time);
+        let needs_rays = self.plan.needs_rays();
+        let frame = Frame {
+            name: FrameName {
+                frame_id: FRAMES * k as i64 + i64::from(exposed.number),
+                scenario: self.about.scenario.clone(),
+                seed: self.about.seed,
+                camera: camera.name.clone(),
+                number: exposed.number,
+            },
+            exposed,
+            labels: needs_rays.then(|| self.labeller.look(job, &sight)),
+            sight,
         };
-        let row = frame::row(row, &sight, left, shot.train.as_ref());
+        self.write_flow(k, &frame)?;
+        let left = matches!(exposed.source, Source::Rig(_)).then(|| &job.views[0]);
+        let mut row = FrameRow::new(&frame.name, &frame.sight, left, exposed.train.as_ref());
+        self.write_pictures(&frame, &mut row, image, pictures)?;
+        self.push_tables(k, &frame)?;
+        self.images.push(json!({
+            "id": row.frame_id,
+            "file_name": row.image,
+            "width": row.width_px,
+            "height": row.height_px,
+            "camera": row.camera,
+        }));
         self.frames.push(row);
         self.cameras[k].written += 1;
-        self.cameras[k].last = labels
-            .filter(|_| self.plan.has(Part::Flow))
-            .map(|labels| Taken {
-                row: self.frames.len() - 1,
-                view: index,
-                job: shot.job.clone(),
-                owners: shot.owners.clone(),
-                labels,
-                paths,
-            });
+        let labels = frame.labels.filter(|_| self.plan.has(LabelKind::Flow));
+        self.cameras[k].last = labels.map(|labels| LastFrame {
+            name: frame.name,
+            row: self.frames.len() - 1,
+            exposed: exposed.clone(),
+            labels,
+        });
         Ok(())
     }
 
     /// The flow from the camera's last frame to this one.
-    fn write_flow(
-        &mut self,
-        k: usize,
-        (shot, next): (&Shot, &Projection<'_>),
-        size: usize,
-        to: i64,
-    ) -> Result<(), ObserverError> {
-        let last = self.cameras[k].last.take();
-        let Some(last) = last.filter(|last| last.labels.depth_m.len() == size) else {
+    fn write_flow(&mut self, k: usize, frame: &Frame<'_>) -> Result {
+        let (Some(last), Some(labels)) = (self.cameras[k].last.take(), &frame.labels) else {
             return Ok(());
         };
-        let sight = Projection::new(&last.job.views[last.view], last.job.time);
-        let goes_on = successors(&last.owners, &shot.owners);
+        if last.labels.depth_m.len() != labels.depth_m.len() {
+            return Ok(());
+        }
+        let (before, now) = (&last.exposed, frame.exposed);
+        let sight = Projection::new(&before.job.views[self.cameras[k].view], before.job.time);
+        let goes_on = successors(&before.owners, &now.owners);
         let flow = self.labeller.flow(
-            (&last.job, &sight, &last.labels),
-            (&shot.job, next),
+            (&before.job, &sight, &last.labels),
+            (&now.job, &frame.sight),
             |body| goes_on[usize::from(body)],
         );
-        let camera = &next.view.camera.intrinsics;
-        let shape = [camera.height_px as usize, camera.width_px as usize, 2];
-        let file = last.paths.file("flow", "npy");
-        write_npy(&self.out.join(&file), &shape, flow.into_iter().flatten())?;
-        frame::set_flow(&mut self.frames[last.row], text(&file), to);
+        let [height, width] = frame.size();
+        let file = last.name.file("flow", "npy");
+        let numbers = flow.into_iter().flatten();
+        write_npy(&self.out.join(&file), &[height, width, 2], numbers)?;
+        let row = &mut self.frames[last.row];
+        (row.flow, row.flow_to) = (Some(file), Some(frame.name.frame_id));
         Ok(())
     }
 
-    /// Image, raw, clean, depth and mask, each where it is wanted.
+    /// Image, raw, clean, depth and mask, each where it is wanted. The row gets their names.
     fn write_pictures(
         &self,
-        paths: &Paths,
-        sight: &Projection<'_>,
-        shot: &Shot,
+        frame: &Frame<'_>,
+        row: &mut FrameRow,
         image: &GrayImage,
-        drawn: &Drawn,
-        labels: Option<&Labels>,
-    ) -> Result<[Option<String>; 5], ObserverError> {
-        let at = |folder: &str, extension: &str| paths.file(folder, extension);
-        let out = &self.out;
-        let full = |file: &Path| out.join(file);
-        let [image_at, raw_at, clean_at, mask_at] =
-            ["images", "raw", "clean", "mask"].map(|folder| at(folder, "png"));
-        let depth_at = at("depth", "npy");
-        let camera = &sight.view.camera.intrinsics;
-        let shape = [camera.height_px as usize, camera.width_px as usize];
-        let depth = labels.filter(|_| self.plan.has(Part::Depth));
-        let mask = labels.filter(|_| self.plan.has(Part::Mask));
-        let mut writes: Vec<Write<'_>> = vec![Box::new(|| write_png(&full(&image_at), image))];
-        if let Some(raw) = &drawn.raw {
-            writes.push(Box::new(|| write_png(&full(&raw_at), raw)));
+        pictures: &Pictures,
+    ) -> Result {
+        let labels = |kind| frame.labels.as_ref().filter(|_| self.plan.has(kind));
+        let (depth, mask) = (labels(LabelKind::Depth), labels(LabelKind::Mask));
+        let name = &frame.name;
+        row.raw = pictures.raw.as_ref().map(|_| name.file("raw", "png"));
+        row.clean = pictures.clean.as_ref().map(|_| name.file("clean", "png"));
+        row.depth = depth.map(|_| name.file("depth", "npy"));
+        row.mask = mask.map(|_| name.file("mask", "png"));
+        let (row, out) = (&*row, &self.out);
+        let at = |file: &Option<String>| out.join(file.as_deref().unwrap_or_default());
+        let mut writes: Vec<Write<'_>> = vec![Box::new(|| write_png(&out.join(&row.image), image))];
+        if let Some(raw) = &pictures.raw {
+            writes.push(Box::new(|| write_png(&at(&row.raw), raw)));
         }
-        if let Some(clean) = &drawn.clean {
-            writes.push(Box::new(|| write_png(&full(&clean_at), clean)));
+        if let Some(clean) = &pictures.clean {
+            writes.push(Box::new(|| write_png(&at(&row.clean), clean)));
         }
         if let Some(labels) = depth {
             writes.push(Box::new(|| {
                 let depth_m = labels.depth_m.iter().map(|d| *d as f32);
-                write_npy(&full(&depth_at), &shape, depth_m)
+                write_npy(&at(&row.depth), &frame.size(), depth_m)
             }));
         }
         if let Some(labels) = mask {
             writes.push(Box::new(|| {
-                let picture = obstacles::picture(&shot.owners, sight, labels);
-                write_png(&full(&mask_at), &picture)
+                let picture = obstacles::picture(&frame.exposed.owners, &frame.sight, labels);
+                write_png(&at(&row.mask), &picture)
             }));
         }
-        writes.par_iter().try_for_each(|write| write())?;
-        Ok([
-            Some(text(&image_at)),
-            drawn.raw.as_ref().map(|_| text(&raw_at)),
-            drawn.clean.as_ref().map(|_| text(&clean_at)),
-            depth.map(|_| text(&depth_at)),
-            mask.map(|_| text(&mask_at)),
-        ])
+        writes.par_iter().try_for_each(|write| write())
     }
 
-    fn push_tables(
-        &mut self,
-        frame_id: i64,
-        k: usize,
-        shot: &Shot,
-        sight: &Projection<'_>,
-        labels: Option<&Labels>,
-    ) -> Result<(), ObserverError> {
+    fn push_tables(&mut self, k: usize, frame: &Frame<'_>) -> Result {
         let Some(tables) = &mut self.tables else {
             return Ok(());
         };
-        let job = &shot.job;
+        let (frame_id, sight, job) = (frame.name.frame_id, &frame.sight, &frame.exposed.job);
         if let Some(table) = &mut tables.rows {
-            frame::rows(frame_id, sight).try_for_each(|row| table.push(row))?;
+            ImageRow::all(frame_id, sight).try_for_each(|row| table.push(&row))?;
         }
         if let Some(table) = &mut tables.lamps {
             let sites = &self.tunnel.lamps;
-            let rows = lamps::rows(frame_id, job, sight, &self.labeller, sites);
-            rows.into_iter().try_for_each(|row| table.push(row))?;
+            let rows = LampRow::all(frame_id, job, sight, &self.labeller, sites);
+            rows.iter().try_for_each(|row| table.push(row))?;
         }
-        let (Some(table), Some(labels)) = (&mut tables.obstacles, labels) else {
+        let (Some(table), Some(labels)) = (&mut tables.obstacles, &frame.labels) else {
             return Ok(());
         };
-        let line = &self.tunnel.alignment;
-        let train_m = shot.train.as_ref().map(|train| train.chainage_m);
+        let train_m = frame.exposed.train.as_ref().map(|train| train.chainage_m);
         let near_m = self.cameras[k].chainage_m.or(train_m).unwrap_or(0.0);
-        for instance in obstacles::instances(job, &shot.owners, sight, labels) {
-            let Some(seen) = obstacles::row(frame_id, job, sight, (line, near_m), &instance) else {
+        let line = (&self.tunnel.alignment, near_m);
+        for instance in obstacles::instances(job, &frame.exposed.owners, sight, labels) {
+            let Some(row) = ObstacleRow::new(frame_id, job, sight, line, &instance) else {
                 continue;
             };
-            table.push(seen.row)?;
-            if instance.mask.area() > 0 {
+            table.push(&row)?;
+            if let Some([left, top, right, bottom]) = instance.mask.bounds() {
                 self.annotations.push(Annotation {
                     id: INSTANCES * frame_id + i64::from(instance.id),
                     image_id: frame_id,
-                    category: instance.category,
-                    visible_share: seen.visible_share,
-                    name: instance.name.to_owned(),
-                    instance: instance.id,
-                    mask: instance.mask,
+                    category_id: instance.category + 1,
+                    bbox: [left, top, right - left, bottom - top],
+                    area: instance.mask.area(),
+                    iscrowd: 0,
+                    name: row.name,
+                    instance_id: instance.id,
+                    visible_share: row.visible_share,
+                    segmentation: instance.mask,
                 });
             }
         }

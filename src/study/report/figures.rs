@@ -3,12 +3,12 @@
 use super::axis::Axis;
 use super::plot::{Layers, Plot};
 use crate::record::parquet::Kind;
-use crate::scenario::draw::{Condition, Distribution, Template};
-use crate::study::digest::is_weighed;
+use crate::scenario::sampling::{Condition, Distribution, Template};
+use crate::study::digest::is_weighted;
 use crate::study::stats::{mean, quantile, rank_correlation, rate};
-use crate::study::table::{events, unit_of};
+use crate::study::table::unit_of;
 use crate::study::{Digest, FigureDigest, Measure, Row};
-use serde_json::Value;
+use std::collections::BTreeSet;
 
 /// More values than that of a variable are put into bins.
 const MOST_GROUPS: usize = 12;
@@ -38,17 +38,9 @@ impl<'a> Input<'a> {
             variable.map(|v| &v.from),
             Some(Distribution::LogUniform { .. } | Distribution::LogNormal { .. })
         );
-        let is_text = rows
-            .iter()
-            .any(|r| r.values.get(name).is_some_and(Value::is_string));
-        if is_text {
-            axis.names = rows
-                .iter()
-                .filter_map(|r| Some(r.values.get(name)?.as_str()?.to_owned()))
-                .collect();
-            axis.names.sort();
-            axis.names.dedup();
-        }
+        let texts = rows.iter().filter_map(|r| r.values.get(name)?.as_str());
+        let texts: BTreeSet<_> = texts.map(str::to_owned).collect();
+        axis.names = texts.into_iter().collect();
         Self { name, axis }
     }
 
@@ -61,7 +53,7 @@ impl<'a> Input<'a> {
         Some(self.axis.names.iter().position(|n| n == text)? as f64)
     }
 
-    /// Pairs of the value and of what `of` says of a run.
+    /// Pairs of the value and of what `of` gives for a run.
     fn pairs(&self, rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> Vec<(f64, f64)> {
         let pairs = rows.iter().filter_map(|r| Some((self.value(r)?, of(r)?)));
         let mut pairs: Vec<_> = pairs.collect();
@@ -90,22 +82,22 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
     let names = template.settings.variables.keys();
     let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
     // Weighed runs lie where they were proposed, not where nature has them: only maps show that.
-    let weighed = is_weighed(template);
+    let weighted = is_weighted(template);
     let mut plots = Vec::new();
-    for (name, condition) in events(template).unwrap_or_default() {
-        let told = || complete.iter().filter_map(|r| r.happened(&condition));
+    for (name, condition) in &template.events {
+        let happened = || complete.iter().filter_map(|r| r.happened(condition));
         // What never happened, or always, depends on nothing.
-        if told().all(|h| h) || !told().any(|h| h) {
+        if happened().all(|h| h) || !happened().any(|h| h) {
             continue;
         }
-        let groups = inputs.iter().filter(|_| !weighed);
-        plots.extend(groups.filter_map(|i| event_plot(i, &name, &condition, &complete)));
-        plots.extend(event_map(&inputs, &name, &condition, &complete));
+        let groups = inputs.iter().filter(|_| !weighted);
+        plots.extend(groups.filter_map(|i| event_plot(i, name, condition, &complete)));
+        plots.extend(event_map(&inputs, name, condition, &complete));
     }
     for figure in digest
         .figures
         .iter()
-        .filter(|f| is_worth_plotting(f.measure) && !weighed)
+        .filter(|f| is_worth_plotting(f.measure) && !weighted)
     {
         plots.extend(distribution(figure.measure, &complete));
         plots.extend(convergence(figure.measure, &complete));
@@ -115,7 +107,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
             .filter(|i| strongest.contains(&i.name) || !i.axis.names.is_empty());
         plots.extend(shown.filter_map(|i| figure_plot(i, figure.measure, &complete)));
     }
-    for method in ["paper", "mono"].into_iter().filter(|_| !weighed) {
+    for method in ["paper", "mono"].into_iter().filter(|_| !weighted) {
         plots.extend(error_by_range(method, &complete));
     }
     plots
@@ -171,15 +163,17 @@ fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -
         ..Layers::default()
     };
     let y = Axis::new(format!("rate of {name}, with 95 % interval"));
+    let variable = input.name;
+    let title = format!("{name} against {variable}");
     Plot::new(
-        format!("event_{name}_{}", input.name),
-        &format!("{name} against {}", input.name),
+        format!("event_{name}_{variable}"),
+        &title,
         [&input.axis, &y],
         &layers,
     )
 }
 
-/// Where in the plane of two variables an event happened: of the two that most tell.
+/// Where in the plane of two variables an event happened: the two that drive it most.
 fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
     let strength = |input: &&Input<'_>| {
         let pairs = input.pairs(rows, |r| r.happened(event).map(f64::from));
@@ -189,8 +183,8 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
     order.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     let [x, y] = [order.first()?, order.get(1)?];
     let of = |wanted: bool| {
-        let told = rows.iter().filter(|r| r.happened(event) == Some(wanted));
-        told.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
+        let runs = rows.iter().filter(|r| r.happened(event) == Some(wanted));
+        runs.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
             .collect::<Vec<_>>()
     };
     let layers = Layers {
@@ -201,12 +195,8 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
     if layers.marked.is_empty() {
         return None;
     }
-    Plot::new(
-        format!("map_{name}"),
-        &format!("{name}: red where it happened"),
-        [&x.axis, &y.axis],
-        &layers,
-    )
+    let title = format!("{name}: red where it happened");
+    Plot::new(format!("map_{name}"), &title, [&x.axis, &y.axis], &layers)
 }
 
 /// A figure of every run against a variable, with the mean of each group.
@@ -222,9 +212,11 @@ fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Pl
         ..Layers::default()
     };
     let y = Axis::new(label(measure));
+    let (figure, variable) = (measure.name, input.name);
+    let title = format!("{figure} against {variable}");
     Plot::new(
-        format!("{}_{}", measure.name, input.name),
-        &format!("{} against {}", measure.name, input.name),
+        format!("{figure}_{variable}"),
+        &title,
         [&input.axis, &y],
         &layers,
     )
@@ -251,16 +243,11 @@ fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         band: band.collect(),
         ..Layers::default()
     };
-    let axes = [
-        Axis::new(label(measure)),
-        Axis::new("share of runs below, with 95 % band"),
-    ];
-    Plot::new(
-        format!("{}_cdf", measure.name),
-        &format!("Distribution of {}", measure.name),
-        [&axes[0], &axes[1]],
-        &layers,
-    )
+    let x = Axis::new(label(measure));
+    let y = Axis::new("share of runs below, with 95 % band");
+    let name = measure.name;
+    let title = format!("Distribution of {name}");
+    Plot::new(format!("{name}_cdf"), &title, [&x, &y], &layers)
 }
 
 /// The mean after each run, with its interval.
@@ -274,16 +261,13 @@ fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         band: after.iter().map(|(n, e)| (*n, e.low, e.high)).collect(),
         ..Layers::default()
     };
-    let axes = [
+    let (x, y) = (
         Axis::new("runs"),
         Axis::new(format!("mean of {}", label(measure))),
-    ];
-    Plot::new(
-        format!("{}_convergence", measure.name),
-        &format!("Convergence of {}", measure.name),
-        [&axes[0], &axes[1]],
-        &layers,
-    )
+    );
+    let name = measure.name;
+    let title = format!("Convergence of {name}");
+    Plot::new(format!("{name}_convergence"), &title, [&x, &y], &layers)
 }
 
 /// Errors of all positions of all runs against the distance of the lamp.
@@ -311,14 +295,13 @@ fn error_by_range(method: &str, rows: &[&Row]) -> Option<Plot> {
         band,
         ..Layers::default()
     };
-    let axes = [
-        Axis::new("distance of the lamp [m]"),
-        Axis::new("error along the track [m]"),
-    ];
+    let x = Axis::new("distance of the lamp [m]");
+    let y = Axis::new("error along the track [m]");
+    let title = format!("{method}: median error of a position, band 5 to 95 %");
     Plot::new(
         format!("{method}_error_by_range"),
-        &format!("{method}: median error of a position, band 5 to 95 %"),
-        [&axes[0], &axes[1]],
+        &title,
+        [&x, &y],
         &layers,
     )
 }

@@ -24,6 +24,7 @@ pub use sample::{mean, quantile};
 pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};
 pub use weight::{Weighted, effective_runs, weighted_mean, weighted_rate};
 
+use serde::{Serialize, Serializer};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::fmt;
 
@@ -40,7 +41,7 @@ pub struct Estimate {
     pub n: usize,
 }
 
-/// To the digits that the interval tells; very small ones in powers of ten.
+/// With as many digits as the width of the interval allows; very small ones in powers of ten.
 impl fmt::Display for Estimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let half = 0.5 * (self.high - self.low);
@@ -61,6 +62,13 @@ impl fmt::Display for Estimate {
             0
         };
         write!(f, "{value:.digits$} ({low:.digits$} to {high:.digits$})")
+    }
+}
+
+/// As it is shown.
+impl Serialize for Estimate {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
     }
 }
 

@@ -1,10 +1,11 @@
 //! How often something happens.
 
 use super::{Estimate, TAIL, z};
+use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF};
 
 /// A rate with both intervals.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Rate {
     /// Times that it happened.
     pub events: u64,

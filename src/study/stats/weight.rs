@@ -1,9 +1,10 @@
-//! Importance sampling: runs drawn from elsewhere, weighed by the ratio of densities.
+//! Importance sampling: runs drawn from elsewhere, weighted by the ratio of densities.
 
 use super::{Estimate, z};
+use serde::Serialize;
 
-/// A rate from weighed runs.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A rate from weighted runs.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Weighted {
     /// The rate.
     pub rate: Estimate,

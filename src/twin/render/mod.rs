@@ -30,7 +30,7 @@ use image::{GrayImage, ImageBuffer, Luma};
 pub type RawImage = ImageBuffer<Luma<u16>, Vec<u16>>;
 
 /// Which renderer drew, for the summary.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Backend {
     /// `vulkan`, `metal`, `dx12` or `cpu`.
     pub backend: String,

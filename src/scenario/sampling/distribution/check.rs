@@ -1,7 +1,7 @@
 //! Distributions that are none.
 
 use super::Cut;
-use crate::scenario::draw::Distribution;
+use crate::scenario::sampling::Distribution;
 use crate::settings::{Problem, Settings};
 
 /// A truncated distribution must leave this much of the whole.
@@ -38,7 +38,7 @@ impl Distribution {
                     let what = format!("mean {mean}, sigma {sigma}");
                     return Some((what, "give a finite mean and a sigma over 0"));
                 }
-                limits(*min, *max).or_else(|| left(&Cut::normal(*mean, *sigma, *min, *max)))
+                limits(*min, *max).or_else(|| left(self.cut()?))
             }
             Self::LogNormal {
                 median,
@@ -53,8 +53,7 @@ impl Distribution {
                 if min.is_some_and(|m| m < 0.0) || max.is_some_and(|m| m <= 0.0) {
                     return Some(("limits below 0".into(), "its values are all over 0"));
                 }
-                let cut = || Cut::log_normal(*median, *sigma_ln, *min, *max);
-                limits(*min, *max).or_else(|| left(&cut()))
+                limits(*min, *max).or_else(|| left(self.cut()?))
             }
             Self::Triangular { min, mode, max } => order(*min, *max).or_else(|| {
                 let what = || format!("mode {mode} is not from min {min} to max {max}");
@@ -94,7 +93,7 @@ fn limits(min: Option<f64>, max: Option<f64>) -> Option<Flaw> {
     order(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX))
 }
 
-fn left(cut: &Cut) -> Option<Flaw> {
+fn left(cut: Cut) -> Option<Flaw> {
     let enough = cut.share() >= LEAST_SHARE && cut.share().is_finite();
     let what = "min and max leave nothing of it";
     (!enough).then(|| (what.into(), "give limits nearer to its middle"))

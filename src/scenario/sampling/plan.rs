@@ -8,6 +8,17 @@ use sobol::params::JoeKuoD6;
 /// Most variables that Sobol's sequence serves here.
 pub const MOST_SOBOL: usize = 100;
 
+/// Which run of a study it is.
+#[derive(Clone, Copy, Debug)]
+pub struct RunNumber {
+    /// Among all.
+    pub index: u64,
+    /// Which combination of swept values it has.
+    pub cell: u64,
+    /// Which run of that combination it is.
+    pub repeat: u64,
+}
+
 /// A plan for some variables by name.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -35,10 +46,14 @@ impl Plan {
         }
     }
 
-    /// The point of run `index`, which is number `repeat` of cell `cell` of a sweep, in (0, 1) for each
-    /// variable. Every cell has a plan of its own. A draw that was rejected is tried again at independent
+    /// The point of a run, in (0, 1) for each variable. Every cell has a plan of its own. A draw that was rejected is tried again at independent
     /// points: what is accepted at last has the distribution that was asked for, whatever the plan.
-    pub fn point(&self, [index, cell, repeat]: [u64; 3], attempt: u32) -> Vec<f64> {
+    pub fn point(&self, run: RunNumber, attempt: u32) -> Vec<f64> {
+        let RunNumber {
+            index,
+            cell,
+            repeat,
+        } = run;
         let random = |name: &String| {
             Stream::new(self.seed, index, &format!("draw/{name}")).uniform(u64::from(attempt))
         };
@@ -119,6 +134,14 @@ mod tests {
         Plan::new(settings, seed, (0..5).map(|k| format!("v{k}")).collect())
     }
 
+    fn run(index: u64, cell: u64, repeat: u64) -> RunNumber {
+        RunNumber {
+            index,
+            cell,
+            repeat,
+        }
+    }
+
     /// scipy.stats.qmc.Sobol(5, scramble=False).random(16).
     #[test]
     fn val_sobol_points_are_scipys() {
@@ -161,7 +184,7 @@ mod tests {
             for (seed, block) in [(1, 0), (2, 0), (2, 3)] {
                 let plan = plan(settings, seed);
                 let points: Vec<_> = (0..n)
-                    .map(|k| plan.point([block * n + k, 2, block * n + k], 0))
+                    .map(|k| plan.point(run(block * n + k, 2, block * n + k), 0))
                     .collect();
                 for v in 0..5 {
                     let slices = points.iter().map(|p| (p[v] * n as f64) as usize);
@@ -180,7 +203,7 @@ mod tests {
         let plan = plan(PlanSettings::Sobol, 7);
         let mut boxes = vec![0; 128];
         for k in 0..128 {
-            let p = plan.point([k, 0, k], 0);
+            let p = plan.point(run(k, 0, k), 0);
             boxes[(p[0] * 16.0) as usize * 8 + (p[1] * 8.0) as usize] += 1;
         }
         assert!(boxes.iter().all(|n| *n == 1), "{boxes:?}");
@@ -188,10 +211,10 @@ mod tests {
 
     /// Cells of a sweep that share their draws: figures over all of them would look surer than they are.
     #[test]
-    fn cells_draw_by_themselves() {
+    fn cells_are_sampled_by_themselves() {
         for settings in [PlanSettings::Random, PlanSettings::Sobol] {
             let plan = plan(settings, 3);
-            let cells = [0, 1].map(|cell| plan.point([2 * 7 + cell, cell, 7], 0));
+            let cells = [0, 1].map(|cell| plan.point(run(2 * 7 + cell, cell, 7), 0));
             assert!(
                 cells[0]
                     .iter()
@@ -203,11 +226,11 @@ mod tests {
 
     /// Seeds and attempts that do not matter, a variable whose draws depend on the others'.
     #[test]
-    fn draws_hang_on_seed_index_and_name_alone() {
+    fn samples_depend_on_seed_index_and_name_alone() {
         let few = Plan::new(PlanSettings::Random, 1, vec!["v3".into()]);
         let many = plan(PlanSettings::Random, 1);
         for index in 0..10 {
-            let at = |plan: &Plan, attempt| plan.point([index, 0, index], attempt);
+            let at = |plan: &Plan, attempt| plan.point(run(index, 0, index), attempt);
             let own = at(&few, 0)[0].to_bits();
             assert_eq!(own, at(&many, 0)[3].to_bits());
             let other = [at(&many, 1), at(&plan(PlanSettings::Random, 2), 0)];

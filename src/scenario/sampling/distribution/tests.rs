@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
-use crate::scenario::draw::{PlanSettings, as_written};
+use crate::scenario::sampling::{PlanSettings, as_written};
 use crate::settings::Settings;
 
 const SHARES: [f64; 4] = [1e-6, 0.1, 0.5, 0.999];

@@ -1,10 +1,12 @@
-//! One run's draw: from an index to values, and from values to a scenario.
+//! One run's sample: from an index to values, and from values to a scenario.
 
 use super::condition::ConditionError;
 use super::copula;
+use super::plan::RunNumber;
 use super::settings::{Distribution, VariableSettings};
 use super::template::{Template, table_coordinate};
 use crate::scenario::build::overridden;
+use crate::scenario::overrides::lookup;
 use crate::scenario::{Override, Scenario, ScenarioError, ScenarioFile};
 use crate::twin::random::Stream;
 use std::collections::BTreeMap;
@@ -13,9 +15,9 @@ use toml::{Table, Value};
 /// How often a draw is tried again before its conditions are taken to be impossible.
 const MOST_ATTEMPTS: u32 = 10_000;
 
-/// One run's draw.
+/// The values of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Draw {
+pub struct Sample {
     /// The run.
     pub index: u64,
     /// Seed of its scenario.
@@ -28,12 +30,12 @@ pub struct Draw {
     pub ln_weight: f64,
 }
 
-/// Why a run cannot be drawn.
+/// Why a run has no sample.
 #[derive(Debug, thiserror::Error)]
-pub enum DrawError {
+pub enum SampleError {
     /// No draw meets the conditions.
     #[error(
-        "run {index}: of {attempts} draws none meets the conditions; `{text}` turned down {refused} of \
+        "run {index}: of {attempts} samples none meets the conditions; `{text}` turned down {refused} of \
          them"
     )]
     Rejected {
@@ -67,23 +69,27 @@ impl Template {
     ///
     /// Runs go through the combinations of swept values in turn, the first variable changing
     /// slowest; every combination gets points of the plan, and noise, of its own.
-    pub fn draw(&self, index: u64) -> Result<Draw, DrawError> {
+    pub fn sample(&self, index: u64) -> Result<Sample, SampleError> {
         let runs = self.runs();
         if index >= runs {
-            return Err(DrawError::NoRun { index, runs });
+            return Err(SampleError::NoRun { index, runs });
         }
-        let (cell, repeat) = (index % self.cells(), index / self.cells());
-        let swept = self.swept_values(cell);
+        let run = RunNumber {
+            index,
+            cell: index % self.cells(),
+            repeat: index / self.cells(),
+        };
+        let swept = self.swept_values(run.cell);
         let mut refused = vec![0u32; self.conditions.len()];
         for attempt in 0..MOST_ATTEMPTS {
-            let draw = self.attempt([index, cell, repeat], attempt, &swept);
-            match self.refusing(&draw)? {
-                None => return Ok(draw),
+            let sample = self.attempt(run, attempt, &swept);
+            match self.unmet_condition(&sample)? {
+                None => return Ok(sample),
                 Some(k) => refused[k] += 1,
             }
         }
         let worst = (0..refused.len()).max_by_key(|k| refused[*k]).unwrap_or(0);
-        Err(DrawError::Rejected {
+        Err(SampleError::Rejected {
             index,
             attempts: MOST_ATTEMPTS,
             text: self
@@ -104,13 +110,8 @@ impl Template {
         places.collect()
     }
 
-    fn attempt(
-        &self,
-        [index, cell, repeat]: [u64; 3],
-        attempt: u32,
-        swept: &BTreeMap<&str, Value>,
-    ) -> Draw {
-        let mut point = self.plan.point([index, cell, repeat], attempt);
+    fn attempt(&self, run: RunNumber, attempt: u32, swept: &BTreeMap<&str, Value>) -> Sample {
+        let mut point = self.plan.point(run, attempt);
         for (places, lower) in &self.groups {
             let mut of_group: Vec<f64> = places.iter().map(|k| point[*k]).collect();
             copula::correlate(lower, &mut of_group);
@@ -149,10 +150,11 @@ impl Template {
             f64::MIN
         };
         // 53 bits: every reader of JSON keeps them.
-        let [low, high, ..] = Stream::new(self.settings.seed, index, "scenario seed").words(0, 0);
+        let [low, high, ..] =
+            Stream::new(self.settings.seed, run.index, "scenario seed").words(0, 0);
         let seed = (u64::from(high) << 32 | u64::from(low)) >> 11;
-        Draw {
-            index,
+        Sample {
+            index: run.index,
             seed,
             values,
             rejected: attempt,
@@ -161,16 +163,16 @@ impl Template {
     }
 
     /// The first condition that a draw does not meet.
-    fn refusing(&self, draw: &Draw) -> Result<Option<usize>, DrawError> {
+    fn unmet_condition(&self, sample: &Sample) -> Result<Option<usize>, SampleError> {
         let mut document = None;
         for (k, condition) in self.conditions.iter().enumerate() {
-            let names_keys = condition.names().any(|name| draw.number(name).is_none());
+            let names_keys = condition.names().any(|name| sample.number(name).is_none());
             if names_keys && document.is_none() {
-                document = Some(self.document(draw)?);
+                document = Some(self.document(sample)?);
             }
             let value_of = |name: &str| {
-                let key = || lookup(document.as_ref()?, name);
-                draw.number(name).or_else(key).map(Some).ok_or(())
+                let key = || number(lookup(document.as_ref()?, name)?);
+                sample.number(name).or_else(key).map(Some).ok_or(())
             };
             if condition.holds(value_of)? != Some(true) {
                 return Ok(Some(k));
@@ -180,43 +182,43 @@ impl Template {
     }
 
     /// The scenario's keys with their defaults, as drawn.
-    fn document(&self, draw: &Draw) -> Result<Table, DrawError> {
-        let key = |e: &dyn std::fmt::Display| DrawError::Key(draw.index, e.to_string());
+    fn document(&self, sample: &Sample) -> Result<Table, SampleError> {
+        let key = |e: &dyn std::fmt::Display| SampleError::Key(sample.index, e.to_string());
         let mut document = Table::try_from(&self.file).map_err(|e| key(&e))?;
-        for change in self.overrides(draw) {
+        for change in self.overrides(sample) {
             change.apply(&mut document).map_err(|e| key(&e))?;
         }
         Ok(document)
     }
 
     /// What a draw changes in the file, its seed among it.
-    pub fn overrides(&self, draw: &Draw) -> Vec<Override> {
+    pub fn overrides(&self, sample: &Sample) -> Vec<Override> {
         let of = |(name, value): &(String, Value)| {
             let variable = self.settings.variables.get(name);
             variable.map(|v| v.overrides(value)).unwrap_or_default()
         };
         let seed = Override {
             key: "seed".into(),
-            value: Value::Integer(draw.seed as i64),
+            value: Value::Integer(sample.seed as i64),
         };
-        let drawn = draw.values.iter().flat_map(of);
+        let drawn = sample.values.iter().flat_map(of);
         std::iter::once(seed).chain(drawn).collect()
     }
 
     /// The scenario of a draw, checked.
-    pub fn scenario(&self, draw: &Draw) -> Result<Scenario, ScenarioError> {
-        Scenario::from_text(&self.path, &self.text, &self.overrides(draw))
+    pub fn scenario(&self, sample: &Sample) -> Result<Scenario, ScenarioError> {
+        Scenario::from_text(&self.path, &self.text, &self.overrides(sample))
     }
 
     /// The file of a draw.
-    pub fn concrete(&self, draw: &Draw) -> Result<ScenarioFile, ScenarioError> {
-        let mut file = overridden(&self.path, &self.text, &self.overrides(draw))?;
+    pub fn concrete(&self, sample: &Sample) -> Result<ScenarioFile, ScenarioError> {
+        let mut file = overridden(&self.path, &self.text, &self.overrides(sample))?;
         file.study = None;
         Ok(file)
     }
 }
 
-impl Draw {
+impl Sample {
     /// A variable's value, where it is a number or a flag.
     pub fn number(&self, name: &str) -> Option<f64> {
         let (_, value) = self.values.iter().find(|(n, _)| n == name)?;
@@ -250,22 +252,5 @@ fn number(value: &Value) -> Option<f64> {
         Value::Float(x) => Some(*x),
         Value::Boolean(x) => Some(f64::from(*x)),
         _ => None,
-    }
-}
-
-/// A number or flag of a document by its dotted key.
-fn lookup(document: &Table, key: &str) -> Option<f64> {
-    let (first, rest) = key.split_once('.').unwrap_or((key, ""));
-    let (name, mut indexes) = first.split_once('[').unwrap_or((first, ""));
-    let mut value = document.get(name)?;
-    while !indexes.is_empty() {
-        let (index, rest) = indexes.split_once(']')?;
-        value = value.as_array()?.get(index.parse::<usize>().ok()?)?;
-        indexes = rest.strip_prefix('[').unwrap_or(rest);
-    }
-    if rest.is_empty() {
-        number(value)
-    } else {
-        lookup(value.as_table()?, rest)
     }
 }

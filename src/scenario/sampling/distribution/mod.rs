@@ -107,24 +107,31 @@ impl Distribution {
         })
     }
 
-    fn real_quantile(&self, u: f64) -> Option<f64> {
-        Some(match *self {
-            Self::Uniform { min, max } => min + u * (max - min),
-            Self::LogUniform { min, max } => min * (u * (max / min).ln()).exp(),
+    /// What is left of a normal distribution, or of that of a logarithm.
+    fn cut(&self) -> Option<Cut> {
+        match *self {
             Self::Normal {
                 mean,
                 sigma,
                 min,
                 max,
-            } => Cut::normal(mean, sigma, min, max).quantile(u),
+            } => Some(Cut::normal(mean, sigma, min, max)),
             Self::LogNormal {
                 median,
                 sigma_ln,
                 min,
                 max,
-            } => Cut::log_normal(median, sigma_ln, min, max)
-                .quantile(u)
-                .exp(),
+            } => Some(Cut::log_normal(median, sigma_ln, min, max)),
+            _ => None,
+        }
+    }
+
+    fn real_quantile(&self, u: f64) -> Option<f64> {
+        Some(match *self {
+            Self::Uniform { min, max } => min + u * (max - min),
+            Self::LogUniform { min, max } => min * (u * (max / min).ln()).exp(),
+            Self::Normal { .. } => self.cut()?.quantile(u),
+            Self::LogNormal { .. } => self.cut()?.quantile(u).exp(),
             Self::Triangular { min, mode, max } => {
                 let rising = (mode - min) / (max - min);
                 if u < rising {
@@ -146,22 +153,14 @@ impl Distribution {
                 f64::NEG_INFINITY
             }
         };
+        let cut = self.cut();
         match *self {
             Self::Uniform { min, max } => within(min, max, 1.0 / (max - min)),
             Self::LogUniform { min, max } => within(min, max, 1.0 / (x * (max / min).ln())),
-            Self::Normal {
-                mean,
-                sigma,
-                min,
-                max,
-            } => Cut::normal(mean, sigma, min, max).ln_density(x),
-            Self::LogNormal { .. } if x <= 0.0 => f64::NEG_INFINITY,
-            Self::LogNormal {
-                median,
-                sigma_ln,
-                min,
-                max,
-            } => Cut::log_normal(median, sigma_ln, min, max).ln_density(x.ln()) - x.ln(),
+            Self::Normal { .. } => cut.map_or(f64::NEG_INFINITY, |c| c.ln_density(x)),
+            Self::LogNormal { .. } if x > 0.0 => {
+                cut.map_or(f64::NEG_INFINITY, |c| c.ln_density(x.ln()) - x.ln())
+            }
             Self::Triangular { min, mode, max } => {
                 let height = 2.0 / (max - min);
                 let share = if x < mode {

@@ -1,5 +1,6 @@
 //! What varies from run to run, as written under `[study]`.
 
+use crate::scenario::overrides::is_within;
 use crate::settings::{Checker, settings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -295,12 +296,6 @@ impl StudySettings {
             }
         }
     }
-}
-
-/// Whether a dotted key is another one or lies below it.
-fn is_within(key: &str, other: &str) -> bool {
-    let rest = key.strip_prefix(other);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
 }
 
 fn is_name(name: &str) -> bool {

@@ -1,7 +1,7 @@
 //! A drawn scenario as a file by itself: complete, every key with its value, and every key with what
 //! it means.
 
-use super::{Draw, Template};
+use super::{Sample, Template};
 use crate::scenario::schema;
 use crate::scenario::{ScenarioError, ScenarioFile};
 use serde_json::Value as Json;
@@ -15,28 +15,28 @@ impl Template {
     /// The text of a draw's scenario file. `place` gives the paths of the files that it names.
     pub fn text_of(
         &self,
-        draw: &Draw,
+        sample: &Sample,
         place: impl Fn(&str) -> String,
     ) -> Result<String, ScenarioError> {
-        let mut file = self.concrete(draw)?;
+        let mut file = self.concrete(sample)?;
         for name in file.files_mut() {
             *name = place(name);
         }
-        let name = format!("{}_{:06}", file.name, draw.index);
-        let head = self.heading(draw, &name);
+        let name = format!("{}_{:06}", file.name, sample.index);
+        let head = self.heading(sample, &name);
         file.name = name;
         Ok(head + &complete(&file))
     }
 
-    fn heading(&self, draw: &Draw, name: &str) -> String {
+    fn heading(&self, sample: &Sample, name: &str) -> String {
         let study = &self.file.name;
         let mut text = format!(
             "# {name}: run {} of the study {study}, seed {}, drawn by metrotwin {}.\n",
-            draw.index,
+            sample.index,
             self.settings.seed,
             env!("CARGO_PKG_VERSION")
         );
-        for (variable, value) in &draw.values {
+        for (variable, value) in &sample.values {
             let keys = self
                 .settings
                 .variables
@@ -45,10 +45,10 @@ impl Template {
             let keys = keys.filter(|k| !k.is_empty()).map(|k| format!("  ->  {k}"));
             text += &format!("#   {variable} = {value}{}\n", keys.unwrap_or_default());
         }
-        if draw.rejected > 0 {
+        if sample.rejected > 0 {
             text += &format!(
                 "# {} draws before did not meet the conditions.\n",
-                draw.rejected
+                sample.rejected
             );
         }
         text + "# Every key stands here, with what it means.\n\n"
@@ -71,7 +71,7 @@ struct Writer {
 }
 
 impl Writer {
-    /// A table's own keys first, then the tables below it, as TOML wants it.
+    /// A table's own keys first, then the tables below it, in TOML's order.
     fn table(&self, text: &mut String, table: &Table, schema: &Json, path: &str) {
         let (below, own): (Vec<_>, Vec<_>) = table.iter().partition(|(_, v)| is_section(v));
         for (key, value) in own {
@@ -122,8 +122,8 @@ impl Writer {
     }
 
     fn comment(&self, text: &mut String, property: Option<&Json>) {
-        let said = property.and_then(|p| p.get("description")?.as_str());
-        for line in said.iter().flat_map(|s| wrapped(s)) {
+        let meaning = property.and_then(|p| p.get("description")?.as_str());
+        for line in meaning.iter().flat_map(|s| wrapped(s)) {
             _ = writeln!(text, "# {line}");
         }
     }

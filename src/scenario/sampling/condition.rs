@@ -131,7 +131,7 @@ impl Condition {
     }
 }
 
-/// As the parser wants it: names in braces, as it would take `min_gap_m` for the function `min`, and
+/// In the form that the parser reads: names in braces, as it would take `min_gap_m` for the function `min`, and
 /// numbers without powers of ten, which it does not know.
 fn plain(text: &str) -> String {
     let (mut out, mut rest) = (String::new(), text);

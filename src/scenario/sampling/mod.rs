@@ -2,7 +2,7 @@
 //! be had alone, by its index.
 //!
 //! ```
-//! use metrotwin::scenario::draw::Template;
+//! use metrotwin::scenario::sampling::Template;
 //! # let folder = std::env::temp_dir().join(format!("metrotwin-draw-{}", std::process::id()));
 //! # std::fs::create_dir_all(&folder)?;
 //! # std::fs::copy("tunnels/test_bench.toml", folder.join("bench.toml"))?;
@@ -24,8 +24,8 @@
 //!     from = { integer = { min = 1, max = 6 } }
 //! "#)?;
 //! let template = Template::load(&path)?;
-//! let draw = template.draw(12)?;
-//! assert_eq!(draw, template.draw(12)?); // whatever came before
+//! let draw = template.sample(12)?;
+//! assert_eq!(draw, template.sample(12)?); // whatever came before
 //! let scenario = template.scenario(&draw)?;
 //! assert_eq!(scenario.seed, draw.seed);
 //! # std::fs::remove_dir_all(&folder)?;
@@ -55,16 +55,16 @@ mod concrete;
 mod condition;
 mod copula;
 mod distribution;
-mod drawing;
 mod inputs;
 mod plan;
+mod sample;
 mod settings;
 mod tables;
 mod template;
 
 pub use condition::{Condition, ConditionError};
-pub use drawing::{Draw, DrawError};
 pub use inputs::{Inputs, sha256};
+pub use sample::{Sample, SampleError};
 pub use settings::{
     CorrelationSettings, Distribution, PlanSettings, PrecisionSettings, StopSettings,
     StudySettings, VariableSettings, as_written,

@@ -1,6 +1,6 @@
 //! A scenario file with a `[study]`, ready to be drawn from.
 
-use super::condition::Condition;
+use super::condition::{Condition, ConditionError};
 use super::copula;
 use super::plan::{MOST_SOBOL, Plan};
 use super::settings::{Distribution, PlanSettings, StudySettings};
@@ -9,6 +9,7 @@ use crate::scenario::build::{overridden, read};
 use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
 use crate::settings::{FileError, Problem, read_toml};
 use nalgebra::DMatrix;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -32,6 +33,8 @@ pub struct Template {
     pub(super) groups: Vec<(Vec<usize>, DMatrix<f64>)>,
     pub(super) tables: Tables,
     pub(super) conditions: Vec<Condition>,
+    /// What counts as an event, by name.
+    pub events: BTreeMap<String, Condition>,
 }
 
 impl Template {
@@ -57,46 +60,17 @@ impl Template {
         let folder = path.parent().unwrap_or(Path::new(""));
         let tables = Tables::read(&settings, folder, &mut problems);
         let conditions = conditions(&settings, &mut problems);
+        let events = events(&settings, &mut problems);
         check_keys(path, &text, &settings, &tables, &mut problems);
         let coordinates = coordinates(&settings);
-        if settings.plan == PlanSettings::Sobol && coordinates.len() > MOST_SOBOL {
-            problems.push(Problem::new(
-                "study.plan",
-                format!(
-                    "{} variables are more than Sobol's sequence has here",
-                    coordinates.len()
-                ),
-                format!("draw at most {MOST_SOBOL}, or use latin_hypercube"),
-            ));
-        }
-        let swept = settings
-            .variables
-            .values()
-            .map(|v| v.from.swept().len().max(1) as u64);
-        if swept.fold(1, u64::saturating_mul) > MOST_RUNS {
-            problems.push(Problem::new(
-                "study.variables",
-                format!("the swept values have more than {MOST_RUNS} combinations"),
-                "sweep fewer values",
-            ));
-        }
+        check_size(&settings, coordinates.len(), &mut problems);
         if !problems.is_empty() {
             return Err(wrong(FileError::Problems(problems)));
         }
-        let place = |name: &String| coordinates.iter().position(|c| c == name);
-        let groups = settings.correlated.iter().filter_map(|group| {
-            let places = group
-                .variables
-                .iter()
-                .map(place)
-                .collect::<Option<Vec<_>>>()?;
-            let lower = copula::lower(&group.matrix, places.len())?;
-            Some((places, lower))
-        });
         let swept = settings.variables.iter().filter(|(_, v)| v.from.is_swept());
         Ok(Self {
             path: path.to_owned(),
-            groups: groups.collect(),
+            groups: groups(&settings, &coordinates),
             swept: swept
                 .map(|(name, v)| (name.clone(), v.from.swept()))
                 .collect(),
@@ -104,6 +78,7 @@ impl Template {
             coordinates,
             tables,
             conditions,
+            events,
             file,
             settings,
             text,
@@ -182,18 +157,58 @@ pub(super) fn table_coordinate(file: &str) -> String {
 }
 
 fn conditions(settings: &StudySettings, problems: &mut Vec<Problem>) -> Vec<Condition> {
-    let mut conditions = Vec::new();
-    for (k, text) in settings.require.iter().enumerate() {
-        match Condition::parse(text) {
-            Ok(condition) => conditions.push(condition),
-            Err(error) => problems.push(Problem::new(
-                format!("study.require[{k}]"),
-                error.to_string(),
-                "compare numbers, as in `gap_m > 2.0 * size_m && speed_kmh < 80`",
-            )),
-        }
+    let remedy = "compare numbers, as in `gap_m > 2.0 * size_m && speed_kmh < 80`";
+    let parsed = settings.require.iter().enumerate();
+    parsed
+        .filter_map(|(k, text)| parse(text, format!("study.require[{k}]"), remedy, problems))
+        .collect()
+}
+
+fn events(settings: &StudySettings, problems: &mut Vec<Problem>) -> BTreeMap<String, Condition> {
+    let remedy = "`metrotwin study figures` lists what may be named, and the signs";
+    let mut events = BTreeMap::new();
+    for (name, text) in &settings.events {
+        let condition = parse(text, format!("study.events.{name}"), remedy, problems);
+        events.extend(condition.map(|condition| (name.clone(), condition)));
     }
-    conditions
+    events
+}
+
+fn parse(text: &str, key: String, remedy: &str, problems: &mut Vec<Problem>) -> Option<Condition> {
+    let wrong = |e: ConditionError| problems.push(Problem::new(key, e.to_string(), remedy));
+    Condition::parse(text).map_err(wrong).ok()
+}
+
+/// Correlated variables by their places among the coordinates, with what turns them.
+fn groups(settings: &StudySettings, coordinates: &[String]) -> Vec<(Vec<usize>, DMatrix<f64>)> {
+    let place = |name: &String| coordinates.iter().position(|c| c == name);
+    let groups = settings.correlated.iter().filter_map(|group| {
+        let places: Option<Vec<_>> = group.variables.iter().map(place).collect();
+        let places = places?;
+        let lower = copula::lower(&group.matrix, places.len())?;
+        Some((places, lower))
+    });
+    groups.collect()
+}
+
+/// More variables than a plan serves, or more combinations than can be run.
+fn check_size(settings: &StudySettings, coordinates: usize, problems: &mut Vec<Problem>) {
+    if settings.plan == PlanSettings::Sobol && coordinates > MOST_SOBOL {
+        problems.push(Problem::new(
+            "study.plan",
+            format!("{coordinates} variables are more than Sobol's sequence has here"),
+            format!("draw at most {MOST_SOBOL}, or use latin_hypercube"),
+        ));
+    }
+    let variables = settings.variables.values();
+    let swept = variables.map(|v| v.from.swept().len().max(1) as u64);
+    if swept.fold(1, u64::saturating_mul) > MOST_RUNS {
+        problems.push(Problem::new(
+            "study.variables",
+            format!("the swept values have more than {MOST_RUNS} combinations"),
+            "sweep fewer values",
+        ));
+    }
 }
 
 /// Every key that a variable sets must be there, and take a value of its kind.

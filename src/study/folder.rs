@@ -1,0 +1,41 @@
+//! A study's folder, opened once for all that is asked of it.
+
+use super::stop::Precision;
+use super::{INPUTS, Manifest, Result, Row, StudyError, journal};
+use crate::scenario::sampling::Template;
+use std::path::{Path, PathBuf};
+
+/// The study that a folder holds, from the copies of its inputs.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// Where it lies.
+    pub folder: PathBuf,
+    /// What its rows were made with.
+    pub manifest: Manifest,
+    /// What its runs are drawn from.
+    pub template: Template,
+}
+
+impl Study {
+    /// Opens a folder that `study run` or `study merge` has written.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let manifest =
+            Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
+        let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
+        template.settings.runs = (manifest.runs / template.cells()) as u32;
+        Ok(Self {
+            folder: folder.to_owned(),
+            manifest,
+            template,
+        })
+    }
+
+    /// The rows that count, in order.
+    pub fn rows(&self) -> Result<Vec<Row>> {
+        let mut rows = journal::read(&self.folder)?;
+        if let Some(precision) = Precision::of(&self.template)? {
+            precision.truncate(&mut rows);
+        }
+        Ok(rows)
+    }
+}
