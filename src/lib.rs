@@ -9,26 +9,27 @@
 //!
 //! | room | what it holds |
 //! |---|---|
-//! | [`settings`] | how files are read, declared and checked |
+//! | [`settings`] | how files are declared, read and checked |
 //! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices |
 //! | [`bus`] | what travels between the world and the stack, as plain data |
 //! | [`stack`] | the real thing: lamp decoding, positioning, obstacle detection, protection |
-//! | `twin` | the world: physics, renderer, sensors |
+//! | `twin` | the world: geometry, physics, renderers, sensors, links, faults |
 //! | `scenario` | the files a user writes |
-//! | `session` | one run, step by step, scored against the truth |
+//! | `session` | one loop over world, sensors, links and equipment, scored against the truth |
 //! | `record` | what a session shows in a rerun recording |
 //! | `study` | many sessions: draws, workers, rows, statistics, report |
 //! | `cli` | one file a subcommand |
 //!
-//! `track`, `bus` and `stack` build alone (`--no-default-features`): that is what would run on a
-//! train or in a wayside box. The feature `twin` (on by default) adds the rest.
+//! `settings`, `track`, `bus` and `stack` build alone (`--no-default-features`): that is what would run
+//! on a train or in a wayside box. The feature `cli` adds the commands that need no world, the feature
+//! `twin` (on by default) the rest.
 
 pub mod bus;
 pub mod settings;
 pub mod stack;
 pub mod track;
 
-#[cfg(feature = "twin")]
+#[cfg(feature = "cli")]
 pub mod cli;
 #[cfg(feature = "twin")]
 pub mod record;

@@ -1,10 +1,9 @@
 //! `metrotwin check`: is this file right, and what does it say?
 
 use super::fault::Failure;
-use super::{print, report};
-use crate::scenario::sampling::Template;
-use crate::scenario::{self, Scenario};
-use crate::study;
+use super::{print, tunnel};
+use crate::settings::FileError;
+use crate::track::Tunnel;
 use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
@@ -48,48 +47,39 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
 }
 
 fn report_on(path: &Path) -> Result<String, Failure> {
-    let text = scenario::read(path)?;
-    let has = |keys: &[&str]| {
-        text.parse::<toml::Table>()
-            .is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
-    };
-    if has(&TUNNEL_KEYS) {
-        Ok(report::tunnel(&scenario::parse_tunnel(path, &text)?))
-    } else if has(&VEHICLE_KEYS) {
-        Ok(report::vehicle(&scenario::parse_vehicle(path, &text)?))
-    } else {
-        let mut lines = report::scenario(&Scenario::from_text(path, &text, &[])?);
-        if has(&["study"]) {
-            let template = Template::load(path)?;
-            study::check(&template, false)?;
-            lines += &report::study(&template);
-            lines += &invalid_draws(&template);
-        }
-        Ok(lines)
+    let text = read(path)?;
+    if has_any(&text, &TUNNEL_KEYS) {
+        let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
+        return Ok(tunnel::report(&tunnel));
     }
+    other(path, &text)
 }
 
-/// What is wrong with the first runs that a study draws; each that is no scenario becomes a row that
-/// says so.
-fn invalid_draws(template: &Template) -> String {
-    let looked = template.runs().min(MOST_DRAWN);
-    let wrong = |k: u64| match template.sample(k) {
-        Ok(sample) => template.scenario(&sample).err().map(|e| e.to_string()),
-        Err(error) => Some(error.to_string()),
-    };
-    let wrong: Vec<String> = (0..looked).filter_map(wrong).collect();
-    match wrong.first() {
-        None => String::new(),
-        Some(first) => format!(
-            "\n    {} of the first {looked} runs cannot be run: {first}",
-            wrong.len()
-        ),
-    }
+/// A vehicle, scenario or study.
+#[cfg(feature = "twin")]
+use super::check_scenario::report_on as other;
+
+/// The onboard box knows tunnels only.
+#[cfg(not(feature = "twin"))]
+fn other(path: &Path, _: &str) -> Result<String, Failure> {
+    Err(Failure::input(
+        format!("{} is no tunnel file", path.display()),
+        "scenarios and vehicles are checked by the whole program, built with its default features",
+    ))
 }
 
-/// Runs of a study that are drawn to see whether they can be run.
-const MOST_DRAWN: u64 = 200;
+fn read(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|source| {
+        let path = path.to_owned();
+        Failure::file(&path.clone(), "", FileError::Read { path, source })
+    })
+}
+
+/// Whether a file has any of these keys.
+pub(super) fn has_any(text: &str, keys: &[&str]) -> bool {
+    let table = text.parse::<toml::Table>();
+    table.is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
+}
+
 /// Keys that only tunnels have. What is not TOML is left to the scenario's parser to complain of.
 const TUNNEL_KEYS: [&str; 6] = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
-/// Keys that only vehicles have.
-const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

@@ -1,6 +1,5 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
-use crate::scenario::{Override, ScenarioError, is_within};
 use crate::settings::{FileError, Problem, locate};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report};
 use std::fmt;
@@ -30,6 +29,13 @@ impl Failure {
         Self::Run(error.into())
     }
 
+    /// A file that cannot be used.
+    pub(super) fn file(path: &Path, text: &str, error: FileError) -> Self {
+        let heading = format!("{} cannot be used", path.display());
+        let fault = Fault::of_file(heading, (path, text), error, &|_| None);
+        Self::Input(Report::new(fault))
+    }
+
     pub(super) fn code(&self) -> u8 {
         match self {
             Self::Run(_) => 1,
@@ -43,12 +49,6 @@ impl Failure {
             Self::Run(error) => eprintln!("error: {error:#}"),
             Self::Reported => {}
         }
-    }
-}
-
-impl From<ScenarioError> for Failure {
-    fn from(error: ScenarioError) -> Self {
-        Self::Input(Report::new(Fault::of(error)))
     }
 }
 
@@ -66,7 +66,7 @@ pub(super) fn set_style() {
 #[derive(Debug, thiserror::Error, Diagnostic)]
 #[error("{what}")]
 #[diagnostic(severity(Error))]
-struct Fault {
+pub(super) struct Fault {
     what: String,
     #[help]
     remedy: Option<String>,
@@ -79,7 +79,7 @@ struct Fault {
 }
 
 impl Fault {
-    fn new(what: impl fmt::Display) -> Self {
+    pub(super) fn new(what: impl fmt::Display) -> Self {
         Self {
             what: what.to_string(),
             remedy: None,
@@ -89,40 +89,12 @@ impl Fault {
         }
     }
 
-    fn of(error: ScenarioError) -> Self {
-        match error {
-            ScenarioError::Override(error) => Self::new(format!("--set {error}")),
-            ScenarioError::Overridden {
-                path,
-                overrides,
-                source,
-            } => {
-                let list: Vec<String> = overrides.iter().map(Override::to_string).collect();
-                let heading = format!(
-                    "{} is right by itself, but not with {}",
-                    path.display(),
-                    list.join(" ")
-                );
-                Self::of_file(heading, &path, "", &overrides, source)
-            }
-            ScenarioError::File {
-                path,
-                text,
-                overrides,
-                source,
-            } => {
-                let heading = format!("{} cannot be used", path.display());
-                Self::of_file(heading, &path, &text, &overrides, source)
-            }
-        }
-    }
-
-    fn of_file(
+    /// Of a wrong file; `changed` tells what a key was changed by from outside, if it was.
+    pub(super) fn of_file(
         heading: String,
-        path: &Path,
-        text: &str,
-        overrides: &[Override],
+        (path, text): (&Path, &str),
         source: FileError,
+        changed: &dyn Fn(&str) -> Option<String>,
     ) -> Self {
         let others = match source {
             FileError::Read { source, .. } => {
@@ -137,7 +109,7 @@ impl Fault {
                 vec![fault.at(path, text, span, "here")]
             }
             FileError::Problems(problems) => {
-                let one = |problem| Self::of_problem(path, text, overrides, problem);
+                let one = |problem| Self::of_problem((path, text), problem, changed);
                 problems.into_iter().map(one).collect()
             }
         };
@@ -147,10 +119,14 @@ impl Fault {
         }
     }
 
-    fn of_problem(path: &Path, text: &str, overrides: &[Override], problem: Problem) -> Self {
+    fn of_problem(
+        (path, text): (&Path, &str),
+        problem: Problem,
+        changed: &dyn Fn(&str) -> Option<String>,
+    ) -> Self {
         let Problem { key, what, remedy } = problem;
-        // An overridden value is not in the file: pointing there would mislead.
-        let fault = match overrides.iter().find(|o| touches(&o.key, &key)) {
+        // A changed value is not in the file: pointing there would mislead.
+        let fault = match changed(&key) {
             Some(change) => Self::new(format!("{key}: {what} ({change})")),
             None => {
                 let span = locate(text, &key).filter(|_| !text.is_empty());
@@ -178,26 +154,5 @@ impl Fault {
             self.places = vec![LabeledSpan::at(span, label)];
         }
         self
-    }
-}
-
-/// One of the keys lies at or below the other.
-fn touches(a: &str, b: &str) -> bool {
-    is_within(b, a) || is_within(a, b)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// An override of a neighbour, or of a key with the same beginning, is not to blame.
-    #[test]
-    fn only_the_overridden_key_is_blamed() {
-        assert!(touches("train", "train.cars"));
-        assert!(touches("train.cars", "train.cars"));
-        assert!(touches("obstacles[0].body", "obstacles[0]"));
-        assert!(!touches("train.cars", "train.car_length_m"));
-        assert!(!touches("train", "training"));
-        assert!(!touches("obstacles[1]", "obstacles[10]"));
     }
 }

@@ -13,14 +13,29 @@
 //! ```
 
 mod check;
-mod doctor;
 mod fault;
+mod tunnel;
+
+/// What needs the simulated world.
+#[cfg(feature = "twin")]
+mod check_scenario;
+#[cfg(feature = "twin")]
+mod doctor;
+#[cfg(feature = "twin")]
 mod frames;
+#[cfg(feature = "twin")]
 mod generate;
+#[cfg(feature = "twin")]
 mod report;
+#[cfg(feature = "twin")]
 mod run;
+#[cfg(feature = "twin")]
 mod running;
+#[cfg(feature = "twin")]
+mod scenario_fault;
+#[cfg(feature = "twin")]
 mod study;
+#[cfg(feature = "twin")]
 mod table;
 
 use clap::{ArgAction, Parser, Subcommand};
@@ -57,11 +72,16 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    #[cfg(feature = "twin")]
     Run(run::RunArgs),
+    #[cfg(feature = "twin")]
     Frames(frames::FramesArgs),
+    #[cfg(feature = "twin")]
     Generate(generate::GenerateArgs),
+    #[cfg(feature = "twin")]
     Study(study::StudyArgs),
     Check(check::CheckArgs),
+    #[cfg(feature = "twin")]
     Doctor(doctor::DoctorArgs),
 }
 
@@ -70,11 +90,16 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     start_messages(cli.verbose);
     let result = match cli.command {
+        #[cfg(feature = "twin")]
         Command::Run(args) => run::run(&args),
+        #[cfg(feature = "twin")]
         Command::Frames(args) => frames::frames(&args),
+        #[cfg(feature = "twin")]
         Command::Generate(args) => generate::generate(&args),
+        #[cfg(feature = "twin")]
         Command::Study(args) => study::study(&args),
         Command::Check(args) => check::check(&args),
+        #[cfg(feature = "twin")]
         Command::Doctor(args) => doctor::doctor(&args),
     };
     match result {

@@ -1,74 +1,11 @@
-//! What a tunnel or scenario says, in a few lines.
+//! What a vehicle, scenario or study says, in a few lines.
 
+use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Template, as_written};
-use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
-
-/// Length, radii, grades, sections, lamps, devices.
-pub(super) fn tunnel(tunnel: &Tunnel) -> String {
-    let length_m = tunnel.alignment.length_m();
-    let mut tightest = 0.0f64;
-    let (mut lowest, mut steepest) = (f64::INFINITY, f64::NEG_INFINITY);
-    for s in 0..=length_m as u32 {
-        let frame = tunnel.alignment.at(f64::from(s));
-        tightest = tightest.max(frame.curvature_per_m.abs());
-        lowest = lowest.min(frame.slope * 1e3);
-        steepest = steepest.max(frame.slope * 1e3);
-    }
-    let plan = match tightest < 1e-9 {
-        true => "straight".to_owned(),
-        false => format!("tightest radius {:.0} m", 1.0 / tightest),
-    };
-    let mut lines = vec![
-        format!(
-            "tunnel `{}`, line {}: {length_m:.1} m, {plan}",
-            tunnel.name, tunnel.line_number
-        ),
-        format!("grades from {lowest:.1} to {steepest:.1} permille"),
-        format!("{} stretches of cross-section", tunnel.sections.len()),
-        lamps(tunnel),
-    ];
-    lines.extend(tunnel.wayside.iter().map(|d| {
-        format!(
-            "wayside device {} at {} m, writes to balise {}",
-            d.name, d.chainage_m, d.balise
-        )
-    }));
-    let named = |what: &str, list: Vec<String>| match list.len() {
-        0 => format!("no {what}"),
-        _ => format!("{what}: {}", list.join(", ")),
-    };
-    let at = |name: &str, chainage_m: f64| format!("{name} at {chainage_m} m");
-    let balises = tunnel.balises.iter().map(|b| at(&b.name, b.chainage_m));
-    let stations = tunnel.stations.iter().map(|(name, s)| at(name, *s));
-    lines.push(named("balises", balises.collect()));
-    lines.push(named("stations", stations.collect()));
-    indented(&lines)
-}
-
-fn lamps(tunnel: &Tunnel) -> String {
-    match (tunnel.lamps.first(), tunnel.lamps.last()) {
-        (Some(first), Some(last)) => {
-            let gaps = tunnel
-                .lamps
-                .windows(2)
-                .map(|w| w[1].chainage_m - w[0].chainage_m);
-            let widest = gaps.fold(0.0, f64::max);
-            format!(
-                "{} lamps from {} to {} m, at most {widest:.1} m apart; chips of {:.1} us, {:?} code",
-                tunnel.lamps.len(),
-                first.chainage_m,
-                last.chainage_m,
-                first.chip_s * 1e6,
-                first.code,
-            )
-        }
-        _ => "no lamps".to_owned(),
-    }
-}
 
 /// Dimensions and masses.
 pub(super) fn vehicle(vehicle: &VehicleFile) -> String {
@@ -214,9 +151,6 @@ fn stripes(camera: &CameraModel, tunnel: &Tunnel) -> String {
     }
 }
 
-fn indented(lines: &[String]) -> String {
-    lines.iter().map(|line| format!("  {line}\n")).collect()
-}
 /// What a study varies.
 pub(super) fn study(template: &Template) -> String {
     let settings = &template.settings;

@@ -1,0 +1,47 @@
+//! `metrotwin check` of vehicles, scenarios and studies.
+
+use super::check::has_any;
+use super::fault::Failure;
+use super::report;
+use crate::scenario::sampling::Template;
+use crate::scenario::{self, Scenario};
+use crate::study;
+use std::path::Path;
+
+/// What is to say of a file that is no tunnel.
+pub(super) fn report_on(path: &Path, text: &str) -> Result<String, Failure> {
+    if has_any(text, &VEHICLE_KEYS) {
+        return Ok(report::vehicle(&scenario::parse_vehicle(path, text)?));
+    }
+    let mut said = report::scenario(&Scenario::from_text(path, text, &[])?);
+    if has_any(text, &["study"]) {
+        let template = Template::load(path)?;
+        study::check(&template, false)?;
+        said += &report::study(&template);
+        said += &invalid_draws(&template);
+    }
+    Ok(said)
+}
+
+/// What is wrong with the first runs that a study draws; each that is no scenario becomes a row that
+/// says so.
+fn invalid_draws(template: &Template) -> String {
+    let looked = template.runs().min(MOST_DRAWN);
+    let wrong = |k: u64| match template.sample(k) {
+        Ok(sample) => template.scenario(&sample).err().map(|e| e.to_string()),
+        Err(error) => Some(error.to_string()),
+    };
+    let wrong: Vec<String> = (0..looked).filter_map(wrong).collect();
+    match wrong.first() {
+        None => String::new(),
+        Some(first) => format!(
+            "\n    {} of the first {looked} runs cannot be run: {first}",
+            wrong.len()
+        ),
+    }
+}
+
+/// Runs of a study that are drawn to see whether they can be run.
+const MOST_DRAWN: u64 = 200;
+/// Keys that only vehicles have.
+const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];
