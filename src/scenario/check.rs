@@ -625,7 +625,7 @@ mod tests {
         let stranger = "camera = 'W1350'\nfault = { kind = 'freeze' }";
         assert_eq!(camera(stranger), [format!("{at}.camera")]);
         let share = "camera = 'rig'\nfault = { kind = 'drop', share = -0.1 }\nfrom_s = -1.0";
-        let expected = ["from_s", "fault.share"].map(|key| format!("{at}.{key}"));
+        let expected = ["fault.share", "from_s"].map(|key| format!("{at}.{key}"));
         assert_eq!(camera(share), expected);
         let late = "camera = 'rig'\nfault = { kind = 'late', by_ms = 1e9 }";
         assert_eq!(camera(late), [format!("{at}.fault.by_ms")]);

@@ -50,11 +50,13 @@ impl<S: Settings> Settings for BTreeMap<String, S> {
 /// }
 /// ```
 ///
-/// Every key is public, has a default, and may have a range (`in`, inclusive, which the schema
-/// states too) or settings of its own (`nested`). `also` names a method that takes a
-/// [`Checker`](super::Checker), for what several keys say together. Without any `= default`, a
-/// table's keys must be written, but for those with a serde attribute. An `enum` has keys of the
-/// latter kind in its variants.
+/// Every key is public. `= ...` is its default, `in` the range that it must lie in (both ends
+/// count, and the schema states it too), and `nested` says that it holds settings that check
+/// themselves. `also` names a method for what several keys say together; it takes a
+/// [`Checker`](super::Checker).
+///
+/// Either all keys have a default or none has. Without one a key must be written, unless it is an
+/// `Option` or has a serde attribute. Keys of an `enum`'s variants have no default.
 macro_rules! settings {
     (
         $(#[$meta:meta])*

@@ -74,8 +74,7 @@ impl<'a> Checker<'a> {
         key_below(&self.at, key)
     }
 
-    /// Adds a problem, unless the key has one: the first is to be solved before others can be told
-    /// from what follows of it.
+    /// Adds a problem, unless the key has one already: a second may only follow from the first.
     pub fn problem(&mut self, key: &str, what: impl Into<String>, remedy: impl Into<String>) {
         let key = self.key(key);
         if self.problems.iter().all(|p| p.key != key) {
@@ -111,12 +110,12 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// Of what stands below one of its keys.
+    /// A checker of what stands below one of its keys.
     pub fn below(&mut self, key: &str) -> Checker<'_> {
         Checker::new(&self.key(key), self.problems)
     }
 
-    /// Adds what is wrong with the settings under a key.
+    /// Adds what the settings under a key find wrong with themselves.
     pub fn nested(&mut self, key: &str, settings: &impl Settings) {
         settings.check(&self.key(key), self.problems);
     }
