@@ -10,7 +10,7 @@ const AFTER: &str = "\
 Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
 A file with any of [[plan]], [[sections]], [lamps] is a tunnel, one with [body] and [bogie] a
 vehicle, any other a scenario; of a scenario the files that it names are checked too, and of one with a
-[study] what it samples.
+[study] what it draws.
 
 Examples:
   metrotwin check tunnels/chengdu_line1.toml

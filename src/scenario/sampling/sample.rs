@@ -35,7 +35,7 @@ pub struct Sample {
 pub enum SampleError {
     /// No draw meets the conditions.
     #[error(
-        "run {index}: of {attempts} samples none meets the conditions; `{text}` turned down {refused} of \
+        "run {index}: of {attempts} draws none meets the conditions; `{text}` turned down {refused} of \
          them"
     )]
     Rejected {
