@@ -4,6 +4,7 @@ use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Template, as_written};
+use crate::track::Tunnel;
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
 

@@ -43,7 +43,7 @@ pub mod sampling;
 pub mod schema;
 
 pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
-pub(crate) use build::{parse_tunnel, parse_vehicle, read};
+pub(crate) use build::{parse_vehicle, read};
 pub use file::{
     BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
     WaysidePostSettings,
