@@ -58,7 +58,7 @@ impl Observer for ErrorByDistance {
         if let Event::Pair(_, _, report, truths_m) = event {
             let fixes = report.fixes.iter().zip(*truths_m);
             self.0
-                .extend(fixes.filter(|(fix, _)| fix.method == Method::Paper).map(
+                .extend(fixes.filter(|(fix, _)| fix.method == Method::Stereo).map(
                     |(fix, truth_m)| (fix.lamp_in_camera.norm(), (fix.chainage_m - truth_m).abs()),
                 ));
         }
@@ -76,15 +76,15 @@ fn val_static_bench() {
     let mut errors = ErrorByDistance::default();
     let summary = figures(&scenario("static_bench", &[]), &mut errors);
     let max_m = |method| summary.positioning[&method].error_m.unwrap().max;
-    for method in [Method::Paper, Method::Mono] {
+    for method in [Method::Stereo, Method::Mono] {
         assert_eq!(summary.positioning[&method].fixes, 200);
     }
-    assert!(max_m(Method::Paper) <= 0.2973);
+    assert!(max_m(Method::Stereo) <= 0.2973);
     assert!(max_m(Method::Mono) <= 0.356);
     // Measured: mean 5 and 43 mm, p95 15 and 155 mm, max 55 mm.
-    regress(&summary, Method::Paper, 0.008, 0.025);
+    regress(&summary, Method::Stereo, 0.008, 0.025);
     regress(&summary, Method::Mono, 0.065, 0.23);
-    assert!(max_m(Method::Paper) < 0.085);
+    assert!(max_m(Method::Stereo) < 0.085);
     let rms = |near_m: f64, far_m: f64| {
         let inside = errors.0.iter().filter(|e| (near_m..far_m).contains(&e.0));
         let (n, sum) = inside.fold((0, 0.0), |(n, sum), e| (n + 1, sum + e.1 * e.1));
@@ -109,14 +109,14 @@ fn val_line_run_at_60_kmh() {
         ],
     );
     let summary = figures(&scenario, &mut ErrorByDistance::default());
-    let paper = &summary.positioning[&Method::Paper];
+    let paper = &summary.positioning[&Method::Stereo];
     assert!(paper.uid_decode_rate.unwrap() >= 0.95);
     assert!(paper.error_m.unwrap().mean < 0.1533);
     // Measured with errors of survey and calibration: mean 30 and 48 mm, p95 76 and 156 mm, and 99.1 %
     // of the pairs. There is room for a rig whose eyes are some 0.004 deg out of parallel.
-    regress(&summary, Method::Paper, 0.06, 0.15);
+    regress(&summary, Method::Stereo, 0.06, 0.15);
     regress(&summary, Method::Mono, 0.07, 0.23);
-    for method in [Method::Paper, Method::Mono] {
+    for method in [Method::Stereo, Method::Mono] {
         assert!(summary.positioning[&method].availability.unwrap() > 0.97);
     }
 }
@@ -211,7 +211,7 @@ fn val_lamps_out() {
         let mut errors = ErrorByTime::default();
         let summary = figures(&scenario, &mut errors);
         let error = Distribution::of(&mut errors.errors_m).unwrap();
-        let paper = &summary.positioning[&Method::Paper];
+        let paper = &summary.positioning[&Method::Stereo];
         let availability = paper.availability.unwrap();
         println!(
             "{:7.1} %   {:8.3} m {:6.3} {:6.3} {:9.2} m {:12.1} % {:7.1} %",

@@ -36,7 +36,7 @@ impl TrainCommand {
 /// One lamp with its buzzer, on the driver's display.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Lamp {
+pub enum Indicator {
     /// Nothing on the way.
     #[default]
     NormalGreen,
@@ -52,7 +52,7 @@ pub struct DriverDisplay {
     /// The equipment has power.
     pub power: bool,
     /// Which lamp is lit.
-    pub lamp: Lamp,
+    pub lamp: Indicator,
     /// Where the train takes itself to be, chainage.
     pub position_m: Option<f64>,
     /// Distance to the obstacle ahead.

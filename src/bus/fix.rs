@@ -12,15 +12,16 @@ use serde::{Deserialize, Serialize};
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
-    /// Stereo triangulation of the lamp centre.
-    Paper,
+    /// Stereo triangulation of the lamp centre, as in the paper; `paper` in files.
+    #[serde(rename = "paper")]
+    Stereo,
     /// One camera, range from the lamp's apparent size.
     Mono,
 }
 
 impl Method {
     /// Every method.
-    pub const ALL: [Self; 2] = [Self::Paper, Self::Mono];
+    pub const ALL: [Self; 2] = [Self::Stereo, Self::Mono];
 }
 
 /// How a lamp got its name.

@@ -1,6 +1,7 @@
-//! What travels between the world and the stack, as plain data: frames with their row times,
-//! calibrations, samples and scans on the way in; fixes, reports, messages and commands on the
-//! way out. Nothing here computes more than a unit conversion.
+//! What travels between the world and the stack, as plain data: each [`Message`] has a sender, a
+//! receiver, its times and a [`Content`]: frames with their row times, calibrations, samples and scans
+//! on the way in; fixes, reports, warnings and commands on the way out. Nothing here computes more than
+//! a unit conversion.
 //!
 //! Frames of reference: world x east, y north, z up; vehicle x forward, y left, z up (ISO 8855);
 //! camera x right, y down, z forward. A transform is named `a_from_b`: it takes coordinates in
@@ -31,7 +32,9 @@ mod warning;
 mod wayside;
 
 pub use camera::{CameraModel, Frame, Intrinsics, RigCalibration, Shutter, StereoPair};
-pub use command::{BrakeDemand, DriverDisplay, Lamp, ProtectionReport, Supervision, TrainCommand};
+pub use command::{
+    BrakeDemand, DriverDisplay, Indicator, ProtectionReport, Supervision, TrainCommand,
+};
 pub use distortion::{Distortion, DistortionCoefficients};
 pub use estimate::{PositionEstimate, PositionSource};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};

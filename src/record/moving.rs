@@ -201,7 +201,7 @@ impl Moving {
             self.stream.at_frame(fix.time, report.number);
             let (name, colour) = palette::method(fix.method);
             let height_m = match fix.method {
-                Method::Paper => 10.8,
+                Method::Stereo => 10.8,
                 Method::Mono => 12.0,
             };
             let path = format!("world/estimate/{name}");

@@ -1,6 +1,6 @@
 //! Colours and widths, the same for the same thing in every pane.
 
-use crate::bus::{DangerLevel, Identity, Lamp, Method};
+use crate::bus::{DangerLevel, Identity, Indicator, Method};
 use crate::track::Material;
 use rerun::{Color, Radius};
 
@@ -31,7 +31,7 @@ pub(super) const fn rgb(r: u8, g: u8, b: u8) -> Color {
 /// Name and colour of an estimator.
 pub(super) fn method(method: Method) -> (&'static str, Color) {
     match method {
-        Method::Paper => ("paper", rgb(255, 110, 180)),
+        Method::Stereo => ("paper", rgb(255, 110, 180)),
         Method::Mono => ("mono", rgb(255, 190, 70)),
     }
 }
@@ -56,11 +56,11 @@ pub(super) fn danger(danger: DangerLevel) -> Color {
 }
 
 /// Of the driver's lamp, with its name.
-pub(super) fn driver_lamp(lamp: Lamp) -> (&'static str, &'static str) {
+pub(super) fn driver_lamp(lamp: Indicator) -> (&'static str, &'static str) {
     match lamp {
-        Lamp::NormalGreen => ("green", "line clear"),
-        Lamp::BrakeWarningRed => ("RED + buzzer", "obstacle ahead"),
-        Lamp::Emergency => ("EMERGENCY + buzzer", "brake by hand"),
+        Indicator::NormalGreen => ("green", "line clear"),
+        Indicator::BrakeWarningRed => ("RED + buzzer", "obstacle ahead"),
+        Indicator::Emergency => ("EMERGENCY + buzzer", "brake by hand"),
     }
 }
 

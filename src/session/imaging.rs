@@ -74,8 +74,9 @@ impl<'s> Imaging<'s> {
             let renderer = &mut self.renderer;
             let images = cost.wait.time(|| renderer.collect()).0?;
             let own = due.plus(pending.late_s);
-            let same_sensor = self.late.iter().filter(|l| l.1.sensor == pending.sensor);
-            let due = same_sensor.last().map_or(own, |(due, ..)| own.max(*due));
+            let same_sensor = self.late.iter().rev();
+            let mut same_sensor = same_sensor.filter(|l| l.1.sensor == pending.sensor);
+            let due = same_sensor.next().map_or(own, |(due, ..)| own.max(*due));
             if due <= now {
                 return Ok(Some((pending, images)));
             }

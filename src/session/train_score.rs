@@ -139,7 +139,7 @@ fn head_at(world: &World, id: TrainId, time: SimTime) -> Option<f64> {
     world.chainage_at(id, time).or_else(|| {
         let train = world.train(id)?;
         let ahead_s = time.since(train.time);
-        (ahead_s > 0.0).then(|| train.chainage_m + train.speed_mps * ahead_s)
+        (ahead_s > 0.0).then_some(train.chainage_m + train.speed_mps * ahead_s)
     })
 }
 

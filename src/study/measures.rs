@@ -6,7 +6,7 @@ use crate::session::{
     Distribution, Event, Observer, ObserverError, ObstacleScore, Opening, Summary, Wayside,
 };
 use Kind::{Flag, Int, Real, Reals};
-use Method::{Mono, Paper};
+use Method::{Mono, Stereo};
 use nalgebra::Vector3;
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -153,7 +153,7 @@ macro_rules! positioning {
 
 /// All figures, in the order of columns.
 pub const MEASURES: &[Measure] = positioning![
-    Paper "paper", Mono "mono";
+    Stereo "paper", Mono "mono";
     measure_of("dark_lamps", Int, "1", "lamps that the stack says do not shine",
         |s, _| json!(s.dark_lamps.len())),
     measure_of("obstacles", Int, "1", "obstacles that were to be found",

@@ -117,11 +117,15 @@ impl Tunnel {
         self.balises.iter().find(|b| b.name == name)
     }
 
-    /// Names of the balises that a train passes whose head runs up the line from one chainage to
-    /// another.
+    /// Names of the balises that a train passes whose head runs from one chainage to another, up or
+    /// down the line.
     pub fn balises_passed(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = &str> {
         (self.balises.iter())
-            .filter(move |b| b.chainage_m > from_m && b.chainage_m <= to_m)
+            .filter(move |b| {
+                let up = b.chainage_m > from_m && b.chainage_m <= to_m;
+                let down = b.chainage_m < from_m && b.chainage_m >= to_m;
+                up || down
+            })
             .map(|b| b.name.as_str())
     }
 }

@@ -219,8 +219,8 @@ impl Session<'_> {
         let distance_m = is_warned.then_some(OBSTACLE_M - position_m);
         let permitted_mps = distance_m.map_or(22.0, |d| (2.0 * (d - 10.0)).max(0.0).sqrt());
         let (brake, lamp) = match is_warned {
-            true => (BrakeDemand::Service, Lamp::BrakeWarningRed),
-            false => (BrakeDemand::None, Lamp::NormalGreen),
+            true => (BrakeDemand::Service, Indicator::BrakeWarningRed),
+            false => (BrakeDemand::None, Indicator::NormalGreen),
         };
         let report = ProtectionReport {
             time: SimTime::from_secs(t_s),
@@ -265,14 +265,16 @@ impl Session<'_> {
             }
         };
         let report = LedReport {
-            best: Method::Paper,
+            best: Method::Stereo,
             eyes: Default::default(),
             dark: Vec::new(),
             time,
             number,
             left: spots.clone(),
             right: spots,
-            fixes: [(Method::Paper, 0.12), (Method::Mono, 0.3)].map(fix).into(),
+            fixes: [(Method::Stereo, 0.12), (Method::Mono, 0.3)]
+                .map(fix)
+                .into(),
         };
         let pair = StereoPair {
             left: frame(time, number),

@@ -1,7 +1,7 @@
 //! Where the train is, from lamps seen by a stereo camera.
 //!
 //! **What for.** Every pair of images of a lamp of known name and surveyed place gives the train's
-//! position, by the method of Zhang et al. ([`Method::Paper`](crate::bus::Method)) and by its
+//! position, by the method of Zhang et al. ([`Method::Stereo`](crate::bus::Method)) and by its
 //! baseline with one camera ([`Method::Mono`](crate::bus::Method)).
 //!
 //! ```
@@ -63,10 +63,10 @@
 //! pitch swings slower than the gyro's fading to be nothing.
 
 mod equipment;
+mod lamp_presence;
 mod naming;
 mod positioner;
 mod reckoning;
-mod roll_call;
 mod settings;
 mod stereo;
 #[cfg(test)]

@@ -1,9 +1,9 @@
 //! The `paper` positioning and its baseline `mono`, from samples to fixes.
 
 use super::LedSettings;
+use super::lamp_presence::LampPresence;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::Reckoning;
-use super::roll_call::RollCall;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
     CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
@@ -31,7 +31,7 @@ pub struct LedPositioner {
     finders: [LampFinder; 2],
     reckoning: Reckoning,
     naming: Naming,
-    roll_call: RollCall,
+    lamp_presence: LampPresence,
     followed: Vec<Followed>,
     anchor: Option<Anchor>,
     epoch: Option<SimTime>,
@@ -99,7 +99,7 @@ impl LedPositioner {
             map,
             alone: finders[0].votes(),
             finders,
-            roll_call: RollCall::default(),
+            lamp_presence: LampPresence::default(),
             followed: Vec::new(),
             anchor: None,
             epoch: None,
@@ -149,10 +149,10 @@ impl LedPositioner {
 
     /// The method that a train should run by. One eye alone has nothing better than `mono`.
     fn best_method(&self, one_eyed: bool) -> Method {
-        if one_eyed || !self.gives(Method::Paper) {
+        if one_eyed || !self.gives(Method::Stereo) {
             Method::Mono
         } else {
-            Method::Paper
+            Method::Stereo
         }
     }
 
@@ -223,7 +223,7 @@ impl LedPositioner {
             if let Some(r) = sighting.right {
                 right[r].spot.uid = sighting.named;
             }
-            if self.gives(Method::Paper) {
+            if self.gives(Method::Stereo) {
                 keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
             }
             if self.gives(Method::Mono) {
@@ -231,7 +231,7 @@ impl LedPositioner {
             }
         }
         let best = match self.best_method(pair.right.image.is_empty()) {
-            Method::Paper => &paper,
+            Method::Stereo => &paper,
             Method::Mono => &mono,
         };
         if let Some(fix) = best {
@@ -247,8 +247,8 @@ impl LedPositioner {
             time: start,
             number: pair.left.number,
             eyes: [CameraHealth::default(); 2],
-            best: Method::Paper,
-            dark: self.call_lamps(pair, &left),
+            best: Method::Stereo,
+            dark: self.dark_lamps(pair, &left),
             left: spots(&left),
             right: spots(&right),
             fixes,
@@ -258,7 +258,7 @@ impl LedPositioner {
     }
 
     /// Lamps that have gone out of the left eye's sight without ever having been in it.
-    fn call_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
+    fn dark_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
         let camera = self.rig.left;
         let middle = 0.5 * f64::from(camera.intrinsics.height_px);
         let time = camera.shutter.row_mid(pair.left.start, middle);
@@ -266,7 +266,7 @@ impl LedPositioner {
             .chainage_m(time)
             .filter(|_| !pair.left.image.is_empty())
         else {
-            self.roll_call.forget();
+            self.lamp_presence.forget();
             return Vec::new();
         };
         let line = &self.map.alignment;
@@ -274,7 +274,7 @@ impl LedPositioner {
         let attitude = self.reckoning.attitude(time, line, chainage_m);
         let eye = Isometry3::from_parts(place, attitude) * self.rig.vehicle_from_left;
         let spots = left.iter().map(|lamp| lamp.spot.centre);
-        (self.roll_call).call(&self.map, &camera.intrinsics, &eye, spots)
+        (self.lamp_presence).check(&self.map, &camera.intrinsics, &eye, spots)
     }
 
     /// Finds the lamps of both eyes' images.
@@ -504,7 +504,7 @@ impl LedPositioner {
                 .hypot(self.settings.baseline_sigma_mm / baseline_mm),
             image_px: l.sigma_px,
         };
-        self.fix(Method::Paper, sighting, stereo.lamp, spread)
+        self.fix(Method::Stereo, sighting, stereo.lamp, spread)
     }
 
     /// What the right eye's yaw against the left makes of its x at depth 1: x = tan(angle), so

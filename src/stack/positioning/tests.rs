@@ -64,7 +64,7 @@ fn val_static_points_stay_within_the_papers_maximum() {
         let world = World::new(&map, map.lamps[k].chainage_m - ahead, 0.0);
         let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
         let reports = drive(&world, &mut positioner, 0.0, 12);
-        let paper = errors_m(&world, &reports, Method::Paper);
+        let paper = errors_m(&world, &reports, Method::Stereo);
         let mono = errors_m(&world, &reports, Method::Mono);
         assert!(!paper.is_empty(), "no fix in twelve pairs at {ahead} m");
         assert!(worst(&paper) < 0.297, "{ahead} m: {}", worst(&paper));
@@ -105,7 +105,7 @@ fn run(settings: &LedSettings, code: &str, kmh: f64, clock_ppm: f64) -> Run {
         }
     }
     Run {
-        errors_m: errors_m(&world, &reports, Method::Paper),
+        errors_m: errors_m(&world, &reports, Method::Stereo),
         lamps_read: read.len(),
         reports,
     }
@@ -156,9 +156,9 @@ fn run_with(told: Told) -> (Vec<f64>, Vec<f64>) {
     let reports = drive(&world, &mut positioner, 0.0, 32);
     let fixes = reports.iter().flat_map(|r| &r.fixes);
     let sigmas = fixes
-        .filter(|f| f.method == Method::Paper)
+        .filter(|f| f.method == Method::Stereo)
         .map(|f| f.sigma_m);
-    (errors_m(&world, &reports, Method::Paper), sigmas.collect())
+    (errors_m(&world, &reports, Method::Stereo), sigmas.collect())
 }
 
 /// Wide lenses that differ, eyes that look past each other, the right one 1 ms late, both read
@@ -357,7 +357,7 @@ fn val_sigma_is_what_fixes_scatter_by() {
                 speed_mps: 0.0,
             });
             let report = positioner.on_pair(&world.pair(number, time_s));
-            let paper = report.fixes.iter().find(|f| f.method == Method::Paper);
+            let paper = report.fixes.iter().find(|f| f.method == Method::Stereo);
             if let Some(fix) = paper.filter(|_| number == 1) {
                 assert_eq!(fix.uid, lamp.uid);
                 squares.push(((fix.chainage_m - world.start_m) / fix.sigma_m).powi(2));
@@ -419,8 +419,8 @@ fn the_gyro_holds_the_position_of_a_swinging_car() {
         lost.push(without.on_pair(&pair));
     }
     let (held, lost) = (
-        errors_m(&world, &held, Method::Paper),
-        errors_m(&world, &lost, Method::Paper),
+        errors_m(&world, &held, Method::Stereo),
+        errors_m(&world, &lost, Method::Stereo),
     );
     assert!(held.len() > 15 && worst(&held) < 0.15, "{}", worst(&held));
     assert!(worst(&lost) > 0.2, "{}", worst(&lost));
@@ -503,7 +503,7 @@ fn a_frozen_rig_gives_no_fix() {
         assert!(report.eyes.iter().all(|eye| eye.fault == fault));
         assert!(!stuck || (report.fixes.is_empty() && report.left.is_empty()));
     }
-    let after = errors_m(&world, &reports[40..], Method::Paper);
+    let after = errors_m(&world, &reports[40..], Method::Stereo);
     assert!(after.len() >= 7 && worst(&after) < 0.3, "{after:?}");
 }
 
@@ -568,7 +568,7 @@ fn lost_pairs_are_counted_and_survived() {
     let reports = drive_with(&world, &map, 60, |k, pair| (!lost(k)).then_some(pair));
     let told: u32 = reports.iter().map(|r| r.eyes[0].lost).sum();
     assert_eq!(told, (0..59).filter(|k| lost(*k)).count() as u32);
-    let errors = errors_m(&world, &reports, Method::Paper);
+    let errors = errors_m(&world, &reports, Method::Stereo);
     assert!(errors.len() * 10 > reports.len() * 7, "{}", errors.len());
     assert!(worst(&errors) < 0.33, "{}", worst(&errors));
 }
@@ -598,7 +598,7 @@ fn a_late_pair_is_a_fix_of_its_time_or_none() {
                 report.eyes.iter().all(|eye| eye.fault == fault),
                 "{late_s} s"
             );
-            given += errors_m(&world, &[report], Method::Paper)
+            given += errors_m(&world, &[report], Method::Stereo)
                 .iter()
                 .inspect(|error| assert!(error.abs() < 0.3, "{error}"))
                 .count();
@@ -624,7 +624,7 @@ fn dark_lamps_are_told_and_skipped() {
         });
         let told: Vec<_> = reports.iter().flat_map(|r| r.dark.clone()).collect();
         assert_eq!(told, out);
-        let errors = errors_m(&world, &reports, Method::Paper);
+        let errors = errors_m(&world, &reports, Method::Stereo);
         assert!(worst(&errors) < 0.33, "{}", worst(&errors));
         let last = reports.iter().rev().find_map(|r| r.best_fix()).unwrap();
         assert!(last.uid.lamp >= map.lamps[35].uid.lamp);

@@ -1,6 +1,6 @@
 //! What the driver sees.
 
-use crate::bus::{DangerLevel, DriverDisplay, Lamp, Supervision};
+use crate::bus::{DangerLevel, DriverDisplay, Indicator, Supervision};
 
 /// All that the display depends on.
 #[derive(Clone, Copy, Debug)]
@@ -29,11 +29,11 @@ pub(super) struct Ahead {
 pub(super) fn display(s: &Situation) -> DriverDisplay {
     let danger = s.obstacle.map_or(DangerLevel::None, |o| o.danger);
     let lamp = if s.brake_failed {
-        Lamp::Emergency
+        Indicator::Emergency
     } else if danger == DangerLevel::High || s.supervision != Supervision::Permitted {
-        Lamp::BrakeWarningRed
+        Indicator::BrakeWarningRed
     } else {
-        Lamp::NormalGreen
+        Indicator::NormalGreen
     };
     DriverDisplay {
         power: true,

@@ -57,8 +57,8 @@
 //!
 //! # What it does not do
 //!
-//! It does not supervise running backwards, speed restrictions of single sections, doors, or a
-//! train ahead. It trusts the odometer's speed within its stated error: a sliding wheel is not
+//! It does not supervise running backwards, speed restrictions of single sections, or doors. A train
+//! ahead is an obstacle that stands where it last said to be ([`TrainProtection`]). It trusts the odometer's speed within its stated error: a sliding wheel is not
 //! recognised.
 
 mod curve;

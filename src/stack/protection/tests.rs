@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use super::*;
-use crate::bus::{Identity, Lamp, Method, ObstacleWarning, Supervision};
+use crate::bus::{Identity, Indicator, Method, ObstacleWarning, Supervision};
 use crate::track::uid::Uid;
 use crate::track::{Alignment, Balise, Grade, PlanElement};
 use nalgebra::{Point3, Vector3};
@@ -56,7 +56,7 @@ fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> Ob
 pub(super) fn fix(time: SimTime, chainage_m: f64, sigma_m: f64) -> PositionFix {
     PositionFix {
         time,
-        method: Method::Paper,
+        method: Method::Stereo,
         chainage_m,
         sigma_m,
         position: Point3::origin(),
@@ -153,7 +153,7 @@ struct Outcome {
     /// Head to obstacle when stopped.
     margin_m: f64,
     worst: Supervision,
-    lamp: Lamp,
+    lamp: Indicator,
     stopped: bool,
 }
 
@@ -191,8 +191,8 @@ fn drive(
             let report = protection.cycle(time);
             command = report.command;
             outcome.worst = outcome.worst.max(report.supervision);
-            if report.display.lamp == Lamp::Emergency {
-                outcome.lamp = Lamp::Emergency;
+            if report.display.lamp == Indicator::Emergency {
+                outcome.lamp = Indicator::Emergency;
             }
         }
         train.step(dt, command);
@@ -300,7 +300,7 @@ fn a_failed_brake_lights_the_emergency_lamp() {
     train.service_mps2 = 0.05;
     train.emergency_mps2 = 0.05;
     let out = drive(&at(500.0, 0.5), train, 0.0, 900.0);
-    assert_eq!(out.lamp, Lamp::Emergency);
+    assert_eq!(out.lamp, Indicator::Emergency);
     assert_eq!(out.worst, Supervision::Emergency);
     // The service brake fails, the emergency brake takes over in time.
     train.emergency_mps2 = 1.2;
@@ -308,7 +308,7 @@ fn a_failed_brake_lights_the_emergency_lamp() {
     assert!(out.stopped && out.margin_m > 10.0);
     let healthy = Train::new(500.0, 15.0, -28.0);
     let out = drive(&at(500.0, 0.5), healthy, -28.0, 900.0);
-    assert_eq!(out.lamp, Lamp::NormalGreen);
+    assert_eq!(out.lamp, Indicator::NormalGreen);
 }
 
 /// One train standing at a place; cycles on demand.
@@ -350,7 +350,7 @@ fn only_a_newer_clear_message_releases() {
     for _ in 0..600 {
         let r = b.cycle(0.0, 0.0);
         assert_eq!(r.command.brake, BrakeDemand::Service);
-        assert_eq!(r.display.lamp, Lamp::BrakeWarningRed);
+        assert_eq!(r.display.lamp, Indicator::BrakeWarningRed);
     }
     let r = b.cycle(0.0, 0.0);
     assert!(
@@ -363,7 +363,7 @@ fn only_a_newer_clear_message_releases() {
     b.hear(6, 70.0, DangerLevel::None, 1020.0);
     let r = b.cycle(0.0, 0.0);
     assert_eq!(r.command.brake, BrakeDemand::None);
-    assert_eq!(r.display.lamp, Lamp::NormalGreen);
+    assert_eq!(r.display.lamp, Indicator::NormalGreen);
     assert!((r.command.permitted_speed_mps - 100.0 / 3.6).abs() < 1e-9);
 }
 
@@ -374,7 +374,7 @@ fn low_dangers_warn_only() {
     b.hear(0, 0.0, DangerLevel::Low, 1020.0);
     let r = b.cycle(0.0, 20.0);
     assert_eq!(r.supervision, Supervision::Permitted);
-    assert_eq!(r.display.lamp, Lamp::NormalGreen);
+    assert_eq!(r.display.lamp, Indicator::NormalGreen);
     assert!((r.display.distance_to_obstacle_m.unwrap() - 20.0).abs() < 1e-6);
     assert!(
         r.display

@@ -74,6 +74,7 @@
 //! | [`distance`] | distance to the train, by the paper's formulas and exact |
 //! | `vision` | is the camera alive, and what its death means |
 //! | `announce` | messages |
+//! | `equipment` | frames, sweeps and reports of trains in, warnings and heartbeats out |
 //!
 //! # The train itself
 //!
@@ -165,7 +166,7 @@ pub struct WaysideDetector {
 
 /// What goes into a report besides what was found.
 #[derive(Clone, Debug)]
-struct Look {
+struct FrameContext {
     time: SimTime,
     number: u32,
     camera: CameraHealth,
@@ -226,23 +227,23 @@ impl WaysideDetector {
     ) -> WaysideReport {
         let intrinsics = self.sight.calibration().camera.intrinsics;
         let camera = self.vision.look(frame);
-        let look = Look {
+        let context = FrameContext {
             time: frame.start,
             number: frame.number,
             camera,
             trains: reckoned(trains, frame.start),
         };
         if !camera.is_good() {
-            return self.report(look, Vec::new());
+            return self.report(context, Vec::new());
         }
         if !self.reference.ready() {
             self.learn(frame.image.as_raw());
-            return self.report(look, Vec::new());
+            return self.report(context, Vec::new());
         }
         self.number = frame.number;
-        let occupied_m: Vec<_> = look.trains.iter().map(|t| self.occupied_m(t)).collect();
+        let occupied_m: Vec<_> = context.trains.iter().map(|t| self.occupied_m(t)).collect();
         self.cells.occupy(&occupied_m);
-        let train_near = look.trains.iter().any(|t| self.may_light(t));
+        let train_near = context.trains.iter().any(|t| self.may_light(t));
         self.difference.run(
             frame.image.as_raw(),
             &self.reference.mean,
@@ -251,8 +252,8 @@ impl WaysideDetector {
             train_near,
         );
         let width_px = intrinsics.width_px as usize;
-        if self.settings.dismiss_shadows {
-            self.shadows.dismiss(
+        if self.settings.reject_shadows {
+            self.shadows.reject(
                 &mut self.difference.binary,
                 width_px,
                 (frame.image.as_raw(), &self.reference.mean),
@@ -274,7 +275,7 @@ impl WaysideDetector {
             self.found.extend(placed);
         }
         self.confirmation.update(&self.found, &self.cells);
-        let mut report = self.report(look, blobs);
+        let mut report = self.report(context, blobs);
         if self.settings.keep_images {
             let (w, h) = frame.image.dimensions();
             report.difference = GrayImage::from_raw(w, h, self.difference.absolute.clone());
@@ -287,13 +288,13 @@ impl WaysideDetector {
     /// tell of it. Gives a report where it has.
     pub fn on_time(&mut self, now: SimTime, trains: &[TrainReport]) -> Option<WaysideReport> {
         let camera = self.vision.wait(now)?;
-        let look = Look {
+        let context = FrameContext {
             time: now,
             number: self.number,
             camera,
             trains: reckoned(trains, now),
         };
-        Some(self.report(look, Vec::new()))
+        Some(self.report(context, Vec::new()))
     }
 
     /// The message that this report gives rise to, if any: on a change of danger, and when the
@@ -354,18 +355,18 @@ impl WaysideDetector {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    fn report(&self, look: Look, blobs: Vec<crate::bus::Blob>) -> WaysideReport {
+    fn report(&self, context: FrameContext, blobs: Vec<crate::bus::Blob>) -> WaysideReport {
         let obstacles: Vec<DetectedObstacle> = self.confirmation.confirmed().cloned().collect();
         let blind = self.vision.is_blind();
         let of_blindness = blind.then_some(self.settings.blind_danger);
         let found = obstacles.iter().map(|o| o.danger);
         let danger = found.chain(of_blindness).max().unwrap_or_default();
-        let distances = self.nearest_m(&look.trains, &obstacles);
+        let distances = self.nearest_m(&context.trains, &obstacles);
         let learning = !self.reference.ready();
         WaysideReport {
-            time: look.time,
-            number: look.number,
-            camera: look.camera,
+            time: context.time,
+            number: context.number,
+            camera: context.camera,
             blind,
             learning,
             train_in_view: self.cells.any_blind(),

@@ -19,7 +19,7 @@ settings! {
         /// level that is not trusted.
         gain_distrust: f64 = 0.35, in 0.0..=1.0;
         /// Leave out what only dims the floor: regions in which its texture still shows.
-        dismiss_shadows: bool = true;
+        reject_shadows: bool = true;
         /// Smallest region, pixels.
         min_area_px: u32 = 24, in 1.0..=1e6;
         /// Smallest extent of an obstacle, the larger of width and height, m.

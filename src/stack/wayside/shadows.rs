@@ -186,7 +186,7 @@ pub(super) struct Shadows {
 
 impl Shadows {
     /// Takes the shadows out of a binary image of what differs from the reference.
-    pub fn dismiss(
+    pub fn reject(
         &mut self,
         binary: &mut [u8],
         width: usize,
@@ -196,7 +196,7 @@ impl Shadows {
         self.runs.label(binary, width, |k| frame[k] < reference[k]);
         self.measure(binary, width, (frame, reference));
         self.judge(noise);
-        self.lose_patience(noise);
+        self.release_held(noise);
         if !self.dark.is_empty() {
             self.clear(binary, width);
         }
@@ -268,7 +268,7 @@ impl Shadows {
     }
 
     /// Takes parts that could not be told back, in squares that have had any for long.
-    fn lose_patience(&mut self, noise: &Noise) {
+    fn release_held(&mut self, noise: &Noise) {
         let number = self.number;
         self.number += 1;
         self.stays.retain(|_, stay| stay.last + GAP >= number);
@@ -345,8 +345,8 @@ mod tests {
         light.iter().enumerate().map(noisy).collect()
     }
 
-    /// Share of the pixels over the threshold that are dismissed, over all pictures of 20 seeds.
-    fn dismissed(floor: &[f64], picture: &[f64], place: Ellipse) -> f64 {
+    /// Share of the pixels over the threshold that are rejected, over all pictures of 20 seeds.
+    fn rejected(floor: &[f64], picture: &[f64], place: Ellipse) -> f64 {
         let reference: Vec<u8> = floor.iter().map(|grey| grey.round() as u8).collect();
         let (mut all, mut left) = (0, 0);
         for seed in 0..20 {
@@ -360,7 +360,7 @@ mod tests {
                     .count()
             };
             all += count(&binary);
-            Shadows::default().dismiss(&mut binary, WIDTH, (&frame, &reference), &NOISE);
+            Shadows::default().reject(&mut binary, WIDTH, (&frame, &reference), &NOISE);
             left += count(&binary);
         }
         1.0 - left as f64 / all as f64
@@ -392,7 +392,7 @@ mod tests {
     fn shadows_go() {
         for (texture, left) in [(20, 0.7), (20, 0.5), (40, 0.7), (40, 0.45), (40, 0.3)] {
             let floor = floor(texture);
-            let share = dismissed(&floor, &shaded(&floor, left), PATCH);
+            let share = rejected(&floor, &shaded(&floor, left), PATCH);
             assert!(share > 0.95, "{texture}, {left}: {share}");
         }
     }
@@ -410,7 +410,7 @@ mod tests {
                     grey + f64::from(stain % (own + 1)) - f64::from(own) / 2.0
                 };
                 covered(&mut picture, PATCH, pattern);
-                let share = dismissed(&floor, &picture, PATCH);
+                let share = rejected(&floor, &picture, PATCH);
                 assert!(share < 0.02, "{texture}, {grey}, {own}: {share}");
             }
         }
@@ -420,7 +420,7 @@ mod tests {
     #[test]
     fn what_cannot_be_told_stays() {
         let floor = floor(0);
-        assert!(dismissed(&floor, &shaded(&floor, 0.5), PATCH) < 0.02);
+        assert!(rejected(&floor, &shaded(&floor, 0.5), PATCH) < 0.02);
     }
 
     /// A dark body in the middle of a shadow stays when the shadow goes: as dark as it, and so one
@@ -431,9 +431,9 @@ mod tests {
         let body = ((85.0, 60.0), (14.0, 12.0));
         let mut picture = shaded(&floor, 0.5);
         covered(&mut picture, body, |_| 40.0);
-        let share = dismissed(&floor, &picture, body);
+        let share = rejected(&floor, &picture, body);
         assert!(share < 0.35, "{share}");
-        assert!(dismissed(&floor, &picture, ((52.0, 60.0), (12.0, 9.0))) > 0.95);
+        assert!(rejected(&floor, &picture, ((52.0, 60.0), (12.0, 9.0))) > 0.95);
     }
 
     /// A body as dark as the shadow that it throws, on a smooth floor: the shadow crosses a floor with
@@ -456,7 +456,7 @@ mod tests {
                 let over = |k: usize| frame[k].abs_diff(reference[k]) >= 15;
                 let mut binary: Vec<u8> =
                     (0..frame.len()).map(|k| 255 * u8::from(over(k))).collect();
-                shadows.dismiss(&mut binary, WIDTH, (&frame, &reference), &NOISE);
+                shadows.reject(&mut binary, WIDTH, (&frame, &reference), &NOISE);
                 let inside = |k: usize| within((k % WIDTH) as f64, (k / WIDTH) as f64, body) > 0.0;
                 (0..binary.len())
                     .filter(|&k| binary[k] != 0 && inside(k))

@@ -42,3 +42,51 @@ impl Sensor for BaliseAntenna {
         Ok(passed.map(sample).collect())
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::track::Direction;
+    use crate::twin::physics::{PhysicsSettings, TrainSettings};
+
+    /// A balise that is missed, read twice, or read by a train that runs up only.
+    #[test]
+    fn each_balise_is_read_once_either_way() {
+        let text = "name = 'line'\nplan = [{ kind = 'straight', length_m = 400.0 }]\n\
+                    balises = [{ name = 'B1', chainage_m = 200.0 }, { name = 'B2', chainage_m = 206.0 }]";
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        for (direction, start_chainage_m, expected) in [
+            (Direction::Up, 195.0, ["B1", "B2"]),
+            (Direction::Down, 211.0, ["B2", "B1"]),
+        ] {
+            let train = TrainSettings {
+                cars: 1,
+                direction,
+                start_chainage_m,
+                start_speed_kmh: 36.0,
+                ..TrainSettings::default()
+            };
+            let settings = PhysicsSettings {
+                trains: vec![train],
+                ..PhysicsSettings::default()
+            };
+            let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
+            let mut antenna = BaliseAntenna::new(TrainId(0), tunnel.clone(), &world);
+            let mut read = Vec::new();
+            while world.time().secs() < 1.5 {
+                world.step(&[]).unwrap();
+                for output in antenna.sample(&world).unwrap() {
+                    if let Output::Sample(Sample {
+                        content: Content::BalisePassed(name),
+                        ..
+                    }) = output
+                    {
+                        read.push(name);
+                    }
+                }
+            }
+            assert_eq!(read, expected);
+        }
+    }
+}

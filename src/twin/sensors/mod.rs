@@ -1,4 +1,21 @@
-//! Sensors: each turns the world's state at its own mount into raw output.
+//! Sensors: each turns the world's state at its own mount, by its own clock, into raw output.
+//!
+//! A [`Sensor`] is asked after every step of the world what has become due. Most give a sample at once;
+//! a camera gives the views to draw, and gets the images back to read them out. What is read at a fixed
+//! rate is a [`Periodic`] with a closure.
+//!
+//! ```
+//! use metrotwin::bus::{Content, TrainId};
+//! use metrotwin::twin::sensors::{ClockSettings, Periodic};
+//! let clock = ClockSettings { offset_ms: 1.0, drift_ppm: 20.0 };
+//! let speedometer = Periodic::new(10.0, clock, |world, _| {
+//!     let values = vec![world.train(TrainId(0))?.speed_mps];
+//!     Some(Content::Values { name: "speed_mps".into(), values })
+//! });
+//! # let _ = speedometer;
+//! ```
+//!
+//! What it does not do: sensors at the rear of a train; clocks that wander; stamps that jump.
 
 mod auto_exposure;
 mod balise_antenna;

@@ -24,6 +24,10 @@ pub trait Sensor {
 }
 
 /// What a sensor gives.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "it is taken apart at once; boxes would cost an allocation a sample"
+)]
 pub enum Output {
     /// A sample.
     Sample(Sample),

@@ -14,7 +14,7 @@ impl Distribution {
         matches!(self, Self::Sweep { .. } | Self::Grid { .. })
     }
 
-    /// Whether it has a density, and so can be weighed against another one.
+    /// Whether it has a density, and so can be weighted against another one.
     pub fn has_density(&self) -> bool {
         self.ends().is_some()
     }

@@ -1,7 +1,7 @@
-//! Which lamps do not shine: a roll call as the train runs past, for the maintenance.
+//! Which lamps do not shine, found as the train runs past them, for the maintenance.
 //!
 //! The train knows where it is, so it knows which lamps an eye must have in its picture. One that
-//! was due in several pairs, well inside the picture and near, and answered in none of them, is
+//! was due in several pairs, well inside the picture and near, and was seen in none of them, is
 //! dark. It says nothing of lamps while the position is unknown or the eye has a fault.
 
 use crate::bus::Intrinsics;
@@ -13,29 +13,29 @@ use nalgebra::{Isometry3, Point2, Point3};
 const NEAR_M: f64 = 8.0;
 /// And so far inside the picture, which is more than a lamp's radius and the position's error take.
 const INSIDE_PX: f64 = 120.0;
-/// A spot so near to where a lamp is due is its answer.
-const ANSWER_PX: f64 = 100.0;
+/// A spot so near to where a lamp is due is that lamp.
+const SAME_PX: f64 = 100.0;
 /// Pairs in which a lamp must have been due to be called dark.
-const CALLS: u32 = 4;
+const LEAST_PAIRS: u32 = 4;
 
 /// A lamp that is passing by.
 #[derive(Clone, Copy, Debug)]
-struct Call {
+struct Passing {
     lamp: usize,
-    calls: u32,
-    answered: bool,
+    pairs: u32,
+    seen: bool,
 }
 
-/// Calls the lamps of the map.
+/// Holds the lamps that are seen against those of the map.
 #[derive(Debug, Default)]
-pub struct RollCall {
-    passing: Vec<Call>,
+pub struct LampPresence {
+    passing: Vec<Passing>,
 }
 
-impl RollCall {
+impl LampPresence {
     /// An eye at `world_from_eye`, as the train takes itself to be, has seen lamps at `spots`. Gives
     /// the lamps that have gone out of its sight without ever having been seen.
-    pub fn call(
+    pub fn check(
         &mut self,
         map: &Tunnel,
         lens: &Intrinsics,
@@ -61,25 +61,25 @@ impl RollCall {
             let Some(pixel) = due(&site.centre) else {
                 continue;
             };
-            let answered = spots.clone().any(|spot| (spot - pixel).norm() < ANSWER_PX);
-            let known = self.passing.iter().position(|call| call.lamp == lamp);
+            let seen = spots.clone().any(|spot| (spot - pixel).norm() < SAME_PX);
+            let known = self.passing.iter().position(|passing| passing.lamp == lamp);
             let k = known.unwrap_or_else(|| {
-                self.passing.push(Call {
+                self.passing.push(Passing {
                     lamp,
-                    calls: 0,
-                    answered: false,
+                    pairs: 0,
+                    seen: false,
                 });
                 self.passing.len() - 1
             });
-            self.passing[k].calls += 1;
-            self.passing[k].answered |= answered;
+            self.passing[k].pairs += 1;
+            self.passing[k].seen |= seen;
         }
         let mut dark = Vec::new();
         self.passing.retain(|call| {
             let site = &map.lamps[call.lamp];
             let passing =
                 (site.centre - eye).norm() < 2.0 * NEAR_M && is_ahead(world_from_eye, site);
-            if !passing && call.calls >= CALLS && !call.answered {
+            if !passing && call.pairs >= LEAST_PAIRS && !call.seen {
                 dark.push(site.uid);
             }
             passing

@@ -1,0 +1,113 @@
+//! Several trains, both ways, with clocks of their own: whole sessions.
+
+#![cfg(feature = "twin")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
+
+use metrotwin::bus::Method;
+use metrotwin::scenario::{Override, Scenario, ScenarioFile};
+use metrotwin::session::{RendererChoice, RunOptions, Summary, run};
+use metrotwin::settings::read_toml;
+use metrotwin::track::Tunnel;
+use std::path::Path;
+
+fn figures(scenario: &Scenario, renderer: RendererChoice) -> Summary {
+    let options = RunOptions {
+        renderer,
+        ..RunOptions::default()
+    };
+    run(scenario, &options, &mut []).unwrap()
+}
+
+/// The shipped scenario, without its rigs: trains that go by their odometers.
+fn two_trains(radio: bool) -> Summary {
+    let text = include_str!("../scenarios/two_trains.toml");
+    let mut file: ScenarioFile = read_toml(text).unwrap();
+    file.rig = None;
+    file.onboard[0].rig = None;
+    if !radio {
+        file.radio.loss = 1.0;
+    }
+    let tunnel = Tunnel::from_toml(include_str!("../tunnels/chengdu_line1.toml")).unwrap();
+    let scenario = Scenario::new(file, tunnel).unwrap();
+    figures(&scenario, RendererChoice::Cpu)
+}
+
+/// The second train hears where the first one is and stops behind it, by as much as its equipment leaves
+/// room: 25 m, and what the odometers of both may be off. Without radio it runs into it, and the hit is
+/// in the figures of both.
+#[test]
+fn the_second_train_stops_behind_the_first() {
+    let summary = two_trains(true);
+    let [first, second] = &summary.trains[..] else {
+        panic!("{} trains", summary.trains.len());
+    };
+    let of = |train: &metrotwin::session::TrainSummary| train.protection.clone().unwrap();
+    assert!(!of(first).collision && !of(second).collision);
+    assert_eq!(of(first).brake_commanded_s, None);
+    let margin_m = of(second).stop_margin_m.unwrap();
+    assert!((20.0..160.0).contains(&margin_m), "{margin_m} m");
+    assert!(first.train.unwrap().stop_error_m.unwrap().abs() < 0.1);
+
+    let hit = two_trains(false);
+    for train in &hit.trains {
+        let protection = of(train);
+        assert!(protection.collision, "train {}", train.id);
+        let speed_kmh = 3.6 * protection.impacts[0].speed_mps;
+        assert!((40.0..50.0).contains(&speed_kmh), "{speed_kmh} km/h");
+    }
+}
+
+/// A stretch of `line_run` at 60 km/h.
+fn stretch(overrides: &[&str]) -> Summary {
+    let fixed = ["duration_s=3.0", "train.start_speed_kmh=60.0"];
+    let overrides: Vec<Override> = (fixed.iter().chain(overrides))
+        .map(|text| text.parse().unwrap())
+        .collect();
+    let scenario = Scenario::load(Path::new("scenarios/line_run.toml"), &overrides).unwrap();
+    figures(&scenario, RendererChoice::Auto)
+}
+
+/// A camera whose clock is fast by 10 ms puts a train that runs at 60 km/h 17 cm back.
+#[test]
+fn a_clock_that_is_off_shifts_the_position() {
+    let up = [
+        "train.start_chainage_m=400.0",
+        "stack.protection.initial_chainage_m=400.0",
+    ];
+    let exact = stretch(&up).positioning[&Method::Stereo].error_m.unwrap();
+    let [start, set] = up;
+    let fast = stretch(&[start, set, "rig.clock.offset_ms=10.0"]);
+    let fast = fast.positioning[&Method::Stereo].error_m.unwrap();
+    assert!(exact.p95 < 0.1, "{}", exact.p95);
+    assert!((fast.p50 - 0.167).abs() < 0.06, "{}", fast.p50);
+}
+
+/// A train that runs down the line, with its rig on the other side, positions itself as well; with the
+/// rig on the wrong side it is told so.
+#[test]
+fn a_train_that_runs_down_positions_itself() {
+    let down = [
+        "train.direction=\"down\"",
+        "train.start_chainage_m=2400.0",
+        "train.stop_at_m=300.0",
+        "stack.protection.initial_chainage_m=2400.0",
+    ];
+    let [a, b, c, d] = down;
+    let summary = stretch(&[a, b, c, d, "rig.side=\"right\""]);
+    let paper = &summary.positioning[&Method::Stereo];
+    assert_eq!(paper.wrong_uid, 0);
+    assert!(paper.fixes > 60, "{}", paper.fixes);
+    let error_m = paper.error_m.unwrap();
+    assert!(error_m.p95 < 0.1, "{}", error_m.p95);
+    let run_m = summary.train.unwrap().run_m;
+    assert!((run_m - 50.0).abs() < 2.0, "{run_m}");
+
+    let overrides: Vec<Override> = down.iter().map(|text| text.parse().unwrap()).collect();
+    let wrong = Scenario::load(Path::new("scenarios/line_run.toml"), &overrides);
+    let wrong = wrong.unwrap_err().to_string();
+    assert!(wrong.contains("rig.side"), "{wrong}");
+}
