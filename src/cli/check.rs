@@ -1,6 +1,7 @@
 //! `metrotwin check`: is this file right, and what does it say?
 
 use super::fault::Failure;
+use super::file_kind::FileKind;
 use super::{print, tunnel};
 use crate::settings::FileError;
 use crate::track::Tunnel;
@@ -48,11 +49,13 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
 
 fn report_on(path: &Path) -> Result<String, Failure> {
     let text = read(path)?;
-    if has_any(&text, &TUNNEL_KEYS) {
-        let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
-        return Ok(tunnel::report(&tunnel));
+    match FileKind::of(&text) {
+        FileKind::Tunnel => {
+            let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
+            Ok(tunnel::report(&tunnel))
+        }
+        kind => other(path, &text, kind),
     }
-    other(path, &text)
 }
 
 /// A vehicle, scenario or study.
@@ -61,7 +64,7 @@ use super::check_scenario::report_on as other;
 
 /// The onboard box knows tunnels only.
 #[cfg(not(feature = "twin"))]
-fn other(path: &Path, _: &str) -> Result<String, Failure> {
+fn other(path: &Path, _: &str, _: FileKind) -> Result<String, Failure> {
     Err(Failure::input(
         format!("{} is no tunnel file", path.display()),
         "scenarios and vehicles are checked by the whole program, built with its default features",
@@ -74,12 +77,3 @@ fn read(path: &Path) -> Result<String, Failure> {
         Failure::file(&path.clone(), "", FileError::Read { path, source })
     })
 }
-
-/// Whether a file has any of these keys.
-pub(super) fn has_any(text: &str, keys: &[&str]) -> bool {
-    let table = text.parse::<toml::Table>();
-    table.is_ok_and(|table| keys.iter().any(|key| table.contains_key(*key)))
-}
-
-/// Keys that only tunnels have. What is not TOML is left to the scenario's parser to complain of.
-const TUNNEL_KEYS: [&str; 6] = ["plan", "grades", "sections", "lamps", "lamp", "balises"];

@@ -1,7 +1,7 @@
 //! `metrotwin check` of vehicles, scenarios and studies.
 
-use super::check::has_any;
 use super::fault::Failure;
+use super::file_kind::FileKind;
 use super::report;
 use crate::scenario::sampling::Template;
 use crate::scenario::{self, Scenario};
@@ -9,12 +9,12 @@ use crate::study;
 use std::path::Path;
 
 /// What is to say of a file that is no tunnel.
-pub(super) fn report_on(path: &Path, text: &str) -> Result<String, Failure> {
-    if has_any(text, &VEHICLE_KEYS) {
+pub(super) fn report_on(path: &Path, text: &str, kind: FileKind) -> Result<String, Failure> {
+    if kind == FileKind::Vehicle {
         return Ok(report::vehicle(&scenario::parse_vehicle(path, text)?));
     }
     let mut said = report::scenario(&Scenario::from_text(path, text, &[])?);
-    if has_any(text, &["study"]) {
+    if kind == FileKind::Study {
         let template = Template::load(path)?;
         study::check(&template, false)?;
         said += &report::study(&template);
@@ -43,5 +43,3 @@ fn invalid_draws(template: &Template) -> String {
 
 /// Runs of a study that are drawn to see whether they can be run.
 const MOST_DRAWN: u64 = 200;
-/// Keys that only vehicles have.
-const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

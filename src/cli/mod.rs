@@ -14,6 +14,7 @@
 
 mod check;
 mod fault;
+mod file_kind;
 mod tunnel;
 
 /// What needs the simulated world.

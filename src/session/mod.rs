@@ -29,6 +29,7 @@ mod presence;
 mod ride;
 mod scheduler;
 mod score;
+mod scoring;
 mod speed;
 mod summary;
 mod train_score;

@@ -8,14 +8,10 @@ use super::imaging::{Imaging, Pending};
 use super::posts::Posts;
 use super::train_score::TrainScore;
 use super::{
-    End, Event, Exposure, Observer, Opening, RunOptions, SessionError, Source, Summary,
-    TrainOpening, TrainPoint,
+    End, Event, Exposure, Observer, RunOptions, SessionError, Source, Summary, TrainPoint,
 };
-use crate::bus::{
-    CameraHealth, Content, EYES, LedReport, Message, Node, Receiver, SimTime, Ticker, TrainCommand,
-    TrainId, WaysideReport,
-};
-use crate::scenario::{Onboard, Scenario};
+use crate::bus::{Content, Message, Node, Receiver, SimTime, Ticker, TrainCommand, TrainId};
+use crate::scenario::Scenario;
 use crate::twin::links::Links;
 use crate::twin::physics::{PhysicsError, World};
 use crate::twin::random::Stream;
@@ -30,25 +26,25 @@ const BODIES_HZ: f64 = 10.0;
 
 /// One session under way.
 pub struct Session<'s> {
-    scenario: &'s Scenario,
+    pub(super) scenario: &'s Scenario,
     /// All that is true.
-    world: World,
+    pub(super) world: World,
     sensors: Vec<Mounted>,
     equipment: Vec<Fitted>,
     links: Links,
-    imaging: Imaging<'s>,
+    pub(super) imaging: Imaging<'s>,
     /// Samples that take their time to the equipment, with when and where they arrive.
     delayed: BTreeMap<(SimTime, u64), (Node, Message)>,
     delayed_so_far: u64,
     /// Messages with images that were delivered in this step, and what working on each cost.
-    images: Vec<Delivered>,
+    pub(super) images: Vec<Delivered>,
     commands: Vec<TrainCommand>,
-    trains: BTreeMap<TrainId, TrainScore>,
-    posts: Posts,
-    bench: Option<Bench>,
-    truth_ticker: Ticker,
-    bodies_ticker: Ticker,
-    cost: Costs,
+    pub(super) trains: BTreeMap<TrainId, TrainScore>,
+    pub(super) posts: Posts,
+    pub(super) bench: Option<Bench>,
+    pub(super) truth_ticker: Ticker,
+    pub(super) bodies_ticker: Ticker,
+    pub(super) cost: Costs,
 }
 
 /// What trains are told before their equipment's first cycle: those without a protection, to run as
@@ -65,9 +61,9 @@ fn first_commands(scenario: &Scenario) -> Vec<TrainCommand> {
 }
 
 /// A message with images, for those who look at it after the equipment.
-struct Delivered {
-    message: Message,
-    cost_ms: f64,
+pub(super) struct Delivered {
+    pub message: Message,
+    pub cost_ms: f64,
 }
 
 impl<'s> Session<'s> {
@@ -134,29 +130,6 @@ impl<'s> Session<'s> {
             Err(other) => return Err(other),
         };
         Ok(self.summary(end, derailed, &observers))
-    }
-
-    fn open(&self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
-        let posts = self.scenario.wayside.iter();
-        let calibrations: Vec<_> = posts.map(|post| post.calibration.clone()).collect();
-        let opening = |onboard: &Onboard| TrainOpening {
-            id: onboard.train,
-            rig: onboard.rig.as_ref().map(|rig| rig.calibration()),
-            car_half_extents_m: (self.world.car_half_extents_m(onboard.train)).unwrap_or_default(),
-            cars: (self.world.train(onboard.train)).map_or(0, |t| t.world_from_cars.len()),
-            radar: onboard.doppler.is_some(),
-            protection: onboard.protects(),
-        };
-        let trains: Vec<_> = self.scenario.onboard.iter().map(opening).collect();
-        let opening = Opening {
-            scenario: &self.scenario.name,
-            seed: self.scenario.seed,
-            tunnel: &self.scenario.tunnel,
-            trains: &trains,
-            wayside: &calibrations,
-        };
-        observers.each(|o| o.open(&opening))?;
-        Ok(())
     }
 
     fn steps(
@@ -305,18 +278,6 @@ impl<'s> Session<'s> {
         Ok(self.imaging.submit(&job, pending, &mut self.cost)?)
     }
 
-    /// Time that the pairs of a bench take.
-    fn pairs_s(&self) -> f64 {
-        let rig = self.scenario.onboard.first().and_then(|o| o.rig.as_ref());
-        let pairs = self
-            .trains
-            .get(&TrainId::default())
-            .map_or(0, TrainScore::pairs);
-        rig.map_or(0.0, |rig| {
-            SimTime::from_secs(f64::from(pairs) / rig.pairs_per_s).secs()
-        })
-    }
-
     /// A train at a time of the recent past, by the speed that it has now.
     fn train_at(&self, id: TrainId, time: SimTime) -> Option<TrainPoint> {
         Some(TrainPoint {
@@ -410,7 +371,7 @@ impl<'s> Session<'s> {
             let equipment = &mut self.equipment[k].equipment;
             let messages = self.cost.stack.time(|| equipment.cycle(now)).0;
             for message in messages {
-                self.take_down(now, &message, observers)?;
+                self.score_message(now, &message, observers)?;
                 self.send(k, message);
             }
         }
@@ -435,123 +396,6 @@ impl<'s> Session<'s> {
         others.for_each(|(_, e)| e.equipment.on(&message));
     }
 
-    /// Scores what equipment says, and shows it.
-    fn take_down(
-        &mut self,
-        now: SimTime,
-        message: &Message,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
-        let sender = &message.sender;
-        match (&message.content, sender) {
-            (Content::Led(report), Node::Train(id)) => self.take_down_led(*id, report, observers),
-            (Content::Wayside(report), Node::Post(_)) => {
-                self.take_down_wayside(now, sender, report, observers)
-            }
-            (Content::Camera(status), _) => {
-                self.note_camera(sender, &status.camera, now, status.health, observers)
-            }
-            (Content::Protection(report), Node::Train(id)) => {
-                if let Some(train) = self.trains.get_mut(id) {
-                    train.on_protection(now, report);
-                }
-                Ok(observers.show(&Event::Message(sender, message))?)
-            }
-            _ => Ok(observers.show(&Event::Message(sender, message))?),
-        }
-    }
-
-    fn take_down_led(
-        &mut self,
-        id: TrainId,
-        report: &LedReport,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
-        let node = Node::Train(id);
-        for (eye, health) in EYES.into_iter().zip(report.eyes) {
-            self.note_camera(&node, eye, report.time, health, observers)?;
-        }
-        let (world, images) = (&self.world, &self.images);
-        let delivered = images.iter().find_map(|d| match &d.message.content {
-            Content::Pair(pair)
-                if d.message.sender == node && pair.left.number == report.number =>
-            {
-                Some((pair, d.cost_ms))
-            }
-            _ => None,
-        });
-        if let (Some(train), Some((pair, cost_ms))) = (self.trains.get_mut(&id), delivered) {
-            let truths_m = train.on_led(report, cost_ms, world)?;
-            observers.show(&Event::Pair(id, pair, report, &truths_m))?;
-        }
-        Ok(())
-    }
-
-    fn take_down_wayside(
-        &mut self,
-        now: SimTime,
-        node: &Node,
-        report: &WaysideReport,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
-        let post = self.posts.index(node);
-        let delivered = self.images.iter().find_map(|d| match &d.message.content {
-            Content::Frame(frame) if d.message.sender == *node && frame.number == report.number => {
-                Some((frame, d.cost_ms))
-            }
-            _ => None,
-        });
-        if let Some((frame, cost_ms)) = delivered {
-            self.posts.report(post, report, now, cost_ms);
-            observers.show(&Event::Wayside(post, frame, report))?;
-        }
-        let Node::Post(name) = node else {
-            return Ok(());
-        };
-        self.note_camera(node, name, report.time, report.camera, observers)
-    }
-
-    /// Takes down what equipment says of a camera, and shows it where it is new.
-    fn note_camera(
-        &mut self,
-        node: &Node,
-        camera: &str,
-        time: SimTime,
-        health: CameraHealth,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
-        let all = match node {
-            Node::Train(id) => self.trains.get_mut(id).map(|train| &mut train.health),
-            _ => Some(&mut self.posts.health),
-        };
-        if all.is_some_and(|all| all.note(camera, time, health)) {
-            observers.show(&Event::Camera(time, node, camera, health.fault))?;
-        }
-        Ok(())
-    }
-
-    fn show_truth(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
-        if self.truth_ticker.due(now, 0.0).is_some() {
-            let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
-            for (id, score) in &mut self.trains {
-                if let Some(train) = world.train(*id) {
-                    score.on_motion(&train, world, line);
-                    let left = score.left_eye(&train.world_from_vehicle);
-                    observers.show(&Event::Train(*id, &train, left.as_ref()))?;
-                }
-            }
-        }
-        if self.bodies_ticker.due(now, 0.0).is_some() {
-            let (bodies, _) = self.world.owned_bodies(self.world.train_ids().next());
-            observers.show(&Event::Bodies(now, &bodies))?;
-        }
-        Ok(())
-    }
-
     /// Fixes of the rig of a bench so far, by the first of its methods.
     fn fixes(&self) -> usize {
         let onboard = self.scenario.onboard.first();
@@ -571,24 +415,5 @@ impl<'s> Session<'s> {
             self.equipment
                 .extend(kinds.filter_map(|kind| onboard_equipment(*kind, onboard, &maps)));
         }
-    }
-
-    fn summary(
-        self,
-        end: End,
-        derailed: Option<TrainId>,
-        observers: &Observers<'_, '_>,
-    ) -> Summary {
-        let simulated_s = match &self.bench {
-            Some(_) => self.pairs_s(),
-            None => self.world.time().secs(),
-        };
-        let (backend, cost) = (self.imaging.backend(), &self.cost);
-        let summary = Summary::new(self.scenario, end, simulated_s, backend, cost, observers);
-        let world = &self.world;
-        let trains = self.trains.into_iter();
-        let trains = trains.map(|(id, score)| score.finish(world, derailed == Some(id)));
-        let trains = trains.collect();
-        self.posts.finish(summary).with_trains(trains)
     }
 }

@@ -1,0 +1,184 @@
+//! What a session writes down as it goes: what equipment says is held against the truth, and shown to
+//! observers.
+
+use super::costs::Observers;
+use super::scheduler::Session;
+use super::train_score::TrainScore;
+use super::{End, Event, Opening, SessionError, Summary, TrainOpening};
+use crate::bus::{
+    CameraHealth, Content, EYES, LedReport, Message, Node, SimTime, TrainId, WaysideReport,
+};
+use crate::scenario::Onboard;
+
+impl Session<'_> {
+    pub(super) fn open(&self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
+        let posts = self.scenario.wayside.iter();
+        let calibrations: Vec<_> = posts.map(|post| post.calibration.clone()).collect();
+        let opening = |onboard: &Onboard| TrainOpening {
+            id: onboard.train,
+            rig: onboard.rig.as_ref().map(|rig| rig.calibration()),
+            car_half_extents_m: (self.world.car_half_extents_m(onboard.train)).unwrap_or_default(),
+            cars: (self.world.train(onboard.train)).map_or(0, |t| t.world_from_cars.len()),
+            radar: onboard.doppler.is_some(),
+            protection: onboard.protects(),
+        };
+        let trains: Vec<_> = self.scenario.onboard.iter().map(opening).collect();
+        let opening = Opening {
+            scenario: &self.scenario.name,
+            seed: self.scenario.seed,
+            tunnel: &self.scenario.tunnel,
+            trains: &trains,
+            wayside: &calibrations,
+        };
+        observers.each(|o| o.open(&opening))?;
+        Ok(())
+    }
+
+    /// Scores what equipment says, and shows it.
+    pub(super) fn score_message(
+        &mut self,
+        now: SimTime,
+        message: &Message,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let sender = &message.sender;
+        match (&message.content, sender) {
+            (Content::Led(report), Node::Train(id)) => self.score_led(*id, report, observers),
+            (Content::Wayside(report), Node::Post(_)) => {
+                self.score_wayside(now, sender, report, observers)
+            }
+            (Content::Camera(status), _) => {
+                self.note_camera(sender, &status.camera, now, status.health, observers)
+            }
+            (Content::Protection(report), Node::Train(id)) => {
+                if let Some(train) = self.trains.get_mut(id) {
+                    train.on_protection(now, report);
+                }
+                Ok(observers.show(&Event::Message(sender, message))?)
+            }
+            _ => Ok(observers.show(&Event::Message(sender, message))?),
+        }
+    }
+
+    fn score_led(
+        &mut self,
+        id: TrainId,
+        report: &LedReport,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let node = Node::Train(id);
+        for (eye, health) in EYES.into_iter().zip(report.eyes) {
+            self.note_camera(&node, eye, report.time, health, observers)?;
+        }
+        let (world, images) = (&self.world, &self.images);
+        let delivered = images.iter().find_map(|d| match &d.message.content {
+            Content::Pair(pair)
+                if d.message.sender == node && pair.left.number == report.number =>
+            {
+                Some((pair, d.cost_ms))
+            }
+            _ => None,
+        });
+        if let (Some(train), Some((pair, cost_ms))) = (self.trains.get_mut(&id), delivered) {
+            let truths_m = train.on_led(report, cost_ms, world)?;
+            observers.show(&Event::Pair(id, pair, report, &truths_m))?;
+        }
+        Ok(())
+    }
+
+    fn score_wayside(
+        &mut self,
+        now: SimTime,
+        node: &Node,
+        report: &WaysideReport,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let post = self.posts.index(node);
+        let delivered = self.images.iter().find_map(|d| match &d.message.content {
+            Content::Frame(frame) if d.message.sender == *node && frame.number == report.number => {
+                Some((frame, d.cost_ms))
+            }
+            _ => None,
+        });
+        if let Some((frame, cost_ms)) = delivered {
+            self.posts.report(post, report, now, cost_ms);
+            observers.show(&Event::Wayside(post, frame, report))?;
+        }
+        let Node::Post(name) = node else {
+            return Ok(());
+        };
+        self.note_camera(node, name, report.time, report.camera, observers)
+    }
+
+    /// Takes down what equipment says of a camera, and shows it where it is new.
+    fn note_camera(
+        &mut self,
+        node: &Node,
+        camera: &str,
+        time: SimTime,
+        health: CameraHealth,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        let all = match node {
+            Node::Train(id) => self.trains.get_mut(id).map(|train| &mut train.health),
+            _ => Some(&mut self.posts.health),
+        };
+        if all.is_some_and(|all| all.note(camera, time, health)) {
+            observers.show(&Event::Camera(time, node, camera, health.fault))?;
+        }
+        Ok(())
+    }
+
+    pub(super) fn show_truth(
+        &mut self,
+        now: SimTime,
+        observers: &mut Observers<'_, '_>,
+    ) -> Result<(), SessionError> {
+        if self.truth_ticker.due(now, 0.0).is_some() {
+            let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
+            for (id, score) in &mut self.trains {
+                if let Some(train) = world.train(*id) {
+                    score.on_motion(&train, world, line);
+                    let left = score.left_eye(&train.world_from_vehicle);
+                    observers.show(&Event::Train(*id, &train, left.as_ref()))?;
+                }
+            }
+        }
+        if self.bodies_ticker.due(now, 0.0).is_some() {
+            let (bodies, _) = self.world.owned_bodies(self.world.train_ids().next());
+            observers.show(&Event::Bodies(now, &bodies))?;
+        }
+        Ok(())
+    }
+
+    /// Time that the pairs of a bench take.
+    fn pairs_s(&self) -> f64 {
+        let rig = self.scenario.onboard.first().and_then(|o| o.rig.as_ref());
+        let pairs = self
+            .trains
+            .get(&TrainId::default())
+            .map_or(0, TrainScore::pairs);
+        rig.map_or(0.0, |rig| {
+            SimTime::from_secs(f64::from(pairs) / rig.pairs_per_s).secs()
+        })
+    }
+
+    pub(super) fn summary(
+        self,
+        end: End,
+        derailed: Option<TrainId>,
+        observers: &Observers<'_, '_>,
+    ) -> Summary {
+        let simulated_s = match &self.bench {
+            Some(_) => self.pairs_s(),
+            None => self.world.time().secs(),
+        };
+        let (backend, cost) = (self.imaging.backend(), &self.cost);
+        let summary = Summary::new(self.scenario, end, simulated_s, backend, cost, observers);
+        let world = &self.world;
+        let trains = self.trains.into_iter();
+        let trains = trains.map(|(id, score)| score.finish(world, derailed == Some(id)));
+        let trains = trains.collect();
+        self.posts.finish(summary).with_trains(trains)
+    }
+}
