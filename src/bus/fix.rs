@@ -5,6 +5,7 @@ use crate::track::uid::Uid;
 use nalgebra::{Point2, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Which estimator made a fix.
 #[derive(
@@ -24,6 +25,16 @@ impl Method {
     pub const ALL: [Self; 2] = [Self::Stereo, Self::Mono];
 }
 
+impl fmt::Display for Method {
+    /// As in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Stereo => "paper",
+            Self::Mono => "mono",
+        })
+    }
+}
+
 /// How a lamp got its name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -37,6 +48,18 @@ pub enum Identity {
     Followed,
     /// Never read: the lamp that the map has where earlier fixes let expect one.
     Predicted,
+}
+
+impl fmt::Display for Identity {
+    /// As in files.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Decoded => "decoded",
+            Self::Joined => "joined",
+            Self::Followed => "followed",
+            Self::Predicted => "predicted",
+        })
+    }
 }
 
 /// Pixel rectangle, both corners inside.

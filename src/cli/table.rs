@@ -66,7 +66,7 @@ fn positioning(s: &Summary) -> String {
         };
         text += &format!(
             "{:10} {:>7} {:>7} {:>7}   {:>6} {:>6} {:>6} {:>6} cm {:>7}\n",
-            format!("{method:?}").to_lowercase(),
+            method.to_string(),
             p.fixes,
             percent(p.availability),
             percent(p.uid_decode_rate),

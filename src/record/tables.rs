@@ -3,7 +3,6 @@
 use super::whole_files::{Result, broken, finish, make_folder_of, part_name};
 use crate::bus::TrainId;
 use crate::session::{Event, Observer, Opening};
-use std::fmt::Debug;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -51,9 +50,9 @@ impl Observer for FixTable {
                 rows,
                 "{:.9},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
                 fix.time.secs(),
-                name(fix.method),
+                fix.method,
                 fix.uid,
-                name(fix.identity),
+                fix.identity,
                 fix.chainage_m,
                 true_m,
                 fix.chainage_m - true_m,
@@ -74,8 +73,4 @@ impl Observer for FixTable {
         rows.flush().map_err(broken(&self.path))?;
         finish(&self.path)
     }
-}
-
-fn name(variant: impl Debug) -> String {
-    format!("{variant:?}").to_lowercase()
 }

@@ -479,7 +479,8 @@ fn check_view(
         },
         ..rig.clone()
     };
-    if sees(&mirrored) {
+    let may_be_mirrored = direction == Direction::Down || rig.side == MountSide::Right;
+    if may_be_mirrored && sees(&mirrored) {
         check.problem(
             &format!("{at}.side"),
             "all lamps are on the other side of a train that runs this way",

@@ -337,8 +337,8 @@ fn check_names_the_keys() {
         keys,
         [
             "x.step_s",
-            "x.train.cars",
-            "x.other_trains[0].cars",
+            "x.trains[0].cars",
+            "x.trains[1].cars",
             "x.obstacles[0].mass_kg"
         ]
     );
