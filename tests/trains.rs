@@ -86,8 +86,9 @@ fn a_clock_that_is_off_shifts_the_position() {
     assert!((fast.p50 - 0.167).abs() < 0.06, "{}", fast.p50);
 }
 
-/// A train that runs down the line, with its rig on the other side, positions itself as well; with the
-/// rig on the wrong side it is told so.
+/// A train that runs down the line positions itself as well, with its rig on the other side and looking
+/// back: the lamps of the line shine towards trains that run up. With the rig on the wrong side the
+/// scenario is refused.
 #[test]
 fn a_train_that_runs_down_positions_itself() {
     let down = [
@@ -97,7 +98,7 @@ fn a_train_that_runs_down_positions_itself() {
         "stack.protection.initial_chainage_m=2400.0",
     ];
     let [a, b, c, d] = down;
-    let summary = stretch(&[a, b, c, d, "rig.side=\"right\""]);
+    let summary = stretch(&[a, b, c, d, "rig.side=\"right\"", "rig.yaw_deg=141.0"]);
     let paper = &summary.positioning[&Method::Stereo];
     assert_eq!(paper.wrong_uid, 0);
     assert!(paper.fixes > 60, "{}", paper.fixes);

@@ -4,7 +4,7 @@ use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Template, as_written};
-use crate::track::Tunnel;
+use crate::track::{Direction, Tunnel};
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
 
@@ -46,12 +46,16 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));
         lines.push(format!(
-            "{what}: {} x `{}`, {:.1} m, {:.1} t, head at {} m, cruises at {} km/h{stop}",
+            "{what}: {} x `{}`, {:.1} m, {:.1} t, head at {} m, cruises{} at {} km/h{stop}",
             train.cars,
             train.vehicle,
             train.length_m(),
             1e-3 * train.mass_kg(),
             train.start_chainage_m,
+            match train.direction {
+                Direction::Up => "",
+                Direction::Down => " down the line",
+            },
             train.cruise_speed_kmh
         ));
     }

@@ -95,7 +95,7 @@ groups! {
         "odometer", "odometer", BLUE, 1.0, Odometer |s| Some(s.speed_mps * KMH);
         "radar", "radar", VIOLET, 1.0, Radar |s| Some(s.speed_mps? * KMH);
         "estimated", "estimated", GREEN, 2.0, Protection |r| Some(r.speed_mps * KMH);
-        "true", "true", WHITE, 2.0, Train |t| Some(t.speed_mps * KMH);
+        "true", "true", WHITE, 2.0, Train |t| Some(t.direction.sign() * t.speed_mps * KMH);
     }
     VIBRATION: "Floor acceleration, m/s²", "plots/vibration", RightTop {
         "vertical", "vertical", BLUE, 1.0, Train |t| Some(t.floor_accel_mps2.z);

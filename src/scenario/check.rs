@@ -2,8 +2,10 @@
 
 use super::WaysidePost;
 use super::file::{ScenarioFile, WaysidePostSettings};
+use crate::bus::TrainId;
 use crate::settings::{Checker, did_you_mean};
 use crate::track::{Direction, Tunnel};
+use crate::twin::faults::rig_cameras;
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
 use std::borrow::Cow;
@@ -154,8 +156,10 @@ fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
 
 /// A fault of a camera that is not there would go unnoticed.
 fn check_faulty_cameras(file: &ScenarioFile, check: &mut Checker<'_>) {
-    let eyes = ["rig", "left", "right"].map(str::to_owned);
-    let eyes = eyes.into_iter().filter(|_| file.rig.is_some());
+    let first = file.rig.iter().map(|_| TrainId(0));
+    let others = file.onboard.iter().filter(|onboard| onboard.rig.is_some());
+    let rigs = first.chain(others.map(|onboard| TrainId(onboard.train)));
+    let eyes = rigs.flat_map(rig_cameras);
     let devices = file.wayside.iter().map(|post| post.device.clone());
     let names: Vec<String> = eyes.chain(devices).collect();
     for (k, fault) in file.faults.cameras.iter().enumerate() {
@@ -193,12 +197,21 @@ fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
         }
         return;
     };
+    check_axle("odometer.axle", file.odometer.axle, train, check);
+    for (k, onboard) in file.onboard.iter().enumerate() {
+        if let Some(train) = file.trains().nth(onboard.train.into()) {
+            let key = format!("onboard[{k}].odometer.axle");
+            check_axle(&key, onboard.odometer.axle, train, check);
+        }
+    }
+}
+
+fn check_axle(key: &str, axle: u32, train: &TrainSettings, check: &mut Checker<'_>) {
     // A train without cars is a problem of its own.
     let axles = train.axles().max(1);
-    let axle = file.odometer.axle;
     if axle > axles {
         check.problem(
-            "odometer.axle",
+            key,
             format!("the train has {axles} wheelsets, not {axle}"),
             format!("give 1 to {axles}"),
         );
@@ -445,6 +458,25 @@ fn in_the_open(
     open
 }
 
+/// A rig on the other side, looking back, and both.
+fn turned(rig: &RigSettings) -> [RigSettings; 3] {
+    let other = match rig.side {
+        MountSide::Left => MountSide::Right,
+        MountSide::Right => MountSide::Left,
+    };
+    let back_deg = 180.0f64.copysign(rig.yaw_deg) - rig.yaw_deg;
+    let turned = [
+        (other, rig.yaw_deg),
+        (rig.side, back_deg),
+        (other, back_deg),
+    ];
+    turned.map(|(side, yaw_deg)| RigSettings {
+        side,
+        yaw_deg,
+        ..rig.clone()
+    })
+}
+
 /// A rig must see lamps on the way that its train runs.
 fn check_view(
     at: &str,
@@ -472,26 +504,17 @@ fn check_view(
     if sees(rig) {
         return;
     }
-    let mirrored = RigSettings {
-        side: match rig.side {
-            MountSide::Left => MountSide::Right,
-            MountSide::Right => MountSide::Left,
-        },
-        ..rig.clone()
-    };
-    let may_be_mirrored = direction == Direction::Down || rig.side == MountSide::Right;
-    if may_be_mirrored && sees(&mirrored) {
+    let asks_for_side = direction == Direction::Down || rig.side == MountSide::Right;
+    let better = turned(rig).into_iter().find(|turned| sees(turned));
+    if let Some(turned) = better.filter(|_| asks_for_side) {
+        let side = match turned.side {
+            MountSide::Left => "left",
+            MountSide::Right => "right",
+        };
         check.problem(
             &format!("{at}.side"),
-            "all lamps are on the other side of a train that runs this way",
-            format!(
-                "give \"{}\"",
-                if mirrored.side == MountSide::Left {
-                    "left"
-                } else {
-                    "right"
-                }
-            ),
+            "on a train that runs this way it sees no lamp from its luminous side",
+            format!("give side = \"{side}\", yaw_deg = {}", turned.yaw_deg),
         );
         return;
     }
@@ -559,7 +582,6 @@ fn unknown_device(post: &WaysidePostSettings, at: &str, tunnel: &Tunnel, check: 
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::bus::TrainId;
     use crate::settings::{Settings, read_toml};
     use crate::twin::render::gpu::layout::MAX_HEADLIGHTS;
 

@@ -2,7 +2,7 @@
 //! sensor and whoever reads them.
 
 use super::check_times;
-use crate::bus::SimTime;
+use crate::bus::{SimTime, TrainId};
 use crate::settings::{Checker, settings};
 use crate::twin::random::Stream;
 use image::GrayImage;
@@ -11,7 +11,7 @@ settings! {
     /// A fault of one camera.
     pub struct CameraFaultSettings {
         /// Whose: `rig` (both eyes), `left` or `right` (one of them), or the name of a wayside
-        /// device.
+        /// device. Those of other trains are `train 1/rig`, `train 1/left` and so on.
         camera: String;
         /// What is wrong with it.
         fault: CameraFaultKind, nested;
@@ -52,6 +52,14 @@ settings! {
 
 fn all() -> f64 {
     1.0
+}
+
+/// What the cameras of a train's rig are called: both eyes together, the left one, the right one.
+pub fn rig_cameras(train: TrainId) -> [String; 3] {
+    ["rig", "left", "right"].map(|name| match train {
+        TrainId(0) => name.to_owned(),
+        other => format!("{other}/{name}"),
+    })
 }
 
 /// Later than this nothing comes.

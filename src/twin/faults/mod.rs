@@ -38,7 +38,7 @@
 mod camera;
 mod lamp;
 
-pub use camera::{CameraFaultKind, CameraFaultSettings, CameraFaults, CameraOutput};
+pub use camera::{CameraFaultKind, CameraFaultSettings, CameraFaults, CameraOutput, rig_cameras};
 pub use lamp::{LampFaultKind, LampFaultSettings, age};
 
 use crate::settings::{Checker, settings};

@@ -395,6 +395,9 @@ pub fn ever_sees(rig: &RigCalibration, tunnel: &Tunnel, lamp: &LampSite) -> bool
 const REACH_STEPS: std::ops::Range<i32> = -100..1600;
 const REACH_STEP_M: f64 = 0.05;
 
+/// Cosine of the angle to a lamp's axis from where its disc is too narrow to be seen: 80 degrees.
+const GRAZING: f64 = 0.17;
+
 fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
     let n = lamp.facing.into_inner();
     let across = n
@@ -422,7 +425,7 @@ fn sees(
         let lens = &eye.intrinsics;
         p.z > 0.1 && lens.project(&p).is_some_and(|pixel| lens.contains(&pixel))
     };
-    towards.dot(&lamp.facing) > 0.0
+    towards.dot(&lamp.facing) > GRAZING * towards.norm()
         && rim.iter().all(|p| {
             let left = left_from_world * p;
             inside(&rig.left, left) && inside(&rig.right, right_from_left * left)

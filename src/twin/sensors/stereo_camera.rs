@@ -5,7 +5,7 @@ use super::{
     Trigger,
 };
 use crate::bus::{CameraModel, Content, RigCalibration, SimTime, StereoPair, Ticker, TrainId};
-use crate::twin::faults::{CameraFaultSettings, CameraFaults, CameraOutput};
+use crate::twin::faults::{CameraFaultSettings, CameraFaults, CameraOutput, rig_cameras};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use crate::twin::render::{CameraMotion, NoiseKey, View};
@@ -50,6 +50,7 @@ impl StereoCamera {
     ) -> Self {
         let trigger = Stream::new(seed, 0, "stereo/trigger");
         let of = |names: &[&str]| CameraFaults::of(names, faults, seed);
+        let [both, left, right] = rig_cameras(train);
         Self {
             train,
             rig: rig.actual(),
@@ -60,8 +61,8 @@ impl StereoCamera {
             poses: (rig.as_built().longest_span_s() / POSE_STEP_S).ceil() as usize + 1,
             streams: ["stereo/left", "stereo/right"].map(|eye| Stream::new(seed, 0, eye)),
             exposure: AutoExposure::of(&rig.exposure_control, rig.exposure_us, &rig.sensor),
-            faults: of(&["rig"]),
-            outputs: ["left", "right"].map(|eye| CameraOutput::new(of(&["rig", eye]))),
+            faults: of(&[&both]),
+            outputs: [left, right].map(|eye| CameraOutput::new(of(&[&both, &eye]))),
             settings: rig.clone(),
         }
     }
@@ -139,7 +140,8 @@ impl Sensor for StereoCamera {
             return Ok(Vec::new());
         };
         let start_true = self.clock.time_of(start);
-        if self.faults.drops(number, start_true) {
+        // What would have begun before time zero was not taken.
+        if start_true < SimTime::ZERO || self.faults.drops(number, start_true) {
             return Ok(Vec::new());
         }
         let vehicle_at = |time| world.vehicle_at(self.train, time);

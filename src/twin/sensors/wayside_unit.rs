@@ -79,7 +79,8 @@ impl Sensor for WaysideCamera {
             return Ok(Vec::new());
         };
         let start_true = self.clock.time_of(start);
-        if self.faults.drops(number, start_true) {
+        // What would have begun before time zero was not taken.
+        if start_true < SimTime::ZERO || self.faults.drops(number, start_true) {
             return Ok(Vec::new());
         }
         let mut views = vec![self.view(number, self.trigger.really(number, start_true))];
