@@ -27,8 +27,9 @@ impl Pixels {
             grey,
         } = self;
         let size = grey.len();
-        GrayImage::from_raw(width, height, grey)
-            .ok_or_else(|| E::custom(format!("{size} pixels are no {width} x {height} image")))
+        let fits = width as usize * height as usize == size;
+        let image = GrayImage::from_raw(width, height, grey).filter(|_| fits);
+        image.ok_or_else(|| E::custom(format!("{size} pixels are no {width} x {height} image")))
     }
 }
 

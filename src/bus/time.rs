@@ -67,8 +67,13 @@ impl Ticker {
 
     /// The next one, if it is due, `delay_s` after its time; moves on if so.
     pub fn due(&mut self, now: SimTime, delay_s: f64) -> Option<(u32, SimTime)> {
+        self.next_if(|time| now >= time.plus(delay_s))
+    }
+
+    /// The next one, if it is due by its time; moves on if so.
+    pub fn next_if(&mut self, due: impl FnOnce(SimTime) -> bool) -> Option<(u32, SimTime)> {
         let (number, time) = self.next();
-        (now >= time.plus(delay_s)).then(|| {
+        due(time).then(|| {
             self.next += 1;
             (number, time)
         })

@@ -64,7 +64,10 @@ use super::check_scenario::report_on as other;
 
 /// The onboard box knows tunnels only.
 #[cfg(not(feature = "twin"))]
-fn other(path: &Path, _: &str, _: FileKind) -> Result<String, Failure> {
+fn other(path: &Path, text: &str, _: FileKind) -> Result<String, Failure> {
+    if let Err(error @ FileError::Syntax { .. }) = Tunnel::from_toml(text) {
+        return Err(Failure::file(path, text, error));
+    }
     Err(Failure::input(
         format!("{} is no tunnel file", path.display()),
         "scenarios and vehicles are checked by the whole program, built with its default features",

@@ -398,7 +398,12 @@ pub(super) fn overridden(
 fn history_s(file: &ScenarioFile) -> f64 {
     let others = file.onboard.iter().filter_map(|other| other.rig.as_ref());
     let spans = file.rig.iter().chain(others);
-    let span_s = spans.fold(0.0, |s: f64, rig| s.max(rig.as_built().pair_span_s()));
+    // A clock that is slow stamps what was longer ago.
+    let needed_s = |rig: &RigSettings| {
+        let drift_s = 1e-6 * rig.clock.drift_ppm.abs() * file.duration_s;
+        rig.as_built().pair_span_s() + 1e-3 * rig.clock.offset_ms.abs() + drift_s
+    };
+    let span_s = spans.fold(0.0, |s: f64, rig| s.max(needed_s(rig)));
     let late_s = file.faults.cameras.iter().map(|fault| fault.late_s());
     let latency_s = 1e-3 * file.stack.latency_ms + late_s.fold(0.0, f64::max);
     // A fix is scored when it has gone through the stack.

@@ -78,6 +78,13 @@ pub(super) fn in_tunnel(
 
 /// Sensors and equipment of other trains, each of a train that there is, and named once.
 fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let kinds = file.onboard.iter().enumerate();
+    let kinds = kinds.map(|(k, o)| (format!("onboard[{k}].equipment"), &o.equipment));
+    for (key, kinds) in kinds.chain([("stack.onboard".to_owned(), &file.stack.onboard)]) {
+        if (1..kinds.len()).any(|k| kinds[..k].contains(&kinds[k])) {
+            check.problem(&key, "names an equipment twice", "name each once");
+        }
+    }
     let others = file.other_trains.len();
     for (k, onboard) in file.onboard.iter().enumerate() {
         let number = usize::from(onboard.train);

@@ -77,9 +77,6 @@ impl<'s> Imaging<'s> {
             let same_sensor = self.late.iter().rev();
             let mut same_sensor = same_sensor.filter(|l| l.1.sensor == pending.sensor);
             let due = same_sensor.next().map_or(own, |(due, ..)| own.max(*due));
-            if due <= now {
-                return Ok(Some((pending, images)));
-            }
             self.late.push_back((due, pending, images));
         }
         let due = self.late.iter().position(|(due, ..)| *due <= now);

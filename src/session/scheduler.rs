@@ -380,7 +380,10 @@ impl<'s> Session<'s> {
 
     /// Sends what equipment `k` says.
     fn send(&mut self, k: usize, message: Message) {
-        if let (Content::Command(command), Node::Train(id)) = (&message.content, &message.sender)
+        let own = message.sender == self.equipment[k].node;
+        if own
+            && let (Content::Command(command), Node::Train(id)) =
+                (&message.content, &message.sender)
             && let Some(current) = self.commands.get_mut(id.index())
         {
             *current = *command;

@@ -15,7 +15,7 @@ impl Tunnel {
     /// let reversed = tunnel.reversed();
     /// let (lamp, same) = (&tunnel.lamps[0], &reversed.lamps[tunnel.lamps.len() - 1]);
     /// assert_eq!((lamp.uid, lamp.centre), (same.uid, same.centre));
-    /// # Ok::<(), metrotwin::track::TunnelError>(())
+    /// # Ok::<(), metrotwin::settings::FileError>(())
     /// ```
     #[must_use]
     pub fn reversed(&self) -> Self {

@@ -122,14 +122,14 @@ impl Equipment for TrainProtection {
             Content::Warning(warning) => {
                 let warning = self.on_route(warning);
                 if message.via == Via::Radio {
-                    self.protection.on_heartbeat(&warning, message.received_at);
+                    (self.protection).on_heartbeat(&warning, message.sent_at, message.received_at);
                 } else {
                     self.protection.on_warning(&warning, message.received_at);
                 }
             }
             Content::Heartbeat(state) => {
                 let state = self.on_route(state);
-                (self.protection).on_heartbeat(&state, message.received_at);
+                (self.protection).on_heartbeat(&state, message.sent_at, message.received_at);
             }
             Content::Train(report) if report.track == self.route.track => {
                 self.on_train(&message.sender, report, message.received_at);

@@ -148,9 +148,9 @@ impl Protection {
         self.obstacles.on_warning(warning, received);
     }
 
-    /// Takes a heartbeat of a device, received by radio: it is alive, and this still holds.
-    pub fn on_heartbeat(&mut self, state: &ObstacleWarning, received: SimTime) {
-        self.obstacles.on_heard(&state.device, received);
+    /// Takes what a device said by radio: it is alive, and this holds.
+    pub fn on_heartbeat(&mut self, state: &ObstacleWarning, sent: SimTime, received: SimTime) {
+        self.obstacles.on_heard(&state.device, sent);
         self.obstacles.on_warning(state, received);
     }
 

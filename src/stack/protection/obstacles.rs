@@ -3,7 +3,7 @@
 //! The last word of each device counts, in the order of issue: by balise and by radio messages
 //! come late, twice, or not at all. A warning stays in force until its own device clears it;
 //! silence clears nothing. A device of the map that has not been heard by radio for too long takes
-//! back its "clear": the stretch that it watches counts as occupied until it is heard again.
+//! back its "clear": all of the stretch that it watches counts as occupied until it is heard again.
 
 use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
@@ -49,10 +49,12 @@ impl Obstacles {
         }
     }
 
-    /// A device was heard by radio.
-    pub fn on_heard(&mut self, device: &str, received: SimTime) {
+    /// A device was heard by radio; what counts is when it spoke.
+    pub fn on_heard(&mut self, device: &str, sent: SimTime) {
         let known = self.devices.iter_mut().find(|d| d.name == device);
-        known.into_iter().for_each(|d| d.heard = Some(received));
+        known
+            .into_iter()
+            .for_each(|d| d.heard = d.heard.max(Some(sent)));
     }
 
     /// Time passes: the stretches of devices that are silent count as occupied.
@@ -63,24 +65,33 @@ impl Obstacles {
                 continue;
             }
             let known = self.notices.iter_mut();
-            let mut known = known.filter(|n| n.warning.device == device.name);
-            let occupied = |issued: SimTime, number: u32| ObstacleWarning {
+            let known = known.filter(|n| n.warning.device == device.name).last();
+            let (from_m, to_m) = device.watched_m;
+            let occupied = ObstacleWarning {
                 device: device.name.clone(),
-                number,
-                issued,
+                number: 0,
+                // Whatever the device says next is newer.
+                issued: SimTime::from_nanos(i64::MIN),
                 danger: DangerLevel::High,
-                from_chainage_m: device.watched_m.0,
-                to_chainage_m: device.watched_m.1,
+                from_chainage_m: from_m,
+                to_chainage_m: to_m,
                 blind: true,
             };
-            match known.next() {
-                Some(notice) if notice.warning.danger == DangerLevel::None => {
-                    // Whatever the device says next is newer.
-                    notice.warning = occupied(notice.warning.issued, notice.warning.number);
+            match known {
+                Some(Notice { warning, .. }) => {
+                    let dangerous = warning.danger != DangerLevel::None;
+                    let least = |a: f64, b: f64| if dangerous { a.min(b) } else { a };
+                    let most = |a: f64, b: f64| if dangerous { a.max(b) } else { a };
+                    *warning = ObstacleWarning {
+                        number: warning.number,
+                        issued: warning.issued,
+                        from_chainage_m: least(from_m, warning.from_chainage_m),
+                        to_chainage_m: most(to_m, warning.to_chainage_m),
+                        ..occupied
+                    };
                 }
-                Some(_) => {}
                 None => self.notices.push(Notice {
-                    warning: occupied(SimTime::from_nanos(i64::MIN), 0),
+                    warning: occupied,
                     received: since,
                 }),
             }

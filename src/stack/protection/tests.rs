@@ -511,15 +511,20 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
     assert_eq!(end_m(&mut protection, 5.0), None);
     let watched = Some(1800.0 - 80.0 - settings.safety_distance_m);
     assert_eq!(end_m(&mut protection, 5.1), watched);
-    protection.on_heartbeat(&clear(0, 5.1), SimTime::from_secs(5.6));
-    assert_eq!(end_m(&mut protection, 10.6), None);
-    assert_eq!(end_m(&mut protection, 10.7), watched);
+    let at = SimTime::from_secs;
+    protection.on_heartbeat(&clear(0, 5.1), at(5.1), at(5.6));
+    assert_eq!(end_m(&mut protection, 10.1), None);
+    assert_eq!(end_m(&mut protection, 10.2), watched);
+    // What was said long ago, and comes only now, is not news.
+    protection.on_heartbeat(&clear(0, 5.0), at(5.0), at(10.2));
+    assert_eq!(end_m(&mut protection, 10.3), watched);
     // By balise one cannot tell whether the device is alive.
     protection.on_warning(&clear(1, 9.0), SimTime::from_secs(10.7));
     assert_eq!(end_m(&mut protection, 10.8), watched);
     let danger = warning(2, SimTime::from_secs(11.0), DangerLevel::High, 1790.0);
-    protection.on_heartbeat(&danger, SimTime::from_secs(11.5));
+    protection.on_heartbeat(&danger, at(11.0), at(11.5));
     let obstacle = Some(1790.0 - settings.safety_distance_m);
     assert_eq!(end_m(&mut protection, 11.6), obstacle);
-    assert_eq!(end_m(&mut protection, 60.0), obstacle);
+    // Of the rest of its stretch a device that has fallen silent says nothing.
+    assert_eq!(end_m(&mut protection, 60.0), watched);
 }

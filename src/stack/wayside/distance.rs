@@ -14,7 +14,7 @@
 //! ```
 
 use crate::bus::{DetectedObstacle, TrainReport, WaysideCalibration};
-use crate::track::Tunnel;
+use crate::track::{Direction, Tunnel};
 use nalgebra::Vector2;
 
 /// Curves flatter than this count as straight, 1/m (a radius of 20 km).
@@ -59,7 +59,7 @@ pub fn tangent_error_m(radius_m: f64, arc_m: f64, inside_m: f64) -> f64 {
 }
 
 /// Distance of the train head to the obstacle's nearer end: by the paper's formula, and exact
-/// along the alignment.
+/// along the alignment. The formula is for trains that run up the line; of others both are exact.
 ///
 /// The paper's device looks towards the train, so that the obstacle's farthest point is the
 /// nearest to the train. For an obstacle beyond the device it is the other way round, and the
@@ -72,6 +72,10 @@ pub fn train_distance_m(
 ) -> (f64, f64) {
     let ahead_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
     let exact = ahead_m(obstacle.from_chainage_m).min(ahead_m(obstacle.to_chainage_m));
+    if train.direction == Direction::Down {
+        // The paper's trains run up the line.
+        return (exact, exact);
+    }
     let m = calibration.chainage_m - calibration.balise_chainage_m;
     let n = train.chainage_m - calibration.balise_chainage_m;
     let (range, angle) = if obstacle.far_angle_rad.cos() < 0.0 {
@@ -104,7 +108,6 @@ pub fn train_distance_m(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::Direction;
 
     /// Coordinates worked out by hand on a circle: balise, device and obstacle placed by their
     /// arcs. A wrong term in the formula (asin, eta, sign) misses by metres.

@@ -65,9 +65,11 @@ impl WaysideDetection {
 
     /// What the trains are to know of a report.
     fn warn(&mut self, report: &WaysideReport, now: SimTime) {
-        let Some(warning) = self.detector.message(report) else {
+        let Some(mut warning) = self.detector.message(report) else {
             return;
         };
+        // The order of what it says is that of its own time, not of its camera's clock.
+        warning.issued = now;
         let balise = self.balise.clone().map(Node::Balise).map(Receiver::Node);
         for receiver in balise.into_iter().chain([Receiver::Trains]) {
             let content = Content::Warning(warning.clone());
@@ -82,7 +84,8 @@ impl WaysideDetection {
         if !self.last_heartbeat.is_none_or(due) {
             return;
         }
-        if let Some(state) = self.detector.heartbeat() {
+        if let Some(mut state) = self.detector.heartbeat() {
+            state.issued = now;
             self.last_heartbeat = Some(now);
             let content = Content::Heartbeat(state);
             let to_trains = Message::to(Receiver::Trains, self.node.clone(), now, content);
@@ -96,7 +99,10 @@ impl Equipment for WaysideDetection {
         match (&message.content, &message.sender) {
             (Content::Scan(scan), _) => self.scan = Some(scan.clone()),
             (Content::Train(report), Node::Train(id)) => {
-                self.trains.insert(*id, *report);
+                let newest = self.trains.entry(*id).or_insert(*report);
+                if report.time > newest.time {
+                    *newest = *report;
+                }
             }
             (Content::Frame(frame), _) => {
                 let now = message.received_at;

@@ -323,7 +323,7 @@ impl WaysideDetector {
     /// What a train covers and dazzles: from its tail to where its glare ends.
     fn occupied_m(&self, train: &TrainReport) -> (f64, f64) {
         let sign = train.direction.sign();
-        let tail_m = train.chainage_m - sign * (self.settings.train_length_m + TRAIN_MARGIN_M);
+        let tail_m = train.chainage_m - sign * (train.length_m + TRAIN_MARGIN_M);
         let glare_m = train.chainage_m + sign * GLARE_M;
         (tail_m.min(glare_m), tail_m.max(glare_m))
     }
@@ -331,7 +331,7 @@ impl WaysideDetector {
     fn may_light(&self, train: &TrainReport) -> bool {
         let device = self.sight.calibration().chainage_m;
         let reach = self.settings.reach_m + HEADLIGHT_M;
-        let tail_m = train.chainage_m - train.direction.sign() * self.settings.train_length_m;
+        let tail_m = train.chainage_m - train.direction.sign() * train.length_m;
         train.chainage_m.max(tail_m) > device - reach
             && train.chainage_m.min(tail_m) < device + reach
     }

@@ -42,8 +42,6 @@ settings! {
         /// Anything on the bed inside the gauge that rises to at least this height over top of rail
         /// is a high danger, m (negative: below).
         dangerous_height_m: f64 = 0.0, in -0.5..=1.0;
-        /// Length of the trains of the line, m.
-        train_length_m: f64 = 118.0, in 5.0..=500.0;
         /// While an obstacle is there, its warning is sent again after this time, s.
         refresh_s: f64 = 1.0, in 0.05..=60.0;
         /// A heartbeat is sent after each frame that comes this long after the last one, s. Trains take

@@ -336,6 +336,7 @@ fn the_train_is_no_obstacle() {
                 direction: Direction::Up,
                 speed_mps: 20.0,
                 time: frame.start.plus(-0.05),
+                length_m: 118.0,
                 ..TrainReport::default()
             };
             let report = d.on_frame(&frame, None, reported.then_some(report).as_slice());
@@ -373,6 +374,7 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
                 direction: Direction::Up,
                 speed_mps: 0.0,
                 time: frame.start,
+                length_m: 118.0,
                 ..TrainReport::default()
             });
             d.on_frame(&frame, None, train.as_slice()).obstacles.len()
@@ -404,6 +406,7 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
             direction: Direction::Up,
             speed_mps: 0.0,
             time: frame.start,
+            length_m: 118.0,
             ..TrainReport::default()
         };
         let report = d.on_frame(&frame, None, &[train]);

@@ -135,8 +135,9 @@ impl StereoCamera {
 impl Sensor for StereoCamera {
     /// A pair whose rows are over and that is not lost.
     fn sample(&mut self, world: &World) -> Result<Vec<Output>, SensorError> {
-        let local = self.clock.local(world.time());
-        let Some((number, start)) = self.ticker.due(local, self.delay_s()) else {
+        let (clock, now, delay_s) = (self.clock, world.time(), self.delay_s());
+        let over = |start| now >= clock.time_of(start).plus(delay_s);
+        let Some((number, start)) = self.ticker.next_if(over) else {
             return Ok(Vec::new());
         };
         let start_true = self.clock.time_of(start);

@@ -74,8 +74,9 @@ impl Sensor for WaysideCamera {
     /// A frame whose last row has closed, however long it was exposed, and that is not lost.
     fn sample(&mut self, world: &World) -> Result<Vec<Output>, SensorError> {
         let delay_s = self.settings.longest_span_s() + self.trigger.latest_s();
-        let local = self.clock.local(world.time());
-        let Some((number, start)) = self.ticker.due(local, delay_s) else {
+        let (clock, now) = (self.clock, world.time());
+        let over = |start| now >= clock.time_of(start).plus(delay_s);
+        let Some((number, start)) = self.ticker.next_if(over) else {
             return Ok(Vec::new());
         };
         let start_true = self.clock.time_of(start);
