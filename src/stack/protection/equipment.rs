@@ -171,3 +171,88 @@ impl Equipment for TrainProtection {
         own.chain(position).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::map;
+    use super::*;
+    use crate::bus::{OdometerSample, TrainId};
+
+    /// The equipment of a train at 2000 m of a line of 4 km, and where its authority ends after it has
+    /// heard `content` of `sender` by radio.
+    fn authority_end_m(direction: Direction, sender: Node, content: Content) -> Option<f64> {
+        let up = map(0.0);
+        let route = Route::new(&up, direction);
+        let map = match direction {
+            Direction::Up => up,
+            Direction::Down => Arc::new(up.reversed()),
+        };
+        let settings = ProtectionSettings {
+            initial_chainage_m: Some(2000.0),
+            ..ProtectionSettings::default()
+        };
+        let node = Node::Train(TrainId(0));
+        let mut equipment = TrainProtection::new((node.clone(), route), &settings, map);
+        let time = SimTime::from_secs(1.0);
+        let odometer = OdometerSample {
+            time,
+            distance_m: 0.0,
+            speed_mps: 0.0,
+        };
+        equipment.on(&Message::own(node, time, Content::Odometer(odometer)));
+        equipment
+            .on(&Message::to(Receiver::Trains, sender, time, content).arrived(time, Via::Radio));
+        let said = equipment.cycle(time);
+        said.iter().find_map(|message| match &message.content {
+            Content::Protection(report) => {
+                assert_eq!(report.position_m, Some(2000.0));
+                report.authority_end_m
+            }
+            _ => None,
+        })
+    }
+
+    /// An obstacle or a train ahead that is met from the wrong end, or is ahead of a train that has
+    /// passed it; a train whose length or sigma is left out.
+    #[test]
+    fn what_is_ahead_ends_the_authority_both_ways() {
+        let obstacle = |from_chainage_m: f64| {
+            Content::Warning(ObstacleWarning {
+                device: "W1".into(),
+                number: 0,
+                issued: SimTime::ZERO,
+                danger: DangerLevel::High,
+                from_chainage_m,
+                to_chainage_m: from_chainage_m + 1.0,
+                blind: false,
+            })
+        };
+        let post = || Node::Post("W1".into());
+        let end = |direction, content| authority_end_m(direction, post(), content);
+        assert_eq!(end(Direction::Up, obstacle(2300.0)), Some(2275.0));
+        assert_eq!(end(Direction::Up, obstacle(1700.0)), None);
+        assert_eq!(end(Direction::Down, obstacle(1700.0)), Some(1726.0));
+        assert_eq!(end(Direction::Down, obstacle(2300.0)), None);
+
+        let train = |chainage_m: f64, direction| {
+            Content::Train(TrainReport {
+                chainage_m,
+                sigma_m: 2.0,
+                length_m: 100.0,
+                direction,
+                ..TrainReport::default()
+            })
+        };
+        let other = || Node::Train(TrainId(1));
+        let end = |direction, content| authority_end_m(direction, other(), content);
+        // The tail, three sigma, and 25 m before.
+        let ahead = end(Direction::Up, train(2500.0, Direction::Up));
+        assert_eq!(ahead, Some(2500.0 - 100.0 - 6.0 - 25.0));
+        let ahead = end(Direction::Down, train(1500.0, Direction::Down));
+        assert_eq!(ahead, Some(1500.0 + 100.0 + 6.0 + 25.0));
+        assert_eq!(end(Direction::Up, train(1500.0, Direction::Up)), None);
+        // One that comes: its head.
+        let comes = end(Direction::Up, train(2500.0, Direction::Down));
+        assert_eq!(comes, Some(2500.0 - 6.0 - 25.0));
+    }
+}
