@@ -35,7 +35,7 @@ impl<S: Settings> Settings for BTreeMap<String, S> {
 
 /// Declares a table of a file.
 ///
-/// ```ignore
+/// ```text
 /// settings! {
 ///     /// A brake.
 ///     pub struct BrakeSettings {
