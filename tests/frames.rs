@@ -6,7 +6,7 @@ use arrow::array::AsArray;
 use arrow::datatypes::{Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
 use image::GrayImage;
-use metrotwin::record::dataset::{DataSet, Inputs, Plan};
+use metrotwin::record::dataset::{DataSet, FramePlan, Inputs};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
     Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, renderer, run,
@@ -91,7 +91,7 @@ impl Observer for Delivered {
 
 /// Makes a set with the plain renderer; a run that comes to `stop_s` is broken off there. Gives the
 /// number of frames, what the stack got, and how long the run was.
-fn make(out: &Path, seed: u64, plan: Plan, stop_s: f64) -> (usize, Delivered, f64) {
+fn make(out: &Path, seed: u64, plan: FramePlan, stop_s: f64) -> (usize, Delivered, f64) {
     let scenario = scenario(seed);
     let draws = renderer(&scenario, RendererChoice::Cpu).unwrap();
     let stop = AtomicBool::new(false);
@@ -169,7 +169,7 @@ fn content(folder: &Path, root: &Path, all: &mut BTreeMap<PathBuf, Vec<u8>>) {
 #[test]
 fn files_tables_and_annotations_agree() {
     let out = folder("agree");
-    let (frames, delivered, _) = make(&out, 1, Plan::default(), f64::INFINITY);
+    let (frames, delivered, _) = make(&out, 1, FramePlan::default(), f64::INFINITY);
     let table_of = |name: &str| table(&out, name);
     let rows = table_of("frames.parquet");
     assert_eq!(rows.num_rows(), frames);
@@ -244,10 +244,10 @@ fn files_tables_and_annotations_agree() {
 #[test]
 fn arrays_have_their_shape_and_still_walls_stand_still() {
     let out = folder("arrays");
-    let plan = Plan {
+    let plan = FramePlan {
         cameras: vec!["W1530".into()],
         limit: Some(3),
-        ..Plan::default()
+        ..FramePlan::default()
     };
     let (frames, _, simulated_s) = make(&out, 1, plan, f64::INFINITY);
     assert_eq!(frames, 3);
@@ -280,10 +280,10 @@ fn arrays_have_their_shape_and_still_walls_stand_still() {
 fn same_seed_same_bytes() {
     let [one, two, other] = ["one", "two", "other"].map(|name| {
         let out = folder(&format!("bytes_{name}"));
-        let plan = Plan {
+        let plan = FramePlan {
             every: 2,
             to_s: 0.45,
-            ..Plan::default()
+            ..FramePlan::default()
         };
         let (_, _, simulated_s) = make(
             &out,
@@ -315,7 +315,7 @@ fn same_seed_same_bytes() {
 #[test]
 fn a_run_broken_off_leaves_a_whole_set() {
     let out = folder("broken_off");
-    let (frames, _, _) = make(&out, 1, Plan::default(), 0.3);
+    let (frames, _, _) = make(&out, 1, FramePlan::default(), 0.3);
     assert!((1..18).contains(&frames), "{frames}");
     let rows = table(&out, "frames.parquet");
     assert_eq!(rows.num_rows(), frames);

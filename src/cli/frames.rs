@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
-use crate::record::dataset::{self, DataSet, Inputs, LabelKinds, Plan};
+use crate::record::dataset::{self, DataSet, FramePlan, Inputs, LabelKinds};
 use crate::scenario::{self, Override, Scenario};
 use crate::session::{self, End, RunOptions, Summary};
 use std::path::{Path, PathBuf};
@@ -118,7 +118,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
 }
 
 /// What the arguments ask for, held against what the scenario has.
-fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<Plan, Failure> {
+fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
     let there = DataSet::cameras_of(scenario);
     if there.is_empty() {
         return Err(Failure::input(
@@ -143,7 +143,7 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<Plan, Failure> {
             "give seconds since the scenario's start, the earlier one as --from",
         ));
     }
-    Ok(Plan {
+    Ok(FramePlan {
         every: args.every,
         from_s: args.from,
         to_s,

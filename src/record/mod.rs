@@ -51,7 +51,7 @@ use moving::Moving;
 use nalgebra::Isometry3;
 use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
-use scene::Scene;
+use scene::RecordedScene;
 use std::path::Path;
 use std::rc::Rc;
 use stream::{Stream, Target};
@@ -176,7 +176,7 @@ struct Open {
     first_camera: Option<Isometry3<f64>>,
     laid_out: bool,
     flush_at: SimTime,
-    scene: Rc<Scene>,
+    scene: Rc<RecordedScene>,
     moving: Moving,
     images: Images,
     plots: Plots,
@@ -193,7 +193,7 @@ impl Open {
             protection: first.is_some_and(|train| train.protection),
             devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
         };
-        let scene = Rc::new(Scene::new(opening.tunnel));
+        let scene = Rc::new(RecordedScene::new(opening.tunnel));
         scene.log(&stream, opening, settings)?;
         Ok(Self {
             moving: Moving::open(stream.clone(), scene.clone(), opening)?,

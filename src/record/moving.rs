@@ -1,7 +1,7 @@
 //! What moves in the 3-D view: train, cameras, obstacles, and where the stack takes them to be.
 
 use super::palette::{self, ui};
-use super::scene::{HEAD, Scene, turn};
+use super::scene::{HEAD, RecordedScene, turn};
 use super::stream::Stream;
 use super::whole_files::{Result, failed};
 use super::{images, slug};
@@ -39,7 +39,7 @@ impl Poses {
         }
     }
 
-    fn push(&mut self, scene: &Scene, time: SimTime, pose: &Isometry3<f64>) {
+    fn push(&mut self, scene: &RecordedScene, time: SimTime, pose: &Isometry3<f64>) {
         self.times_ns.push(time.nanos());
         self.places.push(scene.place(pose));
         self.turns.push(turn(pose));
@@ -63,7 +63,7 @@ impl Poses {
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
     stream: Stream,
-    scene: Rc<Scene>,
+    scene: Rc<RecordedScene>,
     /// Both eyes, where there is a rig.
     rig: Option<(RigCalibration, [Poses; 2])>,
     /// The head, then the cars; empty where there is neither train nor rig.
@@ -77,7 +77,11 @@ pub(super) struct Moving {
 
 impl Moving {
     /// Draws the train, and makes ready for its motion.
-    pub(super) fn open(stream: Stream, scene: Rc<Scene>, opening: &Opening<'_>) -> Result<Self> {
+    pub(super) fn open(
+        stream: Stream,
+        scene: Rc<RecordedScene>,
+        opening: &Opening<'_>,
+    ) -> Result<Self> {
         let first = opening.first();
         let half = first.map_or(Vector3::zeros(), |train| train.car_half_extents_m);
         let half = half.map(|x| x as f32);
@@ -286,7 +290,7 @@ struct Solids {
 }
 
 impl Solids {
-    fn of(scene: &Scene, bodies: &[Body], is_kind: fn(&Shape) -> bool) -> Self {
+    fn of(scene: &RecordedScene, bodies: &[Body], is_kind: fn(&Shape) -> bool) -> Self {
         let mut solids = Self::default();
         for body in bodies.iter().filter(|body| is_kind(&body.shape)) {
             let (size, shift_m) = match &body.shape {
@@ -320,7 +324,7 @@ struct Hulls {
 }
 
 impl Hulls {
-    fn of(scene: &Scene, bodies: &[Body]) -> Self {
+    fn of(scene: &RecordedScene, bodies: &[Body]) -> Self {
         let mut hulls = Self::default();
         for body in bodies {
             if let Shape::Hull(hull) = &body.shape {
@@ -330,7 +334,7 @@ impl Hulls {
         hulls
     }
 
-    fn push(&mut self, scene: &Scene, body: &Body, hull: &Hull) {
+    fn push(&mut self, scene: &RecordedScene, body: &Body, hull: &Hull) {
         for face in hull.faces() {
             let first = self.corners.len() as u32;
             let normal = body.world_from_body * face.normal;

@@ -27,13 +27,13 @@ const MAX_LAMP_LABELS: usize = 12;
 
 /// The recording's own coordinates: the world's, from a point in the middle of the line, so that
 /// single precision is good to a millimetre up to 10 km away.
-pub(super) struct Scene {
+pub(super) struct RecordedScene {
     origin: Vector3<f64>,
     alignment: Alignment,
     lamps: BTreeMap<Uid, Point3<f64>>,
 }
 
-impl Scene {
+impl RecordedScene {
     /// Of a line.
     pub(super) fn new(tunnel: &Tunnel) -> Self {
         let alignment = tunnel.alignment.clone();
@@ -193,7 +193,7 @@ struct Sweep {
 }
 
 impl Sweep {
-    fn sweep(&mut self, scene: &Scene, range: &SectionRange, step_m: f64) {
+    fn sweep(&mut self, scene: &RecordedScene, range: &SectionRange, step_m: f64) {
         for edge in range.section.edges() {
             let first = self.corners.len() as u32;
             for (ring, s_m) in rings(range.from_m, range.to_m, step_m).enumerate() {
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn the_tunnel_shows_its_inner_side() {
         let tunnel = tunnel();
-        let scene = Scene::new(&tunnel);
+        let scene = RecordedScene::new(&tunnel);
         let mut sweep = Sweep::default();
         sweep.sweep(&scene, &tunnel.sections[0], 5.0);
         // 120 stretches, two triangles each.
@@ -268,7 +268,7 @@ mod tests {
     #[test]
     fn coordinates_are_good_to_a_millimetre() {
         let tunnel = tunnel();
-        let scene = Scene::new(&tunnel);
+        let scene = RecordedScene::new(&tunnel);
         for lamp in &tunnel.lamps {
             let back = Vector3::from(scene.local(&lamp.centre)).cast::<f64>() + scene.origin;
             assert!((back - lamp.centre.coords).norm() < 1e-3);

@@ -9,7 +9,7 @@
 //! by image, as without a data set.
 //!
 //! ```no_run
-//! use metrotwin::record::dataset::{DataSet, Inputs, Plan};
+//! use metrotwin::record::dataset::{DataSet, FramePlan, Inputs};
 //! use metrotwin::scenario::Scenario;
 //! use metrotwin::session::{RendererChoice, RunOptions, renderer, run, scene};
 //! use std::path::Path;
@@ -18,7 +18,7 @@
 //! let scenario = Scenario::load(Path::new("scenarios/obstacle_gallery.toml"), &[])?;
 //! let draws = renderer(&scenario, RendererChoice::Auto)?;
 //! let enough = AtomicBool::new(false);
-//! let plan = Plan { limit: Some(10), ..Plan::default() };
+//! let plan = FramePlan { limit: Some(10), ..FramePlan::default() };
 //! let mut set = DataSet::new("out/set".as_ref(), &scenario, plan, Inputs::default(), draws, &enough);
 //! let options = RunOptions { stop: Some(&enough), ..RunOptions::default() };
 //! run(&scenario, &options, &mut [&mut set])?;
@@ -48,7 +48,7 @@ mod readme;
 mod take;
 
 pub use files::{clear, is_empty};
-pub use plan::{LabelKind, LabelKinds, Plan, UnknownLabel};
+pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
 
 use crate::bus::TrainId;
 use crate::record::parquet::{Column, Table};
@@ -84,7 +84,7 @@ pub struct Inputs {
 /// Writes a data set.
 pub struct DataSet<'a> {
     out: PathBuf,
-    plan: Plan,
+    plan: FramePlan,
     about: About,
     tunnel: Arc<Tunnel>,
     renderer: Box<dyn Renderer>,
@@ -153,7 +153,7 @@ impl<'a> DataSet<'a> {
     pub fn new(
         out: &Path,
         scenario: &Scenario,
-        plan: Plan,
+        plan: FramePlan,
         inputs: Inputs,
         renderer: Box<dyn Renderer>,
         enough: &'a AtomicBool,

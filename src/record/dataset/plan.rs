@@ -91,7 +91,7 @@ impl Default for LabelKinds {
 
 /// Which frames, and what of each.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
+pub struct FramePlan {
     /// Every which frame of a camera, by its number.
     pub every: u32,
     /// Frames that start at this time or later.
@@ -106,7 +106,7 @@ pub struct Plan {
     pub labels: LabelKinds,
 }
 
-impl Default for Plan {
+impl Default for FramePlan {
     fn default() -> Self {
         Self {
             every: 1,
@@ -119,7 +119,7 @@ impl Default for Plan {
     }
 }
 
-impl Plan {
+impl FramePlan {
     /// Whether a label is wanted.
     pub fn has(&self, label: LabelKind) -> bool {
         self.labels.0.contains(&label)
@@ -173,12 +173,12 @@ mod tests {
     /// Fails where a limit is of pictures taken and not of those wanted, or an end is left out.
     #[test]
     fn frames_are_chosen_by_number_time_and_count() {
-        let plan = Plan {
+        let plan = FramePlan {
             every: 3,
             from_s: 0.1,
             to_s: 0.4,
             limit: Some(2),
-            ..Plan::default()
+            ..FramePlan::default()
         };
         let mut taken = 0;
         let mut chosen = Vec::new();

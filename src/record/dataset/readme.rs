@@ -3,13 +3,13 @@
 use super::frame::{FrameRow, ImageRow};
 use super::lamps::LampRow;
 use super::obstacles::ObstacleRow;
-use super::{LabelKind, Plan};
+use super::{FramePlan, LabelKind};
 use crate::record::parquet::describe;
 
 const TEMPLATE: &str = include_str!("readme.md");
 
 /// The text for one set.
-pub(super) fn of(scenario: &str, plan: &Plan, meta: &serde_json::Value) -> String {
+pub(super) fn of(scenario: &str, plan: &FramePlan, meta: &serde_json::Value) -> String {
     let missing: Vec<String> = LabelKind::ALL
         .iter()
         .filter(|(_, label)| !plan.has(*label))

@@ -21,7 +21,7 @@ pub struct RunNumber {
 
 /// A plan for some variables by name.
 #[derive(Clone, Debug)]
-pub struct Plan {
+pub struct SamplingPlan {
     settings: PlanSettings,
     seed: u64,
     names: Vec<String>,
@@ -29,7 +29,7 @@ pub struct Plan {
     directions: Vec<Vec<u32>>,
 }
 
-impl Plan {
+impl SamplingPlan {
     /// Of the variables that are drawn.
     pub fn new(settings: PlanSettings, seed: u64, names: Vec<String>) -> Self {
         let dimensions = names.len().min(MOST_SOBOL);
@@ -130,8 +130,8 @@ fn shuffled(at: u32, len: u32, key: [u32; 2]) -> u32 {
 mod tests {
     use super::*;
 
-    fn plan(settings: PlanSettings, seed: u64) -> Plan {
-        Plan::new(settings, seed, (0..5).map(|k| format!("v{k}")).collect())
+    fn plan(settings: PlanSettings, seed: u64) -> SamplingPlan {
+        SamplingPlan::new(settings, seed, (0..5).map(|k| format!("v{k}")).collect())
     }
 
     fn run(index: u64, cell: u64, repeat: u64) -> RunNumber {
@@ -227,10 +227,10 @@ mod tests {
     /// Seeds and attempts that do not matter, a variable whose draws depend on the others'.
     #[test]
     fn samples_depend_on_seed_index_and_name_alone() {
-        let few = Plan::new(PlanSettings::Random, 1, vec!["v3".into()]);
+        let few = SamplingPlan::new(PlanSettings::Random, 1, vec!["v3".into()]);
         let many = plan(PlanSettings::Random, 1);
         for index in 0..10 {
-            let at = |plan: &Plan, attempt| plan.point(run(index, 0, index), attempt);
+            let at = |plan: &SamplingPlan, attempt| plan.point(run(index, 0, index), attempt);
             let own = at(&few, 0)[0].to_bits();
             assert_eq!(own, at(&many, 0)[3].to_bits());
             let other = [at(&many, 1), at(&plan(PlanSettings::Random, 2), 0)];

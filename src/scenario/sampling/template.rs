@@ -2,7 +2,7 @@
 
 use super::condition::{Condition, ConditionError};
 use super::copula;
-use super::plan::{MOST_SOBOL, Plan};
+use super::plan::{MOST_SOBOL, SamplingPlan};
 use super::settings::{Distribution, PlanSettings, StudySettings};
 use super::tables::Tables;
 use crate::scenario::build::{overridden, read};
@@ -26,7 +26,7 @@ pub struct Template {
     pub file: ScenarioFile,
     /// What varies.
     pub settings: StudySettings,
-    pub(super) plan: Plan,
+    pub(super) plan: SamplingPlan,
     /// Names of the plan's coordinates: a variable, or a table's file.
     pub(super) coordinates: Vec<String>,
     pub(super) swept: Vec<(String, Vec<Value>)>,
@@ -74,7 +74,7 @@ impl Template {
             swept: swept
                 .map(|(name, v)| (name.clone(), v.from.swept()))
                 .collect(),
-            plan: Plan::new(settings.plan, settings.seed, coordinates.clone()),
+            plan: SamplingPlan::new(settings.plan, settings.seed, coordinates.clone()),
             coordinates,
             tables,
             conditions,
@@ -90,7 +90,7 @@ impl Template {
         self.settings.seed = seed.unwrap_or(self.settings.seed);
         self.settings.runs = runs.unwrap_or(self.settings.runs);
         let StudySettings { plan, seed, .. } = self.settings;
-        self.plan = Plan::new(plan, seed, self.coordinates.clone());
+        self.plan = SamplingPlan::new(plan, seed, self.coordinates.clone());
         self
     }
 

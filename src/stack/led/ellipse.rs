@@ -240,7 +240,7 @@ mod tests {
     #[test]
     fn the_centres_sigma_is_its_scatter() {
         let e = sample();
-        let mut noise = crate::stack::led::testing::Noise::new(3);
+        let mut noise = crate::stack::led::testing::SplitMix64::new(3);
         for arc in [TAU, 0.6 * TAU] {
             let (mut squares, mut stated) = (0.0, 0.0);
             for _ in 0..300 {

@@ -62,7 +62,7 @@ fn middle(a: u8, b: u8, c: u8) -> u8 {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::Noise;
+    use crate::stack::led::testing::SplitMix64;
 
     /// Sorts every neighbourhood.
     fn slow(source: &Patch) -> Vec<u8> {
@@ -87,7 +87,7 @@ mod tests {
     /// Fails on a wrong sorting step or a wrong border.
     #[test]
     fn equals_sorting_on_random_images() {
-        let mut noise = Noise::new(7);
+        let mut noise = SplitMix64::new(7);
         let mut scratch = MedianScratch::default();
         let mut out = Patch::default();
         for (w, h) in [(1, 1), (1, 5), (5, 1), (2, 2), (17, 9), (40, 33)] {

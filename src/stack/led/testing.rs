@@ -12,9 +12,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 
 /// Uniform and normal numbers from a splitmix64 sequence.
 #[derive(Debug)]
-pub struct Noise(u64);
+pub struct SplitMix64(u64);
 
-impl Noise {
+impl SplitMix64 {
     /// A sequence of its own for each seed.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15))
@@ -154,7 +154,7 @@ impl World {
             start: SimTime::from_secs(start_s),
             exposure_s: eye.camera.shutter.exposure_s,
             gain_db: 0.0,
-            image: self.draw(&eye, &mut Noise::new(2 * u64::from(number) + seed)),
+            image: self.draw(&eye, &mut SplitMix64::new(2 * u64::from(number) + seed)),
         };
         let left = Eye {
             camera: self.rig.left,
@@ -172,7 +172,7 @@ impl World {
         }
     }
 
-    fn draw(&self, eye: &Eye, noise: &mut Noise) -> GrayImage {
+    fn draw(&self, eye: &Eye, noise: &mut SplitMix64) -> GrayImage {
         let c = eye.camera.intrinsics;
         let (w, h) = (c.width_px as usize, c.height_px as usize);
         let mut grey = vec![0.0; w * h];

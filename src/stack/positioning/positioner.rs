@@ -71,7 +71,7 @@ impl Sighting {
 
 /// How well a lamp was measured by the rig.
 #[derive(Clone, Copy, Debug)]
-struct Spread {
+struct LampAccuracy {
     /// Standard deviation of its distance, as a share of it.
     distance: f64,
     /// Standard deviation of its image, pixels.
@@ -499,7 +499,7 @@ impl LedPositioner {
         let sigma = (l.sigma_px / focal_px(&self.rig.left))
             .hypot(r.sigma_px / focal_px(&self.rig.right))
             .hypot(self.vergence_sigma(stereo.right_x));
-        let spread = Spread {
+        let spread = LampAccuracy {
             distance: (sigma / stereo.disparity)
                 .hypot(self.settings.baseline_sigma_mm / baseline_mm),
             image_px: l.sigma_px,
@@ -515,7 +515,7 @@ impl LedPositioner {
 
     fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
         let lamp = &left[sighting.left];
-        let spread = Spread {
+        let spread = LampAccuracy {
             distance: lamp.axis_sigma_px / lamp.own_outline?.semi_major_px,
             image_px: lamp.sigma_px,
         };
@@ -528,7 +528,7 @@ impl LedPositioner {
         method: Method,
         sighting: &Sighting,
         lamp: Vector3<f64>,
-        spread: Spread,
+        spread: LampAccuracy,
     ) -> Option<PositionFix> {
         let (uid, identity) = sighting.named?;
         let site = self.map.lamp(uid)?;
@@ -568,7 +568,7 @@ impl LedPositioner {
         vehicle: &Point3<f64>,
         turn: &UnitQuaternion<f64>,
         heading_rad: f64,
-        spread: Spread,
+        spread: LampAccuracy,
     ) -> f64 {
         let along = Vector3::new(heading_rad.cos(), heading_rad.sin(), 0.0);
         let world_from_camera = turn * self.rig.vehicle_from_left.rotation;

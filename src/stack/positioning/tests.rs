@@ -5,7 +5,7 @@ use crate::bus::{
     CameraFault, CameraModel, Distortion, Identity, ImuSample, Intrinsics, LedReport, Method,
     OdometerSample, RigCalibration, SimTime, StereoPair,
 };
-use crate::stack::led::testing::{Noise, World, rig, tunnel, wide_rig};
+use crate::stack::led::testing::{SplitMix64, World, rig, tunnel, wide_rig};
 use crate::track::Tunnel;
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -301,7 +301,7 @@ fn a_global_shutter_names_no_lamp() {
 
 /// The world of a rig whose calibration, mounting and lamp are off by errors drawn with the stack's
 /// own sigmas, and what the map then says of lamp `k`.
-fn drawn_world(map: &Tunnel, k: usize, noise: &mut Noise) -> (World, Tunnel) {
+fn drawn_world(map: &Tunnel, k: usize, noise: &mut SplitMix64) -> (World, Tunnel) {
     let stated = LedSettings::default();
     let mut world = World::new(map, 0.0, 0.0);
     let mut turn = |sigma_deg: f64| {
@@ -339,7 +339,7 @@ fn val_sigma_is_what_fixes_scatter_by() {
         agreeing_reads: 1,
         ..LedSettings::default()
     };
-    let mut noise = Noise::new(1);
+    let mut noise = SplitMix64::new(1);
     let mut squares = Vec::new();
     for k in 0..RIGS {
         let lamp = &map.lamps[k + 20];
@@ -646,7 +646,7 @@ fn val_lamps_out() {
     for (share, published_m) in [(0.0, 0.09), (0.055, 0.11), (0.11, 0.15), (0.22, 0.18)] {
         let map = tunnel("manchester");
         let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 60.0 / 3.6);
-        let (mut surveyed, mut noise) = (map.clone(), Noise::new(7));
+        let (mut surveyed, mut noise) = (map.clone(), SplitMix64::new(7));
         for lamp in &mut surveyed.lamps {
             let error_m = 0.015 * noise.normal();
             lamp.chainage_m += error_m;

@@ -153,7 +153,7 @@ impl Crate {
 }
 
 /// What the camera of the tests sees.
-pub struct Scene {
+pub struct TestScene {
     pub map: Arc<Tunnel>,
     pub calibration: WaysideCalibration,
     background: Vec<f64>,
@@ -163,7 +163,7 @@ pub struct Scene {
     noise: Vec<f64>,
 }
 
-impl Scene {
+impl TestScene {
     pub fn new(width: u32, height: u32) -> Self {
         Self::through(Intrinsics::centred(width, height, f64::from(width) * 0.573))
     }

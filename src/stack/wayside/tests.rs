@@ -9,7 +9,7 @@ use crate::track::Direction;
 
 const STEADY: fn(u32, u32) -> f64 = |_, _| 1.0;
 
-fn detector(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
+fn detector(scene: &TestScene, settings: &WaysideSettings) -> WaysideDetector {
     WaysideDetector::new(settings, scene.calibration.clone(), scene.map.clone())
 }
 
@@ -21,7 +21,7 @@ fn quiet() -> WaysideSettings {
 }
 
 /// Runs the frames of the reference.
-fn taught(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
+fn taught(scene: &TestScene, settings: &WaysideSettings) -> WaysideDetector {
     let mut d = detector(scene, settings);
     for n in 0..settings.reference_frames {
         let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
@@ -33,7 +33,7 @@ fn taught(scene: &Scene, settings: &WaysideSettings) -> WaysideDetector {
 /// Noise alone, 300 frames: a threshold too near to the noise, or an overflow in sums, alarms.
 #[test]
 fn noise_raises_no_alarm() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let settings = quiet();
     let mut d = taught(&scene, &settings);
     for n in 10..310 {
@@ -61,11 +61,11 @@ fn wide() -> Intrinsics {
 #[test]
 fn crates_are_found_where_they_are() {
     for lens in [Intrinsics::centred(1280, 720, 733.4), wide()] {
-        find_crates(&Scene::through(lens));
+        find_crates(&TestScene::through(lens));
     }
 }
 
-fn find_crates(scene: &Scene) {
+fn find_crates(scene: &TestScene) {
     let settings = quiet();
     let f_px = scene.calibration.camera.intrinsics.fx_px;
     for (s, l, size, grey) in [
@@ -122,7 +122,7 @@ fn find_crates(scene: &Scene) {
 /// above tells whether it is used.
 #[test]
 fn a_lens_that_is_not_known_misplaces() {
-    let scene = Scene::through(wide());
+    let scene = TestScene::through(wide());
     let mut straight = scene.calibration.clone();
     straight.camera.intrinsics.distortion = Distortion::default();
     let settings = quiet();
@@ -167,7 +167,7 @@ fn what_is_out_of_the_picture_stays_out() {
 /// With a lidar the depth is measured, and the place is no longer a matter of one row.
 #[test]
 fn lidar_sharpens_the_place() {
-    let scene = Scene::new(1280, 720);
+    let scene = TestScene::new(1280, 720);
     let settings = quiet();
     let item = Crate {
         s: (178.5, 181.0),
@@ -203,7 +203,7 @@ fn lidar_sharpens_the_place() {
 /// the same warning, refreshed every second, never cleared.
 #[test]
 fn what_stays_stays_found() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let mut d = taught(&scene, &quiet());
     let item = Crate::on_bed(180.0, 0.0, 0.5);
     let mut messages = Vec::new();
@@ -223,7 +223,7 @@ fn what_stays_stays_found() {
 /// there, the box after him, a clear message only when the box is gone too.
 #[test]
 fn a_worker_leaves_his_box() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let mut d = taught(&scene, &quiet());
     let mut messages = Vec::new();
     let mut boxes = 0;
@@ -267,7 +267,7 @@ fn a_worker_leaves_his_box() {
 /// be compared must be left out, and the bands stay under the threshold.
 #[test]
 fn flicker_raises_no_alarm() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let mut d = detector(&scene, &quiet());
     let lamp = |u: u32, v: u32| u.abs_diff(330) < 12 && v.abs_diff(150) < 8;
     for n in 0..120u32 {
@@ -288,7 +288,7 @@ fn flicker_raises_no_alarm() {
 /// crate is still found. Without compensation all of it would be a difference.
 #[test]
 fn brightening_is_told_from_an_obstacle() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(182.0, 0.0, 0.6);
     for with_crate in [false, true] {
         let mut d = taught(&scene, &quiet());
@@ -316,7 +316,7 @@ fn brightening_is_told_from_an_obstacle() {
 /// other body.
 #[test]
 fn the_train_is_no_obstacle() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(185.0, 0.0, 0.5);
     for reported in [true, false] {
         let mut d = taught(&scene, &quiet());
@@ -363,7 +363,7 @@ fn the_train_is_no_obstacle() {
 /// away, or gone. Whoever narrows or widens the zone meets this test.
 #[test]
 fn the_glare_of_a_train_hides_what_falls_before_it() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(150.0, 0.0, 0.8);
     for (head_m, hidden) in [(Some(100.0), true), (Some(20.0), false), (None, false)] {
         let mut d = taught(&scene, &quiet());
@@ -395,7 +395,7 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
 /// its place until the train has gone by, frame by frame.
 #[test]
 fn the_border_of_the_blind_zone_changes_no_obstacle() {
-    let scene = Scene::new(1280, 720);
+    let scene = TestScene::new(1280, 720);
     let mut d = taught(&scene, &quiet());
     let item = [(Crate::on_bed(170.0, 0.0, 0.4), 200.0)];
     let mut whole = None;
@@ -425,7 +425,7 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
 /// A shadow walks over the track: no obstacle; the crate that lies in it is found.
 #[test]
 fn a_shadow_is_no_obstacle() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(182.0, 0.0, 0.6);
     for with_crate in [false, true] {
         let mut d = taught(&scene, &quiet());
@@ -450,9 +450,9 @@ fn a_shadow_is_no_obstacle() {
 /// Frames of another size, empty calibrations: no panic, nothing claimed.
 #[test]
 fn odd_input_is_survived() {
-    let scene = Scene::new(64, 36);
+    let scene = TestScene::new(64, 36);
     let mut d = detector(&scene, &quiet());
-    let other = Scene::new(32, 36).frame(0, STEADY, &[]);
+    let other = TestScene::new(32, 36).frame(0, STEADY, &[]);
     assert!(d.on_frame(&other, None, &[]).learning);
     let mut calibration = scene.calibration.clone();
     for (w, h) in [(0, 0), (1, 1), (2, 7), (9, 2)] {
@@ -526,7 +526,7 @@ fn foot_inverts_projection() {
 /// before the warning ends.
 #[test]
 fn a_blind_device_is_not_silent() {
-    let scene = Scene::new(640, 360);
+    let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(180.0, 0.0, 0.5);
     for fault in [CameraFault::Frozen, CameraFault::Dead, CameraFault::Silent] {
         for falls in [false, true] {
@@ -583,7 +583,7 @@ fn a_blind_device_is_not_silent() {
 /// sees warns although it has learnt nothing, and a lost frame or two are no fault.
 #[test]
 fn a_device_that_never_sees_warns() {
-    let scene = Scene::new(64, 36);
+    let scene = TestScene::new(64, 36);
     let mut d = detector(&scene, &quiet());
     let first = scene.frame(0, STEADY, &[]);
     let mut told = Vec::new();

@@ -24,7 +24,7 @@ use std::f64::consts::{PI, TAU};
 /// The rail that has a defect.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum Side {
+pub enum RailSide {
     /// Both rails alike.
     #[default]
     Both,
@@ -86,7 +86,7 @@ settings! {
         chainage_m: f64, in -1e6..=1e6;
         /// The rail.
         #[serde(default)]
-        side: Side;
+        side: RailSide;
         /// It comes back after this many metres: the length of a rail. Default: only once.
         every_m: Option<f64>, in 0.1..=1e5;
         /// How many there are, where they come back.
@@ -146,9 +146,9 @@ impl Defects {
 
 fn repeated(settings: &DefectSettings) -> impl Iterator<Item = Defect> + '_ {
     let (up, roll_per_m) = match settings.side {
-        Side::Both => (1.0, 0.0),
-        Side::Left => (0.5, 1.0 / CANT_BASE_M),
-        Side::Right => (0.5, -1.0 / CANT_BASE_M),
+        RailSide::Both => (1.0, 0.0),
+        RailSide::Left => (0.5, 1.0 / CANT_BASE_M),
+        RailSide::Right => (0.5, -1.0 / CANT_BASE_M),
     };
     let (begin_m, length_m) = settings.shape.extent_m();
     let count = settings.every_m.map_or(1, |_| settings.count);
@@ -281,7 +281,7 @@ mod tests {
         },
     ];
 
-    fn one_at(shape: DefectShape, chainage_m: f64, side: Side) -> DefectSettings {
+    fn one_at(shape: DefectShape, chainage_m: f64, side: RailSide) -> DefectSettings {
         DefectSettings {
             shape,
             chainage_m,
@@ -332,7 +332,7 @@ mod tests {
     /// Fails where the dip angle of a joint is not the one of its source's drawing, 4 h / L.
     #[test]
     fn val_dip_angle_of_a_joint() {
-        let joint = Defects::new(&[one_at(SHAPES[0], 100.0, Side::Both)]);
+        let joint = Defects::new(&[one_at(SHAPES[0], 100.0, RailSide::Both)]);
         let (before, after) = (at(&joint, 100.0 - 1e-9), at(&joint, 100.0 + 1e-9));
         let angle = after.up_per_m - before.up_per_m;
         assert!((angle - 4.0 * 0.006 / 0.6).abs() < 1e-6, "{angle}");
@@ -342,7 +342,7 @@ mod tests {
     /// Fails where one rail's dip does not lower the axle by half and roll it to that side.
     #[test]
     fn a_dip_of_one_rail_rolls_the_axle() {
-        for (side, sign) in [(Side::Left, -1.0), (Side::Right, 1.0)] {
+        for (side, sign) in [(RailSide::Left, -1.0), (RailSide::Right, 1.0)] {
             let dip = Defects::new(&[one_at(SHAPES[1], 100.0, side)]);
             let d = at(&dip, 100.0);
             assert!((d.up_m + 0.002).abs() < 1e-12);
@@ -356,9 +356,9 @@ mod tests {
         let joints = DefectSettings {
             every_m: Some(25.0),
             count: 4,
-            ..one_at(SHAPES[0], 50.0, Side::Both)
+            ..one_at(SHAPES[0], 50.0, RailSide::Both)
         };
-        let defects = Defects::new(&[joints, one_at(SHAPES[3], 90.0, Side::Both)]);
+        let defects = Defects::new(&[joints, one_at(SHAPES[3], 90.0, RailSide::Both)]);
         for (s_m, want_m) in [
             (50.0, 0.006),
             (75.0, 0.006),

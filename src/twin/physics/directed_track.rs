@@ -119,7 +119,7 @@ mod tests {
     use crate::twin::physics::convert::vector;
     use crate::twin::physics::testing::line;
     use crate::twin::physics::{
-        DefectSettings, DefectShape, IrregularityClass, IrregularitySettings, RailState, Side,
+        DefectSettings, DefectShape, IrregularityClass, IrregularitySettings, RailSide, RailState,
     };
     use nalgebra::{Point3, Vector3};
 
@@ -137,7 +137,7 @@ mod tests {
             defects: vec![DefectSettings {
                 shape: dip,
                 chainage_m: 100.0,
-                side: Side::Left,
+                side: RailSide::Left,
                 every_m: Some(1.7),
                 count: 100,
             }],

@@ -16,7 +16,7 @@ use nalgebra::{DVector, Vector3};
 use rapier3d_f64::math::Vector;
 
 /// A curve to the left, and the car that runs in it.
-struct Curve {
+struct CurveCase {
     vehicle: &'static str,
     radius_m: f64,
     cant_m: f64,
@@ -33,7 +33,7 @@ struct Steady {
     roll_rad: f64,
 }
 
-impl Curve {
+impl CurveCase {
     fn steady(&self) -> Steady {
         let file = shipped(self.vehicle);
         let v = self.kmh / 3.6;
@@ -111,7 +111,7 @@ fn val_steady_curve() {
         ("manchester", 400.0, [40.0, 58.7, 75.0]),
     ] {
         for kmh in speeds {
-            let curve = Curve {
+            let curve = CurveCase {
                 vehicle,
                 radius_m,
                 cant_m: 0.1,
@@ -148,7 +148,7 @@ fn val_steady_curve() {
 /// Fails where a train that starts in a curve starts upright: its first two seconds are steady.
 #[test]
 fn val_start_in_a_curve() {
-    let curve = Curve {
+    let curve = CurveCase {
         vehicle: "metro_b1_crush",
         radius_m: 300.0,
         cant_m: 0.1,
@@ -173,7 +173,7 @@ fn val_start_in_a_curve() {
 #[test]
 fn val_transition() {
     let (kmh, ramp_m) = (62.0, 60.0);
-    let curve = Curve {
+    let curve = CurveCase {
         vehicle: "metro_b1_crush",
         radius_m: 300.0,
         cant_m: 0.1,

@@ -127,7 +127,7 @@ fn val_p2_of_a_joint() {
                 half_length_m,
             },
             chainage_m: 215.0,
-            side: Side::Both,
+            side: RailSide::Both,
             every_m: None,
             count: 1,
         }];

@@ -5,7 +5,7 @@
 //! exposure. In each instant rays go out from places spread over the pixel and the lens's point
 //! spread: a lattice of equal weights, mapped through the quantiles of both together.
 
-use super::spread::Spread;
+use super::spread::BlurSamples;
 use crate::twin::lights::LampLight;
 use crate::twin::render::View;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, FLUSH_M, LAMP_SIGHT_M};
@@ -119,7 +119,7 @@ struct Share {
 /// A disc through a slice of a row's exposure.
 struct Passing<'a> {
     view: &'a View,
-    spread: &'a Spread,
+    spread: &'a BlurSamples,
     /// Each with its share of the slice's light.
     instants: Vec<(Disc, f64)>,
 }
@@ -156,7 +156,7 @@ impl Passing<'_> {
 pub(super) fn draw_disc(
     lamp: &BlinkingLamp,
     view: &View,
-    spread: &Spread,
+    spread: &BlurSamples,
     row: &RowExposure,
     (ambient_lx, haze): (f64, Haze),
     mut depth_of: impl FnMut(usize) -> f64,

@@ -64,7 +64,7 @@ use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use row::{KnownTunnel, RowBuffers, RowRays, ViewContext};
 use sensor::Sensor;
-use spread::Spread;
+use spread::BlurSamples;
 use std::collections::VecDeque;
 
 /// Cameras that stand still and whose view of the tunnel is kept.
@@ -148,7 +148,7 @@ impl CpuRenderer {
             (None, None) => KnownTunnel::Unknown,
         };
         let slices = self.slices.unwrap_or_else(|| smear::slices(job, view));
-        let spread = Spread::new(view.lens.blur_px);
+        let spread = BlurSamples::new(view.lens.blur_px);
         let pixels = camera.width_px as usize * camera.height_px as usize;
         let mut signals_e = vec![0.0; pixels];
         let pinholes = pupil::pinholes(view);

@@ -5,7 +5,7 @@ use super::cast_scene::{CastScene, RayDifferential, TunnelPixel};
 use super::dim::{CELL_PX, DimView};
 use super::lamps::{self, Haze, RowExposure};
 use super::shadow::{Blocker, BodyShadows};
-use super::spread::Spread;
+use super::spread::BlurSamples;
 use crate::twin::geometry::{Solid, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
@@ -206,7 +206,12 @@ impl<'a> RowRays<'a> {
     }
 
     /// Luminance of every pixel of the row, into the buffers.
-    pub fn luminances(&self, lamps: &[&BlinkingLamp], spread: &Spread, buffers: &mut RowBuffers) {
+    pub fn luminances(
+        &self,
+        lamps: &[&BlinkingLamp],
+        spread: &BlurSamples,
+        buffers: &mut RowBuffers,
+    ) {
         self.draw_tunnel(buffers);
         let view = self.view;
         for blocker in &self.blockers {

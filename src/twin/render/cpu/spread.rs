@@ -8,13 +8,13 @@ const POINTS: u32 = 377;
 const STEP: u32 = 233;
 
 /// Places in the image relative to a pixel's centre, pixels.
-pub(super) struct Spread {
+pub(super) struct BlurSamples {
     pub places: Vec<(f64, f64)>,
     /// No place is farther away, along either axis.
     pub reach_px: f64,
 }
 
-impl Spread {
+impl BlurSamples {
     pub fn new(blur_px: f64) -> Self {
         let quantiles: Vec<f64> = (0..POINTS)
             .map(|k| quantile((f64::from(k) + 0.5) / f64::from(POINTS), blur_px))
@@ -68,7 +68,7 @@ mod tests {
     #[test]
     fn places_have_the_moments_of_pixel_and_blur() {
         for blur_px in [0.0, 0.3, 0.5, 2.0] {
-            let spread = Spread::new(blur_px);
+            let spread = BlurSamples::new(blur_px);
             let n = spread.places.len() as f64;
             let mean =
                 |f: &dyn Fn(&(f64, f64)) -> f64| spread.places.iter().map(f).sum::<f64>() / n;

@@ -20,14 +20,14 @@ pub struct Facet {
 /// Where a facet is, seen from the middle of the cross-section: a camera beside a wall does not see the
 /// other one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Side {
+pub enum FacetSide {
     Left,
     Above,
     Right,
     Below,
 }
 
-impl Side {
+impl FacetSide {
     /// All around.
     pub const ALL: [Self; 4] = [Self::Left, Self::Above, Self::Right, Self::Below];
 

@@ -5,7 +5,7 @@
 //! straight between them: at 20 m/s^2 it strays from that by less than a micrometre.
 
 use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
-use super::spread::Spread;
+use super::spread::PointSpread;
 use super::view::{Framed, single};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
@@ -265,11 +265,11 @@ impl LampTable {
     }
 
     /// The spread of the lamp's light, at the depth that it has in the middle of the picture.
-    fn spread(&self, exposed: &Exposed<'_>) -> Spread {
+    fn spread(&self, exposed: &Exposed<'_>) -> PointSpread {
         let view = exposed.view;
         let middle = exposed.mid_s(view.camera.intrinsics.height_px / 2);
         let depth_m = self.track.at(middle).map_or(f64::INFINITY, |s| s.centre.z);
-        Spread::new(view.lens.blur_px, view.confusion_px(depth_m.max(0.1)))
+        PointSpread::new(view.lens.blur_px, view.confusion_px(depth_m.max(0.1)))
     }
 
     /// How far the rim reaches from the centre in the image, in the row that sees the centre.

@@ -8,7 +8,7 @@ const ENDS: f64 = 3.2;
 /// Gaussian, r^2/4 and -r^4/16 of a disc of radius r. Edgeworth's series from them is right to 0.4 % of
 /// full light from a blur of 0.25 px up, to 2 % with none; its errors lie evenly about an edge and do
 /// not shift it.
-pub struct Spread {
+pub struct PointSpread {
     /// Standard deviation.
     pub sigma_px: f64,
     /// A 24th of the cumulant over the square of the variance, less its sign.
@@ -17,7 +17,7 @@ pub struct Spread {
     pub ends_px: f64,
 }
 
-impl Spread {
+impl PointSpread {
     /// Of a lens's blur in focus and the diameter of its circle of confusion.
     pub fn new(blur_px: f64, confusion_px: f64) -> Self {
         let r2 = (0.5 * confusion_px).powi(2);

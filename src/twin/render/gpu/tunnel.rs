@@ -1,7 +1,7 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
 use super::detail::{CHUNK_M, ChunkKey, Cutting, Detail, finer_stations, stations};
-use super::facets::{Facet, Side, facets_of};
+use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
@@ -31,7 +31,7 @@ pub struct ChunkMesh {
     pub mesh: Mesh,
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
-    /// For every cross-section in it one a [`Side`].
+    /// For every cross-section in it one a [`FacetSide`].
     pub parts: Vec<ChunkSide>,
 }
 
@@ -86,9 +86,9 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
             .and_then(|k| paintings.all.get(*k))
             .map_or(0.0, Painting::rail_q_m);
         let facets = facets_of(range, rail_q_m, site.cutting());
-        for side in Side::ALL {
+        for side in FacetSide::ALL {
             let first = mesh.indices.len();
-            for facet in facets.iter().filter(|f| Side::of(f, range) == side) {
+            for facet in facets.iter().filter(|f| FacetSide::of(f, range) == side) {
                 site.add_strip(&mut mesh, facet, &stations);
             }
             if mesh.indices.len() > first {

@@ -130,7 +130,7 @@ pub(super) fn chance(of: Chance, i: i32, j: i32) -> [f64; 4] {
 }
 
 /// Value noise from 0 to 1 on a lattice, smooth between its points.
-pub(super) struct Noise {
+pub(super) struct ValueNoise {
     cell: [usize; 2],
     lattice_columns: usize,
     lattice: Vec<f32>,
@@ -138,7 +138,7 @@ pub(super) struct Noise {
     ease: [Vec<f32>; 2],
 }
 
-impl Noise {
+impl ValueNoise {
     /// With cells of so many texels (which divide strip and period), under a strip.
     pub fn under(strip: &Strip, cell: [usize; 2], kind: i32) -> Self {
         let lattice_columns = strip.columns / cell[0] + 1;

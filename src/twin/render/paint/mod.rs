@@ -55,7 +55,7 @@ mod lining;
 mod unroll;
 
 use crate::track::{CrossSection, Material, Tunnel, rail_outline};
-use brush::{Chance, Noise, Strip, chance};
+use brush::{Chance, Strip, ValueNoise, chance};
 use rayon::prelude::*;
 use unroll::{Place, Unrolled};
 
@@ -233,9 +233,9 @@ fn paint(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Plac
 
 /// Bare surfaces: the tone of each segment, dust, streaks and grain.
 fn prime(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Place>]) {
-    let patches = Noise::under(strip, [48, 48], 0);
-    let streaks = Noise::under(strip, [12, 96], 1);
-    let specks = Noise::under(strip, [8, 8], 2);
+    let patches = ValueNoise::under(strip, [48, 48], 0);
+    let streaks = ValueNoise::under(strip, [12, 96], 1);
+    let specks = ValueNoise::under(strip, [8, 8], 2);
     for (y, place) in places.iter().enumerate() {
         let Some(place) = place else { continue };
         let tone = match place.material {

@@ -88,7 +88,7 @@ const RATE_HZ: usize = 200;
 
 /// Allan variances of one kind of sensor, averaged over axes and units.
 #[derive(Default)]
-struct Curve {
+struct AllanCurve {
     /// At 1, 2 and 4 samples.
     fast: [f64; 3],
     /// At the spans of `SLOW_S`.
@@ -98,7 +98,7 @@ struct Curve {
 const FAST: [usize; 3] = [1, 2, 4];
 const SLOW_S: [usize; 9] = [1, 2, 5, 10, 20, 50, 100, 200, 300];
 
-impl Curve {
+impl AllanCurve {
     /// Adds a record of samples of one axis.
     fn add(&mut self, samples: &[f64]) {
         let share = 1.0 / (3 * UNITS) as f64;
@@ -131,7 +131,7 @@ impl Curve {
 #[test]
 fn val_allan_deviation_of_the_imu() {
     let settings = ImuSettings::default();
-    let mut curves = [Curve::default(), Curve::default()];
+    let mut curves = [AllanCurve::default(), AllanCurve::default()];
     let force = Vector3::new(0.0, 0.0, G_MPS2);
     for index in 0..UNITS {
         let mut imu = Imu::new(&settings, 11, index);
