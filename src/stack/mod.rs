@@ -6,7 +6,9 @@
 
 pub mod camera_watch;
 mod equipment;
+mod history;
 pub mod led;
+mod odometry;
 pub mod positioning;
 pub mod protection;
 pub mod wayside;

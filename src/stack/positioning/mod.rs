@@ -62,12 +62,14 @@
 //! It takes the train to run up the line, its rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 
+mod attitude;
 mod equipment;
 mod lamp_presence;
 mod naming;
 mod positioner;
 mod reckoning;
 mod settings;
+mod smear;
 mod stereo;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]

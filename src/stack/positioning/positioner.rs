@@ -3,7 +3,8 @@
 use super::LedSettings;
 use super::lamp_presence::LampPresence;
 use super::naming::{Expected, Followed, Naming, Verdict};
-use super::reckoning::Reckoning;
+use super::reckoning::DeadReckoning;
+use super::smear::Smear;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
     CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
@@ -11,10 +12,10 @@ use crate::bus::{
 };
 use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
+use crate::track::Tunnel;
 use crate::track::uid::Uid;
-use crate::track::{LampSite, Tunnel};
 use image::GrayImage;
-use nalgebra::{Isometry3, Point2, Point3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
 /// Positions the train from stereo pairs of a lamp, as it would on board: raw images, odometer
@@ -29,11 +30,10 @@ pub struct LedPositioner {
     watches: [CameraWatch; 2],
     /// One an eye, left and right.
     finders: [LampFinder; 2],
-    reckoning: Reckoning,
+    reckoning: DeadReckoning,
     naming: Naming,
     lamp_presence: LampPresence,
     followed: Vec<Followed>,
-    anchor: Option<Anchor>,
     epoch: Option<SimTime>,
     left: Vec<LampImage>,
     right: Vec<LampImage>,
@@ -43,14 +43,6 @@ pub struct LedPositioner {
 
 /// No camera on a train exposes for as long as this.
 const MOST_EXPOSURE_S: f64 = 1.0;
-
-/// The last fix, to reckon on from.
-#[derive(Clone, Copy, Debug)]
-struct Anchor {
-    time: SimTime,
-    chainage_m: f64,
-    distance_m: Option<f64>,
-}
 
 /// A lamp seen in a pair.
 #[derive(Clone, Copy, Debug)]
@@ -89,7 +81,7 @@ impl LedPositioner {
         };
         Self {
             watches: [watch(&rig.left), watch(&rig.right)],
-            reckoning: Reckoning::new(settings),
+            reckoning: DeadReckoning::new(settings, map.clone()),
             naming: Naming {
                 gate_share: settings.gate_share,
                 agreeing_reads: settings.agreeing_reads,
@@ -101,7 +93,6 @@ impl LedPositioner {
             finders,
             lamp_presence: LampPresence::default(),
             followed: Vec::new(),
-            anchor: None,
             epoch: None,
             left: Vec::new(),
             right: Vec::new(),
@@ -111,9 +102,7 @@ impl LedPositioner {
 
     /// Takes an inertial sample; samples come in order of time.
     pub fn on_imu(&mut self, sample: &ImuSample) {
-        let chainage_m = self.chainage_m(sample.time);
-        self.reckoning
-            .on_imu(sample, &self.map.alignment, chainage_m);
+        self.reckoning.on_imu(sample);
     }
 
     /// Takes an odometer sample; samples come in order of time.
@@ -235,11 +224,7 @@ impl LedPositioner {
             Method::Mono => &mono,
         };
         if let Some(fix) = best {
-            self.anchor = Some(Anchor {
-                time: fix.time,
-                chainage_m: fix.chainage_m,
-                distance_m: self.reckoning.distance_m(fix.time),
-            });
+            self.reckoning.on_fix(fix.time, fix.chainage_m);
         }
         let fixes = paper.into_iter().chain(mono).collect();
         let spots = |lamps: &[LampImage]| lamps.iter().map(|l| l.spot.clone()).collect();
@@ -263,16 +248,14 @@ impl LedPositioner {
         let middle = 0.5 * f64::from(camera.intrinsics.height_px);
         let time = camera.shutter.row_mid(pair.left.start, middle);
         let Some(chainage_m) = self
+            .reckoning
             .chainage_m(time)
             .filter(|_| !pair.left.image.is_empty())
         else {
             self.lamp_presence.forget();
             return Vec::new();
         };
-        let line = &self.map.alignment;
-        let place = Translation3::from(line.at(chainage_m).origin);
-        let attitude = self.reckoning.attitude(time, line, chainage_m);
-        let eye = Isometry3::from_parts(place, attitude) * self.rig.vehicle_from_left;
+        let eye = self.reckoning.vehicle(time, chainage_m) * self.rig.vehicle_from_left;
         let spots = left.iter().map(|lamp| lamp.spot.centre);
         (self.lamp_presence).check(&self.map, &camera.intrinsics, &eye, spots)
     }
@@ -280,7 +263,8 @@ impl LedPositioner {
     /// Finds the lamps of both eyes' images.
     fn find(&mut self, pair: &StereoPair, left: &mut Vec<LampImage>, right: &mut Vec<LampImage>) {
         let start = pair.left.start;
-        let (head_m, speed_mps) = (self.chainage_m(start), self.reckoning.speed_mps(start));
+        let reckoning = &self.reckoning;
+        let (head_m, speed_mps) = (reckoning.chainage_m(start), reckoning.speed_mps(start));
         let vehicle_from_left = self.rig.vehicle_from_left;
         let smear = |eye: &CameraModel, vehicle_from_eye: Isometry3<f64>| Smear {
             lens: eye.intrinsics,
@@ -297,16 +281,6 @@ impl LedPositioner {
         let [of_left, of_right] = &mut self.finders;
         of_left.find(&pair.left.image, |p| smears[0].along_row_px(p), left);
         of_right.find(&pair.right.image, |p| smears[1].along_row_px(p), right);
-    }
-
-    /// Where the train takes itself to be at a time.
-    fn chainage_m(&self, time: SimTime) -> Option<f64> {
-        let anchor = self.anchor?;
-        let ran = match (self.reckoning.distance_m(time), anchor.distance_m) {
-            (Some(now), Some(then)) => now - then,
-            _ => self.reckoning.speed_mps(time) * time.since(anchor.time),
-        };
-        Some(anchor.chainage_m + ran)
     }
 
     /// Finds the right eye's image of a lamp and where the lamp is.
@@ -373,21 +347,7 @@ impl LedPositioner {
             return self.rig.left_from_right;
         }
         let mount = self.rig.vehicle_from_left;
-        mount.inverse() * self.moved(now, then) * mount * self.rig.left_from_right
-    }
-
-    /// The vehicle at one time in the vehicle at another, shortly before or after.
-    fn moved(&self, now: SimTime, then: SimTime) -> Isometry3<f64> {
-        let ran_m = self.reckoning.speed_mps(now) * then.since(now);
-        let Some(chainage_m) = self.chainage_m(now) else {
-            return Isometry3::translation(ran_m, 0.0, 0.0);
-        };
-        let line = &self.map.alignment;
-        let vehicle = |time: SimTime, chainage_m: f64| {
-            let place = Translation3::from(line.at(chainage_m).origin);
-            Isometry3::from_parts(place, self.reckoning.attitude(time, line, chainage_m))
-        };
-        vehicle(now, chainage_m).inv_mul(&vehicle(then, chainage_m + ran_m))
+        mount.inverse() * self.reckoning.moved(now, then) * mount * self.rig.left_from_right
     }
 
     /// Where a lamp is by its size in one image.
@@ -414,7 +374,7 @@ impl LedPositioner {
             return;
         };
         let lamp_m = (self.rig.vehicle_from_left * Point3::from(lamp)).coords;
-        let distance_m = self.reckoning.distance_m(sighting.time).unwrap_or(0.0);
+        let distance_m = self.reckoning.distance_m(sighting.time);
         let k = self.follow(lamp_m, distance_m, seconds);
         let decoded = self.read(pair, sighting, seconds, k, left, right);
         let expected = self.expect(sighting.time, &lamp_m);
@@ -424,7 +384,7 @@ impl LedPositioner {
         sighting.named = match verdict {
             Verdict::Named(uid, identity) => Some((uid, identity)),
             Verdict::Moved(uid, identity) => {
-                self.anchor = None;
+                self.reckoning.forget_fix();
                 Some((uid, identity))
             }
             Verdict::Unknown => None,
@@ -477,9 +437,9 @@ impl LedPositioner {
 
     /// Chainage where this lamp must stand, from where the train takes itself to be.
     fn expect(&self, time: SimTime, lamp_m: &Vector3<f64>) -> Option<Expected> {
-        let chainage_m = self.chainage_m(time)?;
+        let chainage_m = self.reckoning.chainage_m(time)?;
         let line = &self.map.alignment;
-        let turn = self.reckoning.attitude(time, line, chainage_m);
+        let turn = self.reckoning.attitude(time, chainage_m);
         let lamp = line.at(chainage_m).origin + turn * lamp_m;
         Some(Expected {
             lamp_chainage_m: line.track_from_world(&lamp, chainage_m).s_m,
@@ -534,16 +494,16 @@ impl LedPositioner {
         let site = self.map.lamp(uid)?;
         let line = &self.map.alignment;
         let vehicle = self.rig.vehicle_from_left * Point3::from(lamp);
-        let expected = self.chainage_m(sighting.time);
+        let expected = self.reckoning.chainage_m(sighting.time);
         let mut chainage_m = expected.unwrap_or(site.chainage_m - vehicle.x);
         let mut position = site.centre;
         // The attitude depends on the place, weakly: twice is enough.
         for _ in 0..2 {
-            let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
+            let turn = self.reckoning.attitude(sighting.time, chainage_m);
             position = site.centre - turn * vehicle.coords;
             chainage_m = line.track_from_world(&position, chainage_m).s_m;
         }
-        let turn = self.reckoning.attitude(sighting.time, line, chainage_m);
+        let turn = self.reckoning.attitude(sighting.time, chainage_m);
         let heading = line.at(chainage_m).heading_rad;
         let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, spread);
         (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
@@ -610,102 +570,4 @@ fn keep_surer(best: &mut Option<PositionFix>, fix: Option<PositionFix>) {
 /// Line of sight of a lamp's centre in an eye's frame, at depth 1.
 fn sight(lens: &Intrinsics, lamp: &LampImage) -> Vector3<f64> {
     pinhole(lens).ray(lamp.centre.x, lamp.centre.y)
-}
-
-/// How far a lamp moves in an eye's image while a row is exposed.
-///
-/// The paper has V cos(psi) f t / W for a lamp at lateral distance W: the speed across the axis
-/// at depth W. Here the depth is that of the lamp's line along the pixel's own ray, which also
-/// holds off the axis, and the way is that of its image before and after.
-#[derive(Clone, Copy, Debug)]
-struct Smear<'a> {
-    lens: Intrinsics,
-    vehicle_from_eye: Isometry3<f64>,
-    lamps: &'a [LampSite],
-    /// Where the train takes its head to be.
-    head_m: Option<f64>,
-    travel_m: f64,
-}
-
-impl Smear<'_> {
-    fn along_row_px(&self, p: &Point2<f64>) -> f64 {
-        let ray = self.lens.ray(p.x, p.y);
-        let turn = self.vehicle_from_eye.rotation;
-        let in_vehicle = turn * ray;
-        let left_m = self.lateral_m(&in_vehicle) - self.vehicle_from_eye.translation.y;
-        let z = left_m / in_vehicle.y;
-        if !(0.3..60.0).contains(&z) {
-            return 0.0;
-        }
-        let half_way = turn.inverse() * Vector3::x() * (0.5 * self.travel_m);
-        let seen = |lamp: Vector3<f64>| Some(self.lens.project(&Point3::from(lamp))?.x);
-        let (before, after) = (seen(ray * z + half_way), seen(ray * z - half_way));
-        before
-            .zip(after)
-            .map_or(0.0, |(before, after)| after - before)
-    }
-
-    /// Of the lamp that is expected nearest to a ray from the eye; of the first lamp while
-    /// the train does not know where it is. The track is taken as straight over the few metres.
-    fn lateral_m(&self, ray: &Vector3<f64>) -> f64 {
-        let eye = self.vehicle_from_eye.translation.vector;
-        let off = |lamp: &LampSite, head_m: f64| {
-            let ahead_m = lamp.chainage_m - head_m;
-            ray.angle(&(Vector3::new(ahead_m, lamp.lateral_m, lamp.height_m) - eye))
-        };
-        let nearest = self.head_m.and_then(|head_m| {
-            let near = |lamp: &&LampSite| (lamp.chainage_m - head_m).abs() < LAMPS_WITHIN_M;
-            (self.lamps.iter().filter(near))
-                .min_by(|a, b| off(a, head_m).total_cmp(&off(b, head_m)))
-        });
-        nearest.or(self.lamps.first()).map_or(0.0, |l| l.lateral_m)
-    }
-}
-
-/// Farther off no lamp is large enough in the image to be found.
-const LAMPS_WITHIN_M: f64 = 60.0;
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::stack::led::testing::{rig, tunnel, wide_rig};
-
-    /// Lamps on the left wall and on a nearer pillar between them, on the other side of the line
-    /// first: each pixel of either eye, straight or wide, takes the lamp that is there, and without
-    /// a position the first.
-    #[test]
-    fn smear_is_of_the_lamp_that_is_looked_at() {
-        let mut lamps = tunnel("manchester").lamps;
-        (lamps[0].lateral_m, lamps[4].lateral_m) = (-2.0, 1.8);
-        let head_m = lamps[4].chainage_m - 2.0;
-        let (rig, wide) = (rig(), wide_rig());
-        let from_right = |rig: &RigCalibration| rig.vehicle_from_left * rig.left_from_right;
-        for (lens, vehicle_from_eye) in [
-            (rig.left.intrinsics, rig.vehicle_from_left),
-            (rig.right.intrinsics, from_right(&rig)),
-            (wide.left.intrinsics, wide.vehicle_from_left),
-            (wide.right.intrinsics, from_right(&wide)),
-        ] {
-            let at_px = |lamp: &LampSite, head_m: f64| {
-                let seen = Point3::new(lamp.chainage_m - head_m, lamp.lateral_m, lamp.height_m);
-                let pixel = lens.project(&vehicle_from_eye.inverse_transform_point(&seen));
-                pixel.unwrap_or_else(Point2::origin)
-            };
-            let smear = |head_m| Smear {
-                lens,
-                vehicle_from_eye,
-                lamps: &lamps,
-                head_m,
-                travel_m: 5e-4,
-            };
-            for lamp in &lamps[4..6] {
-                let seen = at_px(lamp, head_m);
-                let moved = at_px(lamp, head_m + 5e-4).x - seen.x;
-                let said = smear(Some(head_m)).along_row_px(&seen);
-                assert!((said - moved).abs() < 0.02 * moved.abs(), "{said} {moved}");
-            }
-            let seen = at_px(&lamps[4], head_m);
-            assert!(smear(None).along_row_px(&seen).abs() < 1e-12);
-        }
-    }
 }

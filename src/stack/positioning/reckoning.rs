@@ -1,299 +1,109 @@
-//! Between fixes: distance from the odometer, attitude from the map and the gyro.
-//!
-//! **Attitude.** The map gives the attitude that the leading car's body has in the track: its
-//! length axis is the chord between the bogie pivots (in a curve of 300 m the tangent at the head
-//! is 2 deg off that chord), its roll the cant between them. The body deviates from this by what its
-//! suspension does. The deviation D, world_from_vehicle = M D with M the map's attitude, is
-//! integrated from the gyro, D' = M(s')^-1 M(s) D exp(w dt), and fades with a time constant, so
-//! that a gyro bias b leaves an error of b times that constant (6 deg/h and 10 s: 0.02 deg) and no
-//! more. Swings slower than the constant are lost with the bias; suspended cars swing at 0.8 Hz
-//! and above. D keeps unit quaternions, so large swings (the paper's -5 to +7.5 deg) are exact.
+//! Where the train takes itself to be between fixes: the last fix, carried on by the odometer, and
+//! the leading car's attitude there.
 
 use super::LedSettings;
+use super::attitude::CarAttitude;
 use crate::bus::{ImuSample, OdometerSample, SimTime};
-use crate::track::{Alignment, TrackPoint};
-use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
+use crate::stack::odometry::Odometry;
+use crate::track::{Alignment, Tunnel};
+use nalgebra::{Isometry3, Translation3, UnitQuaternion};
+use std::sync::Arc;
 
-/// Samples kept: at 1 kHz the last half second, longer than a frame's read-out.
-const KEPT: usize = 512;
+/// Chainage of a fix, and the distance run by then.
+#[derive(Clone, Copy, Debug)]
+struct LastFix {
+    chainage_m: f64,
+    distance_m: f64,
+}
 
-/// The latest samples of a quantity over time.
+/// Dead reckoning from fix to fix.
 #[derive(Debug)]
-struct History<T> {
-    samples: Vec<(SimTime, T)>,
-    newest: usize,
+pub struct DeadReckoning {
+    map: Arc<Tunnel>,
+    odometry: Odometry,
+    attitude: CarAttitude,
+    last_fix: Option<LastFix>,
 }
 
-impl<T: Copy> History<T> {
-    fn new() -> Self {
-        Self {
-            samples: Vec::with_capacity(KEPT),
-            newest: 0,
-        }
-    }
-
-    fn latest(&self) -> Option<(SimTime, T)> {
-        self.samples.get(self.newest).copied()
-    }
-
-    /// Appends a sample; one that is not newer than the last is dropped.
-    fn push(&mut self, time: SimTime, value: T) -> bool {
-        if self.latest().is_some_and(|(last, _)| time <= last) {
-            return false;
-        }
-        if self.samples.len() < KEPT {
-            self.newest = self.samples.len();
-            self.samples.push((time, value));
-        } else {
-            self.newest = (self.newest + 1) % KEPT;
-            self.samples[self.newest] = (time, value);
-        }
-        true
-    }
-
-    /// Whether samples of a time have been dropped.
-    fn has_forgotten(&self, time: SimTime) -> bool {
-        let oldest = (self.newest + 1) % KEPT;
-        self.samples.len() == KEPT && time < self.samples[oldest].0
-    }
-
-    /// The samples before and after a time, and its share of the way between them; the ends are
-    /// held.
-    fn around(&self, time: SimTime) -> Option<(T, T, f64)> {
-        let n = self.samples.len();
-        let mut after = self.latest()?;
-        for back in 0..n {
-            let sample = self.samples[(self.newest + n - back) % n];
-            if sample.0 <= time {
-                let span = after.0.since(sample.0);
-                let share = if span > 0.0 {
-                    time.since(sample.0) / span
-                } else {
-                    0.0
-                };
-                return Some((sample.1, after.1, share.clamp(0.0, 1.0)));
-            }
-            after = sample;
-        }
-        Some((after.1, after.1, 0.0))
-    }
-}
-
-/// Dead reckoning.
-#[derive(Debug)]
-pub struct Reckoning {
-    fade_s: f64,
-    pivots_m: (f64, f64),
-    odometer: History<OdometerSample>,
-    deviation: History<UnitQuaternion<f64>>,
-    /// Map attitude at the last inertial sample, where a position was known.
-    map_attitude: Option<UnitQuaternion<f64>>,
-}
-
-impl Reckoning {
+impl DeadReckoning {
     /// Nothing known yet.
-    pub fn new(settings: &LedSettings) -> Self {
+    pub fn new(settings: &LedSettings, map: Arc<Tunnel>) -> Self {
         Self {
-            fade_s: settings.imu_fade_s.max(1e-3),
-            pivots_m: (settings.front_pivot_m, settings.rear_pivot_m),
-            odometer: History::new(),
-            deviation: History::new(),
-            map_attitude: None,
+            map,
+            odometry: Odometry::default(),
+            attitude: CarAttitude::new(settings),
+            last_fix: None,
         }
+    }
+
+    fn line(&self) -> &Alignment {
+        &self.map.alignment
     }
 
     /// Takes an odometer sample.
     pub fn on_odometer(&mut self, sample: &OdometerSample) {
-        if sample.distance_m.is_finite() && sample.speed_mps.is_finite() {
-            self.odometer.push(sample.time, *sample);
-        }
+        self.odometry.on_sample(sample);
     }
 
-    /// Takes an inertial sample; `chainage_m` is where the train takes itself to be.
-    pub fn on_imu(&mut self, sample: &ImuSample, line: &Alignment, chainage_m: Option<f64>) {
-        let turn = sample.gyro_rad_s;
-        if !turn.iter().all(|w| w.is_finite()) {
-            return;
-        }
-        let map_attitude = chainage_m.map(|s| self.map_attitude(line, s));
-        let Some((last, deviation)) = self.deviation.latest() else {
-            self.deviation.push(sample.time, UnitQuaternion::identity());
-            self.map_attitude = map_attitude;
-            return;
-        };
-        let dt = sample.time.since(last);
-        if dt <= 0.0 {
-            return;
-        }
-        // Without a position the track is taken as straight: the fading forgets the error.
-        let track_turn = match (self.map_attitude, map_attitude) {
-            (Some(before), Some(now)) => now.inverse() * before,
-            _ => UnitQuaternion::identity(),
-        };
-        let integrated = track_turn * deviation * UnitQuaternion::from_scaled_axis(turn * dt);
-        let kept = (1.0 - dt / self.fade_s).clamp(0.0, 1.0);
-        let faded = UnitQuaternion::from_scaled_axis(integrated.scaled_axis() * kept);
-        self.deviation.push(sample.time, faded);
-        self.map_attitude = map_attitude;
+    /// Takes an inertial sample.
+    pub fn on_imu(&mut self, sample: &ImuSample) {
+        let chainage_m = self.chainage_m(sample.time);
+        (self.attitude).on_imu(sample, &self.map.alignment, chainage_m);
+    }
+
+    /// The train was at a chainage.
+    pub fn on_fix(&mut self, time: SimTime, chainage_m: f64) {
+        let distance_m = self.odometry.distance_m(time);
+        self.last_fix = Some(LastFix {
+            chainage_m,
+            distance_m,
+        });
+    }
+
+    /// The train is not where it took itself to be.
+    pub fn forget_fix(&mut self) {
+        self.last_fix = None;
+    }
+
+    /// Chainage of the train head at a time; `None` without a fix, and where the odometer is lost.
+    pub fn chainage_m(&self, time: SimTime) -> Option<f64> {
+        let fix = self.last_fix.filter(|_| !self.odometry.is_lost(time))?;
+        Some(fix.chainage_m + (self.distance_m(time) - fix.distance_m))
+    }
+
+    /// Distance run from the first odometer sample to a time.
+    pub fn distance_m(&self, time: SimTime) -> f64 {
+        self.odometry.distance_m(time)
+    }
+
+    /// Speed at a time.
+    pub fn speed_mps(&self, time: SimTime) -> f64 {
+        self.odometry.speed_mps(time)
     }
 
     /// Whether a time is longer ago than samples are kept.
     pub fn has_forgotten(&self, time: SimTime) -> bool {
-        self.odometer.has_forgotten(time) || self.deviation.has_forgotten(time)
-    }
-
-    /// Distance on the odometer at a time, run on with the last speed beyond the last sample.
-    pub fn distance_m(&self, time: SimTime) -> Option<f64> {
-        let (latest, sample) = self.odometer.latest()?;
-        if time > latest {
-            return Some(sample.distance_m + sample.speed_mps * time.since(latest));
-        }
-        let (a, b, share) = self.odometer.around(time)?;
-        Some(a.distance_m + share * (b.distance_m - a.distance_m))
-    }
-
-    /// Speed on the odometer at a time, 0 without any sample.
-    pub fn speed_mps(&self, time: SimTime) -> f64 {
-        self.odometer.around(time).map_or(0.0, |(a, b, share)| {
-            a.speed_mps + share * (b.speed_mps - a.speed_mps)
-        })
+        self.odometry.has_forgotten(time) || self.attitude.has_forgotten(time)
     }
 
     /// Attitude `world_from_vehicle` at a time with the train head at a chainage.
-    pub fn attitude(
-        &self,
-        time: SimTime,
-        line: &Alignment,
-        chainage_m: f64,
-    ) -> UnitQuaternion<f64> {
-        let map = self.map_attitude(line, chainage_m);
-        match self.deviation.around(time) {
-            Some((a, b, share)) => map * a.nlerp(&b, share),
-            None => map,
-        }
+    pub fn attitude(&self, time: SimTime, chainage_m: f64) -> UnitQuaternion<f64> {
+        self.attitude.at(time, self.line(), chainage_m)
     }
 
-    /// Attitude of the leading car's body in the track.
-    fn map_attitude(&self, line: &Alignment, chainage_m: f64) -> UnitQuaternion<f64> {
-        let (front, rear) = (chainage_m - self.pivots_m.0, chainage_m - self.pivots_m.1);
-        let at = |s_m: f64| {
-            line.world_from_track(TrackPoint {
-                s_m,
-                l_m: 0.0,
-                h_m: 0.0,
-            })
+    /// Pose `world_from_vehicle` at a time with the train head at a chainage.
+    pub fn vehicle(&self, time: SimTime, chainage_m: f64) -> Isometry3<f64> {
+        let place = Translation3::from(self.line().at(chainage_m).origin);
+        Isometry3::from_parts(place, self.attitude(time, chainage_m))
+    }
+
+    /// The vehicle at one time in the vehicle at another, shortly before or after.
+    pub fn moved(&self, now: SimTime, then: SimTime) -> Isometry3<f64> {
+        let run_m = self.speed_mps(now) * then.since(now);
+        let Some(chainage_m) = self.chainage_m(now) else {
+            return Isometry3::translation(run_m, 0.0, 0.0);
         };
-        let roll = 0.5 * (line.at(front).roll_rad + line.at(rear).roll_rad);
-        let chord = at(front) - at(rear);
-        let Some(x) = chord.try_normalize(1e-9) else {
-            return UnitQuaternion::identity();
-        };
-        let Some(y) = Vector3::z().cross(&x).try_normalize(1e-9) else {
-            return UnitQuaternion::identity();
-        };
-        let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
-        let level = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes));
-        level * UnitQuaternion::from_axis_angle(&Vector3::x_axis(), roll)
-    }
-}
-
-#[cfg(test)]
-#[allow(clippy::unwrap_used, reason = "a test may panic")]
-mod tests {
-    use super::*;
-    use crate::track::PlanElement;
-    use nalgebra::Point3;
-
-    fn curve(radius_m: f64) -> Alignment {
-        let bend = PlanElement {
-            length_m: 500.0,
-            start_per_m: 1.0 / radius_m,
-            end_per_m: 1.0 / radius_m,
-            start_cant_m: 0.0,
-            end_cant_m: 0.0,
-        };
-        Alignment::new(Point3::origin(), 0.0, &[bend], &[])
-    }
-
-    fn turning(rate: f64, k: i64) -> ImuSample {
-        ImuSample {
-            time: SimTime::from_nanos(k * 1_000_000),
-            gyro_rad_s: Vector3::new(0.0, 0.0, rate),
-            accel_m_s2: Vector3::new(0.0, 0.0, 9.81),
-        }
-    }
-
-    /// The chord's heading is the tangent's half way between the pivots.
-    #[test]
-    fn the_body_lies_along_the_chord() {
-        let reckoning = Reckoning::new(&LedSettings::default());
-        let attitude = reckoning.attitude(SimTime::ZERO, &curve(300.0), 200.0);
-        let (_, _, yaw) = attitude.euler_angles();
-        assert!((yaw - (200.0 - 9.8) / 300.0).abs() < 1e-9, "{yaw}");
-    }
-
-    /// Running through a curve turns the gyro but not the car against the track; a bias stays
-    /// bounded; a swing of the car is followed.
-    #[test]
-    fn the_gyro_adds_the_deviation_only() {
-        let (line, speed) = (curve(300.0), 15.0);
-        let mut reckoning = Reckoning::new(&LedSettings::default());
-        let bias = 3e-5;
-        for k in 0..20_000 {
-            let s = 20.0 + speed * f64::from(k) * 1e-3;
-            reckoning.on_imu(&turning(speed / 300.0 + bias, k.into()), &line, Some(s));
-        }
-        let s = 20.0 + speed * 20.0;
-        let off = |r: &Reckoning, ms: i64, s: f64| {
-            let swung = r.attitude(SimTime::from_nanos(ms * 1_000_000), &line, s);
-            (r.map_attitude(&line, s).inverse() * swung).scaled_axis().z
-        };
-        let left = off(&reckoning, 20_000, s);
-        assert!(
-            left > 0.5 * bias * 10.0 && left < 1.01 * bias * 10.0,
-            "{left}"
-        );
-        // Half a period of 1 Hz: the car has turned by 0.1 rad.
-        for k in 0..500 {
-            let rate = 0.1
-                * std::f64::consts::PI
-                * 0.5
-                * (std::f64::consts::PI * f64::from(k) / 500.0).sin()
-                * 2.0;
-            reckoning.on_imu(&turning(rate, 20_000 + i64::from(k)), &line, None);
-        }
-        assert!((off(&reckoning, 20_499, s) - left - 0.1).abs() < 0.005);
-    }
-
-    /// A time is forgotten when its samples have been overwritten, not before.
-    #[test]
-    fn times_are_forgotten_with_their_samples() {
-        let mut reckoning = Reckoning::new(&LedSettings::default());
-        let line = curve(300.0);
-        for k in 0..=1000 {
-            let known = k < KEPT as i64;
-            assert_eq!(reckoning.has_forgotten(SimTime::from_nanos(-1)), !known);
-            reckoning.on_imu(&turning(0.0, k), &line, None);
-        }
-        let kept = 1_000_000 * (1001 - KEPT as i64);
-        assert!(!reckoning.has_forgotten(SimTime::from_nanos(kept)));
-        assert!(reckoning.has_forgotten(SimTime::from_nanos(kept - 1)));
-    }
-
-    #[test]
-    fn the_odometer_is_interpolated_and_run_on() {
-        let mut reckoning = Reckoning::new(&LedSettings::default());
-        assert_eq!(reckoning.distance_m(SimTime::ZERO), None);
-        for k in 0..2000 {
-            reckoning.on_odometer(&OdometerSample {
-                time: SimTime::from_nanos(k * 10_000_000),
-                distance_m: 0.1 * k as f64,
-                speed_mps: 10.0,
-            });
-        }
-        for t in [19.5, 19.993, 20.1] {
-            let d = reckoning.distance_m(SimTime::from_secs(t)).unwrap();
-            assert!((d - 10.0 * t).abs() < 1e-9, "{d} at {t}");
-        }
+        let vehicle = self.vehicle(now, chainage_m);
+        vehicle.inv_mul(&self.vehicle(then, chainage_m + run_m))
     }
 }

@@ -51,9 +51,10 @@
 //!
 //! A high danger ends the authority; a low one only tells the driver. Where the permitted speed
 //! has come down to walking pace, the brake stops and holds the train until the device clears the
-//! warning. Warnings outlive silence of the radio; a "clear" does not: where a device of the map has
-//! not been heard for `radio_timeout_s`, its stretch counts as occupied. With no position the train is restricted to
-//! `restricted_kmh`, and any high danger stops it; with no odometer it stops at once.
+//! warning. Warnings outlive silence of the radio; a "clear" does not: until a device of the map is
+//! heard, and again where it has not been heard for `radio_timeout_s`, its stretch counts as
+//! occupied. With no position the train is restricted to `restricted_kmh`, and any high danger stops
+//! it; with no odometer it stops at once.
 //!
 //! # What it does not do
 //!
@@ -129,9 +130,7 @@ impl Protection {
 
     /// Takes a sample of the odometer.
     pub fn on_odometer(&mut self, sample: &OdometerSample) {
-        if sample.distance_m.is_finite() && sample.speed_mps.is_finite() {
-            self.position.on_odometer(sample);
-        }
+        self.position.odometry.on_sample(sample);
     }
 
     /// The antenna on the train head passed over a balise at `time`. A balise that the map does
@@ -167,7 +166,7 @@ impl Protection {
             track: TrackId::default(),
             direction,
             s_m: chainage_m,
-            v_mps: self.position.speed_mps().unwrap_or(0.0),
+            v_mps: self.position.odometry.mean_speed_mps().unwrap_or(0.0),
             covariance: [[sigma_m.powi(2), 0.0], [0.0, speed_sigma_mps.powi(2)]],
             protection_level_m: None,
             sources: vec![source, PositionSource::Odometer],
@@ -178,7 +177,7 @@ impl Protection {
     pub fn cycle(&mut self, time: SimTime) -> ProtectionReport {
         self.obstacles.lapse(time);
         let train = self.position.at(time);
-        let speed = self.position.speed_mps();
+        let speed = self.position.odometry.mean_speed_mps();
         let speed_mps = speed.unwrap_or(0.0);
         let odometer_lost = self.odometer_lost(time);
         let head_m = train.map(|t| t.chainage_m);
@@ -256,6 +255,6 @@ impl Protection {
 
     fn odometer_lost(&mut self, time: SimTime) -> bool {
         let since_start = time.since(*self.first_cycle.get_or_insert(time));
-        self.position.age_s(time).unwrap_or(since_start) > self.settings.odometer_timeout_s
+        self.position.odometry.age_s(time).unwrap_or(since_start) > self.settings.odometer_timeout_s
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! The last word of each device counts, in the order of issue: by balise and by radio messages
 //! come late, twice, or not at all. A warning stays in force until its own device clears it;
-//! silence clears nothing. A device of the map that has not been heard by radio for too long takes
-//! back its "clear": all of the stretch that it watches counts as occupied until it is heard again.
+//! silence clears nothing. The stretch that a device of the map watches counts as occupied from the
+//! start until the device is heard by radio, and again where it has not been heard for too long.
 
 use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
@@ -30,7 +30,6 @@ pub(super) struct Obstacles {
     notices: Vec<Notice>,
     devices: Vec<Device>,
     silent_after_s: f64,
-    since: Option<SimTime>,
 }
 
 impl Obstacles {
@@ -59,9 +58,9 @@ impl Obstacles {
 
     /// Time passes: the stretches of devices that are silent count as occupied.
     pub fn lapse(&mut self, now: SimTime) {
-        let since = *self.since.get_or_insert(now);
+        let is_current = |heard: SimTime| now.since(heard) <= self.silent_after_s;
         for device in &self.devices {
-            if now.since(device.heard.unwrap_or(since)) <= self.silent_after_s {
+            if device.heard.is_some_and(is_current) {
                 continue;
             }
             let known = self.notices.iter_mut();
@@ -92,7 +91,7 @@ impl Obstacles {
                 }
                 None => self.notices.push(Notice {
                     warning: occupied,
-                    received: since,
+                    received: now,
                 }),
             }
         }

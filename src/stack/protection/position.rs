@@ -8,28 +8,24 @@
 //! train is not where it was thought to be: the last of them is taken.
 
 use super::ProtectionSettings;
-use crate::bus::{OdometerSample, PositionFix, PositionSource, SimTime};
-use std::collections::VecDeque;
+use crate::bus::{PositionFix, PositionSource, SimTime};
+use crate::stack::odometry::Odometry;
 
-/// Odometer samples remembered, for fixes that come late.
-const HISTORY: usize = 256;
-/// Distance over this time gives the speed.
-const SPEED_WINDOW_S: f64 = 0.5;
 /// Refused fixes in a row that overrule the estimate.
 const OVERRULE: u32 = 5;
 
-/// A chainage and the odometer's reading there.
+/// A chainage, and the distance run by then.
 #[derive(Clone, Copy, Debug)]
 struct Anchor {
     chainage_m: f64,
     sigma_m: f64,
-    odometer_m: f64,
+    distance_m: f64,
     source: PositionSource,
 }
 
 impl Anchor {
-    fn carried(&self, odometer_m: f64, drift: f64) -> Estimate {
-        let run_m = odometer_m - self.odometer_m;
+    fn carried(&self, distance_m: f64, drift: f64) -> Estimate {
+        let run_m = distance_m - self.distance_m;
         Estimate {
             chainage_m: self.chainage_m + run_m,
             sigma_m: self.sigma_m.hypot(drift * run_m),
@@ -52,7 +48,7 @@ pub(super) struct Position {
     drift: f64,
     floor_m: f64,
     gate: f64,
-    samples: VecDeque<OdometerSample>,
+    pub odometry: Odometry,
     anchor: Option<Anchor>,
     /// Refused in a row, and the last of them.
     refused: u32,
@@ -65,34 +61,16 @@ impl Position {
             drift: settings.odometer_drift,
             floor_m: settings.sigma_floor_m,
             gate: settings.gate_sigmas,
-            samples: VecDeque::with_capacity(HISTORY),
+            odometry: Odometry::default(),
             anchor: settings.initial_chainage_m.map(|chainage_m| Anchor {
                 chainage_m,
                 sigma_m: settings.initial_sigma_m,
-                odometer_m: 0.0,
+                distance_m: 0.0,
                 source: PositionSource::Setting,
             }),
             refused: 0,
             refused_anchor: None,
         }
-    }
-
-    pub fn on_odometer(&mut self, sample: &OdometerSample) {
-        let Some(last) = self.samples.back() else {
-            // Whatever it counted before, the position setting holds here.
-            if let Some(anchor) = &mut self.anchor {
-                anchor.odometer_m = sample.distance_m;
-            }
-            self.samples.push_back(*sample);
-            return;
-        };
-        if sample.time <= last.time {
-            return;
-        }
-        if self.samples.len() == HISTORY {
-            self.samples.pop_front();
-        }
-        self.samples.push_back(*sample);
     }
 
     /// A position that may be wrong (from the lamps).
@@ -104,14 +82,14 @@ impl Position {
         let fix = Anchor {
             chainage_m,
             sigma_m: sigma_m.max(self.floor_m),
-            odometer_m: self.odometer_at(time),
+            distance_m: self.odometry.distance_m(time),
             source: PositionSource::Lamp(fix.method),
         };
         let Some(anchor) = self.anchor else {
             self.anchor = Some(fix);
             return;
         };
-        let predicted = anchor.carried(fix.odometer_m, self.drift);
+        let predicted = anchor.carried(fix.distance_m, self.drift);
         let off_m = fix.chainage_m - predicted.chainage_m;
         if off_m.abs() > self.gate * predicted.sigma_m.hypot(fix.sigma_m) {
             self.refuse(fix);
@@ -122,18 +100,18 @@ impl Position {
         self.accept(Anchor {
             chainage_m: predicted.chainage_m + gain * off_m,
             sigma_m: (p * r / (p + r)).sqrt().max(self.floor_m),
-            odometer_m: fix.odometer_m,
+            distance_m: fix.distance_m,
             source: fix.source,
         });
     }
 
     /// A position that is right within its sigma (from a balise).
     pub fn reset(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
-        let odometer_m = self.odometer_at(time);
+        let distance_m = self.odometry.distance_m(time);
         self.accept(Anchor {
             chainage_m,
             sigma_m,
-            odometer_m,
+            distance_m,
             source: PositionSource::Balise,
         });
     }
@@ -146,7 +124,7 @@ impl Position {
 
     fn refuse(&mut self, fix: Anchor) {
         let agrees = self.refused_anchor.is_some_and(|before| {
-            let expected = before.carried(fix.odometer_m, self.drift);
+            let expected = before.carried(fix.distance_m, self.drift);
             (expected.chainage_m - fix.chainage_m).abs()
                 <= self.gate * expected.sigma_m.hypot(fix.sigma_m)
         });
@@ -159,46 +137,7 @@ impl Position {
 
     pub fn at(&self, time: SimTime) -> Option<Estimate> {
         self.anchor
-            .map(|a| a.carried(self.odometer_at(time), self.drift))
-    }
-
-    /// Speed over the last [`SPEED_WINDOW_S`]; `None` before the first sample. A wheel gives one
-    /// pulse every 21 mm or so: over a single interval of 20 ms that would be steps of 1 m/s, and
-    /// no deceleration could be told from them. The lag is on the safe side while braking.
-    pub fn speed_mps(&self) -> Option<f64> {
-        let last = self.samples.back()?;
-        let age_s = |s: &OdometerSample| last.time.since(s.time);
-        let old = (self.samples.iter().rev())
-            .take_while(|s| age_s(s) <= SPEED_WINDOW_S)
-            .last()
-            .filter(|s| age_s(s) > 0.0);
-        let speed = old.map_or(last.speed_mps, |s| {
-            (last.distance_m - s.distance_m) / age_s(s)
-        });
-        Some(speed.max(0.0))
-    }
-
-    /// Time since the last sample.
-    pub fn age_s(&self, time: SimTime) -> Option<f64> {
-        self.samples.back().map(|s| time.since(s.time))
-    }
-
-    /// The odometer's reading at a time, between samples by their speeds.
-    fn odometer_at(&self, time: SimTime) -> f64 {
-        let Some(last) = self.samples.back() else {
-            return 0.0;
-        };
-        if time >= last.time {
-            // Samples come often; a longer silence is the supervision's business.
-            return last.distance_m + last.speed_mps * time.since(last.time).min(1.0);
-        }
-        let k = self.samples.partition_point(|s| s.time <= time);
-        let Some(before) = k.checked_sub(1).and_then(|k| self.samples.get(k)) else {
-            return self.samples.front().map_or(0.0, |s| s.distance_m);
-        };
-        let after = self.samples.get(k).unwrap_or(last);
-        let share = time.since(before.time) / after.time.since(before.time);
-        before.distance_m + share * (after.distance_m - before.distance_m)
+            .map(|a| a.carried(self.odometry.distance_m(time), self.drift))
     }
 }
 
@@ -207,12 +146,13 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
     use super::super::tests::fix;
     use super::*;
+    use crate::bus::OdometerSample;
 
     fn driven(settings: &ProtectionSettings, seconds: f64, speed_mps: f64) -> Position {
         let mut p = Position::new(settings);
         for k in 0..=(seconds * 20.0).round() as i64 {
             let t = k as f64 * 0.05;
-            p.on_odometer(&OdometerSample {
+            p.odometry.on_sample(&OdometerSample {
                 time: SimTime::from_secs(t),
                 distance_m: 1000.0 + speed_mps * t,
                 speed_mps,

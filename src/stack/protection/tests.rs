@@ -475,8 +475,9 @@ fn nonsense_changes_nothing() {
     assert!((r.position_m.unwrap() - 1000.0).abs() < 1e-9);
 }
 
-/// A device of the map that is silent watches nothing: its stretch counts as occupied when its last
-/// heartbeat is too old, and is free again with the next one. A warning of it stays.
+/// A device of the map that is silent watches nothing: its stretch counts as occupied until its
+/// first heartbeat and when its last one is too old, and is free again with the next one. A warning
+/// of it stays.
 #[test]
 fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
     let mut map = Tunnel::clone(&map(0.0));
@@ -507,12 +508,11 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
         let issued = SimTime::from_secs(time_s);
         warning(number, issued, DangerLevel::None, 1790.0)
     };
-    assert_eq!(end_m(&mut protection, 0.0), None);
-    assert_eq!(end_m(&mut protection, 5.0), None);
     let watched = Some(1800.0 - 80.0 - settings.safety_distance_m);
-    assert_eq!(end_m(&mut protection, 5.1), watched);
+    assert_eq!(end_m(&mut protection, 0.0), watched);
     let at = SimTime::from_secs;
     protection.on_heartbeat(&clear(0, 5.1), at(5.1), at(5.6));
+    assert_eq!(end_m(&mut protection, 5.6), None);
     assert_eq!(end_m(&mut protection, 10.1), None);
     assert_eq!(end_m(&mut protection, 10.2), watched);
     // What was said long ago, and comes only now, is not news.
