@@ -42,7 +42,7 @@ pub use health::{CameraFault, CameraHealth, CameraStatus, EYES};
 pub use message::{Content, Message, Node, Receiver, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
 pub use time::{SimTime, Ticker};
-pub use train_id::TrainId;
+pub use train_id::{TrainEnd, TrainId};
 pub use warning::ObstacleWarning;
 pub use wayside::{
     Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,

@@ -1,5 +1,6 @@
 //! Trains by number.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -22,6 +23,29 @@ impl TrainId {
     /// Position in a list of all trains.
     pub fn index(self) -> usize {
         usize::from(self.0)
+    }
+}
+
+/// The end of a train at which something is mounted. Either has a cab with a vehicle frame of its
+/// own: its origin at the end of the train on top of rail, its x axis out of the train. So what is in
+/// the rear cab looks back along the line, and runs backwards.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum TrainEnd {
+    /// The end that leads.
+    #[default]
+    Front,
+    /// The end that follows.
+    Rear,
+}
+
+impl TrainEnd {
+    /// 1 where x points in the running direction, -1 where it points back.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Front => 1.0,
+            Self::Rear => -1.0,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::RecordSettings;
 use super::file::{BenchSettings, OnboardEquipment, ScenarioFile, StackSettings};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
-use crate::bus::{TrainId, WaysideCalibration};
+use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
@@ -86,6 +86,11 @@ impl Onboard {
     /// It finds its position by lamps.
     pub fn positions(&self) -> bool {
         self.rig.is_some() && self.equipment.contains(&OnboardEquipment::Led)
+    }
+
+    /// The end at which its rig and its inertial unit are.
+    pub fn rig_end(&self) -> TrainEnd {
+        self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
     }
 
     /// Its speed is supervised.

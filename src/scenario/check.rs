@@ -2,7 +2,7 @@
 
 use super::WaysidePost;
 use super::file::{ScenarioFile, WaysidePostSettings};
-use crate::bus::TrainId;
+use crate::bus::{TrainEnd, TrainId};
 use crate::settings::{Checker, did_you_mean};
 use crate::track::{Direction, Tunnel};
 use crate::twin::faults::rig_cameras;
@@ -67,7 +67,11 @@ pub(super) fn in_tunnel(
     });
     let first = file.rig.iter().map(|rig| ("rig".to_owned(), 0, rig));
     for (at, train, rig) in first.chain(others) {
-        let direction = directions.get(train).copied().unwrap_or_default();
+        let running = directions.get(train).copied().unwrap_or_default();
+        let direction = match rig.end {
+            TrainEnd::Front => running,
+            TrainEnd::Rear => running.reversed(),
+        };
         check_view(&at, rig, direction, tunnel, check);
     }
     let posts = file.wayside.iter().enumerate();
@@ -143,6 +147,17 @@ fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
     }
     if file.bench.is_none() {
         return;
+    }
+    if file
+        .rig
+        .as_ref()
+        .is_some_and(|rig| rig.end == TrainEnd::Rear)
+    {
+        check.problem(
+            "rig.end",
+            "a bench has no train, and so no rear end",
+            "take it out, or give \"front\"",
+        );
     }
     for (key, count) in [
         ("wayside", file.wayside.len()),

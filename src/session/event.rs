@@ -83,7 +83,7 @@ pub struct TrainPoint {
     pub chainage_m: f64,
     /// Speed along the line.
     pub speed_mps: f64,
-    /// Pose of the vehicle frame.
+    /// Pose of the vehicle frame at the end that its rig is at.
     pub world_from_vehicle: Isometry3<f64>,
 }
 

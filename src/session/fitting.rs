@@ -4,10 +4,10 @@
 //!
 #![doc = include_str!("../../docs/extending.md")]
 
-use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
+use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainEnd, TrainId};
 use crate::scenario::{Onboard, OnboardEquipment, Scenario, WaysidePost};
 use crate::stack::Equipment;
-use crate::stack::positioning::LampPositioning;
+use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
 use crate::stack::wayside::WaysideDetection;
 use crate::track::{Direction, Route, Tunnel};
@@ -98,9 +98,10 @@ impl Fitting {
 
     fn add_motion_sensors(&mut self, onboard: &Onboard, node: &Node, seed: u64) {
         let train = onboard.train;
+        let end = onboard.rig_end();
         let mut imu = Imu::new(&onboard.imu, seed, 0);
         let read = move |world: &World, time| {
-            let sample = imu.sample(world, train)?;
+            let sample = imu.sample(world, train, end)?;
             Some(Content::Imu(ImuSample { time, ..sample }))
         };
         let (rate_hz, clock) = (onboard.imu.rate_hz, onboard.imu.clock);
@@ -147,14 +148,28 @@ impl Fitting {
 /// A piece of equipment of a train; `None` where the train lacks what it needs.
 pub fn onboard_equipment(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Option<Fitted> {
     let node = Node::Train(onboard.train);
-    let (route, map) = maps.of(onboard.direction);
-    let at = (node.clone(), route);
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
-            let rig = onboard.rig.as_ref()?.calibration();
-            Box::new(LampPositioning::new(at, &onboard.led, rig, map))
+            let rig = onboard.rig.as_ref()?;
+            let (direction, mount) = match rig.end {
+                TrainEnd::Front => (onboard.direction, CabMount::front()),
+                TrainEnd::Rear => {
+                    let length_m = onboard.protection.train_length_m;
+                    (onboard.direction.reversed(), CabMount::rear(length_m))
+                }
+            };
+            let (route, map) = maps.of(direction);
+            let at = (node.clone(), route, mount);
+            Box::new(LampPositioning::new(
+                at,
+                &onboard.led,
+                rig.calibration(),
+                map,
+            ))
         }
         OnboardEquipment::Protection => {
+            let (route, map) = maps.of(onboard.direction);
+            let at = (node.clone(), route);
             Box::new(TrainProtection::new(at, &onboard.protection, map))
         }
     };

@@ -10,8 +10,10 @@ use super::train_score::TrainScore;
 use super::{
     End, Event, Exposure, Observer, RunOptions, SessionError, Source, Summary, TrainPoint,
 };
-use crate::bus::{Content, Message, Node, Receiver, SimTime, Ticker, TrainCommand, TrainId};
-use crate::scenario::Scenario;
+use crate::bus::{
+    Content, Message, Node, Receiver, SimTime, Ticker, TrainCommand, TrainEnd, TrainId,
+};
+use crate::scenario::{Onboard, Scenario};
 use crate::twin::links::Links;
 use crate::twin::physics::{PhysicsError, World};
 use crate::twin::random::Stream;
@@ -278,12 +280,15 @@ impl<'s> Session<'s> {
         Ok(self.imaging.submit(&job, pending, &mut self.cost)?)
     }
 
-    /// A train at a time of the recent past, by the speed that it has now.
+    /// A train at a time of the recent past, by the speed that it has now, and the end of it that its
+    /// rig is at.
     fn train_at(&self, id: TrainId, time: SimTime) -> Option<TrainPoint> {
+        let onboard = self.scenario.onboard.iter().find(|o| o.train == id);
+        let end = onboard.map_or(TrainEnd::Front, Onboard::rig_end);
         Some(TrainPoint {
             chainage_m: self.world.chainage_at(id, time)?,
             speed_mps: self.world.train(id)?.speed_mps,
-            world_from_vehicle: self.world.vehicle_at(id, time)?,
+            world_from_vehicle: self.world.vehicle_at(id, end, time)?,
         })
     }
 

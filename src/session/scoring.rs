@@ -139,7 +139,7 @@ impl Session<'_> {
             for (id, score) in &mut self.trains {
                 if let Some(train) = world.train(*id) {
                     score.on_motion(&train, world, line);
-                    let left = score.left_eye(&train.world_from_vehicle);
+                    let left = score.left_eye(world);
                     observers.show(&Event::Train(*id, &train, left.as_ref()))?;
                 }
             }

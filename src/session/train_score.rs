@@ -6,7 +6,9 @@ use super::outcome::Outcome;
 use super::ride::Ride;
 use super::score::PositioningScore;
 use super::summary::{Summary, TrainSummary};
-use crate::bus::{EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainId};
+use crate::bus::{
+    EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainEnd, TrainId,
+};
 use crate::scenario::{Onboard, Scenario};
 use crate::track::Alignment;
 use crate::twin::physics::{TrainState, World};
@@ -16,8 +18,8 @@ use nalgebra::Isometry3;
 /// The scores of one train.
 pub struct TrainScore {
     id: TrainId,
-    /// Its rig as it really is.
-    rig: Option<RigCalibration>,
+    /// Its rig as it really is, and the end of the train that it is at.
+    rig: Option<(RigCalibration, TrainEnd)>,
     positioning: Option<PositioningScore>,
     outcome: Outcome,
     ride: Ride,
@@ -44,7 +46,7 @@ impl TrainScore {
         }
         Self {
             id,
-            rig: rig.map(|rig| rig.actual()),
+            rig: rig.map(|rig| (rig.actual(), rig.end)),
             positioning,
             outcome: Outcome::default(),
             ride: Ride::default(),
@@ -73,13 +75,13 @@ impl TrainScore {
         cost_ms: f64,
         world: &World,
     ) -> Result<Vec<f64>, SessionError> {
-        let (Some(rig), Some(positioning)) = (&self.rig, &mut self.positioning) else {
+        let (Some((rig, end)), Some(positioning)) = (&self.rig, &mut self.positioning) else {
             return Ok(Vec::new());
         };
         self.stereo_frames += 1;
         let dark = report.dark.iter().map(|uid| uid.to_string());
         self.dark_lamps.extend(dark);
-        let left_at = |t| Some(world.vehicle_at(self.id, t)? * rig.vehicle_from_left);
+        let left_at = |t| Some(world.vehicle_at(self.id, *end, t)? * rig.vehicle_from_left);
         positioning.report(report, cost_ms, &rig.left.intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());
         for fix in &report.fixes {
@@ -112,10 +114,10 @@ impl TrainScore {
         self.outcome.stood_s(now)
     }
 
-    /// Pose of the left eye on a vehicle.
-    pub fn left_eye(&self, world_from_vehicle: &Isometry3<f64>) -> Option<Isometry3<f64>> {
-        let rig = self.rig.as_ref()?;
-        Some(world_from_vehicle * rig.vehicle_from_left)
+    /// Pose of the left eye now.
+    pub fn left_eye(&self, world: &World) -> Option<Isometry3<f64>> {
+        let (rig, end) = self.rig.as_ref()?;
+        Some(world.vehicle_at(self.id, *end, world.time())? * rig.vehicle_from_left)
     }
 
     /// The figures.

@@ -1,10 +1,12 @@
 //! Lamp positioning as a piece of equipment of a train.
 //!
-//! Inside, distances are those of the train's route; what it says is in chainage of the track.
+//! Inside, distances are those of the route that the rig's cab looks along; what it says is the
+//! chainage of the train head. A rig in the rear cab runs backwards along the opposite route.
 
 use super::{LedPositioner, LedSettings};
 use crate::bus::{
-    CameraHealth, CameraStatus, Content, EYES, Message, Node, RigCalibration, SimTime, Ticker,
+    CameraHealth, CameraStatus, Content, EYES, Message, Node, OdometerSample, RigCalibration,
+    SimTime, Ticker, TrainEnd,
 };
 use crate::stack::Equipment;
 use crate::track::{Route, Tunnel};
@@ -13,21 +15,48 @@ use std::sync::Arc;
 /// How often a second it is looked whether the rig has fallen silent.
 const WATCH_HZ: f64 = 10.0;
 
+/// The cab that the rig is in.
+#[derive(Clone, Copy, Debug)]
+pub struct CabMount {
+    end: TrainEnd,
+    /// How far the train head is behind the cab's end, as the cab looks.
+    head_behind_m: f64,
+}
+
+impl CabMount {
+    /// The leading cab.
+    pub fn front() -> Self {
+        Self {
+            end: TrainEnd::Front,
+            head_behind_m: 0.0,
+        }
+    }
+
+    /// The rear cab of a train of a length.
+    pub fn rear(train_length_m: f64) -> Self {
+        Self {
+            end: TrainEnd::Rear,
+            head_behind_m: train_length_m,
+        }
+    }
+}
+
 /// Takes stereo pairs, inertial and odometer samples; says a [`Content::Led`] a pair.
 #[derive(Debug)]
 pub struct LampPositioning {
     node: Node,
     route: Route,
+    mount: CabMount,
     positioner: LedPositioner,
     watch: Ticker,
     reports: Vec<Message>,
 }
 
 impl LampPositioning {
-    /// On a node, with the rig's calibration sheet and the surveyed map of the route, as the train
-    /// runs it.
+    /// On a node, with the rig's calibration sheet, and the surveyed map of the route that the cab looks
+    /// along.
     pub fn new(
-        (node, route): (Node, Route),
+        (node, route, mount): (Node, Route, CabMount),
         settings: &LedSettings,
         rig: RigCalibration,
         map: Arc<Tunnel>,
@@ -35,6 +64,7 @@ impl LampPositioning {
         Self {
             node,
             route,
+            mount,
             positioner: LedPositioner::new(settings, rig, map),
             watch: Ticker::new(WATCH_HZ),
             reports: Vec::new(),
@@ -57,11 +87,20 @@ impl Equipment for LampPositioning {
     fn on(&mut self, message: &Message) {
         match &message.content {
             Content::Imu(sample) => self.positioner.on_imu(sample),
-            Content::Odometer(sample) => self.positioner.on_odometer(sample),
+            Content::Odometer(sample) => {
+                let sign = self.mount.end.sign();
+                self.positioner.on_odometer(&OdometerSample {
+                    time: sample.time,
+                    distance_m: sign * sample.distance_m,
+                    speed_mps: sign * sample.speed_mps,
+                });
+            }
             Content::Pair(pair) => {
                 let mut report = self.positioner.on_pair(pair);
                 for fix in &mut report.fixes {
-                    fix.chainage_m = self.route.chainage_m(fix.chainage_m);
+                    fix.chainage_m = self
+                        .route
+                        .chainage_m(fix.chainage_m - self.mount.head_behind_m);
                 }
                 self.reports.push(Message {
                     valid_at: report.time,

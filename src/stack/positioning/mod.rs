@@ -59,7 +59,7 @@
 //! each other, are triggered apart or read upwards. What the sheet gets wrong of that is in sigma as
 //! a vergence only: errors of distortion, of a roll or pitch between the eyes, of the line time and
 //! of the trigger times are not in it.
-//! It takes the train to run up the line, its rails to be where the map has them, and roll and
+//! It takes its cab to look up the line, the train's rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 
 mod attitude;
@@ -75,6 +75,6 @@ mod stereo;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
-pub use equipment::LampPositioning;
+pub use equipment::{CabMount, LampPositioning};
 pub use positioner::LedPositioner;
 pub use settings::LedSettings;

@@ -20,7 +20,7 @@ use std::sync::Arc;
 
 /// Positions the train from stereo pairs of a lamp, as it would on board: raw images, odometer
 /// and inertial samples, the rig's calibration and the surveyed map are all that it gets. It
-/// takes the train to run up the line.
+/// takes the rig's cab to look up the line; the train may run backwards.
 #[derive(Debug)]
 pub struct LedPositioner {
     settings: LedSettings,

@@ -14,8 +14,8 @@ use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
 use super::vehicle::{AXLES, GRAVITY_MPS2, Mass, Vehicle};
 use super::wheelset::{Drive, WheelExtremes, Wheelset};
-use crate::bus::{SimTime, TrainId};
-use nalgebra::{Isometry3, Vector3};
+use crate::bus::{SimTime, TrainEnd, TrainId};
+use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::{Pose, Vector};
 use rapier3d_f64::prelude::{
     ColliderBuilder, ColliderHandle, Group, MassProperties, PhysicsWorld, RigidBodyBuilder,
@@ -393,13 +393,25 @@ impl Consist {
         weights + self.ledger.springs_j
     }
 
-    /// Motion of the vehicle frame.
-    pub(super) fn motion(&self, time: SimTime) -> VehicleMotion {
-        let car = &self.states[0];
-        let origin = car.point(self.head_m());
+    /// Motion of the vehicle frame of one end.
+    pub(super) fn motion(&self, end: TrainEnd, time: SimTime) -> VehicleMotion {
+        let front = self.head_m();
+        let (body, origin) = match end {
+            TrainEnd::Front => (0, front),
+            TrainEnd::Rear => (
+                self.states.len() - BODIES,
+                Vector::new(-front.x, front.y, front.z),
+            ),
+        };
+        let car = &self.states[body];
+        let origin = car.point(origin);
+        let world_from_car = isometry(origin, car.rotation);
         VehicleMotion {
             time,
-            world_from_vehicle: isometry(origin, car.rotation),
+            world_from_vehicle: match end {
+                TrainEnd::Front => world_from_car,
+                TrainEnd::Rear => world_from_car * about_turned(),
+            },
             velocity_mps: vector3(car.velocity_at(origin)),
             angular_rad_s: vector3(car.angular),
         }
@@ -436,4 +448,9 @@ impl Consist {
         let change = velocity(&self.states[0]) - velocity(&self.previous);
         vector3(self.states[0].rotation.inverse() * change) / dt_s
     }
+}
+
+/// The last car's frame in that of its cab, which looks back.
+fn about_turned() -> UnitQuaternion<f64> {
+    UnitQuaternion::from_axis_angle(&Vector3::z_axis(), std::f64::consts::PI)
 }

@@ -12,7 +12,7 @@ mod obstacles;
 
 use super::history::History;
 use super::*;
-use crate::bus::BrakeDemand;
+use crate::bus::{BrakeDemand, TrainEnd};
 use crate::settings::Settings;
 use crate::track::PlanElement;
 use testing::{TRAIN, line};
@@ -163,7 +163,7 @@ fn pose_history_of_a_shaken_train() {
     let mut between = Vec::new();
     for k in 0..500 {
         world.step(&[command(BrakeDemand::None, GO)]).unwrap();
-        let motion = *world.vehicle_motion(TRAIN).unwrap();
+        let motion = *world.vehicle_motion(TRAIN, TrainEnd::Front).unwrap();
         if k % 2 == 0 {
             coarse.push(motion);
         } else {
@@ -182,8 +182,16 @@ fn pose_history_of_a_shaken_train() {
         worst_m, worst_rad
     );
     assert!(worst_m < 1e-4 && worst_rad < 5e-6);
-    assert!(world.vehicle_at(TRAIN, world.time().plus(-0.3)).is_some());
-    assert!(world.vehicle_at(TRAIN, world.time().plus(0.001)).is_none());
+    assert!(
+        world
+            .vehicle_at(TRAIN, TrainEnd::Front, world.time().plus(-0.3))
+            .is_some()
+    );
+    assert!(
+        world
+            .vehicle_at(TRAIN, TrainEnd::Front, world.time().plus(0.001))
+            .is_none()
+    );
 }
 
 /// A world that was saved in the middle of a fall and a shake goes on in every byte as the one that

@@ -7,7 +7,7 @@ use super::history::{History, VehicleMotion};
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
-use crate::bus::{SimTime, TrainCommand, TrainId};
+use crate::bus::{SimTime, TrainCommand, TrainEnd, TrainId};
 use crate::track::Alignment;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::lights::Headlight;
@@ -33,7 +33,8 @@ const CAR_ALBEDO: f64 = 0.5;
 pub(super) struct Train {
     pub track: Arc<DirectedTrack>,
     pub consist: Consist,
-    pub history: History,
+    /// Of its front and rear end.
+    histories: [History; 2],
     driver: Driver,
     pub effort: Effort,
 }
@@ -57,7 +58,7 @@ impl Train {
         Self {
             consist: Consist::new(world, &track, &settings, head_m, id),
             track,
-            history: History::new(history_steps),
+            histories: [History::new(history_steps), History::new(history_steps)],
             driver: Driver::new(&settings),
             effort: Effort::default(),
         }
@@ -85,7 +86,14 @@ impl Train {
     /// The run begins.
     pub(super) fn begin(&mut self) {
         self.consist.open_book();
-        self.history.push(self.consist.motion(SimTime::ZERO));
+        self.remember(SimTime::ZERO);
+    }
+
+    fn remember(&mut self, now: SimTime) {
+        let ends = [TrainEnd::Front, TrainEnd::Rear];
+        for (history, end) in self.histories.iter_mut().zip(ends) {
+            history.push(self.consist.motion(end, now));
+        }
     }
 
     /// The driver's decision, and the forces of a step.
@@ -105,13 +113,21 @@ impl Train {
     pub(super) fn read(&mut self, world: &PhysicsWorld, now: SimTime) -> Result<(), PhysicsError> {
         self.consist.read(world, now)?;
         self.consist.on_rails(now)?;
-        self.history.push(self.consist.motion(now));
+        self.remember(now);
         Ok(())
     }
 
-    /// Motion of its vehicle frame now.
-    pub(super) fn motion(&self) -> Option<&VehicleMotion> {
-        self.history.latest()
+    /// The recent past of the vehicle frame of one end.
+    pub(super) fn history(&self, end: TrainEnd) -> &History {
+        match end {
+            TrainEnd::Front => &self.histories[0],
+            TrainEnd::Rear => &self.histories[1],
+        }
+    }
+
+    /// Motion of the leading vehicle frame now.
+    fn motion(&self) -> Option<&VehicleMotion> {
+        self.history(TrainEnd::Front).latest()
     }
 
     /// Chainage on the line of the origin of its vehicle frame at a pose.

@@ -3,7 +3,7 @@
 use super::history::VehicleMotion;
 use super::wheelset::{WheelExtremes, WheelForces};
 use super::{EnergyBook, World};
-use crate::bus::{SimTime, TrainId};
+use crate::bus::{SimTime, TrainEnd, TrainId};
 use crate::track::Direction;
 use crate::twin::geometry::Body;
 use crate::twin::lights::Headlight;
@@ -22,7 +22,7 @@ pub struct TrainState {
     pub speed_mps: f64,
     /// Acceleration along the line, positive up the line.
     pub accel_mps2: f64,
-    /// Pose of the vehicle frame, fixed to the leading car's body, with its x axis ahead.
+    /// Pose of the leading vehicle frame, fixed to the leading car's body, with its x axis ahead.
     pub world_from_vehicle: Isometry3<f64>,
     /// Poses of the centres of all car bodies' boxes, leading car first.
     pub world_from_cars: Vec<Isometry3<f64>>,
@@ -59,30 +59,33 @@ impl World {
         Some(self.get(id)?.track.direction)
     }
 
-    /// Pose of its vehicle frame at a time of the recent past; `None` after now, and before what is
-    /// kept.
-    pub fn vehicle_at(&self, id: TrainId, time: SimTime) -> Option<Isometry3<f64>> {
+    /// Pose of the vehicle frame of one of its ends at a time of the recent past; `None` after now, and
+    /// before what is kept.
+    pub fn vehicle_at(&self, id: TrainId, end: TrainEnd, time: SimTime) -> Option<Isometry3<f64>> {
         match self.get(id) {
-            Some(train) => train.history.at(time),
+            Some(train) => train.history(end).at(time),
             None => Some(self.carrier(id)?.world_from_vehicle),
         }
     }
 
-    /// Motion of its vehicle frame now.
-    pub fn vehicle_motion(&self, id: TrainId) -> Option<&VehicleMotion> {
-        self.get(id)?.motion()
+    /// Motion of the vehicle frame of one of its ends now.
+    pub fn vehicle_motion(&self, id: TrainId, end: TrainEnd) -> Option<&VehicleMotion> {
+        self.get(id)?.history(end).latest()
     }
 
     /// Chainage of its head now.
     pub fn head_m(&self, id: TrainId) -> Option<f64> {
-        self.chainage_of(id, &self.vehicle_motion(id)?.world_from_vehicle)
+        self.chainage_of(
+            id,
+            &self.vehicle_motion(id, TrainEnd::Front)?.world_from_vehicle,
+        )
     }
 
     /// Chainage of its head at a time of the recent past.
     pub fn chainage_at(&self, id: TrainId, time: SimTime) -> Option<f64> {
         match self.carrier(id) {
             Some(carrier) => Some(carrier.head_m),
-            None => self.chainage_of(id, &self.vehicle_at(id, time)?),
+            None => self.chainage_of(id, &self.vehicle_at(id, TrainEnd::Front, time)?),
         }
     }
 

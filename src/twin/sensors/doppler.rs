@@ -22,7 +22,7 @@
 //! spectrum, other radars.
 
 use super::ClockSettings;
-use crate::bus::{DopplerSample, TrainId};
+use crate::bus::{DopplerSample, TrainEnd, TrainId};
 use crate::settings::{Checker, settings};
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -129,7 +129,7 @@ impl Doppler {
     /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the radar.
     pub fn sample(&mut self, world: &World, train: TrainId) -> Option<DopplerSample> {
-        let now = *world.vehicle_motion(train)?;
+        let now = *world.vehicle_motion(train, TrainEnd::Front)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }

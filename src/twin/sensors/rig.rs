@@ -1,4 +1,4 @@
-//! The stereo rig on the train head, from degrees and millimetres to a calibration, and from where
+//! The stereo rig at an end of a train, from degrees and millimetres to a calibration, and from where
 //! it sees a lamp.
 //!
 //! **Why the rig looks where it does.** A lamp 1.7 m to the left and 1.5 m above the left eye is
@@ -26,7 +26,7 @@
 
 use super::camera::{Optics, ReadOut, SIDE_PX, check_jitter, most_jitter_s, mounted};
 use super::{ClockSettings, ExposureSettings};
-use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration};
+use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration, TrainEnd};
 use crate::settings::{Checker, settings};
 use crate::track::{LampSite, Tunnel};
 use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
@@ -38,15 +38,15 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MountSide {
-    /// To the left of the running direction.
+    /// To the left, as one looks out of the cab.
     #[default]
     Left,
-    /// To its right.
+    /// To the right.
     Right,
 }
 
 settings! {
-    /// The stereo rig on the train head: where it is mounted, what it sees, when.
+    /// The stereo rig at an end of a train: where it is mounted, what it sees, when.
     pub struct RigSettings {
         /// Focal length of the left eye, mm. Default 3.9 (1040 px).
         focal_length_mm: f64 = 3.9;
@@ -82,9 +82,12 @@ settings! {
         /// Standard deviation of a pair's true start about the one that its frames say, us, drawn
         /// anew for each and the same for both eyes; held at four times that.
         frame_jitter_us: f64 = 0.0;
+        /// The end of the train that it is at, with the inertial unit. At the rear end it looks back:
+        /// what is ahead and left of it is behind the train and on its right.
+        end: TrainEnd = TrainEnd::Front;
         /// The side of the train that it is made for: `right` mirrors `lateral_m` and `yaw_deg`.
         side: MountSide = MountSide::Left;
-        /// Left eye, m ahead of the train head (negative: behind the windscreen).
+        /// Left eye, m ahead of the end of the train (negative: behind the windscreen).
         forward_m: f64 = -0.5, in -5.0..=5.0;
         /// Left eye, m to the left of the centreline.
         lateral_m: f64 = 1.0, in -2.0..=2.0;

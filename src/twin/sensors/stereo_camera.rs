@@ -145,7 +145,7 @@ impl Sensor for StereoCamera {
         if start_true < SimTime::ZERO || self.faults.drops(number, start_true) {
             return Ok(Vec::new());
         }
-        let vehicle_at = |time| world.vehicle_at(self.train, time);
+        let vehicle_at = |time| world.vehicle_at(self.train, self.settings.end, time);
         let mut views = (self.views(number, start_true, vehicle_at))
             .ok_or(SensorError::PoseForgotten(start_true.secs()))?;
         let with = self.exposure.expose(&mut views);

@@ -1,6 +1,7 @@
 //! Trains that run down the line, and several of them, against those that run up, and closed forms.
 
 use super::*;
+use crate::bus::TrainEnd;
 
 fn run(world: &mut World, seconds: f64) {
     for _ in 0..(seconds * 1000.0).round() as usize {
@@ -133,7 +134,11 @@ fn trains_are_asked_by_number() {
         assert_eq!(world.train(id).unwrap().speed_mps < 9.0, braked, "{id}");
         assert_eq!(world.energy(id).unwrap().brake_j > 1e5, braked);
         assert!(world.wheel_extremes(id).unwrap().most_slip_mps > 0.0);
-        assert!(world.vehicle_at(id, world.time().plus(-0.3)).is_some());
+        assert!(
+            world
+                .vehicle_at(id, TrainEnd::Front, world.time().plus(-0.3))
+                .is_some()
+        );
         assert_eq!(world.train_bodies(id).unwrap().len(), 3);
     }
     assert_eq!(world.headlights().len(), 16);

@@ -1,4 +1,4 @@
-//! Inertial unit of the ADIS16488's class, fixed to the leading car's body.
+//! Inertial unit of the ADIS16488's class, fixed to the body of a train's first or last car.
 //!
 //! A sample is what such a unit puts out: the mean turn rate and mean specific force since the
 //! last one (it integrates inside, so vibration does not alias), in the vehicle frame as far as it
@@ -20,7 +20,7 @@
 //! the drift's slowest part, the Earth's turn (15 deg/h, which the null takes out with the bias).
 
 use super::ClockSettings;
-use crate::bus::{ImuSample, TrainId};
+use crate::bus::{ImuSample, TrainEnd, TrainId};
 use crate::settings::settings;
 use crate::twin::physics::{VehicleMotion, World};
 use crate::twin::random::Stream;
@@ -200,10 +200,10 @@ impl Imu {
         self.period_s
     }
 
-    /// A sample of the time since the last one; `None` without its train, and on the first call,
+    /// A sample at one end of a train, of the time since the last one; `None` without its train, and on the first call,
     /// which starts the unit.
-    pub fn sample(&mut self, world: &World, train: TrainId) -> Option<ImuSample> {
-        let now = *world.vehicle_motion(train)?;
+    pub fn sample(&mut self, world: &World, train: TrainId, end: TrainEnd) -> Option<ImuSample> {
+        let now = *world.vehicle_motion(train, end)?;
         let before = self.last.replace(now)?;
         self.between(&before, &now)
     }
