@@ -3,6 +3,7 @@
 use super::fault::Failure;
 use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
+use crate::bus::TrainId;
 use crate::record::{self, FixTable, Recording};
 use crate::scenario::sampling::Sample;
 use crate::scenario::{Override, Scenario};
@@ -16,7 +17,7 @@ const AFTER: &str = "\
 Into the output folder go:
   recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
   summary.json    the figures
-  fixes.csv       every position, with its truth
+  fixes.csv       every position, with its truth (of train k: fixes_train_k.csv)
 Each is written under a temporary name and renamed when it is complete.
 
 Examples:
@@ -182,13 +183,12 @@ fn observed(
 ) -> Result<Summary, Failure> {
     let mut file = (!args.no_recording)
         .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.record));
-    let mut fixes = scenario
-        .rig()
-        .map(|_| FixTable::to_file(&out.join("fixes.csv")));
+    let rigs = scenario.onboard.iter().filter(|o| o.rig.is_some());
+    let mut fixes: Vec<_> = rigs.map(|o| FixTable::to_folder(out, o.train)).collect();
     let mut observers: Vec<&mut dyn Observer> = vec![errors];
     observers.extend(file.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
-    observers.extend(fixes.as_mut().map(|t| t as &mut dyn Observer));
+    observers.extend(fixes.iter_mut().map(|t| t as &mut dyn Observer));
 
     let progress = ProgressBar::new(RUN_BAR);
     let show = |now_s| progress.show_run(now_s, scenario.duration_s);
@@ -223,11 +223,15 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
 /// What this run did not write, but an earlier one into the same folder, would not belong to its
 /// summary.
 fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
-    let stale = [
-        ("recording.rrd", args.no_recording),
-        ("fixes.csv", scenario.rig().is_none()),
-    ];
-    for (name, _) in stale.into_iter().filter(|(_, stale)| *stale) {
+    let recording = args.no_recording.then(|| "recording.rrd".to_owned());
+    let has_rig = |id| (scenario.onboard.iter()).any(|o| o.train == id && o.rig.is_some());
+    let without_rig = (0..TrainId::MOST)
+        .map(TrainId::from_index)
+        .filter(|id| !has_rig(*id));
+    for name in recording
+        .into_iter()
+        .chain(without_rig.map(FixTable::file_name))
+    {
         match fs::remove_file(out.join(name)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
             _ => {}

@@ -7,7 +7,8 @@
 use super::images::WaysidePaths;
 use super::stream::{SIM_TIME, Stream};
 use super::whole_files::{Result, failed};
-use super::{Contents, images, plots, scene, texts};
+use super::{Contents, images, path_of, plots, scene, texts};
+use crate::bus::TrainId;
 use rerun::external::re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
     TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
@@ -22,10 +23,17 @@ use rerun::{
 };
 use std::ops::Range;
 
-/// One pane, or several beside or above each other with their shares of the room.
+/// One pane, or several.
 enum Node {
     Pane(Pane),
-    Split(ContainerKind, Vec<(f32, Node)>),
+    Split(Split),
+}
+
+/// Several nodes beside, above or behind each other, with their shares of the room.
+struct Split {
+    kind: ContainerKind,
+    name: Option<String>,
+    parts: Vec<(f32, Node)>,
 }
 
 /// A view of the viewer.
@@ -55,7 +63,7 @@ impl Pane {
 }
 
 /// Sends the layout for what this run has.
-pub(super) fn send(stream: &Stream, contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Result {
+pub(super) fn send(stream: &Stream, contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Result {
     let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
     let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
         .enabled(true)
@@ -70,57 +78,106 @@ pub(super) fn send(stream: &Stream, contents: &Contents, eye: ([f32; 3], [f32; 3
     Ok(())
 }
 
-/// The panes for a window of 1600 x 1000: where the train is on the left, what the cameras see and
-/// the stack says on the right.
-fn layout(contents: &Contents, eye: ([f32; 3], [f32; 3])) -> Node {
+/// The panes for a window of 1600 x 1000: where the first train is on the left, what the cameras see
+/// and the stack says on the right. What there is of each train is in tabs.
+fn layout(contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Node {
     let mut right = Vec::new();
-    if contents.rig {
-        let eyes = [
-            (1.0, image("Left camera", images::LEFT)),
-            (1.0, image("Right camera", images::RIGHT)),
-        ];
-        right.push((3.0, row(eyes)));
+    let rigs = contents.iter().filter(|train| train.rig);
+    let rigs: Vec<_> = rigs.map(|train| named(train.id, eyes(train.id))).collect();
+    if !rigs.is_empty() {
+        right.push((3.0, tabbed(rigs)));
     }
-    if !contents.devices.is_empty() {
-        let devices = contents.devices.iter();
+    let first = &contents[0];
+    if !first.devices.is_empty() {
+        let devices = first.devices.iter();
         let devices = tabbed(devices.map(|name| wayside(name, &WaysidePaths::new(name))));
         right.push((3.6, devices));
     }
     let mut words = vec![(1.9, Node::Pane(events()))];
-    if contents.protection {
-        let display = Pane::new("TextDocument", "Driver's display", texts::DISPLAY);
-        words.insert(0, (1.0, Node::Pane(display)));
+    let displays = contents.iter().filter(|train| train.protection);
+    let displays: Vec<_> = displays.map(|train| display(train.id)).collect();
+    if !displays.is_empty() {
+        words.insert(0, (1.0, tabbed(displays)));
     }
     right.push((2.6, row(words)));
 
-    let mut left = vec![(4.4, Node::Pane(world(contents, eye)))];
-    let plots = plots::panes(contents);
-    for pair in plots.chunks(2) {
-        let panes = pair.iter().map(|tabs| (1.0, tabbed(tabs.iter().map(plot))));
-        left.push((2.2, row(panes)));
+    let mut left = vec![(4.4, Node::Pane(world(first, eye)))];
+    if let [only] = contents {
+        left.extend(plots(only));
+    } else {
+        let trains = contents
+            .iter()
+            .map(|train| named(train.id, column(plots(train))));
+        left.push((4.4, tabbed(trains)));
     }
     row([(1.0, column(left)), (1.0, column(right))])
 }
 
+/// Both eyes of a train's rig.
+fn eyes(id: TrainId) -> Node {
+    row([
+        (1.0, image("Left camera", path_of(id, images::LEFT))),
+        (1.0, image("Right camera", path_of(id, images::RIGHT))),
+    ])
+}
+
+fn display(id: TrainId) -> Node {
+    let name = match id.index() {
+        0 => "Driver's display".to_owned(),
+        _ => format!("Driver's display, {id}"),
+    };
+    Node::Pane(Pane::new("TextDocument", name, path_of(id, texts::DISPLAY)))
+}
+
+/// The plots of a train, two panes a row.
+fn plots(contents: &Contents) -> Vec<(f32, Node)> {
+    let plot = |group: &plots::PlotGroup| plot(contents.id, group);
+    let panes = plots::panes(contents);
+    let rows = panes.chunks(2).map(|pair| {
+        let panes = pair.iter().map(|tabs| (1.0, tabbed(tabs.iter().map(plot))));
+        (2.2, row(panes))
+    });
+    rows.collect()
+}
+
+fn split(kind: ContainerKind, parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
+    Node::Split(Split {
+        kind,
+        name: None,
+        parts: parts.into_iter().collect(),
+    })
+}
+
 fn row(parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
-    Node::Split(ContainerKind::Horizontal, parts.into_iter().collect())
+    split(ContainerKind::Horizontal, parts)
 }
 
 fn column(parts: impl IntoIterator<Item = (f32, Node)>) -> Node {
-    Node::Split(ContainerKind::Vertical, parts.into_iter().collect())
+    split(ContainerKind::Vertical, parts)
 }
 
-fn image(name: impl Into<String>, origin: &str) -> Node {
+/// With a train's name on its tab.
+fn named(id: TrainId, node: Node) -> Node {
+    match node {
+        Node::Split(split) => Node::Split(Split {
+            name: Some(id.to_string()),
+            ..split
+        }),
+        pane => pane,
+    }
+}
+
+fn image(name: impl Into<String>, origin: impl Into<String>) -> Node {
     Node::Pane(Pane::new("2D", name, origin))
 }
 
 fn wayside(name: &str, paths: &WaysidePaths) -> Node {
     let found = [
-        (1.0, image("Difference", &paths.difference)),
-        (1.0, image("Binary", &paths.binary)),
+        (1.0, image("Difference", paths.difference.as_str())),
+        (1.0, image("Binary", paths.binary.as_str())),
     ];
     row([
-        (2.0, image(format!("{name}: camera"), &paths.camera)),
+        (2.0, image(format!("{name}: camera"), paths.camera.as_str())),
         (1.0, column(found)),
     ])
 }
@@ -130,16 +187,16 @@ fn tabbed(nodes: impl IntoIterator<Item = Node>) -> Node {
     let nodes: Vec<_> = nodes.into_iter().map(|node| (1.0, node)).collect();
     match <[_; 1]>::try_from(nodes) {
         Ok([(_, only)]) => only,
-        Err(nodes) => Node::Split(ContainerKind::Tabs, nodes),
+        Err(nodes) => split(ContainerKind::Tabs, nodes),
     }
 }
 
-fn plot(group: &plots::PlotGroup) -> Node {
+fn plot(id: TrainId, group: &plots::PlotGroup) -> Node {
     let legend = PlotLegend::new().with_corner(group.legend);
     // All of the run. Left alone, a plot scrolls with the time, and one of more than a minute opens
     // half empty.
     let whole = TimeAxis::new().with_view_range(TimeRange(datatypes::TimeRange::EVERYTHING));
-    let pane = Pane::new("TimeSeries", group.title, group.origin);
+    let pane = Pane::new("TimeSeries", group.title, path_of(id, group.origin));
     Node::Pane(pane.with("PlotLegend", legend).with("TimeAxis", whole))
 }
 
@@ -218,7 +275,7 @@ fn write_node(
             write_pane(rerun, pane, &node_path(node, id))?;
             Ok(id)
         }
-        Node::Split(kind, parts) => {
+        Node::Split(Split { kind, name, parts }) => {
             let mut paths = Vec::with_capacity(parts.len());
             for (_, part) in parts {
                 let id = write_node(rerun, part, next)?;
@@ -227,6 +284,10 @@ fn write_node(
             let id = id(next);
             let shares = parts.iter().map(|(share, _)| *share);
             let container = ContainerBlueprint::new(*kind).with_contents(paths);
+            let container = match name {
+                Some(name) => container.with_display_name(name.as_str()),
+                None => container,
+            };
             let container = match kind {
                 ContainerKind::Vertical => container.with_row_shares(shares),
                 _ => container.with_col_shares(shares),

@@ -4,12 +4,12 @@
 //! an image moves by half a pixel.
 
 use super::palette::{self, ui};
-use super::slug;
 use super::stream::Stream;
 use super::whole_files::{Result, failed};
+use super::{path_of, slug};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
-    StereoPair, WaysideReport,
+    StereoPair, TrainId, WaysideReport,
 };
 use crate::scenario::RecordSettings;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
@@ -102,6 +102,8 @@ impl Rate {
 /// The image part of a recording.
 pub(super) struct Images {
     stream: Stream,
+    /// Of both eyes.
+    eyes: [String; 2],
     quality: u8,
     gain: f64,
     every_frame: bool,
@@ -111,10 +113,15 @@ pub(super) struct Images {
 }
 
 impl Images {
-    /// For so many wayside devices.
-    pub(super) fn new(stream: Stream, settings: &RecordSettings, devices: usize) -> Self {
+    /// Of a train, and of so many wayside devices.
+    pub(super) fn new(
+        stream: Stream,
+        settings: &RecordSettings,
+        (id, devices): (TrainId, usize),
+    ) -> Self {
         Self {
             stream,
+            eyes: [LEFT, RIGHT].map(|path| path_of(id, path)),
             quality: settings.jpeg_quality,
             gain: settings.difference_gain,
             every_frame: settings.overlay_every_frame,
@@ -130,11 +137,8 @@ impl Images {
         if !keep && !self.every_frame {
             return Ok(());
         }
-        let eyes = [
-            (LEFT, &pair.left, &report.left),
-            (RIGHT, &pair.right, &report.right),
-        ];
-        for (path, frame, spots) in eyes {
+        let eyes = [(&pair.left, &report.left), (&pair.right, &report.right)];
+        for (path, (frame, spots)) in self.eyes.iter().zip(eyes) {
             self.stream.at_frame(frame.start, frame.number);
             if keep {
                 self.jpeg(&format!("{path}/image"), &frame.image)?;

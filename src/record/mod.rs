@@ -17,7 +17,8 @@
 //!
 //! Everything lies on the timeline `sim_time`, images and what was found in them also on `frame`.
 //! What is true and what was estimated are siblings: `world/train`, `world/bodies` against
-//! `world/estimate/...`. Two runs with one seed give equal recordings (`rerun rrd compare`): ids
+//! `world/estimate/...`. What belongs to the first train or to none has these paths; of train `k`
+//! the same lie below `world/train_k` and `train_k`. Two runs with one seed give equal recordings (`rerun rrd compare`): ids
 //! of files come from scenario and seed, no row carries the wall clock, and batches are cut every ten
 //! seconds of simulated time. Nothing older than that is held in memory.
 //!
@@ -45,13 +46,14 @@ pub(crate) use whole_files::write_whole;
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;
-use crate::session::{Event, Observer, Opening};
+use crate::session::{Event, Observer, Opening, TrainOpening};
 use images::Images;
 use moving::Moving;
 use nalgebra::Isometry3;
 use plots::{Plots, RIG_CAMERA};
 use rerun::{SpawnError, SpawnOptions};
 use scene::RecordedScene;
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
 use stream::{Stream, Target};
@@ -145,8 +147,11 @@ impl Observer for Recording {
     }
 }
 
-/// What a run has, and so what its recording shows.
+/// What a train has, and so what a recording shows of it. With the first train goes what belongs to
+/// none.
+#[derive(Default)]
 struct Contents {
+    id: TrainId,
     rig: bool,
     train: bool,
     radar: bool,
@@ -156,6 +161,27 @@ struct Contents {
 }
 
 impl Contents {
+    fn of_train(train: &TrainOpening) -> Self {
+        Self {
+            id: train.id,
+            rig: train.rig.is_some(),
+            train: train.cars > 0,
+            radar: train.radar,
+            protection: train.protection,
+            devices: Vec::new(),
+        }
+    }
+
+    /// Of all trains with equipment, by number; the first is always there.
+    fn of(opening: &Opening<'_>) -> Vec<Self> {
+        let first = opening.first().map(Self::of_train).unwrap_or_default();
+        let devices = opening.wayside.iter().map(|d| d.name.clone()).collect();
+        let others = opening.trains.iter().map(Self::of_train);
+        let others = others.filter(|train| train.id != TrainId::default());
+        let first = Self { devices, ..first };
+        std::iter::once(first).chain(others).collect()
+    }
+
     /// Names of all cameras, the rig's first.
     fn cameras(&self) -> impl Iterator<Item = &str> {
         let rig = self.rig.then_some(RIG_CAMERA);
@@ -169,39 +195,50 @@ impl Contents {
     }
 }
 
+/// What a recording shows of one train.
+struct TrainView {
+    moving: Moving,
+    images: Images,
+    plots: Plots,
+}
+
 /// A recording in the making.
 struct Open {
     stream: Stream,
-    contents: Contents,
+    contents: Vec<Contents>,
     first_camera: Option<Isometry3<f64>>,
     laid_out: bool,
     flush_at: SimTime,
     scene: Rc<RecordedScene>,
-    moving: Moving,
-    images: Images,
-    plots: Plots,
+    /// Of the first train, with what belongs to none.
+    first: TrainView,
+    others: BTreeMap<TrainId, TrainView>,
     texts: Texts,
 }
 
 impl Open {
     fn new(stream: Stream, opening: &Opening<'_>, settings: &RecordSettings) -> Result<Self> {
-        let (devices, first) = (opening.wayside.len(), opening.first());
-        let contents = Contents {
-            rig: first.is_some_and(|train| train.rig.is_some()),
-            train: first.is_some_and(|train| train.cars > 0),
-            radar: first.is_some_and(|train| train.radar),
-            protection: first.is_some_and(|train| train.protection),
-            devices: opening.wayside.iter().map(|d| d.name.clone()).collect(),
-        };
+        let contents = Contents::of(opening);
         let scene = Rc::new(RecordedScene::new(opening.tunnel));
         scene.log(&stream, opening, settings)?;
+        let view = |contents: &Contents| -> Result<TrainView> {
+            let (id, devices) = (contents.id, contents.devices.len());
+            let train = opening.trains.iter().find(|train| train.id == id);
+            Ok(TrainView {
+                moving: Moving::open(stream.clone(), scene.clone(), train)?,
+                plots: Plots::open(stream.clone(), contents)?,
+                images: Images::new(stream.clone(), settings, (id, devices)),
+            })
+        };
+        let others = contents.iter().skip(1);
         Ok(Self {
-            moving: Moving::open(stream.clone(), scene.clone(), opening)?,
-            plots: Plots::open(stream.clone(), &contents)?,
+            first: view(&contents[0])?,
+            others: others
+                .map(|c| Ok((c.id, view(c)?)))
+                .collect::<Result<_>>()?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
             flush_at: SimTime::ZERO.plus(stream.batch_s()),
-            images: Images::new(stream.clone(), settings, devices),
             texts: Texts::open(stream.clone(), opening)?,
             stream,
             contents,
@@ -211,43 +248,47 @@ impl Open {
 
     fn observe(&mut self, event: &Event<'_>) -> Result {
         let time = match *event {
-            // Panes show the first train.
-            Event::Train(id, ..) | Event::Pair(id, ..) if id != TrainId::default() => return Ok(()),
-            Event::Train(_, train, left) => {
-                self.moving.train(train, left);
-                self.plots.train(train);
-                let head = train.world_from_vehicle;
-                self.lay_out(Some(&head))?;
+            Event::Train(id, train, left) => {
+                if let Some(view) = self.view(id) {
+                    view.moving.train(train, left);
+                    view.plots.train(train);
+                }
+                if id == TrainId::default() {
+                    self.lay_out(Some(&train.world_from_vehicle))?;
+                }
                 train.time
             }
             Event::Message(Node::Train(id), message) => self.message(*id, message)?,
             Event::Message(..) | Event::Cost(..) => return Ok(()),
             Event::Bodies(time, bodies) => {
-                self.moving.bodies(time, bodies)?;
+                self.first.moving.bodies(time, bodies)?;
                 time
             }
             // Its images come when they reach the stack.
             Event::Exposure(_) => return Ok(()),
-            Event::Pair(_, pair, report, true_chainages_m) => {
-                self.plots.fixes(report, true_chainages_m);
-                self.plots.exposure(RIG_CAMERA, &pair.left);
-                self.texts.dark_lamps(report)?;
-                self.images.pair(pair, report)?;
-                self.moving.fixes(report)?;
+            Event::Pair(id, pair, report, true_chainages_m) => {
+                self.texts.dark_lamps(id, report)?;
+                if let Some(view) = self.view(id) {
+                    view.plots.fixes(report, true_chainages_m);
+                    view.plots.exposure(RIG_CAMERA, &pair.left);
+                    view.images.pair(pair, report)?;
+                    view.moving.fixes(report)?;
+                }
                 report.time
             }
             Event::Wayside(index, frame, report) => {
-                let Some(name) = self.contents.devices.get(index) else {
+                let Some(name) = self.contents[0].devices.get(index) else {
                     return Ok(());
                 };
                 let device = (index, name.as_str());
                 let time = frame.start;
-                self.plots.wayside(index, report);
-                self.plots.exposure(name, frame);
+                let view = &mut self.first;
+                view.plots.wayside(index, report);
+                view.plots.exposure(name, frame);
                 self.texts.wayside(device, report)?;
-                self.images.wayside(device, frame, report)?;
+                view.images.wayside(device, frame, report)?;
                 self.stream.at(time);
-                self.moving.obstacles(name, &report.obstacles)?;
+                view.moving.obstacles(name, &report.obstacles)?;
                 time
             }
             Event::Camera(time, node, camera, fault) => {
@@ -266,24 +307,33 @@ impl Open {
         Ok(())
     }
 
-    /// A message of a train's node, or one that arrived there; gives its time. Panes show the first
-    /// train, the log all.
+    /// A message of a train's node, or one that arrived there; gives its time.
     fn message(&mut self, id: TrainId, message: &Message) -> Result<SimTime> {
-        let first = id == TrainId::default();
+        let time = message.received_at;
+        if let Content::Warning(warning) = &message.content {
+            self.texts.warning(id, message, warning)?;
+        }
+        let Some(view) = self.view(id) else {
+            return Ok(time);
+        };
         match &message.content {
-            Content::Odometer(sample) if first => self.plots.odometer(sample),
-            Content::Doppler(sample) if first => self.plots.doppler(sample),
+            Content::Odometer(sample) => view.plots.odometer(sample),
+            Content::Doppler(sample) => view.plots.doppler(sample),
             Content::Protection(report) => {
+                view.plots.protection(report);
                 self.texts.protection(id, report)?;
-                if first {
-                    self.plots.protection(report);
-                    self.texts.display(report.time, &report.display)?;
-                }
+                self.texts.display(id, report.time, &report.display)?;
             }
-            Content::Warning(warning) => self.texts.warning(id, message, warning)?,
             _ => {}
         }
-        Ok(message.received_at)
+        Ok(time)
+    }
+
+    fn view(&mut self, id: TrainId) -> Option<&mut TrainView> {
+        if id == TrainId::default() {
+            return Some(&mut self.first);
+        }
+        self.others.get_mut(&id)
     }
 
     /// Sends the layout, once: with the first truth, which says where to look.
@@ -301,13 +351,27 @@ impl Open {
     fn flush(&mut self) -> Result {
         self.lay_out(None)?;
         self.stream.flush()?;
-        self.moving.flush()?;
-        self.plots.flush()
+        let views = std::iter::once(&mut self.first).chain(self.others.values_mut());
+        for view in views {
+            view.moving.flush()?;
+            view.plots.flush()?;
+        }
+        Ok(())
     }
 
     fn close(mut self) -> Result {
         self.flush()?;
         self.stream.finish()
+    }
+}
+
+/// Where something of a train goes: as the path says for the first one, below a number for others.
+fn path_of(id: TrainId, path: &str) -> String {
+    let number = id.index();
+    match (number, path.strip_prefix("world/")) {
+        (0, _) => path.to_owned(),
+        (_, Some(in_world)) => format!("world/train_{number}/{in_world}"),
+        (_, None) => format!("train_{number}/{path}"),
     }
 }
 

@@ -4,9 +4,9 @@ use super::palette::{self, ui};
 use super::scene::{HEAD, RecordedScene, turn};
 use super::stream::Stream;
 use super::whole_files::{Result, failed};
-use super::{images, slug};
-use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime};
-use crate::session::Opening;
+use super::{images, path_of, slug};
+use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime, TrainId};
+use crate::session::TrainOpening;
 use crate::track::TrackPoint;
 use crate::twin::geometry::{Body, Hull, Shape};
 use crate::twin::physics::TrainState;
@@ -63,10 +63,11 @@ impl Poses {
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
     stream: Stream,
+    id: TrainId,
     scene: Rc<RecordedScene>,
     /// Both eyes, where there is a rig.
     rig: Option<(RigCalibration, [Poses; 2])>,
-    /// The head, then the cars; empty where there is neither train nor rig.
+    /// The head, then the cars of the first train; empty where there is neither train nor rig.
     train: Vec<Poses>,
     left: Option<Isometry3<f64>>,
     /// Paths of what may be none, and is there.
@@ -76,40 +77,45 @@ pub(super) struct Moving {
 }
 
 impl Moving {
-    /// Draws the train, and makes ready for its motion.
+    /// Draws a train, and makes ready for its motion.
     pub(super) fn open(
         stream: Stream,
         scene: Rc<RecordedScene>,
-        opening: &Opening<'_>,
+        train: Option<&TrainOpening>,
     ) -> Result<Self> {
-        let first = opening.first();
-        let half = first.map_or(Vector3::zeros(), |train| train.car_half_extents_m);
+        let id = train.map(|train| train.id).unwrap_or_default();
+        let half = train.map_or(Vector3::zeros(), |train| train.car_half_extents_m);
         let half = half.map(|x| x as f32);
-        let cars = first.map_or(0, |train| train.cars);
-        let rig = first.and_then(|train| train.rig);
+        // The cars of other trains than the first are among the bodies.
+        let is_first = id == TrainId::default();
+        let cars = train.map_or(0, |train| if is_first { train.cars } else { 0 });
+        let has_head = train.is_some_and(|train| train.cars > 0 || train.rig.is_some());
+        let rig = train.and_then(|train| train.rig);
         for car in 0..cars {
             let body = Boxes3D::from_half_sizes([[half.x, half.y, half.z]])
                 .with_colors([palette::TRAIN])
                 .with_fill_mode(FillMode::TransparentFillMajorWireframe);
             stream.log_static(&car_path(car), &body)?;
         }
-        let eyes = [images::LEFT, images::RIGHT];
+        let eyes = [images::LEFT, images::RIGHT].map(|eye| path_of(id, eye));
         if let Some(rig) = rig {
-            for (eye, camera) in eyes.into_iter().zip([rig.left, rig.right]) {
+            for (eye, camera) in eyes.iter().zip([rig.left, rig.right]) {
                 stream.log_static(eye, &images::pinhole(&camera.intrinsics, 1.2))?;
             }
         }
         let mut train = Vec::new();
-        if cars > 0 || rig.is_some() {
-            train.push(Poses::of(HEAD));
-            train.extend((0..cars).map(|car| Poses::of(car_path(car))));
+        if has_head {
+            let head = path_of(id, HEAD);
             // On the head itself: the viewer's eye can follow only what has a shape of its own,
             // and keeps a distance that fits its size.
             let (mast, tip) = mast(8.4, "true", palette::TRUTH);
-            stream.log_static(HEAD, &[&mast as &dyn AsComponents, &tip])?;
+            stream.log_static(&head, &[&mast as &dyn AsComponents, &tip])?;
+            train.push(Poses::of(head));
+            train.extend((0..cars).map(|car| Poses::of(car_path(car))));
         }
         Ok(Self {
             stream,
+            id,
             scene,
             rig: rig.map(|rig| (rig, eyes.map(Poses::of))),
             train,
@@ -208,7 +214,7 @@ impl Moving {
                 Method::Stereo => 10.8,
                 Method::Mono => 12.0,
             };
-            let path = format!("world/estimate/{name}");
+            let path = path_of(self.id, &format!("world/estimate/{name}"));
             let place = Transform3D::from_translation(self.scene.local(&fix.position));
             self.stream.log(&path, &place)?;
             // Drawn with the first fix: before it, there is nothing to show.
@@ -231,7 +237,7 @@ impl Moving {
             .with_colors(colour)
             .with_labels(label);
         self.stream.at_frame(report.time, report.number);
-        self.log(SIGHT, seen.is_some(), &sight)
+        self.log(&path_of(self.id, SIGHT), seen.is_some(), &sight)
     }
 
     /// Shows where a wayside device takes obstacles to be. The time must have been set.

@@ -2,9 +2,9 @@
 
 use super::stream::Stream;
 use super::whole_files::{Result, failed};
-use super::{Contents, palette, slug};
+use super::{Contents, palette, path_of, slug};
 use crate::bus::{
-    DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime,
+    DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime, TrainId,
     WaysideReport,
 };
 use crate::twin::physics::TrainState;
@@ -180,6 +180,7 @@ struct Series {
 /// The series of a recording.
 pub(super) struct Plots {
     stream: Stream,
+    id: TrainId,
     curves: Vec<(String, ValueOf)>,
     series: BTreeMap<String, Series>,
     /// Names of the wayside devices.
@@ -189,17 +190,18 @@ pub(super) struct Plots {
 impl Plots {
     /// Names and colours the series.
     pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self> {
+        let id = contents.id;
         for group in panes(contents).iter().flatten() {
             let is_there =
                 |curve: &&Curve| contents.radar || !matches!(curve.value, ValueOf::Radar(_));
             for curve in group.curves.iter().filter(is_there) {
-                let path = group.path_of(curve);
+                let path = path_of(id, &group.path_of(curve));
                 style(&stream, &path, curve.name, curve.colour, curve.width)?;
             }
         }
         for method in Method::ALL.into_iter().filter(|_| contents.rig) {
             let (name, colour) = palette::method(method);
-            let [error, upper, lower] = error_paths(method);
+            let [error, upper, lower] = error_paths(id, method);
             style(&stream, &error, name, colour, 1.5)?;
             // One entry of the legend for both.
             for bound in [upper, lower] {
@@ -213,16 +215,17 @@ impl Plots {
             style(&stream, &formula, &formula_name, faint(*colour), 1.5)?;
         }
         for (camera, colour) in contents.cameras().zip(DEVICE_COLOURS.iter().cycle()) {
-            for path in exposure_paths(camera) {
+            for path in exposure_paths(id, camera) {
                 style(&stream, &path, camera, *colour, 1.5)?;
             }
         }
         let curves = GROUPS.iter().flat_map(|group| {
             let curves = group.curves.iter();
-            curves.map(|curve| (group.path_of(curve), curve.value))
+            curves.map(|curve| (path_of(id, &group.path_of(curve)), curve.value))
         });
         Ok(Self {
             stream,
+            id,
             curves: curves.collect(),
             series: BTreeMap::new(),
             devices: contents.devices.clone(),
@@ -275,7 +278,7 @@ impl Plots {
         for (fix, true_m) in report.fixes.iter().zip(true_chainages_m) {
             let bound_m = 2.0 * fix.sigma_m;
             let values_m = [fix.chainage_m - true_m, bound_m, -bound_m].map(Some);
-            self.push(error_paths(fix.method), fix.time, values_m);
+            self.push(error_paths(self.id, fix.method), fix.time, values_m);
         }
     }
 
@@ -290,7 +293,7 @@ impl Plots {
     /// What a camera says it took a frame with.
     pub(super) fn exposure(&mut self, camera: &str, frame: &Frame) {
         let values = [frame.exposure_s * US, frame.gain_db].map(Some);
-        self.push(exposure_paths(camera), frame.start, values);
+        self.push(exposure_paths(self.id, camera), frame.start, values);
     }
 
     fn push<const N: usize>(
@@ -339,9 +342,9 @@ fn push_or_gap(all: &mut BTreeMap<String, Series>, path: &str, time: SimTime, va
 }
 
 /// Of the error and its bounds.
-fn error_paths(method: Method) -> [String; 3] {
+fn error_paths(id: TrainId, method: Method) -> [String; 3] {
     let (name, _) = palette::method(method);
-    ["", "/upper", "/lower"].map(|end| format!("plots/position_error/{name}{end}"))
+    ["", "/upper", "/lower"].map(|end| path_of(id, &format!("plots/position_error/{name}{end}")))
 }
 
 /// Of the distance along the line, and by the paper's formula.
@@ -350,8 +353,8 @@ fn distance_paths(device: &str) -> [String; 2] {
 }
 
 /// Of exposure and gain.
-fn exposure_paths(camera: &str) -> [String; 2] {
-    ["exposure", "gain"].map(|what| format!("plots/{what}/{}", slug(camera)))
+fn exposure_paths(id: TrainId, camera: &str) -> [String; 2] {
+    ["exposure", "gain"].map(|what| path_of(id, &format!("plots/{what}/{}", slug(camera))))
 }
 
 fn faint(colour: Color) -> Color {

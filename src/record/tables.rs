@@ -10,20 +10,30 @@ use std::path::{Path, PathBuf};
 const HEADER: &str = "time_s,method,uid,identity,chainage_m,true_chainage_m,error_m,sigma_m,\
                       lamp_x_m,lamp_y_m,lamp_z_m";
 
-/// One row a position fix, as comma-separated values: when, by which method, on which lamp, the
+/// One row a position fix of one train, as comma-separated values: when, by which method, on which lamp, the
 /// chainage with its sigma, the true one, their difference, and the lamp in the left camera's
 /// frame (x right, y down, z forward). Written as `<path>.part`, and named in [`Observer::close`].
 pub struct FixTable {
+    train: TrainId,
     path: PathBuf,
     rows: Option<BufWriter<File>>,
 }
 
 impl FixTable {
-    /// Into a file.
-    pub fn to_file(path: &Path) -> Self {
+    /// Of a train, into a folder.
+    pub fn to_folder(folder: &Path, train: TrainId) -> Self {
         Self {
-            path: path.to_owned(),
+            train,
+            path: folder.join(Self::file_name(train)),
             rows: None,
+        }
+    }
+
+    /// `fixes.csv` for the first train, `fixes_train_k.csv` for train `k`.
+    pub fn file_name(train: TrainId) -> String {
+        match train.index() {
+            0 => "fixes.csv".to_owned(),
+            k => format!("fixes_train_{k}.csv"),
         }
     }
 }
@@ -39,11 +49,13 @@ impl Observer for FixTable {
     }
 
     fn observe(&mut self, event: &Event<'_>) -> Result {
-        let (Some(rows), Event::Pair(TrainId(0), _, report, true_chainages_m)) =
-            (&mut self.rows, event)
+        let (Some(rows), Event::Pair(train, _, report, true_chainages_m)) = (&mut self.rows, event)
         else {
             return Ok(());
         };
+        if *train != self.train {
+            return Ok(());
+        }
         for (fix, true_m) in report.fixes.iter().zip(*true_chainages_m) {
             let lamp = fix.lamp_in_camera;
             writeln!(

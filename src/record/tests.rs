@@ -339,7 +339,10 @@ fn an_impossible_file_is_an_error() {
 fn fixes_become_rows() {
     let folder = Folder::new("fixes");
     let path = folder.file("fixes.csv");
-    play(&mut FixTable::to_file(&path), SMALL);
+    play(
+        &mut FixTable::to_folder(path.parent().unwrap(), TrainId(0)),
+        SMALL,
+    );
     assert!(!part_name(&path).exists());
     let text = fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();

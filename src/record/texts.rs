@@ -1,8 +1,8 @@
 //! The event log and the driver's display.
 
-use super::palette;
 use super::stream::Stream;
 use super::whole_files::Result;
+use super::{palette, path_of};
 use crate::bus::{
     BrakeDemand, CameraFault, DangerLevel, DriverDisplay, LedReport, Message, Node,
     ObstacleWarning, ProtectionReport, SimTime, TrainId, Via, WaysideReport,
@@ -25,8 +25,8 @@ pub(super) struct Texts {
     danger: Vec<(DangerLevel, usize)>,
     /// What each train last heard of each device each way.
     heard: BTreeMap<(TrainId, String, &'static str), DangerLevel>,
-    /// What the display shows.
-    shown: String,
+    /// What the display of each train shows.
+    shown: BTreeMap<TrainId, String>,
 }
 
 impl Texts {
@@ -46,7 +46,7 @@ impl Texts {
             brake: BTreeMap::new(),
             danger: vec![(DangerLevel::None, 0); opening.wayside.len()],
             heard: BTreeMap::new(),
-            shown: String::new(),
+            shown: BTreeMap::new(),
         };
         texts.note(SimTime::ZERO, &text)?;
         Ok(texts)
@@ -80,9 +80,9 @@ impl Texts {
     }
 
     /// Lamps have gone by without shining.
-    pub(super) fn dark_lamps(&self, report: &LedReport) -> Result {
+    pub(super) fn dark_lamps(&self, id: TrainId, report: &LedReport) -> Result {
         for uid in &report.dark {
-            let text = format!("lamp {uid} is dark");
+            let text = format!("{}lamp {uid} is dark", of_train(id));
             self.log(report.time, TextLogLevel::WARN, &text)?;
         }
         Ok(())
@@ -157,15 +157,22 @@ impl Texts {
     }
 
     /// What the driver sees, when it changed.
-    pub(super) fn display(&mut self, time: SimTime, display: &DriverDisplay) -> Result {
+    pub(super) fn display(
+        &mut self,
+        id: TrainId,
+        time: SimTime,
+        display: &DriverDisplay,
+    ) -> Result {
         let text = markdown(display);
-        if text == self.shown {
+        if self.shown.get(&id) == Some(&text) {
             return Ok(());
         }
         self.stream.at(time);
-        self.stream
-            .log(DISPLAY, &TextDocument::from_markdown(text.as_str()))?;
-        self.shown = text;
+        self.stream.log(
+            &path_of(id, DISPLAY),
+            &TextDocument::from_markdown(text.as_str()),
+        )?;
+        self.shown.insert(id, text);
         Ok(())
     }
 
