@@ -112,3 +112,20 @@ fn a_train_that_runs_down_positions_itself() {
     let wrong = wrong.unwrap_err().to_string();
     assert!(wrong.contains("rig.side"), "{wrong}");
 }
+
+/// A rig in the rear cab looks back and runs backwards; what it gives is the chainage of the head.
+#[test]
+fn a_rig_in_the_rear_cab_gives_the_head() {
+    let summary = stretch(&[
+        "train.start_chainage_m=400.0",
+        "stack.protection.initial_chainage_m=400.0",
+        "rig.end=\"rear\"",
+        "rig.side=\"right\"",
+        "rig.yaw_deg=141.0",
+    ]);
+    let paper = &summary.positioning[&Method::Stereo];
+    assert_eq!(paper.wrong_uid, 0);
+    assert!(paper.fixes > 60, "{}", paper.fixes);
+    let error_m = paper.error_m.unwrap();
+    assert!(error_m.p95 < 0.1, "{}", error_m.p95);
+}

@@ -16,7 +16,7 @@ pub enum BrakeDemand {
     Emergency,
 }
 
-/// From the protection to the train, every cycle.
+/// From a piece of equipment to the train, every cycle. The train obeys all that it is given.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrainCommand {
     /// Overrides the driver where it is not `None`.
@@ -31,6 +31,15 @@ impl TrainCommand {
         brake: BrakeDemand::None,
         permitted_speed_mps: f64::INFINITY,
     };
+
+    /// What obeys both commands.
+    #[must_use]
+    pub fn and(self, other: Self) -> Self {
+        Self {
+            brake: self.brake.max(other.brake),
+            permitted_speed_mps: self.permitted_speed_mps.min(other.permitted_speed_mps),
+        }
+    }
 }
 
 /// One lamp with its buzzer, on the driver's display.

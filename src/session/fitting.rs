@@ -33,6 +33,8 @@ pub struct Fitted {
     pub node: Node,
     /// The equipment.
     pub equipment: Box<dyn Equipment>,
+    /// It is the user's own, which the scenario does not know.
+    pub is_added: bool,
 }
 
 /// Everything that senses and computes in a scenario.
@@ -66,8 +68,11 @@ impl Fitting {
 
     /// A piece of equipment of the user's own.
     pub fn add_equipment(&mut self, node: Node, equipment: impl Equipment + 'static) {
-        let equipment = Box::new(equipment);
-        self.equipment.push(Fitted { node, equipment });
+        self.equipment.push(Fitted {
+            node,
+            equipment: Box::new(equipment),
+            is_added: true,
+        });
     }
 
     /// All nodes that have equipment, each once.
@@ -90,10 +95,7 @@ impl Fitting {
             let camera = StereoCamera::new(train, rig, &scenario.faults.cameras, seed);
             self.add_sensor(node.clone(), camera);
         }
-        for kind in &onboard.equipment {
-            self.equipment
-                .extend(onboard_equipment(*kind, onboard, maps));
-        }
+        self.equipment.extend(onboard_equipment(onboard, maps));
     }
 
     fn add_motion_sensors(&mut self, onboard: &Onboard, node: &Node, seed: u64) {
@@ -141,12 +143,22 @@ impl Fitting {
         self.add_sensor(node.clone(), camera);
         let (settings, calibration) = (&scenario.stack.wayside, post.calibration.clone());
         let detection = WaysideDetection::new(settings, calibration, maps.up.clone());
-        self.add_equipment(node, detection);
+        self.equipment.push(Fitted {
+            node,
+            equipment: Box::new(detection),
+            is_added: false,
+        });
     }
 }
 
+/// The equipment of a train.
+pub fn onboard_equipment(onboard: &Onboard, maps: &Maps) -> impl Iterator<Item = Fitted> {
+    let kinds = onboard.equipment.iter();
+    kinds.filter_map(|kind| one_of_onboard(*kind, onboard, maps))
+}
+
 /// A piece of equipment of a train; `None` where the train lacks what it needs.
-pub fn onboard_equipment(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Option<Fitted> {
+fn one_of_onboard(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Option<Fitted> {
     let node = Node::Train(onboard.train);
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
@@ -173,7 +185,11 @@ pub fn onboard_equipment(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps)
             Box::new(TrainProtection::new(at, &onboard.protection, map))
         }
     };
-    Some(Fitted { node, equipment })
+    Some(Fitted {
+        node,
+        equipment,
+        is_added: false,
+    })
 }
 
 /// The surveyed map, as trains meet it that run up or down the line.

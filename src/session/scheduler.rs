@@ -40,7 +40,10 @@ pub struct Session<'s> {
     delayed_so_far: u64,
     /// Messages with images that were delivered in this step, and what working on each cost.
     pub(super) images: Vec<Delivered>,
+    /// What each train is commanded by all of its equipment.
     commands: Vec<TrainCommand>,
+    /// The last command of each piece of equipment.
+    commanded: BTreeMap<(TrainId, usize), TrainCommand>,
     pub(super) trains: BTreeMap<TrainId, TrainScore>,
     pub(super) posts: Posts,
     pub(super) bench: Option<Bench>,
@@ -49,8 +52,8 @@ pub struct Session<'s> {
     pub(super) cost: Costs,
 }
 
-/// What trains are told before their equipment's first cycle: those without a protection, to run as
-/// their drivers like.
+/// What trains are commanded before their equipment's first cycle: those without a protection, to run
+/// as their drivers like.
 fn first_commands(scenario: &Scenario) -> Vec<TrainCommand> {
     let mut commands = vec![TrainCommand::UNSUPERVISED; TrainId::MOST];
     let protected = scenario.onboard.iter().filter(|o| o.protects());
@@ -97,6 +100,7 @@ impl<'s> Session<'s> {
             posts: Posts::new(scenario),
             bench: scenario.bench.map(|bench| Bench::new(&bench)),
             commands: first_commands(scenario),
+            commanded: BTreeMap::new(),
             scenario,
             world,
             sensors: fitting.sensors,
@@ -383,15 +387,24 @@ impl<'s> Session<'s> {
         Ok(())
     }
 
+    /// Equipment `k` commands a train, which obeys all of its equipment.
+    fn command(&mut self, id: TrainId, k: usize, command: TrainCommand) {
+        self.commanded.insert((id, k), command);
+        let of_train = self.commanded.range((id, 0)..=(id, usize::MAX));
+        let all = of_train.map(|(_, command)| *command);
+        if let Some(current) = self.commands.get_mut(id.index()) {
+            *current = all.fold(TrainCommand::UNSUPERVISED, TrainCommand::and);
+        }
+    }
+
     /// Sends what equipment `k` says.
     fn send(&mut self, k: usize, message: Message) {
         let own = message.sender == self.equipment[k].node;
         if own
             && let (Content::Command(command), Node::Train(id)) =
                 (&message.content, &message.sender)
-            && let Some(current) = self.commands.get_mut(id.index())
         {
-            *current = *command;
+            self.command(*id, k, *command);
         }
         if message.receiver != Receiver::Own {
             let world = &self.world;
@@ -412,16 +425,14 @@ impl<'s> Session<'s> {
         score.map_or(0, |(score, method)| score.fixes(*method))
     }
 
-    /// Puts the rig of a bench at a point. Its equipment starts anew.
+    /// Puts the rig of a bench at a point. The scenario's equipment starts anew; the user's own goes on.
     fn place_rig(&mut self, head_m: f64) {
         self.world.place_carrier(head_m);
         let maps = Maps::new(self.scenario);
-        for onboard in &self.scenario.onboard {
-            let node = Node::Train(onboard.train);
-            self.equipment.retain(|fitted| fitted.node != node);
-            let kinds = onboard.equipment.iter();
-            self.equipment
-                .extend(kinds.filter_map(|kind| onboard_equipment(*kind, onboard, &maps)));
-        }
+        let onboard = self.scenario.onboard.iter();
+        let anew = onboard.flat_map(|onboard| onboard_equipment(onboard, &maps));
+        let added = std::mem::take(&mut self.equipment).into_iter();
+        let added = added.filter(|fitted| fitted.is_added);
+        self.equipment = anew.chain(added).collect();
     }
 }
