@@ -38,7 +38,7 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
     };
     let at = |name: &str, chainage_m: f64| format!("{name} at {chainage_m} m");
     let balises = tunnel.balises.iter().map(|b| at(&b.name, b.chainage_m));
-    let stations = tunnel.stations.iter().map(|(name, s)| at(name, *s));
+    let stations = tunnel.stations.iter().map(|s| at(&s.name, s.chainage_m));
     lines.push(named("balises", balises.collect()));
     lines.push(named("stations", stations.collect()));
     indented(&lines)

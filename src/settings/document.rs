@@ -179,17 +179,23 @@ fn remove_wrong(
     span: Option<Range<usize>>,
 ) -> Option<String> {
     let span = span?;
+    // Spans are exact, unless an enum was read through a buffer: then they are that of the table
+    // around, and the first such key, or quoted value, in it is the one.
     match wrong {
         Wrong::MissingKey { .. } => None,
-        // Spans of unknown keys are exact, unless an enum was read through a buffer: then the
-        // first such key inside the span is the one.
         Wrong::UnknownKey { key, .. } => remove_in_table(table, "", &|k, _| k.span() == span)
-            .or_else(|| {
-                remove_in_table(table, "", &|k, _| {
-                    k.get_ref() == key && span.start <= k.span().start && k.span().end <= span.end
+            .or_else(|| remove_below(table, "", &span, &|k, _| k.get_ref() == key)),
+        Wrong::Value { message } => {
+            remove_in_table(table, "", &|_, v| v.span() == span).or_else(|| {
+                let what = message.split(", expected ").next().unwrap_or_default();
+                let quoted = |text: &str| {
+                    what.contains(&format!("`{text}`")) || what.contains(&format!("\"{text}\""))
+                };
+                remove_below(table, "", &span, &|_, v| {
+                    v.get_ref().as_str().is_some_and(quoted)
                 })
-            }),
-        Wrong::Value { .. } => remove_in_table(table, "", &|_, v| v.span() == span),
+            })
+        }
     }
 }
 
@@ -218,6 +224,39 @@ fn remove_in_value(value: &mut DeValue<'_>, path: &str, pick: Pick<'_>) -> Optio
         }),
         _ => None,
     }
+}
+
+/// Takes an entry out of the innermost table or list with a span.
+fn remove_below(
+    table: &mut DeTable<'_>,
+    path: &str,
+    span: &Range<usize>,
+    pick: Pick<'_>,
+) -> Option<String> {
+    table.iter_mut().find_map(|(key, value)| {
+        remove_below_value(value, &key_below(path, key.get_ref()), span, pick)
+    })
+}
+
+fn remove_below_value(
+    value: &mut Spanned<DeValue<'_>>,
+    path: &str,
+    span: &Range<usize>,
+    pick: Pick<'_>,
+) -> Option<String> {
+    let own = value.span();
+    let deeper = match value.get_mut() {
+        DeValue::Table(table) => remove_below(table, path, span, pick),
+        DeValue::Array(array) => array
+            .iter_mut()
+            .enumerate()
+            .find_map(|(i, v)| remove_below_value(v, &format!("{path}[{i}]"), span, pick)),
+        _ => None,
+    };
+    if deeper.is_some() || own != *span {
+        return deeper;
+    }
+    remove_in_value(value.get_mut(), path, pick)
 }
 
 /// Dotted path of the innermost value that holds a span.

@@ -1,10 +1,12 @@
 //! Tunnel files as a user writes them: TOML, every key with its unit and default.
 
+use super::furniture::{Balise, BaseStation, StoppingPlace};
 use super::section::Side;
 use super::uid::LineCode;
-use crate::settings::{Checker, settings};
+use crate::settings::{Checker, Problem, Settings, put_range, settings};
 use schemars::{JsonSchema, Schema, schema_for};
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// No line is longer: chainages stay exact to a nanometre.
 pub(super) const LONGEST_M: f64 = 1e6;
@@ -32,9 +34,9 @@ settings! {
         grades: Vec<GradeEntry>, nested;
         /// Cross-sections in order; none means circular, 3 m, without walkway, all along.
         #[serde(default)]
-        sections: Vec<SectionEntry>;
+        sections: Vec<SectionEntry>, nested;
         /// A row of lamps at equal distances, and the properties of lamps of this tunnel.
-        lamps: Option<LampRow>, nested;
+        lamps: Option<LampRowEntry>, nested;
         /// Single lamps.
         #[serde(default)]
         lamp: Vec<LampEntry>, nested;
@@ -43,13 +45,13 @@ settings! {
         wayside: Vec<WaysideEntry>, nested;
         /// Balises between the rails.
         #[serde(default)]
-        balises: Vec<BaliseEntry>;
+        balises: Vec<Balise>;
         /// Radio base stations.
         #[serde(default)]
-        base_stations: Vec<BaseStationEntry>, nested;
+        base_stations: Vec<BaseStation>, nested;
         /// Places where trains stop.
         #[serde(default)]
-        stations: Vec<StationEntry>;
+        stations: Vec<StoppingPlace>;
     }
     also check_name
 }
@@ -84,32 +86,47 @@ settings! {
     }
 }
 
-/// Kind of a plan element.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum PlanKind {
-    /// No curvature.
-    Straight,
-    /// Curvature and cant run linearly from those of the element before to those of the next.
-    Clothoid,
-    /// Constant curvature.
-    Arc,
+/// A plan element.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[schemars(extend("unevaluatedProperties" = false))]
+pub struct PlanEntry {
+    /// Length in plan, metres.
+    #[schemars(transform = put_range(LENGTH_M))]
+    pub length_m: f64,
+    /// Its kind.
+    #[serde(flatten)]
+    pub shape: PlanShape,
+}
+
+/// Lengths that a plan element may have.
+const LENGTH_M: RangeInclusive<f64> = 0.001..=LONGEST_M;
+
+impl Settings for PlanEntry {
+    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        Checker::new(at, problems).within("length_m", self.length_m, LENGTH_M);
+        self.shape.check(at, problems);
+    }
 }
 
 settings! {
-    /// A plan element.
-    pub struct PlanEntry {
-        /// Its kind.
-        kind: PlanKind;
-        /// Length in plan, metres.
-        length_m: f64, in 0.001..=LONGEST_M;
-        /// Radius of an arc, metres, positive.
-        radius_m: Option<f64>;
-        /// To which side an arc turns, looking up the line.
-        turn: Option<Side>;
-        /// Height of an arc's outer rail over the inner one, millimetres. Default 0.
-        // The most on metro lines (GB 50157).
-        cant_mm: Option<f64>, in 0.0..=120.0;
+    /// Shape of a plan element, by its kind.
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    pub enum PlanShape {
+        /// No curvature.
+        Straight {},
+        /// Curvature and cant run linearly from those of the element before to those of the next.
+        Clothoid {},
+        /// Constant curvature.
+        Arc {
+            /// Radius, metres, positive.
+            radius_m: f64, in 20.0..=1e6;
+            /// To which side it turns, looking up the line.
+            turn: Side;
+            /// Height of the outer rail over the inner one, millimetres. Default 0.
+            #[serde(default)]
+            // The most on metro lines (GB 50157).
+            cant_mm: f64, in 0.0..=120.0;
+        },
     }
 }
 
@@ -130,60 +147,78 @@ fn vertical_radius() -> f64 {
     3000.0
 }
 
-/// Kind of a cross-section.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum SectionKind {
-    /// Shield-driven: `radius_m`, `centre_m`, `walkway`.
-    Circular,
-    /// Mined: `width_m`, `springing_m`, `ceiling_m`, `walkway`.
-    Horseshoe,
-    /// Cut and cover, or station: `left_m`, `right_m`, `ceiling_m`, `walkway`, `platform`,
-    /// `platform_edge_m`, `platform_height_m`.
-    Rectangular,
-    /// Without walls: `width_m`.
-    Open,
-}
-
-/// A cross-section over a range of chainage.
+/// A cross-section over a stretch of the line.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[schemars(extend("unevaluatedProperties" = false))]
 pub struct SectionEntry {
-    /// Its kind.
-    pub kind: SectionKind,
     /// From this chainage, metres.
     pub from_m: f64,
     /// To this chainage, metres. Default: where the next begins, or the end of the line.
     pub to_m: Option<f64>,
-    /// Inner radius of a circular section, metres. Default 3.0.
-    pub radius_m: Option<f64>,
-    /// Centre of a circular section over top of rail, metres. Default: 0.74 m of track structure
-    /// under top of rail (2.26 for a radius of 3.0).
-    pub centre_m: Option<f64>,
-    /// Width of a horseshoe (default 5.2) or of the bed in the open (default 6.0), metres.
-    pub width_m: Option<f64>,
-    /// Height over top of rail where a horseshoe's arch springs, metres. Default 2.4.
-    pub springing_m: Option<f64>,
-    /// Left wall of a rectangle from the centreline, metres. Default 2.9.
-    pub left_m: Option<f64>,
-    /// Right wall of a rectangle from the centreline, metres. Default 2.9.
-    pub right_m: Option<f64>,
-    /// Crown of a horseshoe (default 4.8) or ceiling of a rectangle (default 4.6) over top of
-    /// rail, metres.
-    pub ceiling_m: Option<f64>,
-    /// Side of an evacuation walkway. Default: none.
-    pub walkway: Option<Side>,
-    /// Side of a platform. Default: none.
-    pub platform: Option<Side>,
-    /// Edge of the platform from the centreline, metres. Default 1.5 (GB 50157, B cars).
-    pub platform_edge_m: Option<f64>,
-    /// Platform over top of rail, metres. Default 1.05 (50 mm under the floor of a B car).
-    pub platform_height_m: Option<f64>,
+    /// Its kind and dimensions.
+    #[serde(flatten)]
+    pub shape: SectionShape,
+}
+
+impl Settings for SectionEntry {
+    fn check(&self, at: &str, problems: &mut Vec<Problem>) {
+        self.shape.check(at, problems);
+    }
+}
+
+settings! {
+    /// Outline of a cross-section, by its kind.
+    #[serde(tag = "kind", rename_all = "snake_case")]
+    pub enum SectionShape {
+        /// Shield-driven.
+        Circular {
+            /// Inner radius, metres. Default 3.0.
+            radius_m: Option<f64>, in 2.2..=20.0;
+            /// Its centre over top of rail, metres. Default: 0.74 m of track structure under top of
+            /// rail (2.26 for a radius of 3.0).
+            centre_m: Option<f64>, in 0.5..=20.0;
+            /// Side of an evacuation walkway. Default: none.
+            walkway: Option<Side>;
+        },
+        /// Mined.
+        Horseshoe {
+            /// Width, metres. Default 5.2.
+            width_m: Option<f64>, in 3.4..=20.0;
+            /// Height over top of rail where the arch springs, metres. Default 2.4.
+            springing_m: Option<f64>, in 0.5..=20.0;
+            /// Crown over top of rail, metres. Default 4.8.
+            ceiling_m: Option<f64>, in 4.0..=30.0;
+            /// Side of an evacuation walkway. Default: none.
+            walkway: Option<Side>;
+        },
+        /// Cut and cover, or station.
+        Rectangular {
+            /// Left wall from the centreline, metres. Default 2.9.
+            left_m: Option<f64>, in 1.7..=60.0;
+            /// Right wall from the centreline, metres. Default 2.9.
+            right_m: Option<f64>, in 1.7..=60.0;
+            /// Ceiling over top of rail, metres. Default 4.6.
+            ceiling_m: Option<f64>, in 4.0..=30.0;
+            /// Side of an evacuation walkway. Default: none.
+            walkway: Option<Side>;
+            /// Side of a platform. Default: none.
+            platform: Option<Side>;
+            /// Edge of the platform from the centreline, metres. Default 1.5 (GB 50157, B cars).
+            platform_edge_m: Option<f64>, in 1.45..=3.0;
+            /// Platform over top of rail, metres. Default 1.05 (50 mm under the floor of a B car).
+            platform_height_m: Option<f64>, in 0.2..=1.2;
+        },
+        /// Track in the open.
+        Open {
+            /// Width of the bed, metres. Default 6.0.
+            width_m: Option<f64>, in 3.4..=60.0;
+        },
+    }
 }
 
 settings! {
     /// A row of lamps, and the properties of lamps of this tunnel.
-    pub struct LampRow {
+    pub struct LampRowEntry {
         /// Chainage of the first lamp, metres.
         from_m: f64 = 0.0;
         /// No lamp of the row stands beyond this chainage, metres. Default: the end of the line.
@@ -218,6 +253,7 @@ settings! {
 
 settings! {
     /// A single lamp. What is not given is as in `[lamps]`.
+    #[derive(Default)]
     pub struct LampEntry {
         /// Lamp number.
         number: u16, in 0.0..=f64::from(LAST_LAMP);
@@ -257,38 +293,6 @@ settings! {
     }
 }
 
-/// A balise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct BaliseEntry {
-    /// Name.
-    pub name: String,
-    /// Chainage, metres.
-    pub chainage_m: f64,
-}
-
-settings! {
-    /// A radio base station.
-    pub struct BaseStationEntry {
-        /// Name.
-        name: String;
-        /// Chainage, metres.
-        chainage_m: f64;
-        /// Reach up and down the line, metres.
-        reach_m: f64, in 1.0..=LONGEST_M;
-    }
-}
-
-/// A place where trains stop.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct StationEntry {
-    /// Name.
-    pub name: String,
-    /// Where the head of a train stops, metres.
-    pub chainage_m: f64,
-}
-
 /// JSON Schema of tunnel files, for editors that complete and check TOML.
 pub fn tunnel_schema() -> Schema {
     schema_for!(TunnelFile)
@@ -308,11 +312,12 @@ mod tests {
         let definitions = root["$defs"].as_object().unwrap().values();
         let mut keys = 0;
         for table in definitions.chain([root]) {
-            let Some(properties) = table["properties"].as_object() else {
-                continue;
-            };
-            assert_eq!(table["additionalProperties"], false);
-            for (key, property) in properties {
+            let choices = table["oneOf"].as_array().into_iter().flatten();
+            let tables = choices.chain([table]);
+            let properties = tables.filter_map(|t| t["properties"].as_object()).flatten();
+            for (key, property) in properties.filter(|(_, p)| p["const"].is_null()) {
+                let more = ["additionalProperties", "unevaluatedProperties"];
+                assert!(more.iter().any(|more| table[more] == false), "{key}");
                 assert!(property["description"].is_string(), "{key}");
                 keys += 1;
             }

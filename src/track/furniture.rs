@@ -1,7 +1,11 @@
-//! What is fixed to the tunnel: lamps, wayside devices, balises, base stations.
+//! What is fixed to the tunnel: lamps, wayside devices, balises, base stations, stopping places.
 
+use super::file::LONGEST_M;
 use super::uid::{LineCode, Uid};
+use crate::settings::settings;
 use nalgebra::{Point3, Unit, Vector3};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
 /// A lamp as surveyed.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,21 +56,33 @@ pub struct WaysideSite {
 }
 
 /// A balise between the rails.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
 pub struct Balise {
     /// Name.
     pub name: String,
-    /// Chainage.
+    /// Chainage, metres.
     pub chainage_m: f64,
 }
 
-/// A radio base station and the stretch that it covers.
-#[derive(Clone, Debug, PartialEq)]
-pub struct BaseStation {
+settings! {
+    /// A radio base station and the stretch that it covers.
+    pub struct BaseStation {
+        /// Name.
+        name: String;
+        /// Chainage, metres.
+        chainage_m: f64;
+        /// Reach up and down the line, metres.
+        reach_m: f64, in 1.0..=LONGEST_M;
+    }
+}
+
+/// A place where trains stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct StoppingPlace {
     /// Name.
     pub name: String,
-    /// Chainage.
+    /// Where the head of a train stops, metres.
     pub chainage_m: f64,
-    /// Reach up and down the line.
-    pub reach_m: f64,
 }

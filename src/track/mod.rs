@@ -59,11 +59,8 @@ pub mod uid;
 pub mod waveform;
 
 pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
-pub use file::{
-    BaliseEntry, BaseStationEntry, GradeEntry, LampEntry, LampRow, PlanEntry, PlanKind,
-    SectionEntry, SectionKind, StartEntry, StationEntry, TunnelFile, WaysideEntry, tunnel_schema,
-};
-pub use furniture::{Balise, BaseStation, LampSite, WaysideSite};
+pub use file::{TunnelFile, tunnel_schema};
+pub use furniture::{Balise, BaseStation, LampSite, StoppingPlace, WaysideSite};
 pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use place::{Direction, Place, TrackId};
 pub use route::Route;
@@ -91,8 +88,8 @@ pub struct Tunnel {
     pub base_stations: Vec<BaseStation>,
     /// Line number, the first part of every lamp's UID.
     pub line_number: u8,
-    /// Names and chainages where trains stop.
-    pub stations: Vec<(String, f64)>,
+    /// Where trains stop.
+    pub stations: Vec<StoppingPlace>,
     /// Light that reaches every surface after many reflections, lux.
     pub ambient_lx: f64,
 }

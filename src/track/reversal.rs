@@ -2,7 +2,8 @@
 //! stands in it stays where it is in the world.
 
 use super::{
-    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, Tunnel, WaysideSite,
+    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, StoppingPlace, Tunnel,
+    WaysideSite,
 };
 use std::f64::consts::PI;
 
@@ -35,7 +36,10 @@ impl Tunnel {
             chainage_m: from_end(base.chainage_m),
             ..base.clone()
         };
-        let turned_station = |(name, s_m): &(String, f64)| (name.clone(), from_end(*s_m));
+        let turned_station = |stop: &StoppingPlace| StoppingPlace {
+            chainage_m: from_end(stop.chainage_m),
+            ..stop.clone()
+        };
         Self {
             name: self.name.clone(),
             alignment: self.alignment.reversed(),
@@ -53,7 +57,7 @@ impl Tunnel {
             balises: sorted(&self.balises, turned_balise, |balise| balise.chainage_m),
             base_stations: sorted(&self.base_stations, turned_base, |base| base.chainage_m),
             line_number: self.line_number,
-            stations: sorted(&self.stations, turned_station, |(_, s_m)| *s_m),
+            stations: sorted(&self.stations, turned_station, |stop| stop.chainage_m),
             ambient_lx: self.ambient_lx,
         }
     }
@@ -134,7 +138,9 @@ mod tests {
         assert!(ascending(
             reversed.wayside.iter().map(|w| w.chainage_m).collect()
         ));
-        assert!(ascending(reversed.stations.iter().map(|s| s.1).collect()));
+        assert!(ascending(
+            reversed.stations.iter().map(|s| s.chainage_m).collect()
+        ));
         let length_m = line.length_m();
         for balise in &tunnel.balises {
             let same = reversed.balise(&balise.name).unwrap();

@@ -28,6 +28,16 @@ pub enum Side {
     Right,
 }
 
+impl Side {
+    /// Of l: 1 on the left, -1 on the right.
+    pub fn sign(self) -> f64 {
+        match self {
+            Self::Left => 1.0,
+            Self::Right => -1.0,
+        }
+    }
+}
+
 /// One corner of the outline.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutlinePoint {
@@ -79,9 +89,15 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// From its start to its end (l, h).
+    fn along(&self) -> (f64, f64) {
+        (self.b.l_m - self.a.l_m, self.b.h_m - self.a.h_m)
+    }
+
     /// Its length.
     pub fn length_m(&self) -> f64 {
-        (self.b.l_m - self.a.l_m).hypot(self.b.h_m - self.a.h_m)
+        let (l, h) = self.along();
+        l.hypot(h)
     }
 
     /// Unit normal (l, h) into the tunnel; zero for an edge without length.
@@ -208,10 +224,7 @@ impl CrossSection {
     /// Builds a ledge of `material` against the wall of one side: everything under `height_m`
     /// and beyond `edge_m` is filled. Leaves the outline as it is where there is no room.
     fn with_ledge(self, side: Side, edge_m: f64, height_m: f64, material: Material) -> Self {
-        let sign = match side {
-            Side::Left => 1.0,
-            Side::Right => -1.0,
-        };
+        let sign = side.sign();
         let (Some(to_wall), Some(to_bed)) = (
             self.ray((0.0, height_m), (sign, 0.0)),
             self.ray((sign * edge_m, height_m), (0.0, -1.0)),
@@ -224,24 +237,18 @@ impl CrossSection {
         let filled = |p: &OutlinePoint| sign * p.l_m >= edge_m - 1e-9 && p.h_m <= height_m + 1e-9;
         // From the right foot over the crown to the left foot: the corners that a ledge replaces
         // stand at the beginning for the right side and at the end for the left one.
-        let kept: Vec<(OutlinePoint, Material)> = self
-            .points
-            .iter()
-            .copied()
-            .zip(self.materials.iter().copied())
-            .filter(|(p, _)| !filled(p))
-            .collect();
+        let kept = self.edges().filter(|e| !filled(&e.a));
+        let kept: Vec<(OutlinePoint, Material)> = kept.map(|e| (e.a, e.material)).collect();
         let wall = OutlinePoint::new(sign * to_wall, height_m);
         let edge = OutlinePoint::new(sign * edge_m, height_m);
         let foot = OutlinePoint::new(sign * edge_m, height_m - to_bed);
-        let ledge = match side {
-            Side::Right => vec![(foot, material), (edge, material), (wall, Material::Lining)],
-            Side::Left => vec![(wall, material), (edge, material), (foot, Material::Bed)],
+        let right = [(foot, material), (edge, material), (wall, Material::Lining)];
+        let left = [(wall, material), (edge, material), (foot, Material::Bed)];
+        let outline = match side {
+            Side::Right => [&right, kept.as_slice()].concat(),
+            Side::Left => [kept.as_slice(), &left].concat(),
         };
-        let (points, materials) = match side {
-            Side::Right => ledge.into_iter().chain(kept).unzip(),
-            Side::Left => kept.into_iter().chain(ledge).unzip(),
-        };
+        let (points, materials) = outline.into_iter().unzip();
         Self {
             points,
             materials,
@@ -279,7 +286,7 @@ impl CrossSection {
     pub fn ray(&self, from: (f64, f64), direction: (f64, f64)) -> Option<f64> {
         self.edges()
             .filter_map(|e| {
-                let along = (e.b.l_m - e.a.l_m, e.b.h_m - e.a.h_m);
+                let along = e.along();
                 let to_a = (e.a.l_m - from.0, e.a.h_m - from.1);
                 let det = cross(direction, along);
                 if det.abs() < 1e-12 {
@@ -296,7 +303,7 @@ impl CrossSection {
     pub fn distance_m(&self, l_m: f64, h_m: f64) -> f64 {
         self.edges()
             .map(|e| {
-                let along = (e.b.l_m - e.a.l_m, e.b.h_m - e.a.h_m);
+                let along = e.along();
                 let to = (l_m - e.a.l_m, h_m - e.a.h_m);
                 let square = along.0 * along.0 + along.1 * along.1;
                 let t = if square > 0.0 {

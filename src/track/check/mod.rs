@@ -9,7 +9,7 @@ use super::Tunnel;
 use super::file::TunnelFile;
 use super::gauge::Gauge;
 use super::section::OutlinePoint;
-use crate::settings::{FileError, Problem, Settings, read_toml};
+use crate::settings::{Checker, FileError, Problem, Settings, read_toml};
 
 /// Chainages closer than this are the same place.
 const SAME_M: f64 = 1e-6;
@@ -18,13 +18,8 @@ impl Tunnel {
     /// Reads and checks the text of a tunnel file. [`locate`](crate::settings::locate) finds the
     /// keys of the problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        Self::from_file(&read_toml(text)?)
-    }
-
-    /// Checks a tunnel as written.
-    pub fn from_file(file: &TunnelFile) -> Result<Self, FileError> {
         let mut problems = Vec::new();
-        let tunnel = check(file, &mut problems);
+        let tunnel = check(&read_toml(text)?, &mut problems);
         if problems.is_empty() {
             Ok(tunnel)
         } else {
@@ -35,54 +30,56 @@ impl Tunnel {
 
 fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     file.check("", problems);
-    let alignment = line::alignment(file, problems);
-    let sections = sections::sections(&file.sections, alignment.length_m(), problems);
+    let mut check = Checker::new("", problems);
+    let check = &mut check;
+    let alignment = line::alignment(file, check);
+    let sections = sections::sections(&file.sections, alignment.length_m(), check);
     let mut tunnel = Tunnel {
         name: file.name.clone(),
         alignment,
         sections,
         lamps: Vec::new(),
         wayside: Vec::new(),
-        balises: devices::balises(file),
-        base_stations: devices::base_stations(file),
+        balises: file.balises.clone(),
+        base_stations: file.base_stations.clone(),
         line_number: file.line_number,
-        stations: devices::stations(file),
+        stations: file.stations.clone(),
         ambient_lx: file.ambient_lx,
     };
-    tunnel.lamps = lamps::place(file, &tunnel, problems);
-    tunnel.wayside = devices::wayside(file, &tunnel, problems);
-    devices::check(file, &tunnel, problems);
+    tunnel.lamps = lamps::place(file, &tunnel, check);
+    tunnel.wayside = devices::wayside(file, &tunnel, check);
+    devices::check_named(&tunnel, check);
     tunnel
 }
 
 /// Whether a chainage is on the line; a problem if not.
-fn on_line(key: impl Into<String>, s_m: f64, tunnel: &Tunnel, problems: &mut Vec<Problem>) -> bool {
+fn on_line(key: &str, s_m: f64, tunnel: &Tunnel, check: &mut Checker<'_>) -> bool {
     let length_m = tunnel.alignment.length_m();
     let on = (-SAME_M..=length_m + SAME_M).contains(&s_m);
     if !on {
-        problems.push(Problem::new(
+        check.problem(
             key,
             format!("{s_m} m is outside of the line"),
             format!("give 0 to {length_m} m"),
-        ));
+        );
     }
     on
 }
 
-/// Problems where any of some points (l, h) lies in the rock or where the train runs.
+/// A problem where any of some points (l, h) lies in the rock or where the train runs.
 fn free_standing(
     key: &str,
     tunnel: &Tunnel,
     s_m: f64,
     points: &[OutlinePoint],
-    problems: &mut Vec<Problem>,
+    check: &mut Checker<'_>,
 ) {
     let Some(section) = tunnel.section_at(s_m) else {
         return;
     };
     let gauge = Gauge::b1(tunnel.alignment.at(s_m).curvature_per_m);
     if let Some(p) = points.iter().find(|p| !section.contains(p.l_m, p.h_m)) {
-        problems.push(Problem::new(
+        check.problem(
             key,
             format!(
                 "at chainage {s_m} m its point l = {:.3} m, h = {:.3} m is inside the rock, {:.3} m \
@@ -92,16 +89,16 @@ fn free_standing(
                 section.distance_m(p.l_m, p.h_m)
             ),
             "move it into the tunnel: smaller `lateral_m`, or another `height_m`",
-        ));
+        );
     } else if let Some(p) = points.iter().find(|p| gauge.contains(p.l_m, p.h_m)) {
-        problems.push(Problem::new(
+        check.problem(
             key,
             format!(
                 "at chainage {s_m} m its point l = {:.3} m, h = {:.3} m is inside the structure gauge",
                 p.l_m, p.h_m
             ),
             "move it towards the wall: larger `lateral_m`",
-        ));
+        );
     }
 }
 
@@ -177,7 +174,7 @@ mod tests {
 
     /// Provokes: a checker that stops at the first fault, or that passes one of them.
     #[test]
-    fn every_fault_is_told_with_its_key() {
+    fn every_fault_is_reported_with_its_key() {
         let cases: [(&str, &str, &str); 16] = [
             ("spacing_m = 10.0", "spacing_mm = 10.0", "lamps.spacing_mm"),
             ("radius_m = 500.0", "radius_m = -500.0", "plan[2].radius_m"),
