@@ -22,8 +22,8 @@ mod tests;
 
 pub use profile::Grade;
 
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
-use piece::{Linear, Piece, pieces};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector2, Vector3};
+use piece::{LinearChange, PlanPiece, pieces};
 use profile::{Parabola, profile};
 
 /// One element of the plan: curvature runs linearly from `start_per_m` to `end_per_m`.
@@ -162,7 +162,7 @@ fn backwards<T>(chain: &[T], begin_m: impl Fn(&T) -> f64, turn: impl Fn(&T, f64)
 #[derive(Clone, Debug)]
 pub struct Alignment {
     /// Never empty: a straight that leads in, the elements, a straight that leads out.
-    plan: Vec<Piece>,
+    plan: Vec<PlanPiece>,
     /// Never empty.
     profile: Vec<Parabola>,
     length_m: f64,
@@ -183,9 +183,15 @@ impl Alignment {
             .filter(|e| e.length_m > 0.0 && e.length_m.is_finite())
             .collect();
         let level = elements.first().map_or(0.0, |e| e.start_cant_m);
-        let straight = Linear::constant(0.0);
-        let begin = (start.x, start.y);
-        let lead_in = Piece::new(0.0, begin, heading_rad, straight, Linear::constant(level));
+        let straight = LinearChange::constant(0.0);
+        let begin = Vector2::new(start.x, start.y);
+        let lead_in = PlanPiece::new(
+            0.0,
+            begin,
+            heading_rad,
+            straight,
+            LinearChange::constant(level),
+        );
         let mut plan = vec![lead_in];
         let (mut last, mut last_m) = (lead_in, 0.0);
         // Lengths are summed by element, so that a user finds his own chainages.
@@ -195,8 +201,9 @@ impl Alignment {
             let step_m = e.length_m / count;
             for k in 0..count as usize {
                 let into_m = k as f64 * step_m;
-                let curvature = Linear::between(e.start_per_m, e.end_per_m, e.length_m, into_m);
-                let cant = Linear::between(e.start_cant_m, e.end_cant_m, e.length_m, into_m);
+                let curvature =
+                    LinearChange::between(e.start_per_m, e.end_per_m, e.length_m, into_m);
+                let cant = LinearChange::between(e.start_cant_m, e.end_cant_m, e.length_m, into_m);
                 last = last.next(last_m, curvature, cant);
                 last.s0 = begin_m + into_m;
                 last_m = step_m;
@@ -204,7 +211,11 @@ impl Alignment {
             }
             begin_m += e.length_m;
         }
-        let mut lead_out = last.next(last_m, straight, Linear::constant(last.cant(last_m)));
+        let mut lead_out = last.next(
+            last_m,
+            straight,
+            LinearChange::constant(last.cant.at(last_m)),
+        );
         lead_out.s0 = begin_m;
         plan.push(lead_out);
         Self {
@@ -219,11 +230,8 @@ impl Alignment {
     pub fn reversed(&self) -> Self {
         let length_m = self.length_m;
         let plan = backwards(&self.plan, |p| p.s0, |p, end_m| p.reversed(end_m, length_m));
-        let profile = backwards(
-            &self.profile,
-            |p| p.s0,
-            |p, end_m| p.reversed(end_m, length_m),
-        );
+        let profile = &self.profile;
+        let profile = backwards(profile, |p| p.s0, |p, end_m| p.reversed(end_m, length_m));
         Self {
             plan,
             profile,
@@ -241,16 +249,16 @@ impl Alignment {
         let k = self.plan.partition_point(|p| p.s0 <= s_m);
         let piece = &self.plan[k.saturating_sub(1)];
         let ds = s_m - piece.s0;
-        let (x, y) = piece.position(ds);
+        let place = piece.position(ds);
         let k = self.profile.partition_point(|p| p.s0 <= s_m);
         let (z, slope) = self.profile[k.saturating_sub(1)].at(s_m);
         TrackFrame {
             s_m,
-            origin: Point3::new(x, y, z),
+            origin: Point3::new(place.x, place.y, z),
             heading_rad: piece.heading(ds),
             slope,
-            curvature_per_m: piece.curvature(ds),
-            roll_rad: -(piece.cant(ds) / CANT_BASE_M).clamp(-1.0, 1.0).asin(),
+            curvature_per_m: piece.curvature.at(ds),
+            roll_rad: -(piece.cant.at(ds) / CANT_BASE_M).clamp(-1.0, 1.0).asin(),
         }
     }
 

@@ -1,6 +1,7 @@
 //! A piece of the plan as a power series; `alignment.rs` says why it is one.
 
 use super::PlanElement;
+use nalgebra::Vector2;
 use std::f64::consts::PI;
 
 /// Terms of the position's power series.
@@ -15,16 +16,14 @@ const MOST_PIECES: f64 = 40_000.0;
 /// A stretch of the plan, from `s0` to where the next begins; the first and the last one run on
 /// for ever.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Piece {
+pub(super) struct PlanPiece {
     pub s0: f64,
     heading0: f64,
-    curvature0: f64,
-    curvature_rate: f64,
-    cant0: f64,
-    cant_rate: f64,
-    /// Position as polynomials of the distance from `s0`, lowest power first.
-    x: [f64; TERMS],
-    y: [f64; TERMS],
+    /// Both by the distance from `s0`, like the position.
+    pub curvature: LinearChange,
+    pub cant: LinearChange,
+    /// Position as a polynomial, x and y, lowest power first.
+    position: [Vector2<f64>; TERMS],
     /// How many of the terms matter within the piece: 2 where it is straight.
     terms: usize,
 }
@@ -32,85 +31,76 @@ pub(super) struct Piece {
 /// What a term must add, somewhere within a piece, to matter.
 const MATTERS_M: f64 = 1e-15;
 
-impl Piece {
-    pub fn new(s0: f64, start: (f64, f64), heading0: f64, curvature: Linear, cant: Linear) -> Self {
-        let (mut x, mut y) = ([0.0; TERMS], [0.0; TERMS]);
-        (x[0], y[0]) = start;
-        // (n + 1) w[n + 1] = i (curvature0 w[n] + rate w[n - 1]), position[n + 1] = w[n] / (n + 1)
+impl PlanPiece {
+    pub fn new(
+        s0: f64,
+        start: Vector2<f64>,
+        heading0: f64,
+        curvature: LinearChange,
+        cant: LinearChange,
+    ) -> Self {
+        let mut position = [start; TERMS];
+        // (n + 1) w[n + 1] = i (curvature w[n] + rate w[n - 1]), position[n + 1] = w[n] / (n + 1)
         let (sin, cos) = heading0.sin_cos();
-        let (mut w, mut before) = ((cos, sin), (0.0, 0.0));
+        let (mut w, mut before) = (Vector2::new(cos, sin), Vector2::zeros());
         for n in 1..TERMS {
-            x[n] = w.0 / n as f64;
-            y[n] = w.1 / n as f64;
-            let re = curvature.start * w.0 + curvature.rate * before.0;
-            let im = curvature.start * w.1 + curvature.rate * before.1;
+            position[n] = w / n as f64;
+            let turned = w * curvature.start + before * curvature.rate;
             before = w;
-            w = (-im / n as f64, re / n as f64);
+            w = Vector2::new(-turned.y, turned.x) / n as f64;
         }
-        let matters = |n: &usize| {
-            let most_m = PIECE_M.powi(*n as i32);
-            x[*n].abs().max(y[*n].abs()) * most_m > MATTERS_M
-        };
+        let matters = |n: &usize| position[*n].amax() * PIECE_M.powi(*n as i32) > MATTERS_M;
         let terms = (2..TERMS).rev().find(matters).map_or(2, |n| n + 1);
         Self {
             s0,
             heading0,
-            curvature0: curvature.start,
-            curvature_rate: curvature.rate,
-            cant0: cant.start,
-            cant_rate: cant.rate,
-            x,
-            y,
+            curvature,
+            cant,
+            position,
             terms,
         }
     }
 
-    pub fn curvature(&self, ds: f64) -> f64 {
-        self.curvature0 + self.curvature_rate * ds
-    }
-
     pub fn heading(&self, ds: f64) -> f64 {
-        self.heading0 + ds * (self.curvature0 + 0.5 * self.curvature_rate * ds)
+        self.heading0 + ds * (self.curvature.start + 0.5 * self.curvature.rate * ds)
     }
 
-    pub fn cant(&self, ds: f64) -> f64 {
-        self.cant0 + self.cant_rate * ds
-    }
-
-    pub fn position(&self, ds: f64) -> (f64, f64) {
-        let terms = self.x[..self.terms].iter().zip(&self.y[..self.terms]);
-        let terms = terms.rev();
-        terms.fold((0.0, 0.0), |(x, y), (cx, cy)| (x * ds + cx, y * ds + cy))
+    pub fn position(&self, ds: f64) -> Vector2<f64> {
+        let terms = self.position[..self.terms].iter().rev();
+        terms.fold(Vector2::zeros(), |p, term| p * ds + term)
     }
 
     /// The piece from here to `end_m` of a line of `length_m`, as met from its other end.
     pub fn reversed(&self, end_m: f64, length_m: f64) -> Self {
         let ds = end_m - self.s0;
-        let opposite = |end: f64, rate: f64| Linear { start: -end, rate };
+        let opposite = |change: LinearChange| LinearChange {
+            start: -change.at(ds),
+            rate: change.rate,
+        };
         Self::new(
             length_m - end_m,
             self.position(ds),
             self.heading(ds) + PI,
-            opposite(self.curvature(ds), self.curvature_rate),
-            opposite(self.cant(ds), self.cant_rate),
+            opposite(self.curvature),
+            opposite(self.cant),
         )
     }
 
     /// The piece that begins `ds` further.
-    pub fn next(&self, ds: f64, curvature: Linear, cant: Linear) -> Self {
+    pub fn next(&self, ds: f64, curvature: LinearChange, cant: LinearChange) -> Self {
         let (s0, heading0) = (self.s0 + ds, self.heading(ds));
         Self::new(s0, self.position(ds), heading0, curvature, cant)
     }
 }
 
 /// A number that changes linearly along the line.
-#[derive(Clone, Copy)]
-pub(super) struct Linear {
-    start: f64,
-    rate: f64,
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LinearChange {
+    pub start: f64,
+    pub rate: f64,
 }
 
-impl Linear {
+impl LinearChange {
     pub fn constant(start: f64) -> Self {
         Self { start, rate: 0.0 }
     }
@@ -122,6 +112,10 @@ impl Linear {
             start: start + rate * into_m,
             rate,
         }
+    }
+
+    pub fn at(&self, ds: f64) -> f64 {
+        self.start + self.rate * ds
     }
 }
 
