@@ -41,16 +41,12 @@ impl Intrinsics {
 
     /// Pixel of a point given in the camera's frame; `None` at or behind the camera's plane.
     pub fn project(&self, p: &Point3<f64>) -> Option<Point2<f64>> {
-        (p.z > 1e-9).then(|| {
-            let [x, y] = self.distortion.distort([p.x / p.z, p.y / p.z]);
-            Point2::new(self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px)
-        })
+        (p.z > 1e-9).then(|| self.pixel(self.distortion.distort([p.x / p.z, p.y / p.z])))
     }
 
     /// Direction of a pixel in the camera's frame, scaled to z = 1.
     pub fn ray(&self, u: f64, v: f64) -> Vector3<f64> {
-        let seen = [(u - self.cx_px) / self.fx_px, (v - self.cy_px) / self.fy_px];
-        let [x, y] = self.distortion.undistort(seen);
+        let [x, y] = self.distortion.undistort(self.at_depth_1(u, v));
         Vector3::new(x, y, 1.0)
     }
 
@@ -60,10 +56,7 @@ impl Intrinsics {
             return *pixel;
         }
         let ray = self.ray(pixel.x, pixel.y);
-        Point2::new(
-            self.fx_px * ray.x + self.cx_px,
-            self.fy_px * ray.y + self.cy_px,
-        )
+        self.pixel([ray.x, ray.y])
     }
 
     /// Where a pixel of a lens without distortion is seen: the inverse of [`Self::ideal`].
@@ -71,12 +64,17 @@ impl Intrinsics {
         if self.distortion.is_none() {
             return *ideal;
         }
-        let (x, y) = (
-            (ideal.x - self.cx_px) / self.fx_px,
-            (ideal.y - self.cy_px) / self.fy_px,
-        );
-        let [x, y] = self.distortion.distort([x, y]);
+        self.pixel(self.distortion.distort(self.at_depth_1(ideal.x, ideal.y)))
+    }
+
+    /// Pixel of a point at depth 1, as it is seen.
+    fn pixel(&self, [x, y]: [f64; 2]) -> Point2<f64> {
         Point2::new(self.fx_px * x + self.cx_px, self.fy_px * y + self.cy_px)
+    }
+
+    /// The point at depth 1 of a pixel, as it is seen.
+    fn at_depth_1(&self, u: f64, v: f64) -> [f64; 2] {
+        [(u - self.cx_px) / self.fx_px, (v - self.cy_px) / self.fy_px]
     }
 
     /// Whether a pixel is in the picture.

@@ -184,43 +184,36 @@ impl WaysideReport {
 
 impl fmt::Display for WaysideReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "time                        {}", self.time)?;
-        if let Some(o) = self.worst() {
-            let angle_deg = o.far_angle_rad.to_degrees();
-            writeln!(f, "angle of the farthest point {angle_deg:.2} deg")?;
-            writeln!(
-                f,
-                "its cosine                  {:.4}",
-                o.far_angle_rad.cos()
-            )?;
-            writeln!(f, "farthest range              {:.2} m", o.far_range_m)?;
-        }
-        if let Some(distance_m) = self.train_distance_m {
-            writeln!(f, "distance to the train head  {distance_m:.2} m")?;
-        }
-        let answer = |yes: bool| if yes { "yes" } else { "no" };
-        let present = answer(!self.obstacles.is_empty());
-        writeln!(f, "obstacle present            {present}")?;
-        writeln!(
-            f,
-            "train affected              {}",
-            answer(self.train_affected)
-        )?;
-        writeln!(
-            f,
-            "normal passage possible     {}",
-            answer(self.passage_possible)
-        )?;
-        writeln!(
-            f,
-            "emergency measure needed    {}",
-            answer(self.emergency_needed)
-        )?;
+        let worst = self.worst();
+        let angle_rad = worst.map(|o| o.far_angle_rad);
+        let degrees = |angle_rad: f64| format!("{:.2} deg", angle_rad.to_degrees());
+        let cosine = |angle_rad: f64| format!("{:.4}", angle_rad.cos());
+        let metres = |m: f64| format!("{m:.2} m");
+        let answer = |yes: bool| Some(if yes { "yes" } else { "no" }.to_owned());
         let plan = match self.plan {
             Plan::Pass => "pass",
             Plan::WarnDriver => "warn the driver",
             Plan::BrakeAutomatically => "brake automatically",
         };
-        write!(f, "plan                        {plan}")
+        let lines = [
+            ("time", Some(self.time.to_string())),
+            ("angle of the farthest point", angle_rad.map(degrees)),
+            ("its cosine", angle_rad.map(cosine)),
+            ("farthest range", worst.map(|o| metres(o.far_range_m))),
+            (
+                "distance to the train head",
+                self.train_distance_m.map(metres),
+            ),
+            ("obstacle present", answer(!self.obstacles.is_empty())),
+            ("train affected", answer(self.train_affected)),
+            ("normal passage possible", answer(self.passage_possible)),
+            ("emergency measure needed", answer(self.emergency_needed)),
+        ];
+        for (name, value) in lines {
+            if let Some(value) = value {
+                writeln!(f, "{name:<28}{value}")?;
+            }
+        }
+        write!(f, "{:<28}{plan}", "plan")
     }
 }
