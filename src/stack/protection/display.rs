@@ -1,15 +1,12 @@
 //! What the driver sees.
 
-use crate::bus::{DangerLevel, DriverDisplay, Indicator, Supervision};
+use crate::bus::{DangerLevel, DriverDisplay, Indicator, ProtectionReport, Supervision};
 
-/// All that the display depends on.
+/// What the display depends on besides the report of the cycle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Situation {
-    pub position_m: Option<f64>,
     /// The nearest obstacle ahead.
     pub obstacle: Option<Ahead>,
-    pub supervision: Supervision,
-    pub permitted_mps: f64,
     pub brake_failed: bool,
     pub odometer_lost: bool,
     pub radio_timeout_s: f64,
@@ -26,11 +23,11 @@ pub(super) struct Ahead {
     pub blind: bool,
 }
 
-pub(super) fn display(s: &Situation) -> DriverDisplay {
+pub(super) fn display(report: &ProtectionReport, s: &Situation) -> DriverDisplay {
     let danger = s.obstacle.map_or(DangerLevel::None, |o| o.danger);
     let lamp = if s.brake_failed {
         Indicator::Emergency
-    } else if danger == DangerLevel::High || s.supervision != Supervision::Permitted {
+    } else if danger == DangerLevel::High || report.supervision != Supervision::Permitted {
         Indicator::BrakeWarningRed
     } else {
         Indicator::NormalGreen
@@ -38,20 +35,20 @@ pub(super) fn display(s: &Situation) -> DriverDisplay {
     DriverDisplay {
         power: true,
         lamp,
-        position_m: s.position_m,
+        position_m: report.position_m,
         distance_to_obstacle_m: s.obstacle.map(|o| o.distance_m),
-        text: text(s),
+        text: text(report, s),
     }
 }
 
-fn text(s: &Situation) -> String {
+fn text(report: &ProtectionReport, s: &Situation) -> String {
     if s.brake_failed {
         return "Automatic brake failed: brake by hand".into();
     }
     if s.odometer_lost {
         return "Odometer silent: emergency brake".into();
     }
-    let action = match s.supervision {
+    let action = match report.supervision {
         Supervision::Emergency => ", emergency brake",
         Supervision::Service => ", service brake",
         Supervision::Warning => ", too fast",
@@ -71,7 +68,7 @@ fn text(s: &Situation) -> String {
             };
             format!("{what} in {:.0} m{action}{radio}", ahead.distance_m)
         }
-        None if s.position_m.is_none() => format!("Position unknown{action}"),
-        None => format!("Permitted {:.0} km/h{action}", s.permitted_mps * 3.6),
+        None if report.position_m.is_none() => format!("Position unknown{action}"),
+        None => format!("Permitted {:.0} km/h{action}", report.permitted_mps * 3.6),
     }
 }

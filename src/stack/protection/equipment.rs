@@ -22,8 +22,6 @@ pub struct TrainProtection {
     node: Node,
     route: Route,
     protection: Protection,
-    train_length_m: f64,
-    position_sigmas: f64,
     cycles: Ticker,
 }
 
@@ -42,8 +40,6 @@ impl TrainProtection {
         Self {
             node,
             route,
-            train_length_m: settings.train_length_m,
-            position_sigmas: settings.position_sigmas,
             protection: Protection::new(&settings, map),
             cycles: Ticker::new(CYCLE_HZ),
         }
@@ -75,7 +71,7 @@ impl TrainProtection {
             return;
         };
         let sign = report.direction.sign();
-        let margin_m = self.position_sigmas * report.sigma_m;
+        let margin_m = self.protection.settings.position_sigmas * report.sigma_m;
         let head_m = report.chainage_m + sign * margin_m;
         let tail_m = report.chainage_m - sign * (report.length_m + margin_m);
         let (from_chainage_m, to_chainage_m) = match report.direction {
@@ -150,7 +146,7 @@ impl Equipment for TrainProtection {
                 track: self.route.track,
                 chainage_m,
                 sigma_m: report.sigma_m.unwrap_or_default(),
-                length_m: self.train_length_m,
+                length_m: self.protection.settings.train_length_m,
                 direction: self.route.direction,
                 speed_mps: report.speed_mps,
                 time: now,

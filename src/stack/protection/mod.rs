@@ -77,15 +77,15 @@ pub use equipment::TrainProtection;
 pub use settings::ProtectionSettings;
 
 use crate::bus::{
-    BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, PositionEstimate, PositionFix,
-    PositionSource, ProtectionReport, SimTime, TrainCommand,
+    BrakeDemand, DangerLevel, DriverDisplay, ObstacleWarning, OdometerSample, PositionEstimate,
+    PositionFix, PositionSource, ProtectionReport, SimTime, TrainCommand,
 };
 use crate::track::{Direction, TrackId, Tunnel};
 use curve::Grades;
 use display::{Ahead, Situation};
 use monitor::BrakeMonitor;
 use obstacles::Obstacles;
-use position::{Estimate, Position};
+use position::{HeadPosition, Position};
 use std::sync::Arc;
 use supervision::Supervisor;
 
@@ -114,7 +114,7 @@ impl Protection {
             position: Position::new(settings),
             obstacles: Obstacles::new(settings, &map),
             supervisor: Supervisor::new(settings),
-            monitor: BrakeMonitor::new(settings),
+            monitor: BrakeMonitor::default(),
             brake: BrakeDemand::None,
             first_cycle: None,
             settings: settings.clone(),
@@ -136,9 +136,9 @@ impl Protection {
     /// The antenna on the train head passed over a balise at `time`. A balise that the map does
     /// not know tells nothing. What message it stores comes by [`Self::on_warning`].
     pub fn on_balise(&mut self, name: &str, time: SimTime) {
-        if let Some(balise) = self.map.balises.iter().find(|b| b.name == name) {
-            self.position
-                .reset(time, balise.chainage_m, self.settings.balise_sigma_m);
+        if let Some(balise) = self.map.balise(name) {
+            let sigma_m = self.settings.balise_sigma_m;
+            self.position.reset(time, balise.chainage_m, sigma_m);
         }
     }
 
@@ -155,21 +155,17 @@ impl Protection {
 
     /// Position and speed on the route, as the protection takes them to be.
     pub fn estimate(&self, time: SimTime, direction: Direction) -> Option<PositionEstimate> {
-        let Estimate {
-            chainage_m,
-            sigma_m,
-            source,
-        } = self.position.at(time)?;
+        let head = self.position.at(time)?;
         let speed_sigma_mps = self.settings.speed_error_kmh / 3.6 / SPEED_ERROR_SIGMAS;
         Some(PositionEstimate {
             time,
             track: TrackId::default(),
             direction,
-            s_m: chainage_m,
+            s_m: head.chainage_m,
             v_mps: self.position.odometry.mean_speed_mps().unwrap_or(0.0),
-            covariance: [[sigma_m.powi(2), 0.0], [0.0, speed_sigma_mps.powi(2)]],
+            covariance: [[head.sigma_m.powi(2), 0.0], [0.0, speed_sigma_mps.powi(2)]],
             protection_level_m: None,
-            sources: vec![source, PositionSource::Odometer],
+            sources: vec![head.source, PositionSource::Odometer],
         })
     }
 
@@ -181,9 +177,8 @@ impl Protection {
         let speed_mps = speed.unwrap_or(0.0);
         let odometer_lost = self.odometer_lost(time);
         let head_m = train.map(|t| t.chainage_m);
-        let failed = self
-            .monitor
-            .update(time, self.brake, speed_mps, head_m, &self.grades);
+        let (grades, settings) = (&self.grades, &self.settings);
+        let failed = (self.monitor).update(time, self.brake, speed_mps, head_m, grades, settings);
 
         // With no position every obstacle may be the next one.
         let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| self.rearmost_m(t));
@@ -191,33 +186,23 @@ impl Protection {
             .obstacles
             .ahead(rearmost_m, DangerLevel::High)
             .map(|(warning, _)| warning.from_chainage_m);
-        let ceiling_mps = if train.is_some() {
-            self.settings.line_speed_kmh / 3.6
-        } else {
-            self.settings
-                .restricted_kmh
-                .min(self.settings.line_speed_kmh)
-                / 3.6
+        let ceiling_kmh = match train {
+            Some(_) => settings.line_speed_kmh,
+            None => settings.restricted_kmh.min(settings.line_speed_kmh),
         };
-        let limits = self
-            .supervisor
-            .limits(&self.grades, ceiling_mps, train, end_m);
+        let limits = (self.supervisor).limits(grades, ceiling_kmh / 3.6, train, end_m);
         let lost = train.is_none() && end_m.is_some();
-        let supervision = self
-            .supervisor
-            .step(limits, speed, lost, odometer_lost || failed);
+        let at_once = odometer_lost || failed;
+        let supervision = self.supervisor.step(limits, speed, lost, at_once);
         self.brake = supervision::demand(supervision);
 
         let situation = Situation {
-            position_m: head_m,
             obstacle: self.nearest(time, train, rearmost_m),
-            supervision,
-            permitted_mps: limits.permitted_mps,
             brake_failed: failed,
             odometer_lost,
             radio_timeout_s: self.settings.radio_timeout_s,
         };
-        ProtectionReport {
+        let mut report = ProtectionReport {
             time,
             position_m: head_m,
             sigma_m: train.map(|t| t.sigma_m),
@@ -231,17 +216,24 @@ impl Protection {
                 brake: self.brake,
                 permitted_speed_mps: limits.permitted_mps,
             },
-            display: display::display(&situation),
-        }
+            display: DriverDisplay::default(),
+        };
+        report.display = display::display(&report, &situation);
+        report
     }
 
     /// The head's rearmost possible place: an obstacle counts as passed only behind it.
-    fn rearmost_m(&self, train: Estimate) -> f64 {
+    fn rearmost_m(&self, train: HeadPosition) -> f64 {
         train.chainage_m - self.settings.position_sigmas * train.sigma_m
     }
 
     /// The obstacle that the driver is shown: a dangerous one first.
-    fn nearest(&self, time: SimTime, train: Option<Estimate>, rearmost_m: f64) -> Option<Ahead> {
+    fn nearest(
+        &self,
+        time: SimTime,
+        train: Option<HeadPosition>,
+        rearmost_m: f64,
+    ) -> Option<Ahead> {
         let head_m = train?.chainage_m;
         let ahead = |danger| self.obstacles.ahead(rearmost_m, danger);
         let (warning, received) = ahead(DangerLevel::High).or_else(|| ahead(DangerLevel::Low))?;

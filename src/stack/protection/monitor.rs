@@ -1,4 +1,4 @@
-//! Whether the brake does what it was told: after the time that it needs to build up, the
+//! Whether the brake does what was demanded: after the time that it needs to build up, the
 //! measured deceleration must be at least half of what is expected.
 
 use super::ProtectionSettings;
@@ -10,11 +10,8 @@ const WINDOW_S: f64 = 1.0;
 /// Below this speed the odometer says too little.
 const SLOWEST_MPS: f64 = 1.5;
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct BrakeMonitor {
-    answer_s: f64,
-    service_mps2: f64,
-    emergency_mps2: f64,
     demand: BrakeDemand,
     since: SimTime,
     /// Start of the running window: time and speed.
@@ -23,18 +20,6 @@ pub(super) struct BrakeMonitor {
 }
 
 impl BrakeMonitor {
-    pub fn new(s: &ProtectionSettings) -> Self {
-        Self {
-            answer_s: s.reaction_s + s.traction_cut_s + s.brake_buildup_s,
-            service_mps2: s.service_mps2,
-            emergency_mps2: s.emergency_mps2,
-            demand: BrakeDemand::None,
-            since: SimTime::ZERO,
-            window: None,
-            failed: false,
-        }
-    }
-
     /// Takes what was demanded in the last cycle and what speed there is now; true while the
     /// brake counts as failed, which it does until the train stands.
     pub fn update(
@@ -44,6 +29,7 @@ impl BrakeMonitor {
         speed_mps: f64,
         at_m: Option<f64>,
         grades: &Grades,
+        settings: &ProtectionSettings,
     ) -> bool {
         if demand != self.demand {
             self.demand = demand;
@@ -52,15 +38,16 @@ impl BrakeMonitor {
         }
         let rate = match demand {
             BrakeDemand::None => return self.failed,
-            BrakeDemand::Service => self.service_mps2,
-            BrakeDemand::Emergency => self.emergency_mps2,
+            BrakeDemand::Service => settings.service_mps2,
+            BrakeDemand::Emergency => settings.emergency_mps2,
         };
         if speed_mps < SLOWEST_MPS {
             self.window = None;
             self.failed &= speed_mps > 0.1;
             return self.failed;
         }
-        if time.since(self.since) < self.answer_s {
+        let answer_s = settings.reaction_s + settings.traction_cut_s + settings.brake_buildup_s;
+        if time.since(self.since) < answer_s {
             return self.failed;
         }
         match self.window {

@@ -9,26 +9,53 @@ use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
 use crate::track::Tunnel;
 
-/// The last word of one device.
+/// Who warns: a device of the map, or another train.
 #[derive(Clone, Debug)]
-struct Notice {
-    warning: ObstacleWarning,
-    received: SimTime,
+struct Warner {
+    name: String,
+    /// The stretch that a device of the map watches.
+    watched_m: Option<(f64, f64)>,
+    /// Last heard by radio.
+    heard: Option<SimTime>,
+    /// The last word, and when it was received.
+    said: Option<(ObstacleWarning, SimTime)>,
 }
 
-/// A device that the map has.
-#[derive(Clone, Debug)]
-struct Device {
-    name: String,
-    watched_m: (f64, f64),
-    /// By radio.
-    heard: Option<SimTime>,
+impl Warner {
+    fn new(name: &str, watched_m: Option<(f64, f64)>) -> Self {
+        Self {
+            name: name.to_owned(),
+            watched_m,
+            heard: None,
+            said: None,
+        }
+    }
+
+    /// Nobody vouches for the stretch that it watches. What it had warned of counts as well.
+    fn occupy(&mut self, (from_m, to_m): (f64, f64), now: SimTime) {
+        let nothing = || ObstacleWarning {
+            device: self.name.clone(),
+            number: 0,
+            // Whatever the device says next is newer.
+            issued: SimTime::from_nanos(i64::MIN),
+            danger: DangerLevel::None,
+            from_chainage_m: from_m,
+            to_chainage_m: to_m,
+            blind: true,
+        };
+        let (warning, _) = self.said.get_or_insert_with(|| (nothing(), now));
+        if warning.danger == DangerLevel::None {
+            (warning.from_chainage_m, warning.to_chainage_m) = (from_m, to_m);
+        }
+        warning.from_chainage_m = from_m.min(warning.from_chainage_m);
+        warning.to_chainage_m = to_m.max(warning.to_chainage_m);
+        (warning.danger, warning.blind) = (DangerLevel::High, true);
+    }
 }
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Obstacles {
-    notices: Vec<Notice>,
-    devices: Vec<Device>,
+    warners: Vec<Warner>,
     silent_after_s: f64,
 }
 
@@ -36,63 +63,30 @@ impl Obstacles {
     /// With the devices of a map.
     pub fn new(settings: &ProtectionSettings, map: &Tunnel) -> Self {
         let reach_m = settings.device_reach_m;
-        let devices = map.wayside.iter().map(|site| Device {
-            name: site.name.clone(),
-            watched_m: (site.chainage_m - reach_m, site.chainage_m + reach_m),
-            heard: None,
+        let devices = map.wayside.iter().map(|site| {
+            let watched_m = (site.chainage_m - reach_m, site.chainage_m + reach_m);
+            Warner::new(&site.name, Some(watched_m))
         });
         Self {
-            devices: devices.collect(),
+            warners: devices.collect(),
             silent_after_s: settings.radio_timeout_s,
-            ..Self::default()
         }
     }
 
     /// A device was heard by radio; what counts is when it spoke.
     pub fn on_heard(&mut self, device: &str, sent: SimTime) {
-        let known = self.devices.iter_mut().find(|d| d.name == device);
-        known
-            .into_iter()
-            .for_each(|d| d.heard = d.heard.max(Some(sent)));
+        for known in self.warners.iter_mut().filter(|w| w.name == device) {
+            known.heard = known.heard.max(Some(sent));
+        }
     }
 
     /// Time passes: the stretches of devices that are silent count as occupied.
     pub fn lapse(&mut self, now: SimTime) {
         let is_current = |heard: SimTime| now.since(heard) <= self.silent_after_s;
-        for device in &self.devices {
-            if device.heard.is_some_and(is_current) {
-                continue;
-            }
-            let known = self.notices.iter_mut();
-            let known = known.filter(|n| n.warning.device == device.name).last();
-            let (from_m, to_m) = device.watched_m;
-            let occupied = ObstacleWarning {
-                device: device.name.clone(),
-                number: 0,
-                // Whatever the device says next is newer.
-                issued: SimTime::from_nanos(i64::MIN),
-                danger: DangerLevel::High,
-                from_chainage_m: from_m,
-                to_chainage_m: to_m,
-                blind: true,
-            };
-            match known {
-                Some(Notice { warning, .. }) => {
-                    let dangerous = warning.danger != DangerLevel::None;
-                    let least = |a: f64, b: f64| if dangerous { a.min(b) } else { a };
-                    let most = |a: f64, b: f64| if dangerous { a.max(b) } else { a };
-                    *warning = ObstacleWarning {
-                        number: warning.number,
-                        issued: warning.issued,
-                        from_chainage_m: least(from_m, warning.from_chainage_m),
-                        to_chainage_m: most(to_m, warning.to_chainage_m),
-                        ..occupied
-                    };
-                }
-                None => self.notices.push(Notice {
-                    warning: occupied,
-                    received: now,
-                }),
+        for warner in &mut self.warners {
+            let silent = !warner.heard.is_some_and(is_current);
+            if let Some(watched_m) = warner.watched_m.filter(|_| silent) {
+                warner.occupy(watched_m, now);
             }
         }
     }
@@ -102,36 +96,24 @@ impl Obstacles {
         if warning.danger != DangerLevel::None && ends.iter().any(|x| !x.is_finite()) {
             return;
         }
-        let notice = Notice {
-            warning: warning.clone(),
-            received,
-        };
-        let known = self
-            .notices
-            .iter_mut()
-            .find(|n| n.warning.device == warning.device);
-        match known {
-            Some(old) => {
-                let order = |w: &ObstacleWarning| (w.issued, w.number);
-                if order(warning) > order(&old.warning) {
-                    *old = notice;
-                }
-            }
-            None => self.notices.push(notice),
+        let known = self.warners.iter().position(|w| w.name == warning.device);
+        let known = known.unwrap_or_else(|| {
+            self.warners.push(Warner::new(&warning.device, None));
+            self.warners.len() - 1
+        });
+        let said = &mut self.warners[known].said;
+        let order = |w: &ObstacleWarning| (w.issued, w.number);
+        if (said.as_ref()).is_none_or(|(last, _)| order(warning) > order(last)) {
+            *said = Some((warning.clone(), received));
         }
     }
 
     /// The nearest obstacle of at least `danger` that the train, head at `head_m`, has not yet
     /// passed, and when its device was last heard.
     pub fn ahead(&self, head_m: f64, danger: DangerLevel) -> Option<(&ObstacleWarning, SimTime)> {
-        self.notices
-            .iter()
-            .filter(|n| n.warning.danger >= danger && n.warning.to_chainage_m >= head_m)
-            .min_by(|a, b| {
-                a.warning
-                    .from_chainage_m
-                    .total_cmp(&b.warning.from_chainage_m)
-            })
-            .map(|n| (&n.warning, n.received))
+        let said = self.warners.iter().filter_map(|w| w.said.as_ref());
+        said.filter(|(w, _)| w.danger >= danger && w.to_chainage_m >= head_m)
+            .min_by(|(a, _), (b, _)| a.from_chainage_m.total_cmp(&b.from_chainage_m))
+            .map(|(warning, received)| (warning, *received))
     }
 }

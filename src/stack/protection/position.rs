@@ -14,33 +14,29 @@ use crate::stack::odometry::Odometry;
 /// Refused fixes in a row that overrule the estimate.
 const OVERRULE: u32 = 5;
 
-/// A chainage, and the distance run by then.
-#[derive(Clone, Copy, Debug)]
-struct Anchor {
-    chainage_m: f64,
-    sigma_m: f64,
-    distance_m: f64,
-    source: PositionSource,
-}
-
-impl Anchor {
-    fn carried(&self, distance_m: f64, drift: f64) -> Estimate {
-        let run_m = distance_m - self.distance_m;
-        Estimate {
-            chainage_m: self.chainage_m + run_m,
-            sigma_m: self.sigma_m.hypot(drift * run_m),
-            source: self.source,
-        }
-    }
-}
-
-/// Chainage of the train head and one sigma of it.
+/// Where the train head is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Estimate {
+pub(super) struct HeadPosition {
     pub chainage_m: f64,
+    /// One sigma of it.
     pub sigma_m: f64,
+    /// The distance run by then.
+    pub distance_m: f64,
     /// The last source besides the odometer.
     pub source: PositionSource,
+}
+
+impl HeadPosition {
+    /// Carried on by the odometer.
+    fn carried(&self, distance_m: f64, drift: f64) -> Self {
+        let run_m = distance_m - self.distance_m;
+        Self {
+            chainage_m: self.chainage_m + run_m,
+            sigma_m: self.sigma_m.hypot(drift * run_m),
+            distance_m,
+            ..*self
+        }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -49,10 +45,10 @@ pub(super) struct Position {
     floor_m: f64,
     gate: f64,
     pub odometry: Odometry,
-    anchor: Option<Anchor>,
+    anchor: Option<HeadPosition>,
     /// Refused in a row, and the last of them.
     refused: u32,
-    refused_anchor: Option<Anchor>,
+    refused_anchor: Option<HeadPosition>,
 }
 
 impl Position {
@@ -62,7 +58,7 @@ impl Position {
             floor_m: settings.sigma_floor_m,
             gate: settings.gate_sigmas,
             odometry: Odometry::default(),
-            anchor: settings.initial_chainage_m.map(|chainage_m| Anchor {
+            anchor: settings.initial_chainage_m.map(|chainage_m| HeadPosition {
                 chainage_m,
                 sigma_m: settings.initial_sigma_m,
                 distance_m: 0.0,
@@ -79,7 +75,7 @@ impl Position {
         if !(chainage_m.is_finite() && sigma_m.is_finite() && sigma_m >= 0.0) {
             return;
         }
-        let fix = Anchor {
+        let fix = HeadPosition {
             chainage_m,
             sigma_m: sigma_m.max(self.floor_m),
             distance_m: self.odometry.distance_m(time),
@@ -97,18 +93,17 @@ impl Position {
         }
         let (p, r) = (predicted.sigma_m.powi(2), fix.sigma_m.powi(2));
         let gain = p / (p + r);
-        self.accept(Anchor {
+        self.accept(HeadPosition {
             chainage_m: predicted.chainage_m + gain * off_m,
             sigma_m: (p * r / (p + r)).sqrt().max(self.floor_m),
-            distance_m: fix.distance_m,
-            source: fix.source,
+            ..fix
         });
     }
 
     /// A position that is right within its sigma (from a balise).
     pub fn reset(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
         let distance_m = self.odometry.distance_m(time);
-        self.accept(Anchor {
+        self.accept(HeadPosition {
             chainage_m,
             sigma_m,
             distance_m,
@@ -116,13 +111,13 @@ impl Position {
         });
     }
 
-    fn accept(&mut self, anchor: Anchor) {
+    fn accept(&mut self, anchor: HeadPosition) {
         self.anchor = Some(anchor);
         self.refused = 0;
         self.refused_anchor = None;
     }
 
-    fn refuse(&mut self, fix: Anchor) {
+    fn refuse(&mut self, fix: HeadPosition) {
         let agrees = self.refused_anchor.is_some_and(|before| {
             let expected = before.carried(fix.distance_m, self.drift);
             (expected.chainage_m - fix.chainage_m).abs()
@@ -135,7 +130,7 @@ impl Position {
         }
     }
 
-    pub fn at(&self, time: SimTime) -> Option<Estimate> {
+    pub fn at(&self, time: SimTime) -> Option<HeadPosition> {
         self.anchor
             .map(|a| a.carried(self.odometry.distance_m(time), self.drift))
     }

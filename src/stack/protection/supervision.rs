@@ -2,7 +2,7 @@
 
 use super::ProtectionSettings;
 use super::curve::{BrakeModel, Grades, overlap_m};
-use super::position::Estimate;
+use super::position::HeadPosition;
 use crate::bus::{BrakeDemand, Supervision};
 
 /// Where the permitted speed is under this, the end of the authority is reached: the brake
@@ -49,7 +49,7 @@ impl Supervisor {
         &self,
         grades: &Grades,
         ceiling_mps: f64,
-        train: Option<Estimate>,
+        train: Option<HeadPosition>,
         obstacle_m: Option<f64>,
     ) -> Limits {
         let s = &self.settings;

@@ -367,7 +367,7 @@ fn only_a_newer_clear_message_releases() {
     assert!((r.command.permitted_speed_mps - 100.0 / 3.6).abs() < 1e-9);
 }
 
-/// A low danger is told and nothing else; an obstacle that the train has passed is forgotten.
+/// A low danger is shown and nothing else; an obstacle that the train has passed is forgotten.
 #[test]
 fn low_dangers_warn_only() {
     let mut b = Bench::new(&at(1000.0, 0.5));
