@@ -75,6 +75,54 @@ pub struct PixelBox {
     pub v1: u32,
 }
 
+impl PixelBox {
+    /// Of some columns, from the first to the last, of one row.
+    pub fn of_row(row: u32, (first, last): (u32, u32)) -> Self {
+        Self {
+            u0: first,
+            v0: row,
+            u1: last,
+            v1: row,
+        }
+    }
+
+    /// With so many columns and rows more on each side; those to the left and above end at 0.
+    #[must_use]
+    pub fn widened(&self, columns: u32, rows: u32) -> Self {
+        Self {
+            u0: self.u0.saturating_sub(columns),
+            v0: self.v0.saturating_sub(rows),
+            u1: self.u1 + columns,
+            v1: self.v1 + rows,
+        }
+    }
+
+    /// The least one around two.
+    #[must_use]
+    pub fn joined(&self, other: &Self) -> Self {
+        Self {
+            u0: self.u0.min(other.u0),
+            v0: self.v0.min(other.v0),
+            u1: self.u1.max(other.u1),
+            v1: self.v1.max(other.v1),
+        }
+    }
+
+    /// Whether another one is no farther away than `gap` pixels.
+    pub fn is_near(&self, other: &Self, gap: u32) -> bool {
+        self.u0 <= other.u1 + gap
+            && other.u0 <= self.u1 + gap
+            && self.v0 <= other.v1 + gap
+            && other.v0 <= self.v1 + gap
+    }
+
+    /// Whether a pixel is in it.
+    pub fn contains(&self, pixel: &Point2<f64>) -> bool {
+        (f64::from(self.u0)..=f64::from(self.u1)).contains(&pixel.x)
+            && (f64::from(self.v0)..=f64::from(self.v1)).contains(&pixel.y)
+    }
+}
+
 /// An ellipse in the image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ellipse {

@@ -11,6 +11,7 @@ pub mod led;
 mod odometry;
 pub mod positioning;
 pub mod protection;
+mod runs;
 pub mod wayside;
 
 pub use equipment::Equipment;

@@ -88,6 +88,11 @@ impl LineCode {
         }
     }
 
+    /// Whether the complement of bit `k` of the payload, counted from the last one, follows it.
+    fn has_complement(self, k: u32) -> bool {
+        self == Self::Manchester || k.is_multiple_of(NRZ_GROUP_BITS)
+    }
+
     /// The header: pattern (bit k is chip k) and its length in chips.
     pub fn header(self) -> (u64, u32) {
         match self {
@@ -115,9 +120,24 @@ impl Uid {
 
     /// One period of the signal in a code.
     pub fn frame(self, code: LineCode) -> ChipFrame {
-        match code {
-            LineCode::Manchester => self.manchester(),
-            LineCode::Nrz => self.nrz(),
+        let (mut bits, mut at) = code.header();
+        let payload = self.payload();
+        for k in (0..PAYLOAD_BITS).rev() {
+            let bit = u64::from(payload >> k & 1);
+            bits |= bit << at;
+            at += 1;
+            if code.has_complement(k) {
+                bits |= (bit ^ 1) << at;
+                at += 1;
+            }
+        }
+        // Footer: off, on; of NRZ a chip off, for which nothing is set.
+        if code == LineCode::Manchester {
+            bits |= 0b10 << at;
+        }
+        ChipFrame {
+            bits,
+            len: code.chips(),
         }
     }
 
@@ -126,53 +146,14 @@ impl Uid {
         let (_, header_chips) = code.header();
         let mut payload = 0;
         let mut at = header_chips;
-        for k in 0..PAYLOAD_BITS {
+        for k in (0..PAYLOAD_BITS).rev() {
             let bit = frame.is_on(at);
             payload = payload << 1 | u32::from(bit);
-            at += match code {
-                LineCode::Manchester => 2,
-                LineCode::Nrz if (k + 1) % NRZ_GROUP_BITS == 0 => 2,
-                LineCode::Nrz => 1,
-            };
+            at += 1 + u32::from(code.has_complement(k));
         }
         // Header, footer, second halves and complements are right if sending again gives the
         // same chips.
         Self::from_payload(payload).filter(|uid| uid.frame(code) == frame)
-    }
-
-    /// One period of the Manchester signal.
-    pub fn manchester(self) -> ChipFrame {
-        let (mut bits, mut at) = LineCode::Manchester.header();
-        let payload = self.payload();
-        for k in (0..PAYLOAD_BITS).rev() {
-            bits |= if payload >> k & 1 == 1 { 0b01 } else { 0b10 } << at;
-            at += 2;
-        }
-        // Footer: off, on.
-        bits |= 0b10 << at;
-        ChipFrame {
-            bits,
-            len: MANCHESTER_CHIPS,
-        }
-    }
-
-    /// One period of the NRZ signal. The footer is a chip off, so nothing is set for it.
-    fn nrz(self) -> ChipFrame {
-        let (mut bits, mut at) = LineCode::Nrz.header();
-        let payload = self.payload();
-        for k in (0..PAYLOAD_BITS).rev() {
-            let bit = u64::from(payload >> k & 1);
-            bits |= bit << at;
-            at += 1;
-            if k % NRZ_GROUP_BITS == 0 {
-                bits |= (bit ^ 1) << at;
-                at += 1;
-            }
-        }
-        ChipFrame {
-            bits,
-            len: NRZ_CHIPS,
-        }
     }
 }
 
@@ -248,7 +229,7 @@ mod tests {
         }
     }
 
-    /// Provokes: data runs as long as the header's, which would have to be told apart by a chip.
+    /// Provokes: data runs as long as the header's, which a single chip would have to distinguish.
     #[test]
     fn runs_are_bounded() {
         for uid in all() {
@@ -265,7 +246,10 @@ mod tests {
     #[test]
     fn manchester_is_on_half_of_the_time() {
         for uid in all() {
-            assert_eq!(uid.manchester().bits.count_ones(), MANCHESTER_CHIPS / 2);
+            assert_eq!(
+                uid.frame(LineCode::Manchester).bits.count_ones(),
+                MANCHESTER_CHIPS / 2
+            );
         }
     }
 

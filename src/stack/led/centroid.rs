@@ -20,6 +20,8 @@
 //! ellipse is symmetric about its centre, so rows are summed with weights symmetric about the v
 //! centre, which fade to nothing at the nearer end.
 
+use nalgebra::Point2;
+
 /// Centre of the Gaussian through three samples; `None` where they have no maximum.
 pub fn log_gaussian_centre(u: [f64; 3], g: [f64; 3]) -> Option<f64> {
     if !g.iter().all(|&g| g > 0.0) {
@@ -49,84 +51,61 @@ pub struct Chord {
     pub right: f64,
 }
 
-/// Grey centroid of spots; owns its buffers.
-#[derive(Debug, Default)]
-pub struct GreyCentroid {
-    chords: Vec<Chord>,
-    marginal: Vec<f64>,
-    sums: Vec<f64>,
+/// Centre of a spot from the chords of its lit rows, in order of rows.
+pub fn grey_centre(lit: impl Iterator<Item = Chord>) -> Option<Point2<f64>> {
+    let chords = filled(lit);
+    let first = chords.first()?.v as f64;
+    let lengths: Vec<f64> = chords.iter().map(|c| c.right - c.left).collect();
+    let v = marginal_centre(&lengths)?;
+    let left = chords.iter().map(|c| c.left).fold(f64::INFINITY, f64::min);
+    let right = chords.iter().map(|c| c.right).fold(0.0, f64::max);
+    let (left, right) = (left.floor() - 1.0, right.ceil() + 1.0);
+    let u = marginal_centre(&column_sums(&chords, v, left, right))?;
+    Some(Point2::new(left + u, first + v))
 }
 
-impl GreyCentroid {
-    /// Centre (u, v) of a spot from the chords of its lit rows, in order of rows.
-    pub fn centre(&mut self, lit: impl Iterator<Item = Chord>) -> Option<(f64, f64)> {
-        self.fill(lit);
-        let first = self.chords.first()?.v as f64;
-        self.marginal.clear();
-        self.marginal
-            .extend(self.chords.iter().map(|c| c.right - c.left));
-        let v = marginal_centre(&self.marginal, &mut self.sums)?;
-        let left = self
-            .chords
-            .iter()
-            .map(|c| c.left)
-            .fold(f64::INFINITY, f64::min)
-            .floor()
-            - 1.0;
-        let right = self
-            .chords
-            .iter()
-            .map(|c| c.right)
-            .fold(0.0, f64::max)
-            .ceil()
-            + 1.0;
-        self.sum_columns(v, left, (right - left) as usize + 1);
-        let u = marginal_centre(&self.marginal, &mut self.sums)?;
-        Some((left + u, first + v))
-    }
-
-    /// Takes lit chords and interpolates dark rows between them.
-    fn fill(&mut self, lit: impl Iterator<Item = Chord>) {
-        self.chords.clear();
-        for chord in lit {
-            if let Some(last) = self.chords.last().copied() {
-                for v in last.v + 1..chord.v {
-                    let share = (v - last.v) as f64 / (chord.v - last.v) as f64;
-                    self.chords.push(Chord {
-                        v,
-                        left: last.left + share * (chord.left - last.left),
-                        right: last.right + share * (chord.right - last.right),
-                    });
-                }
-            }
-            self.chords.push(chord);
-        }
-    }
-
-    /// Sums the chords' cover of every column, with weights symmetric about row `v`.
-    fn sum_columns(&mut self, v: f64, left: f64, columns: usize) {
-        self.marginal.clear();
-        self.marginal.resize(columns, 0.0);
-        let reach = (v + 0.5).min(self.chords.len() as f64 - 0.5 - v).max(1.0);
-        for (k, chord) in self.chords.iter().enumerate() {
-            let weight = 1.0 - ((k as f64 - v) / reach).powi(2);
-            if weight <= 0.0 {
-                continue;
-            }
-            let (a, b) = (chord.left - left, chord.right - left);
-            for u in (a - 0.5).max(0.0) as usize..((b + 1.5) as usize).min(columns) {
-                let cover = (u as f64 + 0.5).min(b) - (u as f64 - 0.5).max(a);
-                self.marginal[u] += weight * cover.max(0.0);
+/// Lit chords, and dark rows interpolated between them.
+fn filled(lit: impl Iterator<Item = Chord>) -> Vec<Chord> {
+    let mut chords: Vec<Chord> = Vec::new();
+    for chord in lit {
+        if let Some(last) = chords.last().copied() {
+            for v in last.v + 1..chord.v {
+                let share = (v - last.v) as f64 / (chord.v - last.v) as f64;
+                chords.push(Chord {
+                    v,
+                    left: last.left + share * (chord.left - last.left),
+                    right: last.right + share * (chord.right - last.right),
+                });
             }
         }
+        chords.push(chord);
     }
+    chords
+}
+
+/// The chords' cover of every column from `left` to `right`, with weights symmetric about the
+/// chord number `v`.
+fn column_sums(chords: &[Chord], v: f64, left: f64, right: f64) -> Vec<f64> {
+    let mut sums = vec![0.0; (right - left) as usize + 1];
+    let reach = (v + 0.5).min(chords.len() as f64 - 0.5 - v).max(1.0);
+    for (k, chord) in chords.iter().enumerate() {
+        let weight = 1.0 - ((k as f64 - v) / reach).powi(2);
+        if weight <= 0.0 {
+            continue;
+        }
+        let (a, b) = (chord.left - left, chord.right - left);
+        for u in (a - 0.5).max(0.0) as usize..((b + 1.5) as usize).min(sums.len()) {
+            let cover = (u as f64 + 0.5).min(b) - (u as f64 - 0.5).max(a);
+            sums[u] += weight * cover.max(0.0);
+        }
+    }
+    sums
 }
 
 /// Centre of a marginal given at 0, 1, 2 ...; `None` where it has no clear top.
-fn marginal_centre(marginal: &[f64], sums: &mut Vec<f64>) -> Option<f64> {
+fn marginal_centre(marginal: &[f64]) -> Option<f64> {
     let (mut sum, mut first) = (0.0, 0.0);
-    sums.clear();
-    sums.push(0.0);
+    let mut sums = vec![0.0];
     for (k, &g) in marginal.iter().enumerate() {
         sum += g;
         first += k as f64 * g;
@@ -151,7 +130,7 @@ fn marginal_centre(marginal: &[f64], sums: &mut Vec<f64>) -> Option<f64> {
         }
         let u = [centre - step, centre, centre + step];
         let means =
-            u.map(|u| (integral(sums, u + window) - integral(sums, u - window)) / (2.0 * window));
+            u.map(|u| (integral(&sums, u + window) - integral(&sums, u - window)) / (2.0 * window));
         // About the present centre, so that large coordinates lose no digits.
         let offset = log_gaussian_centre([-step, 0.0, step], means)?;
         // A top flatter than a Gaussian's makes the formula overshoot.
@@ -180,7 +159,6 @@ mod tests {
     use super::*;
     use crate::bus::Ellipse;
     use crate::stack::led::ellipse::chord;
-    use nalgebra::Point2;
 
     /// The published formula on exact Gaussian samples, equally spaced or not.
     #[test]
@@ -201,16 +179,14 @@ mod tests {
         assert_eq!(log_gaussian_centre([1.0, 2.0, 3.0], [5.0, 5.0, 5.0]), None);
         assert_eq!(log_gaussian_centre([1.0, 2.0, 3.0], [5.0, 2.0, 5.0]), None);
         assert_eq!(log_gaussian_centre([1.0, 2.0, 3.0], [0.0, 2.0, 5.0]), None);
-        let mut sums = Vec::new();
-        assert_eq!(marginal_centre(&[], &mut sums), None);
-        assert_eq!(marginal_centre(&[0.0; 9], &mut sums), None);
-        assert_eq!(GreyCentroid::default().centre([].into_iter()), None);
+        assert_eq!(marginal_centre(&[]), None);
+        assert_eq!(marginal_centre(&[0.0; 9]), None);
+        assert_eq!(grey_centre([].into_iter()), None);
     }
 
     /// A slanting ellipse at any sub-pixel place, of which stripes hide rows, at an end too.
     #[test]
     fn a_striped_slanting_ellipse_is_found() {
-        let mut grey = GreyCentroid::default();
         for k in 0..20 {
             let outline = Ellipse {
                 centre: Point2::new(40.0 + 0.05 * f64::from(k), 40.0 + 0.13 * f64::from(k)),
@@ -223,7 +199,8 @@ mod tests {
                 .filter_map(|v| {
                     chord(&outline, v as f64).map(|(left, right)| Chord { v, left, right })
                 });
-            let (u, v) = grey.centre(lit).unwrap();
+            let centre = grey_centre(lit).unwrap();
+            let (u, v) = (centre.x, centre.y);
             assert!(
                 (u - outline.centre.x).abs() < 0.3,
                 "{u} for {}",
@@ -240,7 +217,6 @@ mod tests {
     /// Without stripes the centre is within 0.03 pixel.
     #[test]
     fn a_whole_ellipse_is_found_closely() {
-        let mut grey = GreyCentroid::default();
         for k in 0..20 {
             let outline = Ellipse {
                 centre: Point2::new(40.0 + 0.05 * f64::from(k), 40.0),
@@ -252,7 +228,8 @@ mod tests {
             let lit = rows.filter_map(|v| {
                 chord(&outline, v as f64).map(|(left, right)| Chord { v, left, right })
             });
-            let (u, v) = grey.centre(lit).unwrap();
+            let centre = grey_centre(lit).unwrap();
+            let (u, v) = (centre.x, centre.y);
             assert!(
                 (u - outline.centre.x).abs() < 0.03,
                 "{u} for {}",

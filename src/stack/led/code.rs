@@ -38,10 +38,7 @@ pub fn decode_cyclic(on: u64, known: u64, code: LineCode) -> Option<Uid> {
     let header_mask = (1u64 << header_chips) - 1;
     let mut found = None;
     for by in 0..n {
-        let (on, known) = match by {
-            0 => (on & whole, known & whole),
-            _ => (turn(on & whole, by), turn(known & whole, by)),
-        };
+        let (on, known) = (turn(on & whole, by), turn(known & whole, by));
         if (on ^ header) & known & header_mask != 0 {
             continue;
         }
@@ -255,7 +252,7 @@ mod tests {
             len: 10,
         };
         assert_eq!(longest_dark_run([frame].into_iter()), 4);
-        let all = (0..1024).map(|lamp| Uid { line: 1, lamp }.manchester());
+        let all = (0..1024).map(|lamp| Uid { line: 1, lamp }.frame(LineCode::Manchester));
         assert_eq!(longest_dark_run(all), 4);
     }
 }

@@ -85,14 +85,7 @@ fn fit(points: &[Point2<f64>], used: impl Fn(&Point2<f64>) -> bool) -> Option<Fi
         right -= row;
     }
     let factor = normal.cholesky()?;
-    let solution = factor.solve(&right);
-    let conic = [
-        solution[0],
-        solution[1],
-        solution[2],
-        solution[3],
-        solution[4],
-    ];
+    let conic: [f64; 5] = factor.solve(&right).into();
     let mut fitted = Fitted {
         fit: EllipseFit {
             ellipse: to_ellipse(conic, &mean, scale)?,
@@ -165,16 +158,6 @@ pub fn roundness(ellipse: &Ellipse) -> f64 {
     4.0 * std::f64::consts::PI.powi(2) * a * b / perimeter.powi(2)
 }
 
-/// A point of an ellipse at parameter `t` (0 to 2 pi).
-pub fn point_at(e: &Ellipse, t: f64) -> Point2<f64> {
-    let (sin, cos) = e.angle_rad.sin_cos();
-    let (x, y) = (e.semi_major_px * t.cos(), e.semi_minor_px * t.sin());
-    Point2::new(
-        e.centre.x + x * cos - y * sin,
-        e.centre.y + x * sin + y * cos,
-    )
-}
-
 /// Left and right end of an ellipse's chord along row `v`; `None` above and below it.
 pub fn chord(e: &Ellipse, v: f64) -> Option<(f64, f64)> {
     let (sin, cos) = e.angle_rad.sin_cos();
@@ -199,6 +182,16 @@ pub fn chord(e: &Ellipse, v: f64) -> Option<(f64, f64)> {
 mod tests {
     use super::*;
     use std::f64::consts::TAU;
+
+    /// A point of an ellipse at parameter `t` (0 to 2 pi).
+    fn point_at(e: &Ellipse, t: f64) -> Point2<f64> {
+        let (sin, cos) = e.angle_rad.sin_cos();
+        let (x, y) = (e.semi_major_px * t.cos(), e.semi_minor_px * t.sin());
+        Point2::new(
+            e.centre.x + x * cos - y * sin,
+            e.centre.y + x * sin + y * cos,
+        )
+    }
 
     fn sample() -> Ellipse {
         Ellipse {

@@ -1,14 +1,15 @@
 //! Lamps in an image: the steps in their order.
 
-use super::centroid::{Chord, GreyCentroid};
+use super::centroid::{Chord, grey_centre};
 use super::code::{ChipVotes, longest_dark_run};
 use super::ellipse::{EllipseFit, fit_ellipse, roundness};
-use super::median::{MedianScratch, median3};
+use super::median::median3;
 use super::otsu::otsu;
-use super::outline::Outline;
+use super::outline::{ClosedSpot, Outline};
 use super::patch::Patch;
 use super::profile::{Profile, REACH_ROWS};
-use super::search::{SearchScratch, SearchSettings, find_regions};
+use super::search::Search;
+use super::spill::SpillTable;
 use super::stripes::{StripeReader, StripeReading};
 use super::wiener::Wiener;
 use crate::bus::{CameraModel, Ellipse, Intrinsics, PixelBox, Spot};
@@ -40,25 +41,17 @@ pub struct LampImage {
     shape: Ellipse,
 }
 
-/// Finds lamps and reads their stripes; owns all buffers.
+/// Finds lamps and reads their stripes.
 #[derive(Debug)]
 pub struct LampFinder {
     settings: LedSettings,
     lens: Intrinsics,
-    search: SearchSettings,
+    /// Of the longest darkness of a lamp.
     dark_rows: usize,
     chip_s: f64,
     code: LineCode,
-    scratch: SearchScratch,
-    regions: Vec<PixelBox>,
-    raw: Patch,
-    filtered: Patch,
-    median: MedianScratch,
-    outline: Outline,
-    ideal: Vec<Point2<f64>>,
-    grey: GreyCentroid,
+    spill: SpillTable,
     wiener: Wiener,
-    profile: Profile,
     reader: StripeReader,
 }
 
@@ -85,26 +78,11 @@ impl LampFinder {
         Self {
             settings: settings.clone(),
             lens: camera.intrinsics,
-            search: SearchSettings {
-                min_contrast_grey: settings.min_contrast_grey,
-                // A bright chip that two rows share is lost in the median: dark runs on both
-                // sides of it are then one.
-                gap_rows: 2 * dark_rows,
-                margin_px: MARGIN_PX,
-            },
             dark_rows,
             chip_s,
             code,
-            scratch: SearchScratch::default(),
-            regions: Vec::new(),
-            raw: Patch::default(),
-            filtered: Patch::default(),
-            median: MedianScratch::default(),
-            outline: Outline::new(camera.blur_px),
-            ideal: Vec::new(),
-            grey: GreyCentroid::default(),
+            spill: SpillTable::new(camera.blur_px),
             wiener: Wiener::default(),
-            profile: Profile::default(),
             reader: StripeReader::new(chip_s, camera.shutter),
         }
     }
@@ -119,31 +97,31 @@ impl LampFinder {
         ChipVotes::new(self.code, self.chip_s)
     }
 
-    /// Finds the lamps of an image. `smear_px` tells how far a lamp at a pixel moves along the row
+    /// Dark rows that may lie between two lit ones of a lamp. A bright chip that two rows share is
+    /// lost in the median: dark runs on both sides of it are then one.
+    fn gap_rows(&self) -> usize {
+        2 * self.dark_rows
+    }
+
+    /// Finds the lamps of an image. `smear_px` says how far a lamp at a pixel moves along the row
     /// during the exposure.
     pub fn find(
         &mut self,
         image: &GrayImage,
         smear_px: impl Fn(&Point2<f64>) -> f64,
-        out: &mut Vec<LampImage>,
-    ) {
-        out.clear();
-        let mut regions = std::mem::take(&mut self.regions);
-        let black = find_regions(image, &self.search, &mut self.scratch, &mut regions);
-        for region in &regions {
-            if let Some(lamp) = self.measure(image, region, black, &smear_px) {
-                let known = |l: &LampImage| {
-                    let b = &l.spot.bounds;
-                    let (u, v) = (lamp.spot.centre.x, lamp.spot.centre.y);
-                    (f64::from(b.u0)..=f64::from(b.u1)).contains(&u)
-                        && (f64::from(b.v0)..=f64::from(b.v1)).contains(&v)
-                };
-                if !out.iter().any(known) {
-                    out.push(lamp);
-                }
+    ) -> Vec<LampImage> {
+        let mut lamps: Vec<LampImage> = Vec::new();
+        let search = Search::of(image, self.settings.min_contrast_grey, self.gap_rows());
+        for region in &search.regions {
+            let Some(lamp) = self.measure(image, region, search.black, &smear_px) else {
+                continue;
+            };
+            let known = |l: &LampImage| l.spot.bounds.contains(&lamp.spot.centre);
+            if !lamps.iter().any(known) {
+                lamps.push(lamp);
             }
         }
-        self.regions = regions;
+        lamps
     }
 
     fn measure(
@@ -153,58 +131,51 @@ impl LampFinder {
         black: f64,
         smear_px: &impl Fn(&Point2<f64>) -> f64,
     ) -> Option<LampImage> {
-        self.raw.cut(image, region);
-        median3(&self.raw, &mut self.filtered, &mut self.median);
-        let split = otsu(&self.filtered.histogram())?;
+        let mut raw = Patch::cut(image, &region.widened(MARGIN_PX, MARGIN_PX));
+        let filtered = median3(&raw);
+        let split = otsu(&filtered.histogram())?;
         if split.bright_mean - split.dark_mean < self.settings.min_contrast_grey {
             return None;
         }
-        let gap = self.search.gap_rows;
-        if !self.outline.find(&self.filtered, split.threshold, gap)
-            || (self.outline.area_px as f64) < self.settings.min_area_px
-        {
+        let spot = ClosedSpot::find(&filtered, split.threshold, self.gap_rows())?;
+        if f64::from(spot.area_px) < self.settings.min_area_px {
             return None;
         }
-        let bounds = self.bounds()?;
-        let middle = |a: u32, b: u32| 0.5 * (f64::from(a) + f64::from(b));
-        let rough = Point2::new(middle(bounds.u0, bounds.u1), middle(bounds.v0, bounds.v1));
-        let smear = smear_px(&rough).abs();
+        let smear = smear_px(&middle(&spot.bounds)).abs();
         if smear > self.settings.deblur_over_px {
             self.wiener
                 .prepare(smear, self.settings.wiener_noise_to_signal);
-            self.wiener.apply(&mut self.raw);
+            self.wiener.apply(&mut raw);
         }
         let size = (image.width() as usize, image.height() as usize);
-        self.outline.trace(&self.raw, black, split.threshold, size);
-        let fits = self.fits();
-        self.describe(bounds, rough, fits, black)
+        let outline = Outline::trace(&spot, &raw, (black, split.threshold), size, &self.spill);
+        self.describe(spot.bounds, &raw, &outline, black)
     }
 
     /// Ellipses through the edge points as they are seen, and as they would be without distortion.
-    fn fits(&mut self) -> Option<(EllipseFit, EllipseFit)> {
+    fn fits(&self, points: &[Point2<f64>]) -> Option<(EllipseFit, EllipseFit)> {
         let fit = |points: &[Point2<f64>]| {
             let close = |f: &EllipseFit| f.rms_px < 0.3 + MAX_MISFIT * f.ellipse.semi_minor_px;
             fit_ellipse(points).filter(close)
         };
-        let seen = fit(&self.outline.points)?;
+        let seen = fit(points)?;
         if self.lens.distortion.is_none() {
             return Some((seen, seen));
         }
-        self.ideal.clear();
-        let points = self.outline.points.iter();
-        self.ideal.extend(points.map(|p| self.lens.ideal(p)));
-        Some((seen, fit(&self.ideal)?))
+        let ideal: Vec<_> = points.iter().map(|p| self.lens.ideal(p)).collect();
+        Some((seen, fit(&ideal)?))
     }
 
     /// Weighs the two centres.
     fn describe(
-        &mut self,
+        &self,
         bounds: PixelBox,
-        rough: Point2<f64>,
-        fits: Option<(EllipseFit, EllipseFit)>,
+        raw: &Patch,
+        outline: &Outline,
         black: f64,
     ) -> Option<LampImage> {
-        let cut = self.outline.cut;
+        let cut = outline.cut;
+        let fits = self.fits(&outline.points);
         let fit = fits.map(|f| f.1);
         let ellipse = fit.map(|f| f.ellipse);
         // What the border cuts off pulls the grey centroid, not the ellipse.
@@ -213,7 +184,7 @@ impl LampFinder {
             Some(e) => roundness(e),
             None => 1.0,
         };
-        let centre = match (self.ideal_grey_centre(fits), ellipse) {
+        let centre = match (self.ideal_grey_centre(raw, outline, fits), ellipse) {
             (Some(g), Some(e)) => Point2::from(alpha * g.coords + (1.0 - alpha) * e.centre.coords),
             (None, Some(e)) => e.centre,
             (Some(g), None) => g,
@@ -221,15 +192,15 @@ impl LampFinder {
         };
         let seen = fits.map(|f| f.0.ellipse);
         let shape = seen.unwrap_or(Ellipse {
-            centre: rough,
+            centre: middle(&bounds),
             semi_major_px: 0.5 * f64::from(bounds.v1 - bounds.v0).max(2.0),
             semi_minor_px: 0.5 * f64::from(bounds.u1 - bounds.u0).max(2.0),
             angle_rad: std::f64::consts::FRAC_PI_2,
         });
         let sigma_px = fit.map_or(1.0, |f| f.centre_sigma_px);
         let scale = self.ideal_scale(&centre);
-        let (spill, spill_sigma) = self.outline.spill.px();
-        let (spill, spill_sigma) = (scale * spill, scale * spill_sigma);
+        let spill = scale * outline.spill.px;
+        let spill_sigma = scale * outline.spill.sigma_px;
         Some(LampImage {
             centre,
             own_outline: ellipse
@@ -254,22 +225,20 @@ impl LampFinder {
         })
     }
 
-    fn bounds(&self) -> Option<PixelBox> {
-        let (first, last) = self.outline.rows?;
-        let left = self.outline.extents.iter().map(|e| e.0).min()?;
-        let right = self.outline.extents.iter().map(|e| e.1).max()?;
-        Some(PixelBox {
-            u0: (self.raw.u0 + left) as u32,
-            v0: (self.raw.v0 + first) as u32,
-            u1: (self.raw.u0 + right) as u32,
-            v1: (self.raw.v0 + last) as u32,
-        })
-    }
-
-    /// The grey centre in ideal pixels. A lens that bends a disc moves the middle of its outline
-    /// off the image of its centre; by how much, the two ellipses tell.
-    fn ideal_grey_centre(&mut self, fits: Option<(EllipseFit, EllipseFit)>) -> Option<Point2<f64>> {
-        let grey = self.grey_centre()?;
+    /// The grey centre in ideal pixels, from the chords of the lit rows. A lens that bends a disc
+    /// moves the middle of its outline off the image of its centre: as far as the centres of the
+    /// two ellipses are apart.
+    fn ideal_grey_centre(
+        &self,
+        raw: &Patch,
+        outline: &Outline,
+        fits: Option<(EllipseFit, EllipseFit)>,
+    ) -> Option<Point2<f64>> {
+        let whole = |e: &&(usize, f64, f64)| e.1.is_finite() && e.2.is_finite();
+        let edges = outline.edges.iter().filter(whole);
+        let chords = edges.map(|&(v, left, right)| Chord { v, left, right });
+        let centre = grey_centre(chords)?;
+        let grey = Point2::new(raw.u0 as f64 + centre.x, raw.v0 as f64 + centre.y);
         let bent =
             fits.map(|(seen, ideal)| self.lens.seen(&ideal.ellipse.centre) - seen.ellipse.centre);
         Some(self.lens.ideal(&(grey + bent.unwrap_or_default())))
@@ -289,30 +258,26 @@ impl LampFinder {
         seen_area.abs().max(1e-6).sqrt().recip()
     }
 
-    /// Log-Gaussian centre from the chords of the lit rows, as seen.
-    fn grey_centre(&mut self) -> Option<Point2<f64>> {
-        let whole = |e: &&(usize, f64, f64)| e.1.is_finite() && e.2.is_finite();
-        let edges = self.outline.edges.iter().filter(whole);
-        let chords = edges.map(|&(v, left, right)| Chord { v, left, right });
-        let (u, v) = self.grey.centre(chords)?;
-        Some(Point2::new(self.raw.u0 as f64 + u, self.raw.v0 as f64 + v))
+    /// Reads the chips of a lamp found in this image; `None` where there is no code in it.
+    pub fn read(&self, image: &GrayImage, lamp: &LampImage) -> Option<StripeReading> {
+        let around = lamp.spot.bounds.widened(MARGIN_PX, REACH_ROWS as u32 + 4);
+        let raw = Patch::cut(image, &around);
+        let tilt_over_rows = self.settings.tilt_over_rows;
+        let profile = Profile::of(
+            &raw,
+            lamp.black,
+            &lamp.shape,
+            self.dark_rows,
+            tilt_over_rows,
+        );
+        self.reader.read(&profile, lamp.black)
     }
+}
 
-    /// Reads the chips of a lamp found in this image.
-    pub fn read(&mut self, image: &GrayImage, lamp: &LampImage, out: &mut StripeReading) -> bool {
-        let reach = REACH_ROWS as u32 + 4;
-        let around = PixelBox {
-            u0: lamp.spot.bounds.u0.saturating_sub(MARGIN_PX),
-            v0: lamp.spot.bounds.v0.saturating_sub(reach),
-            u1: lamp.spot.bounds.u1 + MARGIN_PX,
-            v1: lamp.spot.bounds.v1 + reach,
-        };
-        self.raw.cut(image, &around);
-        let tilt = self.settings.tilt_over_rows;
-        self.profile
-            .take(&self.raw, lamp.black, &lamp.shape, self.dark_rows, tilt);
-        self.reader.read(&self.profile, lamp.black, out)
-    }
+/// Middle of a box.
+fn middle(bounds: &PixelBox) -> Point2<f64> {
+    let middle = |a: u32, b: u32| 0.5 * (f64::from(a) + f64::from(b));
+    Point2::new(middle(bounds.u0, bounds.u1), middle(bounds.v0, bounds.v1))
 }
 
 #[cfg(test)]
@@ -331,10 +296,10 @@ mod tests {
         let start_s = 0.1 + f64::from(number) / 30.0;
         let pair = world.pair(number, start_s);
         let mut finder = LampFinder::new(&LedSettings::default(), &world.rig.left, &world.lamps);
-        let (mut found, mut disparities) = (Vec::new(), [f64::NAN; 2]);
-        finder.find(&pair.right.image, |_| 0.0, &mut found);
-        let right = found.first().map(|l| l.spot.centre.x);
-        finder.find(&pair.left.image, |_| 0.0, &mut found);
+        let mut disparities = [f64::NAN; 2];
+        let right = finder.find(&pair.right.image, |_| 0.0);
+        let right = right.first().map(|l| l.spot.centre.x);
+        let found = finder.find(&pair.left.image, |_| 0.0);
         if let (Some(l), Some(right)) = (found.first(), right) {
             let eye = |x_m| {
                 let pose = world.world_from_left(start_s) * Translation3::new(x_m, 0.0, 0.0);
@@ -346,10 +311,9 @@ mod tests {
                 eye(0.0) - eye(world.rig.baseline_m()),
             ];
         }
-        let mut reading = StripeReading::default();
         let mut votes = finder.votes();
-        let lamp = found.first().cloned();
-        if lamp.is_some_and(|l| finder.read(&pair.left.image, &l, &mut reading)) {
+        let lamp = found.first();
+        if let Some(reading) = lamp.and_then(|l| finder.read(&pair.left.image, l)) {
             votes.add(0.0, &reading);
         }
         (found, disparities, votes.decode())
@@ -395,17 +359,15 @@ mod tests {
         let map = tunnel("manchester");
         let camera = crate::stack::led::testing::rig().left;
         let mut finder = LampFinder::new(&LedSettings::default(), &camera, &map.lamps);
-        let mut found = Vec::new();
         for (w, h) in [(0, 0), (1, 1), (3, 200), (1280, 720)] {
             for grey in [0, 4, 255] {
                 let image = GrayImage::from_pixel(w, h, image::Luma([grey]));
-                finder.find(&image, |_| 9.0, &mut found);
-                assert!(found.is_empty());
+                assert!(finder.find(&image, |_| 9.0).is_empty());
             }
         }
         // A column of light at the border has no two sides.
         let bar = GrayImage::from_fn(300, 200, |u, _| image::Luma([if u < 9 { 250 } else { 3 }]));
-        finder.find(&bar, |_| 0.0, &mut found);
+        let found = finder.find(&bar, |_| 0.0);
         assert!(
             found.iter().all(|l| l.spot.cut && l.spot.ellipse.is_none()),
             "{found:?}"

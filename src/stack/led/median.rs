@@ -6,45 +6,31 @@
 
 use super::patch::Patch;
 
-/// Buffers of [`median3`], kept from call to call.
-#[derive(Debug, Default)]
-pub struct MedianScratch {
-    low: Vec<u8>,
-    mid: Vec<u8>,
-    high: Vec<u8>,
-}
-
 /// Median of every pixel's 3x3 neighbourhood; the border is repeated outwards.
-pub fn median3(source: &Patch, out: &mut Patch, scratch: &mut MedianScratch) {
+pub fn median3(source: &Patch) -> Patch {
     let (w, h) = (source.width, source.height);
-    out.reshape_like(source);
+    let mut out = source.clone();
     if w == 0 || h == 0 {
-        return;
+        return out;
     }
-    for buffer in [&mut scratch.low, &mut scratch.mid, &mut scratch.high] {
-        buffer.clear();
-        buffer.resize(w + 2, 0);
-    }
+    // Each with the border repeated on both sides.
+    let [mut low, mut mid, mut high] = [(); 3].map(|()| vec![0; w + 2]);
     for v in 0..h {
         let above = source.row(v.saturating_sub(1));
         let here = source.row(v);
         let below = source.row((v + 1).min(h - 1));
         let columns = above.iter().zip(here).zip(below);
         for (u, ((&a, &b), &c)) in columns.enumerate() {
-            let (low, high) = (a.min(b), a.max(b));
-            scratch.low[u + 1] = low.min(c);
-            scratch.mid[u + 1] = low.max(high.min(c));
-            scratch.high[u + 1] = high.max(c);
+            let (least, most) = (a.min(b), a.max(b));
+            low[u + 1] = least.min(c);
+            mid[u + 1] = least.max(most.min(c));
+            high[u + 1] = most.max(c);
         }
-        for buffer in [&mut scratch.low, &mut scratch.mid, &mut scratch.high] {
+        for buffer in [&mut low, &mut mid, &mut high] {
             buffer[0] = buffer[1];
             buffer[w + 1] = buffer[w];
         }
-        let windows = scratch
-            .low
-            .windows(3)
-            .zip(scratch.mid.windows(3))
-            .zip(scratch.high.windows(3));
+        let windows = low.windows(3).zip(mid.windows(3)).zip(high.windows(3));
         for (pixel, ((l, m), g)) in out.row_mut(v).iter_mut().zip(windows) {
             let a = l[0].max(l[1]).max(l[2]);
             let b = middle(m[0], m[1], m[2]);
@@ -52,6 +38,7 @@ pub fn median3(source: &Patch, out: &mut Patch, scratch: &mut MedianScratch) {
             *pixel = middle(a, b, c);
         }
     }
+    out
 }
 
 fn middle(a: u8, b: u8, c: u8) -> u8 {
@@ -88,15 +75,12 @@ mod tests {
     #[test]
     fn equals_sorting_on_random_images() {
         let mut noise = SplitMix64::new(7);
-        let mut scratch = MedianScratch::default();
-        let mut out = Patch::default();
         for (w, h) in [(1, 1), (1, 5), (5, 1), (2, 2), (17, 9), (40, 33)] {
             let data = (0..w * h)
                 .map(|_| (noise.uniform() * 256.0) as u8)
                 .collect();
             let source = Patch::from_data(0, 0, w, h, data);
-            median3(&source, &mut out, &mut scratch);
-            assert_eq!(out.data, slow(&source), "{w} x {h}");
+            assert_eq!(median3(&source).data, slow(&source), "{w} x {h}");
         }
     }
 }

@@ -55,8 +55,7 @@ mod stripes;
 pub mod testing;
 mod wiener;
 
-pub use centroid::log_gaussian_centre;
 pub use code::{ChipVotes, decode_cyclic};
-pub use ellipse::{EllipseFit, fit_ellipse, point_at, roundness};
+pub use ellipse::fit_ellipse;
 pub use finder::{LampFinder, LampImage};
 pub use stripes::StripeReading;

@@ -11,21 +11,69 @@
 //! An edge lies where the row crosses half of its own plateau, between two pixels by linear
 //! interpolation; so a row that caught the lamp switching, at half its brightness, gives the same
 //! edge. Where the sensor saturates the plateau is too low and the edge lies outside, left and
-//! right alike: [`Spill`] tells by how much.
+//! right alike: [`Spill`] says by how much.
 
 use super::patch::Patch;
-use super::spill::Spill;
+use super::spill::{Spill, SpillSums, SpillTable};
+use crate::bus::PixelBox;
+use crate::stack::runs::Runs;
 use nalgebra::Point2;
 
-/// A connected spot in a patch, row by row.
+/// The largest spot of a patch, its stripes closed.
+#[derive(Debug)]
+pub struct ClosedSpot {
+    /// First row of the patch that it covers.
+    first_row: usize,
+    /// Leftmost and rightmost column in every row from there on.
+    extents: Vec<(usize, usize)>,
+    /// Its pixels.
+    pub area_px: u32,
+    /// In the image.
+    pub bounds: PixelBox,
+}
+
+impl ClosedSpot {
+    /// Over `threshold` in the filtered patch after closing gaps of up to `gap_rows`; `None` where
+    /// there is none.
+    pub fn find(filtered: &Patch, threshold: u8, gap_rows: usize) -> Option<Self> {
+        let bright = filtered.data.iter().map(|&g| u8::from(g > threshold));
+        let mut mask: Vec<u8> = bright.collect();
+        close_columns(&mut mask, filtered.width, gap_rows);
+        let mut runs = Runs::new(&mask, filtered.width, 0, |_| true);
+        // Of equally large ones the first.
+        let blobs = runs.blobs().into_iter().rev();
+        let (region, spot) = blobs.max_by_key(|(_, blob)| blob.area_px)?;
+        let first_row = spot.bounds.v0 as usize;
+        let mut extents: Vec<(usize, usize)> = Vec::new();
+        for k in 0..runs.all.len() {
+            if runs.region(k) != region {
+                continue;
+            }
+            let run = runs.all[k];
+            let (left, right) = (run.u.0 as usize, run.u.1 as usize);
+            match extents.get_mut(run.v as usize - first_row) {
+                Some(extent) => extent.1 = right,
+                None => extents.push((left, right)),
+            }
+        }
+        let (u0, v0) = (filtered.u0 as u32, filtered.v0 as u32);
+        Some(Self {
+            first_row,
+            extents,
+            area_px: spot.area_px,
+            bounds: PixelBox {
+                u0: u0 + spot.bounds.u0,
+                v0: v0 + spot.bounds.v0,
+                u1: u0 + spot.bounds.u1,
+                v1: v0 + spot.bounds.v1,
+            },
+        })
+    }
+}
+
+/// Edges of a lamp.
 #[derive(Debug)]
 pub struct Outline {
-    /// Rows of the patch that the spot covers: from the first to the last.
-    pub rows: Option<(usize, usize)>,
-    /// Leftmost and rightmost column of the closed spot in every row of `rows`.
-    pub extents: Vec<(usize, usize)>,
-    /// Pixels of the closed spot.
-    pub area_px: usize,
     /// Lit rows, as row of the patch and sub-pixel left and right edge, `NaN` where the image's
     /// border cut it.
     pub edges: Vec<(usize, f64, f64)>,
@@ -35,164 +83,71 @@ pub struct Outline {
     pub spill: Spill,
     /// It touches the image's border.
     pub cut: bool,
-    mask: Vec<bool>,
-    stack: Vec<usize>,
 }
 
 impl Outline {
-    /// For images of a lens that spreads a point with a standard deviation of `blur_px`.
-    pub fn new(blur_px: f64) -> Self {
-        Self {
-            rows: None,
-            extents: Vec::new(),
-            area_px: 0,
-            edges: Vec::new(),
-            points: Vec::new(),
-            spill: Spill::new(blur_px),
-            cut: false,
-            mask: Vec::new(),
-            stack: Vec::new(),
-        }
-    }
-
-    /// Finds the largest spot over `threshold` in the filtered patch after closing gaps of up to
-    /// `gap_rows`. `false` where there is none.
-    pub fn find(&mut self, filtered: &Patch, threshold: u8, gap_rows: usize) -> bool {
-        let w = filtered.width;
-        self.rows = None;
-        self.mask.clear();
-        self.mask
-            .extend(filtered.data.iter().map(|&g| g > threshold));
-        close_columns(&mut self.mask, w, gap_rows);
-        let mut largest = (0, 0);
-        let mut labelled = std::mem::take(&mut self.mask);
-        let seen = labelled.clone();
-        for start in 0..labelled.len() {
-            if labelled[start] {
-                let area = self.flood(&mut labelled, w, start, |_| {});
-                if area > largest.0 {
-                    largest = (area, start);
-                }
-            }
-        }
-        self.mask = seen;
-        if largest.0 == 0 {
-            return false;
-        }
-        self.take(largest.1, w);
-        true
-    }
-
-    /// Fills rows and extents from the component that holds pixel `start`.
-    fn take(&mut self, start: usize, w: usize) {
-        let mut mask = std::mem::take(&mut self.mask);
-        let mut extents = std::mem::take(&mut self.extents);
-        extents.clear();
-        extents.resize(mask.len() / w, (usize::MAX, 0));
-        self.area_px = self.flood(&mut mask, w, start, |k| {
-            let (u, extent) = (k % w, &mut extents[k / w]);
-            *extent = (extent.0.min(u), extent.1.max(u));
-        });
-        self.mask = mask;
-        let covered = |e: &(usize, usize)| e.0 <= e.1;
-        let first = extents.iter().position(covered).unwrap_or(0);
-        let last = extents.iter().rposition(covered).unwrap_or(0);
-        extents.copy_within(first..=last, 0);
-        extents.truncate(last - first + 1);
-        self.extents = extents;
-        self.rows = Some((first, last));
-    }
-
-    /// Clears a component of the mask and counts its pixels (neighbours share a side or corner).
-    fn flood(
-        &mut self,
-        mask: &mut [bool],
-        w: usize,
-        start: usize,
-        mut each: impl FnMut(usize),
-    ) -> usize {
-        let h = mask.len() / w;
-        let mut area = 0;
-        mask[start] = false;
-        self.stack.clear();
-        self.stack.push(start);
-        while let Some(k) = self.stack.pop() {
-            area += 1;
-            each(k);
-            let (u, v) = (k % w, k / w);
-            for v in v.saturating_sub(1)..(v + 2).min(h) {
-                for u in u.saturating_sub(1)..(u + 2).min(w) {
-                    if std::mem::take(&mut mask[v * w + u]) {
-                        self.stack.push(v * w + u);
-                    }
-                }
-            }
-        }
-        area
-    }
-
-    /// Sub-pixel edges of the lit rows from the unfiltered patch (the median would shorten rows
-    /// beside dark ones). `image_size` tells which borders of the patch are the image's.
-    pub fn trace(&mut self, raw: &Patch, black: f64, threshold: u8, image_size: (usize, usize)) {
-        self.edges.clear();
-        self.points.clear();
-        self.cut = false;
-        self.spill.clear();
-        let Some((first, last)) = self.rows else {
-            return;
-        };
+    /// Sub-pixel edges of the lit rows of a spot from the unfiltered patch (the median would shorten
+    /// rows beside dark ones). `image_size` tells which borders of the patch are the image's.
+    pub fn trace(
+        spot: &ClosedSpot,
+        raw: &Patch,
+        (black, threshold): (f64, u8),
+        image_size: (usize, usize),
+        table: &SpillTable,
+    ) -> Self {
+        let (first, rows) = (spot.first_row, spot.extents.len());
         let at_left = raw.u0 == 0;
         let at_right = raw.u0 + raw.width == image_size.0;
-        self.cut = raw.v0 + first == 0 || raw.v0 + last + 1 >= image_size.1;
-        for v in first..=last {
-            let (u0, u1) = self.extents[v - first];
+        let mut outline = Self {
+            edges: Vec::new(),
+            points: Vec::new(),
+            spill: Spill::default(),
+            cut: raw.v0 + first == 0 || raw.v0 + first + rows >= image_size.1,
+        };
+        let mut sums = SpillSums::default();
+        for (v, &(u0, u1)) in (first..).zip(&spot.extents) {
             let row = raw.row(v);
             let Some((u0, u1)) = lit_core(row, u0, u1, threshold) else {
                 continue;
             };
             let top = plateau(row, u0, u1);
             let level = black + 0.5 * (top - black);
-            let left = if at_left && u0 == 0 {
-                None
-            } else {
-                crossing(row, (0..=(u0 + u1) / 2).rev(), level)
-            };
-            let right = if at_right && u1 + 1 == raw.width {
-                None
-            } else {
-                crossing(row, (u0 + u1) / 2..raw.width, level)
-            };
-            let off_middle = (2 * v).abs_diff(first + last) as f64;
-            if off_middle < STEEP_SHARE * (last - first + 1) as f64 {
+            let cut = [at_left && u0 == 0, at_right && u1 + 1 == raw.width];
+            let middle = (u0 + u1) / 2;
+            let left = (!cut[0]).then(|| crossing(row, (0..=middle).rev(), level));
+            let right = (!cut[1]).then(|| crossing(row, middle..raw.width, level));
+            let (left, right) = (left.flatten(), right.flatten());
+            let off_middle = (2 * v).abs_diff(2 * first + rows - 1) as f64;
+            if off_middle < STEEP_SHARE * rows as f64 {
                 for (edge, outwards) in [(left, -1), (right, 1)] {
                     if let Some(edge) = edge {
-                        self.spill.add(row, top, edge, outwards);
+                        sums.add(row, top, edge, outwards);
                     }
                 }
             }
-            self.cut |= (at_left && u0 == 0) || (at_right && u1 + 1 == raw.width);
+            outline.cut |= cut[0] || cut[1];
             let (du, dv) = (raw.u0 as f64, (raw.v0 + v) as f64);
             let found = left.into_iter().chain(right);
-            self.points.extend(found.map(|u| Point2::new(u + du, dv)));
-            self.edges
-                .push((v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN)));
+            outline
+                .points
+                .extend(found.map(|u| Point2::new(u + du, dv)));
+            let edges = (v, left.unwrap_or(f64::NAN), right.unwrap_or(f64::NAN));
+            outline.edges.push(edges);
         }
+        outline.spill = sums.spill(table);
+        outline
     }
 }
 
 /// Fills dark gaps of up to `gap` rows between lit pixels of a column: closing by a segment.
-fn close_columns(mask: &mut [bool], w: usize, gap: usize) {
-    if w == 0 {
-        return;
-    }
-    let h = mask.len() / w;
+fn close_columns(mask: &mut [u8], w: usize, gap: usize) {
     for u in 0..w {
         let mut last_lit: Option<usize> = None;
-        for v in 0..h {
-            if mask[v * w + u] {
+        for v in 0..mask.len() / w {
+            if mask[v * w + u] != 0 {
                 if let Some(last) = last_lit.filter(|last| v - last <= gap + 1) {
                     for between in last + 1..v {
-                        mask[between * w + u] = true;
+                        mask[between * w + u] = 1;
                     }
                 }
                 last_lit = Some(v);
@@ -238,6 +193,7 @@ fn crossing(row: &[u8], columns: impl Iterator<Item = usize>, level: f64) -> Opt
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use crate::bus::Ellipse;
@@ -266,11 +222,11 @@ mod tests {
         // A bright speck far off is another component.
         data[3 * w + 100] = 250;
         let patch = Patch::from_data(1000, 300, w, h, data);
-        let mut outline = Outline::new(0.0);
-        assert!(outline.find(&patch, 60, 9));
-        outline.trace(&patch, 4.0, 60, (1280, 720));
+        let spot = ClosedSpot::find(&patch, 60, 9).unwrap();
+        let table = SpillTable::new(0.0);
+        let outline = Outline::trace(&spot, &patch, (4.0, 60), (1280, 720), &table);
         assert!(!outline.cut);
-        assert!(outline.extents.iter().all(|e| e.1 < 100));
+        assert!(spot.extents.iter().all(|e| e.1 < 100));
         let fit = fit_ellipse(&outline.points).map(|f| f.ellipse.centre);
         let miss = fit.map(|c| (c - lamp.centre - nalgebra::Vector2::new(1000.0, 300.0)).norm());
         assert!(miss.is_some_and(|m| m < 0.05), "{miss:?}");
@@ -280,10 +236,10 @@ mod tests {
     #[test]
     fn closing_joins_up_to_the_gap() {
         let column = |gap: usize| {
-            let mut mask = vec![false; 20];
-            (mask[3], mask[3 + gap + 1]) = (true, true);
+            let mut mask = vec![0; 20];
+            (mask[3], mask[3 + gap + 1]) = (1, 1);
             close_columns(&mut mask, 1, 5);
-            mask.iter().filter(|&&lit| lit).count()
+            mask.iter().filter(|&&lit| lit != 0).count()
         };
         assert_eq!([column(4), column(5), column(6)], [6, 7, 2]);
     }

@@ -4,7 +4,7 @@ use crate::bus::PixelBox;
 use image::GrayImage;
 
 /// Pixels of a rectangle of an image, with its place.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     /// Image column of the patch's left one.
     pub u0: usize,
@@ -32,30 +32,21 @@ impl Patch {
         }
     }
 
-    /// Takes the pixels of `bounds`, as far as the image has them.
-    pub fn cut(&mut self, image: &GrayImage, bounds: &PixelBox) {
+    /// The pixels of `bounds`, as far as the image has them.
+    pub fn cut(image: &GrayImage, bounds: &PixelBox) -> Self {
         let (w, h) = (image.width() as usize, image.height() as usize);
-        self.u0 = (bounds.u0 as usize).min(w);
-        self.v0 = (bounds.v0 as usize).min(h);
-        self.width = (bounds.u1 as usize + 1).min(w).saturating_sub(self.u0);
-        self.height = (bounds.v1 as usize + 1).min(h).saturating_sub(self.v0);
-        self.data.clear();
-        if self.width == 0 {
-            return;
+        let u0 = (bounds.u0 as usize).min(w);
+        let v0 = (bounds.v0 as usize).min(h);
+        let width = (bounds.u1 as usize + 1).min(w).saturating_sub(u0);
+        let height = (bounds.v1 as usize + 1).min(h).saturating_sub(v0);
+        let rows = image.as_raw().chunks_exact(w.max(1)).skip(v0).take(height);
+        Self {
+            u0,
+            v0,
+            width,
+            height,
+            data: rows.flat_map(|row| &row[u0..u0 + width]).copied().collect(),
         }
-        let rows = image.as_raw().chunks_exact(w);
-        for row in rows.skip(self.v0).take(self.height) {
-            self.data
-                .extend_from_slice(&row[self.u0..self.u0 + self.width]);
-        }
-    }
-
-    /// Takes the place and size of another, all black.
-    pub fn reshape_like(&mut self, other: &Self) {
-        (self.u0, self.v0) = (other.u0, other.v0);
-        (self.width, self.height) = (other.width, other.height);
-        self.data.clear();
-        self.data.resize(other.data.len(), 0);
     }
 
     /// Pixels of row `v` of the patch.

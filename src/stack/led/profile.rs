@@ -18,9 +18,10 @@
 use super::ellipse::chord;
 use super::patch::Patch;
 use crate::bus::Ellipse;
+use std::ops::RangeInclusive;
 
 /// Light by rows.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Profile {
     /// Image row of the first entry (may be negative: rows above the image are dark).
     pub first_row: f64,
@@ -28,63 +29,27 @@ pub struct Profile {
     pub light: Vec<f64>,
     /// The same without stripes.
     pub envelope: Vec<f64>,
-    /// Shear of the stripes: rows per column, as corrected.
-    pub tilt: f64,
-    work: Vec<f64>,
-    left: Vec<f64>,
-    right: Vec<f64>,
 }
 
 /// Rows of glare that are looked at above and below the spot.
 pub const REACH_ROWS: i64 = 40;
 
 impl Profile {
-    /// Takes the profile of the spot with this outline ellipse from the patch.
-    pub fn take(
-        &mut self,
+    /// The profile of the spot with this outline ellipse.
+    pub fn of(
         raw: &Patch,
         black: f64,
         spot: &Ellipse,
         gap_rows: usize,
         tilt_over_rows: f64,
-    ) {
-        let half = half_height(spot);
-        let first = (spot.centre.y - half).floor() as i64 - REACH_ROWS;
-        let last = (spot.centre.y + half).ceil() as i64 + REACH_ROWS;
-        self.first_row = first as f64;
-        let mut side = std::mem::take(&mut self.left);
-        band(raw, black, spot, (first, last), (0.0, 0.45), 0.0, &mut side);
-        let mut other = std::mem::take(&mut self.right);
-        band(
-            raw,
-            black,
-            spot,
-            (first, last),
-            (0.55, 1.0),
-            0.0,
-            &mut other,
-        );
-        let width = spot.semi_major_px + spot.semi_minor_px;
-        let between = 0.275 * width;
-        let tilt = shift_between(&side, &other) / between;
-        (self.left, self.right) = (side, other);
-        self.tilt = if (tilt * width).abs() > tilt_over_rows && between > 4.0 {
-            tilt
-        } else {
-            0.0
-        };
-        let mut light = std::mem::take(&mut self.light);
-        band(
-            raw,
-            black,
-            spot,
-            (first, last),
-            (0.0, 1.0),
-            self.tilt,
-            &mut light,
-        );
-        self.light = light;
-        closing(&self.light, gap_rows, &mut self.work, &mut self.envelope);
+    ) -> Self {
+        let tilt = tilt(raw, black, spot, tilt_over_rows);
+        let light = band(raw, black, spot, (0.0, 1.0), tilt);
+        Self {
+            first_row: *rows(spot).start() as f64,
+            envelope: closing(&light, gap_rows),
+            light,
+        }
     }
 
     /// Row numbers of the longest stretch whose envelope is at least `floor`.
@@ -113,35 +78,45 @@ fn half_height(e: &Ellipse) -> f64 {
     (e.semi_major_px * sin).hypot(e.semi_minor_px * cos)
 }
 
+/// Image rows of a profile.
+fn rows(spot: &Ellipse) -> RangeInclusive<i64> {
+    let half = half_height(spot);
+    let first = (spot.centre.y - half).floor() as i64 - REACH_ROWS;
+    let last = (spot.centre.y + half).ceil() as i64 + REACH_ROWS;
+    first..=last
+}
+
+/// Shear of the stripes to be undone, rows per column; 0 where it does not matter.
+fn tilt(raw: &Patch, black: f64, spot: &Ellipse, over_rows: f64) -> f64 {
+    let left = band(raw, black, spot, (0.0, 0.45), 0.0);
+    let right = band(raw, black, spot, (0.55, 1.0), 0.0);
+    let width = spot.semi_major_px + spot.semi_minor_px;
+    let between = 0.275 * width;
+    let tilt = shift_between(&left, &right) / between;
+    if (tilt * width).abs() > over_rows && between > 4.0 {
+        tilt
+    } else {
+        0.0
+    }
+}
+
 /// Mean light of each row between two shares of the spot's chord, sheared by `tilt`. Above and
 /// below the spot the columns of its highest and lowest point are used.
-fn band(
-    raw: &Patch,
-    black: f64,
-    spot: &Ellipse,
-    (first, last): (i64, i64),
-    (from, to): (f64, f64),
-    tilt: f64,
-    out: &mut Vec<f64>,
-) {
-    out.clear();
+fn band(raw: &Patch, black: f64, spot: &Ellipse, (from, to): (f64, f64), tilt: f64) -> Vec<f64> {
     let half = half_height(spot);
     let narrow = (0.4 * spot.semi_minor_px).max(2.0);
-    for v in first..=last {
+    let light = |v: i64| {
         // Rows near the ends keep a band that is wide enough to average noise.
         let dv = (v as f64 - spot.centre.y).clamp(-0.97 * half, 0.97 * half);
         let Some((l, r)) = chord(spot, spot.centre.y + dv) else {
-            out.push(0.0);
-            continue;
+            return 0.0;
         };
         let (middle, half_width) = (0.5 * (l + r), (0.5 * (r - l) - 1.0).max(narrow));
         let u0 = middle + (2.0 * from - 1.0) * half_width;
         let u1 = middle + (2.0 * to - 1.0) * half_width;
-        out.push(mean(raw, v as f64, (u0, u1), (spot.centre.x, tilt)) - black);
-    }
-    for light in out {
-        *light = light.max(0.0);
-    }
+        (mean(raw, v as f64, (u0, u1), (spot.centre.x, tilt)) - black).max(0.0)
+    };
+    rows(spot).map(light).collect()
 }
 
 /// Mean grey of a row from `u0` to `u1`, 0 outside the patch; with a tilt the row is followed
@@ -194,19 +169,19 @@ fn shift_between(a: &[f64], b: &[f64]) -> f64 {
 
 /// Grey closing by a segment of `2 half + 1` samples, where `2 half >= gap`: largest value in the
 /// window, then the smallest of those. Outside the samples it is dark.
-fn closing(samples: &[f64], gap: usize, work: &mut Vec<f64>, out: &mut Vec<f64>) {
+fn closing(samples: &[f64], gap: usize) -> Vec<f64> {
     let half = gap.div_ceil(2);
-    let window = |k: usize, n: usize| k.saturating_sub(half)..(k + half + 1).min(n);
     let n = samples.len();
-    work.clear();
-    work.extend((0..n).map(|k| samples[window(k, n)].iter().copied().fold(0.0, f64::max)));
-    out.clear();
-    out.extend((0..n).map(|k| {
-        work[window(k, n)]
+    let window = |k: usize| k.saturating_sub(half)..(k + half + 1).min(n);
+    let largest = |k: usize| samples[window(k)].iter().copied().fold(0.0, f64::max);
+    let dilated: Vec<f64> = (0..n).map(largest).collect();
+    let smallest = |k: usize| {
+        dilated[window(k)]
             .iter()
             .copied()
             .fold(f64::INFINITY, f64::min)
-    }));
+    };
+    (0..n).map(smallest).collect()
 }
 
 #[cfg(test)]
@@ -218,11 +193,10 @@ mod tests {
     /// The envelope fills stripes to the lower neighbour and leaves what is lit.
     #[test]
     fn closing_fills_gaps_and_nothing_else() {
-        let (mut work, mut out) = (Vec::new(), Vec::new());
         let samples = [
             0.0, 0.0, 9.0, 0.0, 0.0, 7.0, 5.0, 0.0, 0.0, 0.0, 0.0, 4.0, 0.0, 0.0, 0.0,
         ];
-        closing(&samples, 2, &mut work, &mut out);
+        let out = closing(&samples, 2);
         assert_eq!(out[2..7], [9.0, 7.0, 7.0, 7.0, 5.0]);
         assert_eq!((out[8], out[11]), (0.0, 4.0));
     }
@@ -249,10 +223,9 @@ mod tests {
             }
         }
         let raw = Patch::from_data(0, 0, w, h, data);
-        let mut profile = Profile::default();
-        profile.take(&raw, 0.0, &spot, 9, 0.5);
-        assert!((profile.tilt - tilt).abs() < 0.3 * tilt, "{}", profile.tilt);
-        profile.take(&raw, 0.0, &spot, 9, 100.0);
-        assert_eq!(profile.tilt.to_bits(), 0.0f64.to_bits());
+        let measured = super::tilt(&raw, 0.0, &spot, 0.5);
+        assert!((measured - tilt).abs() < 0.3 * tilt, "{measured}");
+        let unimportant = super::tilt(&raw, 0.0, &spot, 100.0);
+        assert_eq!(unimportant.to_bits(), 0.0f64.to_bits());
     }
 }

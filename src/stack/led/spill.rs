@@ -1,7 +1,7 @@
 //! How far the edges of a saturated lamp lie outside of its own.
 //!
 //! Where rows are saturated, the crossing of half their plateau lies too far out by a *spill*, the
-//! same on both sides. What the outermost saturated pixel and the two after it hold tells by how
+//! same on both sides. What the outermost saturated pixel and the two after it hold says by how
 //! much, on average over many rows.
 //!
 //! # Theory
@@ -33,92 +33,84 @@ const SATURATED_GREY: f64 = 250.0;
 /// Standard deviation of the mean share, from discs of all kinds (`the_spill_of_a_saturated_lamp_is_known`).
 const SHARE_SIGMA: f64 = 0.03;
 
-/// The mean share, as a function of how far inside the outermost saturated pixel lies.
-#[derive(Clone, Debug)]
+/// How far the edges of a lamp lie outside of its own, along the outline's normal.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Spill {
-    /// Mean shares, rising, and `a + 1/2` for each.
-    table: [(f64, f64); STEPS],
-    rows: Rows,
+    /// Mean over all edges.
+    pub px: f64,
+    /// Standard deviation of it.
+    pub sigma_px: f64,
 }
+
+/// The mean share, as a function of how far inside the outermost saturated pixel lies: mean shares,
+/// rising, and `a + 1/2` for each.
+#[derive(Clone, Debug)]
+pub struct SpillTable([(f64, f64); STEPS]);
 
 /// Entries of the table, over five pixels.
 const STEPS: usize = 101;
 
+impl SpillTable {
+    /// For a lens that spreads a point with a standard deviation of `blur_px`.
+    pub fn new(blur_px: f64) -> Self {
+        let mut most: f64 = 0.0;
+        Self(std::array::from_fn(|k| {
+            // From far outside, where a lamp ten thousand times too bright still saturates.
+            let from = -0.5 - 4.0 * blur_px;
+            let a = from + (1.0 + 5.5 * blur_px) * k as f64 / (STEPS - 1) as f64;
+            most = most.max(mean_share(a, blur_px));
+            (most, a + 0.5)
+        }))
+    }
+
+    /// How far inside the edge the outermost saturated pixel lies, from the mean share, and how much
+    /// farther for every share more.
+    fn inside_px(&self, share: f64) -> (f64, f64) {
+        let k = self.0.partition_point(|e| e.0 < share).clamp(1, STEPS - 1);
+        let (low, high) = (self.0[k - 1], self.0[k]);
+        let slope = (high.1 - low.1) / (high.0 - low.0).max(1e-12);
+        let inside = low.1 + slope * (share.clamp(low.0, high.0) - low.0);
+        (inside, slope)
+    }
+}
+
 /// Sums over the edges looked at.
 #[derive(Clone, Copy, Debug, Default)]
-struct Rows {
+pub struct SpillSums {
     looked_at: usize,
     saturated: usize,
     share: f64,
     away_px: f64,
 }
 
-impl Spill {
-    /// For a lens that spreads a point with a standard deviation of `blur_px`.
-    pub fn new(blur_px: f64) -> Self {
-        let mut table = [(0.0, 0.0); STEPS];
-        let mut most: f64 = 0.0;
-        for (k, entry) in table.iter_mut().enumerate() {
-            // From far outside, where a lamp ten thousand times too bright still saturates.
-            let from = -0.5 - 4.0 * blur_px;
-            let a = from + (1.0 + 5.5 * blur_px) * k as f64 / (STEPS - 1) as f64;
-            most = most.max(mean_share(a, blur_px));
-            *entry = (most, a + 0.5);
-        }
-        Self {
-            table,
-            rows: Rows::default(),
-        }
-    }
-
-    /// Forgets all edges.
-    pub fn clear(&mut self) {
-        self.rows = Rows::default();
-    }
-
+impl SpillSums {
     /// Looks at an edge found in a row whose plateau is `top`. `outwards` is -1 for a left edge, 1
     /// for a right one.
     pub fn add(&mut self, row: &[u8], top: f64, edge: f64, outwards: isize) {
-        self.rows.looked_at += 1;
+        self.looked_at += 1;
         if top < SATURATED_GREY {
             return;
         }
         if let Some((away_px, share)) = away_and_share(row, edge, outwards) {
-            self.rows.saturated += 1;
-            self.rows.away_px += away_px;
-            self.rows.share += share;
+            self.saturated += 1;
+            self.away_px += away_px;
+            self.share += share;
         }
     }
 
-    /// Mean over all edges looked at, along the outline's normal, and its standard deviation.
-    pub fn px(&self) -> (f64, f64) {
-        let Rows {
-            looked_at,
-            saturated,
-            share,
-            away_px,
-        } = self.rows;
-        if saturated == 0 {
-            return (0.0, 0.0);
+    /// Of all edges looked at.
+    pub fn spill(&self, table: &SpillTable) -> Spill {
+        if self.saturated == 0 {
+            return Spill::default();
         }
-        let n = saturated as f64;
-        let (inside_px, px_per_share) = self.inside_px(share / n);
-        let of_all = n / looked_at as f64;
-        let spill = of_all * (away_px / n - inside_px);
-        (spill.max(0.0), of_all * SHARE_SIGMA * px_per_share)
-    }
-
-    /// How far inside the edge the outermost saturated pixel lies, from the mean share, and how much
-    /// farther for every share more.
-    fn inside_px(&self, share: f64) -> (f64, f64) {
-        let k = self
-            .table
-            .partition_point(|e| e.0 < share)
-            .clamp(1, STEPS - 1);
-        let (low, high) = (self.table[k - 1], self.table[k]);
-        let slope = (high.1 - low.1) / (high.0 - low.0).max(1e-12);
-        let inside = low.1 + slope * (share.clamp(low.0, high.0) - low.0);
-        (inside, slope)
+        let n = self.saturated as f64;
+        let (inside_px, px_per_share) = table.inside_px(self.share / n);
+        let of_all = n / self.looked_at as f64;
+        let spill_px = of_all * (self.away_px / n - inside_px);
+        Spill {
+            px: spill_px.max(0.0),
+            sigma_px: of_all * SHARE_SIGMA * px_per_share,
+        }
     }
 }
 
@@ -167,18 +159,19 @@ fn away_and_share(row: &[u8], edge: f64, outwards: isize) -> Option<(f64, f64)> 
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use crate::stack::led::ellipse::fit_ellipse;
     use crate::stack::led::otsu::otsu;
-    use crate::stack::led::outline::Outline;
+    use crate::stack::led::outline::{ClosedSpot, Outline};
     use crate::stack::led::patch::Patch;
 
     /// Without a lens the share is half of what saturates: a = t - 1/2, s = t / 2 in the mean where
     /// the pixel after the next is dark.
     #[test]
     fn a_sharp_edge_is_read_as_the_pixel_alone_has_it() {
-        let spill = Spill::new(0.0);
+        let spill = SpillTable::new(0.0);
         for t in [0.1, 0.3, 0.55, 0.9] {
             assert!((mean_share(t - 0.5, 0.0) - 0.5 * t).abs() < 1e-3, "{t}");
             assert!((spill.inside_px(0.5 * t).0 - t).abs() < 0.02, "{t}");
@@ -189,7 +182,7 @@ mod tests {
     #[test]
     fn shares_invert() {
         for blur_px in [0.2, 0.5, 1.0, 2.0] {
-            let spill = Spill::new(blur_px);
+            let spill = SpillTable::new(blur_px);
             for k in 0..=10 {
                 let a = -0.5 + (0.2 * f64::from(k) - 1.2) * blur_px;
                 let found = spill.inside_px(mean_share(a, blur_px)).0;
@@ -233,14 +226,13 @@ mod tests {
         };
         let data = (0..w * h).map(|k| pixel(k % w, k / w)).collect();
         let patch = Patch::from_data(0, 0, w, h, data);
-        let mut outline = Outline::new(blur_px);
         let threshold = otsu(&patch.histogram()).map_or(0, |split| split.threshold);
-        assert!(outline.find(&patch, threshold, 9));
-        outline.trace(&patch, 4.0, threshold, (1280, 720));
+        let spot = ClosedSpot::find(&patch, threshold, 9).unwrap();
+        let table = SpillTable::new(blur_px);
+        let outline = Outline::trace(&spot, &patch, (4.0, threshold), (1280, 720), &table);
         let found = fit_ellipse(&outline.points).map(|f| f.ellipse);
         let found_px = found.map_or(f64::NAN, |e| (e.semi_major_px * e.semi_minor_px).sqrt());
-        let (px, sigma_px) = outline.spill.px();
-        [found_px - radius, px, sigma_px]
+        [found_px - radius, outline.spill.px, outline.spill.sigma_px]
     }
 
     /// Discs of many sizes that saturate the sensor up to tenfold, in glare of up to 40 % of its

@@ -21,14 +21,13 @@ const MAX_HALF: usize = 64;
 /// Frequencies over which the response is inverted.
 const FREQUENCIES: usize = 256;
 
-/// A filter and its buffer.
+/// A filter.
 #[derive(Debug, Default)]
 pub struct Wiener {
     /// Middle and one side: the filter is symmetric.
     taps: Vec<f64>,
     length_px: f64,
     noise_to_signal: f64,
-    line: Vec<f64>,
 }
 
 impl Wiener {
@@ -60,19 +59,18 @@ impl Wiener {
     }
 
     /// Filters every row of a patch in place; rows go on beyond the border as they end.
-    pub fn apply(&mut self, patch: &mut Patch) {
+    pub fn apply(&self, patch: &mut Patch) {
         let w = patch.width;
         if w == 0 || self.taps.is_empty() {
             return;
         }
         for v in 0..patch.height {
             let row = patch.row_mut(v);
-            self.line.clear();
-            self.line.extend(row.iter().map(|&g| f64::from(g)));
+            let line: Vec<f64> = row.iter().map(|&g| f64::from(g)).collect();
             for (u, pixel) in row.iter_mut().enumerate() {
-                let mut sum = self.taps[0] * self.line[u];
+                let mut sum = self.taps[0] * line[u];
                 for (n, tap) in self.taps.iter().enumerate().skip(1) {
-                    sum += tap * (self.line[u.saturating_sub(n)] + self.line[(u + n).min(w - 1)]);
+                    sum += tap * (line[u.saturating_sub(n)] + line[(u + n).min(w - 1)]);
                 }
                 *pixel = sum.round().clamp(0.0, 255.0) as u8;
             }

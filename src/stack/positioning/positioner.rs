@@ -11,7 +11,7 @@ use crate::bus::{
     Method, OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
 use crate::stack::camera_watch::CameraWatch;
-use crate::stack::led::{ChipVotes, LampFinder, LampImage, StripeReading};
+use crate::stack::led::{ChipVotes, LampFinder, LampImage};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;
 use image::GrayImage;
@@ -37,7 +37,6 @@ pub struct LedPositioner {
     epoch: Option<SimTime>,
     left: Vec<LampImage>,
     right: Vec<LampImage>,
-    reading: StripeReading,
     alone: ChipVotes,
 }
 
@@ -96,7 +95,6 @@ impl LedPositioner {
             epoch: None,
             left: Vec::new(),
             right: Vec::new(),
-            reading: StripeReading::default(),
         }
     }
 
@@ -279,8 +277,8 @@ impl LedPositioner {
             smear(&self.rig.right, from_right),
         ];
         let [of_left, of_right] = &mut self.finders;
-        of_left.find(&pair.left.image, |p| smears[0].along_row_px(p), left);
-        of_right.find(&pair.right.image, |p| smears[1].along_row_px(p), right);
+        *left = of_left.find(&pair.left.image, |p| smears[0].along_row_px(p));
+        *right = of_right.find(&pair.right.image, |p| smears[1].along_row_px(p));
     }
 
     /// Finds the right eye's image of a lamp and where the lamp is.
@@ -425,13 +423,11 @@ impl LedPositioner {
             Some(r) if lamp.spot.cut => (1, &pair.right, &right[r]),
             _ => (0, &pair.left, lamp),
         };
-        if !self.finders[eye].read(&frame.image, lamp, &mut self.reading) {
-            return None;
-        }
+        let reading = self.finders[eye].read(&frame.image, lamp)?;
         let seconds = seconds + frame.start.since(pair.left.start);
-        self.followed[k].votes.add(seconds, &self.reading);
+        self.followed[k].votes.add(seconds, &reading);
         self.alone.clear();
-        self.alone.add(seconds, &self.reading);
+        self.alone.add(seconds, &reading);
         self.alone.decode()
     }
 

@@ -1,7 +1,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
 use super::*;
 use crate::bus::{CameraModel, Shutter, SimTime};
-use crate::track::uid::{ChipFrame, Uid};
+use crate::track::uid::{ChipFrame, LineCode, Uid};
 use crate::track::waveform::{Ripple, Waveform};
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
@@ -275,7 +275,11 @@ fn a_body_throws_its_shadow_on_the_wall_and_takes_it_along() {
 /// instead of a waveform: rows inside a large lamp are the waveform's exact integral.
 #[test]
 fn rows_in_a_lamp_are_the_waveform_over_their_exposure() {
-    let waveform = Waveform::sharp(Uid { line: 3, lamp: 77 }.manchester(), 70e-6, 0.123_456);
+    let waveform = Waveform::sharp(
+        Uid { line: 3, lamp: 77 }.frame(LineCode::Manchester),
+        70e-6,
+        0.123_456,
+    );
     let mut light = lamp(waveform);
     light.luminance_cd_m2 = 7000.0;
     let mut view = view(Intrinsics::centred(200, 300, 700.0));
