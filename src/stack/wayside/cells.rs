@@ -42,11 +42,11 @@ impl Cells {
     pub fn occupy(&mut self, trains: &[(f64, f64)]) {
         self.any_blind = false;
         for (blind, span) in self.blind.iter_mut().zip(&self.spans) {
-            let passes = |span: &GaugeSpan, (from_m, to_m): (f64, f64)| {
-                span.from_m <= to_m && span.to_m >= from_m
+            let passes = |span: &GaugeSpan| {
+                let meets = |train: &(f64, f64)| span.from_m <= train.1 && span.to_m >= train.0;
+                trains.iter().any(meets)
             };
-            *blind = (span.as_ref())
-                .is_some_and(|span| trains.iter().any(|stretch| passes(span, *stretch)));
+            *blind = span.as_ref().is_some_and(passes);
             self.any_blind |= *blind;
         }
     }
@@ -57,17 +57,14 @@ impl Cells {
 
     /// Whether a region, or a neighbour of it, is blind: a region that blind cells cut off ends
     /// beside them.
-    pub fn touches_blind(&self, bounds: PixelBox) -> bool {
+    pub fn touches_blind(&self, bounds: &PixelBox) -> bool {
+        let around = bounds.widened(CUT_PX, CUT_PX);
         let cell = |px: u32| px as usize / CELL_PX;
-        let columns = cell(bounds.u0.saturating_sub(CUT_PX))..=cell(bounds.u1 + CUT_PX);
-        let rows = cell(bounds.v0.saturating_sub(CUT_PX))..=cell(bounds.v1 + CUT_PX);
+        let last = cell(around.u1).min(self.wide.saturating_sub(1));
+        let is_blind = |x: usize, y: usize| self.blind.get(y * self.wide + x) == Some(&true);
         self.any_blind
-            && rows.into_iter().any(|y| {
-                let row = self.blind.get(y * self.wide..(y + 1) * self.wide);
-                let last = (*columns.end()).min(self.wide.saturating_sub(1));
-                row.and_then(|row| row.get(*columns.start()..=last))
-                    .is_some_and(|cells| cells.contains(&true))
-            })
+            && (cell(around.v0)..=cell(around.v1))
+                .any(|y| (cell(around.u0)..=last).any(|x| is_blind(x, y)))
     }
 
     /// Sets the pixels of blind cells to 0.

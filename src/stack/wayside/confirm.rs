@@ -16,57 +16,48 @@ struct Candidate {
 }
 
 /// Follows regions by the overlap of their boxes.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Confirmation {
     candidates: Vec<Candidate>,
-    taken: Vec<bool>,
-    needed: u32,
-    /// Bits of the history that count for confirmation, and for staying confirmed.
-    memory: u64,
-    clear_memory: u64,
 }
 
 impl Confirmation {
-    pub fn new(settings: &WaysideSettings) -> Self {
-        let of = settings.confirm_of.clamp(1, 64);
-        Self {
-            candidates: Vec::new(),
-            taken: Vec::new(),
-            needed: settings.confirm_frames.clamp(1, of),
-            memory: u64::MAX >> (64 - of),
-            clear_memory: u64::MAX >> (64 - settings.clear_frames.clamp(of, 64)),
-        }
-    }
-
     /// Takes what one frame shows. What a train hides or dazzles, if only in part, stays as it was
     /// seen whole until it passed: the part that is left says nothing of the rest.
-    pub fn update(&mut self, found: &[DetectedObstacle], cells: &Cells) {
-        self.taken.clear();
-        self.taken.resize(found.len(), false);
+    pub fn update(
+        &mut self,
+        found: &[DetectedObstacle],
+        cells: &Cells,
+        settings: &WaysideSettings,
+    ) {
+        let of = settings.confirm_of.clamp(1, 64);
+        let needed = settings.confirm_frames.clamp(1, of);
+        // Bits of the history that count for confirmation, and for staying confirmed.
+        let memory = u64::MAX >> (64 - of);
+        let clear_memory = u64::MAX >> (64 - settings.clear_frames.clamp(of, 64));
+        let mut taken = vec![false; found.len()];
         for candidate in &mut self.candidates {
             let bounds = candidate.obstacle.blob.bounds;
-            if cells.touches_blind(bounds) {
-                take_parts(&bounds, found, &mut self.taken);
+            if cells.touches_blind(&bounds) {
+                take_parts(&bounds, found, &mut taken);
                 continue;
             }
             candidate.history <<= 1;
-            if let Some(k) = best_match(&bounds, found, &self.taken) {
-                self.taken[k] = true;
+            if let Some(k) = best_match(&bounds, found, &taken) {
+                taken[k] = true;
                 candidate.history |= 1;
                 candidate.obstacle = found[k].clone();
             }
-            candidate.confirmed |= (candidate.history & self.memory).count_ones() >= self.needed;
+            candidate.confirmed |= (candidate.history & memory).count_ones() >= needed;
         }
-        let (memory, clear_memory) = (self.memory, self.clear_memory);
         let remembered = |c: &Candidate| if c.confirmed { clear_memory } else { memory };
         self.candidates.retain(|c| c.history & remembered(c) != 0);
-        for (obstacle, _) in found.iter().zip(&self.taken).filter(|(_, taken)| !**taken) {
-            self.candidates.push(Candidate {
-                obstacle: obstacle.clone(),
-                history: 1,
-                confirmed: self.needed <= 1,
-            });
-        }
+        let new = found.iter().zip(&taken).filter(|(_, taken)| !**taken);
+        self.candidates.extend(new.map(|(obstacle, _)| Candidate {
+            obstacle: obstacle.clone(),
+            history: 1,
+            confirmed: needed <= 1,
+        }));
     }
 
     /// Confirmed obstacles, oldest first.
@@ -78,16 +69,13 @@ impl Confirmation {
     }
 }
 
-/// The free region with the greatest overlap with `bounds`.
+/// The free region with the greatest overlap with `bounds`, of equal ones the first.
 fn best_match(bounds: &PixelBox, found: &[DetectedObstacle], taken: &[bool]) -> Option<usize> {
-    let mut best: Option<(f64, usize)> = None;
-    for (k, obstacle) in found.iter().enumerate().filter(|(k, _)| !taken[*k]) {
-        let share = overlap(bounds, &obstacle.blob.bounds);
-        if share > best.map_or(0.0, |b| b.0) {
-            best = Some((share, k));
-        }
-    }
-    best.map(|b| b.1)
+    let share = |k: &usize| overlap(bounds, &found[*k].blob.bounds);
+    let free = (0..found.len())
+        .rev()
+        .filter(|k| !taken[*k] && share(k) > 0.0);
+    free.max_by(|a, b| share(a).total_cmp(&share(b)))
 }
 
 /// Marks every region that overlaps `bounds`.

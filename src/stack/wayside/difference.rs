@@ -11,6 +11,7 @@
 use super::WaysideSettings;
 use super::cells::{CELL_PX, Cells};
 use super::rails::Rails;
+use super::reference::Reference;
 
 /// Side of a gain tile.
 const TILE_PX: usize = 48;
@@ -40,7 +41,6 @@ pub(super) struct Difference {
     reference_sums: Vec<(u64, u32)>,
     ratio: Vec<f64>,
     gain: Vec<f64>,
-    window: Vec<f64>,
     gain_row: Vec<u16>,
     raw: Vec<u8>,
     votes: Vec<u8>,
@@ -65,7 +65,6 @@ impl Difference {
             reference_sums: Vec::new(),
             ratio: vec![1.0; tiles],
             gain: vec![1.0; tiles],
-            window: Vec::with_capacity(25),
             gain_row: vec![0; width],
             raw: vec![0; width * height],
             votes: vec![0; width],
@@ -75,9 +74,9 @@ impl Difference {
     }
 
     /// Prepares for a new reference.
-    pub fn set_reference(&mut self, reference: &[u8], valid: &[u8]) {
+    pub fn set_reference(&mut self, reference: &Reference) {
         self.reference_sums = (0..self.ratio.len())
-            .map(|tile| self.tile_sum(tile, reference, valid))
+            .map(|tile| self.tile_sum(tile, &reference.mean, &reference.valid))
             .collect();
     }
 
@@ -85,28 +84,27 @@ impl Difference {
     pub fn run(
         &mut self,
         frame: &[u8],
-        reference: &[u8],
-        valid: &[u8],
+        reference: &Reference,
         (cells, rails): (&Cells, &Rails),
         train_near: bool,
     ) {
-        let changed = self.measure_gain(frame, valid);
+        let changed = self.measure_gain(frame, &reference.valid);
         if train_near || changed {
             self.smooth_gain();
             // What blinds the camera while a train is near is its lamps.
             let dazzle = if train_near { self.saturated } else { u8::MAX };
-            self.compare_compensated(frame, reference, valid, dazzle);
+            self.compare_compensated(frame, reference, dazzle);
         } else {
-            self.compare(frame, reference, valid);
+            self.compare(frame, reference);
         }
         cells.clear_blind(&mut self.raw, self.width);
-        rails.forgive(frame, reference, &mut self.raw);
+        rails.forgive(frame, &reference.mean, &mut self.raw);
         self.vote();
     }
 
     /// The plain difference of the paper.
-    fn compare(&mut self, frame: &[u8], reference: &[u8], valid: &[u8]) {
-        let inputs = frame.iter().zip(reference).zip(valid);
+    fn compare(&mut self, frame: &[u8], reference: &Reference) {
+        let inputs = frame.iter().zip(&reference.mean).zip(&reference.valid);
         let outputs = self.absolute.iter_mut().zip(&mut self.raw);
         for (((&f, &b), &ok), (absolute, raw)) in inputs.zip(outputs) {
             let d = f.abs_diff(b);
@@ -115,7 +113,7 @@ impl Difference {
         }
     }
 
-    fn compare_compensated(&mut self, frame: &[u8], reference: &[u8], valid: &[u8], dazzle: u8) {
+    fn compare_compensated(&mut self, frame: &[u8], reference: &Reference, dazzle: u8) {
         let (threshold, distrust) = (u16::from(self.threshold), self.distrust);
         for v in 0..self.height {
             if v % CELL_PX == 0 {
@@ -124,8 +122,8 @@ impl Difference {
             let span = v * self.width..(v + 1) * self.width;
             let inputs = frame[span.clone()]
                 .iter()
-                .zip(&reference[span.clone()])
-                .zip(&valid[span.clone()])
+                .zip(&reference.mean[span.clone()])
+                .zip(&reference.valid[span.clone()])
                 .zip(&self.gain_row);
             let outputs = self.absolute[span.clone()]
                 .iter_mut()
@@ -198,17 +196,17 @@ impl Difference {
         let (wide, high) = (self.tiles_wide, self.tiles_high);
         for j in 0..high {
             for i in 0..wide {
-                self.window.clear();
+                let mut near: Vec<f64> = Vec::with_capacity(25);
                 for y in j.saturating_sub(2)..(j + 3).min(high) {
                     for x in i.saturating_sub(2)..(i + 3).min(wide) {
                         let ratio = self.ratio[y * wide + x];
                         if ratio.is_finite() {
-                            self.window.push(ratio);
+                            near.push(ratio);
                         }
                     }
                 }
-                self.window.sort_unstable_by(f64::total_cmp);
-                let median = self.window.get(self.window.len() / 2).copied();
+                near.sort_unstable_by(f64::total_cmp);
+                let median = near.get(near.len() / 2).copied();
                 self.gain[j * wide + i] = median.unwrap_or(1.0);
             }
         }
@@ -295,6 +293,8 @@ mod tests {
             let cells = Cells::new(&sight, w, h);
             let reference = random(w * h, 1, 200);
             let valid = random(w * h, 2, 2);
+            let mut learnt = Reference::new(&settings, 0);
+            (learnt.mean, learnt.valid) = (reference.clone(), valid.clone());
             // Mostly equal, some pixels just under, at and over the threshold.
             let frame: Vec<u8> = reference
                 .iter()
@@ -303,15 +303,9 @@ mod tests {
                 .collect();
             for train_near in [false, true] {
                 let mut fast = Difference::new(&settings, w, h);
-                fast.set_reference(&reference, &valid);
+                fast.set_reference(&learnt);
                 let compensated = train_near || fast.measure_gain(&frame, &valid);
-                fast.run(
-                    &frame,
-                    &reference,
-                    &valid,
-                    (&cells, &Rails::default()),
-                    train_near,
-                );
+                fast.run(&frame, &learnt, (&cells, &Rails::default()), train_near);
                 let mut raw = vec![0u8; w * h];
                 for k in 0..w * h {
                     let (u, v) = (k % w / CELL_PX * CELL_PX, k / w / CELL_PX * CELL_PX);

@@ -4,7 +4,7 @@
 //! curve the formula projects the way from the device's foot F to the obstacle on the tangent at
 //! F: for an obstacle an arc `a` away from F and `y` inside the centreline it takes
 //! (R1 - y) sin(a / R1) for `a`, and so finds it too far from the train by
-//! [`tangent_error_m`], about a^3 / 6 R1^2 + y a / R1. That is on the unsafe side.
+//! a - (R1 - y) sin(a / R1), about a^3 / 6 R1^2 + y a / R1. That is on the unsafe side.
 //!
 //! ```text
 //!   C--------n------->E             B           F          up the line ->
@@ -50,12 +50,6 @@ pub fn curve_m(
     let sine = k * chord_m / 2.0;
     (sine.abs() <= 1.0)
         .then(|| 2.0 / k * sine.asin() - n_m - (range_m * (angle_rad - eta_rad).sin()).abs())
-}
-
-/// By how much [`curve_m`] exceeds the exact distance: `arc_m` from F to the obstacle,
-/// `inside_m` its offset from the centreline towards the curve's centre.
-pub fn tangent_error_m(radius_m: f64, arc_m: f64, inside_m: f64) -> f64 {
-    arc_m - (radius_m - inside_m) * (arc_m / radius_m).sin()
 }
 
 /// Distance of the train head to the obstacle's nearer end: by the paper's formula, and exact
@@ -108,6 +102,12 @@ pub fn train_distance_m(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// By how much [`curve_m`] exceeds the exact distance: `arc_m` from F to the obstacle,
+    /// `inside_m` its offset from the centreline towards the curve's centre.
+    fn tangent_error_m(radius_m: f64, arc_m: f64, inside_m: f64) -> f64 {
+        arc_m - (radius_m - inside_m) * (arc_m / radius_m).sin()
+    }
 
     /// Coordinates worked out by hand on a circle: balise, device and obstacle placed by their
     /// arcs. A wrong term in the formula (asin, eta, sign) misses by metres.

@@ -63,6 +63,11 @@ impl WaysideDetection {
             .collect()
     }
 
+    fn send(&mut self, receiver: Receiver, now: SimTime, content: Content) {
+        let message = Message::to(receiver, self.node.clone(), now, content);
+        self.messages.push(message);
+    }
+
     /// What the trains are to know of a report.
     fn warn(&mut self, report: &WaysideReport, now: SimTime) {
         let Some(mut warning) = self.detector.message(report) else {
@@ -72,9 +77,7 @@ impl WaysideDetection {
         warning.issued = now;
         let balise = self.balise.clone().map(Node::Balise).map(Receiver::Node);
         for receiver in balise.into_iter().chain([Receiver::Trains]) {
-            let content = Content::Warning(warning.clone());
-            self.messages
-                .push(Message::to(receiver, self.node.clone(), now, content));
+            self.send(receiver, now, Content::Warning(warning.clone()));
         }
     }
 
@@ -87,9 +90,7 @@ impl WaysideDetection {
         if let Some(mut state) = self.detector.heartbeat() {
             state.issued = now;
             self.last_heartbeat = Some(now);
-            let content = Content::Heartbeat(state);
-            let to_trains = Message::to(Receiver::Trains, self.node.clone(), now, content);
-            self.messages.push(to_trains);
+            self.send(Receiver::Trains, now, Content::Heartbeat(state));
         }
     }
 }
@@ -130,11 +131,7 @@ impl Equipment for WaysideDetection {
                     camera: self.name.clone(),
                     health: report.camera,
                 };
-                self.messages.push(Message::own(
-                    self.node.clone(),
-                    now,
-                    Content::Camera(status),
-                ));
+                self.send(Receiver::Own, now, Content::Camera(status));
             }
         }
         std::mem::take(&mut self.messages)

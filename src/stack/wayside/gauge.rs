@@ -5,7 +5,7 @@ use crate::bus::DangerLevel;
 
 /// What an obstacle takes up across the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Extent {
+pub(super) struct CrossExtent {
     /// Rightmost point (smallest l).
     pub right_m: f64,
     /// Leftmost point.
@@ -19,7 +19,7 @@ pub(super) struct Extent {
 /// High: the train would hit it, or could ride over it. Low: near the gauge, or in it but too
 /// low to be hit. None: clear of it, or seen to begin on the wall, where nothing stands: light
 /// that moves over the lining does.
-pub(super) fn danger(settings: &WaysideSettings, extent: Extent) -> DangerLevel {
+pub(super) fn danger(settings: &WaysideSettings, extent: CrossExtent) -> DangerLevel {
     let within = |half_width: f64| extent.right_m <= half_width && extent.left_m >= -half_width;
     if extent.foot_m.abs() > settings.gauge_half_width_m + settings.near_gauge_m {
         return DangerLevel::None;
@@ -44,7 +44,7 @@ mod tests {
         let level = |right_m, left_m, top_m| {
             danger(
                 &settings,
-                Extent {
+                CrossExtent {
                     right_m,
                     left_m,
                     foot_m: 0.5 * (right_m + left_m),
@@ -63,7 +63,7 @@ mod tests {
         assert_eq!(level(w + near + 0.01, w + 1.0, 1.0), DangerLevel::None);
         // A patch of light 5 m wide that begins on the wall reaches into the gauge, but stands on
         // nothing.
-        let patch = Extent {
+        let patch = CrossExtent {
             right_m: 0.0,
             left_m: 5.0,
             foot_m: w + near + 0.01,

@@ -65,7 +65,7 @@
 //! | `reference` | the reference image, learnt from the first frames and held |
 //! | `difference` | difference, threshold, 3x3 median; compensation of headlights |
 //! | `rails` | rail heads, which mirror any light |
-//! | `shadows` | shadows told from bodies by the texture that shows in them |
+//! | `shadows` | shadows, which are no bodies: the texture of the floor shows in them |
 //! | `regions` | connected regions |
 //! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
 //! | `place` | region to obstacle: place, width, height; fused with lidar echoes |
@@ -114,12 +114,11 @@ mod tests;
 mod vision;
 
 pub use equipment::WaysideDetection;
-pub use place::lidar_point;
 pub use settings::WaysideSettings;
 
 use crate::bus::{
-    CameraHealth, DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, SimTime,
-    TrainReport, WaysideCalibration, WaysideReport,
+    DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, SimTime, TrainReport,
+    WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use announce::Announcer;
@@ -130,8 +129,8 @@ use image::GrayImage;
 use place::Placer;
 use rails::Rails;
 use reference::Reference;
-use regions::Regions;
-use shadows::Shadows;
+use regions::regions;
+use shadows::ShadowFilter;
 use sight::Sight;
 use std::sync::Arc;
 use vision::Vision;
@@ -154,24 +153,11 @@ pub struct WaysideDetector {
     rails: Rails,
     reference: Reference,
     difference: Difference,
-    shadows: Shadows,
-    regions: Regions,
-    placer: Placer,
+    shadows: ShadowFilter,
     confirmation: Confirmation,
     announcer: Announcer,
-    found: Vec<DetectedObstacle>,
     /// Of the last good frame.
     number: u32,
-}
-
-/// What goes into a report besides what was found.
-#[derive(Clone, Debug)]
-struct FrameContext {
-    time: SimTime,
-    number: u32,
-    camera: CameraHealth,
-    /// Where the trains are at that time.
-    trains: Vec<TrainReport>,
 }
 
 /// Reports of trains carried on to a time.
@@ -196,7 +182,7 @@ impl WaysideDetector {
     ) -> Self {
         let intrinsics = calibration.camera.intrinsics;
         let (width, height) = (intrinsics.width_px as usize, intrinsics.height_px as usize);
-        let announcer = Announcer::new(settings, &calibration.name);
+        let announcer = Announcer::new(&calibration.name);
         let sight = Sight::new(settings, calibration, map);
         Self {
             settings: settings.clone(),
@@ -206,12 +192,9 @@ impl WaysideDetector {
             sight,
             reference: Reference::new(settings, width * height),
             difference: Difference::new(settings, width, height),
-            shadows: Shadows::default(),
-            regions: Regions::default(),
-            placer: Placer::default(),
-            confirmation: Confirmation::new(settings),
+            shadows: ShadowFilter::default(),
+            confirmation: Confirmation::default(),
             announcer,
-            found: Vec::new(),
             number: 0,
         }
     }
@@ -225,57 +208,43 @@ impl WaysideDetector {
         scan: Option<&LidarScan>,
         trains: &[TrainReport],
     ) -> WaysideReport {
-        let intrinsics = self.sight.calibration().camera.intrinsics;
-        let camera = self.vision.look(frame);
-        let context = FrameContext {
+        let width_px = self.sight.calibration().camera.intrinsics.width_px as usize;
+        let grey = frame.image.as_raw().as_slice();
+        let seen = WaysideReport {
             time: frame.start,
             number: frame.number,
-            camera,
-            trains: reckoned(trains, frame.start),
+            camera: self.vision.look(frame, &self.settings),
+            ..WaysideReport::default()
         };
-        if !camera.is_good() {
-            return self.report(context, Vec::new());
+        let trains = reckoned(trains, frame.start);
+        if !seen.camera.is_good() {
+            return self.report(seen, &trains);
         }
         if !self.reference.ready() {
-            self.learn(frame.image.as_raw());
-            return self.report(context, Vec::new());
+            self.learn(grey);
+            return self.report(seen, &trains);
         }
         self.number = frame.number;
-        let occupied_m: Vec<_> = context.trains.iter().map(|t| self.occupied_m(t)).collect();
+        let occupied_m: Vec<_> = trains.iter().map(|t| self.occupied_m(t)).collect();
         self.cells.occupy(&occupied_m);
-        let train_near = context.trains.iter().any(|t| self.may_light(t));
-        self.difference.run(
-            frame.image.as_raw(),
-            &self.reference.mean,
-            &self.reference.valid,
-            (&self.cells, &self.rails),
-            train_near,
-        );
-        let width_px = intrinsics.width_px as usize;
+        let train_near = trains.iter().any(|t| self.may_light(t));
+        let places = (&self.cells, &self.rails);
+        (self.difference).run(grey, &self.reference, places, train_near);
+        let binary = &mut self.difference.binary;
         if self.settings.reject_shadows {
-            self.shadows.reject(
-                &mut self.difference.binary,
-                width_px,
-                (frame.image.as_raw(), &self.reference.mean),
-                &self.reference.noise,
-            );
+            let images = (grey, self.reference.mean.as_slice());
+            (self.shadows).reject(binary, width_px, images, &self.reference.noise);
         }
-        let blobs = self
-            .regions
-            .find(&self.difference.binary, width_px, self.settings.min_area_px);
-        self.found.clear();
-        for blob in &blobs {
-            let placed = self.placer.place(
-                &self.settings,
-                &self.sight,
-                blob,
-                &self.difference.binary,
-                scan,
-            );
-            self.found.extend(placed);
-        }
-        self.confirmation.update(&self.found, &self.cells);
-        let mut report = self.report(context, blobs);
+        let blobs = regions(binary, width_px, self.settings.min_area_px);
+        let placer = Placer {
+            settings: &self.settings,
+            sight: &self.sight,
+            binary,
+            scan,
+        };
+        let found: Vec<_> = blobs.iter().filter_map(|b| placer.place(b)).collect();
+        (self.confirmation).update(&found, &self.cells, &self.settings);
+        let mut report = self.report(WaysideReport { blobs, ..seen }, &trains);
         if self.settings.keep_images {
             let (w, h) = frame.image.dimensions();
             report.difference = GrayImage::from_raw(w, h, self.difference.absolute.clone());
@@ -287,21 +256,21 @@ impl WaysideDetector {
     /// To be called at least some times a second: a camera that has fallen silent has no frames to
     /// tell of it. Gives a report where it has.
     pub fn on_time(&mut self, now: SimTime, trains: &[TrainReport]) -> Option<WaysideReport> {
-        let camera = self.vision.wait(now)?;
-        let context = FrameContext {
+        let seen = WaysideReport {
             time: now,
             number: self.number,
-            camera,
-            trains: reckoned(trains, now),
+            camera: self.vision.wait(now, &self.settings)?,
+            ..WaysideReport::default()
         };
-        Some(self.report(context, Vec::new()))
+        Some(self.report(seen, &reckoned(trains, now)))
     }
 
     /// The message that this report gives rise to, if any: on a change of danger, and when the
     /// device goes blind or sees again; again every `refresh_s` while either lasts; and a clear
     /// message (danger none) when it is over.
     pub fn message(&mut self, report: &WaysideReport) -> Option<ObstacleWarning> {
-        self.announcer.message(report, self.sight.watched_m())
+        let refresh_s = self.settings.refresh_s;
+        (self.announcer).message(report, self.sight.watched_m(), refresh_s)
     }
 
     /// What a heartbeat says: the state of the last report; `None` before the reference is learnt.
@@ -315,8 +284,7 @@ impl WaysideDetector {
             let width = self.sight.calibration().camera.intrinsics.width_px as usize;
             let cells = &self.cells;
             self.reference.restrict(width, |u, v| cells.in_gauge(u, v));
-            self.difference
-                .set_reference(&self.reference.mean, &self.reference.valid);
+            self.difference.set_reference(&self.reference);
         }
     }
 
@@ -355,22 +323,20 @@ impl WaysideDetector {
             .min_by(|a, b| a.1.total_cmp(&b.1))
     }
 
-    fn report(&self, context: FrameContext, blobs: Vec<crate::bus::Blob>) -> WaysideReport {
+    /// The report of what was seen and of what is confirmed.
+    fn report(&self, seen: WaysideReport, trains: &[TrainReport]) -> WaysideReport {
         let obstacles: Vec<DetectedObstacle> = self.confirmation.confirmed().cloned().collect();
         let blind = self.vision.is_blind();
         let of_blindness = blind.then_some(self.settings.blind_danger);
         let found = obstacles.iter().map(|o| o.danger);
         let danger = found.chain(of_blindness).max().unwrap_or_default();
-        let distances = self.nearest_m(&context.trains, &obstacles);
+        let distances = self.nearest_m(trains, &obstacles);
         let learning = !self.reference.ready();
         WaysideReport {
-            time: context.time,
-            number: context.number,
-            camera: context.camera,
             blind,
             learning,
             train_in_view: self.cells.any_blind(),
-            blobs,
+            obstacles,
             train_distance_m: distances.map(|d| d.0),
             train_distance_exact_m: distances.map(|d| d.1),
             train_affected: danger == DangerLevel::High,
@@ -382,9 +348,7 @@ impl WaysideDetector {
                 DangerLevel::Low => Plan::WarnDriver,
                 DangerLevel::High => Plan::BrakeAutomatically,
             },
-            obstacles,
-            difference: None,
-            binary: None,
+            ..seen
         }
     }
 }

@@ -9,10 +9,10 @@
 //! than that; the camera's outline gives width and height at that range.
 
 use super::WaysideSettings;
-use super::gauge::{Extent, danger};
-use super::sight::Sight;
-use crate::bus::{Blob, DetectedObstacle, LidarReturn, LidarScan};
-use nalgebra::{Point3, Vector2, Vector3};
+use super::gauge::{CrossExtent, danger};
+use super::sight::{Sight, ends};
+use crate::bus::{Blob, DetectedObstacle, LidarReturn, LidarScan, PixelBox};
+use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 /// Most depth that an obstacle of unknown depth is given.
 const DEPTH_LIMIT_M: f64 = 2.0;
@@ -20,15 +20,8 @@ const DEPTH_LIMIT_M: f64 = 2.0;
 /// is behind it.
 const DEPTH_GAP_M: f64 = 1.0;
 
-/// World point of an echo in the lidar's own frame.
-///
-/// ```
-/// use metrotwin::bus::LidarReturn;
-/// use metrotwin::stack::wayside::lidar_point;
-/// let echo = LidarReturn { range_m: 2.0, azimuth_rad: 0.0, elevation_rad: 0.0 };
-/// assert_eq!(lidar_point(&echo).y, 2.0);
-/// ```
-pub fn lidar_point(echo: &LidarReturn) -> Point3<f64> {
+/// Point of an echo in the lidar's own frame.
+pub(super) fn lidar_point(echo: &LidarReturn) -> Point3<f64> {
     let (sin_a, cos_a) = echo.azimuth_rad.sin_cos();
     let (sin_w, cos_w) = echo.elevation_rad.sin_cos();
     Point3::new(
@@ -38,31 +31,23 @@ pub fn lidar_point(echo: &LidarReturn) -> Point3<f64> {
     )
 }
 
-/// Places regions; owns the list of echoes on one.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Placer {
-    /// Horizontal ranges from the camera.
-    echoes: Vec<f64>,
+/// Places the regions of one frame.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Placer<'a> {
+    pub settings: &'a WaysideSettings,
+    pub sight: &'a Sight,
+    pub binary: &'a [u8],
+    pub scan: Option<&'a LidarScan>,
 }
 
-impl Placer {
+impl Placer<'_> {
     /// The obstacle that a region shows; `None` where its foot is not on the floor within reach.
-    pub fn place(
-        &mut self,
-        settings: &WaysideSettings,
-        sight: &Sight,
-        blob: &Blob,
-        binary: &[u8],
-        scan: Option<&LidarScan>,
-    ) -> Option<DetectedObstacle> {
-        let width_px = sight.calibration().camera.intrinsics.width_px as usize;
-        let foot_px = foot_column(blob, binary, width_px);
+    pub fn place(&self, blob: &Blob) -> Option<DetectedObstacle> {
+        let sight = self.sight;
+        let foot_px = self.foot_column(&blob.bounds);
         // Pixel centres are at integers: the lowest edge is half a pixel further down.
         let foot_row = f64::from(blob.bounds.v1) + 0.5;
-        let foot = sight.foot(foot_px, foot_row);
-        self.collect_echoes(sight, blob, binary, scan);
-        let by_camera = foot.map(|p| sight.map().alignment.world_from_track(p));
-        let (front, depth) = match self.front_and_depth() {
+        let (front, depth) = match front_and_depth(&self.echoes(&blob.bounds)) {
             Some((range, depth)) => {
                 let d = sight.direction(foot_px, foot_row);
                 let across = Vector2::new(d.x, d.y).normalize() * range;
@@ -73,92 +58,113 @@ impl Placer {
                 let z = rail + sight.floor_m(on_line);
                 (Point3::new(p.x, p.y, z), Some(depth))
             }
-            None => (by_camera?, None),
+            None => {
+                let foot = sight.foot(foot_px, foot_row)?;
+                (sight.map().alignment.world_from_track(foot), None)
+            }
         };
-        let outline = Outline::at(sight, blob, foot_px, front)?;
-        if outline.width_m.max(outline.height_m) < settings.min_size_m {
+        let outline = Outline::at(sight, &blob.bounds, foot_px, front)?;
+        if outline.width_m.max(outline.height_m) < self.settings.min_size_m {
             return None;
         }
         // Echoes on the top are sparse: the depth that they span is a lower bound.
         let guess = outline.width_m.min(DEPTH_LIMIT_M);
         let depth = depth.map_or(guess, |measured| measured.max(guess));
-        Some(outline.obstacle(settings, sight, blob, front, depth))
+        Some(self.obstacle(blob, &outline, front, depth))
     }
 
-    /// Ranges of the echoes on the region's own pixels, in order.
-    fn collect_echoes(
-        &mut self,
-        sight: &Sight,
-        blob: &Blob,
-        binary: &[u8],
-        scan: Option<&LidarScan>,
-    ) {
-        self.echoes.clear();
-        let calibration = sight.calibration();
-        let (Some(scan), Some(world_from_lidar)) = (scan, calibration.world_from_lidar) else {
-            return;
-        };
-        let intrinsics = &calibration.camera.intrinsics;
-        let camera_from_lidar = calibration.world_from_camera.inv_mul(&world_from_lidar);
-        let eye = sight.eye();
-        for echo in &scan.returns {
-            let p = lidar_point(echo);
-            let Some(pixel) = intrinsics.project(&(camera_from_lidar * p)) else {
-                continue;
-            };
-            let (u, v) = (pixel.x.round(), pixel.y.round());
-            let b = &blob.bounds;
-            let inside = u >= f64::from(b.u0)
-                && u <= f64::from(b.u1)
-                && v >= f64::from(b.v0)
-                && v <= f64::from(b.v1);
-            let index = v as usize * intrinsics.width_px as usize + u as usize;
-            if inside && binary.get(index).is_some_and(|&x| x != 0) {
-                let world = world_from_lidar * p;
-                self.echoes.push((world.x - eye.x).hypot(world.y - eye.y));
-            }
-        }
-        self.echoes.sort_unstable_by(f64::total_cmp);
+    fn is_set(&self, u: u32, v: u32) -> bool {
+        let width_px = self.sight.calibration().camera.intrinsics.width_px as usize;
+        let pixel = self.binary.get(v as usize * width_px + u as usize);
+        pixel.is_some_and(|&x| x != 0)
     }
 
-    /// Nearest range and depth of the cluster of echoes around the middle one.
-    fn front_and_depth(&self) -> Option<(f64, f64)> {
-        let middle = self.echoes.len() / 2;
-        let gap = |k: usize| self.echoes[k + 1] - self.echoes[k];
-        let mut first = middle;
-        while first > 0 && gap(first - 1) <= DEPTH_GAP_M {
-            first -= 1;
-        }
-        let mut last = middle;
-        while last + 1 < self.echoes.len() && gap(last) <= DEPTH_GAP_M {
-            last += 1;
-        }
-        let (near, far) = (*self.echoes.get(first)?, *self.echoes.get(last)?);
-        (last > first && near > 0.0).then_some((near, far - near))
-    }
-}
-
-/// Mean column of the region's pixels in its lowest tenth.
-fn foot_column(blob: &Blob, binary: &[u8], width_px: usize) -> f64 {
-    let b = &blob.bounds;
-    let rows = ((b.v1 - b.v0) / 10).max(1);
-    let (mut sum, mut n) = (0u64, 0u64);
-    for v in b.v1.saturating_sub(rows)..=b.v1 {
-        for u in b.u0..=b.u1 {
-            let set = binary
-                .get(v as usize * width_px + u as usize)
-                .is_some_and(|&x| x != 0);
-            if set {
+    /// Mean column of the region's pixels in its lowest tenth.
+    fn foot_column(&self, b: &PixelBox) -> f64 {
+        let rows = ((b.v1 - b.v0) / 10).max(1);
+        let (mut sum, mut n) = (0u64, 0u64);
+        for v in b.v1.saturating_sub(rows)..=b.v1 {
+            for u in (b.u0..=b.u1).filter(|u| self.is_set(*u, v)) {
                 sum += u64::from(u);
                 n += 1;
             }
         }
+        if n == 0 {
+            f64::from(b.u0 + b.u1) / 2.0
+        } else {
+            sum as f64 / n as f64
+        }
     }
-    if n == 0 {
-        f64::from(b.u0 + b.u1) / 2.0
-    } else {
-        sum as f64 / n as f64
+
+    /// Horizontal ranges, from the camera, of the echoes on the region's own pixels, in order.
+    fn echoes(&self, bounds: &PixelBox) -> Vec<f64> {
+        let calibration = self.sight.calibration();
+        let (Some(scan), Some(world_from_lidar)) = (self.scan, calibration.world_from_lidar) else {
+            return Vec::new();
+        };
+        let intrinsics = &calibration.camera.intrinsics;
+        let camera_from_lidar = calibration.world_from_camera.inv_mul(&world_from_lidar);
+        let eye = self.sight.eye();
+        let range = |echo: &LidarReturn| {
+            let p = lidar_point(echo);
+            let seen = intrinsics.project(&(camera_from_lidar * p))?;
+            let pixel = Point2::new(seen.x.round(), seen.y.round());
+            let hit = bounds.contains(&pixel) && self.is_set(pixel.x as u32, pixel.y as u32);
+            let world = world_from_lidar * p;
+            hit.then(|| (world.x - eye.x).hypot(world.y - eye.y))
+        };
+        let mut ranges: Vec<f64> = scan.returns.iter().filter_map(range).collect();
+        ranges.sort_unstable_by(f64::total_cmp);
+        ranges
     }
+
+    fn obstacle(
+        &self,
+        blob: &Blob,
+        outline: &Outline,
+        foot: Point3<f64>,
+        depth_m: f64,
+    ) -> DetectedObstacle {
+        let sight = self.sight;
+        let behind = outline.away * depth_m;
+        let (left, right) = (outline.left, outline.right);
+        let corners = [left, right, left + behind, right + behind];
+        let corners = corners.map(|p| sight.track_from_world(&p));
+        let (from_chainage_m, to_chainage_m) = ends(corners.iter().map(|p| p.s_m));
+        let (right_m, left_m) = ends(corners.iter().map(|p| p.l_m));
+        let place = sight.track_from_world(&foot);
+        let extent = CrossExtent {
+            right_m,
+            left_m,
+            foot_m: place.l_m,
+            top_m: place.h_m + outline.height_m,
+        };
+        let (near_range_m, near_angle_rad) = polar(sight, foot);
+        let (far_range_m, far_angle_rad) = polar(sight, foot + behind);
+        DetectedObstacle {
+            blob: blob.clone(),
+            position: foot,
+            near_range_m,
+            near_angle_rad,
+            far_range_m,
+            far_angle_rad,
+            from_chainage_m,
+            to_chainage_m,
+            lateral_m: place.l_m,
+            width_m: outline.width_m,
+            height_m: outline.height_m,
+            danger: danger(self.settings, extent),
+        }
+    }
+}
+
+/// Nearest range and depth of the cluster of echoes around the middle one.
+fn front_and_depth(ranges: &[f64]) -> Option<(f64, f64)> {
+    let middle = ranges.get(ranges.len() / 2)?;
+    let mut clusters = ranges.chunk_by(|a, b| b - a <= DEPTH_GAP_M);
+    let cluster = clusters.find(|cluster| cluster.last() >= Some(middle))?;
+    let (near, far) = (cluster[0], cluster[cluster.len() - 1]);
+    (cluster.len() > 1 && near > 0.0).then_some((near, far - near))
 }
 
 /// The outline, on an upright plane through the foot across the line of sight.
@@ -172,7 +178,7 @@ struct Outline {
 }
 
 impl Outline {
-    fn at(sight: &Sight, blob: &Blob, foot_px: f64, foot: Point3<f64>) -> Option<Self> {
+    fn at(sight: &Sight, b: &PixelBox, foot_px: f64, foot: Point3<f64>) -> Option<Self> {
         let eye = sight.eye();
         let away = Vector3::new(foot.x - eye.x, foot.y - eye.y, 0.0);
         let range = away.norm();
@@ -185,7 +191,6 @@ impl Outline {
             let speed = d.dot(&away);
             (speed > 1e-6).then(|| eye + d * (range / speed))
         };
-        let b = &blob.bounds;
         let bottom = f64::from(b.v1) + 0.5;
         let left = on_plane(f64::from(b.u0) - 0.5, bottom)?;
         let right = on_plane(f64::from(b.u1) + 0.5, bottom)?;
@@ -198,72 +203,14 @@ impl Outline {
             height_m: (top.z - foot.z).max(0.0),
         })
     }
-
-    fn obstacle(
-        &self,
-        settings: &WaysideSettings,
-        sight: &Sight,
-        blob: &Blob,
-        foot: Point3<f64>,
-        depth_m: f64,
-    ) -> DetectedObstacle {
-        let behind = self.away * depth_m;
-        let corners = [
-            self.left,
-            self.right,
-            self.left + behind,
-            self.right + behind,
-        ]
-        .map(|p| sight.track_from_world(&p));
-        let ends = |f: fn(&crate::track::TrackPoint) -> f64| {
-            corners
-                .iter()
-                .map(f)
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| {
-                    (a.min(x), b.max(x))
-                })
-        };
-        let (from_chainage_m, to_chainage_m) = ends(|p| p.s_m);
-        let (right_m, left_m) = ends(|p| p.l_m);
-        let place = sight.track_from_world(&foot);
-        let top_m = place.h_m + self.height_m;
-        let (near_range_m, near_angle_rad) = polar(sight, foot);
-        let (far_range_m, far_angle_rad) = polar(sight, foot + behind);
-        DetectedObstacle {
-            blob: blob.clone(),
-            position: foot,
-            near_range_m,
-            near_angle_rad,
-            far_range_m,
-            far_angle_rad,
-            from_chainage_m,
-            to_chainage_m,
-            lateral_m: place.l_m,
-            width_m: self.width_m,
-            height_m: self.height_m,
-            danger: danger(
-                settings,
-                Extent {
-                    right_m,
-                    left_m,
-                    foot_m: place.l_m,
-                    top_m,
-                },
-            ),
-        }
-    }
 }
 
 /// Range in plan from the device, and angle to the running direction there, as the paper's plan
 /// views have them.
 fn polar(sight: &Sight, p: Point3<f64>) -> (f64, f64) {
     let eye = sight.eye();
-    let heading = sight
-        .map()
-        .alignment
-        .at(sight.calibration().chainage_m)
-        .heading_rad;
-    let (sin, cos) = heading.sin_cos();
+    let device = sight.map().alignment.at(sight.calibration().chainage_m);
+    let (sin, cos) = device.heading_rad.sin_cos();
     let (dx, dy) = (p.x - eye.x, p.y - eye.y);
     let (along, left) = (dx * cos + dy * sin, dy * cos - dx * sin);
     (dx.hypot(dy), left.atan2(along))

@@ -46,15 +46,21 @@ impl Noise {
     }
 }
 
+/// What a pixel was in the frames learnt from.
+#[derive(Clone, Copy, Debug)]
+struct Learnt {
+    sum: u16,
+    squares: u32,
+    least: u8,
+    most: u8,
+}
+
 /// Learns the reference, then keeps it.
 #[derive(Clone, Debug)]
 pub(super) struct Reference {
     frames: u32,
     wanted: u32,
-    sum: Vec<u16>,
-    squares: Vec<u32>,
-    least: Vec<u8>,
-    most: Vec<u8>,
+    learnt: Vec<Learnt>,
     /// The reference image.
     pub mean: Vec<u8>,
     /// 1 where a pixel can be compared, 0 where it is left out.
@@ -65,16 +71,19 @@ pub(super) struct Reference {
 
 impl Reference {
     pub fn new(settings: &WaysideSettings, pixels: usize) -> Self {
+        let nothing = Learnt {
+            sum: 0,
+            squares: 0,
+            least: u8::MAX,
+            most: 0,
+        };
         Self {
             frames: 0,
             // 257 frames of 255 would overflow the sums.
             wanted: settings.reference_frames.clamp(1, 250),
-            sum: vec![0; pixels],
-            squares: vec![0; pixels],
-            least: vec![u8::MAX; pixels],
-            most: vec![0; pixels],
-            mean: vec![0; pixels],
-            valid: vec![0; pixels],
+            learnt: vec![nothing; pixels],
+            mean: Vec::new(),
+            valid: Vec::new(),
             noise: Noise::default(),
         }
     }
@@ -85,13 +94,11 @@ impl Reference {
 
     /// Adds a frame; with the last one the reference is made.
     pub fn learn(&mut self, grey: &[u8], settings: &WaysideSettings) {
-        let sums = self.sum.iter_mut().zip(&mut self.squares);
-        let stats = sums.zip(&mut self.least).zip(&mut self.most);
-        for ((((sum, squares), least), most), &g) in stats.zip(grey) {
-            *sum += u16::from(g);
-            *squares += u32::from(g) * u32::from(g);
-            *least = g.min(*least);
-            *most = g.max(*most);
+        for (pixel, &g) in self.learnt.iter_mut().zip(grey) {
+            pixel.sum += u16::from(g);
+            pixel.squares += u32::from(g) * u32::from(g);
+            pixel.least = g.min(pixel.least);
+            pixel.most = g.max(pixel.most);
         }
         self.frames += 1;
         if self.ready() {
@@ -101,29 +108,21 @@ impl Reference {
 
     fn finish(&mut self, settings: &WaysideSettings) {
         let n = self.wanted;
-        for k in 0..self.sum.len() {
-            self.mean[k] = ((u32::from(self.sum[k]) + n / 2) / n) as u8;
-            let stable = f64::from(self.most[k] - self.least[k]) < settings.unstable_grey;
-            let clear = f64::from(self.most[k]) < settings.saturated_grey;
-            self.valid[k] = u8::from(stable && clear);
-        }
-        self.noise = self.measured_noise();
-        self.sum = Vec::new();
-        self.squares = Vec::new();
-        self.least = Vec::new();
-        self.most = Vec::new();
-    }
-
-    /// From one frame alone there is none to see.
-    fn measured_noise(&self) -> Noise {
-        let n = f64::from(self.wanted);
-        let sums = self.sum.iter().zip(&self.squares);
-        let points = sums.zip(&self.valid).filter(|(_, valid)| **valid != 0);
-        Noise::fit(points.map(|((&sum, &squares), _)| {
-            let sum = f64::from(sum);
-            let variance = (f64::from(squares) - sum * sum / n) / (n - 1.0).max(1.0);
-            (sum / n, variance)
-        }))
+        let learnt = std::mem::take(&mut self.learnt);
+        let mean = |p: &Learnt| ((u32::from(p.sum) + n / 2) / n) as u8;
+        let is_valid = |p: &Learnt| {
+            let stable = f64::from(p.most - p.least) < settings.unstable_grey;
+            stable && f64::from(p.most) < settings.saturated_grey
+        };
+        self.mean = learnt.iter().map(mean).collect();
+        self.valid = learnt.iter().map(|p| u8::from(is_valid(p))).collect();
+        // From one frame alone there is no noise to see.
+        let n = f64::from(n);
+        let valid = learnt.iter().filter(|p| is_valid(p));
+        self.noise = Noise::fit(valid.map(|p| {
+            let (sum, squares) = (f64::from(p.sum), f64::from(p.squares));
+            (sum / n, (squares - sum * sum / n) / (n - 1.0).max(1.0))
+        }));
     }
 
     /// Leaves out every pixel for which `keep` (given column and row) is false.

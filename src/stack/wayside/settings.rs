@@ -50,7 +50,7 @@ settings! {
         /// When no good frame has come for this long, the stretch that the camera watches counts as
         /// occupied, s.
         blind_after_s: f64 = 1.0, in 0.1..=60.0;
-        /// What the trains are told then: `high` stops them before the stretch, `low` warns the
+        /// What is said to the trains then: `high` stops them before the stretch, `low` warns the
         /// driver, who then runs on sight.
         blind_danger: DangerLevel = DangerLevel::High;
         /// Take an image that repeats the one before, bit for bit, for a good one. A real sensor's

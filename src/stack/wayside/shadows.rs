@@ -1,4 +1,4 @@
-//! Shadows told from bodies. A shadow takes one of several lamps away: the picture under it gets
+//! Shadows, which are no bodies. A shadow takes one of several lamps away: the picture under it gets
 //! darker, but what is painted on the floor still shows in it. A body hides it.
 //!
 //! So in a region that is darker than the reference, the steps from pixel to pixel of the frame are
@@ -23,8 +23,9 @@
 //! texture every dark patch is an obstacle.
 
 use super::reference::Noise;
-use super::regions::Runs;
-use std::collections::BTreeMap;
+use crate::bus::PixelBox;
+use crate::stack::runs::Runs;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The texture of a shadow is at least this share of what light is left.
 const LEAST_SHARE: f64 = 1.0 / 3.0;
@@ -112,54 +113,23 @@ impl Sums {
     }
 }
 
-/// A part of a region: what it has in one square of the image.
-#[derive(Clone, Copy, Debug)]
-struct Part {
-    region: usize,
-    /// Column and row of its square.
-    square: (u32, u32),
-    sums: Sums,
-}
+/// What a region has in one square of the image: the region's number, and column and row of the
+/// square.
+type Part = (usize, (u32, u32));
 
 /// A region as a whole.
 #[derive(Clone, Copy, Debug)]
 struct Region {
-    parts: usize,
-    /// First and last column and row of its squares.
-    columns: (u32, u32),
-    rows: (u32, u32),
+    /// Bounds, in squares.
+    squares: PixelBox,
     sums: Sums,
-    /// For sure.
-    is_shadow: bool,
 }
 
 impl Region {
-    fn of(parts: &[Part], noise: &Noise) -> Self {
-        let mut region = Self {
-            parts: parts.len(),
-            columns: (u32::MAX, 0),
-            rows: (u32::MAX, 0),
-            sums: Sums::default(),
-            is_shadow: false,
-        };
-        for part in parts {
-            let (column, row) = part.square;
-            region.columns = (region.columns.0.min(column), region.columns.1.max(column));
-            region.rows = (region.rows.0.min(row), region.rows.1.max(row));
-            region.sums.add(&part.sums);
-        }
-        region.is_shadow = region.sums.is_shadow(noise);
-        region
-    }
-
-    /// Whether their squares meet.
-    fn is_near(&self, other: &Self) -> bool {
-        let meet = |a: (u32, u32), b: (u32, u32)| a.0 <= b.1 + 1 && b.0 <= a.1 + 1;
-        meet(self.columns, other.columns) && meet(self.rows, other.rows)
-    }
-
-    fn is_as_dark(&self, other: &Self) -> bool {
+    /// Whether another one is as dark, and beside it, so that their squares meet.
+    fn is_piece_of(&self, other: &Self) -> bool {
         (self.sums.left() - other.sums.left()).abs() < ALIKE
+            && self.squares.is_near(&other.squares, 1)
     }
 }
 
@@ -170,21 +140,15 @@ struct Stay {
     last: u32,
 }
 
-/// Finds shadows, with buffers of its own.
+/// Finds shadows.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shadows {
-    runs: Runs,
-    /// In order of region and square.
-    parts: Vec<Part>,
-    regions: Vec<Region>,
-    /// Those that are shadow, in order.
-    dark: Vec<(usize, (u32, u32))>,
+pub(super) struct ShadowFilter {
     /// Of frames looked at.
     number: u32,
     stays: BTreeMap<(u32, u32), Stay>,
 }
 
-impl Shadows {
+impl ShadowFilter {
     /// Takes the shadows out of a binary image of what differs from the reference.
     pub fn reject(
         &mut self,
@@ -193,110 +157,109 @@ impl Shadows {
         (frame, reference): (&[u8], &[u8]),
         noise: &Noise,
     ) {
-        self.runs.label(binary, width, |k| frame[k] < reference[k]);
-        self.measure(binary, width, (frame, reference));
-        self.judge(noise);
-        self.release_held(noise);
-        if !self.dark.is_empty() {
-            self.clear(binary, width);
-        }
-    }
-
-    /// The parts of all regions and their sums.
-    fn measure(&mut self, binary: &[u8], width: usize, (frame, reference): (&[u8], &[u8])) {
-        self.parts.clear();
-        let grey = |image: &[u8], k: usize| f64::from(image[k]);
-        for k in 0..self.runs.all.len() {
-            let region = self.runs.region(k);
-            let run = self.runs.all[k];
+        let mut runs = Runs::new(binary, width, 0, |k| frame[k] < reference[k]);
+        let parts = parts(&mut runs, binary, width, (frame, reference));
+        let mut shadows = shadows(&parts, noise);
+        self.release_held(&parts, &mut shadows, noise);
+        for k in 0..runs.all.len() {
+            let region = runs.region(k);
+            let run = runs.all[k];
             for (square, from, to) in pieces(run.v, run.u) {
-                let mut sums = Sums::default();
-                for u in from..=to {
-                    let here = run.v as usize * width + u as usize;
-                    let (f, b) = (grey(frame, here), grey(reference, here));
-                    sums.pixels += 1.0;
-                    sums.frame += f;
-                    sums.reference += b;
-                    // Neighbours to the right and below that are as dark are of the same region.
-                    let right = (u < run.u.1).then_some(here + 1);
-                    let below = here + width;
-                    let below = (binary.get(below).is_some_and(|&set| set != 0)
-                        && frame[below] < reference[below])
-                        .then_some(below);
-                    for next in [right, below].into_iter().flatten() {
-                        sums.step(grey(frame, next) - f, grey(reference, next) - b);
-                    }
-                }
-                self.parts.push(Part {
-                    region,
-                    square,
-                    sums,
-                });
-            }
-        }
-        let key = |part: &Part| (part.region, part.square);
-        self.parts.sort_unstable_by_key(key);
-        self.parts.dedup_by(|next, part| {
-            let same = key(next) == key(part);
-            if same {
-                part.sums.add(&next.sums);
-            }
-            same
-        });
-    }
-
-    /// Which parts are shadow: those of regions that are shadow for sure, then those of undecided
-    /// pieces beside them that are as dark.
-    fn judge(&mut self, noise: &Noise) {
-        self.dark.clear();
-        self.regions.clear();
-        let regions = self.parts.chunk_by(|a, b| a.region == b.region);
-        self.regions
-            .extend(regions.map(|parts| Region::of(parts, noise)));
-        let mut at = 0;
-        for k in 0..self.regions.len() {
-            let region = &self.regions[k];
-            let parts = &self.parts[at..at + region.parts];
-            at += region.parts;
-            let least = LEAST_SHARE * region.sums.left();
-            let piece_of = |r: &Region| r.is_shadow && r.is_near(region) && r.is_as_dark(region);
-            if region.is_shadow || self.regions.iter().any(piece_of) {
-                let shadows = parts.iter().filter(|p| !p.sums.is_covered(least, noise));
-                self.dark.extend(shadows.map(|p| (p.region, p.square)));
-            }
-        }
-    }
-
-    /// Takes parts that could not be told back, in squares that have had any for long.
-    fn release_held(&mut self, noise: &Noise) {
-        let number = self.number;
-        self.number += 1;
-        self.stays.retain(|_, stay| stay.last + GAP >= number);
-        let (parts, stays) = (&self.parts, &mut self.stays);
-        self.dark.retain(|dark| {
-            let at = parts.partition_point(|part| (part.region, part.square) < *dark);
-            if parts[at].sums.is_shadow(noise) {
-                return true;
-            }
-            let first = number;
-            let stay = stays.entry(dark.1).or_insert(Stay { first, last: first });
-            stay.last = number;
-            number - stay.first < PATIENCE
-        });
-    }
-
-    fn clear(&mut self, binary: &mut [u8], width: usize) {
-        for k in 0..self.runs.all.len() {
-            let region = self.runs.region(k);
-            let run = self.runs.all[k];
-            for (square, from, to) in pieces(run.v, run.u) {
-                if self.dark.binary_search(&(region, square)).is_ok() {
+                if shadows.contains(&(region, square)) {
                     let row = run.v as usize * width;
                     binary[row + from as usize..=row + to as usize].fill(0);
                 }
             }
         }
     }
+
+    /// Takes back parts that their own texture does not decide, in squares that have had any for
+    /// long.
+    fn release_held(
+        &mut self,
+        parts: &BTreeMap<Part, Sums>,
+        shadows: &mut BTreeSet<Part>,
+        noise: &Noise,
+    ) {
+        let number = self.number;
+        self.number += 1;
+        self.stays.retain(|_, stay| stay.last + GAP >= number);
+        shadows.retain(|part| {
+            if parts[part].is_shadow(noise) {
+                return true;
+            }
+            let first = number;
+            let stay = self.stays.entry(part.1);
+            let stay = stay.or_insert(Stay { first, last: first });
+            stay.last = number;
+            number - stay.first < PATIENCE
+        });
+    }
+}
+
+/// The parts of all regions and their sums.
+fn parts(
+    runs: &mut Runs,
+    binary: &[u8],
+    width: usize,
+    (frame, reference): (&[u8], &[u8]),
+) -> BTreeMap<Part, Sums> {
+    let mut parts: BTreeMap<Part, Sums> = BTreeMap::new();
+    let grey = |image: &[u8], k: usize| f64::from(image[k]);
+    for k in 0..runs.all.len() {
+        let region = runs.region(k);
+        let run = runs.all[k];
+        for (square, from, to) in pieces(run.v, run.u) {
+            let sums = parts.entry((region, square)).or_default();
+            for u in from..=to {
+                let here = run.v as usize * width + u as usize;
+                let (f, b) = (grey(frame, here), grey(reference, here));
+                sums.pixels += 1.0;
+                sums.frame += f;
+                sums.reference += b;
+                // Neighbours to the right and below that are as dark are of the same region.
+                let right = (u < run.u.1).then_some(here + 1);
+                let below = here + width;
+                let below = (binary.get(below).is_some_and(|&set| set != 0)
+                    && frame[below] < reference[below])
+                    .then_some(below);
+                for next in [right, below].into_iter().flatten() {
+                    sums.step(grey(frame, next) - f, grey(reference, next) - b);
+                }
+            }
+        }
+    }
+    parts
+}
+
+/// Which parts are shadow: those of regions that are shadow for sure, and of undecided pieces beside
+/// them that are as dark.
+fn shadows(parts: &BTreeMap<Part, Sums>, noise: &Noise) -> BTreeSet<Part> {
+    let mut regions = regions(parts);
+    let sure = regions.values().filter(|r| r.sums.is_shadow(noise));
+    let sure: Vec<Region> = sure.copied().collect();
+    regions.retain(|_, region| sure.iter().any(|shadow| region.is_piece_of(shadow)));
+    let is_shadow = |(part, sums): &(&Part, &Sums)| {
+        let region = regions.get(&part.0);
+        region.is_some_and(|r| !sums.is_covered(LEAST_SHARE * r.sums.left(), noise))
+    };
+    parts
+        .iter()
+        .filter(is_shadow)
+        .map(|(part, _)| *part)
+        .collect()
+}
+
+fn regions(parts: &BTreeMap<Part, Sums>) -> BTreeMap<usize, Region> {
+    let mut regions: BTreeMap<usize, Region> = BTreeMap::new();
+    for (&(number, (u, v)), part) in parts {
+        let squares = PixelBox::of_row(v, (u, u));
+        let sums = Sums::default();
+        let region = regions.entry(number).or_insert(Region { squares, sums });
+        region.squares = region.squares.joined(&squares);
+        region.sums.add(part);
+    }
+    regions
 }
 
 /// A run cut at the borders of the squares: square, first and last column.
@@ -360,7 +323,7 @@ mod tests {
                     .count()
             };
             all += count(&binary);
-            Shadows::default().reject(&mut binary, WIDTH, (&frame, &reference), &NOISE);
+            ShadowFilter::default().reject(&mut binary, WIDTH, (&frame, &reference), &NOISE);
             left += count(&binary);
         }
         1.0 - left as f64 / all as f64
@@ -418,7 +381,7 @@ mod tests {
 
     /// A floor without texture cannot tell: the doubt is for the obstacle.
     #[test]
-    fn what_cannot_be_told_stays() {
+    fn what_cannot_be_decided_stays() {
         let floor = floor(0);
         assert!(rejected(&floor, &shaded(&floor, 0.5), PATCH) < 0.02);
     }
@@ -449,7 +412,7 @@ mod tests {
         let mut picture = shaded(&floor, 0.5);
         covered(&mut picture, body, |_| 40.0);
         let reference: Vec<u8> = floor.iter().map(|grey| grey.round() as u8).collect();
-        let mut shadows = Shadows::default();
+        let mut shadows = ShadowFilter::default();
         let left: Vec<usize> = (0..2 * PATIENCE)
             .map(|n| {
                 let frame = seen(&picture, n);

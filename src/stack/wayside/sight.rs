@@ -7,7 +7,7 @@
 
 use super::WaysideSettings;
 use crate::bus::WaysideCalibration;
-use crate::track::{CrossSection, TrackPoint, Tunnel};
+use crate::track::{CrossSection, Edge, TrackPoint, Tunnel};
 use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const DEFAULT_BED_M: f64 = -0.2;
 const PROFILE_STEP_M: f64 = 0.02;
 
 /// Lowest and highest points of an outline over l.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Profile {
     first_l_m: f64,
     /// Floor and ceiling at each step.
@@ -28,42 +28,33 @@ struct Profile {
 
 impl Profile {
     fn new(section: &CrossSection) -> Self {
-        let points = &section.points;
-        let (low, high) = points
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), p| {
-                (a.min(p.l_m), b.max(p.l_m))
-            });
-        let steps = if high > low {
-            ((high - low) / PROFILE_STEP_M).floor().min(5000.0) as usize
-        } else {
-            0
-        };
-        let heights_m = (0..steps)
-            .map(|k| Self::extent(section, low + (k as f64 + 0.5) * PROFILE_STEP_M))
-            .collect();
+        let across = section.points.iter().map(|p| p.l_m);
+        let (low, high) = ends(across);
+        let steps = ((high - low) / PROFILE_STEP_M).floor().clamp(0.0, 5000.0) as usize;
+        let middle = |k: usize| low + (k as f64 + 0.5) * PROFILE_STEP_M;
         Self {
             first_l_m: low,
-            heights_m,
+            heights_m: (0..steps)
+                .map(|k| Self::extent(section, middle(k)))
+                .collect(),
         }
     }
 
     /// Lowest and highest crossing of the outline with the vertical at `l`.
     fn extent(section: &CrossSection, l: f64) -> (f64, f64) {
-        let points = &section.points;
-        let edges = points.len().saturating_sub(usize::from(!section.closed));
-        let mut extent = (f64::INFINITY, f64::NEG_INFINITY);
-        for k in 0..edges {
-            let (a, b) = (points[k], points[(k + 1) % points.len()]);
-            if (a.l_m <= l) != (b.l_m <= l) {
-                let h = a.h_m + (b.h_m - a.h_m) * (l - a.l_m) / (b.l_m - a.l_m);
-                extent = (extent.0.min(h), extent.1.max(h));
-            }
-        }
-        if !section.closed {
-            extent.1 = f64::INFINITY;
-        }
-        extent
+        let crossing = |Edge { a, b, .. }: Edge| {
+            let h = a.h_m + (b.h_m - a.h_m) * (l - a.l_m) / (b.l_m - a.l_m);
+            ((a.l_m <= l) != (b.l_m <= l)).then_some(h)
+        };
+        let (floor, ceiling) = ends(section.edges().filter_map(crossing));
+        (
+            floor,
+            if section.closed {
+                ceiling
+            } else {
+                f64::INFINITY
+            },
+        )
     }
 
     /// Floor and ceiling at `l`; `None` beside the tunnel.
@@ -77,6 +68,19 @@ impl Profile {
         }
         self.heights_m.get(k as usize).copied()
     }
+
+    /// Whether a point is in the tunnel.
+    fn contains(&self, p: TrackPoint) -> bool {
+        let room = self.at(p.l_m);
+        room.is_some_and(|(floor, ceiling)| p.h_m > floor && p.h_m < ceiling)
+    }
+}
+
+/// The least and the greatest of some numbers.
+pub(super) fn ends(numbers: impl Iterator<Item = f64>) -> (f64, f64) {
+    numbers.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+        (low.min(x), high.max(x))
+    })
 }
 
 /// The plane of one chainage.
@@ -121,10 +125,7 @@ impl Sight {
             .iter()
             .map(|r| Profile::new(&r.section))
             .collect();
-        profiles.push(Profile {
-            first_l_m: 0.0,
-            heights_m: Vec::new(),
-        });
+        profiles.push(Profile::default());
         let camera = Point3::from(calibration.world_from_camera.translation.vector);
         let own = map
             .alignment
@@ -134,7 +135,6 @@ impl Sight {
             .map(|k| {
                 let s_m = own.s_m + (k as f64 - here as f64) * STATION_M;
                 let frame = map.alignment.at(s_m);
-                let (sin, cos) = frame.heading_rad.sin_cos();
                 let profile = map
                     .sections
                     .iter()
@@ -143,7 +143,7 @@ impl Sight {
                 Station {
                     s_m,
                     origin: frame.origin,
-                    along: Vector3::new(cos, sin, 0.0),
+                    along: frame.ahead(),
                     profile,
                 }
             })
@@ -171,7 +171,7 @@ impl Sight {
     pub fn watched_m(&self) -> (f64, f64) {
         let here_m = self.stations[self.here].s_m;
         let ahead = self.calibration.world_from_camera * Vector3::z();
-        if self.stations[self.here].along.dot(&ahead) >= 0.0 {
+        if self.sign(&ahead) > 0.0 {
             (here_m, self.stations[2 * self.here].s_m)
         } else {
             (self.stations[0].s_m, here_m)
@@ -216,88 +216,71 @@ impl Sight {
     /// beyond reach.
     pub fn foot(&self, u: f64, v: f64) -> Option<TrackPoint> {
         let mut last: Option<(TrackPoint, &Profile)> = None;
-        let mut foot = None;
-        self.march(self.direction(u, v), |p, profile| {
-            let inside = profile
-                .at(p.l_m)
-                .is_some_and(|(floor, ceiling)| p.h_m > floor && p.h_m < ceiling);
-            if let Some((before, profile_before)) = last
-                && !inside
-            {
-                foot = crossing(before, p, profile_before);
-                return false;
-            }
-            if inside {
+        for (p, profile) in self.march(self.direction(u, v)) {
+            if profile.contains(p) {
                 last = Some((p, profile));
+            } else if let Some((before, profile_before)) = last {
+                return crossing(before, p, profile_before);
             }
-            true
-        });
-        foot
+        }
+        None
     }
 
     /// Through which stretch of the structure gauge (widened by the margin for low danger) a
     /// pixel looks.
     pub fn gauge_span(&self, u: f64, v: f64) -> Option<GaugeSpan> {
-        let mut span: Option<GaugeSpan> = None;
-        let mut was_inside = false;
-        let mut at_end = None;
-        let complete = self.march(self.direction(u, v), |p, profile| {
-            let inside = profile
-                .at(p.l_m)
-                .is_some_and(|(floor, ceiling)| p.h_m > floor && p.h_m < ceiling);
+        let mut seen_m: Vec<f64> = Vec::new();
+        let (mut was_inside, mut was_in_gauge) = (false, false);
+        let mut steps = 0;
+        for (p, profile) in self.march(self.direction(u, v)) {
+            let inside = profile.contains(p);
             let in_gauge = p.l_m.abs() <= self.half_width_m && p.h_m <= self.top_m;
-            if was_inside && !inside {
-                // The gauge reaches to the floor: the last step counts where it began in it.
-                if at_end.is_some() || in_gauge {
-                    widen(&mut span, p.s_m);
-                }
-                return false;
+            let leaves = was_inside && !inside;
+            // The gauge reaches to the floor: the last step counts where it began in it.
+            if in_gauge && inside || leaves && (in_gauge || was_in_gauge) {
+                seen_m.push(p.s_m);
             }
-            was_inside |= inside;
-            at_end = in_gauge.then_some(p.s_m);
-            if in_gauge && inside {
-                widen(&mut span, p.s_m);
+            if leaves {
+                break;
             }
-            true
-        });
-        if complete && let (Some(span), Some(end)) = (&mut span, at_end) {
-            if end > self.calibration.chainage_m {
-                span.to_m = f64::INFINITY;
-            } else {
-                span.from_m = f64::NEG_INFINITY;
-            }
+            (was_inside, was_in_gauge) = (was_inside || inside, in_gauge);
+            steps += 1;
         }
-        span
+        // Beyond reach the sight goes on.
+        if steps > self.here && was_in_gauge && !seen_m.is_empty() {
+            seen_m.push(self.sign(&self.direction(u, v)) * f64::INFINITY);
+        }
+        let (from_m, to_m) = ends(seen_m.into_iter());
+        (from_m <= to_m).then_some(GaugeSpan { from_m, to_m })
     }
 
-    /// Calls `visit` with the points of a ray, station by station away from the device, until it
-    /// returns false; true when the ray reached the last station.
-    fn march<'a>(
-        &'a self,
-        direction: Vector3<f64>,
-        mut visit: impl FnMut(TrackPoint, &'a Profile) -> bool,
-    ) -> bool {
+    /// 1 for a direction up the line, else -1.
+    fn sign(&self, direction: &Vector3<f64>) -> f64 {
+        let up_the_line = self.stations[self.here].along.dot(direction) >= 0.0;
+        if up_the_line { 1.0 } else { -1.0 }
+    }
+
+    /// The points of a ray, station by station away from the device, as far as it goes on along the
+    /// line.
+    fn march(&self, direction: Vector3<f64>) -> impl Iterator<Item = (TrackPoint, &Profile)> {
         let eye = self.eye();
-        let up_the_line = self.stations[self.here].along.dot(&direction) >= 0.0;
+        let up_the_line = self.sign(&direction) > 0.0;
         let mut far = 0.0;
-        for k in 0..=self.here {
-            let station = &self.stations[if up_the_line {
+        (0..=self.here).map_while(move |k| {
+            let at = if up_the_line {
                 self.here + k
             } else {
                 self.here - k
-            }];
-            let across = station.along.dot(&direction);
-            if across.abs() < 1e-9 {
-                return false;
-            }
-            let t = if k == 0 {
-                0.0
-            } else {
-                station.along.dot(&(station.origin - eye)) / across
             };
-            if t < far {
-                // The ray turned away from the line (a sharp curve): it left the tunnel before.
-                return false;
+            let station = &self.stations[at];
+            let across = station.along.dot(&direction);
+            let t = match k {
+                0 => 0.0,
+                _ => station.along.dot(&(station.origin - eye)) / across,
+            };
+            // The ray turned away from the line (a sharp curve): it left the tunnel before.
+            if across.abs() < 1e-9 || t < far {
+                return None;
             }
             far = t;
             let p = eye + direction * t - station.origin;
@@ -306,23 +289,9 @@ impl Sight {
                 l_m: p.y * station.along.x - p.x * station.along.y,
                 h_m: p.z,
             };
-            if !visit(point, &self.profiles[station.profile]) {
-                return false;
-            }
-        }
-        true
+            Some((point, &self.profiles[station.profile]))
+        })
     }
-}
-
-fn widen(span: &mut Option<GaugeSpan>, s_m: f64) {
-    let old = span.unwrap_or(GaugeSpan {
-        from_m: s_m,
-        to_m: s_m,
-    });
-    *span = Some(GaugeSpan {
-        from_m: old.from_m.min(s_m),
-        to_m: old.to_m.max(s_m),
-    });
 }
 
 /// Where the straight way from `a` (inside) to `b` (outside) leaves the tunnel, if it does so
@@ -333,15 +302,10 @@ fn crossing(a: TrackPoint, b: TrackPoint, profile: &Profile) -> Option<TrackPoin
         l_m: a.l_m + (b.l_m - a.l_m) * x,
         h_m: a.h_m + (b.h_m - a.h_m) * x,
     };
-    let inside = |p: TrackPoint| {
-        profile
-            .at(p.l_m)
-            .is_some_and(|(floor, ceiling)| p.h_m > floor && p.h_m < ceiling)
-    };
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..30 {
         let mid = 0.5 * (low + high);
-        if inside(at(mid)) {
+        if profile.contains(at(mid)) {
             low = mid;
         } else {
             high = mid;

@@ -249,7 +249,7 @@ impl TestScene {
         for k in 0..300 * 120 {
             let azimuth_rad = (f64::from(k % 300) * 0.2 - 30.0).to_radians();
             let elevation_rad = (f64::from(k / 300) * 0.2 - 20.0).to_radians();
-            let unit = super::lidar_point(&LidarReturn {
+            let unit = super::place::lidar_point(&LidarReturn {
                 range_m: 1.0,
                 azimuth_rad,
                 elevation_rad,

@@ -118,7 +118,7 @@ fn find_crates(scene: &TestScene) {
     }
 }
 
-/// A detector that is not told of the distortion places what is off the axis wrongly; so the test
+/// A detector that does not know the distortion places what is off the axis wrongly; so the test
 /// above tells whether it is used.
 #[test]
 fn a_lens_that_is_not_known_misplaces() {
@@ -127,7 +127,7 @@ fn a_lens_that_is_not_known_misplaces() {
     straight.camera.intrinsics.distortion = Distortion::default();
     let settings = quiet();
     let item = Crate::on_bed(193.0, -1.0, 0.3);
-    let [told, untold] = [scene.calibration.clone(), straight].map(|calibration| {
+    let [known, unknown] = [scene.calibration.clone(), straight].map(|calibration| {
         let mut d = WaysideDetector::new(&settings, calibration, scene.map.clone());
         for n in 0..settings.reference_frames {
             d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
@@ -137,7 +137,7 @@ fn a_lens_that_is_not_known_misplaces() {
         let report = d.on_frame(&frame(13), None, &[]);
         (report.obstacles[0].to_chainage_m - item.s.1).abs()
     });
-    assert!(untold > 0.3 && untold > 3.0 * told, "{told} {untold}");
+    assert!(unknown > 0.3 && unknown > 3.0 * known, "{known} {unknown}");
 }
 
 /// Echoes of a lidar from beside and behind the picture must not fall into it through a lens whose
@@ -287,7 +287,7 @@ fn flicker_raises_no_alarm() {
 /// The light doubles everywhere, or grows towards one side as before headlights: no alarm, and a
 /// crate is still found. Without compensation all of it would be a difference.
 #[test]
-fn brightening_is_told_from_an_obstacle() {
+fn brightening_is_no_obstacle() {
     let scene = TestScene::new(640, 360);
     let item = Crate::on_bed(182.0, 0.0, 0.6);
     for with_crate in [false, true] {
@@ -586,7 +586,7 @@ fn a_device_that_never_sees_warns() {
     let scene = TestScene::new(64, 36);
     let mut d = detector(&scene, &quiet());
     let first = scene.frame(0, STEADY, &[]);
-    let mut told = Vec::new();
+    let mut said = Vec::new();
     for n in 0..20 {
         let frame = Frame {
             number: n,
@@ -596,10 +596,10 @@ fn a_device_that_never_sees_warns() {
         };
         let report = d.on_frame(&frame, None, &[]);
         assert!(report.learning && !report.passage_possible);
-        told.extend(d.message(&report));
+        said.extend(d.message(&report));
     }
-    assert_eq!(told.len(), 1);
-    assert!(told[0].blind);
+    assert_eq!(said.len(), 1);
+    assert!(said[0].blind);
     let mut d = taught(&scene, &quiet());
     for (n, lost) in [(10, 0), (13, 2), (14, 0), (22, 7)] {
         let report = d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);

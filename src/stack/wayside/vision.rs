@@ -6,14 +6,12 @@
 //! come as a confirmation takes, so that what fell on the track meanwhile is found first.
 
 use super::WaysideSettings;
-use crate::bus::{CameraFault, CameraHealth, Frame, SimTime};
+use crate::bus::{CameraHealth, Frame, SimTime};
 use crate::stack::camera_watch::CameraWatch;
 
 #[derive(Clone, Debug)]
 pub(super) struct Vision {
     watch: CameraWatch,
-    blind_after_s: f64,
-    frames_to_see: u32,
     /// When the last good frame was taken.
     last_good: SimTime,
     /// Good frames in a row.
@@ -25,8 +23,6 @@ impl Vision {
     pub fn new(settings: &WaysideSettings, size_px: (u32, u32)) -> Self {
         Self {
             watch: CameraWatch::new(size_px, settings.allow_repeated_images),
-            blind_after_s: settings.blind_after_s,
-            frames_to_see: settings.confirm_of.clamp(1, 64),
             last_good: SimTime::ZERO,
             good: 0,
             blind: false,
@@ -34,7 +30,7 @@ impl Vision {
     }
 
     /// A frame came.
-    pub fn look(&mut self, frame: &Frame) -> CameraHealth {
+    pub fn look(&mut self, frame: &Frame, settings: &WaysideSettings) -> CameraHealth {
         let health = self.watch.look(frame);
         if health.is_good() {
             self.good = self.good.saturating_add(1);
@@ -42,27 +38,24 @@ impl Vision {
         } else {
             self.good = 0;
         }
-        self.judge(frame.start);
+        self.judge(frame.start, settings);
         health
     }
 
-    /// Time passes. Gives the camera's state where it has fallen silent: otherwise its frames tell.
-    pub fn wait(&mut self, now: SimTime) -> Option<CameraHealth> {
-        let silent = self.watch.silence(now, self.blind_after_s);
+    /// Time passes. Gives the camera's state where it has fallen silent; else its frames show it.
+    pub fn wait(&mut self, now: SimTime, settings: &WaysideSettings) -> Option<CameraHealth> {
+        let silent = self.watch.silence(now, settings.blind_after_s);
         silent.then(|| {
             self.good = 0;
-            self.judge(now);
-            CameraHealth {
-                fault: Some(CameraFault::Silent),
-                lost: 0,
-            }
+            self.judge(now, settings);
+            CameraHealth::SILENT
         })
     }
 
-    fn judge(&mut self, now: SimTime) {
+    fn judge(&mut self, now: SimTime, settings: &WaysideSettings) {
         self.blind = match self.blind {
-            true => self.good < self.frames_to_see,
-            false => now.since(self.last_good) > self.blind_after_s,
+            true => self.good < settings.confirm_of.clamp(1, 64),
+            false => now.since(self.last_good) > settings.blind_after_s,
         };
     }
 
