@@ -36,22 +36,21 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, FileError> {
             Err(error) => error,
         };
         let wrong = Wrong::read(error.message());
-        let removed = remove_wrong(document.get_mut(), &wrong, error.span());
+        let entries = entries(document.get_ref());
+        let culprit = wrong.culprit(&entries, error.span());
         let missing_only_because_removed = matches!(&wrong, Wrong::MissingKey { key }
             if problems.iter().any(|p| last_key(&p.key) == key));
         if !missing_only_because_removed {
-            let key = match (&removed, &wrong) {
-                (Some(key), _) => key.clone(),
-                (None, Wrong::MissingKey { key }) => {
-                    key_below(&table_path(document.get_ref(), error.span()), key)
-                }
-                (None, _) => key_at(document.get_ref(), error.span()),
+            let key = match culprit {
+                Some(entry) => entry.path.clone(),
+                None => wrong.key(&entries, error.span()),
             };
             problems.push(wrong.problem(key));
         }
-        if removed.is_none() {
+        let Some(key) = culprit.and_then(|entry| entry.key.as_ref()) else {
             return Err(FileError::Problems(problems));
-        }
+        };
+        take_out(document.get_mut(), key);
     }
 }
 
@@ -59,34 +58,97 @@ pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, FileError> {
 /// the nearest table around it where it is not written. `None` only for text that is not TOML.
 pub fn locate(text: &str, dotted_key: &str) -> Option<Range<usize>> {
     let document = DeTable::parse(text).ok()?;
-    let mut best = document.span();
-    let mut table = Some(document.get_ref());
-    let mut parts = dotted_key.split('.');
-    while let (Some(current), Some(part)) = (table, parts.next()) {
-        let mut pieces = part.split('[');
-        let name = pieces.next().unwrap_or_default();
-        let Some((key, mut value)) = current.iter().find(|(k, _)| k.get_ref() == name) else {
-            break;
-        };
-        // A table's own span is its header only when it has one, its key is always there.
-        best = if value.get_ref().is_table() {
-            key.span()
-        } else {
-            value.span()
-        };
-        for piece in pieces {
-            let index: Option<usize> = piece.trim_end_matches(']').parse().ok();
-            let Some(element) =
-                index.and_then(|i| value.get_ref().as_array().and_then(|a| a.get(i)))
-            else {
-                return Some(best);
-            };
-            value = element;
-            best = value.span();
+    let leads_there = |entry: &Entry| {
+        let rest = dotted_key.strip_prefix(&entry.path);
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+    };
+    let entries = entries(document.get_ref());
+    let nearest = innermost(&entries, leads_there);
+    Some(nearest.map_or(document.span(), |entry| entry.shown.clone()))
+}
+
+/// A key of a document with its value, or an element of a list.
+struct Entry {
+    /// Dotted, as `obstacles[2].mass_kg`.
+    path: String,
+    /// Where the key is written; an element has none.
+    key: Option<Range<usize>>,
+    value: Range<usize>,
+    /// The value, where it is a text.
+    text: Option<String>,
+    /// What to show of it. A table's own span is its header only when it has one, its key is always
+    /// there.
+    shown: Range<usize>,
+}
+
+impl Entry {
+    /// At a path, with the span of its key.
+    fn new(path: String, key: Option<Range<usize>>, value: &Spanned<DeValue<'_>>) -> Self {
+        let table_key = key.clone().filter(|_| value.get_ref().is_table());
+        Self {
+            path,
+            key,
+            value: value.span(),
+            text: value.get_ref().as_str().map(str::to_owned),
+            shown: table_key.unwrap_or(value.span()),
         }
-        table = value.get_ref().as_table();
     }
-    Some(best)
+}
+
+/// All entries of a table, each before those inside it.
+fn entries(table: &DeTable<'_>) -> Vec<Entry> {
+    let mut found = Vec::new();
+    collect_table(table, "", &mut found);
+    found
+}
+
+fn collect_table(table: &DeTable<'_>, path: &str, found: &mut Vec<Entry>) {
+    for (key, value) in table {
+        let path = key_below(path, key.get_ref());
+        found.push(Entry::new(path.clone(), Some(key.span()), value));
+        collect_value(value.get_ref(), &path, found);
+    }
+}
+
+fn collect_value(value: &DeValue<'_>, path: &str, found: &mut Vec<Entry>) {
+    match value {
+        DeValue::Table(table) => collect_table(table, path, found),
+        DeValue::Array(array) => {
+            for (k, element) in array.iter().enumerate() {
+                let path = format!("{path}[{k}]");
+                found.push(Entry::new(path.clone(), None, element));
+                collect_value(element.get_ref(), &path, found);
+            }
+        }
+        _ => {}
+    }
+}
+
+/// The innermost entry that fits.
+fn innermost(entries: &[Entry], fits: impl Fn(&Entry) -> bool) -> Option<&Entry> {
+    let fitting = entries.iter().filter(|entry| fits(entry));
+    fitting.max_by_key(|entry| entry.path.len())
+}
+
+/// Takes the entry out whose key has a span.
+fn take_out(table: &mut DeTable<'_>, key: &Range<usize>) {
+    let found = table.keys().find(|other| other.span() == *key).cloned();
+    if let Some(found) = found {
+        table.remove(&found);
+    }
+    for (_, value) in table.iter_mut() {
+        take_out_of_value(value.get_mut(), key);
+    }
+}
+
+fn take_out_of_value(value: &mut DeValue<'_>, key: &Range<usize>) {
+    match value {
+        DeValue::Table(table) => take_out(table, key),
+        DeValue::Array(array) => array
+            .iter_mut()
+            .for_each(|element| take_out_of_value(element.get_mut(), key)),
+        _ => {}
+    }
 }
 
 /// What serde found wrong, read from its message (it gives no other form).
@@ -98,7 +160,7 @@ enum Wrong {
 
 impl Wrong {
     fn read(message: &str) -> Self {
-        let mut quoted = message.split('`').skip(1).step_by(2).map(str::to_owned);
+        let mut quoted = quoted(message);
         if message.starts_with("unknown field") {
             Self::UnknownKey {
                 key: quoted.next().unwrap_or_default(),
@@ -112,6 +174,47 @@ impl Wrong {
             Self::Value {
                 message: message.to_owned(),
             }
+        }
+    }
+
+    /// The entry that an error with a span is about, if it can be taken out.
+    fn culprit<'e>(&self, entries: &'e [Entry], span: Option<Range<usize>>) -> Option<&'e Entry> {
+        let span = span?;
+        let keys = entries.iter().filter(|entry| entry.key.is_some());
+        let is_inside = |own: &Range<usize>| span.start <= own.start && own.end <= span.end;
+        // Spans are exact, unless an enum was read through a buffer: then they are those of the table
+        // around, and the outermost such key, or the first quoted value, in it is the one.
+        match self {
+            Self::MissingKey { .. } => None,
+            Self::Value { message } => {
+                let what = message.split(", expected ").next().unwrap_or_default();
+                let is_quoted = |text: &String| {
+                    what.contains(&format!("`{text}`")) || what.contains(&format!("\"{text}\""))
+                };
+                let exact = keys.clone().find(|entry| entry.value == span);
+                let mut inside = keys.filter(|entry| is_inside(&entry.value));
+                exact.or_else(|| inside.find(|entry| entry.text.as_ref().is_some_and(is_quoted)))
+            }
+            Self::UnknownKey { key, .. } => {
+                let exact = keys.clone().find(|entry| entry.key.as_ref() == Some(&span));
+                let inside = keys.filter(|entry| entry.key.as_ref().is_some_and(is_inside));
+                let named = inside.filter(|entry| last_key(&entry.path) == key);
+                exact.or_else(|| named.min_by_key(|entry| entry.path.len()))
+            }
+        }
+    }
+
+    /// Dotted key of an error with a span about an entry that cannot be taken out.
+    fn key(&self, entries: &[Entry], span: Option<Range<usize>>) -> String {
+        let span = span.unwrap_or_default();
+        let around = |own: &Range<usize>| own.start <= span.start && span.end <= own.end;
+        match self {
+            Self::MissingKey { key } => {
+                let table = innermost(entries, |entry| entry.value == span);
+                key_below(table.map_or("", |table| &table.path), key)
+            }
+            _ => innermost(entries, |entry| around(&entry.value))
+                .map_or_else(String::new, |entry| entry.path.clone()),
         }
     }
 
@@ -132,17 +235,17 @@ impl Wrong {
     }
 }
 
+/// What stands between backquotes.
+fn quoted(message: &str) -> impl Iterator<Item = String> {
+    message.split('`').skip(1).step_by(2).map(str::to_owned)
+}
+
 /// "invalid type: string "x", expected f64" and its like, split at the comma.
 fn value_problem(key: String, message: &str) -> Problem {
     let (what, expected) = message.split_once(", expected ").unwrap_or((message, ""));
-    let allowed: Vec<String> = expected
-        .split('`')
-        .skip(1)
-        .step_by(2)
-        .map(str::to_owned)
-        .collect();
-    let wrong = what.split('`').nth(1).unwrap_or_default();
-    let similar = did_you_mean(wrong, &allowed);
+    let allowed: Vec<String> = quoted(expected).collect();
+    let wrong = quoted(what).next().unwrap_or_default();
+    let similar = did_you_mean(&wrong, &allowed);
     let remedy = match (similar, expected) {
         (Some(similar), _) => format!("did you mean `{similar}`?"),
         (None, "") => "correct it".to_owned(),
@@ -170,134 +273,6 @@ pub fn did_you_mean<'k>(wrong: &str, known: &'k [String]) -> Option<&'k str> {
                 .map(|(_, k)| k)
         })
         .map(String::as_str)
-}
-
-/// Takes the entry that an error is about out of the document; its dotted key.
-fn remove_wrong(
-    table: &mut DeTable<'_>,
-    wrong: &Wrong,
-    span: Option<Range<usize>>,
-) -> Option<String> {
-    let span = span?;
-    // Spans are exact, unless an enum was read through a buffer: then they are that of the table
-    // around, and the first such key, or quoted value, in it is the one.
-    match wrong {
-        Wrong::MissingKey { .. } => None,
-        Wrong::UnknownKey { key, .. } => remove_in_table(table, "", &|k, _| k.span() == span)
-            .or_else(|| remove_below(table, "", &span, &|k, _| k.get_ref() == key)),
-        Wrong::Value { message } => {
-            remove_in_table(table, "", &|_, v| v.span() == span).or_else(|| {
-                let what = message.split(", expected ").next().unwrap_or_default();
-                let quoted = |text: &str| {
-                    what.contains(&format!("`{text}`")) || what.contains(&format!("\"{text}\""))
-                };
-                remove_below(table, "", &span, &|_, v| {
-                    v.get_ref().as_str().is_some_and(quoted)
-                })
-            })
-        }
-    }
-}
-
-type Pick<'p> = &'p dyn Fn(&Spanned<std::borrow::Cow<'_, str>>, &Spanned<DeValue<'_>>) -> bool;
-
-fn remove_in_table(table: &mut DeTable<'_>, path: &str, pick: Pick<'_>) -> Option<String> {
-    let found = table
-        .iter()
-        .find(|(k, v)| pick(k, v))
-        .map(|(k, _)| k.clone());
-    if let Some(key) = found {
-        table.remove(&key);
-        return Some(key_below(path, key.get_ref()));
-    }
-    table.iter_mut().find_map(|(key, value)| {
-        let path = key_below(path, key.get_ref());
-        remove_in_value(value.get_mut(), &path, pick)
-    })
-}
-
-fn remove_in_value(value: &mut DeValue<'_>, path: &str, pick: Pick<'_>) -> Option<String> {
-    match value {
-        DeValue::Table(table) => remove_in_table(table, path, pick),
-        DeValue::Array(array) => array.iter_mut().enumerate().find_map(|(i, element)| {
-            remove_in_value(element.get_mut(), &format!("{path}[{i}]"), pick)
-        }),
-        _ => None,
-    }
-}
-
-/// Takes an entry out of the innermost table or list with a span.
-fn remove_below(
-    table: &mut DeTable<'_>,
-    path: &str,
-    span: &Range<usize>,
-    pick: Pick<'_>,
-) -> Option<String> {
-    table.iter_mut().find_map(|(key, value)| {
-        remove_below_value(value, &key_below(path, key.get_ref()), span, pick)
-    })
-}
-
-fn remove_below_value(
-    value: &mut Spanned<DeValue<'_>>,
-    path: &str,
-    span: &Range<usize>,
-    pick: Pick<'_>,
-) -> Option<String> {
-    let own = value.span();
-    let deeper = match value.get_mut() {
-        DeValue::Table(table) => remove_below(table, path, span, pick),
-        DeValue::Array(array) => array
-            .iter_mut()
-            .enumerate()
-            .find_map(|(i, v)| remove_below_value(v, &format!("{path}[{i}]"), span, pick)),
-        _ => None,
-    };
-    if deeper.is_some() || own != *span {
-        return deeper;
-    }
-    remove_in_value(value.get_mut(), path, pick)
-}
-
-/// Dotted path of the innermost value that holds a span.
-fn key_at(table: &DeTable<'_>, span: Option<Range<usize>>) -> String {
-    span.and_then(|span| innermost(table, "", &span, false))
-        .unwrap_or_default()
-}
-
-/// Dotted path of the table with a span.
-fn table_path(table: &DeTable<'_>, span: Option<Range<usize>>) -> String {
-    span.and_then(|span| innermost(table, "", &span, true))
-        .unwrap_or_default()
-}
-
-fn innermost(table: &DeTable<'_>, path: &str, span: &Range<usize>, exact: bool) -> Option<String> {
-    table.iter().find_map(|(key, value)| {
-        innermost_value(value, &key_below(path, key.get_ref()), span, exact)
-    })
-}
-
-fn innermost_value(
-    value: &Spanned<DeValue<'_>>,
-    path: &str,
-    span: &Range<usize>,
-    exact: bool,
-) -> Option<String> {
-    let inside = match value.get_ref() {
-        DeValue::Table(table) => innermost(table, path, span, exact),
-        DeValue::Array(array) => array
-            .iter()
-            .enumerate()
-            .find_map(|(i, v)| innermost_value(v, &format!("{path}[{i}]"), span, exact)),
-        _ => None,
-    };
-    let own = value.span();
-    let holds = if exact {
-        own == *span
-    } else {
-        own.start <= span.start && span.end <= own.end
-    };
-    inside.or_else(|| holds.then(|| path.to_owned()))
 }
 
 fn last_key(dotted: &str) -> &str {

@@ -52,7 +52,7 @@ fn problems(text: &str) -> Vec<Problem> {
 
 /// Provokes: stopping at the first fault, a wrong path, a suggestion that does not help.
 #[test]
-fn all_faults_are_told_in_one_go() {
+fn all_faults_are_listed_at_once() {
     let text = r#"
         name = "x"
         colour = 3
@@ -71,7 +71,7 @@ fn all_faults_are_told_in_one_go() {
         shape = { kind = "sphere", radius_m = 1.0, radios_m = 1.0 }
     "#;
     let found = problems(text);
-    let told = |key: &str, part: &str| {
+    let listed = |key: &str, part: &str| {
         assert!(
             found
                 .iter()
@@ -79,16 +79,16 @@ fn all_faults_are_told_in_one_go() {
             "{key}, {part}: {found:#?}"
         );
     };
-    told("colour", "keys that may stand here: name");
-    told("renderer", "did you mean `cpu`?");
-    told("lamps.spacing_mm", "did you mean `spacing_m`?");
-    told("lamps.chip_us", "give a number");
-    told("obstacles[1].mass_g", "did you mean `mass_kg`?");
-    told("obstacles[1].shape.radios_m", "did you mean `radius_m`?");
+    listed("colour", "keys that may stand here: name");
+    listed("renderer", "did you mean `cpu`?");
+    listed("lamps.spacing_mm", "did you mean `spacing_m`?");
+    listed("lamps.chip_us", "give a number");
+    listed("obstacles[1].mass_g", "did you mean `mass_kg`?");
+    listed("obstacles[1].shape.radios_m", "did you mean `radius_m`?");
     assert_eq!(found.len(), 6, "{found:#?}");
 }
 
-/// Provokes: a missing key told without its path, or told again because its wrong value was
+/// Provokes: a missing key listed without its path, or listed again because its wrong value was
 /// taken out.
 #[test]
 fn missing_keys_have_their_path() {
