@@ -7,9 +7,7 @@
 //! swing dies out within some ten seconds, a falling end loses less than a tenth of its speed.
 
 use super::cable_settings::CableSettings;
-
 use super::catenary::Catenary;
-use super::convert::{isometry, point3, pose, vector3};
 use super::entity::Entity;
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUPS, groups};
 use super::obstacle_body::{RESTING_MPS, Rest};
@@ -91,7 +89,7 @@ impl Cable {
             let anchor = |world: &mut PhysicsWorld| {
                 let at = Isometry3::from(Translation3::from(curve[k]));
                 (
-                    world.insert_body(RigidBodyBuilder::fixed().pose(pose(&at))),
+                    world.insert_body(RigidBodyBuilder::fixed().pose(at.into())),
                     Vector::ZERO,
                 )
             };
@@ -205,7 +203,7 @@ impl Cable {
             let body = world.bodies.get(link.body)?;
             let half = *body.rotation() * (Vector::Z * link.half_m);
             let centre = body.translation();
-            Some([centre - half, centre + half].map(point3))
+            Some([centre - half, centre + half].map(Point3::from))
         })
     }
 
@@ -213,23 +211,21 @@ impl Cable {
     pub(super) fn velocity_mps(&self, world: &PhysicsWorld) -> Vector3<f64> {
         let bodies = self.links.iter().filter_map(|l| world.bodies.get(l.body));
         let sum = bodies.fold(Vector::ZERO, |sum, body| sum + body.linvel());
-        vector3(sum) / self.links.len() as f64
+        Vector3::from(sum) / self.links.len() as f64
     }
 
-    /// Appends it as the renderer draws it.
-    pub(super) fn draw(&self, world: &PhysicsWorld, bodies: &mut Vec<Body>) {
-        for link in &self.links {
-            let Some(body) = world.bodies.get(link.body) else {
-                continue;
-            };
-            bodies.push(Body {
+    /// As the renderer draws it.
+    pub(super) fn draw(&self, world: &PhysicsWorld) -> impl Iterator<Item = Body> {
+        self.links.iter().filter_map(|link| {
+            let body = world.bodies.get(link.body)?;
+            Some(Body {
                 shape: Shape::Capsule(0.5 * self.settings.diameter_m, link.half_m),
-                world_from_body: isometry(body.translation(), *body.rotation()),
-                velocity_mps: vector3(body.linvel()),
+                world_from_body: (*body.position()).into(),
+                velocity_mps: body.linvel().into(),
                 albedo: self.settings.albedo,
                 luminance_cd_m2: 0.0,
-            });
-        }
+            })
+        })
     }
 }
 
@@ -259,7 +255,7 @@ fn insert_link(
     let place = Isometry3::from_parts(Translation3::from(ends[0] + 0.5 * along), turn);
     let body = world.insert_body(
         RigidBodyBuilder::dynamic()
-            .pose(pose(&place))
+            .pose(place.into())
             .linear_damping(settings.drag_per_s())
             .angular_damping(TWIST_PER_S)
             .user_data(entity.user_data())

@@ -2,14 +2,13 @@
 //! them.
 
 use super::PhysicsError;
-use super::convert::{isometry, vector, vector3};
 use super::directed_track::DirectedTrack;
 use super::driver::{Effort, Instruments};
 use super::energy::{EnergyBook, Ledger};
 use super::entity::{Entity, train_name};
 use super::groups::{self, train_group};
 use super::history::VehicleMotion;
-use super::placement::{BODIES, BodyKind, body_name, place_train, wheelset_of};
+use super::placement::{BODIES, body_name, is_wheelset, place_train, wheelset_of};
 use super::settings::TrainSettings;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
 use super::vehicle::{AXLES, GRAVITY_MPS2, Mass, Vehicle};
@@ -90,8 +89,9 @@ impl Consist {
         for car in &cars {
             consist.insert(world, car);
             for state in &car[3..] {
-                let p = super::convert::point3(state.position);
-                let s_m = alignment.track_from_world(&p, head_m).s_m;
+                let s_m = alignment
+                    .track_from_world(&state.position.into(), head_m)
+                    .s_m;
                 let roll_rad = alignment.at(s_m).roll_rad;
                 consist.wheelsets.push(Wheelset::new(s_m, roll_rad));
             }
@@ -108,13 +108,13 @@ impl Consist {
                 .linvel(state.velocity)
                 .angvel(state.angular)
                 .additional_mass_properties(MassProperties::new(Vector::ZERO, kg, kg_m2))
-                .gyroscopic_forces_enabled(matches!(BodyKind::of(k), BodyKind::Wheelset))
+                .gyroscopic_forces_enabled(is_wheelset(k))
                 .can_sleep(false);
             self.handles.push(world.insert_body(body));
         }
         let half = self.half_extents_m();
         let collider = ColliderBuilder::cuboid(half.x, half.y, half.z)
-            .translation(vector(self.box_centre_m()))
+            .translation(self.box_centre_m())
             .density(0.0)
             .friction(0.3)
             .restitution(0.1)
@@ -137,10 +137,10 @@ impl Consist {
 
     /// Of body `k`.
     fn mass(&self, k: usize) -> Mass {
-        match BodyKind::of(k) {
-            BodyKind::Car => self.vehicle.car,
-            BodyKind::Bogie => self.vehicle.bogie,
-            BodyKind::Wheelset => self.vehicle.wheelset,
+        match k % BODIES {
+            0 => self.vehicle.car,
+            1 | 2 => self.vehicle.bogie,
+            _ => self.vehicle.wheelset,
         }
     }
 
@@ -151,9 +151,9 @@ impl Consist {
     }
 
     /// Centre of a car's box over its centre of gravity.
-    fn box_centre_m(&self) -> Vector3<f64> {
+    fn box_centre_m(&self) -> Vector {
         let middle = 0.5 * (self.vehicle.height_m + UNDERSIDE_M);
-        Vector3::new(0.0, 0.0, middle - self.vehicle.car_cg_m)
+        Vector::new(0.0, 0.0, middle - self.vehicle.car_cg_m)
     }
 
     /// Origin of the vehicle frame in the leading car's body.
@@ -343,9 +343,10 @@ impl Consist {
     pub(super) fn hold_speed(&mut self, world: &mut PhysicsWorld, speed_mps: f64, dt_s: f64) {
         for (k, handle) in self.handles.iter().enumerate() {
             let state = &self.states[k];
-            let along = match BodyKind::of(k) {
-                BodyKind::Wheelset => state.velocity.normalize_or_zero(),
-                _ => state.rotation * Vector::X,
+            let along = if is_wheelset(k) {
+                state.velocity.normalize_or_zero()
+            } else {
+                state.rotation * Vector::X
             };
             let off = speed_mps - state.velocity.dot(along);
             let pull = off * (HOLD_PER_S * dt_s).min(1.0) / dt_s + GRAVITY_MPS2 * along.z;
@@ -405,15 +406,15 @@ impl Consist {
         };
         let car = &self.states[body];
         let origin = car.point(origin);
-        let world_from_car = isometry(origin, car.rotation);
+        let world_from_car = Isometry3::from(Pose::from_parts(origin, car.rotation));
         VehicleMotion {
             time,
             world_from_vehicle: match end {
                 TrainEnd::Front => world_from_car,
                 TrainEnd::Rear => world_from_car * about_turned(),
             },
-            velocity_mps: vector3(car.velocity_at(origin)),
-            angular_rad_s: vector3(car.angular),
+            velocity_mps: car.velocity_at(origin).into(),
+            angular_rad_s: car.angular.into(),
         }
     }
 
@@ -424,19 +425,19 @@ impl Consist {
 
     /// Poses of the centres of the car bodies' boxes, leading car first.
     pub(super) fn boxes(&self) -> impl Iterator<Item = Isometry3<f64>> + '_ {
-        let centre = vector(self.box_centre_m());
+        let centre = self.box_centre_m();
         self.cars()
-            .map(move |car| isometry(car.point(centre), car.rotation))
+            .map(move |car| Pose::from_parts(car.point(centre), car.rotation).into())
     }
 
     /// Velocities of the car bodies.
     pub(super) fn velocities_mps(&self) -> impl Iterator<Item = Vector3<f64>> + '_ {
-        self.cars().map(|car| vector3(car.velocity))
+        self.cars().map(|car| car.velocity.into())
     }
 
     /// Acceleration over the last step of the leading car's centre of gravity along a direction.
     pub(super) fn accel_mps2(&self, along: Vector3<f64>, dt_s: f64) -> f64 {
-        (self.states[0].velocity - self.previous.velocity).dot(vector(along)) / dt_s
+        (self.states[0].velocity - self.previous.velocity).dot(along.into()) / dt_s
     }
 
     /// Acceleration over the last step of the leading car's floor over its first bogie, in the
@@ -446,7 +447,7 @@ impl Consist {
         let floor = Vector::new(v.semi_bogie_distance_m, 0.0, v.floor_m - v.car_cg_m);
         let velocity = |s: &BodyState| s.velocity_at(s.point(floor));
         let change = velocity(&self.states[0]) - velocity(&self.previous);
-        vector3(self.states[0].rotation.inverse() * change) / dt_s
+        Vector3::from(self.states[0].rotation.inverse() * change) / dt_s
     }
 }
 

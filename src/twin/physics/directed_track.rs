@@ -5,7 +5,6 @@
 //! line's end, and left is the line's right. The rails are the same ones.
 
 use super::adhesion::{Adhesion, RailZone};
-use super::convert::point;
 use super::defect::Defects;
 use super::deviation::Deviation;
 use super::irregularity::Irregularity;
@@ -109,14 +108,13 @@ pub(super) fn rail_axes(frame: &TrackFrame) -> (Vector, Axes) {
         y: left * upright + up * lean,
         z: up * upright - left * lean,
     };
-    (point(frame.origin), axes)
+    (frame.origin.into(), axes)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::track::PlanElement;
-    use crate::twin::physics::convert::vector;
     use crate::twin::physics::testing::line;
     use crate::twin::physics::{
         DefectSettings, DefectShape, IrregularityClass, IrregularitySettings, RailSide, RailState,
@@ -207,13 +205,13 @@ mod tests {
         };
         let (origin, axes) = rail_axes(&frame);
         let want = frame.world_from_rails();
-        assert_eq!(origin, point(frame.origin));
+        assert_eq!(origin, Vector::from(frame.origin));
         for (axis, along) in [
             (axes.x, Vector3::x()),
             (axes.y, Vector3::y()),
             (axes.z, Vector3::z()),
         ] {
-            assert!((axis - vector(want.rotation * along)).length() < 1e-14);
+            assert!((axis - Vector::from(want.rotation * along)).length() < 1e-14);
         }
     }
 }

@@ -38,7 +38,7 @@ pub(super) struct Effort {
 
 /// Driver and brake control.
 #[derive(Clone, Debug)]
-pub(super) struct Driver {
+pub(super) struct AutomaticDriver {
     settings: TrainSettings,
     /// Driver's lever: traction over zero, brake below.
     lever_mps2: f64,
@@ -47,7 +47,7 @@ pub(super) struct Driver {
     emergency: bool,
 }
 
-impl Driver {
+impl AutomaticDriver {
     pub(super) fn new(settings: &TrainSettings) -> Self {
         let standing = settings.start_speed_kmh < 3.6 * STANDING_MPS;
         Self {

@@ -1,7 +1,6 @@
 //! What obstacles fall on: slabs behind the tunnel's outline and boxes for the rails, laid along
 //! the line in short lengths, and only where there is something to fall.
 
-use super::convert::{pose, vector};
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, groups};
 use crate::track::{
     BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Tunnel, rail_outline,
@@ -94,9 +93,8 @@ fn lay_edge(world: &mut PhysicsWorld, edge: &Edge, level: &Isometry3<f64>) {
 }
 
 fn insert(world: &mut PhysicsWorld, half: Vector3<f64>, place: Isometry3<f64>) {
-    let half = vector(half);
     let slab = ColliderBuilder::cuboid(half.x, half.y, half.z)
-        .position(pose(&place))
+        .position(place.into())
         .friction(FRICTION)
         .collision_groups(groups(GROUND_GROUP, OBSTACLE_GROUP));
     world.insert_collider(slab, None);

@@ -18,7 +18,7 @@ use rapier3d_f64::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
 use serde::{Serialize, Serializer};
 
 /// One hit of a train on something.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Impact {
     /// The train. Files list hits by train.
     #[serde(skip)]
@@ -122,7 +122,7 @@ pub(super) struct Impacts {
     /// By train.
     bounds: Vec<DamageBounds>,
     touches: Vec<Touch>,
-    list: Vec<Impact>,
+    pub list: Vec<Impact>,
 }
 
 impl Impacts {
@@ -146,10 +146,6 @@ impl Impacts {
             bounds: masses_kg.map(DamageBounds::of_train).collect(),
             ..Self::default()
         }
-    }
-
-    pub(super) fn list(&self) -> &[Impact] {
-        &self.list
     }
 
     /// To be called before a step.
@@ -245,22 +241,14 @@ impl Impacts {
                 time: now,
                 with: name.to_owned(),
                 speed_mps,
-                momentum_n_s: 0.0,
-                energy_j: 0.0,
-                energy_lost_j: 0.0,
-                damage: Damage::default(),
+                ..Impact::default()
             });
         }
-        match known {
-            Some(k) => {
-                self.touches[k] = touch;
-                k
-            }
-            None => {
-                self.touches.push(touch);
-                self.touches.len() - 1
-            }
+        if let Some(k) = known {
+            self.touches.swap_remove(k);
         }
+        self.touches.push(touch);
+        self.touches.len() - 1
     }
 }
 

@@ -70,21 +70,6 @@ impl IrregularitySettings {
     }
 }
 
-/// Constants of one class, SI.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Spectra {
-    German {
-        vertical: f64,
-        lateral: f64,
-        gauge: f64,
-    },
-    Fra {
-        vertical: f64,
-        lateral: f64,
-        cross_corner: f64,
-    },
-}
-
 /// Which of the four signals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Signal {
@@ -105,73 +90,52 @@ const FRA_CORNER: f64 = 0.8245;
 const FRA_SCALE: f64 = 0.25;
 
 impl IrregularityClass {
-    fn spectra(self) -> Option<Spectra> {
-        let german = |vertical, lateral, gauge| {
-            Some(Spectra::German {
-                vertical,
-                lateral,
-                gauge,
-            })
-        };
-        // FRA tables are in cm^2 rad/m.
-        let fra = |vertical: f64, lateral: f64, cross_corner| {
-            Some(Spectra::Fra {
-                vertical: vertical * 1e-4,
-                lateral: lateral * 1e-4,
-                cross_corner,
-            })
-        };
+    /// One-sided density at `omega` (rad/m): m^2/(rad/m), of the cross level rad^2/(rad/m).
+    fn density(self, signal: Signal, omega: f64) -> f64 {
+        let german = |scales| german(scales, signal, omega);
+        let fra = |scales, cross_corner| fra(scales, cross_corner, signal, omega);
         match self {
-            Self::None => None,
-            Self::GermanLow => german(4.032e-7, 2.119e-7, 5.32e-8),
-            Self::GermanHigh => german(1.08e-6, 6.125e-7, 1.032e-7),
-            Self::Fra1 => fra(1.2107, 3.3634, 0.6046),
-            Self::Fra2 => fra(1.0181, 1.2107, 0.9308),
-            Self::Fra3 => fra(0.6816, 0.4128, 0.8520),
-            Self::Fra4 => fra(0.5376, 0.3027, 1.1312),
-            Self::Fra5 => fra(0.2095, 0.0762, 0.8209),
-            Self::Fra6 => fra(0.0339, 0.0339, 0.4380),
+            Self::None => 0.0,
+            Self::GermanLow => german([4.032e-7, 2.119e-7, 5.32e-8]),
+            Self::GermanHigh => german([1.08e-6, 6.125e-7, 1.032e-7]),
+            Self::Fra1 => fra([1.2107, 3.3634], 0.6046),
+            Self::Fra2 => fra([1.0181, 1.2107], 0.9308),
+            Self::Fra3 => fra([0.6816, 0.4128], 0.8520),
+            Self::Fra4 => fra([0.5376, 0.3027], 1.1312),
+            Self::Fra5 => fra([0.2095, 0.0762], 0.8209),
+            Self::Fra6 => fra([0.0339, 0.0339], 0.4380),
         }
     }
 }
 
-impl Spectra {
-    /// One-sided density at `omega` (rad/m): m^2/(rad/m), of the cross level rad^2/(rad/m).
-    fn density(self, signal: Signal, omega: f64) -> f64 {
-        let o2 = omega * omega;
-        match self {
-            Self::German {
-                vertical,
-                lateral,
-                gauge,
-            } => {
-                let (c2, r2) = (GERMAN_CORNER.powi(2), GERMAN_LONG.powi(2));
-                let shape = c2 / ((o2 + r2) * (o2 + c2));
-                let short = shape * o2 / (o2 + GERMAN_CROSS.powi(2));
-                match signal {
-                    Signal::Vertical => vertical * shape,
-                    Signal::Lateral => lateral * shape,
-                    Signal::CrossLevel => vertical / GERMAN_HALF_BASE_M.powi(2) * short,
-                    Signal::Gauge => gauge * short,
-                }
-            }
-            Self::Fra {
-                vertical,
-                lateral,
-                cross_corner,
-            } => {
-                let c2 = FRA_CORNER.powi(2);
-                let shape = FRA_SCALE * c2 / (o2 + c2);
-                let short = 4.0 * vertical * shape / (o2 + cross_corner.powi(2));
-                match signal {
-                    Signal::Vertical => vertical * shape / o2,
-                    Signal::Lateral => lateral * shape / o2,
-                    // Given as the height of one rail over the other.
-                    Signal::CrossLevel => short / CANT_BASE_M.powi(2),
-                    Signal::Gauge => short,
-                }
-            }
-        }
+/// Of German track, by the scales of vertical, lateral and gauge.
+fn german([vertical, lateral, gauge]: [f64; 3], signal: Signal, omega: f64) -> f64 {
+    let o2 = omega * omega;
+    let (c2, r2) = (GERMAN_CORNER.powi(2), GERMAN_LONG.powi(2));
+    let shape = c2 / ((o2 + r2) * (o2 + c2));
+    let short = shape * o2 / (o2 + GERMAN_CROSS.powi(2));
+    match signal {
+        Signal::Vertical => vertical * shape,
+        Signal::Lateral => lateral * shape,
+        Signal::CrossLevel => vertical / GERMAN_HALF_BASE_M.powi(2) * short,
+        Signal::Gauge => gauge * short,
+    }
+}
+
+/// Of track of an FRA class, by the scales of vertical and lateral in cm^2 rad/m, as its tables
+/// have them.
+fn fra(scales: [f64; 2], cross_corner: f64, signal: Signal, omega: f64) -> f64 {
+    let [vertical, lateral] = scales.map(|scale| scale * 1e-4);
+    let o2 = omega * omega;
+    let c2 = FRA_CORNER.powi(2);
+    let shape = FRA_SCALE * c2 / (o2 + c2);
+    let short = 4.0 * vertical * shape / (o2 + cross_corner.powi(2));
+    match signal {
+        Signal::Vertical => vertical * shape / o2,
+        Signal::Lateral => lateral * shape / o2,
+        // Given as the height of one rail over the other.
+        Signal::CrossLevel => short / CANT_BASE_M.powi(2),
+        Signal::Gauge => short,
     }
 }
 
@@ -193,20 +157,19 @@ impl Irregularity {
         seed: u64,
         index: u64,
     ) -> Self {
-        let Some(spectra) = settings.class.spectra() else {
+        if settings.class == IrregularityClass::None {
             return Self::default();
-        };
+        }
         // At least ten of the longest waves.
         let span_m = length_m.max(10.0 * settings.longest_m);
         let n = ((span_m / GRID_M).ceil() as usize).next_power_of_two();
-        let signal = |signal, name| {
-            let stream = Stream::new(seed, index, name);
-            synthesise(n, settings, |o| spectra.density(signal, o), stream)
-        };
-        let up = signal(Signal::Vertical, "track vertical");
-        let left = signal(Signal::Lateral, "track lateral");
-        let roll = signal(Signal::CrossLevel, "track cross level");
-        let gauge = signal(Signal::Gauge, "track gauge");
+        let [up, left, roll, gauge] = [
+            (Signal::Vertical, "track vertical"),
+            (Signal::Lateral, "track lateral"),
+            (Signal::CrossLevel, "track cross level"),
+            (Signal::Gauge, "track gauge"),
+        ]
+        .map(|(signal, name)| synthesise(n, settings, signal, Stream::new(seed, index, name)));
         let rows = (0..n).map(|k| [up[k], left[k], roll[k], gauge[k]]);
         Self {
             table: rows.collect(),
@@ -255,11 +218,11 @@ fn catmull_rom(p: [f64; 4], t: f64) -> (f64, f64) {
     )
 }
 
-/// A real Gaussian signal of `n` (a power of two) grid points with the given density.
+/// A real Gaussian signal of `n` (a power of two) grid points with the density of its class.
 fn synthesise(
     n: usize,
     settings: &IrregularitySettings,
-    density: impl Fn(f64) -> f64,
+    signal: Signal,
     stream: Stream,
 ) -> Vec<f64> {
     let step = TAU / (n as f64 * GRID_M);
@@ -269,7 +232,7 @@ fn synthesise(
         let omega = k as f64 * step;
         if (low..=high).contains(&omega) {
             // a cos + b sin with a, b of variance S dOmega each has the variance S dOmega.
-            let sigma = (density(omega) * step).sqrt();
+            let sigma = (settings.class.density(signal, omega) * step).sqrt();
             let k = 2 * k as u64;
             *amplitude = [sigma * stream.normal(k), sigma * stream.normal(k + 1)];
         }

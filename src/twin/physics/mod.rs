@@ -48,7 +48,6 @@ mod cable_settings;
 mod carrier;
 mod catenary;
 mod consist;
-mod convert;
 mod damage;
 mod defect;
 mod deviation;
@@ -110,7 +109,6 @@ pub use worker::{Waypoint, WorkerSettings};
 use crate::bus::{SimTime, TrainCommand, TrainId};
 use crate::settings::Settings;
 use crate::track::{Direction, Tunnel};
-use carrier::Carrier;
 use directed_track::DirectedTrack;
 use irregularity::Irregularity;
 use rapier3d_f64::math::Vector;
@@ -126,7 +124,7 @@ pub struct World {
     /// By number.
     trains: Vec<Train>,
     /// What carries a rig at rest where there is no train.
-    carrier: Option<Carrier>,
+    carrier: Option<TrainState>,
     surroundings: Surroundings,
     time: SimTime,
     step: SimTime,

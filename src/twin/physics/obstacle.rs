@@ -165,10 +165,10 @@ impl ObstacleSettings {
     }
 
     /// The pieces of this entry, number `entry` of the scenario.
-    pub(super) fn pieces(&self, entry: &str, seed: u64, index: u64) -> Vec<Piece> {
+    pub(super) fn pieces(&self, entry: &str, seed: u64, index: u64) -> Vec<SingleObstacle> {
         let stream = |what: &str| Stream::new(seed, index, &format!("{entry} {what}"));
         let draws = stream("places");
-        let mut made: Vec<Piece> = Vec::new();
+        let mut made: Vec<SingleObstacle> = Vec::new();
         for k in 0..u64::from(self.count) {
             let draw = |n: u64| 2.0 * draws.uniform(k * 4 * (DRAWS + 1) + n) - 1.0;
             let mut settings = self.clone();
@@ -192,14 +192,14 @@ impl ObstacleSettings {
                     break;
                 }
             }
-            made.push(Piece { settings, body });
+            made.push(SingleObstacle { settings, body });
         }
         made
     }
 }
 
 /// Whether the balls around two things do not overlap.
-fn apart(settings: &ObstacleSettings, body: &Shape, other: &Piece) -> bool {
+fn apart(settings: &ObstacleSettings, body: &Shape, other: &SingleObstacle) -> bool {
     let place = |s: &ObstacleSettings| Vector3::new(s.chainage_m, s.lateral_m, s.height_m);
     let distance_m = (place(settings) - place(&other.settings)).norm();
     distance_m > body.half_extents_m().max() + other.body.half_extents_m().max()
@@ -207,7 +207,7 @@ fn apart(settings: &ObstacleSettings, body: &Shape, other: &Piece) -> bool {
 
 /// One thing to come.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
+pub(super) struct SingleObstacle {
     pub settings: ObstacleSettings,
     pub body: Shape,
 }
@@ -245,8 +245,9 @@ mod tests {
             assert!(reach_m <= 0.5 * 0.3 * 1.4 + 1e-9);
             assert!(made[..k].iter().all(|other| apart(s, &one.body, other)));
         }
-        let masses =
-            |made: &[Piece]| -> Vec<f64> { made.iter().map(|one| one.settings.mass_kg).collect() };
+        let masses = |made: &[SingleObstacle]| -> Vec<f64> {
+            made.iter().map(|one| one.settings.mass_kg).collect()
+        };
         assert_eq!(
             masses(&made),
             masses(&rocks.pieces("obstacle 0", 1, 0)),

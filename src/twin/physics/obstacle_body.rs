@@ -1,10 +1,9 @@
 //! An obstacle in the world: a rigid body of rapier that falls, rolls, rests, or is still held.
 
-use super::convert::{isometry, pose, vector, vector3};
 use super::entity::Entity;
 use super::groups::{fixed, loose};
 use super::impact::Motion;
-use super::obstacle::{HingeEdge, HingeSettings, Piece};
+use super::obstacle::{HingeEdge, HingeSettings, SingleObstacle};
 use crate::bus::SimTime;
 use crate::track::{Alignment, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
@@ -50,7 +49,7 @@ enum Hold {
 /// An obstacle.
 #[derive(Clone)]
 pub(super) struct ObstacleBody {
-    pub piece: Piece,
+    pub piece: SingleObstacle,
     pub body: RigidBodyHandle,
     pub collider: ColliderHandle,
     hold: Hold,
@@ -64,7 +63,7 @@ impl ObstacleBody {
     pub(super) fn insert(
         world: &mut PhysicsWorld,
         alignment: &Alignment,
-        piece: &Piece,
+        piece: &SingleObstacle,
         entity: Entity,
     ) -> Self {
         let settings = &piece.settings;
@@ -80,12 +79,12 @@ impl ObstacleBody {
         let builder = match settings.held_until_s {
             Some(_) => RigidBodyBuilder::fixed(),
             None => RigidBodyBuilder::dynamic()
-                .linvel(vector(heading * Vector3::from(settings.velocity_mps)))
-                .angvel(vector(heading * Vector3::from(settings.spin_rad_s))),
+                .linvel((heading * Vector3::from(settings.velocity_mps)).into())
+                .angvel((heading * Vector3::from(settings.spin_rad_s)).into()),
         };
         let body = world.insert_body(
             builder
-                .pose(pose(&place))
+                .pose(place.into())
                 .ccd_enabled(true)
                 .user_data(entity.user_data())
                 .additional_solver_iterations(EXTRA_PASSES),
@@ -118,28 +117,22 @@ impl ObstacleBody {
 
     /// The train has touched it where it was held.
     pub(super) fn tear_off(&mut self, world: &mut PhysicsWorld) {
-        match self.hold {
-            Hold::Nothing => {}
-            Hold::Fixed { .. } => self.let_go(world),
-            Hold::Hinge { joint, .. } => {
-                world.remove_impulse_joint(joint);
-                self.let_go(world);
-            }
+        if !matches!(self.hold, Hold::Nothing) {
+            self.let_go(world);
         }
     }
 
     /// Lets go what is due.
     pub(super) fn release(&mut self, world: &mut PhysicsWorld, now_s: f64) {
-        match self.hold {
-            Hold::Fixed { until_s } if until_s <= now_s => match self.piece.settings.hinge {
-                Some(hinge) => self.swing(world, &hinge),
-                None => self.let_go(world),
-            },
-            Hold::Hinge { until_s, joint } if until_s <= now_s => {
-                world.remove_impulse_joint(joint);
-                self.let_go(world);
-            }
-            _ => {}
+        let (Hold::Fixed { until_s } | Hold::Hinge { until_s, .. }) = self.hold else {
+            return;
+        };
+        if until_s > now_s {
+            return;
+        }
+        match self.piece.settings.hinge.filter(|_| self.fixed()) {
+            Some(hinge) => self.swing(world, &hinge),
+            None => self.let_go(world),
         }
     }
 
@@ -151,6 +144,9 @@ impl ObstacleBody {
     }
 
     fn let_go(&mut self, world: &mut PhysicsWorld) {
+        if let Hold::Hinge { joint, .. } = self.hold {
+            world.remove_impulse_joint(joint);
+        }
         self.set_free(world);
         if let Some(collider) = world.colliders.get_mut(self.collider) {
             collider.set_solver_groups(loose());
@@ -171,10 +167,10 @@ impl ObstacleBody {
             HingeEdge::Back => (Vector3::x() * -half.x, Vector::Z),
         };
         let at = place * Isometry3::translation(edge.x, edge.y, edge.z);
-        let wall = world.insert_body(RigidBodyBuilder::fixed().pose(pose(&at)));
+        let wall = world.insert_body(RigidBodyBuilder::fixed().pose(at.into()));
         let joint = RevoluteJointBuilder::new(axis)
             .local_anchor1(Vector::ZERO)
-            .local_anchor2(vector(edge));
+            .local_anchor2(edge.into());
         self.hold = Hold::Hinge {
             until_s: hinge.until_s.unwrap_or(f64::INFINITY),
             joint: world.insert_impulse_joint(wall, self.body, joint),
@@ -193,10 +189,7 @@ impl ObstacleBody {
     /// Where it is and how it moves.
     pub(super) fn state(&self, world: &PhysicsWorld) -> Option<(Isometry3<f64>, Vector3<f64>)> {
         let body = world.bodies.get(self.body)?;
-        Some((
-            isometry(body.translation(), *body.rotation()),
-            vector3(body.linvel()),
-        ))
+        Some(((*body.position()).into(), body.linvel().into()))
     }
 
     /// As the renderer draws it.
@@ -268,8 +261,7 @@ fn collider_of(body: &Shape) -> ColliderBuilder {
         }
         Shape::Capsule(radius, half) => ColliderBuilder::capsule_z(*half, *radius),
         Shape::Hull(hull) => {
-            let corners = hull.corners().iter();
-            let corners: Vec<Vector> = corners.map(|c| super::convert::point(*c)).collect();
+            let corners: Vec<Vector> = hull.corners().iter().map(|c| (*c).into()).collect();
             // It is a hull already; a ball in its place would only stand for a broken library.
             ColliderBuilder::convex_hull(&corners)
                 .unwrap_or_else(|| ColliderBuilder::ball(hull.half_extents_m().min()))

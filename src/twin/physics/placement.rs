@@ -1,6 +1,5 @@
 //! Where the bodies of a train are at the start: cars over the track as it lies, couplers closed.
 
-use super::convert::{rotation, vector3};
 use super::directed_track::{DirectedTrack, rail_axes};
 use super::suspension::BodyState;
 use super::vehicle::{AXLES, Vehicle};
@@ -9,23 +8,9 @@ use rapier3d_f64::math::{Rotation, Vector};
 /// Bodies of a car: itself, front and rear bogie, four wheelsets from the front.
 pub(super) const BODIES: usize = 7;
 
-/// Which of a car's bodies.
-#[derive(Clone, Copy)]
-pub(super) enum BodyKind {
-    Car,
-    Bogie,
-    Wheelset,
-}
-
-impl BodyKind {
-    /// Body `k` of a train.
-    pub(super) fn of(k: usize) -> Self {
-        match k % BODIES {
-            0 => Self::Car,
-            1 | 2 => Self::Bogie,
-            _ => Self::Wheelset,
-        }
-    }
+/// Whether body `k` of a train is a wheelset.
+pub(super) fn is_wheelset(k: usize) -> bool {
+    k % BODIES > 2
 }
 
 /// The body of an axle, counted from the front of the train.
@@ -125,7 +110,7 @@ fn on_rails(track: &DirectedTrack, s_m: f64, height_m: f64, speed_mps: f64) -> B
 }
 
 fn turned(x: Vector, y: Vector, z: Vector) -> Rotation {
-    let axes = nalgebra::Matrix3::from_columns(&[vector3(x), vector3(y), vector3(z)]);
+    let axes = nalgebra::Matrix3::from_columns(&[x.into(), y.into(), z.into()]);
     let axes = nalgebra::Rotation3::from_matrix_unchecked(axes);
-    rotation(&nalgebra::UnitQuaternion::from_rotation_matrix(&axes))
+    nalgebra::UnitQuaternion::from_rotation_matrix(&axes).into()
 }

@@ -25,7 +25,7 @@ impl Clone for World {
             tunnel: self.tunnel.clone(),
             rapier: copy(&self.rapier),
             trains: self.trains.clone(),
-            carrier: self.carrier,
+            carrier: self.carrier.clone(),
             surroundings: self.surroundings.clone(),
             time: self.time,
             step: self.step,

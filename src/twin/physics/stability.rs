@@ -10,8 +10,6 @@ use rapier3d_f64::math::Vector;
 
 /// The longest step, and what limits it, for rails of a stiffness and damping under a wheel.
 pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static str) {
-    let (primary, half) = (v.primary, v.half_primary_m);
-    let (kp, cp) = (primary.stiffness_n_m, primary.damping_n_s_m);
     let turned = |e: Vector, arm: Vector| {
         Vector::new(
             e.y * arm.z * arm.z + e.z * arm.y * arm.y,
@@ -19,6 +17,8 @@ pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static
             e.x * arm.y * arm.y + e.y * arm.x * arm.x,
         )
     };
+    let half = v.half_primary_m;
+    let at_axle = Vector::Y * half;
     let at_box = Vector::new(v.semi_wheelbase_m, half, v.wheel_radius_m - v.bogie_cg_m);
     let at_side = Vector::new(0.0, v.half_secondary_m, v.secondary_m - v.bogie_cg_m);
     let at_car = Vector::new(
@@ -26,51 +26,37 @@ pub(super) fn longest_step_s(v: &Vehicle, support: (f64, f64)) -> (f64, &'static
         v.half_secondary_m,
         v.secondary_m - v.car_cg_m,
     );
-    let (ks, cs) = bogie_side(v);
-    let rail = |r: f64| {
-        let down = Vector::new(0.0, 0.0, 2.0 * r);
-        (
-            down,
-            Vector::X * (2.0 * r * HALF_CONTACT_M * HALF_CONTACT_M),
-        )
+    // Shift and turn of wheelset, bogie and car against fixed neighbours; of stiffness, or damping.
+    let of_bodies = |primary: Vector, side: Vector, rail: f64, flange: Vector| {
+        let down = Vector::Z * (2.0 * rail);
+        let roll = Vector::X * (2.0 * rail * HALF_CONTACT_M * HALF_CONTACT_M);
+        [
+            [
+                primary * 2.0 + down + flange,
+                turned(primary, at_axle) * 2.0 + roll,
+            ],
+            [
+                primary * 4.0 + side * 2.0,
+                turned(primary, at_box) * 4.0 + turned(side, at_side) * 2.0,
+            ],
+            [side * 4.0, turned(side, at_car) * 4.0],
+        ]
     };
-    let (rail_k, rail_c) = (rail(support.0), rail(support.1));
+    let ((side_k, side_c), primary) = (bogie_side(v), v.primary);
     let flange = Vector::Y * FLANGE_STIFFNESS_N_M;
-    let axle = Vector::Y * half;
+    let stiffness = of_bodies(primary.stiffness_n_m, side_k, support.0, flange);
+    let damping = of_bodies(primary.damping_n_s_m, side_c, support.1, Vector::ZERO);
     let bodies = [
-        (
-            "a wheelset",
-            v.wheelset,
-            [kp * 2.0 + rail_k.0 + flange, cp * 2.0 + rail_c.0],
-            [
-                turned(kp, axle) * 2.0 + rail_k.1,
-                turned(cp, axle) * 2.0 + rail_c.1,
-            ],
-        ),
-        (
-            "a bogie",
-            v.bogie,
-            [kp * 4.0 + ks * 2.0, cp * 4.0 + cs * 2.0],
-            [
-                turned(kp, at_box) * 4.0 + turned(ks, at_side) * 2.0,
-                turned(cp, at_box) * 4.0 + turned(cs, at_side) * 2.0,
-            ],
-        ),
-        (
-            "the car body",
-            v.car,
-            [ks * 4.0, cs * 4.0],
-            [turned(ks, at_car) * 4.0, turned(cs, at_car) * 4.0],
-        ),
+        ("a wheelset", v.wheelset),
+        ("a bogie", v.bogie),
+        ("the car body", v.car),
     ];
     let mut longest = (f64::INFINITY, "nothing");
-    for (name, mass, [k, c], [k_turn, c_turn]) in bodies {
-        let shifts = [
-            (k / mass.kg, c / mass.kg),
-            (k_turn / mass.kg_m2, c_turn / mass.kg_m2),
-        ];
-        for (k, c) in shifts {
-            for (k, c) in [(k.x, c.x), (k.y, c.y), (k.z, c.z)] {
+    for (((name, mass), k), c) in bodies.into_iter().zip(stiffness).zip(damping) {
+        let shift = (k[0] / mass.kg, c[0] / mass.kg);
+        let turn = (k[1] / mass.kg_m2, c[1] / mass.kg_m2);
+        for (k, c) in [shift, turn] {
+            for (k, c) in k.to_array().into_iter().zip(c.to_array()) {
                 let step_s = 2.0 / (c + (c * c + 2.0 * k).sqrt());
                 if step_s < longest.0 {
                     longest = (step_s, name);

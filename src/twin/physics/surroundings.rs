@@ -6,15 +6,14 @@
 
 use super::PhysicsError;
 use super::cable::Cable;
-use super::convert::point3;
 use super::entity::{Entity, train_name};
 use super::ground::Ground;
-use super::impact::{Impact, Impacts, Motion};
-use super::obstacle::Piece;
+use super::impact::{Impacts, Motion};
+use super::obstacle::SingleObstacle;
 use super::obstacle_body::ObstacleBody;
 use super::settings::PhysicsSettings;
 use super::train::Train;
-use super::truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth, cable_truth, obstacle_truth};
+use super::truth::{BodyLabel, BodyOwner};
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
 use crate::track::{Alignment, Tunnel};
@@ -37,15 +36,15 @@ pub(super) struct Surroundings {
     /// `None` for what was taken away again.
     pub obstacles: Vec<Option<ObstacleBody>>,
     pub cables: Vec<Cable>,
-    walkers: Vec<Walker>,
+    pub walkers: Vec<Walker>,
     /// Names of the trains.
     trains: Vec<String>,
     ground: Ground,
     /// Still to come, the next one last.
-    to_come: Vec<Piece>,
+    to_come: Vec<SingleObstacle>,
     /// Times when something fixed lets go, the next one last.
     releases_s: Vec<f64>,
-    impacts: Impacts,
+    pub impacts: Impacts,
     awake: Vec<Awake>,
     steps: u64,
 }
@@ -66,7 +65,7 @@ impl Surroundings {
         // Contacts that are kept while a body turns by some degrees make a wheel a polygon.
         solver.contact_recycling = false;
         let entries = settings.obstacles.iter().enumerate();
-        let mut to_come: Vec<Piece> = entries
+        let mut to_come: Vec<SingleObstacle> = entries
             .flat_map(|(k, entry)| entry.pieces(&format!("obstacle {k}"), seed, index))
             .collect();
         to_come.sort_by(|a, b| a.settings.appears_s.total_cmp(&b.settings.appears_s));
@@ -202,8 +201,7 @@ impl Surroundings {
         let Some(near_m) = near_m else {
             return;
         };
-        let centre = point3(at);
-        *near_m = tunnel.alignment.track_from_world(&centre, *near_m).s_m;
+        *near_m = tunnel.alignment.track_from_world(&at.into(), *near_m).s_m;
         self.ground.lay(world, tunnel, *near_m);
     }
 
@@ -261,7 +259,12 @@ impl Surroundings {
         }
     }
 
-    fn insert(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, piece: &Piece) -> usize {
+    fn insert(
+        &mut self,
+        world: &mut PhysicsWorld,
+        tunnel: &Tunnel,
+        piece: &SingleObstacle,
+    ) -> usize {
         let number = self.obstacles.len();
         self.ground.lay(world, tunnel, piece.settings.chainage_m);
         let entity = Entity::Obstacle(number);
@@ -303,11 +306,6 @@ impl Surroundings {
         }
     }
 
-    /// Hits of the trains so far.
-    pub(super) fn impacts(&self) -> &[Impact] {
-        self.impacts.list()
-    }
-
     /// As renderers draw them, with their labels.
     pub(super) fn draw(
         &self,
@@ -315,77 +313,42 @@ impl Surroundings {
         line: &Alignment,
         now_s: f64,
     ) -> Vec<(Body, BodyLabel<'_>)> {
-        let mut labelled = Vec::new();
+        let mut drawn = Vec::new();
         for (k, obstacle) in self.obstacles.iter().enumerate() {
-            let Some((body, obstacle)) = obstacle.as_ref().and_then(|t| Some((t.draw(world)?, t)))
-            else {
+            let Some(obstacle) = obstacle else {
                 continue;
             };
-            let (owner, name) = (
-                BodyOwner::Obstacle(k),
-                obstacle.piece.settings.name.as_str(),
-            );
-            labelled.push((body, BodyLabel { owner, name }));
+            let (owner, name) = (BodyOwner::Obstacle(k), &obstacle.piece.settings.name);
+            drawn.extend(labelled(obstacle.draw(world), owner, name));
         }
-        let mut bodies = Vec::new();
         for (k, cable) in self.cables.iter().enumerate() {
-            cable.draw(world, &mut bodies);
-            let (owner, name) = (BodyOwner::Cable(k), cable.settings.name.as_str());
-            labelled.extend(bodies.drain(..).map(|b| (b, BodyLabel { owner, name })));
+            let (owner, name) = (BodyOwner::Cable(k), &cable.settings.name);
+            drawn.extend(labelled(cable.draw(world), owner, name));
         }
         for (k, walker) in self.walkers.iter().enumerate() {
-            walker.draw(world, line, now_s, &mut bodies);
-            let load = walker.draw_load(world, line, now_s);
-            let (owner, name) = (BodyOwner::Worker(k), walker.settings.name.as_str());
-            labelled.extend(bodies.drain(..).map(|b| (b, BodyLabel { owner, name })));
-            if let Some((body, name)) = load {
-                let owner = BodyOwner::Load(k);
-                labelled.push((body, BodyLabel { owner, name }));
+            let (owner, name) = (BodyOwner::Worker(k), &walker.settings.name);
+            drawn.extend(labelled(walker.draw(world, line, now_s), owner, name));
+            if let Some((body, name)) = walker.draw_load(world, line, now_s) {
+                drawn.extend(labelled([body], BodyOwner::Load(k), name));
             }
         }
-        labelled
+        drawn
     }
 
     /// Name of a train.
     pub(super) fn train_name(&self, id: TrainId) -> &str {
         self.name(Entity::Train(id))
     }
+}
 
-    /// Obstacles that are there now; what is fixed to the lining is none.
-    pub(super) fn obstacles<'a>(
-        &'a self,
-        world: &'a PhysicsWorld,
-        line: &'a Alignment,
-        now: SimTime,
-    ) -> impl Iterator<Item = ObstacleTruth<'a>> {
-        let loose = self
-            .obstacles
-            .iter()
-            .flatten()
-            .filter(|obstacle| !obstacle.fixed());
-        let obstacles =
-            loose.filter_map(move |obstacle| obstacle_truth(obstacle, world, line, now));
-        let fallen = self.cables.iter().filter(|cable| cable.loose());
-        obstacles.chain(fallen.filter_map(move |cable| cable_truth(cable, world, line, now)))
-    }
-
-    /// Workers who are on the line now.
-    pub(super) fn workers<'a>(
-        &'a self,
-        world: &'a PhysicsWorld,
-        line: &'a Alignment,
-        now_s: f64,
-    ) -> impl Iterator<Item = WorkerTruth<'a>> {
-        self.walkers.iter().filter_map(move |walker| {
-            let (chainage_m, lateral_m) = walker.place_m(world, line, now_s)?;
-            Some(WorkerTruth {
-                name: &walker.settings.name,
-                stature_m: walker.settings.stature_m,
-                chainage_m,
-                lateral_m,
-            })
-        })
-    }
+/// Bodies with the label that they share.
+fn labelled(
+    bodies: impl IntoIterator<Item = Body>,
+    owner: BodyOwner,
+    name: &str,
+) -> impl Iterator<Item = (Body, BodyLabel<'_>)> {
+    let label = BodyLabel { owner, name };
+    bodies.into_iter().map(move |body| (body, label))
 }
 
 /// All times when something lets go, the first one last.

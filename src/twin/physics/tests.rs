@@ -501,7 +501,7 @@ fn follows_a_crooked_track() {
         run(&mut world, 0.05, &command(BrakeDemand::None, GO));
         let consist = &world.trains[0].consist;
         let place = |k: usize| {
-            let p = convert::point3(consist.states[k].position);
+            let p = consist.states[k].position.into();
             world.tunnel.alignment.track_from_world(&p, 300.0)
         };
         let axle = place(3);
@@ -573,7 +573,7 @@ fn runs_steadily_at_design_speed() {
                 world.step(&[command(BrakeDemand::None, GO)]).unwrap();
                 let axle = world.trains[0].consist.states[3].position;
                 let line = &world.tunnel.alignment;
-                let place = line.track_from_world(&convert::point3(axle), 300.0);
+                let place = line.track_from_world(&axle.into(), 300.0);
                 most_m = most_m.max(place.l_m.abs());
             }
             most_m

@@ -2,7 +2,7 @@
 
 use super::consist::Consist;
 use super::directed_track::DirectedTrack;
-use super::driver::{Driver, Effort, STANDING_MPS};
+use super::driver::{AutomaticDriver, Effort, STANDING_MPS};
 use super::history::{History, VehicleMotion};
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
@@ -35,7 +35,7 @@ pub(super) struct Train {
     pub consist: Consist,
     /// Of its front and rear end.
     histories: [History; 2],
-    driver: Driver,
+    driver: AutomaticDriver,
     pub effort: Effort,
 }
 
@@ -59,7 +59,7 @@ impl Train {
             consist: Consist::new(world, &track, &settings, head_m, id),
             track,
             histories: [History::new(history_steps), History::new(history_steps)],
-            driver: Driver::new(&settings),
+            driver: AutomaticDriver::new(&settings),
             effort: Effort::default(),
         }
     }

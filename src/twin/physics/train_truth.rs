@@ -5,7 +5,6 @@ use super::wheelset::{WheelExtremes, WheelForces};
 use super::{EnergyBook, World};
 use crate::bus::{SimTime, TrainEnd, TrainId};
 use crate::track::Direction;
-use crate::twin::geometry::Body;
 use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, Vector3};
 
@@ -84,7 +83,7 @@ impl World {
     /// Chainage of its head at a time of the recent past.
     pub fn chainage_at(&self, id: TrainId, time: SimTime) -> Option<f64> {
         match self.carrier(id) {
-            Some(carrier) => Some(carrier.head_m),
+            Some(carrier) => Some(carrier.chainage_m),
             None => self.chainage_of(id, &self.vehicle_at(id, TrainEnd::Front, time)?),
         }
     }
@@ -124,11 +123,6 @@ impl World {
     /// Its energy since the start.
     pub fn energy(&self, id: TrainId) -> Option<EnergyBook> {
         Some(self.get(id)?.consist.book())
-    }
-
-    /// Its cars as boxes, then the lenses of its headlights.
-    pub fn train_bodies(&self, id: TrainId) -> Option<Vec<Body>> {
-        Some(self.get(id)?.bodies())
     }
 
     /// The headlights of all trains.

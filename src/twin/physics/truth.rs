@@ -1,14 +1,12 @@
 //! What sessions ask of the world to score by.
 
 use super::cable::{Cable, bounds};
-use super::obstacle::Piece;
-use super::obstacle_body::ObstacleBody;
+use super::obstacle::SingleObstacle;
+use super::obstacle_body::{ObstacleBody, Rest};
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
-use crate::track::Alignment;
 use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
-use rapier3d_f64::prelude::PhysicsWorld;
 
 /// One obstacle as it really is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,87 +103,90 @@ impl World {
     /// Obstacles that are there now: what lies, falls or swings. What is still fixed to the lining
     /// is none.
     pub fn obstacles(&self) -> impl Iterator<Item = ObstacleTruth<'_>> {
-        let line = &self.tunnel.alignment;
-        self.surroundings.obstacles(&self.rapier, line, self.time)
+        let around = &self.surroundings;
+        let loose = around.obstacles.iter().flatten().filter(|o| !o.fixed());
+        let fallen = around.cables.iter().filter(|cable| cable.loose());
+        let loose = loose.filter_map(|obstacle| self.obstacle_truth(obstacle));
+        loose.chain(fallen.filter_map(|cable| self.cable_truth(cable)))
     }
 
     /// Workers who are on the line now.
     pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
-        let line = &self.tunnel.alignment;
-        self.surroundings
-            .workers(&self.rapier, line, self.time.secs())
+        let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
+        self.surroundings.walkers.iter().filter_map(move |walker| {
+            let (chainage_m, lateral_m) = walker.place_m(&self.rapier, line, now_s)?;
+            Some(WorkerTruth {
+                name: &walker.settings.name,
+                stature_m: walker.settings.stature_m,
+                chainage_m,
+                lateral_m,
+            })
+        })
     }
 
     /// Hits of trains on obstacles, cables, workers and other trains, in order of time; the first
     /// thousand. Where two trains hit each other, each of them has its own.
     pub fn impacts(&self) -> &[Impact] {
-        self.surroundings.impacts()
+        &self.surroundings.impacts.list
     }
-}
 
-fn resting(since: Option<SimTime>, now: SimTime) -> Option<SimTime> {
-    since.filter(|since| now.since(*since) >= RESTING_S)
-}
+    fn resting(&self, rest: Rest) -> Option<SimTime> {
+        rest.since
+            .filter(|since| self.time.since(*since) >= RESTING_S)
+    }
 
-/// An obstacle as it lies, flies or swings.
-pub(super) fn obstacle_truth<'a>(
-    obstacle: &'a ObstacleBody,
-    world: &PhysicsWorld,
-    line: &Alignment,
-    now: SimTime,
-) -> Option<ObstacleTruth<'a>> {
-    let (world_from_body, velocity_mps) = obstacle.state(world)?;
-    let Piece { settings, body } = &obstacle.piece;
-    let centre = world_from_body.translation.vector.into();
-    let place = line.track_from_world(&centre, obstacle.near_m);
-    let world_from_line = line.at(place.s_m).world_from_line().rotation;
-    let body_from_line = world_from_body.rotation.inverse() * world_from_line;
-    let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
-        let axis = body_from_line * axis;
-        body.reach_m(&axis).max(body.reach_m(&-axis))
-    });
-    Some(ObstacleTruth {
-        name: &settings.name,
-        size_m: 2.0 * body.half_extents_m(),
-        chainage_m: place.s_m,
-        lateral_m: place.l_m,
-        height_m: place.h_m,
-        half_extents_m: half.into(),
-        world_from_body,
-        velocity_mps,
-        resting_since: resting(obstacle.rest.since, now),
-        temperature_c: settings.temperature_c,
-    })
-}
+    /// An obstacle as it lies, flies or swings.
+    fn obstacle_truth<'a>(&self, obstacle: &'a ObstacleBody) -> Option<ObstacleTruth<'a>> {
+        let line = &self.tunnel.alignment;
+        let (world_from_body, velocity_mps) = obstacle.state(&self.rapier)?;
+        let SingleObstacle { settings, body } = &obstacle.piece;
+        let centre = world_from_body.translation.vector.into();
+        let place = line.track_from_world(&centre, obstacle.near_m);
+        let world_from_line = line.at(place.s_m).world_from_line().rotation;
+        let body_from_line = world_from_body.rotation.inverse() * world_from_line;
+        let half = [Vector3::x(), Vector3::y(), Vector3::z()].map(|axis| {
+            let axis = body_from_line * axis;
+            body.reach_m(&axis).max(body.reach_m(&-axis))
+        });
+        Some(ObstacleTruth {
+            name: &settings.name,
+            size_m: 2.0 * body.half_extents_m(),
+            chainage_m: place.s_m,
+            lateral_m: place.l_m,
+            height_m: place.h_m,
+            half_extents_m: half.into(),
+            world_from_body,
+            velocity_mps,
+            resting_since: self.resting(obstacle.rest),
+            temperature_c: settings.temperature_c,
+        })
+    }
 
-/// A cable as the box around it.
-pub(super) fn cable_truth<'a>(
-    cable: &'a Cable,
-    world: &PhysicsWorld,
-    line: &Alignment,
-    now: SimTime,
-) -> Option<ObstacleTruth<'a>> {
-    let settings = &cable.settings;
-    let middle = cable.ends(world).flatten().map(|p| p.coords);
-    let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
-    let s_m = line
-        .track_from_world(&Point3::from(middle), cable.near_m)
-        .s_m;
-    let frame = line.at(s_m).world_from_line();
-    let [low, high] = bounds(cable.ends(world).flatten(), &frame.inverse())?;
-    let half_extents_m = 0.5 * (high - low).add_scalar(settings.diameter_m);
-    let centre = frame * Point3::from(0.5 * (low + high));
-    let place = line.track_from_world(&centre, s_m);
-    Some(ObstacleTruth {
-        name: &settings.name,
-        size_m: 2.0 * half_extents_m,
-        chainage_m: place.s_m,
-        lateral_m: place.l_m,
-        height_m: place.h_m,
-        half_extents_m,
-        world_from_body: Isometry3::from_parts(centre.into(), frame.rotation),
-        velocity_mps: cable.velocity_mps(world),
-        resting_since: resting(cable.rest.since, now),
-        temperature_c: settings.temperature_c,
-    })
+    /// A cable as the box around it.
+    fn cable_truth<'a>(&self, cable: &'a Cable) -> Option<ObstacleTruth<'a>> {
+        let (world, line) = (&self.rapier, &self.tunnel.alignment);
+        let settings = &cable.settings;
+        let middle = cable.ends(world).flatten().map(|p| p.coords);
+        let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
+        let s_m = line
+            .track_from_world(&Point3::from(middle), cable.near_m)
+            .s_m;
+        let frame = line.at(s_m).world_from_line();
+        let [low, high] = bounds(cable.ends(world).flatten(), &frame.inverse())?;
+        let half_extents_m = 0.5 * (high - low).add_scalar(settings.diameter_m);
+        let centre = frame * Point3::from(0.5 * (low + high));
+        let place = line.track_from_world(&centre, s_m);
+        Some(ObstacleTruth {
+            name: &settings.name,
+            size_m: 2.0 * half_extents_m,
+            chainage_m: place.s_m,
+            lateral_m: place.l_m,
+            height_m: place.h_m,
+            half_extents_m,
+            world_from_body: Isometry3::from_parts(centre.into(), frame.rotation),
+            velocity_mps: cable.velocity_mps(world),
+            resting_since: self.resting(cable.rest),
+            temperature_c: settings.temperature_c,
+        })
+    }
 }

@@ -4,15 +4,15 @@
 //! and meets the train only, so that the solver lets the train hit a body of his mass, not a wall.
 //! From then on it is a body like others: it is thrown, falls, and lies.
 
-use super::convert::{isometry, pose, vector, vector3};
 use super::entity::Entity;
 use super::groups::{OBSTACLE_GROUP, TRAIN_GROUPS, groups, loose};
-use super::obstacle::Piece;
+use super::obstacle::SingleObstacle;
 use super::obstacle_body::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
 use crate::track::Alignment;
 use crate::twin::geometry::Body;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
+use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
 
 /// Half the depth and width of a body, the mean of both.
@@ -25,7 +25,7 @@ const REACH_M: f64 = 1.5;
 pub(super) struct Walker {
     pub settings: WorkerSettings,
     /// What he carries, or has put down.
-    load: Option<Piece>,
+    load: Option<SingleObstacle>,
     load_is: Load,
     /// While he is on the line.
     pub body: Option<RigidBodyHandle>,
@@ -46,7 +46,7 @@ enum Load {
 
 /// What a worker does with his load now.
 pub(super) enum Act {
-    PutDown(Box<Piece>),
+    PutDown(Box<SingleObstacle>),
     /// Wants to pick up what lies under this number, if it is within his reach of a place (chainage,
     /// left of the centreline).
     PickUp(usize, [f64; 2]),
@@ -54,7 +54,7 @@ pub(super) enum Act {
 
 impl Walker {
     /// A worker, with what he carries.
-    pub(super) fn new(settings: &WorkerSettings, load: Option<Piece>) -> Self {
+    pub(super) fn new(settings: &WorkerSettings, load: Option<SingleObstacle>) -> Self {
         Self {
             settings: settings.clone(),
             load,
@@ -98,9 +98,9 @@ impl Walker {
             None => *self.body.insert(self.insert(world, &centre, entity)),
         };
         if let Some(body) = world.bodies.get_mut(body) {
-            body.set_position(pose(&centre), true);
-            body.set_linvel(vector(velocity), true);
-            body.set_angvel(vector(Vector3::zeros()), true);
+            body.set_position(centre.into(), true);
+            body.set_linvel(velocity.into(), true);
+            body.set_angvel(Vector::ZERO, true);
         }
     }
 
@@ -112,7 +112,7 @@ impl Walker {
     ) -> RigidBodyHandle {
         let body = world.insert_body(
             RigidBodyBuilder::dynamic()
-                .pose(pose(at))
+                .pose((*at).into())
                 .gravity_scale(0.0)
                 .user_data(entity.user_data())
                 .additional_solver_iterations(EXTRA_PASSES),
@@ -189,9 +189,9 @@ impl Walker {
             return Some((stance, self.settings.feet(alignment, &stance)));
         };
         let body = world.bodies.get(self.body?)?;
-        let centre = isometry(body.translation(), *body.rotation());
+        let centre = Isometry3::from(*body.position());
         let feet = centre * Isometry3::translation(0.0, 0.0, -self.half_m());
-        Some((hit, (feet, vector3(body.linvel()))))
+        Some((hit, (feet, body.linvel().into())))
     }
 
     /// Chainage and place left of the centreline of his middle; `None` while he is not on the line.
@@ -210,17 +210,17 @@ impl Walker {
         Some((place.s_m, place.l_m))
     }
 
-    /// Appends him as the renderer draws him.
+    /// His limbs as the renderer draws them.
     pub(super) fn draw(
         &self,
         world: &PhysicsWorld,
         alignment: &Alignment,
         now_s: f64,
-        bodies: &mut Vec<Body>,
-    ) {
-        if let Some((stance, feet)) = self.feet(world, alignment, now_s) {
-            self.settings.draw(&stance, feet, bodies);
-        }
+    ) -> Vec<Body> {
+        let feet = self.feet(world, alignment, now_s);
+        feet.map_or(Vec::new(), |(stance, feet)| {
+            self.settings.draw(&stance, feet)
+        })
     }
 
     /// What he has in his hand as the renderer draws it, with its name.

@@ -66,7 +66,7 @@ pub struct WheelForces {
 }
 
 /// A wheelset.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Wheelset {
     pub forces: WheelForces,
     /// What its treads have rolled off since the start.
@@ -135,16 +135,10 @@ pub(super) struct Drive {
 impl Wheelset {
     pub(super) fn new(s_m: f64, roll_rad: f64) -> Self {
         Self {
-            forces: WheelForces::default(),
             effort_share: 1.0,
-            off_m: 0.0,
-            over_m: 0.0,
-            extremes: WheelExtremes::default(),
-            rolled_m: 0.0,
             s_m,
             roll_rad,
-            roll_rad_per_m: 0.0,
-            brake_slip_m: 0.0,
+            ..Self::default()
         }
     }
 

@@ -1,7 +1,7 @@
 //! People on the line: they walk where their path says, carry something, put it down and pick it up
 //! again.
 
-use super::obstacle::{ObstacleSettings, Piece};
+use super::obstacle::{ObstacleSettings, SingleObstacle};
 use crate::settings::{Checker, settings};
 use crate::track::{Alignment, BED_M, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
@@ -151,7 +151,7 @@ impl WorkerSettings {
     }
 
     /// What he carries, to be put down beside him where he stands.
-    pub(super) fn put_down(&self, stance: &Stance, load: &Piece) -> Piece {
+    pub(super) fn put_down(&self, stance: &Stance, load: &SingleObstacle) -> SingleObstacle {
         let (sin, cos) = stance.facing_rad.sin_cos();
         // His right hand.
         let (s_m, l_m) = (stance.s_m + HAND_M * sin, stance.l_m - HAND_M * cos);
@@ -166,7 +166,7 @@ impl WorkerSettings {
             hinge: None,
             ..load.settings.clone()
         };
-        Piece {
+        SingleObstacle {
             settings,
             body: load.body.clone(),
         }
@@ -190,45 +190,44 @@ impl WorkerSettings {
         )
     }
 
-    /// Appends his limbs.
-    pub(super) fn draw(
-        &self,
-        stance: &Stance,
-        (world_from_feet, velocity): Feet,
-        bodies: &mut Vec<Body>,
-    ) {
-        let mut put = |shape, feet_from_part: Isometry3<f64>| {
-            bodies.push(Body {
-                shape,
-                world_from_body: world_from_feet * feet_from_part,
-                velocity_mps: velocity,
-                albedo: self.albedo,
-                luminance_cd_m2: 0.0,
-            });
+    /// His limbs.
+    pub(super) fn draw(&self, stance: &Stance, (world_from_feet, velocity): Feet) -> Vec<Body> {
+        let part = |shape, feet_from_part: Isometry3<f64>| Body {
+            shape,
+            world_from_body: world_from_feet * feet_from_part,
+            velocity_mps: velocity,
+            albedo: self.albedo,
+            luminance_cd_m2: 0.0,
         };
         let tall = self.stature_m;
         let hip = 0.52 * tall;
-        let at = |x: f64, y: f64, z: f64| Isometry3::translation(x, y, z);
-        put(
-            Shape::Capsule(0.17, 0.31 * tall / 2.0 - 0.1),
-            at(0.0, 0.0, 0.68 * tall),
-        );
-        put(Shape::Sphere(0.11), at(0.0, 0.0, tall - 0.11));
+        let up = |z: f64| Isometry3::translation(0.0, 0.0, z);
+        let trunk = Shape::Capsule(0.17, 0.31 * tall / 2.0 - 0.1);
         let [along, left] = stance.velocity_mps;
         let pace = (along.hypot(left) / 1.4).min(1.2);
         let phase = std::f64::consts::TAU * stance.walked_m / STRIDE_M;
-        for (side, sign) in [(0.09, 1.0), (-0.09, -1.0)] {
+        let leg = |side: f64, sign: f64| {
             let swing = sign * SWING_RAD * pace * phase.sin();
             // Turned about the hip, forward positive.
             let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), -swing);
-            let leg = Isometry3::from_parts(Translation3::new(0.0, side, hip), turn)
-                * at(0.0, 0.0, -hip / 2.0);
-            put(Shape::Capsule(0.08, hip / 2.0 - 0.08), leg);
-        }
+            let hip_joint = Isometry3::from_parts(Translation3::new(0.0, side, hip), turn);
+            let leg = Shape::Capsule(0.08, hip / 2.0 - 0.08);
+            part(leg, hip_joint * up(-hip / 2.0))
+        };
+        vec![
+            part(trunk, up(0.68 * tall)),
+            part(Shape::Sphere(0.11), up(tall - 0.11)),
+            leg(0.09, 1.0),
+            leg(-0.09, -1.0),
+        ]
     }
 
     /// What he carries, in his right hand.
-    pub(super) fn draw_load(&self, (world_from_feet, velocity): Feet, load: &Piece) -> Body {
+    pub(super) fn draw_load(
+        &self,
+        (world_from_feet, velocity): Feet,
+        load: &SingleObstacle,
+    ) -> Body {
         let half = load.body.half_extents_m().z;
         let centre = (0.42 * self.stature_m - half).max(half);
         Body {

@@ -139,7 +139,7 @@ fn trains_are_asked_by_number() {
                 .vehicle_at(id, TrainEnd::Front, world.time().plus(-0.3))
                 .is_some()
         );
-        assert_eq!(world.train_bodies(id).unwrap().len(), 3);
+        assert_eq!(world.get(id).unwrap().bodies().len(), 3);
     }
     assert_eq!(world.headlights().len(), 16);
     assert_eq!(world.bodies(None).len(), 24);

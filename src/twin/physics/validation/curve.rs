@@ -10,7 +10,7 @@
 //! g_q: K q = -m a_q. Where in the gauge the wheelsets run does not matter for that: the flanges
 //! hold each bogie's share. With the roll r of the car the floor feels a_q cos r + g_q sin r.
 
-use super::model::{CAR, G_MPS2, Linear, ROLL, Under, Y, dof};
+use super::model::{CAR, G_MPS2, LinearModel, ROLL, Under, Y, dof};
 use super::*;
 use nalgebra::{DVector, Vector3};
 use rapier3d_f64::math::Vector;
@@ -45,7 +45,7 @@ impl CurveCase {
             flange_n_m: 40e6,
             ..Under::dry(0.0)
         };
-        let model = Linear::new(&file, under).lateral();
+        let model = LinearModel::new(&file, under).lateral();
         let mut force = DVector::zeros(model.dofs.len());
         for body in 0..7 {
             let y = model.place(dof(body, Y));
@@ -92,7 +92,7 @@ fn felt(world: &World) -> (f64, f64) {
         .world_from_rails()
         .rotation;
     let along = rails * Vector3::x();
-    let y = convert::vector3(across);
+    let y = Vector3::from(across);
     // The angle from the rails' own left to the car's, about the track.
     let roll = along.dot(&(rails * Vector3::y()).cross(&y));
     (
@@ -198,7 +198,7 @@ fn val_transition() {
     let mut world = World::new(line(&plan, 0.0), &curve.settings(), 1, 0).unwrap();
     let v = kmh / 3.6;
     let file = shipped("metro_b1_crush");
-    let slowest = &Linear::new(&file, Under::dry(v)).lateral().modes()[0];
+    let slowest = &LinearModel::new(&file, Under::dry(v)).lateral().modes()[0];
     let rate = steady.floor_mps2 * v / ramp_m;
     let (mut worst, mut fastest, mut before) = (0.0f64, 0.0f64, None);
     for _ in 0..120 {

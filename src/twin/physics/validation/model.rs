@@ -70,7 +70,7 @@ impl Under {
 
 /// M q'' + C q' + K q = f over some of the coordinates.
 #[derive(Clone)]
-pub(super) struct Linear {
+pub(super) struct LinearModel {
     pub dofs: Vec<usize>,
     pub mass: DMatrix<f64>,
     pub damping: DMatrix<f64>,
@@ -132,7 +132,7 @@ fn add_rise(matrix: &mut DMatrix<f64>, scale: f64, (body, at): Place) {
     }
 }
 
-impl Linear {
+impl LinearModel {
     /// All 42 coordinates.
     pub(super) fn new(file: &VehicleFile, under: Under) -> Self {
         let mut car = Self {

@@ -5,7 +5,7 @@
 //! shape that is not one of the simulation's own brings the others in, and the fit of one damped
 //! oscillation fails. The car coasts at 72 km/h: a standing one is locked by brake and creep.
 
-use super::model::{BOGIES, CAR, Linear, Mode, PITCH, ROLL, Under, Y, Z, dof};
+use super::model::{BOGIES, CAR, LinearModel, Mode, PITCH, ROLL, Under, Y, Z, dof};
 use super::*;
 use nalgebra::{Complex, DMatrix, DVector, Vector3};
 use rapier3d_f64::math::Rotation;
@@ -38,16 +38,16 @@ fn coordinates(now: &World, calm: &World) -> Vec<f64> {
     let frame = calm.tunnel.alignment.at(0.0).world_from_rails().rotation;
     let pairs = consist(now).states.iter().zip(&consist(calm).states);
     let both = pairs.flat_map(|(a, b)| {
-        let moved = frame.inverse() * convert::vector3(a.position - b.position);
+        let moved = frame.inverse() * Vector3::from(a.position - b.position);
         let turn = a.rotation * b.rotation.inverse();
-        let turned = frame.inverse() * convert::vector3(turn.to_scaled_axis());
+        let turned = frame.inverse() * Vector3::from(turn.to_scaled_axis());
         [moved.x, moved.y, moved.z, turned.x, turned.y, turned.z]
     });
     both.collect()
 }
 
 /// Puts the bodies into a mode's shape.
-fn excite(world: &mut World, model: &Linear, mode: &Mode) {
+fn excite(world: &mut World, model: &LinearModel, mode: &Mode) {
     let frame = world.tunnel.alignment.at(0.0).world_from_rails().rotation;
     let handles = consist(world).handles.clone();
     for (body, handle) in handles.iter().enumerate() {
@@ -56,7 +56,7 @@ fn excite(world: &mut World, model: &Linear, mode: &Mode) {
                 Some(k) => AMPLITUDE * (mode.shape[k] * scale).re,
                 None => 0.0,
             };
-            convert::vector(frame * Vector3::new(of(first), of(first + 1), of(first + 2)))
+            Vector::from(frame * Vector3::new(of(first), of(first + 1), of(first + 2)))
         };
         let one = Complex::from(1.0);
         let (shift, turn) = (part(one, 0), part(one, 3));
@@ -77,7 +77,7 @@ fn excite(world: &mut World, model: &Linear, mode: &Mode) {
 }
 
 /// Frequency and damping of the simulated car let go in a mode's shape.
-fn simulated(file: &VehicleFile, model: &Linear, mode: &Mode) -> (f64, f64) {
+fn simulated(file: &VehicleFile, model: &LinearModel, mode: &Mode) -> (f64, f64) {
     let settings = on_track(
         free_car(file.clone(), 3.6 * SPEED_MPS),
         IrregularityClass::None,
@@ -105,7 +105,7 @@ fn simulated(file: &VehicleFile, model: &Linear, mode: &Mode) -> (f64, f64) {
 
 /// Prints both; whether they agree to 3 % in frequency, and in damping to 5 % and half a percent of
 /// critical.
-fn agree(file: &VehicleFile, model: &Linear, name: &str, mode: &Mode) -> bool {
+fn agree(file: &VehicleFile, model: &LinearModel, name: &str, mode: &Mode) -> bool {
     let (hertz, damping) = simulated(file, model, mode);
     let off = hertz / mode.hertz() - 1.0;
     eprintln!(
@@ -140,7 +140,7 @@ fn val_vertical_modes() {
     let mut agreed = true;
     for name in VehicleFile::shipped_names() {
         let file = shipped(name);
-        let model = Linear::new(&file, Under::dry(SPEED_MPS)).vertical();
+        let model = LinearModel::new(&file, Under::dry(SPEED_MPS)).vertical();
         for (name, pattern) in vertical_patterns() {
             agreed &= agree(&file, &model, name, &model.mode_like(&pattern));
         }
@@ -155,7 +155,7 @@ fn val_lateral_modes() {
     let mut agreed = true;
     for name in VehicleFile::shipped_names() {
         let file = shipped(name);
-        let model = Linear::new(&file, Under::dry(SPEED_MPS)).lateral();
+        let model = LinearModel::new(&file, Under::dry(SPEED_MPS)).lateral();
         let mut car_modes = 0;
         for mode in model.modes() {
             let of = |body: usize| -> f64 {
@@ -229,8 +229,8 @@ fn val_published_frequencies() {
         (trailer, [0, 1, 2, 4], [0.75, 0.84, 6.00, 7.10]),
         (motor, [0, 1, 4, 2], [0.84, 0.97, 4.78, 6.28]),
     ] {
-        let model = Linear::new(&file, Under::dry(SPEED_MPS)).vertical();
-        let six = Linear::six(&file).undamped();
+        let model = LinearModel::new(&file, Under::dry(SPEED_MPS)).vertical();
+        let six = LinearModel::six(&file).undamped();
         let patterns = vertical_patterns();
         for (k, want) in order.into_iter().zip(want) {
             let (name, pattern) = &patterns[k];

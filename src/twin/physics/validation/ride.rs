@@ -7,7 +7,7 @@
 //! band is 0.3 to 30 Hz, wavelengths are 1 to 80 m (the settings' default), and accelerations are
 //! those of the harmonics, omega^2 z.
 
-use super::model::{CAR, Linear, PITCH, Under, WHEELSETS, Z, dof};
+use super::model::{CAR, LinearModel, PITCH, Under, WHEELSETS, Z, dof};
 use super::*;
 use nalgebra::{Complex, DVector};
 use rapier3d_f64::math::Vector;
@@ -137,7 +137,7 @@ impl Case {
         let up: Vec<f64> = (0..8192)
             .map(|k| track.at(0.2 * f64::from(k)).up_m)
             .collect();
-        let model = Linear::new(file, Under::dry(self.speed_mps())).vertical();
+        let model = LinearModel::new(file, Under::dry(self.speed_mps())).vertical();
         let a = 0.5 * file.bogie.distance_m;
         let (mut same, mut expected, mut fourth) = ([0.0; 4], [0.0; 4], [0.0; 4]);
         let span = &settings.track.irregularity;
@@ -174,7 +174,7 @@ fn wheelsets_m(file: &VehicleFile) -> [f64; 4] {
 
 /// Bounce and pitch (about y) of the car on a wave of the rails of 1 m, by the wheels' springs and
 /// the share of the weight along the slope.
-fn answer(model: &Linear, file: &VehicleFile, speed_mps: f64, omega: f64) -> [C; 2] {
+fn answer(model: &LinearModel, file: &VehicleFile, speed_mps: f64, omega: f64) -> [C; 2] {
     let under = Under::dry(speed_mps);
     let mass_kg = file.body.mass_kg + 2.0 * file.bogie.mass_kg + 4.0 * file.wheelset.mass_kg;
     let mut force = DVector::from_element(model.dofs.len(), C::from(0.0));
@@ -192,8 +192,8 @@ fn answer(model: &Linear, file: &VehicleFile, speed_mps: f64, omega: f64) -> [C;
 /// Expected root mean squares of the textbook's car: six coordinates on rigid rails, between two
 /// wavelengths.
 fn textbook(case: &Case, file: &VehicleFile, wavelengths_m: (f64, f64)) -> Ride {
-    let full = Linear::textbook(file);
-    let six = Linear::six(file);
+    let full = LinearModel::textbook(file);
+    let six = LinearModel::six(file);
     let mut sum = [0.0; 4];
     for (_, omega) in case.harmonics() {
         let wave = omega / case.speed_mps();
