@@ -14,8 +14,7 @@ use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{
-    DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
-    WaysideCameraSettings,
+    CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
 };
 use crate::twin::survey::SurveySettings;
 use std::path::{Path, PathBuf};
@@ -148,7 +147,7 @@ pub struct WaysidePost {
     /// Name of the balise that gets its messages.
     pub balise: String,
     /// Its camera's settings.
-    pub camera: WaysideCameraSettings,
+    pub camera: CameraSettings,
     /// Its lidar's settings.
     pub lidar: Option<LidarSettings>,
 }
@@ -206,8 +205,8 @@ impl Scenario {
             overrides: overrides.to_vec(),
             source,
         };
-        // The file must be right by itself, so that its errors are told apart from those of
-        // the command line.
+        // The file must be right by itself, so that its errors are not mixed up with those
+        // of the command line.
         let mut file: ScenarioFile = read_toml(text).map_err(wrong)?;
         if !overrides.is_empty() {
             file = overridden(path, text, overrides)?;
@@ -232,11 +231,7 @@ impl Scenario {
         let tunnel = match std::fs::read_to_string(&tunnel_path) {
             Ok(text) => Some(parse_tunnel(&tunnel_path, &text)),
             Err(error) => {
-                problems.push(Problem::new(
-                    "tunnel",
-                    format!("cannot read {}: {error}", tunnel_path.display()),
-                    "give the path of a tunnel file, counted from the scenario's folder",
-                ));
+                problems.push(unreadable("tunnel", &tunnel_path, "tunnel", &error));
                 None
             }
         };
@@ -332,46 +327,45 @@ fn load_vehicle(
     let path = folder.join(&train.vehicle);
     match std::fs::read_to_string(&path) {
         Ok(text) => train.vehicle_file = Some(parse_vehicle(&path, &text)?),
-        Err(error) => problems.push(Problem::new(
-            key,
-            format!("cannot read {}: {error}", path.display()),
-            "give the path of a vehicle file, counted from the scenario's folder",
-        )),
+        Err(error) => problems.push(unreadable(&key, &path, "vehicle", &error)),
     }
     Ok(())
 }
 
+fn unreadable(key: &str, path: &Path, kind: &str, error: &std::io::Error) -> Problem {
+    Problem::new(
+        key,
+        format!("cannot read {}: {error}", path.display()),
+        format!("give the path of a {kind} file, counted from the scenario's folder"),
+    )
+}
+
 /// Reads and checks a vehicle file's text; `path` is for the messages.
 pub(crate) fn parse_vehicle(path: &Path, text: &str) -> Result<VehicleFile, ScenarioError> {
-    VehicleFile::from_toml(text).map_err(|source| ScenarioError::File {
-        path: path.to_owned(),
-        text: text.to_owned(),
-        overrides: Vec::new(),
-        source,
-    })
+    VehicleFile::from_toml(text).map_err(|source| in_file(path, text, source))
 }
 
 /// Reads and checks a tunnel's text; `path` is for the messages.
 pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioError> {
-    Tunnel::from_toml(text).map_err(|source| ScenarioError::File {
-        path: path.to_owned(),
-        text: text.to_owned(),
-        overrides: Vec::new(),
-        source,
-    })
+    Tunnel::from_toml(text).map_err(|source| in_file(path, text, source))
 }
 
 /// Reads a file's text.
 pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(path).map_err(|source| ScenarioError::File {
-        path: path.to_owned(),
-        text: String::new(),
-        overrides: Vec::new(),
-        source: FileError::Read {
-            path: path.to_owned(),
-            source,
-        },
+    std::fs::read_to_string(path).map_err(|source| {
+        let file = path.to_owned();
+        in_file(path, "", FileError::Read { path: file, source })
     })
+}
+
+/// What is wrong with a file that no override has changed.
+fn in_file(path: &Path, text: &str, source: FileError) -> ScenarioError {
+    ScenarioError::File {
+        path: path.to_owned(),
+        text: text.to_owned(),
+        overrides: Vec::new(),
+        source,
+    }
 }
 
 /// A file with some of its keys set anew.

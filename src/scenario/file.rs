@@ -14,8 +14,7 @@ use crate::twin::physics::{
     TrainSettings, WorkerSettings, train_key,
 };
 use crate::twin::sensors::{
-    DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
-    WaysideCameraSettings,
+    CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
 };
 use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
@@ -168,7 +167,7 @@ settings! {
         device: String;
         /// Its camera. Default: 1920 x 1080, 10 frames a second.
         #[serde(default)]
-        camera: WaysideCameraSettings, nested;
+        camera: CameraSettings, nested;
         /// Its lidar. Default: none, the camera alone.
         lidar: Option<LidarSettings>, nested;
     }

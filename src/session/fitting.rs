@@ -135,7 +135,7 @@ impl Fitting {
             let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
             let lidar = Lidar::new(settings, &scenario.tunnel, &pose, stream);
             let delay_s = 1e-3 * scenario.stack.latency_ms;
-            let lidar = WaysideLidar::new(lidar, settings.clock, delay_s);
+            let lidar = WaysideLidar::new(lidar, delay_s);
             self.add_sensor(node.clone(), lidar);
         }
         let faults = &scenario.faults.cameras;

@@ -84,10 +84,12 @@ impl CameraFaultSettings {
     }
 }
 
-/// All that is wrong with one camera, through a run.
+/// All that is wrong with one camera, through a run: hands on its images with its faults.
 #[derive(Clone, Debug)]
 pub struct CameraFaults {
     faults: Vec<(CameraFaultSettings, Stream)>,
+    /// The last image that was handed on.
+    held: Option<GrayImage>,
 }
 
 impl CameraFaults {
@@ -102,6 +104,7 @@ impl CameraFaults {
                     (f.clone(), Stream::new(seed, 0, &name))
                 })
                 .collect(),
+            held: None,
         }
     }
 
@@ -129,40 +132,21 @@ impl CameraFaults {
     fn has(&self, kind: &CameraFaultKind, time: SimTime) -> bool {
         self.at(time).any(|(f, _)| f.fault == *kind)
     }
-}
-
-/// Hands on the images of one camera, with its faults.
-#[derive(Clone, Debug)]
-pub struct CameraOutput {
-    faults: CameraFaults,
-    held: Option<GrayImage>,
-}
-
-impl CameraOutput {
-    /// Before the first image.
-    pub fn new(faults: CameraFaults) -> Self {
-        Self { faults, held: None }
-    }
-
-    /// By how much the images of a frame that starts then are late.
-    pub fn late_s(&self, start: SimTime) -> f64 {
-        self.faults.late_s(start)
-    }
 
     /// What is handed on in place of the image of a frame; 0 x 0 pixels where it is lost.
     pub fn deliver(&mut self, number: u32, start: SimTime, image: GrayImage) -> GrayImage {
-        if self.faults.faults.is_empty() {
+        if self.faults.is_empty() {
             return image;
         }
-        if self.faults.drops(number, start) {
+        if self.drops(number, start) {
             return GrayImage::default();
         }
-        if self.faults.has(&CameraFaultKind::Freeze, start)
+        if self.has(&CameraFaultKind::Freeze, start)
             && let Some(held) = &self.held
         {
             return held.clone();
         }
-        let image = if self.faults.has(&CameraFaultKind::Dead, start) {
+        let image = if self.has(&CameraFaultKind::Dead, start) {
             GrayImage::new(image.width(), image.height())
         } else {
             image
@@ -190,7 +174,7 @@ mod tests {
     }
 
     /// What comes of the images 1, 2, 3 ..., each of one grey; 0 where none comes.
-    fn delivered(output: &mut CameraOutput, numbers: std::ops::Range<u32>) -> Vec<u8> {
+    fn delivered(output: &mut CameraFaults, numbers: std::ops::Range<u32>) -> Vec<u8> {
         let grey = |number: u32| {
             let image = GrayImage::from_pixel(3, 2, Luma([number as u8 + 1]));
             let image = output.deliver(number, start(number), image);
@@ -205,11 +189,11 @@ mod tests {
     fn a_frozen_camera_repeats_its_last_image() {
         let text =
             "cameras = [{ camera = 'W1', fault = { kind = 'freeze' }, from_s = 0.3, to_s = 0.6 }]";
-        let images = |name| delivered(&mut CameraOutput::new(faults(&[name], 1, text)), 0..8);
+        let images = |name| delivered(&mut faults(&[name], 1, text), 0..8);
         assert_eq!(images("W1"), [1, 2, 3, 3, 3, 3, 7, 8]);
         assert_eq!(images("W2"), [1, 2, 3, 4, 5, 6, 7, 8]);
         let from_start = "cameras = [{ camera = 'W1', fault = { kind = 'freeze' } }]";
-        let mut output = CameraOutput::new(faults(&["W1"], 1, from_start));
+        let mut output = faults(&["W1"], 1, from_start);
         assert_eq!(delivered(&mut output, 0..3), [1, 1, 1]);
     }
 
@@ -218,11 +202,11 @@ mod tests {
     fn a_dead_camera_is_black() {
         let text = "[[cameras]]\ncamera = 'left'\nfault = { kind = 'dead' }\nfrom_s = 0.1\nto_s = 0.3\n\
                     [[cameras]]\ncamera = 'rig'\nfault = { kind = 'freeze' }\nfrom_s = 0.2\nto_s = 0.4\n";
-        let mut left = CameraOutput::new(faults(&["rig", "left"], 1, text));
+        let mut left = faults(&["rig", "left"], 1, text);
         let black = left.deliver(0, start(1), GrayImage::from_pixel(3, 2, Luma([9])));
         assert_eq!(black.dimensions(), (3, 2));
         assert_eq!(delivered(&mut left, 0..6), [1, 0, 0, 0, 5, 6]);
-        let mut right = CameraOutput::new(faults(&["rig", "right"], 1, text));
+        let mut right = faults(&["rig", "right"], 1, text);
         assert_eq!(delivered(&mut right, 0..6), [1, 2, 2, 2, 5, 6]);
     }
 
@@ -247,7 +231,7 @@ mod tests {
         assert!(dropped.iter().any(|k| !other.drops(*k, start(*k))));
         let list =
             "cameras = [{ camera = 'W1', fault = { kind = 'drop', frames = [2, 5] }, to_s = 0.4 }]";
-        let mut output = CameraOutput::new(faults(&["W1"], 1, list));
+        let mut output = faults(&["W1"], 1, list);
         assert_eq!(delivered(&mut output, 0..7), [1, 2, 0, 4, 5, 6, 7]);
     }
 

@@ -75,15 +75,8 @@ fn twice_the_mains() -> f64 {
 impl LampFaultSettings {
     fn check_stretches(&self, check: &mut Checker<'_>) {
         check_times(self.from_s, self.to_s, check);
-        if let (Some(from_m), Some(to_m)) = (self.from_m, self.to_m)
-            && from_m > to_m
-        {
-            check.problem(
-                "to_m",
-                format!("the stretch ends at {to_m} m, before it begins at {from_m} m"),
-                "give from_m <= to_m",
-            );
-        }
+        let from_m = self.from_m.unwrap_or(-1e6);
+        check.within("to_m", self.to_m, from_m..=1e6);
     }
 
     /// A fault that strikes nothing is a slip of the pen.
@@ -197,16 +190,14 @@ fn with((level, ripple): (f64, Ripple), fault: LampFaultKind, own_rad: f64) -> (
             depth,
             frequency_hz,
             phase_deg,
-        } if depth > ripple.depth => {
-            let phase_rad = phase_deg.map_or(own_rad, f64::to_radians);
-            let ripple = Ripple {
+        } => {
+            let own = Ripple {
                 depth,
                 frequency_hz,
-                phase_rad,
+                phase_rad: phase_deg.map_or(own_rad, f64::to_radians),
             };
-            (level, ripple)
+            (level, if depth > ripple.depth { own } else { ripple })
         }
-        LampFaultKind::Flicker { .. } => (level, ripple),
     }
 }
 

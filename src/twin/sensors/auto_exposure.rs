@@ -29,8 +29,8 @@
 //! assert!(control.now().exposure_s > first.exposure_s);
 //! ```
 
+use super::CameraSettings;
 use crate::settings::{Checker, settings};
-use crate::twin::render::{SensorSettings, View};
 use image::GrayImage;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -92,20 +92,10 @@ impl ExposureSettings {
         if self.mode == ExposureMode::Fixed {
             return;
         }
-        let most_us = self.max_exposure_us.unwrap_or(exposure_us);
-        let limits = [
-            ("exposure_us", self.min_exposure_us, most_us, "us"),
-            ("gain_db", self.min_gain_db, self.max_gain_db, "dB"),
-        ];
-        for (key, low, high, unit) in limits {
-            if low > high {
-                check.problem(
-                    &format!("min_{key}"),
-                    format!("{low} {unit} is more than the most, {high} {unit}"),
-                    format!("give {high} {unit} or less, or raise max_{key}"),
-                );
-            }
-        }
+        let most_us = self.max_exposure_us.filter(|us| !us.is_nan());
+        let most_us = most_us.unwrap_or(exposure_us);
+        check.within("min_exposure_us", self.min_exposure_us, 0.1..=most_us);
+        check.within("min_gain_db", self.min_gain_db, -20.0..=self.max_gain_db);
     }
 }
 
@@ -147,26 +137,18 @@ impl AutoExposure {
         }
     }
 
-    /// Of a camera that is written with this exposure and sensor.
-    pub fn of(settings: &ExposureSettings, exposure_us: f64, sensor: &SensorSettings) -> Self {
+    /// Of a camera, begins as its settings say.
+    pub(super) fn of(camera: &CameraSettings) -> Self {
         let start = Exposed {
-            exposure_s: 1e-6 * exposure_us,
-            gain_db: sensor.gain_db,
+            exposure_s: 1e-6 * camera.exposure_us,
+            gain_db: camera.sensor.gain_db,
         };
-        Self::new(settings, start, sensor.black_level_grey)
+        let black_grey = camera.sensor.black_level_grey;
+        Self::new(&camera.exposure_control, start, black_grey)
     }
 
     /// What the next frame is taken with.
     pub fn now(&self) -> Exposed {
-        self.now
-    }
-
-    /// Takes a frame with it: all views that the camera has of it.
-    pub fn expose(&self, views: &mut [View]) -> Exposed {
-        for view in views {
-            view.camera.shutter.exposure_s = self.now.exposure_s;
-            view.sensor.gain_db = self.now.gain_db;
-        }
         self.now
     }
 

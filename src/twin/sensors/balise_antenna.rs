@@ -1,6 +1,6 @@
 //! The antenna under the train head that notices balises.
 
-use super::{Output, Sample, Sensor, SensorError};
+use super::{Output, Sensor, SensorError};
 use crate::bus::{Content, TrainId};
 use crate::track::Tunnel;
 use crate::twin::physics::World;
@@ -32,13 +32,8 @@ impl Sensor for BaliseAntenna {
             return Ok(Vec::new());
         };
         let passed = self.tunnel.balises_passed(from_m, to_m);
-        let sample = |name: &str| {
-            Output::Sample(Sample {
-                valid_at: world.time(),
-                delay_s: 0.0,
-                content: Content::BalisePassed(name.to_owned()),
-            })
-        };
+        let sample =
+            |name: &str| Output::at_once(world.time(), Content::BalisePassed(name.to_owned()));
         Ok(passed.map(sample).collect())
     }
 }
@@ -49,6 +44,7 @@ mod tests {
     use super::*;
     use crate::track::Direction;
     use crate::twin::physics::{PhysicsSettings, TrainSettings};
+    use crate::twin::sensors::SensorSample;
 
     /// A balise that is missed, read twice, or read by a train that runs up only.
     #[test]
@@ -77,7 +73,7 @@ mod tests {
             while world.time().secs() < 1.5 {
                 world.step(&[]).unwrap();
                 for output in antenna.sample(&world).unwrap() {
-                    if let Output::Sample(Sample {
+                    if let Output::Sample(SensorSample {
                         content: Content::BalisePassed(name),
                         ..
                     }) = output

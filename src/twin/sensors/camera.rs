@@ -5,12 +5,9 @@
 //! hand axis (up positive). Zhang et al. 2023 measure psi from the lateral direction: psi = 90 deg - yaw.
 
 use super::{ClockSettings, ExposureSettings};
-use crate::bus::{
-    CameraModel, DistortionCoefficients, Intrinsics, Shutter, SimTime, WaysideCalibration,
-};
+use crate::bus::{CameraModel, DistortionCoefficients, Intrinsics, Shutter, WaysideCalibration};
 use crate::settings::{Checker, settings};
 use crate::track::{TrackPoint, Tunnel, WaysideSite};
-use crate::twin::random::Stream;
 use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -29,69 +26,21 @@ pub enum ReadOut {
     Up,
 }
 
-/// When a camera is really triggered: about the time that its frame says, by a frame's own jitter.
-#[derive(Clone, Copy, Debug)]
-pub struct Trigger {
-    stream: Stream,
-    jitter_us: f64,
-}
-
 /// Columns and rows: at most the widest texture that every graphics adapter has.
 pub(super) const SIDE_PX: RangeInclusive<f64> = 16.0..=8192.0;
 
-/// Draws farther off than this many standard deviations are held there.
-const MOST_SIGMAS: f64 = 4.0;
+/// Draws of jitter farther off than this many standard deviations are held there.
+pub(super) const MOST_SIGMAS: f64 = 4.0;
 
-impl Trigger {
-    /// With jitter of this standard deviation, from a stream of its own.
-    pub fn new(stream: Stream, jitter_us: f64) -> Self {
-        Self { stream, jitter_us }
-    }
-
-    /// When frame `number`, triggered at `start` as it says, really starts. Nothing is seen before
-    /// time zero.
-    pub fn really(&self, number: u32, start: SimTime) -> SimTime {
-        let sigmas = self.stream.normal(u64::from(number));
-        let late_us = self.jitter_us * sigmas.clamp(-MOST_SIGMAS, MOST_SIGMAS);
-        start.plus(1e-6 * late_us).max(SimTime::ZERO)
-    }
-
-    /// The latest that a frame can start after the time that it says.
-    pub fn latest_s(&self) -> f64 {
-        most_jitter_s(self.jitter_us)
-    }
-}
-
-/// The most that jitter of this standard deviation can be.
-pub(super) fn most_jitter_s(jitter_us: f64) -> f64 {
-    1e-6 * MOST_SIGMAS * jitter_us
-}
-
-/// Shape and timing of one image sensor behind its lens.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Optics {
-    pub focal_length_mm: f64,
-    pub pixel_um: f64,
-    pub width_px: u32,
-    pub height_px: u32,
-    pub principal_px: [f64; 2],
-    pub distortion: DistortionCoefficients,
-    pub read_out: ReadOut,
-    pub line_time_us: f64,
-    pub exposure_us: f64,
-    pub frames_per_s: f64,
-    pub blur_px: f64,
-    pub rate_key: &'static str,
-}
-
-impl Optics {
+impl CameraSettings {
+    /// The camera alone.
     pub fn camera(&self) -> CameraModel {
         let f_px = self.focal_length_mm * 1e3 / self.pixel_um;
         let centred = Intrinsics::centred(self.width_px, self.height_px, f_px);
         CameraModel {
             intrinsics: Intrinsics {
-                cx_px: centred.cx_px + self.principal_px[0],
-                cy_px: centred.cy_px + self.principal_px[1],
+                cx_px: centred.cx_px + self.principal_u_px,
+                cy_px: centred.cy_px + self.principal_v_px,
                 distortion: self.distortion.into(),
                 ..centred
             },
@@ -103,35 +52,35 @@ impl Optics {
                     ReadOut::Up => self.height_px.saturating_sub(1),
                 },
             },
-            blur_px: self.blur_px,
+            blur_px: self.lens.blur_px,
         }
     }
 
-    pub fn check(&self, check: &mut Checker<'_>) {
+    /// All of it but the errors of calibration; `rate_key` is what the frames a second are called.
+    pub(super) fn check_camera(&self, rate_key: &str, check: &mut Checker<'_>) {
+        self.check_optics(rate_key, check);
+        self.check_jitter(check);
+        self.check_control(rate_key, check);
+    }
+
+    fn check_optics(&self, rate_key: &str, check: &mut Checker<'_>) {
         check.positive("focal_length_mm", self.focal_length_mm, 3.9);
         check.positive("pixel_um", self.pixel_um, 3.75);
         check.positive("exposure_us", self.exposure_us, 30.0);
-        check.positive(self.rate_key, self.frames_per_s, 30.0);
-        if !(self.line_time_us.is_finite() && self.line_time_us >= 0.0) {
-            check.problem(
-                "line_time_us",
-                format!(
-                    "a row cannot open {} us after the one before",
-                    self.line_time_us
-                ),
-                "give the time from row to row in us, 0 for a global shutter",
-            );
-        }
-        self.check_frame_time(check);
+        check.positive(rate_key, self.frames_per_s, 30.0);
+        check.within("line_time_us", self.line_time_us, 0.0..=1e7);
+        self.check_frame_time(rate_key, check);
         self.check_lens(check);
     }
 
     /// Principal point and distortion.
-    pub fn check_lens(&self, check: &mut Checker<'_>) {
-        let size_px = [self.width_px, self.height_px].map(f64::from);
-        let keys = ["principal_u_px", "principal_v_px"];
-        for ((key, value), size_px) in keys.into_iter().zip(self.principal_px).zip(size_px) {
-            check.within(key, value, -0.5 * size_px..=0.5 * size_px);
+    pub(super) fn check_lens(&self, check: &mut Checker<'_>) {
+        for (key, value, size_px) in [
+            ("principal_u_px", self.principal_u_px, self.width_px),
+            ("principal_v_px", self.principal_v_px, self.height_px),
+        ] {
+            let half_px = 0.5 * f64::from(size_px);
+            check.within(key, value, -half_px..=half_px);
         }
         let DistortionCoefficients { k1, k2, k3, p1, p2 } = self.distortion;
         for (key, value) in [("k1", k1), ("k2", k2), ("k3", k3)] {
@@ -180,12 +129,12 @@ impl Optics {
     /// Whether nothing is wrong.
     fn is_sound(&self) -> bool {
         let mut problems = Vec::new();
-        self.check(&mut Checker::new("", &mut problems));
+        self.check_optics("", &mut Checker::new("", &mut problems));
         problems.is_empty()
     }
 
     /// What the errors of calibration spoil of a camera that is sound by its sheet.
-    pub fn check_actual(&self, sheet: &Self, check: &mut Checker<'_>) {
+    pub(super) fn check_actual(&self, sheet: &Self, check: &mut Checker<'_>) {
         if !sheet.is_sound() {
             return;
         }
@@ -204,43 +153,57 @@ impl Optics {
         }
     }
 
-    /// These, with the longest exposure that a control may choose.
-    pub fn exposed_longest(&self, control: &ExposureSettings) -> Self {
+    /// This camera with the longest exposure that its control may choose.
+    pub(super) fn exposed_longest(&self) -> Self {
         Self {
-            exposure_us: control.longest_us(self.exposure_us),
+            exposure_us: self.exposure_control.longest_us(self.exposure_us),
             ..*self
         }
     }
 
     /// A control may lengthen the exposure: what holds for the written one holds for the longest.
-    pub fn check_control(&self, control: &ExposureSettings, check: &mut Checker<'_>) {
-        control.check_limits(self.exposure_us, &mut check.below("exposure_control"));
-        let longest = self.exposed_longest(control);
+    fn check_control(&self, rate_key: &str, check: &mut Checker<'_>) {
+        let mut control = check.below("exposure_control");
+        self.exposure_control
+            .check_limits(self.exposure_us, &mut control);
+        let longest = self.exposed_longest();
         let (span_us, frame_us) = (longest.span_us(), 1e6 / self.frames_per_s);
         // Of a written one that is too long, the camera's own check tells.
         if self.span_us() <= frame_us && span_us > frame_us {
-            check.problem(
-                "exposure_control.max_exposure_us",
+            control.problem(
+                "max_exposure_us",
                 format!(
                     "exposed for {} us, {} rows of {} us take {span_us:.0} us, but a frame lasts \
-                     {frame_us:.0} us at {} {}",
-                    longest.exposure_us,
-                    self.height_px,
-                    self.line_time_us,
-                    self.frames_per_s,
-                    self.rate_key
+                     {frame_us:.0} us at {} {rate_key}",
+                    longest.exposure_us, self.height_px, self.line_time_us, self.frames_per_s,
                 ),
                 format!(
-                    "give at most {:.0} us, or lower height_px, line_time_us or {}",
+                    "give at most {:.0} us, or lower height_px, line_time_us or {rate_key}",
                     (frame_us - span_us + longest.exposure_us).floor(),
-                    self.rate_key
                 ),
             );
         }
     }
 
+    /// The latest that a frame can start after the time that it says.
+    pub(super) fn most_jitter_s(&self) -> f64 {
+        1e-6 * MOST_SIGMAS * self.frame_jitter_us
+    }
+
+    /// Jitter must not let frames overtake each other.
+    fn check_jitter(&self, check: &mut Checker<'_>) {
+        let most_us = 1e6 / (2.0 * MOST_SIGMAS * self.frames_per_s);
+        if most_us.is_finite() && most_us > 0.0 {
+            check.within(
+                "frame_jitter_us",
+                self.frame_jitter_us,
+                0.0..=most_us.floor(),
+            );
+        }
+    }
+
     /// From the opening of the first row to the closing of the last.
-    pub fn span_s(&self) -> f64 {
+    pub(super) fn span_s(&self) -> f64 {
         self.camera().shutter.frame_span_s(self.height_px)
     }
 
@@ -249,7 +212,7 @@ impl Optics {
     }
 
     /// The last row must close before the next frame's first one opens.
-    fn check_frame_time(&self, check: &mut Checker<'_>) {
+    fn check_frame_time(&self, rate_key: &str, check: &mut Checker<'_>) {
         let frame_us = 1e6 / self.frames_per_s;
         if !(frame_us.is_finite() && frame_us > 0.0) {
             return;
@@ -260,13 +223,12 @@ impl Optics {
             check.problem(
                 "exposure_us",
                 format!(
-                    "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {}",
-                    self.exposure_us, self.frames_per_s, self.rate_key
+                    "an exposure of {} us is longer than the frame, {frame_us:.0} us at {} {rate_key}",
+                    self.exposure_us, self.frames_per_s
                 ),
                 format!(
-                    "expose for at most {:.0} us, or lower {}",
-                    (frame_us - read_us).max(0.0),
-                    self.rate_key
+                    "expose for at most {:.0} us, or lower {rate_key}",
+                    (frame_us - read_us).max(0.0)
                 ),
             );
             return;
@@ -276,13 +238,12 @@ impl Optics {
             check.problem(
                 "height_px",
                 format!(
-                    "{} rows of {} us take {span_us:.0} us, but a frame lasts {frame_us:.0} us at {} {}",
-                    self.height_px, self.line_time_us, self.frames_per_s, self.rate_key
+                    "{} rows of {} us take {span_us:.0} us, but a frame lasts {frame_us:.0} us at {} {rate_key}",
+                    self.height_px, self.line_time_us, self.frames_per_s
                 ),
                 format!(
-                    "expose for at most {:.0} us, read at most {fits:.0} rows, or lower line_time_us or {}",
-                    (frame_us - read_us).max(0.0),
-                    self.rate_key
+                    "expose for at most {:.0} us, read at most {fits:.0} rows, or lower line_time_us or {rate_key}",
+                    (frame_us - read_us).max(0.0)
                 ),
             );
         }
@@ -291,7 +252,9 @@ impl Optics {
 
 settings! {
     /// The camera of a wayside device. Where it hangs and looks is in the tunnel file.
-    pub struct WaysideCameraSettings {
+    // The eyes of a rig are worked out as cameras, too.
+    #[derive(Copy)]
+    pub struct CameraSettings {
         /// Focal length, mm. Default 4.1 (1093 px: 83 deg across).
         focal_length_mm: f64 = 4.1;
         /// Width and height of a pixel, um.
@@ -338,11 +301,11 @@ settings! {
 }
 
 fn wayside_lens<'de, D: Deserializer<'de>>(input: D) -> Result<LensSettings, D::Error> {
-    over(WaysideCameraSettings::default().lens, input)
+    over(CameraSettings::default().lens, input)
 }
 
 fn wayside_sensor<'de, D: Deserializer<'de>>(input: D) -> Result<SensorSettings, D::Error> {
-    over(WaysideCameraSettings::default().sensor, input)
+    over(CameraSettings::default().sensor, input)
 }
 
 /// Reads a table whose missing keys are those of `base`, not those of its type.
@@ -385,12 +348,7 @@ settings! {
     }
 }
 
-impl WaysideCameraSettings {
-    /// The camera alone.
-    pub fn camera(&self) -> CameraModel {
-        self.optics().camera()
-    }
-
+impl CameraSettings {
     /// The device as surveyed: this camera at that site, with a lidar in the same housing where
     /// `with_lidar`. `None` where the tunnel has no balise of the name that the site gives.
     pub fn calibration(
@@ -444,49 +402,38 @@ impl WaysideCameraSettings {
             },
             line_time_us: self.line_time_us + error.line_time_us,
             calibration_error: WaysideError::default(),
-            ..self.clone()
+            ..*self
         }
     }
 
     fn check_together(&self, check: &mut Checker<'_>) {
-        self.optics().check(check);
-        check_jitter(self.frame_jitter_us, self.frames_per_s, check);
-        self.optics().check_control(&self.exposure_control, check);
-        let error = self.calibration_error;
-        let half_mm = 0.5 * self.focal_length_mm.abs();
-        let key = "calibration_error.focal_length_mm";
-        check.within(key, error.focal_length_mm, -half_mm..=half_mm);
-        let half_us = 0.5 * self.line_time_us.abs();
-        let key = "calibration_error.line_time_us";
-        check.within(key, error.line_time_us, -half_us..=half_us);
-        let longest = |optics: Optics| optics.exposed_longest(&self.exposure_control);
-        let actual = longest(self.actual_camera().optics());
-        actual.check_actual(&longest(self.optics()), check);
+        self.check_camera("frames_per_s", check);
+        let (error, mut below) = (self.calibration_error, check.below("calibration_error"));
+        for (key, error, calibrated) in [
+            (
+                "focal_length_mm",
+                error.focal_length_mm,
+                self.focal_length_mm,
+            ),
+            ("line_time_us", error.line_time_us, self.line_time_us),
+        ] {
+            check_half(key, error, calibrated, &mut below);
+        }
+        let actual = self.actual_camera().exposed_longest();
+        actual.check_actual(&self.exposed_longest(), check);
     }
 
     /// From the start of a frame to the closing of its last row, with the longest exposure that it
     /// may have.
     pub fn longest_span_s(&self) -> f64 {
-        let actual = self.actual_camera().optics();
-        actual.exposed_longest(&self.exposure_control).span_s()
+        self.actual_camera().exposed_longest().span_s()
     }
+}
 
-    fn optics(&self) -> Optics {
-        Optics {
-            focal_length_mm: self.focal_length_mm,
-            pixel_um: self.pixel_um,
-            width_px: self.width_px,
-            height_px: self.height_px,
-            principal_px: [self.principal_u_px, self.principal_v_px],
-            distortion: self.distortion,
-            read_out: self.read_out,
-            line_time_us: self.line_time_us,
-            exposure_us: self.exposure_us,
-            frames_per_s: self.frames_per_s,
-            blur_px: self.lens.blur_px,
-            rate_key: "frames_per_s",
-        }
-    }
+/// An error, or a difference, must leave half of what is calibrated.
+pub(super) fn check_half(key: &str, error: f64, calibrated: f64, check: &mut Checker<'_>) {
+    let half = 0.5 * calibrated.abs();
+    check.within(key, error, -half..=half);
 }
 
 /// Forward, left, up at the device's axis.
@@ -533,14 +480,6 @@ fn axes(columns: Matrix3<f64>) -> Isometry3<f64> {
     )
 }
 
-/// Jitter must not let frames overtake each other.
-pub(super) fn check_jitter(jitter_us: f64, rate_hz: f64, check: &mut Checker<'_>) {
-    let most_us = 1e6 / (2.0 * MOST_SIGMAS * rate_hz);
-    if most_us.is_finite() && most_us > 0.0 {
-        check.within("frame_jitter_us", jitter_us, 0.0..=most_us.floor());
-    }
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
@@ -551,12 +490,12 @@ mod tests {
     #[test]
     fn what_is_left_out_is_the_wayside_cameras_own() {
         let text = "sensor = { bits = 12 }\nlens = { focus_m = 20.0 }\n";
-        let camera: WaysideCameraSettings = toml::from_str(text).unwrap();
-        let mut expected = WaysideCameraSettings::default();
+        let camera: CameraSettings = toml::from_str(text).unwrap();
+        let mut expected = CameraSettings::default();
         expected.sensor.bits = 12;
         expected.lens.focus_m = Some(20.0);
         assert_eq!(camera, expected);
-        let wrong = toml::from_str::<WaysideCameraSettings>("sensor = { bitz = 12 }").unwrap_err();
+        let wrong = toml::from_str::<CameraSettings>("sensor = { bitz = 12 }").unwrap_err();
         assert!(
             wrong.to_string().contains("unknown field `bitz`"),
             "{wrong}"
@@ -569,7 +508,7 @@ mod tests {
         let text = include_str!("../../../tunnels/chengdu_line1.toml");
         let tunnel = Tunnel::from_toml(text).unwrap();
         let site = &tunnel.wayside[0];
-        let mut camera = WaysideCameraSettings::default();
+        let mut camera = CameraSettings::default();
         let exact = camera.calibration(site, &tunnel, true).unwrap();
         assert_eq!(camera.actual(site, &tunnel, true), Some(exact.clone()));
         camera.calibration_error.pitch_deg = 0.5;
@@ -590,7 +529,7 @@ mod tests {
     #[test]
     fn impossible_cameras_are_refused() {
         let problems = |text: &str| {
-            let camera: WaysideCameraSettings = toml::from_str(text).unwrap();
+            let camera: CameraSettings = toml::from_str(text).unwrap();
             let mut problems = Vec::new();
             camera.check("camera", &mut problems);
             problems
@@ -644,7 +583,7 @@ mod tests {
         let text = include_str!("../../../tunnels/chengdu_line1.toml");
         let tunnel = Tunnel::from_toml(text).unwrap();
         let site = &tunnel.wayside[0];
-        let device = WaysideCameraSettings::default()
+        let device = CameraSettings::default()
             .calibration(site, &tunnel, true)
             .unwrap();
         let axis = device.world_from_camera * Vector3::z();

@@ -121,11 +121,6 @@ impl Doppler {
         }
     }
 
-    /// From sample to sample.
-    pub fn period_s(&self) -> f64 {
-        1.0 / self.settings.rate_hz
-    }
-
     /// A sample of the time since the last one; `None` without its train, and on the first call,
     /// which starts the radar.
     pub fn sample(&mut self, world: &World, train: TrainId) -> Option<DopplerSample> {
@@ -346,7 +341,7 @@ mod tests {
         assert!((sigma / wanted - 1.0).abs() < 0.1, "{sigma} for {wanted}");
     }
 
-    /// The mount's errors: at 45 deg one beam's scale scatters over units as the pitch told.
+    /// The mount's errors: at 45 deg one beam's scale scatters over units as the given pitch.
     #[test]
     fn mount_errors_are_scale_errors() {
         let settings = DopplerSettings {

@@ -69,7 +69,7 @@ impl LidarSettings {
 /// A lidar on the wall.
 #[derive(Clone, Debug)]
 pub struct Lidar {
-    settings: LidarSettings,
+    pub(super) settings: LidarSettings,
     origin: Point3<f64>,
     beams: Vec<Beam>,
     stream: Stream,
@@ -143,11 +143,6 @@ impl Lidar {
             beams,
             stream,
         }
-    }
-
-    /// From scan to scan.
-    pub fn period_s(&self) -> f64 {
-        1.0 / self.settings.rate_hz
     }
 
     /// From the first shot of a scan to its last.

@@ -1,7 +1,7 @@
 //! Wheel pulse counter of one wheelset.
 //!
 //! It counts whole pulses of the wheelset's turn. Distance is their number times what one pulse
-//! is worth on the radius that the box was told; the true radius differs by a tolerance and by the
+//! is worth on the radius set in the box; the true radius differs by a tolerance and by the
 //! wear since, and that is a scale error. Whatever the wheelset does it takes for travel: slip and
 //! slide of the axle that it sits on are errors of its distance and speed.
 //!
@@ -25,8 +25,7 @@ use std::f64::consts::TAU;
 const STANDSTILL_S: f64 = 0.5;
 
 settings! {
-    /// The odometer: pulses of one wheelset, turned into distance with the radius that the box was
-    /// told.
+    /// The odometer: pulses of one wheelset, turned into distance with the radius set in the box.
     #[derive(Copy)]
     pub struct OdometerSettings {
         /// Samples a second.
@@ -38,7 +37,7 @@ settings! {
         /// Two channels, a quarter pulse apart, tell which way the wheel turns; with one channel
         /// every pulse counts as forward.
         two_channels: bool = true;
-        /// Radius that the box was told, metres.
+        /// Radius set in the box, metres.
         wheel_radius_m: f64 = 0.43, in 0.2..=0.7;
         // A metro wheel has about 35 mm to lose.
         /// What the radius has lost since by wear, metres. The box then says too much.
@@ -85,11 +84,6 @@ impl Odometer {
             phase: Stream::new(seed, index, "odometer phase").uniform(0),
             last: None,
         }
-    }
-
-    /// From sample to sample.
-    pub fn period_s(&self) -> f64 {
-        1.0 / self.settings.rate_hz
     }
 
     /// A sample now; `None` without the train that carries it, or without that wheelset.

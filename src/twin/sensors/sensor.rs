@@ -30,13 +30,24 @@ pub trait Sensor {
 )]
 pub enum Output {
     /// A sample.
-    Sample(Sample),
+    Sample(SensorSample),
     /// Images that are over, and have yet to be drawn.
     Capture(Capture),
 }
 
+impl Output {
+    /// A sample that reaches the equipment at once.
+    pub(super) fn at_once(valid_at: SimTime, content: Content) -> Self {
+        Self::Sample(SensorSample {
+            valid_at,
+            delay_s: 0.0,
+            content,
+        })
+    }
+}
+
 /// A sample of a sensor without images.
-pub struct Sample {
+pub struct SensorSample {
     /// When it was true, by the sensor's clock.
     pub valid_at: SimTime,
     /// From now until it reaches the equipment, seconds.
@@ -153,13 +164,8 @@ impl<F: FnMut(&World, SimTime) -> Option<Content>> Sensor for Periodic<F> {
         if self.ticker.due(local, 0.0).is_none() {
             return Ok(Vec::new());
         }
-        let sample = (self.read)(world, local).map(|content| {
-            Output::Sample(Sample {
-                valid_at: local,
-                delay_s: 0.0,
-                content,
-            })
-        });
+        let content = (self.read)(world, local);
+        let sample = content.map(|content| Output::at_once(local, content));
         Ok(sample.into_iter().collect())
     }
 }

@@ -150,7 +150,7 @@ fn val_allan_deviation_of_the_imu() {
     let to_mg = 1e3 / G_MPS2;
     let gyro = ("gyro", to_deg_h, "deg/h", 60.0 * 1f64.to_degrees());
     let accel = ("accel", to_mg, "mg", 60.0);
-    let told = [
+    let wanted = [
         (
             settings.angle_random_walk_deg_sqrt_h,
             settings.gyro_bias_deg_h,
@@ -160,8 +160,8 @@ fn val_allan_deviation_of_the_imu() {
             settings.accel_bias_mg,
         ),
     ];
-    for ((curve, (name, to_unit, unit, to_walk)), told) in
-        curves.iter().zip([gyro, accel]).zip(told)
+    for ((curve, (name, to_unit, unit, to_walk)), wanted) in
+        curves.iter().zip([gyro, accel]).zip(wanted)
     {
         let (walk, floor) = curve.walk_and_floor();
         let (walk, floor) = (walk * to_walk, floor * to_unit);
@@ -169,12 +169,12 @@ fn val_allan_deviation_of_the_imu() {
             .map(|(v, tau)| format!("{tau} s {:.4}", v.sqrt() * to_unit))
             .collect();
         eprintln!(
-            "{name}: random walk {walk:.5} (told {}), floor {floor:.4} {unit} (told {}); {}",
-            told.0,
-            told.1,
+            "{name}: random walk {walk:.5} (wanted {}), floor {floor:.4} {unit} (wanted {}); {}",
+            wanted.0,
+            wanted.1,
             slow.join(", ")
         );
-        assert!((walk / told.0 - 1.0).abs() < 0.1, "{name} {walk}");
-        assert!((floor / told.1 - 1.0).abs() < 0.1, "{name} {floor}");
+        assert!((walk / wanted.0 - 1.0).abs() < 0.1, "{name} {walk}");
+        assert!((floor / wanted.1 - 1.0).abs() < 0.1, "{name} {floor}");
     }
 }

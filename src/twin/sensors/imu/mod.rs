@@ -96,28 +96,6 @@ settings! {
 }
 
 impl ImuSettings {
-    /// A unit without errors: the truth at its place.
-    pub fn ideal() -> Self {
-        Self {
-            position_error_m: 0.0,
-            attitude_error_deg: 0.0,
-            gyro_turn_on_deg_s: 0.0,
-            gyro_null_s: 0.0,
-            gyro_bias_deg_h: 0.0,
-            angle_random_walk_deg_sqrt_h: 0.0,
-            gyro_scale_share: 0.0,
-            gyro_skew_deg: 0.0,
-            gyro_per_g_deg_s: 0.0,
-            accel_turn_on_mg: 0.0,
-            accel_bias_mg: 0.0,
-            velocity_random_walk_mps_sqrt_h: 0.0,
-            accel_scale_share: 0.0,
-            accel_skew_deg: 0.0,
-            quantise: false,
-            ..Self::default()
-        }
-    }
-
     fn gyro(&self) -> Errors {
         let step = GYRO_LSB_DEG_S * f64::from(u8::from(self.quantise));
         Errors {
@@ -195,12 +173,8 @@ impl Imu {
         self.gyro.bias -= sum / samples.max(1) as f64;
     }
 
-    /// From sample to sample.
-    pub fn period_s(&self) -> f64 {
-        self.period_s
-    }
-
-    /// A sample at one end of a train, of the time since the last one; `None` without its train, and on the first call,
+    /// A sample at one end of a train, of the time since the last one; `None` without its train, and on
+    /// the first call,
     /// which starts the unit.
     pub fn sample(&mut self, world: &World, train: TrainId, end: TrainEnd) -> Option<ImuSample> {
         let now = *world.vehicle_motion(train, end)?;

@@ -4,6 +4,28 @@ use super::*;
 use crate::bus::SimTime;
 use nalgebra::{Isometry3, Translation3};
 
+/// A unit without errors: the truth at its place.
+fn ideal() -> ImuSettings {
+    ImuSettings {
+        position_error_m: 0.0,
+        attitude_error_deg: 0.0,
+        gyro_turn_on_deg_s: 0.0,
+        gyro_null_s: 0.0,
+        gyro_bias_deg_h: 0.0,
+        angle_random_walk_deg_sqrt_h: 0.0,
+        gyro_scale_share: 0.0,
+        gyro_skew_deg: 0.0,
+        gyro_per_g_deg_s: 0.0,
+        accel_turn_on_mg: 0.0,
+        accel_bias_mg: 0.0,
+        velocity_random_walk_mps_sqrt_h: 0.0,
+        accel_scale_share: 0.0,
+        accel_skew_deg: 0.0,
+        quantise: false,
+        ..ImuSettings::default()
+    }
+}
+
 /// A body that turns about the world's z with rate w + a t, its origin on a straight way.
 fn spinning(t: f64, w: f64, a: f64) -> VehicleMotion {
     let turned = UnitQuaternion::from_scaled_axis(Vector3::z() * (w * t + 0.5 * a * t * t));
@@ -23,7 +45,7 @@ fn the_lever_arm_is_felt() {
     for (arm, wanted) in [(0.0, [0.0, 0.0]), (r, [-r * w * w, r * a])] {
         let settings = ImuSettings {
             position_m: [arm, 0.0, 1.0],
-            ..ImuSettings::ideal()
+            ..ideal()
         };
         let mut imu = Imu::new(&settings, 1, 0);
         let sample = imu
@@ -36,12 +58,12 @@ fn the_lever_arm_is_felt() {
 }
 
 /// A unit that leans feels a part of the weight sideways, and of a turn too; the lean is of the
-/// size told.
+/// size given.
 #[test]
 fn a_tilted_mount_feels_the_weight_sideways() {
     let settings = ImuSettings {
         attitude_error_deg: 0.5,
-        ..ImuSettings::ideal()
+        ..ideal()
     };
     let units = 1000;
     let mut square = 0.0;
@@ -85,12 +107,12 @@ fn the_null_takes_the_bias_out() {
     assert!((500.0..900.0).contains(&without), "{without} deg/h");
 }
 
-/// A turn under acceleration: 1 g along the track shifts the gyros by the sensitivity told.
+/// A turn under acceleration: 1 g along the track shifts the gyros by the sensitivity given.
 #[test]
 fn acceleration_shifts_the_gyros() {
     let settings = ImuSettings {
         gyro_per_g_deg_s: 0.009,
-        ..ImuSettings::ideal()
+        ..ideal()
     };
     let units = 1000;
     let mut square = 0.0;
