@@ -99,11 +99,9 @@ impl Onboard {
 
     /// Of all trains of a file.
     fn of(file: &ScenarioFile) -> Vec<Self> {
-        let trains: Vec<&TrainSettings> = file.train.iter().chain(&file.other_trains).collect();
         let direction = |id: TrainId| {
-            trains
-                .get(id.index())
-                .map_or(Direction::Up, |t| t.direction)
+            let train = file.trains().nth(id.index());
+            train.map_or(Direction::Up, |train| train.direction)
         };
         let first = TrainId::default();
         let first = (file.train.is_some() || file.bench.is_some()).then(|| Self {
@@ -241,23 +239,14 @@ impl Scenario {
             Some(Ok(tunnel)) => tunnel,
             _ => return Err(wrong(FileError::Problems(problems))),
         };
-        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
-        if !problems.is_empty() {
-            return Err(wrong(FileError::Problems(problems)));
-        }
-        Ok(Self::put_together(file, tunnel, wayside))
+        Self::in_tunnel(file, tunnel, problems).map_err(wrong)
     }
 
     /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
     pub fn new(file: ScenarioFile, tunnel: Tunnel) -> Result<Self, FileError> {
         let mut problems = Vec::new();
         file.check("", &mut problems);
-        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
-        if problems.is_empty() {
-            Ok(Self::put_together(file, tunnel, wayside))
-        } else {
-            Err(FileError::Problems(problems))
-        }
+        Self::in_tunnel(file, tunnel, problems)
     }
 
     /// Sensors and equipment of the first train, or of a bench.
@@ -285,13 +274,22 @@ impl Scenario {
         Arc::new(map)
     }
 
-    fn put_together(file: ScenarioFile, tunnel: Tunnel, wayside: Vec<WaysidePost>) -> Self {
+    /// In its tunnel, unless there are problems already, or are then.
+    fn in_tunnel(
+        file: ScenarioFile,
+        tunnel: Tunnel,
+        mut problems: Vec<Problem>,
+    ) -> Result<Self, FileError> {
+        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        if !problems.is_empty() {
+            return Err(FileError::Problems(problems));
+        }
         let onboard = Onboard::of(&file);
         let physics = PhysicsSettings {
             history_s: history_s(&file),
             ..file.physics()
         };
-        Self {
+        Ok(Self {
             duration_s: match (&file.bench, &file.rig) {
                 (Some(bench), Some(rig)) => bench.duration_s(rig.pairs_per_s),
                 _ => file.duration_s,
@@ -311,7 +309,7 @@ impl Scenario {
             faults: file.faults,
             stack: file.stack,
             record: file.record,
-        }
+        })
     }
 }
 

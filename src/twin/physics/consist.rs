@@ -29,7 +29,7 @@ const FADE_MPS: f64 = 0.1;
 const HOLD_PER_S: f64 = 50.0;
 
 /// The train.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 pub(super) struct Consist {
     pub id: TrainId,
     pub vehicle: Vehicle,
@@ -73,18 +73,11 @@ impl Consist {
             id,
             vehicle,
             settings: settings.clone(),
-            wheelsets: Vec::new(),
             states: cars.concat(),
-            primary_travel_m: 0.0,
-            secondary_travel_m: 0.0,
             couplers_n: vec![0.0; cars.len() - 1],
-            handles: Vec::new(),
-            colliders: Vec::new(),
             wrenches: vec![Wrench::default(); BODIES * cars.len()],
             previous,
-            ledger: Ledger::default(),
-            book: EnergyBook::default(),
-            start_potential_j: 0.0,
+            ..Self::default()
         };
         for car in &cars {
             consist.insert(world, car);

@@ -1,9 +1,9 @@
 //! What a hit does to a train. Classes go by the energy that the hit used up, all of it taken to have
 //! gone into the train. Their bounds are energies that trains are designed for:
 //!
-//! - up to [`DamageBounds::glazing_j`]: EN 15152 has the front glazing withstand a projectile of
+//! - superficial: EN 15152 has the front glazing withstand a projectile of
 //!   1 kg at the train's top speed plus 160 km/h;
-//! - up to the others: a train that runs into a standing one of the same kind. Both go on with
+//! - the others: a train that runs into a standing one of the same kind. Both go on with
 //!   half the speed, so m v^2 / 4 is used up and each takes m v^2 / 8. EN 15227 wants a metro
 //!   (category C-II) to keep its survival space at 25 km/h. Below that metros are commonly bought
 //!   with couplers whose buffers take 5 km/h without any harm, and whose collapse tubes, to be
@@ -44,44 +44,29 @@ impl fmt::Display for Damage {
     }
 }
 
-/// Energies between the classes of damage.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct DamageBounds {
-    /// Superficial up to this.
-    pub glazing_j: f64,
-    /// Light up to this.
-    pub buffers_j: f64,
-    /// Repairable up to this.
-    pub tubes_j: f64,
-    /// Structural up to this.
-    pub design_j: f64,
-}
-
 /// Top speed that metros of this kind are built for.
 const TOP_SPEED_KMH: f64 = 80.0;
 
-impl DamageBounds {
-    /// Of a train of a mass.
-    pub fn of_train(mass_kg: f64) -> Self {
-        let into_like = |kmh: f64| mass_kg * (kmh / 3.6).powi(2) / 8.0;
-        Self {
-            glazing_j: 0.5 * ((TOP_SPEED_KMH + 160.0) / 3.6).powi(2),
-            buffers_j: into_like(5.0),
-            tubes_j: into_like(15.0),
-            design_j: into_like(25.0),
-        }
+impl Damage {
+    /// The class of a hit that used up an energy, on a train of a mass.
+    pub(super) fn of_hit(energy_lost_j: f64, train_kg: f64) -> Self {
+        let classes = Self::bounds_j(train_kg);
+        let class = classes
+            .iter()
+            .find(|(bound_j, _)| energy_lost_j <= *bound_j);
+        class.map_or(Self::BeyondDesign, |(_, class)| *class)
     }
 
-    /// The class of a hit.
-    pub fn class(&self, energy_lost_j: f64) -> Damage {
-        let classes = [
-            (self.glazing_j, Damage::Superficial),
-            (self.buffers_j, Damage::Light),
-            (self.tubes_j, Damage::Repairable),
-            (self.design_j, Damage::Structural),
-        ];
-        let class = classes.iter().find(|(bound, _)| energy_lost_j <= *bound);
-        class.map_or(Damage::BeyondDesign, |(_, class)| *class)
+    /// The most energy of each class.
+    fn bounds_j(train_kg: f64) -> [(f64, Self); 4] {
+        let into_like = |kmh: f64| train_kg * (kmh / 3.6).powi(2) / 8.0;
+        let glazing_j = 0.5 * ((TOP_SPEED_KMH + 160.0) / 3.6).powi(2);
+        [
+            (glazing_j, Self::Superficial),
+            (into_like(5.0), Self::Light),
+            (into_like(15.0), Self::Repairable),
+            (into_like(25.0), Self::Structural),
+        ]
     }
 }
 
@@ -93,13 +78,13 @@ mod tests {
     #[test]
     fn damage_classes_are_those_of_like_trains() {
         let mass_kg = 302_000.0;
-        let bounds = DamageBounds::of_train(mass_kg);
+        let bounds_j = Damage::bounds_j(mass_kg).map(|(bound_j, _)| bound_j);
         let v = 25.0 / 3.6;
         let before = 0.5 * mass_kg * v * v;
         let after = 0.5 * (2.0 * mass_kg) * (v / 2.0) * (v / 2.0);
-        assert!((bounds.design_j - (before - after) / 2.0).abs() < 1.0);
-        assert!((bounds.glazing_j - 2222.0).abs() < 1.0);
-        let classes = [1e3, 1e4, 3e5, 1e6, 1e7].map(|e| bounds.class(e));
+        assert!((bounds_j[3] - (before - after) / 2.0).abs() < 1.0);
+        assert!((bounds_j[0] - 2222.0).abs() < 1.0);
+        let classes = [1e3, 1e4, 3e5, 1e6, 1e7].map(|e| Damage::of_hit(e, mass_kg));
         assert!(
             classes.windows(2).all(|pair| pair[0] < pair[1]),
             "{classes:?}"

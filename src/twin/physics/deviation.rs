@@ -25,14 +25,11 @@ impl Deviation {
     /// The same place as met by who runs the other way: left is right, and what rises falls.
     pub(super) fn reversed(self) -> Self {
         Self {
-            up_m: self.up_m,
             left_m: -self.left_m,
             roll_rad: -self.roll_rad,
-            gauge_m: self.gauge_m,
             up_per_m: -self.up_per_m,
-            left_per_m: self.left_per_m,
-            roll_rad_per_m: self.roll_rad_per_m,
             gauge_per_m: -self.gauge_per_m,
+            ..self
         }
     }
 }

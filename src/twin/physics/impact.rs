@@ -7,7 +7,7 @@
 //! spinning or not, on springs or not. A hit lasts until the train has left the thing, 50 ms at
 //! most: what is pushed along after that is no blow any more.
 
-use super::damage::{Damage, DamageBounds};
+use super::damage::Damage;
 use super::entity::Entity;
 use super::placement::BODIES;
 use super::train::Train;
@@ -119,8 +119,8 @@ struct Push {
 #[derive(Clone, Default)]
 pub(super) struct Impacts {
     cars: Vec<CarBox>,
-    /// By train.
-    bounds: Vec<DamageBounds>,
+    /// Of the trains.
+    masses_kg: Vec<f64>,
     touches: Vec<Touch>,
     pub list: Vec<Impact>,
 }
@@ -143,7 +143,7 @@ impl Impacts {
         let masses_kg = trains.iter().map(|train| train.consist.mass_kg());
         Self {
             cars: cars.collect(),
-            bounds: masses_kg.map(DamageBounds::of_train).collect(),
+            masses_kg: masses_kg.collect(),
             ..Self::default()
         }
     }
@@ -208,7 +208,7 @@ impl Impacts {
             impact.energy_lost_j -= 0.5 * push.impulse.dot(closing(push) + after);
         }
         impact.momentum_n_s = touch.momentum.length();
-        impact.damage = self.bounds[train.index()].class(impact.energy_lost_j);
+        impact.damage = Damage::of_hit(impact.energy_lost_j, self.masses_kg[train.index()]);
     }
 
     /// The touch that goes on, or a new one, with a hit of its own where it is one.

@@ -87,7 +87,7 @@ mod worker;
 
 pub use adhesion::{RailState, RailZone};
 pub use cable_settings::{CableEnd, CableSettings};
-pub use damage::{Damage, DamageBounds};
+pub use damage::Damage;
 pub use defect::{DefectSettings, DefectShape, RailSide};
 pub use energy::EnergyBook;
 pub use error::PhysicsError;

@@ -81,14 +81,10 @@ impl Surroundings {
                 .iter()
                 .map(|train| train_name(train.consist.id))
                 .collect(),
-            obstacles: Vec::new(),
-            cables: Vec::new(),
-            ground: Ground::default(),
             releases_s: releases_s(settings),
             to_come,
             impacts: Impacts::new(trains),
-            awake: Vec::new(),
-            steps: 0,
+            ..Self::default()
         };
         for (k, cable) in settings.cables.iter().enumerate() {
             surroundings

@@ -12,7 +12,7 @@ use rapier3d_f64::math::{Rotation, Vector};
 use std::cmp::Ordering;
 
 /// Pose of a centre of gravity with its velocities, world.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct BodyState {
     pub position: Vector,
     pub rotation: Rotation,

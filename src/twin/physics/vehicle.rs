@@ -13,7 +13,7 @@ pub(super) const AXLES: usize = 4;
 pub(super) const FLANGE_STIFFNESS_N_M: f64 = 40e6;
 
 /// Springs and dampers of one element along its x, y and z, under a static load along z.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Element {
     pub stiffness_n_m: Vector,
     pub damping_n_s_m: Vector,
@@ -21,7 +21,7 @@ pub(super) struct Element {
 }
 
 /// Mass and moments of inertia of a body.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Mass {
     pub kg: f64,
     /// Roll, pitch, yaw.
@@ -29,7 +29,7 @@ pub(super) struct Mass {
 }
 
 /// A car in SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Vehicle {
     pub length_m: f64,
     pub width_m: f64,
@@ -62,7 +62,7 @@ pub(super) struct Vehicle {
 }
 
 /// A coupler in SI units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Coupler {
     pub height_m: f64,
     pub stiffness_n_m: f64,

@@ -3,20 +3,11 @@
 use crate::settings::{Checker, FileError, Settings, read_toml, settings};
 use std::sync::LazyLock;
 
-/// Sets that come with the program, by name.
-const SHIPPED: [(&str, &str); 3] = [
-    (
-        "metro_b1_empty",
-        include_str!("../../../scenarios/vehicles/metro_b1_empty.toml"),
-    ),
-    (
-        "metro_b1_crush",
-        include_str!("../../../scenarios/vehicles/metro_b1_crush.toml"),
-    ),
-    (
-        "manchester",
-        include_str!("../../../scenarios/vehicles/manchester.toml"),
-    ),
+/// Texts of the sets that come with the program.
+const SHIPPED: [&str; 3] = [
+    include_str!("../../../scenarios/vehicles/metro_b1_empty.toml"),
+    include_str!("../../../scenarios/vehicles/metro_b1_crush.toml"),
+    include_str!("../../../scenarios/vehicles/manchester.toml"),
 ];
 
 settings! {
@@ -164,18 +155,23 @@ impl VehicleFile {
 
     /// A set that comes with the program.
     pub fn shipped(name: &str) -> Option<&'static Self> {
-        static READ: LazyLock<Vec<VehicleFile>> = LazyLock::new(|| {
-            let files = SHIPPED.iter();
-            files
-                .filter_map(|(_, text)| VehicleFile::from_toml(text).ok())
-                .collect()
-        });
-        READ.iter().find(|file| file.name == name)
+        Self::all_shipped().iter().find(|file| file.name == name)
     }
 
     /// Names of the sets that come with the program.
-    pub fn shipped_names() -> [&'static str; SHIPPED.len()] {
-        SHIPPED.map(|(name, _)| name)
+    pub fn shipped_names() -> Vec<&'static str> {
+        let all = Self::all_shipped().iter();
+        all.map(|file| file.name.as_str()).collect()
+    }
+
+    fn all_shipped() -> &'static [Self] {
+        static READ: LazyLock<Vec<VehicleFile>> = LazyLock::new(|| {
+            let files = SHIPPED.iter();
+            files
+                .filter_map(|text| VehicleFile::from_toml(text).ok())
+                .collect()
+        });
+        &READ
     }
 
     /// Mass of the car with bogies and wheelsets.
@@ -197,13 +193,13 @@ mod tests {
     use super::*;
     use crate::twin::physics::vehicle::Vehicle;
 
-    /// Fails where a set that comes with the program cannot be read, has another name, or gives
-    /// other figures than its file.
+    /// Fails where a set that comes with the program cannot be read, or gives other figures than
+    /// its file.
     #[test]
     fn shipped_vehicles_are_right() {
+        assert_eq!(VehicleFile::shipped_names().len(), SHIPPED.len());
         for name in VehicleFile::shipped_names() {
             let file = VehicleFile::shipped(name).unwrap();
-            assert_eq!(file.name, name);
             let car = Vehicle::new(file);
             // Class B allows 14 t on an axle.
             let axle_t = 1e-3 * 0.25 * car.total_kg();
@@ -217,8 +213,7 @@ mod tests {
     /// Fails where a wrong figure is not named with its key.
     #[test]
     fn wrong_figures_are_named() {
-        let (_, text) = SHIPPED[0];
-        let wrong = text.replace("distance_m = 12.6", "distance_m = 19.0");
+        let wrong = SHIPPED[0].replace("distance_m = 12.6", "distance_m = 19.0");
         let error = VehicleFile::from_toml(&wrong).unwrap_err().to_string();
         assert!(error.contains("bogie.distance_m"), "{error}");
     }

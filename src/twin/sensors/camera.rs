@@ -409,16 +409,14 @@ impl CameraSettings {
     fn check_together(&self, check: &mut Checker<'_>) {
         self.check_camera("frames_per_s", check);
         let (error, mut below) = (self.calibration_error, check.below("calibration_error"));
-        for (key, error, calibrated) in [
-            (
-                "focal_length_mm",
-                error.focal_length_mm,
-                self.focal_length_mm,
-            ),
-            ("line_time_us", error.line_time_us, self.line_time_us),
-        ] {
-            check_half(key, error, calibrated, &mut below);
-        }
+        let (error_mm, focal_mm) = (error.focal_length_mm, self.focal_length_mm);
+        check_half("focal_length_mm", error_mm, focal_mm, &mut below);
+        check_half(
+            "line_time_us",
+            error.line_time_us,
+            self.line_time_us,
+            &mut below,
+        );
         let actual = self.actual_camera().exposed_longest();
         actual.check_actual(&self.exposed_longest(), check);
     }

@@ -266,17 +266,14 @@ impl RigSettings {
 
     fn check_errors(&self, check: &mut Checker<'_>) {
         let error = self.calibration_error;
-        for (key, error, calibrated) in [
-            (
-                "focal_length_mm",
-                error.focal_length_mm,
-                self.focal_length_mm,
-            ),
-            ("line_time_us", error.line_time_us, self.line_time_us),
-            ("baseline_mm", error.baseline_mm, self.baseline_mm),
-        ] {
-            check_half(key, error, calibrated, check);
-        }
+        check_half(
+            "focal_length_mm",
+            error.focal_length_mm,
+            self.focal_length_mm,
+            check,
+        );
+        check_half("line_time_us", error.line_time_us, self.line_time_us, check);
+        check_half("baseline_mm", error.baseline_mm, self.baseline_mm, check);
         // The lens with its error must blur as a lens can.
         let (sheet_px, (least_px, most_px)) = (self.lens.blur_px, BLUR_PX.into_inner());
         if BLUR_PX.contains(&sheet_px) {
