@@ -574,7 +574,7 @@ fn place(
         calibration,
         actual,
         balise: site.balise.clone(),
-        camera: post.camera.clone(),
+        camera: post.camera,
         lidar: post.lidar.clone(),
     })
 }
