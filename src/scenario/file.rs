@@ -6,6 +6,7 @@ use crate::settings::settings;
 use crate::stack::positioning::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
+use crate::track::Direction;
 use crate::twin::air::AirSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
@@ -242,6 +243,11 @@ impl ScenarioFile {
     /// All trains, by number.
     pub(super) fn trains(&self) -> impl Iterator<Item = &TrainSettings> {
         self.train.iter().chain(&self.other_trains)
+    }
+
+    /// Which way the `k`-th of [`Self::trains`] runs.
+    pub(super) fn direction(&self, k: usize) -> Direction {
+        self.trains().nth(k).map_or(Direction::Up, |t| t.direction)
     }
 
     /// Key of the `k`-th of [`Self::trains`].

@@ -223,11 +223,7 @@ impl Wrong {
             Self::UnknownKey { key: name, known } => Problem::new(
                 key,
                 format!("there is no key `{name}` here"),
-                match did_you_mean(name, known) {
-                    Some(similar) => format!("did you mean `{similar}`?"),
-                    None if known.is_empty() => "take it out".to_owned(),
-                    None => format!("keys that may stand here: {}", known.join(", ")),
-                },
+                name_advice(name, known, "keys that may stand here", "take it out"),
             ),
             Self::MissingKey { .. } => Problem::new(key, "is missing", "give it a value"),
             Self::Value { message } => value_problem(key, message),
@@ -273,6 +269,16 @@ pub fn did_you_mean<'k>(wrong: &str, known: &'k [String]) -> Option<&'k str> {
                 .map(|(_, k)| k)
         })
         .map(String::as_str)
+}
+
+/// What would be right in place of a wrong name: the known one that it was most likely meant to be,
+/// else all known ones under a heading, or other advice where there is none.
+pub fn name_advice(wrong: &str, known: &[String], heading: &str, without_any: &str) -> String {
+    match did_you_mean(wrong, known) {
+        Some(similar) => format!("did you mean `{similar}`?"),
+        None if known.is_empty() => without_any.to_owned(),
+        None => format!("{heading}: {}", known.join(", ")),
+    }
 }
 
 fn last_key(dotted: &str) -> &str {

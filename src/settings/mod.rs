@@ -12,6 +12,6 @@ mod unit;
 
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
-pub use document::{did_you_mean, locate, read_toml};
+pub use document::{did_you_mean, locate, name_advice, read_toml};
 pub use numbers::{Numbers, put_range};
 pub use problem::{Checker, FileError, Problem, key_below};

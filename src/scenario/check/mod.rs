@@ -1,0 +1,266 @@
+//! What no part can check by itself: how the parts of a scenario go together.
+
+mod line;
+
+pub(super) use line::in_tunnel;
+
+use super::file::ScenarioFile;
+use crate::bus::{TrainEnd, TrainId};
+use crate::settings::{Checker, name_advice};
+use crate::twin::faults::rig_cameras;
+use crate::twin::physics::TrainSettings;
+
+impl ScenarioFile {
+    /// What needs no tunnel.
+    pub(super) fn check_together(&self, check: &mut Checker<'_>) {
+        check_name(&self.name, check);
+        if self.train.is_none() && !self.other_trains.is_empty() {
+            check.problem(
+                "other_trains",
+                "there is no first train that they are added to",
+                "call the first of them [train]",
+            );
+        } else {
+            self.physics().check_together(check);
+        }
+        check_onboard(self, check);
+        for (k, post) in self.wayside.iter().enumerate() {
+            if self.wayside[..k].iter().any(|p| p.device == post.device) {
+                check.problem(
+                    &format!("wayside[{k}].device"),
+                    format!("`{}` is in use already", post.device),
+                    "name each device once",
+                );
+            }
+        }
+        check_faulty_cameras(self, check);
+        check_carrier(self, check);
+        check_motion(self, check);
+        check_appearances(self, check);
+    }
+}
+
+/// Sensors and equipment of other trains, each of a train that there is, and named once.
+fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let kinds = file.onboard.iter().enumerate();
+    let kinds = kinds.map(|(k, o)| (format!("onboard[{k}].equipment"), &o.equipment));
+    for (key, kinds) in kinds.chain([("stack.onboard".to_owned(), &file.stack.onboard)]) {
+        if (1..kinds.len()).any(|k| kinds[..k].contains(&kinds[k])) {
+            check.problem(&key, "names an equipment twice", "name each once");
+        }
+    }
+    let others = file.other_trains.len();
+    for (k, onboard) in file.onboard.iter().enumerate() {
+        let number = usize::from(onboard.train);
+        let twice = file.onboard[..k].iter().any(|o| o.train == onboard.train);
+        let what = if twice {
+            format!("train {number} has its equipment already")
+        } else if number == 0 || number > others {
+            format!("there is no other train {number}")
+        } else {
+            continue;
+        };
+        let remedy = match others {
+            0 => "add it to [[other_trains]]".to_owned(),
+            1 => "give 1: the one of [[other_trains]]".to_owned(),
+            most => format!("give 1 to {most}, each once, in the order of [[other_trains]]"),
+        };
+        check.problem(&format!("onboard[{k}].train"), what, remedy);
+    }
+}
+
+fn check_name(name: &str, check: &mut Checker<'_>) {
+    let fit = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if name.is_empty() || !name.chars().all(fit) {
+        check.problem(
+            "name",
+            format!("`{name}` cannot name a folder of results"),
+            "use letters, digits, `_` and `-`",
+        );
+    }
+}
+
+/// Something must move or look, and only one thing may carry the rig.
+fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
+    match (&file.train, &file.bench, &file.rig) {
+        (Some(_), Some(_), _) => check.problem(
+            "bench",
+            "there is a train too, and the rig can be on one of them only",
+            "take out [bench] or [train]",
+        ),
+        (None, Some(_), None) => check.problem(
+            "bench",
+            "there is no rig to stand at its points",
+            "add [rig]; empty, it is the reference rig",
+        ),
+        (None, None, Some(_)) => check.problem(
+            "rig",
+            "there is nothing that carries it",
+            "add [train], or [bench] for a rig at rest",
+        ),
+        (None, None, None) if file.wayside.is_empty() => check.problem(
+            "train",
+            "there is no train, no bench and no wayside device: nothing would be seen",
+            "add [train] with [rig], [bench] with [rig], or [[wayside]]",
+        ),
+        _ => {}
+    }
+    if file.bench.is_none() {
+        return;
+    }
+    if file
+        .rig
+        .as_ref()
+        .is_some_and(|rig| rig.end == TrainEnd::Rear)
+    {
+        check.problem(
+            "rig.end",
+            "a bench has no train, and so no rear end",
+            "take it out, or give \"front\"",
+        );
+    }
+    for (key, count) in [
+        ("wayside", file.wayside.len()),
+        ("other_trains", file.other_trains.len()),
+        ("obstacles", file.obstacles.len()),
+        ("cables", file.cables.len()),
+        ("workers", file.workers.len()),
+    ] {
+        if count > 0 {
+            check.problem(
+                key,
+                "a bench test has the rig and the lamps only: they would not be there",
+                format!("take out [bench] or [[{key}]]"),
+            );
+        }
+    }
+}
+
+/// A fault of a camera that is not there would go unnoticed.
+fn check_faulty_cameras(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let first = file.rig.iter().map(|_| TrainId(0));
+    let others = file.onboard.iter().filter(|onboard| onboard.rig.is_some());
+    let rigs = first.chain(others.map(|onboard| TrainId(onboard.train)));
+    let eyes = rigs.flat_map(rig_cameras);
+    let devices = file.wayside.iter().map(|post| post.device.clone());
+    let names: Vec<String> = eyes.chain(devices).collect();
+    for (k, fault) in file.faults.cameras.iter().enumerate() {
+        if !names.contains(&fault.camera) {
+            check.problem(
+                &format!("faults.cameras[{k}].camera"),
+                format!("there is no camera `{}`", fault.camera),
+                name_advice(
+                    &fault.camera,
+                    &names,
+                    "cameras of this scenario",
+                    "add [rig] or [[wayside]], or take this out",
+                ),
+            );
+        }
+        if file.bench.is_some() && fault.late_s() > 0.0 {
+            check.problem(
+                &format!("faults.cameras[{k}].fault.by_ms"),
+                "a rig at rest on a bench does not wait for its images: they cannot be late",
+                "take this out",
+            );
+        }
+    }
+}
+
+/// The sensors of motion need the part of the train that they sit on.
+fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let Some(train) = &file.train else {
+        if file.doppler.is_some() {
+            check.problem(
+                "doppler",
+                "there is no train that carries it",
+                "add [train], or take this out",
+            );
+        }
+        return;
+    };
+    check_axle("odometer.axle", file.odometer.axle, train, check);
+    for (k, onboard) in file.onboard.iter().enumerate() {
+        if let Some(train) = file.trains().nth(onboard.train.into()) {
+            let key = format!("onboard[{k}].odometer.axle");
+            check_axle(&key, onboard.odometer.axle, train, check);
+        }
+    }
+}
+
+fn check_axle(key: &str, axle: u32, train: &TrainSettings, check: &mut Checker<'_>) {
+    // A train without cars is a problem of its own.
+    let axles = train.axles().max(1);
+    if axle > axles {
+        check.problem(
+            key,
+            format!("the train has {axles} wheelsets, not {axle}"),
+            format!("give 1 to {axles}"),
+        );
+    }
+}
+
+/// What happens after the end would never be seen.
+fn check_appearances(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let end_s = file.duration_s;
+    let late = |check: &mut Checker<'_>, key: String, what: &str, at_s: Option<f64>| {
+        if let Some(at_s) = at_s.filter(|at_s| *at_s > end_s) {
+            check.problem(
+                &key,
+                format!("{what} at {at_s} s, but the run ends at {end_s} s"),
+                "choose an earlier time, or a longer duration_s",
+            );
+        }
+    };
+    for (k, obstacle) in file.obstacles.iter().enumerate() {
+        let key = |key: &str| format!("obstacles[{k}].{key}");
+        late(
+            check,
+            key("appears_s"),
+            "it appears",
+            Some(obstacle.appears_s),
+        );
+        late(
+            check,
+            key("held_until_s"),
+            "it comes loose",
+            obstacle.held_until_s,
+        );
+    }
+    for (k, cable) in file.cables.iter().enumerate() {
+        for (end, at_s) in [("from", cable.from.lets_go_s), ("to", cable.to.lets_go_s)] {
+            late(
+                check,
+                format!("cables[{k}].{end}.lets_go_s"),
+                "it lets go",
+                at_s,
+            );
+        }
+    }
+    let carriers = file.workers.iter().enumerate();
+    for (k, worker) in carriers.filter(|(_, worker)| worker.puts_down_s.is_some()) {
+        let key = |key: &str| format!("workers[{k}].{key}");
+        if worker.carries.is_none() {
+            check.problem(
+                &key("puts_down_s"),
+                "he carries nothing that he could put down",
+                format!("add [workers.carries] to workers[{k}], or take this out"),
+            );
+        }
+        late(
+            check,
+            key("puts_down_s"),
+            "he puts it down",
+            worker.puts_down_s,
+        );
+        late(
+            check,
+            key("picks_up_s"),
+            "he picks it up",
+            worker.picks_up_s,
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests;

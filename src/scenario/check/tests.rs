@@ -1,0 +1,149 @@
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+use super::*;
+use crate::settings::{Settings, read_toml};
+use crate::track::Tunnel;
+use crate::twin::render::gpu::layout::MAX_HEADLIGHTS;
+
+fn keys(rest: &str) -> Vec<String> {
+    let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
+    let mut problems = Vec::new();
+    read_toml::<ScenarioFile>(&text)
+        .unwrap()
+        .check("", &mut problems);
+    problems.into_iter().map(|p| p.key).collect()
+}
+
+/// A sensor of motion that nothing carries, or on a wheelset that the train has not, would
+/// be silent all the run.
+#[test]
+fn sensors_of_motion_need_their_place() {
+    assert_eq!(keys("[bench]\n[rig]\n[doppler]\n"), ["doppler"]);
+    assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
+    let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";
+    assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
+}
+
+/// Every fault that could not act as written is refused, with its key.
+#[test]
+fn faults_must_be_able_to_strike() {
+    let text = include_str!("../../../tunnels/chengdu_line1.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let keys = |faults: &str| {
+        let text = format!(
+            "name = \"test\"\ntunnel = \"given\"\n[train]\nstop_at_m = 900.0\n[rig]\n\
+             [[wayside]]\ndevice = \"W1530\"\n{faults}"
+        );
+        let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
+        file.check("", &mut problems);
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+    };
+    let lamp = |rest: &str| keys(&format!("[[faults.lamps]]\n{rest}\n"));
+    assert_eq!(lamp("share = 0.22\nfault = { kind = 'dead' }"), [""; 0]);
+    let bad = "share = 1.5\nfault = { kind = 'dim', level = -0.1 }\nfrom_s = 5.0\nto_s = 4.0";
+    let at = "faults.lamps[0]";
+    let expected = ["share", "fault.level", "to_s"].map(|key| format!("{at}.{key}"));
+    assert_eq!(lamp(bad), expected);
+    let flicker = "fault = { kind = 'flicker', depth = 2.0, frequency_hz = 0.0 }";
+    let expected = ["depth", "frequency_hz"].map(|key| format!("{at}.fault.{key}"));
+    assert_eq!(lamp(flicker), expected);
+    let missing = "numbers = [3, 4000]\nfault = { kind = 'dead' }";
+    assert_eq!(lamp(missing), [format!("{at}.numbers")]);
+    let nowhere = "from_m = 12.0\nto_m = 13.0\nfault = { kind = 'dead' }";
+    assert_eq!(lamp(nowhere), [format!("{at}.from_m")]);
+    let backwards = "from_m = 40.0\nto_m = 30.0\nfault = { kind = 'dead' }";
+    assert_eq!(lamp(backwards)[0], format!("{at}.to_m"));
+
+    assert_eq!(keys("[air]\nvisibility_m = 60.0"), [""; 0]);
+    let air = "[air]\nvisibility_m = 0.0\nscattered_share = 2.0";
+    assert_eq!(keys(air), ["air.visibility_m", "air.scattered_share"]);
+
+    let camera = |rest: &str| keys(&format!("[[faults.cameras]]\n{rest}\n"));
+    for name in ["rig", "left", "right", "W1530"] {
+        let freeze = format!("camera = '{name}'\nfault = {{ kind = 'freeze' }}");
+        assert_eq!(camera(&freeze), [""; 0]);
+    }
+    let at = "faults.cameras[0]";
+    let stranger = "camera = 'W1350'\nfault = { kind = 'freeze' }";
+    assert_eq!(camera(stranger), [format!("{at}.camera")]);
+    let share = "camera = 'rig'\nfault = { kind = 'drop', share = -0.1 }\nfrom_s = -1.0";
+    let expected = ["fault.share", "from_s"].map(|key| format!("{at}.{key}"));
+    assert_eq!(camera(share), expected);
+    let late = "camera = 'rig'\nfault = { kind = 'late', by_ms = 1e9 }";
+    assert_eq!(camera(late), [format!("{at}.fault.by_ms")]);
+}
+
+/// With more trains the same line would be lit by one renderer and not by another.
+#[test]
+fn all_headlights_light_a_picture() {
+    let keys = |others: usize| keys(&format!("[train]\n{}", "[[other_trains]]\n".repeat(others)));
+    assert_eq!(keys(7), [""; 0]);
+    assert_eq!(keys(8), ["other_trains"]);
+    assert_eq!(TrainId::MOST * 2, MAX_HEADLIGHTS);
+}
+
+/// Two trains in one place would burst apart.
+#[test]
+fn trains_stand_clear_of_each_other() {
+    let text = include_str!("../../../tunnels/chengdu_line1.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let keys = |other_m: f64| {
+        let text = format!(
+            "name = \"test\"\ntunnel = \"given\"\n[train]\nstart_chainage_m = 300.0\n\
+             stop_at_m = 2000.0\n[[other_trains]]\nstart_chainage_m = {other_m}\n\
+             stop_at_m = 2500.0\n"
+        );
+        let mut problems = Vec::new();
+        let mut check = Checker::new("", &mut problems);
+        in_tunnel(&read_toml(&text).unwrap(), &tunnel, &mut check);
+        problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+    };
+    assert_eq!(keys(420.0), [""; 0]);
+    assert_eq!(keys(417.0), ["other_trains[0].start_chainage_m"]);
+}
+
+/// Fails where a train that runs down stands, stops or ends as one that runs up.
+#[test]
+fn a_train_that_runs_down_stands_up_the_line_of_its_head() {
+    let text = include_str!("../../../tunnels/chengdu_line1.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let end_m = tunnel.alignment.length_m();
+    let problems = |start_m: f64, rest: &str| {
+        let text = format!(
+            "name = \"test\"\ntunnel = \"given\"\n[[wayside]]\ndevice = \"W1530\"\n[train]\n\
+             start_chainage_m = 300.0\nstop_at_m = 600.0\n[[other_trains]]\n\
+             direction = \"down\"\nstart_chainage_m = {start_m}\n{rest}"
+        );
+        let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
+        file.check("", &mut problems);
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        problems
+    };
+    let keys = |start_m: f64, rest: &str| -> Vec<String> {
+        let problems = problems(start_m, rest).into_iter();
+        problems.map(|p| p.key).collect()
+    };
+    let (start, stop) = (
+        "other_trains[0].start_chainage_m",
+        "other_trains[0].stop_at_m",
+    );
+    assert_eq!(keys(end_m - 120.0, "stop_at_m = 1000.0"), [""; 0]);
+    assert_eq!(keys(end_m - 100.0, "stop_at_m = 1000.0"), [start]);
+    assert_eq!(keys(1000.0, "stop_at_m = 1200.0"), [stop]);
+    // Its tail would be in the first train's head, and its own head behind that one's tail.
+    assert_eq!(keys(290.0, "stop_at_m = 0.0"), [start]);
+    assert_eq!(keys(310.0, "stop_at_m = 0.0"), [""; 0]);
+    let far = problems(800.0, "");
+    assert_eq!(far[0].key, stop);
+    assert!(far[0].remedy.contains("down to 0 m"), "{}", far[0].remedy);
+}
+
+/// Fails where trains are numbered without a first one, or their keys are those of others.
+#[test]
+fn other_trains_are_other_than_a_first_one() {
+    let rest = "[[wayside]]\ndevice = \"W1530\"\n[[other_trains]]\n";
+    assert_eq!(keys(rest), ["other_trains"]);
+    let text = format!("name = \"test\"\ntunnel = \"given\"\n{rest}");
+    let file: ScenarioFile = read_toml(&text).unwrap();
+    assert_eq!(file.train_key(0), "other_trains[0]");
+}
