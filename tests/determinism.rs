@@ -6,7 +6,7 @@
 
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
-    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Summary, run,
+    Event, Observer, ObserverError, RendererChoice, RunOptions, Summary, run,
 };
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::Path;
@@ -19,10 +19,6 @@ struct Digest {
 }
 
 impl Observer for Digest {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
             Event::Pair(_, pair, report, truths_m) => {
@@ -41,10 +37,6 @@ impl Observer for Digest {
             Event::Cost(..) => {}
             other => format!("{other:?}").hash(&mut self.hasher),
         }
-        Ok(())
-    }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }

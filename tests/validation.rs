@@ -15,7 +15,7 @@
 use metrotwin::bus::{Content, Method, SimTime};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
-    Distribution, End, Event, Observer, ObserverError, Opening, RunOptions, Summary, run,
+    Distribution, End, Event, Observer, ObserverError, RunOptions, Summary, run,
 };
 use std::path::Path;
 
@@ -51,9 +51,6 @@ fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
 struct ErrorByDistance(Vec<(f64, f64)>);
 
 impl Observer for ErrorByDistance {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         if let Event::Pair(_, _, report, truths_m) = event {
             let fixes = report.fixes.iter().zip(*truths_m);
@@ -62,9 +59,6 @@ impl Observer for ErrorByDistance {
                     |(fix, truth_m)| (fix.lamp_in_camera.norm(), (fix.chainage_m - truth_m).abs()),
                 ));
         }
-        Ok(())
-    }
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }
@@ -160,9 +154,6 @@ struct ErrorByTime {
 }
 
 impl Observer for ErrorByTime {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
             Event::Message(_, message) => {
@@ -180,9 +171,6 @@ impl Observer for ErrorByTime {
             }
             _ => {}
         }
-        Ok(())
-    }
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }

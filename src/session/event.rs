@@ -117,11 +117,15 @@ pub enum Event<'a> {
 /// Something that watches a session. It cannot change what happens.
 pub trait Observer {
     /// Before the first step.
-    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError>;
+    fn open(&mut self, _opening: &Opening<'_>) -> Result<(), ObserverError> {
+        Ok(())
+    }
     /// After each happening.
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError>;
     /// After the last one; also when a run is broken off or fails.
-    fn close(&mut self) -> Result<(), ObserverError>;
+    fn close(&mut self) -> Result<(), ObserverError> {
+        Ok(())
+    }
 }
 
 /// Why an observer could not write down what it saw.

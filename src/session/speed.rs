@@ -6,9 +6,7 @@
 
 use super::costs::Stopwatch;
 use super::summary::Cost;
-use super::{
-    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Source, renderer, run_on,
-};
+use super::{Event, Observer, ObserverError, RendererChoice, RunOptions, Source, renderer, run_on};
 use crate::bus::{Node, TrainCommand};
 use crate::scenario::{Scenario, ScenarioFile};
 use crate::settings::read_toml;
@@ -113,10 +111,6 @@ struct Watched {
 }
 
 impl Observer for Watched {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
             Event::Exposure(exposure) => match exposure.source {
@@ -128,10 +122,6 @@ impl Observer for Watched {
             Event::Cost(Node::Post(_), ms) => self.wayside_ms.push(*ms),
             _ => {}
         }
-        Ok(())
-    }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }

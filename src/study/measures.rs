@@ -3,7 +3,7 @@
 use crate::bus::{Method, TrainId};
 use crate::record::parquet::Kind;
 use crate::session::{
-    Distribution, Event, Observer, ObserverError, ObstacleScore, Opening, Summary, Wayside,
+    Distribution, Event, Observer, ObserverError, ObstacleScore, Summary, Wayside,
 };
 use Kind::{Flag, Int, Real, Reals};
 use Method::{Mono, Stereo};
@@ -47,10 +47,6 @@ pub struct Fixes {
 }
 
 impl Observer for Fixes {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         let Event::Pair(TrainId(0), _, report, truths_m) = event else {
             return Ok(());
@@ -59,10 +55,6 @@ impl Observer for Fixes {
             let range_m = Vector3::norm(&fix.lamp_in_camera);
             self.of_method[fix.method as usize].push((range_m, fix.chainage_m - truth_m));
         }
-        Ok(())
-    }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use crate::scenario::Scenario;
-use crate::session::{Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, run};
+use crate::session::{Event, Observer, ObserverError, RendererChoice, RunOptions, run};
 use crate::settings::read_toml;
 use crate::track::Tunnel;
 use crate::twin::render::View;
@@ -17,10 +17,6 @@ struct Seen {
 }
 
 impl Observer for Seen {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
             Event::Exposure(exposure) => {
@@ -41,10 +37,6 @@ impl Observer for Seen {
             }
             _ => {}
         }
-        Ok(())
-    }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
         Ok(())
     }
 }
