@@ -1,6 +1,12 @@
 //! Conditions between named values: `gap_m > 2.0 * size_m && !(dark || wet)`.
 
-use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator, ops_factory};
+use exmex::regex::{Captures, Regex};
+use exmex::{
+    BinOp, Express, FlatEx, MakeOperators, MatchLiteral, Operator, literal_matcher_from_pattern,
+    ops_factory,
+};
+use std::borrow::Cow;
+use std::sync::LazyLock;
 
 /// One operator between two numbers; a larger `prio` binds tighter.
 macro_rules! between {
@@ -61,12 +67,14 @@ ops_factory!(
     Operator::make_unary("floor", f64::floor)
 );
 
+literal_matcher_from_pattern!(Numbers, r"^([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?");
+
 /// A condition, parsed.
 #[derive(Clone, Debug)]
 pub struct Condition {
     text: String,
     /// Large: it holds its nodes by value.
-    expression: Box<FlatEx<f64, Operators>>,
+    expression: Box<FlatEx<f64, Operators, Numbers>>,
 }
 
 /// Why a condition cannot be used.
@@ -90,7 +98,7 @@ impl Condition {
         let form = |e: exmex::ExError| ConditionError::Form(text.to_owned(), e.to_string());
         Ok(Self {
             text: text.to_owned(),
-            expression: Box::new(FlatEx::parse(&plain(text)).map_err(form)?),
+            expression: Box::new(FlatEx::parse(&in_braces(text)).map_err(form)?),
         })
     }
 
@@ -131,49 +139,25 @@ impl Condition {
     }
 }
 
-/// In the form that the parser reads: names in braces, as it would take `min_gap_m` for the function `min`, and
-/// numbers without powers of ten, which it does not know.
-fn plain(text: &str) -> String {
-    let (mut out, mut rest) = (String::new(), text);
-    while let Some(first) = rest.chars().next() {
-        let length = match first {
-            '{' => rest.find('}').map_or(rest.len(), |k| k + 1),
-            '0'..='9' | '.' => number_length(rest),
-            'a'..='z' | 'A'..='Z' | '_' => word_length(rest),
-            _ => first.len_utf8(),
-        };
-        let (token, after) = rest.split_at(length);
-        let is_word = first.is_ascii_alphabetic() || first == '_';
-        match token.parse::<f64>() {
-            // Without an exponent, whatever its size.
-            Ok(number) if !is_word => out += &number.to_string(),
-            _ if is_word && !after.trim_start().starts_with('(') => out.extend(["{", token, "}"]),
-            _ => out += token,
-        }
-        rest = after;
-    }
-    out
-}
+/// Names in braces, whole numbers with their powers of ten, functions, and names without braces.
+#[allow(clippy::unwrap_used, reason = "the pattern is right")]
+static WORDS: LazyLock<Regex> = LazyLock::new(|| {
+    Regex::new(
+        r"(?x)
+          \{[^}]*\}?
+        | [0-9.]+ ([eE][+-]?[0-9]+)?
+        | [a-zA-Z_][a-zA-Z0-9_]* [\ \t\r\n]* \(
+        | (?<name>[a-zA-Z_][a-zA-Z0-9_]*)",
+    )
+    .unwrap()
+});
 
-fn word_length(text: &str) -> usize {
-    let is_inner = |c: char| c.is_ascii_alphanumeric() || c == '_';
-    text.find(|c| !is_inner(c)).unwrap_or(text.len())
-}
-
-/// Of digits with a point, and of a power of ten behind them.
-fn number_length(text: &str) -> usize {
-    let digits = |t: &str| t.find(|c: char| !c.is_ascii_digit()).unwrap_or(t.len());
-    let mantissa = text
-        .find(|c: char| !c.is_ascii_digit() && c != '.')
-        .unwrap_or(text.len());
-    let Some(power) = text[mantissa..].strip_prefix(['e', 'E']) else {
-        return mantissa;
-    };
-    let sign = usize::from(power.starts_with(['+', '-']));
-    match digits(&power[sign..]) {
-        0 => mantissa,
-        n => mantissa + 1 + sign + n,
-    }
+/// With all names in braces: the parser would take `min_gap_m` for the function `min`.
+fn in_braces(text: &str) -> Cow<'_, str> {
+    WORDS.replace_all(text, |word: &Captures<'_>| match word.name("name") {
+        Some(name) => format!("{{{}}}", name.as_str()),
+        None => word[0].to_owned(),
+    })
 }
 
 #[cfg(test)]
