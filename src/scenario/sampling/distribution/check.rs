@@ -1,6 +1,6 @@
 //! Distributions that are none.
 
-use super::Cut;
+use super::TruncatedNormal;
 use crate::scenario::sampling::Distribution;
 use crate::settings::{Problem, Settings};
 
@@ -38,7 +38,7 @@ impl Distribution {
                     let what = format!("mean {mean}, sigma {sigma}");
                     return Some((what, "give a finite mean and a sigma over 0"));
                 }
-                limits(*min, *max).or_else(|| left(self.cut()?))
+                limits(*min, *max).or_else(|| left(self.truncated_normal()?))
             }
             Self::LogNormal {
                 median,
@@ -53,7 +53,7 @@ impl Distribution {
                 if min.is_some_and(|m| m < 0.0) || max.is_some_and(|m| m <= 0.0) {
                     return Some(("limits below 0".into(), "its values are all over 0"));
                 }
-                limits(*min, *max).or_else(|| left(self.cut()?))
+                limits(*min, *max).or_else(|| left(self.truncated_normal()?))
             }
             Self::Triangular { min, mode, max } => order(*min, *max).or_else(|| {
                 let what = || format!("mode {mode} is not from min {min} to max {max}");
@@ -93,8 +93,8 @@ fn limits(min: Option<f64>, max: Option<f64>) -> Option<Flaw> {
     order(min.unwrap_or(f64::MIN), max.unwrap_or(f64::MAX))
 }
 
-fn left(cut: Cut) -> Option<Flaw> {
-    let enough = cut.share() >= LEAST_SHARE && cut.share().is_finite();
+fn left(normal: TruncatedNormal) -> Option<Flaw> {
+    let enough = normal.share() >= LEAST_SHARE && normal.share().is_finite();
     let what = "min and max leave nothing of it";
     (!enough).then(|| (what.into(), "give limits nearer to its middle"))
 }

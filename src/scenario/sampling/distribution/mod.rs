@@ -2,11 +2,11 @@
 //! that any plan of points serves any distribution.
 
 mod check;
-mod cut;
+mod truncated;
 
 use super::settings::Distribution;
-use cut::Cut;
 use toml::Value;
+use truncated::TruncatedNormal;
 
 impl Distribution {
     /// Whether it is swept, not drawn.
@@ -29,26 +29,12 @@ impl Distribution {
     /// integral of other^2 / own is finite. Of what covers the other one, only tails without an end and
     /// corners of triangles can fall off too fast; the latter are turned down as a whole.
     pub fn bounds_weights_of(&self, other: &Self) -> bool {
-        let wide = |own: f64, other: f64| 2.0 * own * own > other * other;
         match (self, other) {
-            (
-                Self::Normal { sigma, .. },
-                Self::Normal {
-                    sigma: of,
-                    min,
-                    max,
-                    ..
-                },
-            ) => (min.is_some() && max.is_some()) || wide(*sigma, *of),
-            (
-                Self::LogNormal { sigma_ln, .. },
-                Self::LogNormal {
-                    sigma_ln: of,
-                    min,
-                    max,
-                    ..
-                },
-            ) => (min.is_some() && max.is_some()) || wide(*sigma_ln, *of),
+            (Self::Normal { .. }, Self::Normal { .. })
+            | (Self::LogNormal { .. }, Self::LogNormal { .. }) => {
+                let both = self.truncated_normal().zip(other.truncated_normal());
+                both.is_some_and(|(own, other)| own.bounds_weights_of(&other))
+            }
             // Its tail to the right is thicker than any normal one, and a normal one thinner.
             (Self::Normal { .. }, Self::LogNormal { max, .. }) => max.is_some(),
             (Self::Triangular { .. }, _) => self == other,
@@ -108,20 +94,20 @@ impl Distribution {
     }
 
     /// What is left of a normal distribution, or of that of a logarithm.
-    fn cut(&self) -> Option<Cut> {
+    fn truncated_normal(&self) -> Option<TruncatedNormal> {
         match *self {
             Self::Normal {
                 mean,
                 sigma,
                 min,
                 max,
-            } => Some(Cut::normal(mean, sigma, min, max)),
+            } => Some(TruncatedNormal::normal(mean, sigma, min, max)),
             Self::LogNormal {
                 median,
                 sigma_ln,
                 min,
                 max,
-            } => Some(Cut::log_normal(median, sigma_ln, min, max)),
+            } => Some(TruncatedNormal::log_normal(median, sigma_ln, min, max)),
             _ => None,
         }
     }
@@ -130,8 +116,8 @@ impl Distribution {
         Some(match *self {
             Self::Uniform { min, max } => min + u * (max - min),
             Self::LogUniform { min, max } => min * (u * (max / min).ln()).exp(),
-            Self::Normal { .. } => self.cut()?.quantile(u),
-            Self::LogNormal { .. } => self.cut()?.quantile(u).exp(),
+            Self::Normal { .. } => self.truncated_normal()?.quantile(u),
+            Self::LogNormal { .. } => self.truncated_normal()?.quantile(u).exp(),
             Self::Triangular { min, mode, max } => {
                 let rising = (mode - min) / (max - min);
                 if u < rising {
@@ -153,13 +139,13 @@ impl Distribution {
                 f64::NEG_INFINITY
             }
         };
-        let cut = self.cut();
+        let normal = self.truncated_normal();
         match *self {
             Self::Uniform { min, max } => within(min, max, 1.0 / (max - min)),
             Self::LogUniform { min, max } => within(min, max, 1.0 / (x * (max / min).ln())),
-            Self::Normal { .. } => cut.map_or(f64::NEG_INFINITY, |c| c.ln_density(x)),
+            Self::Normal { .. } => normal.map_or(f64::NEG_INFINITY, |n| n.ln_density(x)),
             Self::LogNormal { .. } if x > 0.0 => {
-                cut.map_or(f64::NEG_INFINITY, |c| c.ln_density(x.ln()) - x.ln())
+                normal.map_or(f64::NEG_INFINITY, |n| n.ln_density(x.ln()) - x.ln())
             }
             Self::Triangular { min, mode, max } => {
                 let height = 2.0 / (max - min);

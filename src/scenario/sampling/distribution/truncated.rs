@@ -3,7 +3,7 @@
 use statrs::distribution::{Continuous, ContinuousCDF, Normal};
 
 /// What two limits leave of a normal distribution.
-pub(super) struct Cut {
+pub(super) struct TruncatedNormal {
     mean: f64,
     sigma: f64,
     /// Limits in standard deviations.
@@ -11,7 +11,7 @@ pub(super) struct Cut {
     to: f64,
 }
 
-impl Cut {
+impl TruncatedNormal {
     pub(super) fn normal(mean: f64, sigma: f64, min: Option<f64>, max: Option<f64>) -> Self {
         let score = |x: f64| (x - mean) / sigma;
         Self {
@@ -40,6 +40,12 @@ impl Cut {
         } else {
             curve.cdf(self.to) - curve.cdf(self.from)
         }
+    }
+
+    /// Whether the weights of draws from it, which stand for those of another one, have a variance.
+    pub(super) fn bounds_weights_of(&self, other: &Self) -> bool {
+        let other_is_bounded = other.from.is_finite() && other.to.is_finite();
+        other_is_bounded || 2.0 * self.sigma.powi(2) > other.sigma.powi(2)
     }
 
     pub(super) fn quantile(&self, u: f64) -> f64 {
