@@ -99,14 +99,9 @@ impl Onboard {
 
     /// Of all trains of a file.
     fn of(file: &ScenarioFile) -> Vec<Self> {
-        let direction = |id: TrainId| {
-            let train = file.trains().nth(id.index());
-            train.map_or(Direction::Up, |train| train.direction)
-        };
-        let first = TrainId::default();
         let first = (file.train.is_some() || file.bench.is_some()).then(|| Self {
-            train: first,
-            direction: direction(first),
+            train: TrainId::default(),
+            direction: file.direction(0),
             rig: file.rig.clone(),
             imu: file.imu,
             odometer: file.odometer,
@@ -120,7 +115,7 @@ impl Onboard {
         });
         let others = file.onboard.iter().map(|other| Self {
             train: TrainId(other.train),
-            direction: direction(TrainId(other.train)),
+            direction: file.direction(other.train.into()),
             rig: other.rig.clone(),
             imu: other.imu,
             odometer: other.odometer,
@@ -180,6 +175,18 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    /// Of a file as it stands, without overrides.
+    pub(super) fn file(path: &Path, text: &str, source: FileError) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            text: text.to_owned(),
+            overrides: Vec::new(),
+            source,
+        }
+    }
+}
+
 fn list(overrides: &[Override]) -> String {
     let list: Vec<String> = overrides.iter().map(Override::to_string).collect();
     list.join(" ")
@@ -203,7 +210,7 @@ impl Scenario {
             overrides: overrides.to_vec(),
             source,
         };
-        // The file must be right by itself, so that its errors are not mixed up with those
+        // The file must be right by itself, so that its errors are not taken for those
         // of the command line.
         let mut file: ScenarioFile = read_toml(text).map_err(wrong)?;
         if !overrides.is_empty() {
@@ -340,32 +347,23 @@ fn unreadable(key: &str, path: &Path, kind: &str, error: &std::io::Error) -> Pro
 
 /// Reads and checks a vehicle file's text; `path` is for the messages.
 pub(crate) fn parse_vehicle(path: &Path, text: &str) -> Result<VehicleFile, ScenarioError> {
-    VehicleFile::from_toml(text).map_err(|source| in_file(path, text, source))
+    VehicleFile::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
 }
 
 /// Reads and checks a tunnel's text; `path` is for the messages.
 pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioError> {
-    Tunnel::from_toml(text).map_err(|source| in_file(path, text, source))
+    Tunnel::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
 }
 
 /// Reads a file's text.
 pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
     std::fs::read_to_string(path).map_err(|source| {
         let file = path.to_owned();
-        in_file(path, "", FileError::Read { path: file, source })
+        ScenarioError::file(path, "", FileError::Read { path: file, source })
     })
 }
 
 /// What is wrong with a file that no override has changed.
-fn in_file(path: &Path, text: &str, source: FileError) -> ScenarioError {
-    ScenarioError::File {
-        path: path.to_owned(),
-        text: text.to_owned(),
-        overrides: Vec::new(),
-        source,
-    }
-}
-
 /// A file with some of its keys set anew.
 pub(super) fn overridden(
     path: &Path,

@@ -1,5 +1,6 @@
 //! `--set key=value`: changes to a scenario from the command line.
 
+use crate::settings::key_below;
 use std::fmt;
 use std::str::FromStr;
 use toml::{Table, Value};
@@ -163,7 +164,7 @@ impl Override {
             place = match step {
                 Step::Key(name) => {
                     let table = place.as_table_mut().ok_or_else(|| no_table(&path))?;
-                    path = join(&path, &name);
+                    path = key_below(&path, &name);
                     table
                         .entry(name)
                         .or_insert_with(|| Value::Table(Table::new()))
@@ -184,14 +185,6 @@ impl Override {
         }
         *place = self.value.clone();
         Ok(())
-    }
-}
-
-fn join(path: &str, name: &str) -> String {
-    if path.is_empty() {
-        name.to_owned()
-    } else {
-        format!("{path}.{name}")
     }
 }
 

@@ -6,16 +6,13 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
+/// Headers, each with its cells.
+type Columns = Vec<(String, Vec<Value>)>;
+
 /// All tables of a study, by the name that the study has for the file.
 #[derive(Clone, Debug, Default)]
 pub struct Tables {
     tables: BTreeMap<String, Columns>,
-}
-
-#[derive(Clone, Debug)]
-struct Columns {
-    headers: Vec<String>,
-    rows: Vec<Vec<Value>>,
 }
 
 impl Tables {
@@ -38,13 +35,12 @@ impl Tables {
                     }
                 }
             }
-            if let Some(table) = tables.get(file)
-                && !table.headers.contains(column)
-            {
+            let headers: Vec<&str> = tables[file].iter().map(|(h, _)| h.as_str()).collect();
+            if !headers.contains(&column.as_str()) {
                 problems.push(Problem::new(
                     key,
                     format!("{file} has no column `{column}`"),
-                    format!("its columns are {}", table.headers.join(", ")),
+                    format!("its columns are {}", headers.join(", ")),
                 ));
             }
         }
@@ -57,21 +53,17 @@ impl Tables {
     }
 
     /// All values of a column.
-    pub fn values(&self, file: &str, column: &str) -> Vec<&Value> {
-        let of = |table: &'_ Columns| table.headers.iter().position(|h| h == column);
-        let found = self.tables.get(file).and_then(|t| Some((t, of(t)?)));
-        let cells = found
-            .into_iter()
-            .flat_map(|(t, k)| t.rows.iter().map(move |row| row.get(k)));
-        cells.flatten().collect()
+    pub fn values(&self, file: &str, column: &str) -> &[Value] {
+        let columns = self.tables.get(file).into_iter().flatten();
+        let mut cells = columns.filter(|(header, _)| header == column);
+        cells.next().map_or(&[], |(_, cells)| cells)
     }
 
     /// The value of a column in the row that a share `u` of all rows lies before.
     pub fn value(&self, file: &str, column: &str, u: f64) -> Option<Value> {
-        let table = self.tables.get(file)?;
-        let row = ((u * table.rows.len() as f64) as usize).min(table.rows.len() - 1);
-        let column = table.headers.iter().position(|h| h == column)?;
-        table.rows[row].get(column).cloned()
+        let cells = self.values(file, column);
+        let row = (u * cells.len() as f64) as usize;
+        cells.get(row).or(cells.last()).cloned()
     }
 }
 
@@ -82,15 +74,17 @@ fn read(path: &Path) -> Result<Columns, String> {
         .comment(Some(b'#'))
         .from_path(path)
         .map_err(failed)?;
-    let headers = reader.headers().map_err(failed)?.iter().map(str::to_owned);
-    let headers = headers.collect();
-    let row = |record: csv::StringRecord| record.iter().map(value).collect();
-    let rows = reader.records().map(|r| r.map(row));
-    let rows: Vec<_> = rows.collect::<Result<_, _>>().map_err(failed)?;
-    if rows.is_empty() {
+    let headers = reader.headers().map_err(failed)?.iter();
+    let mut columns: Columns = headers.map(|h| (h.to_owned(), Vec::new())).collect();
+    for record in reader.records() {
+        for ((_, cells), cell) in columns.iter_mut().zip(&record.map_err(failed)?) {
+            cells.push(value(cell));
+        }
+    }
+    if columns.iter().all(|(_, cells)| cells.is_empty()) {
         return Err(format!("{} has no rows", path.display()));
     }
-    Ok(Columns { headers, rows })
+    Ok(columns)
 }
 
 /// A number where it is one.

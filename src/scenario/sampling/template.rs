@@ -41,12 +41,7 @@ impl Template {
     /// Reads and checks a file, and the scenario that it is as it stands.
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
         let text = read(path)?;
-        let wrong = |source| ScenarioError::File {
-            path: path.to_owned(),
-            text: text.clone(),
-            overrides: Vec::new(),
-            source,
-        };
+        let wrong = |source| ScenarioError::file(path, &text, source);
         Scenario::from_text(path, &text, &[])?;
         let file: ScenarioFile = read_toml(&text).map_err(wrong)?;
         let settings = file.study.clone().ok_or_else(|| {
@@ -115,12 +110,10 @@ impl Template {
         };
         add(self.file.clone());
         for variable in self.settings.variables.values() {
-            let listed = match &variable.from {
-                Distribution::Choice { values, .. } | Distribution::Sweep { values } => {
-                    values.iter().collect()
-                }
+            let listed: &[Value] = match &variable.from {
+                Distribution::Choice { values, .. } | Distribution::Sweep { values } => values,
                 Distribution::Table { file, column } => self.tables.values(file, column),
-                _ => Vec::new(),
+                _ => &[],
             };
             for value in listed {
                 let changes = variable.overrides(value);
