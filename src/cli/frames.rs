@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
-use crate::record::dataset::{self, DataSet, FramePlan, Inputs, LabelKinds};
+use crate::record::dataset::{self, DataSet, FramePlan, LabelKinds, Provenance};
 use crate::scenario::{self, Override, Scenario};
 use crate::session::{self, End, RunOptions, Summary};
 use std::path::{Path, PathBuf};
@@ -85,7 +85,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let choice = args.renderer.into();
     let renderer = session::renderer(&scenario, choice).map_err(Failure::run)?;
     let overrides = args.overrides.iter();
-    let inputs = Inputs {
+    let provenance = Provenance {
         scenario: text,
         overrides: overrides
             .map(|o| format!("{}={}", o.key, o.value))
@@ -93,7 +93,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     };
     let progress = ProgressBar::new(RUN_BAR);
     let to_s = plan.to_s.min(scenario.duration_s);
-    let mut set = DataSet::new(&args.out, &scenario, plan, inputs, renderer, &STOP);
+    let mut set = DataSet::new(&args.out, &scenario, plan, provenance, renderer, &STOP);
     let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
         renderer: choice,

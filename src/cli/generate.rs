@@ -4,7 +4,7 @@ use super::fault::Failure;
 use super::print;
 use super::running::prepare;
 use crate::record;
-use crate::scenario::sampling::{Inputs, Sample, Template};
+use crate::scenario::sampling::{Inputs, ScenarioSample, Template};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -69,7 +69,7 @@ fn write(
     out: &Path,
     template: &Template,
     inputs: &Inputs,
-    samples: &[Sample],
+    samples: &[ScenarioSample],
     texts: &[String],
 ) -> io::Result<()> {
     inputs.copy_to(&out.join("inputs"))?;

@@ -5,7 +5,7 @@ use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_c
 use super::{print, table};
 use crate::bus::TrainId;
 use crate::record::{self, FixTable, Recording};
-use crate::scenario::sampling::Sample;
+use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RunOptions, Summary};
 use crate::study::{self, Fixes, Row, Study, StudyError};
@@ -89,7 +89,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     if args.json {
         print(&text)?;
     } else {
-        print(&table::of(&summary, &out))?;
+        print(&table::of(&summary, &out)?)?;
     }
     if let Some((sample, row)) = &task.of_study {
         compare(sample, row, &summary, &fixes)?;
@@ -114,7 +114,7 @@ struct Task {
     /// Where its results go.
     out: PathBuf,
     /// A study's draw, and its row.
-    of_study: Option<(Sample, Row)>,
+    of_study: Option<(ScenarioSample, Row)>,
 }
 
 fn task(args: &RunArgs) -> Result<Task, Failure> {
@@ -161,7 +161,12 @@ fn from_study(folder: &Path, index: u64) -> Result<Task, Failure> {
 }
 
 /// Says whether a run came out as it did in its study.
-fn compare(sample: &Sample, row: &Row, summary: &Summary, fixes: &Fixes) -> Result<(), Failure> {
+fn compare(
+    sample: &ScenarioSample,
+    row: &Row,
+    summary: &Summary,
+    fixes: &Fixes,
+) -> Result<(), Failure> {
     match row.difference(&Row::of(sample, summary, fixes)) {
         None => {
             eprintln!("equal to its row in the study, in every figure");

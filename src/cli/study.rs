@@ -4,8 +4,8 @@ use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RendererArg, STOP, prepare, stop_on_ctrl_c};
 use crate::record::parquet::Kind;
+use crate::record::render;
 use crate::scenario::sampling::Template;
-use crate::study::stats::Estimate;
 use crate::study::{
     self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
     Submission,
@@ -177,7 +177,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
             let rows = study.rows()?;
             let digest = Digest::of(&study.template, &rows);
             let page = study::report(&study, &digest, &rows)?;
-            print(&digest_text(&digest))?;
+            print(&digest_text(&digest)?)?;
             print(&format!("report  {}", page.display()))
         }
         StudyCommand::Compare(args) => compare(args),
@@ -210,7 +210,7 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
     let bar = ProgressBar::new("{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go");
     let show = |progress: &Progress| show(&bar, progress);
     let options = Options {
-        jobs: args.jobs.map_or(0, usize::from),
+        jobs: args.jobs.map(usize::from),
         resume: args.resume,
         shard: args.shard,
         renderer: args.renderer.into(),
@@ -259,24 +259,8 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
             Some(what) => Err(Failure::Run(anyhow::anyhow!("not the same: {what}"))),
         };
     }
-    let mut text = format!(
-        "{} pairs of runs; second less first, intervals of 95 %\n",
-        found.pairs
-    );
-    if found.sampled_otherwise > 0 {
-        text += &format!(
-            "{} of them were not drawn alike: their differences scatter as if there were no pairs (weighted \
-             runs have none)\n",
-            found.sampled_otherwise
-        );
-    }
-    for (name, unit, difference) in &found.differences {
-        let unit = if unit == "1" { "" } else { unit };
-        text += &format!("  {name:<28} {difference} {unit}\n");
-    }
-    if found.differences.is_empty() {
-        text += "no figure differs\n";
-    }
+    let template = include_str!("texts/comparison.txt");
+    let text = render("comparison.txt", template, found).map_err(Failure::run)?;
     print(&text)
 }
 
@@ -323,7 +307,7 @@ fn conclude(out: &Path, whole: bool) -> Result<(), Failure> {
     let study = Study::open(out)?;
     let rows = study.rows()?;
     let digest = Digest::of(&study.template, &rows);
-    print(&digest_text(&digest))?;
+    print(&digest_text(&digest)?)?;
     let planned = study.template.runs();
     if whole && (rows.len() as u64) < planned {
         print(&format!("stopped after {} of {planned} runs", rows.len()))?;
@@ -355,45 +339,9 @@ fn reasons(rows: &[Row]) -> Vec<(&str, usize)> {
     counts
 }
 
-fn digest_text(digest: &Digest) -> String {
-    let mut text = format!("{} runs, {} complete", digest.runs, digest.complete);
-    if digest.rejected > 0 {
-        text += &format!("; {} draws did not meet the conditions", digest.rejected);
-    }
-    if let Some(n) = digest.effective_runs {
-        text += &format!("; worth {n:.1} unweighted ones");
-    }
-    text += "\nintervals of 95 %\n";
-    for event in &digest.events {
-        let rate = match (&event.weighted, &event.rate) {
-            (Some(w), _) => format!(
-                "{}, from {} runs worth {:.1}",
-                w.rate, w.events, w.effective_events
-            ),
-            (None, Some(r)) => format!("{}, {} of {}", r.wilson, r.events, r.wilson.n),
-            (None, None) => "unknown".into(),
-        };
-        let lacking = match digest.complete.saturating_sub(event.runs) {
-            0 => String::new(),
-            n => format!("; {n} runs lack what it asks for"),
-        };
-        text += &format!("  {:<28} rate {rate}{lacking}\n", event.name);
-    }
-    for figure in &digest.figures {
-        let unit = figure.measure.unit;
-        let shown = |e: Option<Estimate>| e.map_or("-".into(), |e| e.to_string());
-        let [mean, p95] = [figure.mean, figure.quantiles[2]].map(shown);
-        let some = if figure.runs < digest.complete {
-            format!(", of {} runs", figure.runs)
-        } else {
-            String::new()
-        };
-        text += &format!(
-            "  {:<28} mean {mean}, 95 % below {p95} {unit}{some}\n",
-            figure.measure.name
-        );
-    }
-    text
+fn digest_text(digest: &Digest) -> Result<String, Failure> {
+    let template = include_str!("texts/digest.txt");
+    render("digest.txt", template, digest).map_err(Failure::run)
 }
 
 fn show(bar: &ProgressBar, progress: &Progress) {

@@ -1,118 +1,34 @@
 //! The short table at the end of a run.
 
-use crate::session::{
-    CameraFigures, Cost, Distribution, Protection, Summary, TrainFigures, Wayside,
-};
+use super::fault::Failure;
+use crate::record::render;
+use crate::session::{CameraFigures, Summary};
+use serde::Serialize;
 use std::path::Path;
 
-/// Dark lamps that the table names.
-const LAMPS: usize = 8;
 /// Faults of a camera that the table lists.
 const FAULTS: usize = 4;
-/// Hits that the table lists.
-const IMPACTS: usize = 10;
+
+#[derive(Serialize)]
+struct RunTable<'a> {
+    run: &'a Summary,
+    cameras: Vec<String>,
+    out: String,
+}
 
 /// The figures that one looks at first; all of them are in summary.json.
-pub(super) fn of(s: &Summary, out: &Path) -> String {
-    let mut text = format!(
-        "{}: {:.1} s simulated in {:.1} s ({:.2} x real time), seed {}\n",
-        s.scenario, s.simulated_s, s.wall_s, s.real_time_factor, s.seed
-    );
-    text += &format!(
-        "{} stereo pairs and {} wayside frames by {} ({}); physics {:.1} us a step\n",
-        s.stereo_frames,
-        s.wayside_frames,
-        s.renderer.adapter,
-        s.renderer.backend,
-        s.physics.us_per_step
-    );
-    text += &positioning(s);
-    text += &s.wayside.as_ref().map_or(String::new(), wayside);
-    text.extend(s.cameras.iter().map(|(name, c)| camera(name, c)));
-    text += &dark_lamps(&s.dark_lamps);
-    text += &s.protection.as_ref().map_or(String::new(), protection);
-    text += &s.train.as_ref().map_or(String::new(), train);
-    text + &format!("\nresults in {}\n", out.display())
-}
-
-fn train(t: &TrainFigures) -> String {
-    let [_, lateral, vertical] = t.floor_accel_rms_mps2;
-    let stop = match t.stop_error_m {
-        Some(error_m) => format!("; stopped {:.2} m off the mark", error_m.abs()),
-        None => String::new(),
+pub(super) fn of(run: &Summary, out: &Path) -> Result<String, Failure> {
+    let cameras = run.cameras.iter();
+    let table = RunTable {
+        run,
+        cameras: cameras.filter_map(|(name, c)| camera(name, c)).collect(),
+        out: out.display().to_string(),
     };
-    format!(
-        "train ran {:.1} m; floor {vertical:.3} m/s^2 vertical, {lateral:.3} lateral (RMS); \
-         wheel load down to {:.0} %; slip up to {:.2} m/s{stop}\n",
-        t.run_m,
-        100.0 * t.least_wheel_load_share,
-        t.most_slip_mps,
-    )
-}
-
-fn positioning(s: &Summary) -> String {
-    if s.positioning.is_empty() {
-        return String::new();
-    }
-    let mut text = format!(
-        "\n{:10} {:>7} {:>7} {:>7}   {:>6} {:>6} {:>6} {:>6}   {:>10}\n",
-        "position", "fixes", "avail.", "decoded", "mean", "p75", "p95", "max", "cost p50"
-    );
-    for (method, p) in &s.positioning {
-        let percent = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.1} %", x * 100.0));
-        let cm = |pick: fn(&Distribution) -> f64| {
-            p.error_m
-                .map_or("-".to_owned(), |d| format!("{:.1}", pick(&d) * 100.0))
-        };
-        text += &format!(
-            "{:10} {:>7} {:>7} {:>7}   {:>6} {:>6} {:>6} {:>6} cm {:>7}\n",
-            method.to_string(),
-            p.fixes,
-            percent(p.availability),
-            percent(p.uid_decode_rate),
-            cm(|d| d.mean),
-            cm(|d| d.p75),
-            cm(|d| d.p95),
-            cm(|d| d.max),
-            cost(p.ms_per_frame),
-        );
-    }
-    text
-}
-
-fn cost(cost: Option<Cost>) -> String {
-    cost.map_or("-".to_owned(), |c| format!("{:.2} ms", c.p50))
-}
-
-fn wayside(w: &Wayside) -> String {
-    let heading = match w.obstacles.is_empty() {
-        true => "no obstacle",
-        false => "obstacle, size      first seen   after   distance error",
-    };
-    let value = |x: Option<f64>, unit: &str| match x {
-        Some(x) => format!("{x:.2} {unit}"),
-        None => "-".to_owned(),
-    };
-    let obstacles = w.obstacles.iter().map(|o| {
-        format!(
-            "{:12} {:.2} m {:>11} {:>8} {:>12}\n",
-            o.name,
-            o.size_m,
-            value(o.first_detected_s, "s"),
-            value(o.latency_s, "s"),
-            value(o.distance_error_m, "m"),
-        )
-    });
-    format!(
-        "\n{heading}\n{}{} false alarms, {} a frame\n",
-        obstacles.collect::<String>(),
-        w.false_alarms,
-        cost(w.ms_per_frame)
-    )
+    render("run.txt", include_str!("texts/run.txt"), table).map_err(Failure::run)
 }
 
 /// Only of a camera that had something.
-fn camera(name: &str, camera: &CameraFigures) -> String {
+fn camera(name: &str, camera: &CameraFigures) -> Option<String> {
     let mut parts = Vec::new();
     if camera.lost_frames > 0 {
         parts.push(format!("{} frames lost", camera.lost_frames));
@@ -125,50 +41,165 @@ fn camera(name: &str, camera: &CameraFigures) -> String {
     if camera.faults.len() > FAULTS {
         parts.push(format!("{} faults in all", camera.faults.len()));
     }
-    match parts.is_empty() {
-        true => String::new(),
-        false => format!("\ncamera {name}: {}\n", parts.join(", ")),
-    }
+    (!parts.is_empty()).then(|| format!("{name}: {}", parts.join(", ")))
 }
 
-/// How many lamps are out, with the first ones' names.
-fn dark_lamps(names: &[String]) -> String {
-    match names.len() {
-        0 => String::new(),
-        n if n <= LAMPS => format!("dark lamps: {}\n", names.join(", ")),
-        n => format!("{n} dark lamps: {}, ...\n", names[..LAMPS].join(", ")),
-    }
-}
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use crate::bus::{CameraFault, Method, SimTime, TrainId};
+    use crate::session::{
+        Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning, Protection,
+        TrainFigures, WallShares, Wayside,
+    };
+    use crate::twin::physics::{Damage, Impact};
+    use crate::twin::render::Backend;
+    use std::collections::BTreeMap;
 
-fn protection(p: &Protection) -> String {
-    let mut text = match p.brake_commanded_s {
-        Some(t) => format!("\nprotection braked at {t:.2} s"),
-        None => "\nprotection did not brake".to_owned(),
-    };
-    if let Some(t) = p.stopped_s {
-        text += &format!(", the train stood at {t:.2} s");
+    /// A run with nothing but its speed.
+    fn bare() -> Summary {
+        Summary {
+            scenario: "gallery".into(),
+            seed: 7,
+            end: End::Complete,
+            simulated_s: 60.04,
+            wall_s: 12.06,
+            real_time_factor: 4.978,
+            renderer: Backend {
+                backend: "vulkan".into(),
+                adapter: "llvmpipe".into(),
+            },
+            stereo_frames: 0,
+            wayside_frames: 3,
+            physics: Physics { us_per_step: 80.25 },
+            wall_shares_s: WallShares {
+                physics_s: 0.0,
+                submit_s: 0.0,
+                wait_s: 0.0,
+                stack_s: 0.0,
+                record_s: 0.0,
+            },
+            positioning: BTreeMap::new(),
+            wayside: None,
+            cameras: BTreeMap::new(),
+            dark_lamps: Vec::new(),
+            protection: None,
+            train: None,
+            trains: Vec::new(),
+        }
     }
-    if let Some(margin) = p.stop_margin_m {
-        text += &format!(", {margin:.1} m before the obstacle");
+
+    /// A run with everything that the table has a place for.
+    fn full() -> Summary {
+        let method = |error_m: Option<f64>| Positioning {
+            fixes: 12,
+            availability: error_m.map(|_| 0.923),
+            uid_decode_rate: error_m,
+            wrong_uid: 0,
+            error_m: error_m.map(|e| Distribution {
+                mean: e,
+                p50: e,
+                p75: 2.0 * e,
+                p95: 3.0 * e,
+                p99: 3.5 * e,
+                max: 4.0 * e,
+            }),
+            ms_per_frame: error_m.map(|e| Cost { p50: e, p99: e }),
+            nees_mean: None,
+        };
+        let span = |fault, to_s| FaultSpan {
+            fault,
+            from_s: 1.0,
+            to_s,
+        };
+        let faults = [(CameraFault::Missing, Some(2.5)), (CameraFault::Late, None)];
+        let faults = faults.into_iter().cycle().take(5);
+        let impact = Impact {
+            train: TrainId(0),
+            time: SimTime::from_secs(31.5),
+            with: "toolbox".into(),
+            speed_mps: 10.0,
+            momentum_n_s: 1234.5,
+            energy_j: 5000.0,
+            energy_lost_j: 1500.0,
+            damage: Damage::BeyondDesign,
+        };
+        let obstacle = |first_detected_s| ObstacleScore {
+            name: "toolbox".into(),
+            size_m: 0.4,
+            first_detected_s,
+            latency_s: None,
+            distance_error_m: first_detected_s,
+        };
+        Summary {
+            positioning: [
+                (Method::Mono, method(None)),
+                (Method::Stereo, method(Some(0.0123))),
+            ]
+            .into(),
+            wayside: Some(Wayside {
+                obstacles: vec![obstacle(Some(4.25)), obstacle(None)],
+                false_alarms: 2,
+                ms_per_frame: None,
+            }),
+            cameras: [
+                ("rig.left".into(), CameraFigures::default()),
+                (
+                    "W1530".into(),
+                    CameraFigures {
+                        lost_frames: 3,
+                        faults: faults.map(|(fault, to_s)| span(fault, to_s)).collect(),
+                    },
+                ),
+            ]
+            .into(),
+            dark_lamps: (1..=9).map(|k| format!("1-{k}")).collect(),
+            protection: Some(Protection {
+                brake_commanded_s: Some(20.0),
+                stopped_s: Some(30.006),
+                stop_margin_m: Some(-1.25),
+                collision: true,
+                impacts: vec![impact; 11],
+            }),
+            train: Some(TrainFigures {
+                run_m: 512.34,
+                stop_error_m: Some(-0.256),
+                least_wheel_load_share: 0.876,
+                most_slip_mps: 0.123,
+                floor_accel_rms_mps2: [0.1, 0.2, 0.3456],
+                ..TrainFigures::default()
+            }),
+            ..bare()
+        }
     }
-    text += match p.collision {
-        true => "; COLLISION\n",
-        false => "; no collision\n",
-    };
-    text.extend(p.impacts.iter().take(IMPACTS).map(|hit| {
-        format!(
-            "  hit {} at {:.2} s with {:.1} km/h: {:.0} N s, {:.2} kJ of {:.2} kJ lost, {} damage\n",
-            hit.with,
-            hit.time.secs(),
-            3.6 * hit.speed_mps,
-            hit.momentum_n_s,
-            1e-3 * hit.energy_lost_j,
-            1e-3 * hit.energy_j,
-            hit.damage,
-        )
-    }));
-    match p.impacts.len().saturating_sub(IMPACTS) {
-        0 => text,
-        more => text + &format!("  and {more} more hits: see summary.json\n"),
+
+    /// Fails where a template asks for what is not there, or a part of the table is lost.
+    #[test]
+    fn the_table_shows_what_there_is() {
+        let text = |run: &Summary| of(run, Path::new("out/x")).unwrap();
+        assert_eq!(
+            text(&bare()),
+            "gallery: 60.0 s simulated in 12.1 s (4.98 x real time), seed 7\n\
+             0 stereo pairs and 3 wayside frames by llvmpipe (vulkan); physics 80.2 us a step\n\
+             \nresults in out/x"
+        );
+        let text = text(&full());
+        for line in [
+            "paper           12  92.3 %   1.2 %      1.2    2.5    3.7    4.9 cm 0.01 ms",
+            "mono            12       -       -        -      -      -      - cm       -",
+            "toolbox      0.40 m      4.25 s        -       4.25 m",
+            "2 false alarms, - a frame",
+            "camera W1530: 3 frames lost, no image from 1.00 to 2.50 s, too late from 1.00 s to the end, \
+             no image from 1.00 to 2.50 s, too late from 1.00 s to the end, 5 faults in all",
+            "9 dark lamps: 1-1, 1-2, 1-3, 1-4, 1-5, 1-6, 1-7, 1-8, ...",
+            "protection braked at 20.00 s, the train stood at 30.01 s, -1.2 m before the obstacle; COLLISION",
+            "  hit toolbox at 31.50 s with 36.0 km/h: 1234 N s, 1.50 kJ of 5.00 kJ lost, beyond design damage",
+            "  and 1 more hits: see summary.json",
+            "train ran 512.3 m; floor 0.346 m/s^2 vertical, 0.200 lateral (RMS); wheel load down to 88 %; \
+             slip up to 0.12 m/s; stopped 0.26 m off the mark",
+        ] {
+            assert!(text.lines().any(|l| l == line), "{line}\n{text}");
+        }
     }
 }

@@ -38,10 +38,12 @@ mod plots;
 mod scene;
 mod stream;
 mod tables;
+mod template;
 mod texts;
 mod whole_files;
 
 pub use tables::FixTable;
+pub(crate) use template::render;
 pub(crate) use whole_files::write_whole;
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};

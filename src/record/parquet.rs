@@ -83,13 +83,13 @@ pub const fn column(
 }
 
 /// The kind of column that a field of a row makes.
-pub(super) trait Cell {
+pub(super) trait ColumnType {
     const KIND: Kind;
 }
 
 macro_rules! cells {
     ($($type:ty => $kind:ident),* $(,)?) => {
-        $(impl Cell for $type {
+        $(impl ColumnType for $type {
             const KIND: Kind = Kind::$kind;
         })*
     };
@@ -106,11 +106,11 @@ cells! {
     Vec<f64> => Reals,
 }
 
-impl<const N: usize> Cell for [f64; N] {
+impl<const N: usize> ColumnType for [f64; N] {
     const KIND: Kind = Kind::Reals;
 }
 
-impl<T: Cell> Cell for Option<T> {
+impl<T: ColumnType> ColumnType for Option<T> {
     const KIND: Kind = T::KIND;
 }
 
@@ -133,7 +133,7 @@ macro_rules! table_rows {
             pub(super) const COLUMNS: &[$crate::record::parquet::Column] = &[
                 $($crate::record::parquet::column(
                     stringify!($field),
-                    <$type as $crate::record::parquet::Cell>::KIND,
+                    <$type as $crate::record::parquet::ColumnType>::KIND,
                     $unit,
                     concat!($($meaning),+).trim_ascii(),
                 ),)+
@@ -154,13 +154,13 @@ pub fn describe(columns: &[Column]) -> String {
 }
 
 /// A table on its way into a file.
-pub struct Table {
+pub struct ParquetTable {
     path: PathBuf,
     rows: Decoder,
     writer: ArrowWriter<File>,
 }
 
-impl Table {
+impl ParquetTable {
     /// Begins a file; it gets its name in [`Self::close`].
     pub fn create(path: PathBuf, columns: &[Column]) -> Result<Self> {
         let fields = columns.iter().map(|c| {

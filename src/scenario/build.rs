@@ -363,7 +363,6 @@ pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
     })
 }
 
-/// What is wrong with a file that no override has changed.
 /// A file with some of its keys set anew.
 pub(super) fn overridden(
     path: &Path,

@@ -39,6 +39,7 @@ pub use event::{
 };
 pub use fitting::{Fitted, Fitting, Mounted};
 pub use speed::{Speeds, measure};
+pub(crate) use summary::quantile;
 pub use summary::{
     CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
     Protection, Summary, TrainFigures, TrainSummary, WallShares, Wayside,

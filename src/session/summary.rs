@@ -212,7 +212,7 @@ impl Cost {
 }
 
 /// Linear interpolation between order statistics (numpy's default) of sorted values.
-fn quantile(sorted: &[f64], p: f64) -> f64 {
+pub(crate) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let x = p * (sorted.len() - 1) as f64;
     let k = x.floor() as usize;
     let next = sorted[(k + 1).min(sorted.len() - 1)];

@@ -1,48 +1,69 @@
 //! Units, which the names of keys end with.
 
-/// Units that messages write as keys do.
-const AS_IN_KEYS: [&str; 18] = [
-    "cars", "cd", "deg", "e", "g", "kg", "m", "mg", "mm", "ms", "points", "px", "rows", "runs",
-    "s", "trains", "um", "us",
-];
-
-/// Other endings of keys, and the unit as messages have it.
-const UNITS: [(&str, &str); 26] = [
+/// Endings of keys with their units.
+const UNITS: [(&str, &str); 46] = [
     ("_c", "deg C"),
+    ("_c_per_m", "deg C/m"),
+    ("_cd", "cd"),
     ("_db", "dB"),
+    ("_deg", "deg"),
     ("_deg_h", "deg/h"),
     ("_deg_s", "deg/s"),
     ("_deg_sqrt_h", "deg/sqrt(h)"),
+    ("_e", "e"),
     ("_e_per_s", "e/s"),
+    ("_g", "g"),
     ("_ghz", "GHz"),
+    ("_grey", "grey"),
     ("_hz", "Hz"),
+    ("_kg", "kg"),
     ("_kg_m2", "kg m^2"),
     ("_kg_per_m", "kg/m"),
     ("_kmh", "km/h"),
+    ("_kn", "kN"),
     ("_kn_s_m", "kN s/m"),
+    ("_kw", "kW"),
     ("_lm_per_w", "lm/W"),
     ("_lx", "lx"),
+    ("_m", "m"),
+    ("_mg", "mg"),
+    ("_mm", "mm"),
     ("_mn_m", "MN/m"),
     ("_mn_m_rad", "MN m/rad"),
     ("_mps", "m/s"),
     ("_mps2", "m/s^2"),
     ("_mps3", "m/s^3"),
     ("_mps_sqrt_h", "m/s/sqrt(h)"),
+    ("_ms", "ms"),
+    ("_ms_per_s", "ms/s"),
     ("_n", "N"),
     ("_per_m", "1/m"),
     ("_per_s", "1/s"),
     ("_permille", "permille"),
+    ("_px", "px"),
+    ("_rad", "rad"),
     ("_rad_s", "rad/s"),
+    ("_rows", "rows"),
+    ("_s", "s"),
+    ("_um", "um"),
+    ("_us", "us"),
     ("_w", "W"),
 ];
 
-/// The unit of a key; empty for a number without one.
-pub(super) fn of_key(key: &str) -> &'static str {
+/// What keys count.
+const COUNTS: [&str; 4] = ["cars", "runs", "points", "trains"];
+
+/// The unit that the end of a key names.
+pub fn unit_in(key: &str) -> Option<&'static str> {
     let fitting = UNITS.iter().filter(|(ending, _)| key.ends_with(ending));
     let longest = fitting.max_by_key(|(ending, _)| ending.len());
-    let last_word = key.rsplit(['_', '.']).next().unwrap_or(key);
-    let as_in_key = AS_IN_KEYS.into_iter().find(|unit| *unit == last_word);
-    longest.map(|(_, unit)| *unit).or(as_in_key).unwrap_or("")
+    longest.map(|(_, unit)| *unit)
+}
+
+/// The unit of a key, or what it counts; empty for a number without either.
+pub(super) fn of_key(key: &str) -> &'static str {
+    let counted = || COUNTS.into_iter().find(|count| key.ends_with(count));
+    unit_in(key).or_else(counted).unwrap_or_default()
 }
 
 #[cfg(test)]

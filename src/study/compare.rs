@@ -2,13 +2,14 @@
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
 use super::digest::is_weighted;
-use super::stats::{Estimate, mean, weighted_mean};
+use super::stats::{IntervalEstimate, mean, weighted_mean};
 use super::{MEASURES, Result, Row, Study};
 use crate::record::parquet::Kind;
+use serde::Serialize;
 use std::path::Path;
 
 /// What differs between two studies, b less a.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Rows of the first.
     pub rows: usize,
@@ -18,7 +19,7 @@ pub struct Comparison {
     /// are then two, have no differences.
     pub sampled_otherwise: usize,
     /// Name, unit, and mean difference of each figure and event that differs in some run.
-    pub differences: Vec<(String, String, Estimate)>,
+    pub differences: Vec<(String, String, IntervalEstimate)>,
     /// The first thing in which they are not the same, value by value, wall times aside.
     pub first_difference: Option<String>,
 }

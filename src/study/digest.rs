@@ -1,8 +1,8 @@
 //! What the rows of a study come to.
 
 use super::stats::{
-    Estimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean, quantile,
-    rank_correlation, rate, weighted_mean, weighted_rate,
+    IntervalEstimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean,
+    quantile, rank_correlation, rate, weighted_mean, weighted_rate,
 };
 use super::{MEASURES, Measure, Row};
 use crate::record::parquet::Kind;
@@ -53,21 +53,21 @@ pub struct FigureDigest {
     /// How many runs have it.
     pub runs: usize,
     /// Its mean.
-    pub mean: Option<Estimate>,
+    pub mean: Option<IntervalEstimate>,
     /// Its [`QUANTILES`].
-    pub quantiles: [Option<Estimate>; QUANTILES.len()],
+    pub quantiles: [Option<IntervalEstimate>; QUANTILES.len()],
     /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
     /// no quantiles and drivers: theirs are not those of the distributions that were asked for.
-    pub drivers: Vec<Driver>,
+    pub drivers: Vec<Sensitivity>,
 }
 
 /// A variable as the cause of a figure.
 #[derive(Clone, Debug, Serialize)]
-pub struct Driver {
+pub struct Sensitivity {
     /// The variable.
     pub variable: String,
     /// Spearman's rank correlation; `None` of names.
-    pub correlation: Option<Estimate>,
+    pub correlation: Option<IntervalEstimate>,
     /// First-order Sobol index; `None` where inputs are not independent.
     pub first_order: Option<f64>,
 }
@@ -121,19 +121,12 @@ pub fn is_weighted(template: &Template) -> bool {
 
 /// Whether two variables come from one table, whose rows tie them together.
 fn shares_a_table(template: &Template) -> bool {
-    let files = template
-        .settings
-        .variables
-        .values()
-        .filter_map(|v| match &v.from {
-            Distribution::Table { file, .. } => Some(file),
-            _ => None,
-        });
-    let files: Vec<_> = files.collect();
-    files
-        .iter()
-        .enumerate()
-        .any(|(k, file)| files[..k].contains(file))
+    let mut files = BTreeSet::new();
+    let mut variables = template.settings.variables.values();
+    variables.any(|v| match &v.from {
+        Distribution::Table { file, .. } => !files.insert(file),
+        _ => false,
+    })
 }
 
 fn is_shown(measure: &Measure) -> bool {
@@ -164,7 +157,7 @@ impl FigureDigest {
         let mean = mean(&sample);
         sample.sort_by(f64::total_cmp);
         let variables = template.settings.variables.keys();
-        let drivers = variables.map(|name| Driver::of(template, name, measure, rows));
+        let drivers = variables.map(|name| Sensitivity::of(template, name, measure, rows));
         Some(Self {
             measure,
             runs: sample.len(),
@@ -175,7 +168,7 @@ impl FigureDigest {
     }
 }
 
-impl Driver {
+impl Sensitivity {
     fn of(template: &Template, name: &str, measure: &Measure, rows: &[&Row]) -> Self {
         let settings = &template.settings;
         let pairs = rows

@@ -64,7 +64,7 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>> {
 }
 
 fn wrong<T>(what: String) -> Result<T> {
-    Err(StudyError::Shards(what))
+    Err(StudyError::Unusable(what))
 }
 
 /// A folder that holds another study is left alone.

@@ -42,7 +42,7 @@ mod table;
 mod worker;
 
 pub use compare::{Comparison, compare};
-pub use digest::{Digest, Driver, EventDigest, FigureDigest, QUANTILES};
+pub use digest::{Digest, EventDigest, FigureDigest, QUANTILES, Sensitivity};
 pub use folder::Study;
 pub use journal::read as read_rows;
 pub use manifest::{INPUTS, MANIFEST, Manifest, Shard};
@@ -109,19 +109,13 @@ pub enum StudyError {
     /// There is no study in a folder.
     #[error("{} holds no study (no {MANIFEST}); give the --out of a `study run`", .0.display())]
     NoStudy(PathBuf),
-    /// Shards that are not a whole.
-    #[error("{0}")]
-    Shards(String),
-    /// An error of Slurm's.
-    #[error("{0}")]
-    Slurm(String),
     /// No run can be drawn.
     #[error(transparent)]
     Sample(#[from] SampleError),
     /// An event that cannot be worked out.
     #[error("study.events: {0}")]
     Event(#[from] ConditionError),
-    /// A name or number that cannot be used.
+    /// A name or number that cannot be used, shards that are not a whole, or an error of Slurm's.
     #[error("{0}")]
     Unusable(String),
     /// A name that no interval can be had of.

@@ -1,7 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
-use crate::scenario::sampling::{Sample, SampleError};
+use crate::scenario::sampling::{SampleError, ScenarioSample};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -52,15 +52,15 @@ impl Row {
 
     /// Of a run for which nothing could be drawn.
     pub fn not_sampled(index: u64, error: &SampleError) -> Self {
-        let sample = Sample {
+        let sample = ScenarioSample {
             index,
-            ..Sample::default()
+            ..ScenarioSample::default()
         };
         Self::without_figures(&sample, Status::Invalid, error.to_string())
     }
 
     /// Of a run that has no figures.
-    pub fn without_figures(sample: &Sample, status: Status, reason: String) -> Self {
+    pub fn without_figures(sample: &ScenarioSample, status: Status, reason: String) -> Self {
         let json = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
         let values = sample
             .values
@@ -79,7 +79,7 @@ impl Row {
     }
 
     /// Of a run that has come to an end.
-    pub fn of(sample: &Sample, summary: &Summary, fixes: &Fixes) -> Self {
+    pub fn of(sample: &ScenarioSample, summary: &Summary, fixes: &Fixes) -> Self {
         let (status, reason) = match &summary.end {
             End::Complete => (Status::Complete, None),
             End::Interrupted => (Status::Failed, Some("broken off".to_owned())),

@@ -16,8 +16,8 @@ use std::time::{Duration, Instant};
 /// How to run a study, apart from what its file says.
 #[derive(Default)]
 pub struct Options<'a> {
-    /// Workers; 0 is one a core.
-    pub jobs: usize,
+    /// Workers. Default: one a core.
+    pub jobs: Option<usize>,
     /// Go on with what the folder holds.
     pub resume: bool,
     /// Only a part of it.
@@ -67,7 +67,7 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> 
     }
     let precision = Precision::of(template)?;
     if precision.is_some() && in_shards {
-        return Err(StudyError::Shards(
+        return Err(StudyError::Unusable(
             "study.stop.when looks at all runs, and a shard does not see the others': run the study \
              whole, or without it"
                 .into(),
@@ -172,11 +172,7 @@ fn pool<'a>(folder: &'a Path, manifest: &Manifest, options: &Options<'_>) -> Res
         program: std::env::current_exe().map_err(StudyError::Worker)?,
         folder,
         renderer: if is_plain { "cpu" } else { "gpu" },
-        jobs: if options.jobs == 0 {
-            cores
-        } else {
-            options.jobs
-        },
+        jobs: options.jobs.unwrap_or(cores),
         run_limit: options.run_limit.unwrap_or(limit),
     })
 }

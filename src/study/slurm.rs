@@ -113,19 +113,19 @@ impl Submission {
             .output();
         let output = output.map_err(|e| {
             match e.kind() {
-            io::ErrorKind::NotFound => StudyError::Slurm(
+            io::ErrorKind::NotFound => StudyError::Unusable(
                 "sbatch is not there: install Slurm's client (on Debian: slurm-client), or run the \
                  shards yourself with --shard and merge them"
                     .into(),
             ),
-            _ => StudyError::Slurm(format!("sbatch: {e}")),
+            _ => StudyError::Unusable(format!("sbatch: {e}")),
         }
         })?;
         let stdout = String::from_utf8_lossy(&output.stdout);
         if !output.status.success() {
             let why = String::from_utf8_lossy(&output.stderr);
             let why = format!("{} {}", why.trim(), stdout.trim());
-            return Err(StudyError::Slurm(format!(
+            return Err(StudyError::Unusable(format!(
                 "sbatch {}: {why}",
                 script.display()
             )));

@@ -4,7 +4,7 @@
 //! than it says, the more so the skewer the figure is.
 
 use super::digest::is_weighted;
-use super::stats::{Estimate, mean, rate};
+use super::stats::{IntervalEstimate, mean, rate};
 use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
@@ -76,7 +76,7 @@ impl Precision {
 
     fn is_known(&self, rows: &[Row]) -> bool {
         let rows = || rows.iter().filter(|r| r.is_complete());
-        let estimate: Option<Estimate> = match &self.figure {
+        let estimate: Option<IntervalEstimate> = match &self.figure {
             Figure::Mean(name) => mean(&rows().filter_map(|r| r.number(name)).collect::<Vec<_>>()),
             Figure::Rate(condition) => {
                 let happened: Vec<bool> = rows().filter_map(|r| r.happened(condition)).collect();
@@ -85,7 +85,8 @@ impl Precision {
             }
         };
         // A figure that has not varied yet is not known at all.
-        let known = |e: Estimate| e.high > e.low && 0.5 * (e.high - e.low) <= self.half_width;
+        let known =
+            |e: IntervalEstimate| e.high > e.low && 0.5 * (e.high - e.low) <= self.half_width;
         estimate.is_some_and(known)
     }
 }

@@ -1,8 +1,9 @@
 //! Rows as a table in Parquet.
 
 use super::{MEASURES, Result, Row, Status, StudyError, measure};
-use crate::record::parquet::{Column, Kind, Table, column};
+use crate::record::parquet::{Column, Kind, ParquetTable, column};
 use crate::scenario::sampling::{Condition, ConditionError, Template, VariableSettings};
+use crate::settings;
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -101,7 +102,7 @@ pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result {
     let columns = OWN.into_iter().chain(variables.iter().cloned());
     let columns: Vec<_> = columns.chain(events).chain(measures).collect();
 
-    let mut table = Table::create(folder.join(TABLE), &columns)?;
+    let mut table = ParquetTable::create(folder.join(TABLE), &columns)?;
     for row in rows {
         let mut others = row.figures.clone();
         for column in &variables {
@@ -162,49 +163,8 @@ pub fn unit_of(name: &str, variable: &VariableSettings) -> &'static str {
     }
 }
 
-/// The unit by the end of a key.
+/// The unit by the end of a dotted key.
 fn unit_in(key: &str) -> Option<&'static str> {
     let last = key.rsplit('.').next().unwrap_or(key);
-    let last = last.split('[').next().unwrap_or(last);
-    let found = UNITS.iter().find(|(end, _)| last.ends_with(end));
-    found.map(|(_, unit)| *unit)
+    settings::unit_in(last.split('[').next().unwrap_or(last))
 }
-
-/// Longer ends first.
-const UNITS: &[(&str, &str)] = &[
-    ("_ms_per_s", "ms/s"),
-    ("_e_per_s", "e/s"),
-    ("_per_s", "1/s"),
-    ("_kg_per_m", "kg/m"),
-    ("_c_per_m", "degC/m"),
-    ("_per_m", "1/m"),
-    ("_mn_m", "MN m"),
-    ("_rad_s", "rad/s"),
-    ("_deg_s", "deg/s"),
-    ("_mps3", "m/s^3"),
-    ("_mps2", "m/s^2"),
-    ("_mps", "m/s"),
-    ("_kmh", "km/h"),
-    ("_permille", "permille"),
-    ("_deg", "deg"),
-    ("_rad", "rad"),
-    ("_grey", "grey"),
-    ("_kg", "kg"),
-    ("_hz", "Hz"),
-    ("_db", "dB"),
-    ("_px", "px"),
-    ("_um", "um"),
-    ("_mm", "mm"),
-    ("_us", "us"),
-    ("_ms", "ms"),
-    ("_mg", "mg"),
-    ("_cd", "cd"),
-    ("_lx", "lx"),
-    ("_kn", "kN"),
-    ("_kw", "kW"),
-    ("_c", "degC"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_n", "N"),
-    ("_e", "e"),
-];

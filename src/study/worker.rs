@@ -4,7 +4,7 @@ use super::measures::Fixes;
 use super::pool::READY;
 use super::{Result, Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
-use crate::scenario::sampling::{Sample, Template};
+use crate::scenario::sampling::{ScenarioSample, Template};
 use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
 use crate::twin::render::Renderer;
 use std::io::{self, BufRead, Write};
@@ -90,7 +90,7 @@ impl ScenarioRunner {
         })
     }
 
-    fn run_sample(&mut self, template: &Template, sample: &Sample) -> Row {
+    fn run_sample(&mut self, template: &Template, sample: &ScenarioSample) -> Row {
         let without = |status, reason| Row::without_figures(sample, status, reason);
         let scenario = match template.scenario(sample) {
             Ok(scenario) => scenario,

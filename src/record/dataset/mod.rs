@@ -9,7 +9,7 @@
 //! by image, as without a data set.
 //!
 //! ```no_run
-//! use metrotwin::record::dataset::{DataSet, FramePlan, Inputs};
+//! use metrotwin::record::dataset::{DataSet, FramePlan, Provenance};
 //! use metrotwin::scenario::Scenario;
 //! use metrotwin::session::{RendererChoice, RunOptions, renderer, run, scene};
 //! use std::path::Path;
@@ -19,7 +19,7 @@
 //! let draws = renderer(&scenario, RendererChoice::Auto)?;
 //! let enough = AtomicBool::new(false);
 //! let plan = FramePlan { limit: Some(10), ..FramePlan::default() };
-//! let mut set = DataSet::new("out/set".as_ref(), &scenario, plan, Inputs::default(), draws, &enough);
+//! let mut set = DataSet::new("out/set".as_ref(), &scenario, plan, Provenance::default(), draws, &enough);
 //! let options = RunOptions { stop: Some(&enough), ..RunOptions::default() };
 //! run(&scenario, &options, &mut [&mut set])?;
 //! println!("{} frames", set.frames());
@@ -51,12 +51,11 @@ pub use files::{clear, is_empty};
 pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
 
 use crate::bus::TrainId;
-use crate::record::parquet::{Column, Table};
+use crate::record::parquet::{Column, ParquetTable};
 use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::sha256;
 use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};
-use crate::track::Tunnel;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::Labeller;
 use crate::twin::render::{Job, Renderer};
@@ -74,7 +73,7 @@ use take::LastFrame;
 
 /// Where a data set comes from, to be written down with it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Inputs {
+pub struct Provenance {
     /// The scenario file's text.
     pub scenario: String,
     /// Changes to it, `key=value`.
@@ -85,8 +84,8 @@ pub struct Inputs {
 pub struct DataSet<'a> {
     out: PathBuf,
     plan: FramePlan,
-    about: About,
-    tunnel: Arc<Tunnel>,
+    scenario: &'a Scenario,
+    provenance: Provenance,
     renderer: Box<dyn Renderer>,
     labeller: Labeller,
     /// After that time a lamp's signal repeats.
@@ -94,7 +93,7 @@ pub struct DataSet<'a> {
     cameras: Vec<Camera>,
     /// Frames whose images are on their way.
     waiting: Vec<ExposedFrame>,
-    tables: Option<Tables>,
+    tables: Tables,
     frames: Vec<FrameRow>,
     images: Vec<serde_json::Value>,
     annotations: Vec<coco::Annotation>,
@@ -102,20 +101,11 @@ pub struct DataSet<'a> {
     complete: bool,
 }
 
-/// What holds for the whole set.
-struct About {
-    scenario: String,
-    description: String,
-    seed: u64,
-    /// SHA-256 of the scenario as checked, with all that it names.
-    inputs_sha256: String,
-    inputs: Inputs,
-}
-
+#[derive(Default)]
 struct Tables {
-    rows: Option<Table>,
-    lamps: Option<Table>,
-    obstacles: Option<Table>,
+    rows: Option<ParquetTable>,
+    lamps: Option<ParquetTable>,
+    obstacles: Option<ParquetTable>,
 }
 
 /// One camera of the run.
@@ -152,9 +142,9 @@ impl<'a> DataSet<'a> {
     /// the plan have been taken.
     pub fn new(
         out: &Path,
-        scenario: &Scenario,
+        scenario: &'a Scenario,
         plan: FramePlan,
-        inputs: Inputs,
+        provenance: Provenance,
         renderer: Box<dyn Renderer>,
         enough: &'a AtomicBool,
     ) -> Self {
@@ -163,20 +153,14 @@ impl<'a> DataSet<'a> {
         Self {
             out: out.to_owned(),
             plan,
-            about: About {
-                scenario: scenario.name.clone(),
-                description: scenario.description.clone(),
-                seed: scenario.seed,
-                inputs_sha256: sha256(format!("{scenario:?}").as_bytes()),
-                inputs,
-            },
-            tunnel: scenario.tunnel.clone(),
+            scenario,
+            provenance,
             renderer,
             period_s: periods.fold(0.0, f64::max),
             labeller: Labeller::new(&scene),
             cameras: Vec::new(),
             waiting: Vec::new(),
-            tables: None,
+            tables: Tables::default(),
             frames: Vec::new(),
             images: Vec::new(),
             annotations: Vec::new(),
@@ -209,10 +193,15 @@ impl<'a> DataSet<'a> {
         rig.map(str::to_owned).chain(devices).collect()
     }
 
-    fn table(&self, label: LabelKind, name: &str, columns: &[Column]) -> Result<Option<Table>> {
+    fn table(
+        &self,
+        label: LabelKind,
+        name: &str,
+        columns: &[Column],
+    ) -> Result<Option<ParquetTable>> {
         let wanted = self.plan.has(label);
         wanted
-            .then(|| Table::create(self.out.join(name), columns))
+            .then(|| ParquetTable::create(self.out.join(name), columns))
             .transpose()
     }
 
@@ -278,7 +267,7 @@ impl<'a> DataSet<'a> {
     }
 
     fn meta(&self) -> serde_json::Value {
-        let about = &self.about;
+        let scenario = self.scenario;
         let cameras = self.cameras.iter();
         let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
         let labels = self.plan.labels.0.iter().map(|label| label.word());
@@ -287,11 +276,12 @@ impl<'a> DataSet<'a> {
             "format": "metrotwin frames",
             "format_version": 1,
             "metrotwin": env!("CARGO_PKG_VERSION"),
-            "scenario": about.scenario,
-            "description": about.description,
-            "seed": about.seed,
-            "overrides": about.inputs.overrides,
-            "inputs_sha256": about.inputs_sha256,
+            "scenario": scenario.name,
+            "description": scenario.description,
+            "seed": scenario.seed,
+            "overrides": self.provenance.overrides,
+            // Of the scenario as checked, with all that it names.
+            "inputs_sha256": sha256(format!("{scenario:?}").as_bytes()),
             "renderer": self.renderer.backend(),
             "frames": self.frames.len(),
             "cameras": cameras.collect::<Vec<_>>(),
@@ -340,7 +330,7 @@ impl Observer for DataSet<'_> {
                 }
             }
         }
-        self.tables = Some(Tables {
+        self.tables = Tables {
             rows: self.table(LabelKind::Rows, "rows.parquet", ImageRow::COLUMNS)?,
             lamps: self.table(LabelKind::Lamps, "lamps.parquet", LampRow::COLUMNS)?,
             obstacles: self.table(
@@ -348,7 +338,7 @@ impl Observer for DataSet<'_> {
                 "obstacles.parquet",
                 ObstacleRow::COLUMNS,
             )?,
-        });
+        };
         Ok(())
     }
 
@@ -370,28 +360,27 @@ impl Observer for DataSet<'_> {
 
     /// Also of a run that was broken off: what has been taken is a whole, smaller set.
     fn close(&mut self) -> Result {
-        let Some(tables) = self.tables.take() else {
-            return Ok(());
-        };
-        for table in [tables.rows, tables.lamps, tables.obstacles]
-            .into_iter()
-            .flatten()
-        {
+        let Tables {
+            rows,
+            lamps,
+            obstacles,
+        } = std::mem::take(&mut self.tables);
+        for table in [rows, lamps, obstacles].into_iter().flatten() {
             table.close()?;
         }
-        let mut frames = Table::create(self.out.join("frames.parquet"), FrameRow::COLUMNS)?;
+        let mut frames = ParquetTable::create(self.out.join("frames.parquet"), FrameRow::COLUMNS)?;
         for row in &self.frames {
             frames.push(row)?;
         }
         frames.close()?;
         let meta = self.meta();
         if self.plan.has(LabelKind::Obstacles) {
-            let set = coco::document(&self.about.scenario, &self.images, &self.annotations);
+            let set = coco::document(&self.scenario.name, &self.images, &self.annotations);
             self.write_json("coco.json", &set)?;
         }
-        let text = readme::of(&self.about.scenario, &self.plan, &meta);
+        let text = readme::of(&self.plan, &meta).map_err(failed("writing README.md"))?;
         self.write("README.md", &text)?;
-        self.write("scenario.toml", &self.about.inputs.scenario)?;
+        self.write("scenario.toml", &self.provenance.scenario)?;
         self.write_json("meta.json", &meta)
     }
 }

@@ -117,8 +117,8 @@ impl DataSet<'_> {
         let frame = Frame {
             name: FrameName {
                 frame_id: FRAMES * k as i64 + i64::from(exposed.number),
-                scenario: self.about.scenario.clone(),
-                seed: self.about.seed,
+                scenario: self.scenario.name.clone(),
+                seed: self.scenario.seed,
                 camera: camera.name.clone(),
                 number: exposed.number,
             },
@@ -215,15 +215,13 @@ impl DataSet<'_> {
     }
 
     fn push_tables(&mut self, k: usize, frame: &Frame<'_>) -> Result {
-        let Some(tables) = &mut self.tables else {
-            return Ok(());
-        };
+        let tables = &mut self.tables;
         let (frame_id, sight, job) = (frame.name.frame_id, &frame.sight, &frame.exposed.job);
         if let Some(table) = &mut tables.rows {
             ImageRow::all(frame_id, sight).try_for_each(|row| table.push(&row))?;
         }
         if let Some(table) = &mut tables.lamps {
-            let sites = &self.tunnel.lamps;
+            let sites = &self.scenario.tunnel.lamps;
             let rows = LampRow::all(frame_id, job, sight, &self.labeller, sites);
             rows.iter().try_for_each(|row| table.push(row))?;
         }
@@ -232,7 +230,7 @@ impl DataSet<'_> {
         };
         let train_m = frame.exposed.train.as_ref().map(|train| train.chainage_m);
         let near_m = self.cameras[k].chainage_m.or(train_m).unwrap_or(0.0);
-        let line = (&self.tunnel.alignment, near_m);
+        let line = (&self.scenario.tunnel.alignment, near_m);
         for instance in obstacles::instances(job, &frame.exposed.owners, sight, labels) {
             let Some(row) = ObstacleRow::new(frame_id, job, sight, line, &instance) else {
                 continue;

@@ -1,9 +1,10 @@
 //! A drawn scenario as a file by itself: complete, every key with its value, and every key with what
 //! it means.
 
-use super::{Sample, Template};
+use super::{ScenarioSample, Template};
 use crate::scenario::schema;
 use crate::scenario::{ScenarioError, ScenarioFile};
+use crate::settings::key_below;
 use serde_json::Value as Json;
 use std::fmt::Write;
 use toml::{Table, Value};
@@ -15,7 +16,7 @@ impl Template {
     /// The text of a draw's scenario file. `place` gives the paths of the files that it names.
     pub fn text_of(
         &self,
-        sample: &Sample,
+        sample: &ScenarioSample,
         place: impl Fn(&str) -> String,
     ) -> Result<String, ScenarioError> {
         let mut file = self.concrete(sample)?;
@@ -28,7 +29,7 @@ impl Template {
         Ok(head + &complete(&file))
     }
 
-    fn heading(&self, sample: &Sample, name: &str) -> String {
+    fn heading(&self, sample: &ScenarioSample, name: &str) -> String {
         let study = &self.file.name;
         let mut text = format!(
             "# {name}: run {} of the study {study}, seed {}, drawn by metrotwin {}.\n",
@@ -80,10 +81,10 @@ impl Writer {
         }
         for (key, value) in below {
             let property = self.property(schema, key);
-            let path = if path.is_empty() {
-                quoted(key)
-            } else {
-                format!("{path}.{}", quoted(key))
+            let path = key_below(path, &quoted(key));
+            let [open, close] = match value.is_array() {
+                true => ["[[", "]]"],
+                false => ["[", "]"],
             };
             let entries = value
                 .as_array()
@@ -93,12 +94,7 @@ impl Writer {
                 if k == 0 {
                     self.comment(text, property);
                 }
-                let header = if value.is_array() {
-                    format!("[[{path}]]")
-                } else {
-                    format!("[{path}]")
-                };
-                _ = writeln!(text, "{header}");
+                _ = writeln!(text, "{open}{path}{close}");
                 let of_entry = property.map_or(&Json::Null, |p| p.get("items").unwrap_or(p));
                 if let Some(table) = entry.as_table() {
                     self.table(text, table, self.resolved(of_entry), &path);

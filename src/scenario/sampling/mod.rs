@@ -64,7 +64,7 @@ mod template;
 
 pub use condition::{Condition, ConditionError};
 pub use inputs::{Inputs, sha256};
-pub use sample::{Sample, SampleError};
+pub use sample::{SampleError, ScenarioSample};
 pub use settings::{
     CorrelationSettings, Distribution, PlanSettings, PrecisionSettings, StopSettings,
     StudySettings, VariableSettings, as_written,

@@ -17,7 +17,7 @@ const MOST_ATTEMPTS: u32 = 10_000;
 
 /// The values of one run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sample {
+pub struct ScenarioSample {
     /// The run.
     pub index: u64,
     /// Seed of its scenario.
@@ -69,7 +69,7 @@ impl Template {
     ///
     /// Runs go through the combinations of swept values in turn, the first variable changing
     /// slowest; every combination gets points of the plan, and noise, of its own.
-    pub fn sample(&self, index: u64) -> Result<Sample, SampleError> {
+    pub fn sample(&self, index: u64) -> Result<ScenarioSample, SampleError> {
         let runs = self.runs();
         if index >= runs {
             return Err(SampleError::NoRun { index, runs });
@@ -110,7 +110,12 @@ impl Template {
         places.collect()
     }
 
-    fn attempt(&self, run: RunNumber, attempt: u32, swept: &BTreeMap<&str, Value>) -> Sample {
+    fn attempt(
+        &self,
+        run: RunNumber,
+        attempt: u32,
+        swept: &BTreeMap<&str, Value>,
+    ) -> ScenarioSample {
         let mut point = self.plan.point(run, attempt);
         for (places, lower) in &self.groups {
             let mut of_group: Vec<f64> = places.iter().map(|k| point[*k]).collect();
@@ -153,7 +158,7 @@ impl Template {
         let [low, high, ..] =
             Stream::new(self.settings.seed, run.index, "scenario seed").words(0, 0);
         let seed = (u64::from(high) << 32 | u64::from(low)) >> 11;
-        Sample {
+        ScenarioSample {
             index: run.index,
             seed,
             values,
@@ -163,7 +168,7 @@ impl Template {
     }
 
     /// The first condition that a draw does not meet.
-    fn unmet_condition(&self, sample: &Sample) -> Result<Option<usize>, SampleError> {
+    fn unmet_condition(&self, sample: &ScenarioSample) -> Result<Option<usize>, SampleError> {
         let mut document = None;
         for (k, condition) in self.conditions.iter().enumerate() {
             let names_keys = condition.names().any(|name| sample.number(name).is_none());
@@ -182,7 +187,7 @@ impl Template {
     }
 
     /// The scenario's keys with their defaults, as drawn.
-    fn document(&self, sample: &Sample) -> Result<Table, SampleError> {
+    fn document(&self, sample: &ScenarioSample) -> Result<Table, SampleError> {
         let key = |e: &dyn std::fmt::Display| SampleError::Key(sample.index, e.to_string());
         let mut document = Table::try_from(&self.file).map_err(|e| key(&e))?;
         for change in self.overrides(sample) {
@@ -192,7 +197,7 @@ impl Template {
     }
 
     /// What a draw changes in the file, its seed among it.
-    pub fn overrides(&self, sample: &Sample) -> Vec<Override> {
+    pub fn overrides(&self, sample: &ScenarioSample) -> Vec<Override> {
         let of = |(name, value): &(String, Value)| {
             let variable = self.settings.variables.get(name);
             variable.map(|v| v.overrides(value)).unwrap_or_default()
@@ -206,19 +211,19 @@ impl Template {
     }
 
     /// The scenario of a draw, checked.
-    pub fn scenario(&self, sample: &Sample) -> Result<Scenario, ScenarioError> {
+    pub fn scenario(&self, sample: &ScenarioSample) -> Result<Scenario, ScenarioError> {
         Scenario::from_text(&self.path, &self.text, &self.overrides(sample))
     }
 
     /// The file of a draw.
-    pub fn concrete(&self, sample: &Sample) -> Result<ScenarioFile, ScenarioError> {
+    pub fn concrete(&self, sample: &ScenarioSample) -> Result<ScenarioFile, ScenarioError> {
         let mut file = overridden(&self.path, &self.text, &self.overrides(sample))?;
         file.study = None;
         Ok(file)
     }
 }
 
-impl Sample {
+impl ScenarioSample {
     /// A variable's value, where it is a number or a flag.
     pub fn number(&self, name: &str) -> Option<f64> {
         let (_, value) = self.values.iter().find(|(n, _)| n == name)?;

@@ -1,7 +1,7 @@
 //! Which plots a study gets, and what is in them.
 
 use super::axis::Axis;
-use super::plot::{Layers, Plot};
+use super::plot::{Plot, PlotLayers};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
 use crate::study::digest::is_weighted;
@@ -158,18 +158,17 @@ fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -
         let e = rate(happened, group.len() as u64)?.wilson;
         Some((middle(group), e))
     });
-    let layers = Layers {
+    let layers = PlotLayers {
         bars: bars.collect(),
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     let y = Axis::new(format!("rate of {name}, with 95 % interval"));
     let variable = input.name;
     let title = format!("{name} against {variable}");
-    Plot::new(
+    layers.plot(
         format!("event_{name}_{variable}"),
         &title,
         [&input.axis, &y],
-        &layers,
     )
 }
 
@@ -187,16 +186,16 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
         runs.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
             .collect::<Vec<_>>()
     };
-    let layers = Layers {
+    let layers = PlotLayers {
         points: of(false),
         marked: of(true),
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     if layers.marked.is_empty() {
         return None;
     }
     let title = format!("{name}: red where it happened");
-    Plot::new(format!("map_{name}"), &title, [&x.axis, &y.axis], &layers)
+    layers.plot(format!("map_{name}"), &title, [&x.axis, &y.axis])
 }
 
 /// A figure of every run against a variable, with the mean of each group.
@@ -206,20 +205,15 @@ fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Pl
         let e = mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
         Some((middle(group), e))
     });
-    let layers = Layers {
+    let layers = PlotLayers {
         bars: bars.collect(),
         points: pairs.clone(),
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     let y = Axis::new(label(measure));
     let (figure, variable) = (measure.name, input.name);
     let title = format!("{figure} against {variable}");
-    Plot::new(
-        format!("{figure}_{variable}"),
-        &title,
-        [&input.axis, &y],
-        &layers,
-    )
+    layers.plot(format!("{figure}_{variable}"), &title, [&input.axis, &y])
 }
 
 /// Share of runs that lie below each value.
@@ -238,16 +232,16 @@ fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         let middle = share(k) + 0.5 / n;
         (*x, (middle - half).max(0.0), (middle + half).min(1.0))
     });
-    let layers = Layers {
+    let layers = PlotLayers {
         line: steps.collect(),
         band: band.collect(),
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     let x = Axis::new(label(measure));
     let y = Axis::new("share of runs below, with 95 % band");
     let name = measure.name;
     let title = format!("Distribution of {name}");
-    Plot::new(format!("{name}_cdf"), &title, [&x, &y], &layers)
+    layers.plot(format!("{name}_cdf"), &title, [&x, &y])
 }
 
 /// The mean after each run, with its interval.
@@ -256,10 +250,10 @@ fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
     let looks = (4..=sample.len()).step_by((sample.len() / 200).max(1));
     let after = looks.filter_map(|n| Some((n as f64, mean(&sample[..n])?)));
     let after: Vec<_> = after.collect();
-    let layers = Layers {
+    let layers = PlotLayers {
         line: after.iter().map(|(n, e)| (*n, e.value)).collect(),
         band: after.iter().map(|(n, e)| (*n, e.low, e.high)).collect(),
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     let (x, y) = (
         Axis::new("runs"),
@@ -267,7 +261,7 @@ fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
     );
     let name = measure.name;
     let title = format!("Convergence of {name}");
-    Plot::new(format!("{name}_convergence"), &title, [&x, &y], &layers)
+    layers.plot(format!("{name}_convergence"), &title, [&x, &y])
 }
 
 /// Errors of all positions of all runs against the distance of the lamp.
@@ -290,18 +284,13 @@ fn error_by_range(method: &str, rows: &[&Row]) -> Option<Plot> {
         line.push((middle(group), at(0.5)));
         band.push((middle(group), at(0.05), at(0.95)));
     }
-    let layers = Layers {
+    let layers = PlotLayers {
         line,
         band,
-        ..Layers::default()
+        ..PlotLayers::default()
     };
     let x = Axis::new("distance of the lamp [m]");
     let y = Axis::new("error along the track [m]");
     let title = format!("{method}: median error of a position, band 5 to 95 %");
-    Plot::new(
-        format!("{method}_error_by_range"),
-        &title,
-        [&x, &y],
-        &layers,
-    )
+    layers.plot(format!("{method}_error_by_range"), &title, [&x, &y])
 }

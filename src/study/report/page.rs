@@ -1,10 +1,10 @@
 //! The page as HTML: what the template `page.html` shows.
 
 use super::plot::Plot;
+use crate::record::render;
 use crate::scenario::sampling::{StudySettings, as_written};
 use crate::study::{Digest, Manifest, Row, Study};
-use minijinja::value::Serde;
-use minijinja::{Environment, Error};
+use minijinja::Error;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -74,10 +74,7 @@ pub fn page(study: &Study, digest: &Digest, plots: &[Plot], rows: &[Row]) -> Res
         worst: worst(digest, rows),
         incomplete: rows.iter().filter(|r| !r.is_complete()).collect(),
     };
-    let mut environment = Environment::new();
-    environment.add_filter("fixed", |x: f64, digits: usize| format!("{x:.digits$}"));
-    // By the name's end, every value is escaped.
-    environment.render_named_str("page.html", include_str!("page.html"), Serde(page))
+    render("page.html", include_str!("page.html"), page)
 }
 
 /// By the first figure that is an error, a latency or a margin.

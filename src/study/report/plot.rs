@@ -1,7 +1,7 @@
 //! Plots as SVG.
 
 use super::axis::Axis;
-use crate::study::stats::Estimate;
+use crate::study::stats::IntervalEstimate;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
 use plotters::coord::types::RangedCoordf64;
@@ -17,7 +17,7 @@ const GREY: RGBColor = RGBColor(120, 124, 130);
 
 /// What is drawn, one over the other.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Layers {
+pub struct PlotLayers {
     /// Small points.
     pub points: Vec<(f64, f64)>,
     /// Small red points.
@@ -27,7 +27,7 @@ pub struct Layers {
     /// A band about it: x, low, high.
     pub band: Vec<(f64, f64, f64)>,
     /// Values with intervals.
-    pub bars: Vec<(f64, Estimate)>,
+    pub bars: Vec<(f64, IntervalEstimate)>,
 }
 
 /// A plot with its file name.
@@ -39,19 +39,19 @@ pub struct Plot {
     pub svg: String,
 }
 
-impl Plot {
+impl PlotLayers {
     /// `None` where there is nothing to draw.
-    pub fn new(name: String, title: &str, axes: [&Axis; 2], layers: &Layers) -> Option<Self> {
+    pub fn plot(&self, name: String, title: &str, axes: [&Axis; 2]) -> Option<Plot> {
         let mut svg = String::new();
         let root = SVGBackend::with_string(&mut svg, SIZE).into_drawing_area();
-        let ranges = ranges(axes, layers)?;
-        let drawn = draw(&root, title, axes, ranges, layers);
+        let ranges = ranges(axes, self)?;
+        let drawn = draw(&root, title, axes, ranges, self);
         drop(root);
-        drawn.ok().map(|()| Self { name, svg })
+        drawn.ok().map(|()| Plot { name, svg })
     }
 }
 
-fn ranges([x, y]: [&Axis; 2], layers: &Layers) -> Option<[Range<f64>; 2]> {
+fn ranges([x, y]: [&Axis; 2], layers: &PlotLayers) -> Option<[Range<f64>; 2]> {
     let points = || {
         [&layers.points, &layers.marked, &layers.line]
             .into_iter()
@@ -109,7 +109,7 @@ fn draw(
     title: &str,
     [x, y]: [&Axis; 2],
     [xs, ys]: [Range<f64>; 2],
-    layers: &Layers,
+    layers: &PlotLayers,
 ) -> Result<(), Box<dyn Error>> {
     let fail = |e: DrawingAreaErrorKind<std::io::Error>| e.to_string();
     root.fill(&WHITE).map_err(fail)?;

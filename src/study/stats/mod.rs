@@ -30,7 +30,7 @@ use std::fmt;
 
 /// A figure with its interval of 95 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Estimate {
+pub struct IntervalEstimate {
     /// The figure.
     pub value: f64,
     /// Lower end.
@@ -42,7 +42,7 @@ pub struct Estimate {
 }
 
 /// With as many digits as the width of the interval allows; very small ones in powers of ten.
-impl fmt::Display for Estimate {
+impl fmt::Display for IntervalEstimate {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let half = 0.5 * (self.high - self.low);
         let scale = if half.is_finite() && half > 0.0 {
@@ -66,7 +66,7 @@ impl fmt::Display for Estimate {
 }
 
 /// As it is shown.
-impl Serialize for Estimate {
+impl Serialize for IntervalEstimate {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_str(self)
     }

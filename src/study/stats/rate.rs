@@ -1,6 +1,6 @@
 //! How often something happens.
 
-use super::{Estimate, TAIL, z};
+use super::{IntervalEstimate, TAIL, z};
 use serde::Serialize;
 use statrs::distribution::{Beta, ContinuousCDF};
 
@@ -10,9 +10,9 @@ pub struct Rate {
     /// Times that it happened.
     pub events: u64,
     /// Wilson's score interval: right on average, short.
-    pub wilson: Estimate,
+    pub wilson: IntervalEstimate,
     /// Clopper and Pearson's: right at least, for proofs.
-    pub exact: Estimate,
+    pub exact: IntervalEstimate,
 }
 
 /// Of `events` in `n` runs; `None` of no runs.
@@ -25,7 +25,7 @@ pub fn rate(events: u64, n: u64) -> Option<Rate> {
     let z = z();
     let middle = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
     let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
-    let estimate = |low: f64, high: f64| Estimate {
+    let estimate = |low: f64, high: f64| IntervalEstimate {
         value: p,
         low,
         high,

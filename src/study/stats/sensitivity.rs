@@ -1,12 +1,13 @@
 //! Which input drives a figure.
 
-use super::{Estimate, z};
+use super::{IntervalEstimate, z};
 use crate::twin::random::Stream;
+use statrs::statistics::{Data, OrderStatistics, RankTieBreaker};
 use std::collections::BTreeMap;
 
 /// Spearman's rank correlation; equal values share their mean rank. `None` where one of both does not
 /// vary, or of fewer than five pairs.
-pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Estimate> {
+pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<IntervalEstimate> {
     let n = pairs.len();
     if n < 5 {
         return None;
@@ -26,7 +27,7 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Estimate> {
     let half = z * ((1.0 + 0.5 * r * r) / (n as f64 - 3.0)).sqrt();
     // Of a perfect order, atanh is infinite, and so the ends stay there.
     let end = |shift: f64| (r.atanh() + shift).tanh();
-    Some(Estimate {
+    Some(IntervalEstimate {
         value: r,
         low: end(-half),
         high: end(half),
@@ -35,19 +36,8 @@ pub fn rank_correlation(pairs: &[(f64, f64)]) -> Option<Estimate> {
 }
 
 fn ranks(values: impl Iterator<Item = f64>) -> Vec<f64> {
-    let values: Vec<f64> = values.collect();
-    let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-    let mut ranks = vec![0.0; values.len()];
-    let mut before = 0;
-    for group in order.chunk_by(|a, b| values[*a].total_cmp(&values[*b]).is_eq()) {
-        let rank = before as f64 + (group.len() as f64 + 1.0) / 2.0;
-        for k in group {
-            ranks[*k] = rank;
-        }
-        before += group.len();
-    }
-    ranks
+    let mut values: Vec<f64> = values.collect();
+    Data::new(values.as_mut_slice()).ranks(RankTieBreaker::Average)
 }
 
 /// First-order Sobol index: the share of the variance of y that x alone explains. The estimator

@@ -13,7 +13,7 @@ const SAMPLE: [f64; 40] = [
     4.056863, 4.472285, 5.090075, 6.380926,
 ];
 
-fn close(e: Estimate, value: f64, low: f64, high: f64) {
+fn close(e: IntervalEstimate, value: f64, low: f64, high: f64) {
     for (a, b) in [(e.value, value), (e.low, low), (e.high, high)] {
         assert!(
             (a - b).abs() <= 1e-9 * b.abs().max(1e-3),
@@ -130,7 +130,7 @@ fn intervals_cover_the_truth() {
     for trial in 0..TRIALS {
         let stream = Stream::new(3, trial, "coverage");
         let mut sample: Vec<f64> = (0..40).map(|k| -stream.uniform(k).ln()).collect();
-        let holds = |e: Estimate, truth: f64| u32::from((e.low..=e.high).contains(&truth));
+        let holds = |e: IntervalEstimate, truth: f64| u32::from((e.low..=e.high).contains(&truth));
         held[0] += holds(mean(&sample).unwrap(), 1.0);
         sample.sort_by(f64::total_cmp);
         held[1] += holds(quantile(&sample, 0.8).unwrap(), 5f64.ln());
@@ -196,7 +196,7 @@ fn weighted_means_are_those_of_the_distributions() {
     };
     let given = |shift| (0..400).filter_map(move |trial| weighted_mean(&sample(shift, trial)));
     for (shift, least) in [(0.5, 0.92), (1.0, 0.88)] {
-        let all: Vec<Estimate> = given(shift).collect();
+        let all: Vec<IntervalEstimate> = given(shift).collect();
         let held = all.iter().filter(|e| (e.low..=e.high).contains(&100.0));
         let share = held.count() as f64 / all.len() as f64;
         assert!(

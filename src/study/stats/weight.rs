@@ -1,13 +1,13 @@
 //! Importance sampling: runs drawn from elsewhere, weighted by the ratio of densities.
 
-use super::{Estimate, z};
+use super::{IntervalEstimate, z};
 use serde::Serialize;
 
 /// A rate from weighted runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Weighted {
     /// The rate.
-    pub rate: Estimate,
+    pub rate: IntervalEstimate,
     /// Kish's effective number of the runs in which it happened: so many unweighted ones would be as
     /// precise. If few, do not trust the interval.
     pub effective_events: f64,
@@ -22,7 +22,7 @@ const LEAST_WORTH: f64 = 100.0;
 /// The mean over the distributions that were asked for, of the natural logarithm of each run's weight
 /// and a number. Weights are brought to mean 1, so that it does not depend on where the numbers' zero is;
 /// the interval is that of a ratio (delta method). `None` of runs worth fewer than 100.
-pub fn weighted_mean(runs: &[(f64, f64)]) -> Option<Estimate> {
+pub fn weighted_mean(runs: &[(f64, f64)]) -> Option<IntervalEstimate> {
     let ln_weights: Vec<f64> = runs.iter().map(|r| r.0).collect();
     if effective_runs(&ln_weights) < LEAST_WORTH {
         return None;
@@ -41,7 +41,7 @@ pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> 
         .map(|r| r.0)
         .collect();
     Some(Weighted {
-        rate: Estimate {
+        rate: IntervalEstimate {
             value: mean.value.min(1.0),
             low: mean.low.max(0.0),
             // Where it was never seen, nothing bounds it.
@@ -57,7 +57,7 @@ pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> 
     })
 }
 
-fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<Estimate> {
+fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<IntervalEstimate> {
     let n = runs.len();
     let weights: Vec<f64> = runs.iter().map(|(ln, _)| ln.exp()).collect();
     let sum: f64 = weights.iter().sum();
@@ -77,7 +77,7 @@ fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<Estimate> {
     let squares: f64 = (0..n).map(|k| (share(k) - centre(k)).powi(2)).sum();
     let sigma = (squares / (n - 1) as f64 / n as f64).sqrt();
     let z = z();
-    Some(Estimate {
+    Some(IntervalEstimate {
         value,
         low: value - z * sigma,
         high: value + z * sigma,

@@ -1,0 +1,20 @@
+//! Texts for people, as templates that see what is serialised.
+
+use minijinja::value::Serde;
+use minijinja::{Environment, Error, UndefinedBehavior, Value};
+use serde::Serialize;
+
+/// Fills a template. In one whose name ends with `.html` every value is escaped. Beside the filters
+/// of Jinja there are `fixed(digits)` for numbers, and `left(width)` and `right(width)` for columns.
+pub fn render(name: &str, source: &str, values: impl Serialize) -> Result<String, Error> {
+    let mut environment = Environment::new();
+    environment.set_undefined_behavior(UndefinedBehavior::Strict);
+    environment.add_filter("fixed", |x: f64, digits: usize| format!("{x:.digits$}"));
+    environment.add_filter("left", |text: Value, width: usize| {
+        format!("{:<width$}", text.to_string())
+    });
+    environment.add_filter("right", |text: Value, width: usize| {
+        format!("{:>width$}", text.to_string())
+    });
+    environment.render_named_str(name, source, Serde(values))
+}
