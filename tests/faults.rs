@@ -10,37 +10,16 @@
 
 mod common;
 
-use common::{Make, cpu, gpu};
+use common::{Make, cpu, gpu, small_scenario};
 use metrotwin::bus::{CameraFault, Content, DangerLevel, Intrinsics, Node, SimTime};
-use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{
-    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, Summary, run,
+    Event, Observer, ObserverError, RendererChoice, RunOptions, Summary, run,
 };
 use metrotwin::settings::read_toml;
-use metrotwin::track::Tunnel;
 use metrotwin::twin::faults::{FaultSettings, age};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::{Job, Renderer, Scene, sample};
 use std::hash::{DefaultHasher, Hash, Hasher};
-
-const TUNNEL: &str = include_str!("../tunnels/chengdu_line1.toml");
-
-/// A train on its way past a wayside device, all cameras of few pixels.
-const SMALL: &str = r#"
-    name = "small"
-    tunnel = "given"
-    duration_s = 4.0
-    train = { cars = 1, start_chainage_m = 1300.0, start_speed_kmh = 60.0, cruise_speed_kmh = 60.0 }
-    stack = { protection = { initial_chainage_m = 1300.0 } }
-    [rig]
-    pairs_per_s = 10.0
-    width_px = 64
-    height_px = 36
-    pixel_um = 75.0
-    [[wayside]]
-    device = "W1530"
-    camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
-"#;
 
 /// Number and start of a pair, hashes of its images, faults of its eyes.
 type SeenPair = (u32, SimTime, [u64; 2], [Option<CameraFault>; 2]);
@@ -69,9 +48,6 @@ fn hash(image: &image::GrayImage) -> u64 {
 }
 
 impl Observer for Seen {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
             Event::Pair(_, pair, report, _) => {
@@ -103,14 +79,6 @@ impl Observer for Seen {
         }
         Ok(())
     }
-    fn close(&mut self) -> Result<(), ObserverError> {
-        Ok(())
-    }
-}
-
-fn scenario(faults: &str) -> Scenario {
-    let file: ScenarioFile = read_toml(&format!("{SMALL}\n{faults}")).unwrap();
-    Scenario::new(file, Tunnel::from_toml(TUNNEL).unwrap()).unwrap()
 }
 
 fn seen(faults: &str) -> (Seen, Summary) {
@@ -119,14 +87,14 @@ fn seen(faults: &str) -> (Seen, Summary) {
         ..RunOptions::default()
     };
     let mut seen = Seen::default();
-    let summary = run(&scenario(faults), &options, &mut [&mut seen]).unwrap();
+    let summary = run(&small_scenario(faults), &options, &mut [&mut seen]).unwrap();
     (seen, summary)
 }
 
 /// Fails where a frozen frame has an old number or time, another image than the one before, or is
 /// taken for a good one; where the device is silent about it; or where it does not recover.
 #[test]
-fn a_frozen_wayside_camera_is_told_and_fails_safe() {
+fn a_frozen_wayside_camera_is_reported_and_fails_safe() {
     let (seen, summary) = seen(
         "[[faults.cameras]]\ncamera = 'W1530'\nfault = { kind = 'freeze' }\nfrom_s = 1.0\nto_s = 2.5\n",
     );
@@ -142,8 +110,8 @@ fn a_frozen_wayside_camera_is_told_and_fails_safe() {
         // One second without a good frame; then five good ones.
         assert_eq!(*blind, (20..29).contains(&k), "frame {k}");
     }
-    let told = ["1.000 s W1530 Some(Frozen)", "2.500 s W1530 None"];
-    assert_eq!(seen.said, told);
+    let said = ["1.000 s W1530 Some(Frozen)", "2.500 s W1530 None"];
+    assert_eq!(seen.said, said);
     assert_eq!(seen.warnings.first(), Some(&(true, DangerLevel::High)));
     assert_eq!(seen.warnings.last(), Some(&(false, DangerLevel::None)));
     let figures = &summary.cameras["W1530"];

@@ -6,10 +6,10 @@ use arrow::array::AsArray;
 use arrow::datatypes::{Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
 use image::GrayImage;
-use metrotwin::record::dataset::{DataSet, FramePlan, Inputs};
+use metrotwin::record::dataset::{DataSet, FramePlan, Provenance};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
-    Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, renderer, run,
+    Event, Observer, ObserverError, RendererChoice, RunOptions, renderer, run,
 };
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
@@ -64,10 +64,6 @@ fn folder(test: &str) -> PathBuf {
 struct Delivered(BTreeMap<String, GrayImage>);
 
 impl Observer for Delivered {
-    fn open(&mut self, _: &Opening<'_>) -> Result<(), ObserverError> {
-        Ok(())
-    }
-
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         let mut keep = |camera: &str, number: u32, image: &GrayImage| {
             let name = format!("images/{camera}/{number:06}.png");
@@ -83,10 +79,6 @@ impl Observer for Delivered {
         }
         Ok(())
     }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
-        Ok(())
-    }
 }
 
 /// Makes a set with the plain renderer; a run that comes to `stop_s` is broken off there. Gives the
@@ -95,7 +87,7 @@ fn make(out: &Path, seed: u64, plan: FramePlan, stop_s: f64) -> (usize, Delivere
     let scenario = scenario(seed);
     let draws = renderer(&scenario, RendererChoice::Cpu).unwrap();
     let stop = AtomicBool::new(false);
-    let mut set = DataSet::new(out, &scenario, plan, Inputs::default(), draws, &stop);
+    let mut set = DataSet::new(out, &scenario, plan, Provenance::default(), draws, &stop);
     let progress = |now_s: f64| {
         if now_s >= stop_s {
             stop.store(true, Ordering::Relaxed);

@@ -3,23 +3,20 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+mod common;
+
+use common::small_scenario;
 use metrotwin::bus::{Content, Message, Node};
-use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{
     Event, Observer, ObserverError, Opening, RendererChoice, RunOptions, run,
 };
-use metrotwin::settings::read_toml;
-use metrotwin::track::Tunnel;
 use std::collections::BTreeSet;
 
-/// Two trains with all sensors, a wayside device with a lidar, all cameras of few pixels.
-const SMALL: &str = r#"
-    name = "small"
-    tunnel = "given"
-    duration_s = 3.0
-    train = { cars = 1, start_chainage_m = 1300.0, start_speed_kmh = 60.0, cruise_speed_kmh = 60.0 }
-    stack = { protection = { initial_chainage_m = 1300.0 } }
-    doppler = {}
+/// A second train, and all sensors that there are.
+const MORE: &str = r#"
+    [wayside.lidar]
+    step_deg = 5.0
+    [doppler]
     [[other_trains]]
     cars = 1
     start_chainage_m = 1200.0
@@ -27,15 +24,6 @@ const SMALL: &str = r#"
     [[onboard]]
     train = 1
     protection = { initial_chainage_m = 1200.0 }
-    [rig]
-    pairs_per_s = 10.0
-    width_px = 64
-    height_px = 36
-    pixel_um = 75.0
-    [[wayside]]
-    device = "W1530"
-    lidar = { step_deg = 5.0 }
-    camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
 "#;
 
 /// Kinds of content that were written and read back.
@@ -87,18 +75,12 @@ impl Observer for Copied {
         }
         Ok(())
     }
-
-    fn close(&mut self) -> Result<(), ObserverError> {
-        Ok(())
-    }
 }
 
 /// A field that is skipped, written in another form than it is read, or loses digits.
 #[test]
 fn every_message_is_read_back_as_it_was_written() {
-    let tunnel = Tunnel::from_toml(include_str!("../tunnels/chengdu_line1.toml")).unwrap();
-    let file: ScenarioFile = read_toml(SMALL).unwrap();
-    let scenario = Scenario::new(file, tunnel).unwrap();
+    let scenario = small_scenario(MORE);
     let options = RunOptions {
         renderer: RendererChoice::Cpu,
         ..RunOptions::default()

@@ -1,4 +1,4 @@
-//! What the tests of the renderers share.
+//! What tests share.
 
 #![allow(
     dead_code,
@@ -8,6 +8,9 @@
 )]
 
 use image::GrayImage;
+use metrotwin::scenario::{Scenario, ScenarioFile};
+use metrotwin::settings::read_toml;
+use metrotwin::track::Tunnel;
 use metrotwin::twin::air::Air;
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::reflectance::Wet;
@@ -56,4 +59,28 @@ pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
         air: Air::default(),
         wet: Wet::default(),
     }
+}
+
+/// A train on its way past a wayside device, all cameras of few pixels.
+const SMALL: &str = r#"
+    name = "small"
+    tunnel = "given"
+    duration_s = 4.0
+    train = { cars = 1, start_chainage_m = 1300.0, start_speed_kmh = 60.0, cruise_speed_kmh = 60.0 }
+    stack = { protection = { initial_chainage_m = 1300.0 } }
+    [rig]
+    pairs_per_s = 10.0
+    width_px = 64
+    height_px = 36
+    pixel_um = 75.0
+    [[wayside]]
+    device = "W1530"
+    camera = { width_px = 64, height_px = 36, pixel_um = 45.0 }
+"#;
+
+/// The small scenario, with more keys.
+pub fn small_scenario(more: &str) -> Scenario {
+    let file: ScenarioFile = read_toml(&format!("{SMALL}\n{more}")).unwrap();
+    let tunnel = Tunnel::from_toml(include_str!("../../tunnels/chengdu_line1.toml")).unwrap();
+    Scenario::new(file, tunnel).unwrap()
 }
