@@ -2,10 +2,10 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_ctrl_c};
 use crate::record::dataset::{self, DataSet, FramePlan, LabelKinds, Provenance};
 use crate::scenario::{self, Override, Scenario};
-use crate::session::{self, End, RunOptions, Summary};
+use crate::session::{self, End, RendererChoice, RunOptions, Summary};
 use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
@@ -49,8 +49,8 @@ pub(super) struct FramesArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
     /// What draws the images
-    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
-    renderer: RendererArg,
+    #[arg(long, value_enum, default_value_t = RendererChoice::Auto)]
+    renderer: RendererChoice,
     /// Take each N-th frame of a camera only
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     every: u32,
@@ -82,8 +82,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     make_room(&args.out, args.force)?;
 
     stop_on_ctrl_c();
-    let choice = args.renderer.into();
-    let renderer = session::renderer(&scenario, choice).map_err(Failure::run)?;
+    let renderer = session::renderer(&scenario, args.renderer).map_err(Failure::run)?;
     let overrides = args.overrides.iter();
     let provenance = Provenance {
         scenario: text,
@@ -96,7 +95,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let mut set = DataSet::new(&args.out, &scenario, plan, provenance, renderer, &STOP);
     let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
-        renderer: choice,
+        renderer: args.renderer,
         stop: Some(&STOP),
         progress: Some(&show),
     };

@@ -1,13 +1,13 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_ctrl_c};
 use super::{print, table};
 use crate::bus::TrainId;
 use crate::record::{self, FixTable, Recording};
 use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
-use crate::session::{self, End, Observer, RunOptions, Summary};
+use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
 use crate::study::{self, Fixes, Row, Study, StudyError};
 use std::fs;
 use std::io;
@@ -54,8 +54,8 @@ pub(super) struct RunArgs {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
     /// What draws the images
-    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
-    renderer: RendererArg,
+    #[arg(long, value_enum, default_value_t = RendererChoice::Auto)]
+    renderer: RendererChoice,
     /// Write no recording.rrd
     #[arg(long)]
     no_recording: bool,
@@ -198,7 +198,7 @@ fn observed(
     let progress = ProgressBar::new(RUN_BAR);
     let show = |now_s| progress.show_run(now_s, scenario.duration_s);
     let options = RunOptions {
-        renderer: args.renderer.into(),
+        renderer: args.renderer,
         stop: Some(&STOP),
         progress: Some(&show),
     };
@@ -233,14 +233,7 @@ fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<(
     let without_rig = (0..TrainId::MOST)
         .map(TrainId::from_index)
         .filter(|id| !has_rig(*id));
-    for name in recording
-        .into_iter()
-        .chain(without_rig.map(FixTable::file_name))
-    {
-        match fs::remove_file(out.join(name)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-    }
-    Ok(())
+    let fixes = without_rig.map(FixTable::file_name);
+    let mut stale = recording.into_iter().chain(fixes);
+    stale.try_for_each(|name| record::gone(fs::remove_file(out.join(name))))
 }

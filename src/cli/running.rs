@@ -3,6 +3,7 @@
 use super::fault::Failure;
 use crate::session::RendererChoice;
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
 use std::fs;
@@ -10,34 +11,24 @@ use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-#[derive(Clone, Copy, ValueEnum)]
-pub(super) enum RendererArg {
-    /// The graphics adapter, or the plain renderer where there is none
-    Auto,
-    /// The graphics adapter (a GPU, or a software adapter) or nothing
-    Gpu,
-    /// The plain renderer, on the CPU alone
-    Cpu,
-}
-
-impl RendererArg {
-    /// As it is given.
-    pub(super) fn name(self) -> &'static str {
-        match self {
-            Self::Auto => "auto",
-            Self::Gpu => "gpu",
-            Self::Cpu => "cpu",
-        }
+impl ValueEnum for RendererChoice {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Auto, Self::Gpu, Self::Cpu]
     }
-}
 
-impl From<RendererArg> for RendererChoice {
-    fn from(arg: RendererArg) -> Self {
-        match arg {
-            RendererArg::Auto => Self::Auto,
-            RendererArg::Gpu => Self::Gpu,
-            RendererArg::Cpu => Self::Cpu,
-        }
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let (name, help) = match self {
+            Self::Auto => (
+                "auto",
+                "The graphics adapter, or the plain renderer where there is none",
+            ),
+            Self::Gpu => (
+                "gpu",
+                "The graphics adapter (a GPU, or a software adapter) or nothing",
+            ),
+            Self::Cpu => ("cpu", "The plain renderer, on the CPU alone"),
+        };
+        Some(PossibleValue::new(name).help(help))
     }
 }
 

@@ -2,15 +2,16 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{ProgressBar, RendererArg, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, STOP, prepare, stop_on_ctrl_c};
 use crate::record::parquet::Kind;
 use crate::record::render;
 use crate::scenario::sampling::Template;
+use crate::session::RendererChoice;
 use crate::study::{
     self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
     Submission,
 };
-use clap::Subcommand;
+use clap::{Subcommand, ValueEnum};
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -85,8 +86,8 @@ struct RunArgs {
     #[arg(long, value_name = "I/N")]
     shard: Option<Shard>,
     /// What draws the images
-    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
-    renderer: RendererArg,
+    #[arg(long, value_enum, default_value_t = RendererChoice::Auto)]
+    renderer: RendererChoice,
     /// Give up a run that takes longer, as one that has hung
     #[arg(long, value_name = "S", default_value_t = RUN_LIMIT_S, value_parser = seconds)]
     run_limit_s: f64,
@@ -144,8 +145,8 @@ struct SubmitArgs {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     runs: Option<u32>,
     /// What draws the images
-    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
-    renderer: RendererArg,
+    #[arg(long, value_enum, default_value_t = RendererChoice::Auto)]
+    renderer: RendererChoice,
     /// One more argument for sbatch; may be given again
     #[arg(long, value_name = "ARG", allow_hyphen_values = true)]
     sbatch: Vec<String>,
@@ -161,8 +162,8 @@ struct SubmitArgs {
 #[derive(clap::Args)]
 struct WorkerArgs {
     folder: PathBuf,
-    #[arg(long, value_enum, default_value_t = RendererArg::Auto)]
-    renderer: RendererArg,
+    #[arg(long, value_enum, default_value_t = RendererChoice::Auto)]
+    renderer: RendererChoice,
 }
 
 pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
@@ -188,12 +189,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
             ctrlc::set_handler(|| {}).ok();
             let input = std::io::BufReader::new(std::io::stdin());
             let output = std::io::stdout().lock();
-            Ok(study::serve(
-                &args.folder,
-                args.renderer.into(),
-                input,
-                output,
-            )?)
+            Ok(study::serve(&args.folder, args.renderer, input, output)?)
         }
     }
 }
@@ -213,7 +209,7 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
         jobs: args.jobs.map(usize::from),
         resume: args.resume,
         shard: args.shard,
-        renderer: args.renderer.into(),
+        renderer: args.renderer,
         run_limit: Some(Duration::from_secs_f64(args.run_limit_s)),
         stop: Some(&STOP),
         progress: Some(&show),
@@ -278,7 +274,10 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
         .runs
         .iter()
         .flat_map(|n| ["--runs".to_owned(), n.to_string()]);
-    let renderer = ["--renderer".to_owned(), args.renderer.name().to_owned()];
+    let renderer = args.renderer.to_possible_value();
+    let renderer = renderer
+        .iter()
+        .flat_map(|value| ["--renderer".to_owned(), value.get_name().to_owned()]);
     let submission = Submission {
         name,
         program: std::env::current_exe().map_err(Failure::run)?,

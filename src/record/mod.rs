@@ -44,7 +44,7 @@ mod whole_files;
 
 pub use tables::FixTable;
 pub(crate) use template::render;
-pub(crate) use whole_files::write_whole;
+pub(crate) use whole_files::{gone, write_whole};
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;

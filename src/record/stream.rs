@@ -148,14 +148,14 @@ impl Stream {
 
     /// Cuts the batches here and passes them on.
     pub(super) fn flush(&self) -> Result {
-        let flushed = match self.file {
-            Some(_) => self.rerun.flush_blocking(),
-            None => self.rerun.flush_with_timeout(VIEWER_TIMEOUT),
+        let (flushed, doing) = match self.file {
+            Some(_) => (self.rerun.flush_blocking(), "writing the recording"),
+            None => (
+                self.rerun.flush_with_timeout(VIEWER_TIMEOUT),
+                "sending the recording to the viewer",
+            ),
         };
-        flushed.map_err(failed(match self.file {
-            Some(_) => "writing the recording",
-            None => "sending the recording to the viewer",
-        }))
+        flushed.map_err(failed(doing))
     }
 
     /// Ends the stream; a file gets its index and its final name.

@@ -23,6 +23,14 @@ pub(crate) fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
     fs::rename(&part, path)
 }
 
+/// What is gone already need not be removed.
+pub(crate) fn gone(removed: io::Result<()>) -> io::Result<()> {
+    match removed {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        _ => Ok(()),
+    }
+}
+
 /// Gives a file that has been written its name.
 pub(super) fn finish(path: &Path) -> Result {
     fs::rename(part_name(path), path).map_err(broken(path))

@@ -7,6 +7,9 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+const NO_SBATCH: &str = "sbatch is not there: install Slurm's client (on Debian: slurm-client), or run \
+                         the shards yourself with --shard and merge them";
+
 /// What to hand in.
 #[derive(Clone, Debug)]
 pub struct Submission {
@@ -112,14 +115,10 @@ impl Submission {
             .arg(script)
             .output();
         let output = output.map_err(|e| {
-            match e.kind() {
-            io::ErrorKind::NotFound => StudyError::Unusable(
-                "sbatch is not there: install Slurm's client (on Debian: slurm-client), or run the \
-                 shards yourself with --shard and merge them"
-                    .into(),
-            ),
-            _ => StudyError::Unusable(format!("sbatch: {e}")),
-        }
+            StudyError::Unusable(match e.kind() {
+                io::ErrorKind::NotFound => NO_SBATCH.to_owned(),
+                _ => format!("sbatch: {e}"),
+            })
         })?;
         let stdout = String::from_utf8_lossy(&output.stdout);
         if !output.status.success() {

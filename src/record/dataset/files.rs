@@ -1,6 +1,6 @@
 //! Files of a data set.
 
-use crate::record::whole_files::{Result, broken, finish, part_name, write_whole};
+use crate::record::whole_files::{Result, broken, finish, gone, part_name, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
 use std::fs::{self, File};
@@ -34,10 +34,6 @@ pub fn is_empty(folder: &Path) -> io::Result<bool> {
 
 /// Takes away what a data set has written into a folder, and nothing else.
 pub fn clear(folder: &Path) -> io::Result<()> {
-    let gone = |result: io::Result<()>| match result {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-        _ => Ok(()),
-    };
     for name in FILES {
         let path = folder.join(name);
         gone(fs::remove_file(part_name(&path)))?;

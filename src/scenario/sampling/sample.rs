@@ -88,15 +88,14 @@ impl Template {
                 Some(k) => refused[k] += 1,
             }
         }
-        let worst = (0..refused.len()).max_by_key(|k| refused[*k]).unwrap_or(0);
+        let texts = self.conditions.iter().map(|c| c.text().to_owned());
+        let worst = texts.zip(refused).max_by_key(|(_, refused)| *refused);
+        let (text, refused) = worst.unwrap_or_default();
         Err(SampleError::Rejected {
             index,
             attempts: MOST_ATTEMPTS,
-            text: self
-                .conditions
-                .get(worst)
-                .map_or(String::new(), |c| c.text().to_owned()),
-            refused: refused.get(worst).copied().unwrap_or(0),
+            text,
+            refused,
         })
     }
 

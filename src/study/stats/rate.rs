@@ -32,19 +32,12 @@ pub fn rate(events: u64, n: u64) -> Option<Rate> {
         n: n as usize,
     };
     let beta = |a, b, u| Beta::new(a, b).map(|beta| beta.inverse_cdf(u)).ok();
-    // At both ends the interval reaches the end itself, which rounding would miss.
+    // Of no events, and of nothing else, there is no such distribution: the interval ends there.
     let exact = estimate(
-        if events == 0 {
-            0.0
-        } else {
-            beta(k, m - k + 1.0, TAIL)?
-        },
-        if events == n {
-            1.0
-        } else {
-            beta(k + 1.0, m - k, 1.0 - TAIL)?
-        },
+        beta(k, m - k + 1.0, TAIL).unwrap_or(0.0),
+        beta(k + 1.0, m - k, 1.0 - TAIL).unwrap_or(1.0),
     );
+    // Rounding would miss the ends.
     let wilson = estimate(
         if events == 0 { 0.0 } else { middle - half },
         if events == n { 1.0 } else { middle + half },
