@@ -2,7 +2,7 @@
 
 use super::imager::Imager;
 use super::{Capture, FrameHeader, Output, RigSettings, Sensor, SensorError};
-use crate::bus::{CameraModel, Content, RigCalibration, SimTime, StereoPair, TrainId};
+use crate::bus::{CameraModel, Content, RigCalibration, SimTime, StereoPair, TrainEnd, TrainId};
 use crate::twin::faults::{CameraFaultSettings, CameraFaults, rig_cameras};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
@@ -17,6 +17,8 @@ const POSE_STEP_S: f64 = 1e-3;
 #[derive(Debug)]
 pub struct StereoCamera {
     train: TrainId,
+    /// Where on the train it is.
+    end: TrainEnd,
     /// Both eyes and the mount as they really are.
     rig: RigCalibration,
     /// What both eyes have in common.
@@ -47,6 +49,7 @@ impl StereoCamera {
         let [both, left, right] = rig_cameras(train);
         Self {
             train,
+            end: rig.end,
             rig: built.calibration(),
             imager: Imager::new(rig.left_eye(), trigger, of(&[&both])),
             sheet_later_s: rig.trigger_offset_s(),
@@ -120,7 +123,7 @@ impl Sensor for StereoCamera {
             return Ok(Vec::new());
         };
         let start_true = header.start_true;
-        let vehicle_at = |time| world.vehicle_at(self.train, self.settings.end, time);
+        let vehicle_at = |time| world.vehicle_at(self.train, self.end, time);
         let views = (self.views(header.number, start_true, vehicle_at))
             .ok_or(SensorError::PoseForgotten(start_true.secs()))?;
         // A pair is complete with the later eye.
