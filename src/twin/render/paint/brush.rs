@@ -10,6 +10,31 @@ pub(super) type Along = [f64; 2];
 /// Metres along the outline, from and to.
 pub(super) type Up = [f64; 2];
 
+/// So far to either side of a place.
+pub(super) fn about(place: f64, half: f64) -> [f64; 2] {
+    [place - half, place + half]
+}
+
+/// A place on the outline, and which way along it is counted from there (1 or -1).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Anchor {
+    pub q: f64,
+    pub sense: f64,
+}
+
+impl Anchor {
+    /// What is so far away.
+    pub fn at(&self, away: f64) -> f64 {
+        self.q + self.sense * away
+    }
+
+    /// What lies between two distances.
+    pub fn band(&self, from: f64, to: f64) -> Up {
+        let (a, b) = (self.at(from), self.at(to));
+        [a.min(b), a.max(b)]
+    }
+}
+
 /// What a stroke does to what is under it.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Paint {
@@ -54,13 +79,17 @@ impl Strip {
         [0, self.columns].map(|k| (self.first_column + k) as f64 / PER_M)
     }
 
-    /// Multiples of a pitch within some length of the strip. Before the image's begin they are
-    /// negative and behind its end they run on, where the image wraps.
-    pub fn multiples(&self, pitch_m: f64, length_m: f64) -> impl Iterator<Item = i32> + use<> {
+    /// Multiples of a pitch within some length of the strip, each with its number. Before the image's
+    /// begin they are negative and behind its end they run on, where the image wraps.
+    pub fn multiples(
+        &self,
+        pitch_m: f64,
+        length_m: f64,
+    ) -> impl Iterator<Item = (i32, f64)> + use<> {
         let [from, to] = self.span_m();
         let first = ((from - length_m) / pitch_m).ceil() as i32;
         let last = ((to + length_m) / pitch_m).floor() as i32;
-        first..=last
+        (first..=last).map(move |k| (k, f64::from(k) * pitch_m))
     }
 
     /// An upright rectangle.
@@ -68,15 +97,26 @@ impl Strip {
         self.area(s, q, |_, _| 1.0, paint);
     }
 
+    /// Upright rectangles around a place, in the order of painting: along the line, along the outline.
+    pub fn stamp(&mut self, s: f64, anchor: Anchor, parts: &[([f64; 2], [f64; 2], Paint)]) {
+        for ([from, to], [low, high], paint) in parts {
+            self.rect([s + from, s + to], anchor.band(*low, *high), *paint);
+        }
+    }
+
     /// A disc.
     pub fn disc(&mut self, centre: [f64; 2], radius_m: f64, paint: Paint) {
         let reach = radius_m + 1.0 / PER_M;
-        let around = |x: f64| [x - reach, x + reach];
         let inside = |s: f64, q: f64| {
             let away = (s - centre[0]).hypot(q - centre[1]);
             ((radius_m - away) * PER_M + 0.5).clamp(0.0, 1.0)
         };
-        self.area(around(centre[0]), around(centre[1]), inside, paint);
+        self.area(
+            about(centre[0], reach),
+            about(centre[1], reach),
+            inside,
+            paint,
+        );
     }
 
     /// A rectangle with its own cover at each place.

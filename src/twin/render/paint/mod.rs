@@ -57,7 +57,7 @@ mod unroll;
 use crate::track::{CrossSection, Material, Tunnel, rail_outline};
 use brush::{Chance, Strip, ValueNoise, chance};
 use rayon::prelude::*;
-use unroll::{Place, Unrolled};
+use unroll::{OutlinePlace, Unrolled};
 
 /// Along the line everything repeats after this.
 pub const PERIOD_M: f64 = 60.0;
@@ -210,7 +210,7 @@ fn places(
     rail: &Unrolled,
     rail_row: usize,
     height: usize,
-) -> Vec<Option<Place>> {
+) -> Vec<Option<OutlinePlace>> {
     let q_of = |rows: f64| (rows + 0.5) / f64::from(TEXELS_PER_M);
     (0..height)
         .map(|row| {
@@ -224,7 +224,7 @@ fn places(
 }
 
 /// Paints a strip of one ring.
-fn paint(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Place>]) {
+fn paint(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<OutlinePlace>]) {
     prime(strip, ring, outline, places);
     lining::paint(strip, outline);
     ground::paint(strip, outline);
@@ -232,7 +232,7 @@ fn paint(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Plac
 }
 
 /// Bare surfaces: the tone of each segment, dust, streaks and grain.
-fn prime(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Place>]) {
+fn prime(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<OutlinePlace>]) {
     let patches = ValueNoise::under(strip, [48, 48], 0);
     let streaks = ValueNoise::under(strip, [12, 96], 1);
     let specks = ValueNoise::under(strip, [8, 8], 2);

@@ -1,6 +1,8 @@
 //! A cross-section laid flat: where things of the (l, h) plane come to lie along its outline.
 
+use super::brush::Anchor;
 use crate::track::{CrossSection, Edge, Material, OutlinePoint, Side};
+use nalgebra::{Matrix2, Vector2};
 
 /// The edges of an outline with their place along it.
 pub(super) struct Unrolled {
@@ -20,7 +22,7 @@ pub(super) struct Circle {
 
 /// A place on an outline.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct OutlinePlace {
     pub at: OutlinePoint,
     pub material: Material,
     /// Steepness of the surface: 0 for floors and ceilings, 1 for upright walls.
@@ -47,7 +49,7 @@ impl Unrolled {
     }
 
     /// What is `q_m` along the outline; its end beyond it.
-    pub fn at(&self, q_m: f64) -> Option<Place> {
+    pub fn at(&self, q_m: f64) -> Option<OutlinePlace> {
         let k = self.edges.partition_point(|(begin, _)| *begin <= q_m);
         let (begin_m, edge) = self.edges.get(k.saturating_sub(1))?;
         let length_m = edge.length_m();
@@ -56,7 +58,7 @@ impl Unrolled {
         } else {
             0.0
         };
-        Some(Place {
+        Some(OutlinePlace {
             at: between(edge, t),
             material: edge.material,
             upright: edge.normal().0.abs(),
@@ -76,9 +78,8 @@ impl Unrolled {
         all
     }
 
-    /// Where the wall of one side is at a height, and which way along the outline is up there
-    /// (1 or -1).
-    pub fn wall(&self, side: Side, height_m: f64) -> Option<(f64, f64)> {
+    /// Where the wall of one side is at a height, counted upwards.
+    pub fn wall(&self, side: Side, height_m: f64) -> Option<Anchor> {
         let sign = match side {
             Side::Left => 1.0,
             Side::Right => -1.0,
@@ -93,15 +94,17 @@ impl Unrolled {
     /// Where a floor of some material is at a distance left of the centreline.
     pub fn floor(&self, material: Material, l_m: f64) -> Option<f64> {
         self.crossing(material, |p| p.l_m - l_m, |_| true)
-            .map(|(q_m, _)| q_m)
+            .map(|at| at.q)
     }
 
-    /// Which way along the outline is up at a place of a wall (1 or -1); nothing where it is
-    /// level.
-    pub fn up_at(&self, q_m: f64) -> Option<f64> {
+    /// A place of a wall, counted upwards; nothing where it is level.
+    pub fn up_at(&self, q_m: f64) -> Option<Anchor> {
         let [below, above] = [-0.05, 0.05].map(|d| self.at(q_m + d).map(|p| p.at.h_m));
         let rise = above? - below?;
-        (rise.abs() > 1e-3).then(|| rise.signum())
+        (rise.abs() > 1e-3).then(|| Anchor {
+            q: q_m,
+            sense: rise.signum(),
+        })
     }
 
     /// The first place where `measure` passes through zero on a material, and its sense.
@@ -110,7 +113,7 @@ impl Unrolled {
         material: Material,
         measure: impl Fn(&OutlinePoint) -> f64,
         wanted: impl Fn(&OutlinePoint) -> bool,
-    ) -> Option<(f64, f64)> {
+    ) -> Option<Anchor> {
         let of_material = self.edges.iter().filter(|(_, e)| e.material == material);
         of_material.into_iter().find_map(|(begin_m, edge)| {
             let (from, to) = (measure(&edge.a), measure(&edge.b));
@@ -118,8 +121,10 @@ impl Unrolled {
                 return None;
             }
             let t = from / (from - to);
-            let sense = if to > from { 1.0 } else { -1.0 };
-            wanted(&between(edge, t)).then(|| (begin_m + t * edge.length_m(), sense))
+            wanted(&between(edge, t)).then(|| Anchor {
+                q: begin_m + t * edge.length_m(),
+                sense: if to > from { 1.0 } else { -1.0 },
+            })
         })
     }
 
@@ -134,12 +139,11 @@ impl Unrolled {
             (p.l_m - circle.centre.l_m) * sin + (p.h_m - circle.centre.h_m) * cos > 0.0
         };
         self.crossing(Material::Lining, across, ahead)
-            .map(|(q_m, _)| q_m)
+            .map(|at| at.q)
     }
 
-    /// Corners where two edges of a ledge's material meet, and which way along the outline its
-    /// floor lies.
-    pub fn ledges(&self, material: Material) -> Vec<(f64, f64)> {
+    /// Corners where two edges of a ledge's material meet, counted over its floor.
+    pub fn ledges(&self, material: Material) -> Vec<Anchor> {
         let pairs = self.edges.windows(2);
         pairs
             .filter(|pair| pair.iter().all(|(_, e)| e.material == material))
@@ -150,7 +154,8 @@ impl Unrolled {
                     (false, true) => 1.0,
                     _ => return None,
                 };
-                Some((pair[1].0, sense))
+                let q = pair[1].0;
+                Some(Anchor { q, sense })
             })
             .collect()
     }
@@ -182,15 +187,12 @@ fn circle_of(edges: &[(f64, Edge)]) -> Option<Circle> {
         return None;
     }
     let [a, b, c] = [0, corners.len() / 2, corners.len() - 1].map(|k| corners[k]);
-    let (bx, by) = (b.l_m - a.l_m, b.h_m - a.h_m);
-    let (cx, cy) = (c.l_m - a.l_m, c.h_m - a.h_m);
-    let det = 2.0 * (bx * cy - by * cx);
-    if det.abs() < 1e-9 {
-        return None;
-    }
-    let (b2, c2) = (bx * bx + by * by, cx * cx + cy * cy);
-    let (x, y) = ((cy * b2 - by * c2) / det, (bx * c2 - cx * b2) / det);
-    let (centre, radius_m) = (OutlinePoint::new(a.l_m + x, a.h_m + y), x.hypot(y));
+    let [to_b, to_c] = [b, c].map(|p| Vector2::new(p.l_m - a.l_m, p.h_m - a.h_m));
+    // The centre is as far from either as from a.
+    let sides = Matrix2::new(to_b.x, to_b.y, to_c.x, to_c.y).try_inverse()?;
+    let to_centre = sides * Vector2::new(to_b.norm_squared(), to_c.norm_squared()) * 0.5;
+    let radius_m = to_centre.norm();
+    let centre = OutlinePoint::new(a.l_m + to_centre.x, a.h_m + to_centre.y);
     let off = |p: &OutlinePoint| {
         ((p.l_m - centre.l_m).hypot(p.h_m - centre.h_m) - radius_m).abs() < ROUND_M
     };
@@ -214,18 +216,17 @@ mod tests {
     fn places_lie_where_the_outline_has_them() {
         let u = bored();
         for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
-            let (q, up) = u.wall(side, 2.0).unwrap();
-            let place = u.at(q).unwrap();
+            let up = u.wall(side, 2.0).unwrap();
+            let place = u.at(up.q).unwrap();
             assert!((place.at.h_m - 2.0).abs() < 1e-9 && sign * place.at.l_m > 2.9);
             assert!(place.upright > 0.95);
-            assert!(u.at(q + 0.1 * up).unwrap().at.h_m > 2.05);
+            assert!(u.at(up.at(0.1)).unwrap().at.h_m > 2.05);
         }
         let q = u.floor(Material::Bed, -0.75).unwrap();
         assert!((u.at(q).unwrap().at.l_m + 0.75).abs() < 1e-9);
         let ledges = u.ledges(Material::Walkway);
         assert_eq!(ledges.len(), 1);
-        let (q, in_) = ledges[0];
-        let top = u.at(q + 0.1 * in_).unwrap().at;
+        let top = u.at(ledges[0].at(0.1)).unwrap().at;
         assert!((top.h_m - 0.9).abs() < 1e-9 && (top.l_m - 1.7).abs() < 1e-9);
         assert_eq!(u.side_of(Material::Walkway), Some(Side::Left));
     }
