@@ -76,6 +76,12 @@ struct Row<'a> {
     rays: &'a [[f64; 2]],
 }
 
+/// What the pixels of a row show.
+struct RowLabels<'a> {
+    depth_m: &'a mut [f64],
+    surface: &'a mut [Surface],
+}
+
 impl Row<'_> {
     fn eye(&self) -> Point3<f64> {
         self.pose.translation.vector.into()
@@ -133,8 +139,9 @@ impl Labeller {
                     *surface = Surface::Tunnel;
                 }
             }
-            put_bodies(job, projection, &row, depth_m, surface);
-            put_lamps(lamps, projection, &row, depth_m, surface);
+            let mut labels = RowLabels { depth_m, surface };
+            labels.put_bodies(&row, job, projection);
+            labels.put_lamps(&row, lamps, projection);
         });
         labels
     }
@@ -249,57 +256,51 @@ fn cast_tunnel(tunnel: &TunnelCaster, row: &Row<'_>, depth_m: &mut [f64]) {
     }
 }
 
-fn put_bodies(
-    job: &Job,
-    projection: &Projection<'_>,
-    row: &Row<'_>,
-    depth_m: &mut [f64],
-    surface: &mut [Surface],
-) {
-    let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
-    for (k, body) in job.bodies.iter().enumerate() {
-        let solid = Solid::at(body, after_s);
-        let camera = &projection.view.camera.intrinsics;
-        let bounds = ImageBounds::of(solid.corners(), camera, &row.pose);
+impl RowLabels<'_> {
+    /// Puts a thing over the pixels within bounds where `meets` has a depth for it, by the ray and the
+    /// depth so far.
+    fn put(
+        &mut self,
+        row: &Row<'_>,
+        bounds: ImageBounds,
+        thing: Surface,
+        meets: impl Fn(&Vector3<f64>, f64) -> Option<f64>,
+    ) {
         for u in bounds.columns(row.v, row.rays.len()) {
-            let ray = row.ray(u);
-            if let Some((t, _)) = solid.cast(&eye, &ray)
-                && t < depth_m[u]
-                && t * ray.norm() < SIGHT_M
-            {
-                depth_m[u] = t;
-                surface[u] = Surface::Body(k as u16);
+            if let Some(depth_m) = meets(&row.ray(u), self.depth_m[u]) {
+                self.depth_m[u] = depth_m;
+                self.surface[u] = thing;
             }
         }
     }
-}
 
-fn put_lamps(
-    lamps: &[LampLight],
-    projection: &Projection<'_>,
-    row: &Row<'_>,
-    depth_m: &mut [f64],
-    surface: &mut [Surface],
-) {
-    let eye = row.eye();
-    for (k, lamp) in lamps.iter().enumerate() {
-        let way = lamp.centre - eye;
-        if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
-            continue;
+    fn put_bodies(&mut self, row: &Row<'_>, job: &Job, projection: &Projection<'_>) {
+        let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
+        for (k, body) in job.bodies.iter().enumerate() {
+            let solid = Solid::at(body, after_s);
+            let camera = &projection.view.camera.intrinsics;
+            let bounds = ImageBounds::of(solid.corners(), camera, &row.pose);
+            self.put(row, bounds, Surface::Body(k as u16), |ray, depth_m| {
+                let (t, _) = solid.cast(&eye, ray)?;
+                (t < depth_m && t * ray.norm() < SIGHT_M).then_some(t)
+            });
         }
-        let camera = &projection.view.camera.intrinsics;
-        let corners = ImageBounds::cube(&lamp.centre, lamp.radius_m);
-        let bounds = ImageBounds::of(corners, camera, &row.pose);
-        for u in bounds.columns(row.v, row.rays.len()) {
-            let ray = row.ray(u);
-            let t = lamp.facing.dot(&way) / lamp.facing.dot(&ray);
-            if t > 0.0
-                && (ray * t - way).norm_squared() <= lamp.radius_m * lamp.radius_m
-                && t - FLUSH_M <= depth_m[u]
-            {
-                depth_m[u] = t;
-                surface[u] = Surface::Lamp(k as u16);
+    }
+
+    fn put_lamps(&mut self, row: &Row<'_>, lamps: &[LampLight], projection: &Projection<'_>) {
+        for (k, lamp) in lamps.iter().enumerate() {
+            let way = lamp.centre - row.eye();
+            if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
+                continue;
             }
+            let camera = &projection.view.camera.intrinsics;
+            let corners = ImageBounds::cube(&lamp.centre, lamp.radius_m);
+            let bounds = ImageBounds::of(corners, camera, &row.pose);
+            self.put(row, bounds, Surface::Lamp(k as u16), |ray, depth_m| {
+                let t = lamp.facing.dot(&way) / lamp.facing.dot(ray);
+                let on_disc = (ray * t - way).norm_squared() <= lamp.radius_m * lamp.radius_m;
+                (t > 0.0 && on_disc && t - FLUSH_M <= depth_m).then_some(t)
+            });
         }
     }
 }
