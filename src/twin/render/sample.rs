@@ -12,8 +12,7 @@ use super::{CameraMotion, Job, LensSettings, NoiseKey, Scene, SensorSettings, Vi
 use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use crate::track::uid::{LineCode, Uid};
 use crate::track::{
-    Alignment, CrossSection, LampSite, Material, OutlinePoint, PlanElement, SectionRange,
-    TrackPoint, Tunnel,
+    Alignment, BED_M, CrossSection, LampSite, PlanElement, SectionRange, TrackPoint, Tunnel,
 };
 use crate::twin::air::Air;
 use crate::twin::geometry::{Body, Shape};
@@ -21,7 +20,6 @@ use crate::twin::lights::LampLight;
 use crate::twin::random::Stream;
 use crate::twin::reflectance::Wet;
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Length of the line.
@@ -32,8 +30,6 @@ pub const LAMP_SPACING_M: f64 = 10.0;
 pub const FIRST_LAMP_M: f64 = 5.0;
 /// Width of the pixels of both cameras.
 const PIXEL_M: f64 = 3.75e-6;
-/// Top of the bed under top of rail.
-const BED_M: f64 = -0.17;
 /// Radius of the lining, and the height of its centre above top of rail: a lamp 2.78 m left and
 /// 3.25 m up stands clear of the wall.
 const RADIUS_M: f64 = 3.4;
@@ -41,19 +37,12 @@ const CENTRE_M: f64 = 1.7;
 
 /// The line with its lamps.
 pub fn tunnel() -> Tunnel {
-    let element = |start_per_m: f64| PlanElement {
-        length_m: 0.5 * LENGTH_M,
-        start_per_m,
-        end_per_m: start_per_m,
-        start_cant_m: 0.0,
-        end_cant_m: 0.0,
-    };
-    let alignment = Alignment::new(
-        Point3::new(1000.0, 2000.0, -15.0),
-        0.3,
-        &[element(0.0), element(1.0 / 300.0)],
-        &[],
-    );
+    let half_m = 0.5 * LENGTH_M;
+    let plan = [
+        PlanElement::straight(half_m),
+        PlanElement::arc(half_m, 1.0 / 300.0, 0.0),
+    ];
+    let alignment = Alignment::new(Point3::new(1000.0, 2000.0, -15.0), 0.3, &plan, &[]);
     let lamps = (0..(LENGTH_M / LAMP_SPACING_M) as u16)
         .map(|k| lamp_site(&alignment, k))
         .collect();
@@ -63,7 +52,7 @@ pub fn tunnel() -> Tunnel {
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: LENGTH_M,
-            section: bored_section(),
+            section: CrossSection::circular(RADIUS_M, CENTRE_M, None),
         }],
         lamps,
         wayside: Vec::new(),
@@ -128,27 +117,38 @@ pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
             camera_pose(tunnel, at, 41f64.to_radians(), 26f64.to_radians())
         })
         .collect();
+    let motion = CameraMotion {
+        first: SimTime::from_secs(-step_s),
+        step_s,
+        poses,
+    };
+    let lens = Intrinsics::centred(1280, 720, 1040.0);
+    view("sample rig", lens, (22.2e-6, 30e-6), motion)
+}
+
+fn view(
+    name: &str,
+    intrinsics: Intrinsics,
+    (line_time_s, exposure_s): (f64, f64),
+    motion: CameraMotion,
+) -> View {
     View {
         camera: CameraModel {
-            intrinsics: Intrinsics::centred(1280, 720, 1040.0),
+            intrinsics,
             shutter: Shutter {
-                line_time_s: 22.2e-6,
-                exposure_s: 30e-6,
+                line_time_s,
+                exposure_s,
                 first_row: 0,
             },
             blur_px: 0.5,
         },
         start: SimTime::ZERO,
-        motion: CameraMotion {
-            first: SimTime::from_secs(-step_s),
-            step_s,
-            poses,
-        },
+        motion,
         pixel_m: PIXEL_M,
         lens: LensSettings::default(),
         sensor: SensorSettings::default(),
         noise: NoiseKey {
-            stream: Stream::new(1, 0, "sample rig"),
+            stream: Stream::new(1, 0, name),
             frame: 0,
         },
     }
@@ -176,49 +176,29 @@ pub fn wayside_job(tunnel: &Tunnel, s_m: f64) -> Job {
         h_m: 3.0,
     };
     let pose = camera_pose(tunnel, at, 8f64.to_radians(), -12f64.to_radians());
-    let side = 0.3;
+    let half_m = 0.15;
     let mut bodies = worker(tunnel, s_m + 18.0, 0.4);
-    bodies.push(Body {
-        shape: Shape::Box(Vector3::repeat(0.5 * side)),
-        world_from_body: on_bed(tunnel, s_m + 12.0, -0.3, 0.5 * side),
-        velocity_mps: Vector3::zeros(),
-        albedo: 0.5,
-        luminance_cd_m2: 0.0,
-    });
+    bodies.push(body(
+        Shape::Box(Vector3::repeat(half_m)),
+        on_bed(tunnel, s_m + 12.0, -0.3, half_m),
+        0.5,
+    ));
     Job {
         bodies,
-        views: vec![View {
-            camera: CameraModel {
-                intrinsics: Intrinsics::centred(1920, 1080, 1100.0),
-                shutter: Shutter {
-                    line_time_s: 14.8e-6,
-                    exposure_s: 8e-3,
-                    first_row: 0,
-                },
-                blur_px: 0.5,
-            },
-            start: SimTime::ZERO,
-            motion: CameraMotion::still(pose),
-            pixel_m: PIXEL_M,
-            lens: LensSettings::default(),
-            sensor: SensorSettings::default(),
-            noise: NoiseKey {
-                stream: Stream::new(1, 0, "sample wayside"),
-                frame: 0,
-            },
-        }],
+        views: vec![view(
+            "sample wayside",
+            Intrinsics::centred(1920, 1080, 1100.0),
+            (14.8e-6, 8e-3),
+            CameraMotion::still(pose),
+        )],
         ..Job::default()
     }
 }
 
 /// Somebody standing on the bed in a dark coat: legs, arms, trunk and head.
 pub fn worker(tunnel: &Tunnel, s_m: f64, l_m: f64) -> Vec<Body> {
-    let part = |shape: Shape, left_m: f64, up_m: f64, albedo: f64| Body {
-        shape,
-        world_from_body: on_bed(tunnel, s_m, l_m + left_m, up_m),
-        velocity_mps: Vector3::zeros(),
-        albedo,
-        luminance_cd_m2: 0.0,
+    let part = |shape: Shape, left_m: f64, up_m: f64, albedo: f64| {
+        body(shape, on_bed(tunnel, s_m, l_m + left_m, up_m), albedo)
     };
     vec![
         part(Shape::Capsule(0.09, 0.34), 0.12, 0.43, 0.1),
@@ -228,6 +208,16 @@ pub fn worker(tunnel: &Tunnel, s_m: f64, l_m: f64) -> Vec<Body> {
         part(Shape::Capsule(0.06, 0.26), -0.27, 1.12, 0.4),
         part(Shape::Sphere(0.12), 0.0, 1.66, 0.5),
     ]
+}
+
+fn body(shape: Shape, world_from_body: Isometry3<f64>, albedo: f64) -> Body {
+    Body {
+        shape,
+        world_from_body,
+        velocity_mps: Vector3::zeros(),
+        albedo,
+        luminance_cd_m2: 0.0,
+    }
 }
 
 /// A pose `up_m` above the bed, axes along the line.
@@ -241,31 +231,6 @@ pub fn on_bed(tunnel: &Tunnel, s_m: f64, l_m: f64, up_m: f64) -> Isometry3<f64> 
         Translation3::from(tunnel.alignment.world_from_track(at)),
         tunnel.alignment.at(s_m).world_from_line().rotation,
     )
-}
-
-/// A circle cut off by the bed, 32 facets, from the bed's left end round by the right.
-fn bored_section() -> CrossSection {
-    let facets = 32;
-    let bed_angle = ((BED_M - CENTRE_M) / RADIUS_M).asin();
-    let sweep = 0.5 * TAU - 2.0 * bed_angle;
-    // Angles run from the right end of the bed over the top to its left end.
-    let mut points: Vec<_> = (0..=facets)
-        .map(|k| {
-            let a = bed_angle + sweep * f64::from(k) / f64::from(facets);
-            OutlinePoint {
-                l_m: -RADIUS_M * a.cos(),
-                h_m: CENTRE_M + RADIUS_M * a.sin(),
-            }
-        })
-        .collect();
-    points.rotate_right(1);
-    let mut materials = vec![Material::Lining; points.len()];
-    materials[0] = Material::Bed;
-    CrossSection {
-        points,
-        materials,
-        closed: true,
-    }
 }
 
 fn lamp_site(alignment: &Alignment, k: u16) -> LampSite {
