@@ -24,9 +24,7 @@ pub struct LitScene {
     pub lamps: LampField,
     /// With all that becomes of them.
     all_lamps: Vec<LampLight>,
-    /// When any of them changes.
-    changes: Vec<SimTime>,
-    /// So many changes are over.
+    /// So many of their changes are over.
     passed: usize,
 }
 
@@ -38,10 +36,6 @@ impl LitScene {
     }
 
     fn painted(scene: Scene, paintings: Paintings) -> Self {
-        let changes = scene.lamps.iter().flat_map(|lamp| &lamp.changes);
-        let mut changes: Vec<_> = changes.map(|change| change.at).collect();
-        changes.sort_unstable();
-        changes.dedup();
         Self {
             tunnel: scene.tunnel,
             air: scene.air,
@@ -49,7 +43,6 @@ impl LitScene {
             paintings,
             lamps: LampField::new(&scene.lamps, scene.air),
             all_lamps: scene.lamps,
-            changes,
             passed: 0,
         }
     }
@@ -69,7 +62,8 @@ impl LitScene {
     /// Takes the lamps as they are at a time; whether any has changed since the last call. Until one
     /// does, all that they light stays as it is: a lamp changes between two jobs, never within one.
     pub fn follow_lamps(&mut self, time: SimTime) -> bool {
-        let passed = self.changes.partition_point(|at| *at <= time);
+        let changes = self.all_lamps.iter().flat_map(|lamp| &lamp.changes);
+        let passed = changes.filter(|change| change.at <= time).count();
         let changed = passed != self.passed;
         if changed {
             self.passed = passed;
