@@ -3,7 +3,7 @@
 
 const PI: f32 = 3.14159265;
 
-struct Headlight {
+struct ViewHeadlight {
     // Relative to the view's reference point.
     position_m: vec3f,
     intensity_cd: f32,
@@ -11,7 +11,7 @@ struct Headlight {
     exponent: f32,
 }
 
-struct View {
+struct ViewConstants {
     focal_px: vec2f,
     centre_px: vec2f,
     size_px: vec2f,
@@ -26,7 +26,8 @@ struct View {
     electrons_per_cd_m2: f32,
     black_dn: f32,
     white_dn: f32,
-    grey_per_dn: f32,
+    // Place of row 0 in the table of poses.
+    pose_middle: f32,
     read_noise_e: f32,
     full_well_e: f32,
     blooming: f32,
@@ -40,8 +41,6 @@ struct View {
     // p1, p2 of the lens's distortion; k1, k2, k3 and the square of its reach.
     tangential: vec2f,
     radial: vec4f,
-    // Place of row 0 in the table of poses.
-    pose_middle: f32,
     // Share of light that the air takes on a metre, and the signal of endless air.
     extinction_per_m: f32,
     airlight_e: f32,
@@ -52,10 +51,10 @@ struct View {
     reach_px: i32,
     // Lamps that glossy surfaces mirror.
     mirrored: u32,
-    headlights: array<Headlight, MAX_HEADLIGHTS>,
+    headlights: array<ViewHeadlight, MAX_HEADLIGHTS>,
 }
 
-@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(0) var<uniform> view: ViewConstants;
 
 // Where a point in the camera's frame is seen at depth 1, times its depth: bus/camera.rs.
 fn distort(c: vec3f) -> vec2f {

@@ -2,7 +2,7 @@
 // row: twin/render/glare.rs. Far from a lamp it is flat, near it the lamp outshines it, so between
 // texels it may run straight.
 
-struct Glare {
+struct GlareArea {
     // Bounds, pixels.
     low: vec2f,
     high: vec2f,
@@ -21,7 +21,7 @@ struct GlareRow {
     wide_px2: f32,
 }
 
-@group(0) @binding(1) var<storage, read> glares: array<Glare>;
+@group(0) @binding(1) var<storage, read> glares: array<GlareArea>;
 @group(0) @binding(2) var<storage, read> rows: array<GlareRow>;
 
 struct Corner {

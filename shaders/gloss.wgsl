@@ -1,5 +1,5 @@
 // Lamps and headlights mirrored in rail heads and in a wet bed, added to the signal. The law and its
-// sources are told in twin/render/gloss.rs.
+// sources stand in twin/render/gloss.rs.
 
 struct Mirrored {
     // From the view's reference point.

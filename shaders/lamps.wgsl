@@ -27,7 +27,7 @@ struct Lamp {
     ends_px: f32,
 }
 
-struct LampRow {
+struct DiscRow {
     // Of the disc in the camera's frame.
     normal: vec3f,
     unused: f32,
@@ -41,7 +41,7 @@ struct Instant {
 }
 
 @group(0) @binding(1) var<storage, read> lamps: array<Lamp>;
-@group(0) @binding(2) var<storage, read> rows: array<LampRow>;
+@group(0) @binding(2) var<storage, read> rows: array<DiscRow>;
 @group(0) @binding(3) var<storage, read> instants: array<Instant>;
 @group(0) @binding(4) var depth: texture_depth_2d;
 

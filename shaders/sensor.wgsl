@@ -1,5 +1,5 @@
 // The sensor: fixed pattern, noise, bits, as twin/render/sensor.rs has it. Every fragment makes
-// four neighbouring pixels of a row, packed in one RGBA texel: the target's bytes are the image,
+// four neighbouring pixels of a row, packed in one RGBA texel: the target's words are the image,
 // and one hash serves four pixels.
 
 @group(0) @binding(1) var glare: texture_2d<f32>;
@@ -32,15 +32,14 @@ struct Texel {
     @location(6) @interpolate(flat, either) read_noise_e: f32,
     @location(7) @interpolate(flat, either) black_dn: f32,
     @location(8) @interpolate(flat, either) white_dn: f32,
-    @location(9) @interpolate(flat, either) grey_per_dn: f32,
     // Of the noise, the frame's number last.
-    @location(10) @interpolate(flat, either) key: vec3u,
+    @location(9) @interpolate(flat, either) key: vec3u,
     // 0 without noise.
-    @location(11) @interpolate(flat, either) noise: f32,
+    @location(10) @interpolate(flat, either) noise: f32,
     // Entries a row of `signal`.
-    @location(12) @interpolate(flat, either) stride: u32,
+    @location(11) @interpolate(flat, either) stride: u32,
     // Texels a row.
-    @location(13) @interpolate(flat, either) width: u32,
+    @location(12) @interpolate(flat, either) width: u32,
 }
 
 @vertex
@@ -58,7 +57,6 @@ fn whole(@builtin(vertex_index) k: u32) -> Texel {
         view.read_noise_e,
         view.black_dn,
         view.white_dn,
-        view.grey_per_dn,
         vec3u(view.key, view.frame),
         f32(min(view.noise, 1u)),
         (width_px + 127u) / 128u * 32u,
@@ -132,13 +130,7 @@ fn converted(in: Texel) -> vec4f {
     return round(clamp(dn, vec4f(0.0), vec4f(in.white_dn)));
 }
 
-// The eight upper bits.
 @fragment
-fn develop(in: Texel) -> @location(0) vec4f {
-    return floor(converted(in) * in.grey_per_dn) / 255.0;
-}
-
-@fragment
-fn develop_raw(in: Texel) -> @location(0) vec4u {
+fn develop(in: Texel) -> @location(0) vec4u {
     return vec4u(converted(in));
 }

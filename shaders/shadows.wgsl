@@ -25,7 +25,7 @@ struct Tile {
     corners: array<Corner, 4>,
 }
 
-struct Source {
+struct ShadowSource {
     position_m: vec3f,
     intensity_cd: f32,
     axis: vec3f,
@@ -61,7 +61,7 @@ override OTHERS: bool = true;
 @group(0) @binding(2) var<storage, read> tiles: array<Tile>;
 // Software adapters read these faster from uniforms than from storage.
 @group(0) @binding(3) var<uniform> lists: array<vec4u, MAX_WORDS / 4u>;
-@group(0) @binding(4) var<uniform> sources: array<Source, MAX_SOURCES>;
+@group(0) @binding(4) var<uniform> sources: array<ShadowSource, MAX_SOURCES>;
 @group(0) @binding(5) var<uniform> blockers: array<Blocker, MAX_BLOCKERS>;
 @group(0) @binding(6) var<uniform> slabs: array<Slab, MAX_SLABS>;
 
@@ -162,7 +162,7 @@ fn enters(span: vec2f, end: f32) -> bool {
 
 // To the place number `k` on a disc, in shares of its radius; `turn` is the cosine and sine of k
 // golden angles.
-fn place(source: Source, k: u32, turn: vec2f) -> vec3f {
+fn place(source: ShadowSource, k: u32, turn: vec2f) -> vec3f {
     return (source.aside_m * turn.x + source.up_m * turn.y) * sqrt((f32(k) + 0.5) / f32(PLACES));
 }
 
@@ -180,7 +180,7 @@ fn word(at: u32) -> u32 {
 
 // Which places on a light's disc the capsules in a range of the lists hide from a point. Where all
 // or none of the disc is hidden one line to its centre tells.
-fn behind_capsules(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
+fn behind_capsules(at: vec3f, time_s: f32, source: ShadowSource, begin: u32, end: u32) -> u32 {
     let radius_m = length(source.aside_m);
     let to = source.position_m - at;
     var mask = 0u;
@@ -203,7 +203,7 @@ fn behind_capsules(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32)
 }
 
 // The same of other bodies.
-fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -> u32 {
+fn behind_others(at: vec3f, time_s: f32, source: ShadowSource, begin: u32, end: u32) -> u32 {
     let radius_m = length(source.aside_m);
     let to = source.position_m - at;
     var mask = 0u;
@@ -224,7 +224,7 @@ fn behind_others(at: vec3f, time_s: f32, source: Source, begin: u32, end: u32) -
 }
 
 // Illuminance by a light: twin/render/photometry.rs.
-fn irradiance_lx(p: vec3f, n: vec3f, source: Source) -> f32 {
+fn irradiance_lx(p: vec3f, n: vec3f, source: ShadowSource) -> f32 {
     let d = p - source.position_m;
     let square = max(dot(d, d), 1e-4);
     let inverse = inverseSqrt(square);

@@ -108,7 +108,6 @@ fn frames(
     let job = Job {
         bodies: vec![body],
         views: views.collect(),
-        raw: true,
         ..Job::default()
     };
     renderer.submit(&job).unwrap();
@@ -454,15 +453,14 @@ fn noise_is_equal_for_gpu_and_cpu_streams() {
     }
 }
 
-/// Provokes eight bits that are not the upper ones, and raw images of what did not ask for them.
+/// Provokes eight bits that are not the upper ones.
 #[test]
 fn eight_bits_are_the_upper_ones() {
     both(|renderer, who| {
         let view = camera();
-        let mut job = Job {
+        let job = Job {
             bodies: vec![all_over(&view, 4000.0)],
             views: vec![view.clone()],
-            raw: true,
             ..Job::default()
         };
         renderer.submit(&job).unwrap();
@@ -475,10 +473,6 @@ fn eight_bits_are_the_upper_ones() {
             raw[0].iter().any(|x| x % 16 != 0),
             "{who}: no more than eight bits"
         );
-        job.raw = false;
-        renderer.submit(&job).unwrap();
-        assert!(renderer.collect_raw().is_err(), "{who}");
-        assert!(renderer.collect().unwrap()[0] == upper, "{who}");
     });
 }
 

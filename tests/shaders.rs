@@ -77,7 +77,7 @@ macro_rules! same_layout {
 fn structs_agree() {
     same_layout!(
         "common",
-        View,
+        ViewConstants,
         focal_px,
         centre_px,
         size_px,
@@ -90,7 +90,7 @@ fn structs_agree() {
         electrons_per_cd_m2,
         black_dn,
         white_dn,
-        grey_per_dn,
+        pose_middle,
         read_noise_e,
         full_well_e,
         blooming,
@@ -103,7 +103,6 @@ fn structs_agree() {
         saturation_e,
         tangential,
         radial,
-        pose_middle,
         extinction_per_m,
         airlight_e,
         confusion_px_m,
@@ -114,7 +113,7 @@ fn structs_agree() {
     );
     same_layout!(
         "common",
-        Headlight,
+        ViewHeadlight,
         position_m,
         intensity_cd,
         axis,
@@ -147,9 +146,9 @@ fn structs_agree() {
         flat,
         ends_px
     );
-    same_layout!("lamps", LampRow, normal, unused);
+    same_layout!("lamps", DiscRow, normal, unused);
     same_layout!("lamps", Instant, centre, signal_e);
-    same_layout!("glare", Glare, low, high, first_row, rows_at);
+    same_layout!("glare", GlareArea, low, high, first_row, rows_at);
     same_layout!(
         "glare",
         GlareRow,
@@ -165,7 +164,7 @@ fn structs_agree() {
     );
     same_layout!(
         "shadows",
-        Source,
+        ShadowSource,
         position_m,
         intensity_cd,
         axis,

@@ -30,7 +30,7 @@ impl AirSettings {
     }
 }
 
-/// The tunnel's air: clear, or full of mist or dust. What it does to light is told in
+/// The tunnel's air: clear, or full of mist or dust. What it does to light is said in
 /// [`photometry`](super::render::photometry).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Air {

@@ -263,7 +263,6 @@ mod tests {
         for s_m in [100.4, 102.0, 402.5] {
             let job = Job {
                 views: vec![view(s_m)],
-                raw: true,
                 ..Job::default()
             };
             renderer.submit(&job).unwrap();

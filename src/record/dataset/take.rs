@@ -88,7 +88,6 @@ impl DataSet<'_> {
         let spare: Vec<u32> = all.iter().map(|view| view.sensor.spare_bits()).collect();
         let job = Job {
             views: all,
-            raw: true,
             ..job.clone()
         };
         let broken = || failed("drawing a picture for the data set");

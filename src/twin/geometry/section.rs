@@ -27,8 +27,8 @@ pub(super) struct OutlineEdge {
 #[derive(Clone, Debug)]
 pub(super) struct SectionCaster {
     pub edges: Vec<OutlineEdge>,
-    /// Corners of the tunnel itself where it is closed.
-    ring: Vec<Vector2<f64>>,
+    /// Without the rails.
+    section: CrossSection,
     low: Vector2<f64>,
     high: Vector2<f64>,
     columns: usize,
@@ -48,15 +48,6 @@ impl SectionCaster {
         for side in [1.0, -1.0] {
             edges.extend(edges_of(&rail_outline(side * RAIL_OFFSET_M)));
         }
-        let ring = if section.closed {
-            section
-                .points
-                .iter()
-                .map(|p| Vector2::new(p.l_m, p.h_m))
-                .collect()
-        } else {
-            Vec::new()
-        };
         let corners = || {
             edges
                 .iter()
@@ -80,7 +71,7 @@ impl SectionCaster {
         }
         Self {
             edges,
-            ring,
+            section: section.clone(),
             low,
             high,
             columns,
@@ -146,23 +137,9 @@ impl SectionCaster {
         }
     }
 
-    /// A disc around a point over the centreline that holds it: the point's height, and radius.
-    pub fn disc(&self) -> (f64, f64) {
-        let up_m = 0.5 * (self.low.y + self.high.y);
-        let half = Vector2::new(self.low.x.abs().max(self.high.x.abs()), self.high.y - up_m);
-        (up_m, half.norm())
-    }
-
     /// Whether a point is in free space, for closed outlines; open ones say yes.
     pub fn contains(&self, p: &Vector2<f64>) -> bool {
-        let n = self.ring.len();
-        let crossings = (0..n)
-            .filter(|&k| {
-                let (a, b) = (self.ring[k], self.ring[(k + 1) % n]);
-                (a.y > p.y) != (b.y > p.y) && p.x < a.x + (p.y - a.y) / (b.y - a.y) * (b.x - a.x)
-            })
-            .count();
-        n == 0 || crossings % 2 == 1
+        !self.section.closed || self.section.contains(p.x, p.y)
     }
 }
 
@@ -189,27 +166,21 @@ impl OutlineEdge {
 
 /// The edges of an outline; corners that coincide make none.
 fn edges_of(section: &CrossSection) -> Vec<OutlineEdge> {
-    let n = section.points.len();
     let mut q_m = 0.0;
-    let mut edges = Vec::with_capacity(n);
-    let count = if section.closed {
-        n
-    } else {
-        n.saturating_sub(1)
-    };
-    for (k, &material) in section.materials.iter().enumerate().take(count) {
-        let (a, b) = (section.points[k], section.points[(k + 1) % n]);
-        let step = Vector2::new(b.l_m - a.l_m, b.h_m - a.h_m);
+    let mut edges = Vec::new();
+    for edge in section.edges() {
+        let [start, end] = [edge.a, edge.b].map(|p| Vector2::new(p.l_m, p.h_m));
+        let step = end - start;
         let length_m = step.norm();
         if length_m > 1e-9 {
             let along = step / length_m;
             edges.push(OutlineEdge {
-                start: Vector2::new(a.l_m, a.h_m),
+                start,
                 along,
                 normal: Vector2::new(along.y, -along.x),
                 length_m,
                 q_m,
-                material,
+                material: edge.material,
             });
         }
         q_m += length_m;

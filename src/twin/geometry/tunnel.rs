@@ -14,7 +14,6 @@
 use super::section::SectionCaster;
 use crate::track::{Material, Tunnel};
 use nalgebra::{Point3, Vector2, Vector3};
-use std::ops::Range;
 
 /// The swept tunnel with its rails, ready for rays.
 #[derive(Clone, Debug)]
@@ -84,10 +83,6 @@ pub const STATION_STEP_M: f64 = 1.0;
 /// A segment begins this much early, so that rounding opens no crack between two of them.
 const OVERLAP_M: f64 = 0.05;
 
-fn plan(v: Vector3<f64>) -> Vector2<f64> {
-    v.xy()
-}
-
 impl TunnelCaster {
     /// Sweeps the cross-sections of a tunnel along its line.
     pub fn new(tunnel: &Tunnel) -> Self {
@@ -108,8 +103,8 @@ impl TunnelCaster {
             .map(|pair| {
                 let mid = 0.5 * (pair[0].s_m + pair[1].s_m);
                 let step = pair[1].origin - pair[0].origin;
-                let length = plan(step).norm();
-                let chord = plan(step) / length;
+                let length = step.xy().norm();
+                let chord = step.xy() / length;
                 Segment {
                     chord,
                     left: Vector2::new(-chord.y, chord.x),
@@ -141,43 +136,9 @@ impl TunnelCaster {
         })
     }
 
-    /// How many segments there are.
-    pub fn segments(&self) -> usize {
-        self.segments.len()
-    }
-
     /// Where a segment begins.
     pub fn chainage_m(&self, segment: usize) -> f64 {
         self.stations[segment].s_m
-    }
-
-    /// Segments within some metres of chainage of one.
-    pub fn segments_about(&self, segment: usize, reach_m: f64) -> Range<usize> {
-        if segment >= self.segments() {
-            return 0..0;
-        }
-        let at = self.chainage_m(segment);
-        let near = |k: &usize| (self.chainage_m(*k) - at).abs() <= reach_m;
-        let begin = (0..segment)
-            .rev()
-            .take_while(near)
-            .last()
-            .unwrap_or(segment);
-        let end = (segment..self.segments())
-            .take_while(near)
-            .last()
-            .unwrap_or(segment);
-        begin..end + 1
-    }
-
-    /// A ball around a segment's surface.
-    pub fn segment_ball(&self, segment: usize) -> (Point3<f64>, f64) {
-        let [near, far] = [0, 1].map(|k| self.stations[segment + k].origin);
-        let (up_m, radius_m) = self.segments[segment]
-            .section
-            .map_or((0.0, 0.0), |i| self.sections[i].disc());
-        let middle = nalgebra::center(&near, &far) + Vector3::z() * up_m;
-        (middle, radius_m + (far - near).norm())
     }
 
     /// The segment that a place is in: from a segment close by, or else by search for the nearest
@@ -208,7 +169,7 @@ impl TunnelCaster {
     /// Distance of a place up the line from the plane of a station.
     fn ahead_of(&self, station: usize, p: &Point3<f64>) -> f64 {
         let s = &self.stations[station];
-        s.forward.dot(&plan(p - s.origin))
+        s.forward.dot(&(p - s.origin).xy())
     }
 
     /// First surface that the ray o + t d meets for t up to `reach`; `segment` is that of o. Rays
@@ -226,7 +187,7 @@ impl TunnelCaster {
         {
             return None;
         }
-        let (d2, overlap) = (plan(*d), OVERLAP_M / d.norm());
+        let (d2, overlap) = (d.xy(), OVERLAP_M / d.norm());
         let (mut k, mut entry) = (segment, 0.0f64);
         // Each station's plane is crossed once; the bound is for rays that are not numbers.
         for _ in 0..self.segments.len() {
@@ -271,7 +232,7 @@ impl TunnelCaster {
     fn across(&self, k: usize, o: &Point3<f64>, d: &Vector3<f64>) -> (Vector2<f64>, Vector2<f64>) {
         let segment = &self.segments[k];
         let v = o - self.stations[k].origin;
-        let (v2, d2) = (plan(v), plan(*d));
+        let (v2, d2) = (v.xy(), d.xy());
         (
             Vector2::new(
                 segment.left.dot(&v2),
@@ -301,6 +262,10 @@ impl TunnelCaster {
         // Across the edge and across the ruling, which climbs with the slope.
         let (n, along) = (edge.normal, -edge.normal.y * segment.slope);
         let level = segment.left * n.x + segment.chord * along;
+        // How metres along the edge grow with the position: the transpose of what
+        // [`Self::across`] does to directions.
+        let climb = segment.slope * edge.along.y;
+        let up_edge = segment.left * edge.along.x - segment.chord * climb;
         SurfacePoint {
             position,
             normal: Vector3::new(level.x, level.y, n.y).normalize(),
@@ -312,16 +277,9 @@ impl TunnelCaster {
             gradients: [
                 Vector3::new(segment.chord.x, segment.chord.y, 0.0)
                     * ((far_m - near_m) / (past + before)),
-                Self::up_edge(segment, &edge.along),
+                Vector3::new(up_edge.x, up_edge.y, edge.along.y),
             ],
         }
-    }
-
-    /// How metres along an edge grow with the position: the transpose of what
-    /// [`Self::across`] does to directions.
-    fn up_edge(segment: &Segment, along: &Vector2<f64>) -> Vector3<f64> {
-        let level = segment.left * along.x - segment.chord * (segment.slope * along.y);
-        Vector3::new(level.x, level.y, along.y)
     }
 }
 

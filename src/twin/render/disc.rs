@@ -6,22 +6,6 @@ use std::f64::consts::PI;
 /// Places on a light's disc from which shadows are counted.
 pub const DISC_PLACES: usize = 16;
 
-/// Places on a light's disc, each for the same share of its area.
-pub fn disc_places(
-    centre: &Point3<f64>,
-    axis: &Vector3<f64>,
-    radius_m: f64,
-) -> [Point3<f64>; DISC_PLACES] {
-    let mut places = [*centre; DISC_PLACES];
-    for (place, point) in places
-        .iter_mut()
-        .zip(disc_points(centre, axis, radius_m, DISC_PLACES))
-    {
-        *place = point;
-    }
-    places
-}
-
 /// Places on a disc, each for the same share of its area: on a spiral of the golden angle (after
 /// Vogel, "A better way to construct the sunflower head", Mathematical Biosciences 44, 1979).
 pub fn disc_points(
@@ -51,8 +35,8 @@ mod tests {
     #[test]
     fn places_are_even_over_the_disc() {
         let (centre, axis) = (Point3::new(3.0, -2.0, 7.0), Vector3::new(0.6, 0.0, -0.8));
-        let places = disc_places(&centre, &axis, 0.5);
-        let offs = places.map(|p| p - centre);
+        let places = disc_points(&centre, &axis, 0.5, DISC_PLACES);
+        let offs: Vec<_> = places.map(|p| p - centre).collect();
         let mean = offs.iter().sum::<Vector3<f64>>() / 16.0;
         let square = offs.iter().map(Vector3::norm_squared).sum::<f64>() / 16.0;
         assert!(mean.norm() < 0.03 && (square / 0.125 - 1.0).abs() < 1e-9);

@@ -24,9 +24,9 @@
 //! Only lamps and headlights are mirrored; walls, trains and sky are not. Bodies do not hide what is
 //! mirrored. The film is even, without puddles.
 
+use super::light_source::LightSource;
 use crate::track::Material;
 use crate::twin::air::Air;
-use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight, LampLight};
 use nalgebra::{Matrix2, Point3, Vector2, Vector3};
 use std::f64::consts::PI;
 
@@ -166,39 +166,18 @@ pub struct MirroredLight {
 }
 
 impl MirroredLight {
-    /// A lamp from a place, with its light as a share of that of a good one that stays on.
-    pub fn lamp(lamp: &LampLight, share: f64, air: &Air, place: &Point3<f64>) -> Self {
-        let away = lamp.centre - place;
-        let axial_cd = share * lamp.axial_intensity_cd();
+    /// A light of some intensity along its axis, from a place.
+    pub fn of(source: &LightSource<'_>, axial_cd: f64, air: &Air, place: &Point3<f64>) -> Self {
+        let away = source.centre - place;
+        let distance_m = away.norm();
+        let cos = (-source.axis.dot(&away) / distance_m.max(1e-9)).max(0.0);
+        let towards_cd = axial_cd * cos.powf(source.exponent());
         Self {
             away,
-            intensity_cd: towards(axial_cd, lamp.exponent, &lamp.facing, air, &away),
-            radius_m: lamp.radius_m,
+            intensity_cd: towards_cd * air.transmission(distance_m),
+            radius_m: source.radius_m,
         }
     }
-
-    /// A headlight from a place.
-    pub fn headlight(light: &Headlight, air: &Air, place: &Point3<f64>) -> Self {
-        let (away, axis) = (light.place() - place, light.axis());
-        Self {
-            away,
-            intensity_cd: towards(light.intensity_cd, light.exponent, &axis, air, &away),
-            radius_m: HEADLIGHT_RADIUS_M,
-        }
-    }
-}
-
-/// Intensity of a source that is `away` from a place, towards it.
-fn towards(
-    axial_cd: f64,
-    exponent: f64,
-    axis: &Vector3<f64>,
-    air: &Air,
-    away: &Vector3<f64>,
-) -> f64 {
-    let distance_m = away.norm();
-    let cos = (-axis.dot(away) / distance_m.max(1e-9)).max(0.0);
-    axial_cd * cos.powf(exponent) * air.transmission(distance_m)
 }
 
 #[cfg(test)]

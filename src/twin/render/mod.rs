@@ -12,6 +12,7 @@ pub mod gpu;
 mod image_bounds;
 pub mod labels;
 pub mod lamp_field;
+mod light_source;
 mod lit_scene;
 pub mod paint;
 pub mod photometry;
@@ -50,9 +51,6 @@ pub enum RenderError {
     /// `collect` without `submit`.
     #[error("no picture was asked for")]
     NothingSubmitted,
-    /// `collect_raw` for a job that did not ask for raw images.
-    #[error("the job did not ask for raw images")]
-    NotRaw,
 }
 
 /// A renderer holds the scene and draws jobs, one in flight while the caller does other work.
@@ -66,7 +64,6 @@ pub trait Renderer: Send {
     fn submit(&mut self, job: &Job) -> Result<(), RenderError>;
     /// Waits for the oldest submitted job; one image a view, in order.
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError>;
-    /// The same for a job with [`Job::raw`]: all bits of the converter. `collect` gives the upper
-    /// eight of the same numbers.
+    /// The same with all bits of the converter, of which `collect` gives the upper eight.
     fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError>;
 }

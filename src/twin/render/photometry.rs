@@ -21,7 +21,7 @@
 //! ```
 //!
 //! where E0 is the illuminance without bodies and `hidden` counts those of 16 places on the disc,
-//! spread evenly over its area ([`disc_places`](super::disc::disc_places)), to which a straight line from the surface is cut
+//! spread evenly over its area ([`disc_points`](super::disc::disc_points)), to which a straight line from the surface is cut
 //! by a body. So an edge throws a penumbra as wide as the disc seen through it, in 16 steps. Lines
 //! start [`OFFSET_M`] off the surface. A body carries a headlight ([`Headlight::is_carried_by`]) or
 //! hides it. Only bodies hide light, the tunnel and the rails do not.

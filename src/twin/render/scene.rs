@@ -147,6 +147,4 @@ pub struct Job {
     pub headlights: Vec<Headlight>,
     /// One image each.
     pub views: Vec<View>,
-    /// Whether raw images are wanted, for [`Renderer::collect_raw`](super::Renderer::collect_raw).
-    pub raw: bool,
 }

@@ -8,7 +8,6 @@ use crate::twin::render::photometry::BlinkingLamp;
 const BAND: f64 = 0.004;
 
 /// Every lamp of the scene.
-#[derive(Default)]
 pub(super) struct Blinking {
     /// Its light in the slice over its mean, less 1; 0 for those not asked for.
     pub flicker: Vec<f64>,

@@ -21,7 +21,7 @@ pub(super) struct CastScene {
 }
 
 /// The tunnel through one pixel.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct TunnelPixel {
     /// Depth along the camera's axis and facet, or nothing within sight.
     pub hit: Option<TunnelHit>,
@@ -122,11 +122,7 @@ impl CastScene {
     pub fn pixel(&self, segment: usize, eye: &Point3<f64>, pixel: &RayDifferential) -> TunnelPixel {
         let ray = &pixel.ray;
         let Some(hit) = self.tunnel.cast(segment, eye, ray, SIGHT_M / ray.norm()) else {
-            return TunnelPixel {
-                hit: None,
-                albedo: 0.0,
-                luminance: 0.0,
-            };
+            return TunnelPixel::default();
         };
         let at = self.tunnel.surface_at(eye, ray, &hit);
         let albedo = self.albedo(&at, ray, hit.t, pixel.aside)

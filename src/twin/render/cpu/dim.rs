@@ -2,7 +2,7 @@
 //!
 //! Rays are followed through the corners of cells of 8 x 8 pixels, each with the pose of its own
 //! row. Where none of a cell's four corners gives a tenth of a grey level, no pixel between them
-//! can be told from another, whatever is painted on the wall: paint changes its light by two times
+//! can be seen apart from another, whatever is painted on the wall: paint changes its light by two times
 //! at most, and light itself changes little over 8 pixels but close to a lamp, where it is bright. Such
 //! cells are filled linearly. Bed and rails are never dark: they may mirror a lamp in any place.
 

@@ -63,7 +63,7 @@ use lamps::RowExposure;
 use nalgebra::{Isometry3, Point3};
 use rayon::prelude::*;
 use row::{KnownTunnel, RowBuffers, RowRays, ViewContext};
-use sensor::Sensor;
+use sensor::ExposedSensor;
 use spread::BlurSamples;
 use std::collections::VecDeque;
 
@@ -82,12 +82,8 @@ pub struct CpuRenderer {
     finished: VecDeque<FinishedJob>,
 }
 
-/// A job that is done.
-struct FinishedJob {
-    raw: bool,
-    /// With the bits that an image of eight does not have.
-    images: Vec<(RawImage, u32)>,
-}
+/// The images of a job that is done, with the bits that one of eight does not have.
+type FinishedJob = Vec<(RawImage, u32)>;
 
 impl CpuRenderer {
     /// Follows a ray through every pixel.
@@ -136,7 +132,7 @@ impl CpuRenderer {
         });
         let lamps = self.scene.lamps_by_distance(&pose);
         let segment = (self.scene.tunnel).segment_of(&Point3::from(pose.translation.vector), None);
-        let context = ViewContext::new(&self.scene, job, view, segment, !self.every_ray);
+        let context = ViewContext::new(&self.scene, job, view, segment);
         let corners = |row: &RowExposure, corners: &mut [f64]| {
             RowRays::new(&self.scene, &context, view, row, KnownTunnel::Unknown).corners(corners);
         };
@@ -171,7 +167,7 @@ impl CpuRenderer {
                 }
             });
         let map = (self.maps).get(MapKey::new(view), MapKey::make_map);
-        let sensor = Sensor {
+        let sensor = ExposedSensor {
             view,
             map,
             signals_e: &signals_e,
@@ -198,28 +194,22 @@ impl Renderer for CpuRenderer {
         if self.scene.lit.follow_lamps(job.time) {
             self.kept.clear();
         }
-        let views = job.views.iter();
-        let images = views.map(|view| (self.draw_raw(job, view), view.sensor.spare_bits()));
-        let images = images.collect();
-        self.finished.push_back(FinishedJob {
-            raw: job.raw,
-            images,
-        });
+        let images: Vec<_> = (job.views.iter())
+            .map(|view| (self.draw_raw(job, view), view.sensor.spare_bits()))
+            .collect();
+        self.finished.push_back(images);
         Ok(())
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
         let job = (self.finished.pop_front()).ok_or(RenderError::NothingSubmitted)?;
-        let images = job.images.iter();
+        let images = job.iter();
         Ok(images.map(|(raw, spare)| upper_bits(raw, *spare)).collect())
     }
 
     fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
-        if self.finished.front().is_some_and(|job| !job.raw) {
-            return Err(RenderError::NotRaw);
-        }
         let job = (self.finished.pop_front()).ok_or(RenderError::NothingSubmitted)?;
-        Ok(job.images.into_iter().map(|(raw, _)| raw).collect())
+        Ok(job.into_iter().map(|(raw, _)| raw).collect())
     }
 }
 

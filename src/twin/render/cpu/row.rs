@@ -4,13 +4,14 @@ use super::blinking::Blinking;
 use super::cast_scene::{CastScene, RayDifferential, TunnelPixel};
 use super::dim::{CELL_PX, DimView};
 use super::lamps::{self, Haze, RowExposure};
-use super::shadow::{Blocker, BodyShadows};
+use super::shadow::{BodyShadows, RowShadows};
 use super::spread::BlurSamples;
 use crate::twin::geometry::{Solid, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
 use crate::twin::render::image_bounds::ImageBounds;
+use crate::twin::render::light_source::LightSource;
 use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
@@ -55,28 +56,23 @@ pub(super) struct RowRays<'a> {
     known: KnownTunnel<'a>,
     eye: Point3<f64>,
     segment: usize,
-    /// The job's bodies as they are by now.
-    blockers: Vec<Blocker<'a>>,
+    /// Of the job's bodies as they are by now.
+    shadows: RowShadows<'a>,
     blinking: Blinking,
     /// Patterns are averaged over squares of so many pixels.
     side_px: f64,
 }
 
 impl<'a> ViewContext<'a> {
-    pub fn new(
-        scene: &'a CastScene,
-        job: &'a Job,
-        view: &View,
-        segment: usize,
-        quick: bool,
-    ) -> Self {
-        let s_m = scene.tunnel.chainage_m(segment);
+    /// Of a view from somewhere in a segment.
+    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, segment: usize) -> Self {
+        let lamps = scene.lamps_about(view);
         Self {
             job,
-            shadows: BodyShadows::new(scene, job, view, segment, quick),
-            airlight_cd_m2: scene.lit.airlight_cd_m2(s_m),
+            shadows: BodyShadows::new(scene, job, &lamps),
+            airlight_cd_m2: scene.lit.airlight_cd_m2(scene.tunnel.chainage_m(segment)),
             segment,
-            lamps: scene.lamps_about(view),
+            lamps,
         }
     }
 }
@@ -97,7 +93,7 @@ impl<'a> RowRays<'a> {
             view,
             row,
             segment: scene.tunnel.segment_of(&eye, Some(context.segment)),
-            blockers: context.shadows.blockers(mid.since(context.job.time)),
+            shadows: context.shadows.at(mid.since(context.job.time)),
             blinking: Blinking::new(scene.lit.lamps.lamps(), &context.lamps, view, row),
             eye,
             known,
@@ -132,13 +128,12 @@ impl<'a> RowRays<'a> {
         let Some(hit) = &ground.hit else {
             return (ground.luminance, f64::INFINITY);
         };
-        let ViewContext { job, shadows, .. } = self.context;
-        let (mut luminance, segment) = (ground.luminance, hit.segment as usize);
-        let lit_by_job = !job.headlights.is_empty() || !shadows.leave_alone(segment);
+        let mut luminance = ground.luminance;
+        let lit_by_job = !self.context.job.headlights.is_empty() || !self.shadows.is_empty();
         let level = self.scene.tunnel.is_level(hit);
         if lit_by_job || level || self.blinking.shows {
             let at = (self.scene.tunnel).surface_at(&self.eye, &self.ray(u), hit);
-            let lux = self.by_job_lx(segment, &at.position, &at.normal);
+            let lux = self.by_job_lx(&at.position, &at.normal);
             luminance += ground.albedo * lux / PI + self.mirrored_cd_m2(&at);
         }
         (luminance, hit.t)
@@ -146,15 +141,15 @@ impl<'a> RowRays<'a> {
 
     /// What a job's headlights and bodies change in the illuminance of a surface, and the blinking of
     /// lamps.
-    fn by_job_lx(&self, segment: usize, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
-        let (scene, ViewContext { job, shadows, .. }) = (self.scene, self.context);
+    fn by_job_lx(&self, p: &Point3<f64>, n: &Vector3<f64>) -> f64 {
+        let lit = &self.scene.lit;
         let blinking_lx = if self.blinking.shows {
-            (scene.lit.lamps).flickering_lx(p, n, &self.blinking.flicker)
+            (lit.lamps).flickering_lx(p, n, &self.blinking.flicker)
         } else {
             0.0
         };
-        blinking_lx + headlights_lx(&job.headlights, &scene.lit.air, p, n)
-            - shadows.hidden_lx(segment, (p, n), &self.blockers, &self.blinking)
+        blinking_lx + headlights_lx(&self.context.job.headlights, &lit.air, p, n)
+            - self.shadows.hidden_lx(p, n, &self.blinking)
     }
 
     /// Luminance of what the tunnel's surface mirrors.
@@ -170,12 +165,13 @@ impl<'a> RowRays<'a> {
             let lamp = &scene.lit.lamps.lamps()[*k];
             let near = (lamp.centre - place).norm_squared() < MIRROR_REACH_M * MIRROR_REACH_M;
             let share = lamp.duty() * (1.0 + self.blinking.flicker[*k]);
-            near.then(|| MirroredLight::lamp(lamp, share, air, place))
+            near.then(|| (LightSource::lamp(lamp), share * lamp.axial_intensity_cd()))
         });
         let headlights = self.context.job.headlights.iter();
-        let headlights = headlights.map(|light| MirroredLight::headlight(light, air, place));
+        let headlights = headlights.map(|l| (LightSource::headlight(l), l.intensity_cd));
         lamps
             .chain(headlights)
+            .map(|(source, axial_cd)| MirroredLight::of(&source, axial_cd, air, place))
             .map(|source| gloss.luminance_cd_m2(&facing, &to_eye, &source))
             .sum()
     }
@@ -214,8 +210,8 @@ impl<'a> RowRays<'a> {
     ) {
         self.draw_tunnel(buffers);
         let view = self.view;
-        for blocker in &self.blockers {
-            self.draw_solid(&blocker.solid, buffers);
+        for body in &self.shadows.bodies {
+            self.draw_solid(&body.solid, buffers);
         }
         self.veil(buffers);
         let RowBuffers {
@@ -274,10 +270,9 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let segment = scene.tunnel.segment_of(&at, Some(self.segment));
                 let lux = scene.lit.tunnel.ambient_lx
                     + scene.lit.lamps.irradiance_lx(&at, &normal)
-                    + self.by_job_lx(segment, &at, &normal);
+                    + self.by_job_lx(&at, &normal);
                 let body = solid.body();
                 buffers.depths[u] = t;
                 buffers.luminances[u] = body.luminance_cd_m2 + body.albedo * lux / PI;

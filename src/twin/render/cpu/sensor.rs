@@ -8,14 +8,14 @@ use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// A picture's signal on its way to digital numbers.
-pub(super) struct Sensor<'a> {
+pub(super) struct ExposedSensor<'a> {
     pub view: &'a View,
     pub map: &'a PixelMap,
     /// Photo-electrons, row by row.
     pub signals_e: &'a [f64],
 }
 
-impl Sensor<'_> {
+impl ExposedSensor<'_> {
     /// All pixels, with the noise of the view's frame.
     pub fn develop(&self) -> RawImage {
         let camera = &self.view.camera.intrinsics;

@@ -1,16 +1,18 @@
 //! What cameras that stand still see of the tunnel, kept from frame to frame: bodies are drawn over a
 //! copy.
 
-use super::adapter::Gpu;
 use super::draw_list::DrawList;
-use super::target::Layers;
+use super::target::SurfaceLayers;
 use super::view::Framed;
 use crate::bus::Intrinsics;
+use crate::twin::render::cache::Cache;
 use nalgebra::Isometry3;
-use std::collections::VecDeque;
 
 /// Cameras whose tunnel is kept.
-const KEPT: usize = 4;
+pub const KEPT_BACKDROPS: usize = 4;
+
+/// Tunnels as seen.
+pub type Backdrops = Cache<BackdropKey, SurfaceLayers>;
 
 /// What the picture of a tunnel in steady light depends on.
 #[derive(Clone, Debug, PartialEq)]
@@ -33,53 +35,5 @@ impl BackdropKey {
             electrons_per_cd_m2: view.electrons_per_cd_m2(),
             grey_per_cd_m2: view.grey_per_cd_m2(),
         })
-    }
-}
-
-/// Tunnels as seen, the latest last.
-#[derive(Default)]
-pub struct Backdrops {
-    kept: VecDeque<(BackdropKey, Layers)>,
-}
-
-impl Backdrops {
-    /// Where the light has changed, nothing holds any more.
-    pub fn clear(&mut self) {
-        self.kept.clear();
-    }
-
-    /// Copies a tunnel that was kept; whether there was one.
-    pub fn show(
-        &self,
-        key: &BackdropKey,
-        onto: &Layers,
-        encoder: &mut wgpu::CommandEncoder,
-    ) -> bool {
-        let kept = self.kept.iter().find(|(k, _)| k == key);
-        if let Some((_, layers)) = kept {
-            layers.copy_to(onto, encoder);
-        }
-        kept.is_some()
-    }
-
-    /// Keeps a tunnel.
-    pub fn keep(
-        &mut self,
-        gpu: &Gpu,
-        key: BackdropKey,
-        of: &Layers,
-        encoder: &mut wgpu::CommandEncoder,
-    ) {
-        let oldest = if self.kept.len() >= KEPT {
-            self.kept.pop_front()
-        } else {
-            None
-        };
-        let layers = oldest
-            .map(|(_, layers)| layers)
-            .filter(|layers| layers.size_px() == of.size_px())
-            .unwrap_or_else(|| Layers::new(&gpu.device, of.size_px()));
-        of.copy_to(&layers, encoder);
-        self.kept.push_back((key, layers));
     }
 }

@@ -1,20 +1,17 @@
 //! The passes that draw tunnel and bodies, and what they mirror.
 
-use super::adapter::Gpu;
 use super::backdrop::{BackdropKey, Backdrops};
 use super::bodies::BodyBuffers;
-use super::chunks::Chunks;
-use super::draw_list::{DrawCall, DrawList};
-use super::pipeline::{Background, Pipelines};
-use super::render_pass::{KEEP, begin, bind, draw_rectangles, grey, resume};
-use super::target::{Layers, Target};
+use super::draw_list::DrawCall;
+use super::pipeline::Background;
+use super::prepared::PreparedView;
+use super::recorder::{KEEP, Recorder, begin, grey};
+use super::target::SurfaceLayers;
+use super::texture::Texture;
 use super::textures::Textures;
-use super::view_buffers::ViewBuffers;
 
 /// Tunnel and bodies on the adapter.
 pub struct Surfaces<'a> {
-    /// Meshes of the tunnel.
-    pub chunks: &'a Chunks,
     /// Meshes of the bodies.
     pub bodies: &'a BodyBuffers,
     /// What is painted on the tunnel.
@@ -22,16 +19,14 @@ pub struct Surfaces<'a> {
 }
 
 impl Surfaces<'_> {
-    /// Chooses the mesh of a draw call, if it is there.
-    fn set_buffers(&self, pass: &mut wgpu::RenderPass<'_>, call: &DrawCall) -> bool {
-        let (vertices, indices) = match call.chunk.map(|key| self.chunks.get(key)) {
-            Some(None) => return false,
-            Some(Some(chunk)) => (&chunk.vertices, &chunk.indices),
+    /// Chooses the mesh of a draw call.
+    fn set_buffers(&self, pass: &mut wgpu::RenderPass<'_>, call: &DrawCall) {
+        let (vertices, indices) = match &call.chunk {
+            Some(chunk) => (&chunk.vertices, &chunk.indices),
             None => (&self.bodies.vertices.buffer, &self.bodies.indices.buffer),
         };
         pass.set_vertex_buffer(0, vertices.slice(..));
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-        true
     }
 }
 
@@ -44,110 +39,138 @@ struct Bound<'a> {
     constants: wgpu::BindGroup,
 }
 
-impl<'a> Bound<'a> {
-    fn new(
-        gpu: &Gpu,
-        buffers: &ViewBuffers,
-        background: &'a Background,
-        banded: bool,
-        textures: &Textures,
-    ) -> Self {
-        let lit = if banded {
+impl<'a> Recorder<'a> {
+    fn bound(&self, background: &'a Background, textures: &Textures) -> Bound<'a> {
+        let (poses, list) = (self.view.poses.binding(), &self.view.list);
+        let lit = if list.banded {
             &background.banded
         } else {
             &background.lit
         };
-        let paintings = (textures.views.iter())
-            .map(|painting| {
-                let resources = [
-                    buffers.view.binding(),
-                    buffers.poses.binding(),
-                    buffers.shares.binding(),
-                    wgpu::BindingResource::TextureView(painting),
-                    wgpu::BindingResource::Sampler(&textures.sampler),
-                ];
-                bind(&gpu.device, lit, &resources)
-            })
-            .collect();
-        let constants = [buffers.view.binding(), buffers.poses.binding()];
-        Self {
+        let painted = (textures.all.iter()).map(|painting| {
+            let resources = [
+                poses.clone(),
+                list.shares.binding(),
+                painting.binding(),
+                wgpu::BindingResource::Sampler(&textures.sampler),
+            ];
+            self.bind(lit, &resources)
+        });
+        Bound {
             lit,
-            paintings,
+            paintings: painted.collect(),
             dim: &background.dim,
-            constants: bind(&gpu.device, &background.dim, &constants),
+            constants: self.bind(&background.dim, &[poses]),
+        }
+    }
+
+    /// Tunnel and bodies in the mean over the exposure, under so many headlights; a tunnel with a key
+    /// is kept for the next frame.
+    pub fn draw_background(
+        &mut self,
+        headlights: usize,
+        surfaces: &Surfaces<'_>,
+        (backdrops, key): (&mut Backdrops, Option<&BackdropKey>),
+    ) {
+        let (device, pipelines) = (&self.gpu.device, self.pipelines);
+        let (view, target, list) = (self.view, self.target, &self.view.list);
+        let headlit = list.calls.iter().any(|call| call.headlit);
+        let headlights = [0, headlights];
+        let bound: Vec<_> = (headlights[..=usize::from(headlit)].iter())
+            .map(|n| self.bound(pipelines.background(device, *n), surfaces.textures))
+            .collect();
+        let (tunnel, bodies) = list.calls.split_at(list.tunnel().count());
+        let empty = wgpu::LoadOp::Clear(wgpu::Color {
+            r: view.beyond_e,
+            ..wgpu::Color::BLACK
+        });
+        let far = wgpu::LoadOp::Clear(0.0);
+        for k in 0..list.instants {
+            let layers = match k {
+                0 => &target.layers,
+                _ => &target.instant,
+            };
+            let (mut calls, mut load, mut depth_load) = (&list.calls[..], empty, far);
+            if let Some(key) = key {
+                let draw_tunnel = |_: &_| {
+                    let kept = SurfaceLayers::new(device, target.size_px);
+                    let depth = Some((&kept.depth, far));
+                    let mut pass = begin(self.encoder, &kept.signal, empty, depth);
+                    view.draw_instant(&mut pass, &bound, tunnel, surfaces, k);
+                    drop(pass);
+                    kept
+                };
+                let kept = backdrops.get(key.clone(), draw_tunnel);
+                kept.copy_to(layers, self.encoder);
+                (calls, load, depth_load) = (bodies, KEEP, wgpu::LoadOp::Load);
+            }
+            let depth = Some((&layers.depth, depth_load));
+            let mut pass = begin(self.encoder, &layers.signal, load, depth);
+            list.moving.clip(&mut pass, k > 0);
+            view.draw_instant(&mut pass, &bound, calls, surfaces, k);
+            drop(pass);
+            if k > 0 {
+                self.mix_in(&layers.signal, k);
+            }
+        }
+    }
+
+    /// Mixes instant `k` into the mean of those before it. A running mean: rounding to half precision
+    /// does not add up.
+    fn mix_in(&mut self, instant: &Texture, k: u32) {
+        let blend = &self.pipelines.blend;
+        let group = self.bind(blend, &[instant.binding()]);
+        let mut pass = begin(self.encoder, &self.target.layers.signal, KEEP, None);
+        self.view.list.moving.clip(&mut pass, true);
+        pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
+        pass.set_pipeline(blend);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..6, 0..1);
+    }
+
+    /// What rail heads and a wet bed mirror, at every instant of the exposure.
+    pub fn draw_gloss(&mut self, headlights: usize, surfaces: &Surfaces<'_>) {
+        let (view, list, layers) = (self.view, &self.view.list, &self.target.layers);
+        let glossy = list.calls.iter().filter(|call| !call.glossy.is_empty());
+        if glossy.clone().next().is_none() {
+            return;
+        }
+        let background = (self.pipelines).background(&self.gpu.device, headlights);
+        let resources = [
+            view.poses.binding(),
+            list.shares.binding(),
+            list.mirrored.binding(),
+        ];
+        let group = self.bind(&background.gloss, &resources);
+        let depth = Some((&layers.depth, wgpu::LoadOp::Load));
+        let mut pass = begin(self.encoder, &layers.signal, KEEP, depth);
+        pass.set_pipeline(&background.gloss);
+        pass.set_bind_group(0, &group, &[]);
+        pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));
+        pass.set_vertex_buffer(1, list.placements.buffer.slice(..));
+        for call in glossy {
+            surfaces.set_buffers(&mut pass, call);
+            for instant in 0..list.instants {
+                let at = instant * list.meshes + call.mesh;
+                pass.draw_indexed(call.glossy.clone(), 0, at..at + 1);
+            }
         }
     }
 }
 
-impl ViewBuffers {
-    /// Tunnel and bodies in the mean over the exposure; with the pipelines for what no headlight
-    /// lights and for what they light. A tunnel with a key is kept for the next frame.
-    pub fn draw_background(
-        &self,
-        gpu: &Gpu,
-        (pipelines, backgrounds): (&Pipelines, &[Background; 2]),
-        encoder: &mut wgpu::CommandEncoder,
-        (target, backdrops): (&Target, &mut Backdrops),
-        (list, key): (&DrawList, Option<BackdropKey>),
-        surfaces: &Surfaces<'_>,
-    ) {
-        let headlit = list.calls.iter().any(|call| call.headlit);
-        let used = &backgrounds[..=usize::from(headlit)];
-        let bound: Vec<_> = (used.iter())
-            .map(|b| Bound::new(gpu, self, b, list.banded, surfaces.textures))
-            .collect();
-        let (tunnel, bodies) = list.calls.split_at(list.tunnel().count());
-        let empty = wgpu::LoadOp::Clear(wgpu::Color {
-            r: self.beyond_e,
-            ..wgpu::Color::BLACK
-        });
-        let mut draw = |encoder: &mut _, layers: &Layers, k| {
-            let Some(key) = &key else {
-                let mut pass = begin(encoder, &layers.signal, empty, Some(&layers.depth));
-                list.moving.clip(&mut pass, k > 0);
-                self.draw_instant(&mut pass, &bound, (list, &list.calls), surfaces, k);
-                return;
-            };
-            if !backdrops.show(key, layers, encoder) {
-                let mut pass = begin(encoder, &layers.signal, empty, Some(&layers.depth));
-                self.draw_instant(&mut pass, &bound, (list, tunnel), surfaces, k);
-                drop(pass);
-                backdrops.keep(gpu, key.clone(), layers, encoder);
-            }
-            let mut pass = resume(encoder, &layers.signal, &layers.depth);
-            list.moving.clip(&mut pass, k > 0);
-            self.draw_instant(&mut pass, &bound, (list, bodies), surfaces, k);
-        };
-        draw(encoder, &target.layers, 0);
-        for k in 1..list.instants {
-            let instant = target.instant(&gpu.device);
-            draw(encoder, instant, k);
-            let resources = [
-                self.view.binding(),
-                wgpu::BindingResource::TextureView(&instant.signal),
-            ];
-            let mut pass = begin(encoder, &target.layers.signal, KEEP, None);
-            list.moving.clip(&mut pass, true);
-            // A running mean: rounding to half precision does not add up.
-            pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
-            draw_rectangles(&mut pass, &gpu.device, &pipelines.blend, &resources, 0..1);
-        }
-    }
-
+impl PreparedView {
     fn draw_instant(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         bound: &[Bound<'_>],
-        (list, calls): (&DrawList, &[DrawCall]),
+        calls: &[DrawCall],
         surfaces: &Surfaces<'_>,
         instant: u32,
     ) {
-        pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
+        pass.set_vertex_buffer(1, self.list.placements.buffer.slice(..));
         for call in calls {
-            if !surfaces.set_buffers(pass, call) {
-                continue;
-            }
-            let at = instant * list.meshes + call.mesh;
+            surfaces.set_buffers(pass, call);
+            let at = instant * self.list.meshes + call.mesh;
             let bound = &bound[usize::from(call.headlit)];
             if !call.lit.is_empty() {
                 pass.set_pipeline(bound.lit);
@@ -158,43 +181,6 @@ impl ViewBuffers {
                 pass.set_pipeline(bound.dim);
                 pass.set_bind_group(0, &bound.constants, &[]);
                 pass.draw_indexed(call.dim.clone(), 0, at..at + 1);
-            }
-        }
-    }
-
-    /// What rail heads and a wet bed mirror, at every instant of the exposure.
-    pub fn draw_gloss(
-        &self,
-        gpu: &Gpu,
-        pipeline: &wgpu::RenderPipeline,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &Target,
-        (list, surfaces): (&DrawList, &Surfaces<'_>),
-    ) {
-        let mut glossy = (list.calls.iter())
-            .filter(|call| !call.glossy.is_empty())
-            .peekable();
-        if glossy.peek().is_none() {
-            return;
-        }
-        let resources = [
-            self.view.binding(),
-            self.poses.binding(),
-            self.shares.binding(),
-            self.mirrored.binding(),
-        ];
-        let group = bind(&gpu.device, pipeline, &resources);
-        let mut pass = resume(encoder, &target.layers.signal, &target.layers.depth);
-        pass.set_pipeline(pipeline);
-        pass.set_bind_group(0, &group, &[]);
-        pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));
-        pass.set_vertex_buffer(1, self.placements.buffer.slice(..));
-        for call in glossy {
-            if surfaces.set_buffers(&mut pass, call) {
-                for instant in 0..list.instants {
-                    let at = instant * list.meshes + call.mesh;
-                    pass.draw_indexed(call.glossy.clone(), 0, at..at + 1);
-                }
             }
         }
     }

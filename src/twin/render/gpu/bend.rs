@@ -13,7 +13,7 @@ use crate::track::TrackPoint;
 const BENT_PX: f64 = 0.25;
 /// Radii at which a lens is probed.
 const PROBES: u32 = 32;
-/// Places of a camera in the cross-section are told apart by this.
+/// Places of a camera in the cross-section that are nearer to each other than this count as one.
 const PLACE_M: f64 = 0.25;
 /// No surface is taken to be nearer to a camera than this.
 const NEAREST_M: f64 = 0.5;

@@ -1,6 +1,7 @@
 //! The bodies of a job on the adapter.
 
 use super::adapter::Gpu;
+use super::layout::Vertex;
 use super::mesh::{Fineness, Mesh};
 use super::upload::Upload;
 use crate::twin::render::lamp_field::LampField;
@@ -10,31 +11,26 @@ use std::ops::Range;
 /// The triangles of all bodies of a job.
 pub struct BodyBuffers {
     /// Corners.
-    pub vertices: Upload,
+    pub vertices: Upload<Vertex>,
     /// Triangles.
-    pub indices: Upload,
+    pub indices: Upload<u32>,
     /// Range of indices of each body.
     pub ranges: Vec<Range<u32>>,
-    /// Where they are made, used again for every job.
-    mesh: Mesh,
 }
 
 impl BodyBuffers {
     /// Empty.
     pub fn new(gpu: &Gpu) -> Self {
         Self {
-            vertices: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 16),
-            indices: Upload::new(gpu, wgpu::BufferUsages::INDEX, 1 << 16),
+            vertices: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 12),
+            indices: Upload::new(gpu, wgpu::BufferUsages::INDEX, 1 << 12),
             ranges: Vec::new(),
-            mesh: Mesh::default(),
         }
     }
 
     /// Takes the bodies of the next job.
     pub fn write(&mut self, gpu: &Gpu, job: &Job, lamps: &LampField, ambient_lx: f64) {
-        let mesh = &mut self.mesh;
-        mesh.vertices.clear();
-        mesh.indices.clear();
+        let mut mesh = Mesh::default();
         self.ranges.clear();
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
@@ -42,7 +38,7 @@ impl BodyBuffers {
             mesh.add_body(body, lamps, ambient_lx, fineness);
             self.ranges.push(first..mesh.indices.len() as u32);
         }
-        self.vertices.write(gpu, &mesh.vertices);
-        self.indices.write(gpu, &mesh.indices);
+        self.vertices.send_all(gpu, mesh.vertices);
+        self.indices.send_all(gpu, mesh.indices);
     }
 }

@@ -3,12 +3,14 @@
 use super::adapter::Gpu;
 use super::bend::Bend;
 use super::detail::{CHUNK_M, ChunkKey, Detail};
-use super::tunnel::{ChunkSide, chunk_mesh};
+use super::layout::Vertex;
+use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
 /// Range drawn before and behind a camera.
@@ -23,6 +25,8 @@ const NEAR_LINE_M: f64 = 30.0;
 
 /// A mesh on the adapter.
 pub struct Chunk {
+    /// Which it is.
+    pub key: ChunkKey,
     /// Its origin in the world.
     pub origin: Point3<f64>,
     /// Distance of the farthest vertex from the origin.
@@ -41,7 +45,6 @@ pub struct Chunk {
     pub glossy: Vec<Point3<f64>>,
     /// Up the track at its origin.
     pub along: Vector3<f64>,
-    near_in: u64,
 }
 
 /// A place of a chunk's surface, in the world.
@@ -61,7 +64,8 @@ const GLOSSY_EVERY: usize = 4;
 /// All chunks in use.
 #[derive(Default)]
 pub struct Chunks {
-    made: BTreeMap<ChunkKey, Option<Chunk>>,
+    /// Each with the latest job in which a camera was near it.
+    made: BTreeMap<ChunkKey, (Arc<Chunk>, u64)>,
     last_seen_s_m: f64,
     job: u64,
 }
@@ -72,19 +76,16 @@ impl Chunks {
         self.job += 1;
         let job = self.job;
         self.made
-            .retain(|_, c| c.as_ref().is_none_or(|c| job - c.near_in < KEEP_JOBS));
+            .retain(|_, (_, near_in)| job - *near_in < KEEP_JOBS);
     }
 
-    /// Puts the keys of the chunks in sight into `keys`, near ones first, and makes them; gives the
-    /// camera's chainage.
+    /// The camera's chainage, and the chunks in sight, near ones first.
     pub fn in_sight(
         &mut self,
         gpu: &Gpu,
         scene: &LitScene,
         framed: &Framed<'_>,
-        keys: &mut Vec<ChunkKey>,
-    ) -> f64 {
-        keys.clear();
+    ) -> (f64, Vec<Arc<Chunk>>) {
         let tunnel = &scene.tunnel;
         let eye = framed.reference();
         let s_m = self.locate(tunnel, &eye);
@@ -101,6 +102,7 @@ impl Chunks {
         let moves = framed.view.motion.poses.len() > 1;
         let place = tunnel.alignment.track_from_world(&eye, s_m);
         let bend = Bend::of(&framed.view.camera.intrinsics, &place);
+        let mut in_sight = Vec::new();
         for index in first..=last {
             let from_m = index as f64 * CHUNK_M;
             let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
@@ -109,26 +111,17 @@ impl Chunks {
                 detail: Detail::at(away_m, moves || bend.is_some()),
                 bend,
             };
-            let job = self.job;
-            let chunk = self
-                .made
-                .entry(key)
-                .or_insert_with(|| upload(gpu, scene, key));
-            if let Some(chunk) = chunk {
-                // Kept whether it is in the picture or beside it: the next view may turn there.
-                chunk.near_in = job;
-                if framed.may_see(&chunk.origin, chunk.radius_m) {
-                    keys.push(key);
-                }
+            let make = || (Arc::new(upload(gpu, scene, key)), self.job);
+            let (chunk, near_in) = self.made.entry(key).or_insert_with(make);
+            // Kept whether it is in the picture or beside it: the next view may turn there.
+            *near_in = self.job;
+            if framed.may_see(&chunk.origin, chunk.radius_m) {
+                in_sight.push(Arc::clone(chunk));
             }
         }
-        keys.sort_by(|a, b| f64::total_cmp(&middle_away_m(*a, s_m), &middle_away_m(*b, s_m)));
-        s_m
-    }
-
-    /// A chunk that [`Self::in_sight`] has named.
-    pub fn get(&self, key: ChunkKey) -> Option<&Chunk> {
-        self.made.get(&key).and_then(Option::as_ref)
+        let away_m = |chunk: &Chunk| (chunk.key.start_m() + 0.5 * CHUNK_M - s_m).abs();
+        in_sight.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+        (s_m, in_sight)
     }
 
     /// Chainage of a camera: by Newton's method from where the last one was, else by search.
@@ -147,10 +140,6 @@ impl Chunks {
     }
 }
 
-fn middle_away_m(key: ChunkKey, s_m: f64) -> f64 {
-    (key.start_m() + 0.5 * CHUNK_M - s_m).abs()
-}
-
 fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
     let from_m = tunnel.sections.first().map_or(0.0, |r| r.from_m);
     let to_m = tunnel.sections.last().map_or(0.0, |r| r.to_m);
@@ -162,15 +151,15 @@ fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
         .map_or(from_m, |(_, s_m)| s_m)
 }
 
-fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Option<Chunk> {
-    let made = chunk_mesh(scene, key);
-    let (sin, cos) = scene
-        .tunnel
-        .alignment
-        .at(key.start_m())
-        .heading_rad
-        .sin_cos();
-    let mesh = made.mesh;
+fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
+    let ChunkMesh {
+        origin,
+        mesh,
+        lamp,
+        parts,
+    } = chunk_mesh(scene, key);
+    let heading_rad = scene.tunnel.alignment.at(key.start_m()).heading_rad;
+    let (sin, cos) = heading_rad.sin_cos();
     let buffer = |contents: &[u8], usage| {
         gpu.device
             .create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -179,8 +168,10 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Option<Chunk> {
                 usage,
             })
     };
-    (!mesh.indices.is_empty()).then(|| Chunk {
-        origin: made.origin,
+    let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
+    Chunk {
+        key,
+        origin,
         radius_m: mesh.radius_m(),
         vertices: buffer(
             bytemuck::cast_slice(&mesh.vertices),
@@ -190,24 +181,20 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Option<Chunk> {
             bytemuck::cast_slice(&mesh.indices),
             wgpu::BufferUsages::INDEX,
         ),
-        lamp: made.lamp,
-        parts: made.parts,
+        lamp,
+        parts,
         probes: (mesh.vertices.iter().step_by(PROBE_EVERY))
-            .map(|v| {
-                let [p, n] = [v.position_m, v.normal].map(|x| Vector3::from(x).cast::<f64>());
-                Probe {
-                    at: made.origin + p,
-                    normal: n,
-                    reflected_per_lx: v.brightest_per_lx(),
-                }
+            .map(|v| Probe {
+                at: place(v),
+                normal: Vector3::from(v.normal).cast(),
+                reflected_per_lx: v.brightest_per_lx(),
             })
             .collect(),
         glossy: (mesh.vertices.iter())
             .filter(|v| v.gloss[0] > 0.0)
             .step_by(GLOSSY_EVERY)
-            .map(|v| made.origin + Vector3::from(v.position_m).cast())
+            .map(place)
             .collect(),
         along: Vector3::new(cos, sin, 0.0),
-        near_in: 0,
-    })
+    }
 }

@@ -37,45 +37,37 @@ impl Detail {
         }
     }
 
-    /// A chunk is at least so far from the camera along the line.
-    fn nearest_m(self) -> f64 {
-        match self {
-            Self::Near => 0.0,
-            Self::Close => NEAR_M,
-            Self::Middle => CLOSE_M,
-            Self::Far => MIDDLE_M,
+    fn cells(self) -> Cells {
+        let [nearest_m, step_m, share_of_distance, least_m] = match self {
+            Self::Near => [0.0, 0.5 * STATION_STEP_M, 0.25, 0.06],
+            Self::Close => [NEAR_M, STATION_STEP_M, 0.3, 0.15],
+            Self::Middle => [CLOSE_M, 0.5 * CHUNK_M, 0.5, 0.4],
+            Self::Far => [MIDDLE_M, CHUNK_M, 0.5, 0.8],
+        };
+        Cells {
+            nearest_m,
+            step_m,
+            share_of_distance,
+            least_m,
         }
     }
 
     /// From one station of a chunk to the next.
     pub fn step_m(self) -> f64 {
-        match self {
-            Self::Near => 0.5 * STATION_STEP_M,
-            Self::Close => STATION_STEP_M,
-            Self::Middle => 0.5 * CHUNK_M,
-            Self::Far => CHUNK_M,
-        }
+        self.cells().step_m
     }
+}
 
+/// The cells of a detail.
+struct Cells {
+    /// A chunk is at least so far from the camera along the line.
+    nearest_m: f64,
+    step_m: f64,
     /// Share of its distance from the nearest lamp that a cell of the mesh may be long, since light falls
     /// with a power of that distance and is interpolated over the cell.
-    fn share_of_distance(self) -> f64 {
-        match self {
-            Self::Near => 0.25,
-            Self::Close => 0.3,
-            Self::Middle | Self::Far => 0.5,
-        }
-    }
-
+    share_of_distance: f64,
     /// No cell gets smaller than this, which is 6 to 12 pixels of the usual cameras.
-    fn least_m(self) -> f64 {
-        match self {
-            Self::Near => 0.06,
-            Self::Close => 0.15,
-            Self::Middle => 0.4,
-            Self::Far => 0.8,
-        }
-    }
+    least_m: f64,
 }
 
 /// Which mesh.
@@ -114,14 +106,14 @@ impl Cutting<'_> {
         [from_m, to_m]: [f64; 2],
         across_m: impl Fn(&TrackPoint) -> f64,
     ) -> bool {
-        let detail = self.key.detail;
+        let cells = self.key.detail.cells();
         let lit_evenly = |lamp: &TrackPoint| {
             let along_m = (from_m - lamp.s_m).max(lamp.s_m - to_m).max(0.0);
             let away_m = along_m.hypot(across_m(lamp));
-            cell_m <= detail.share_of_distance() * away_m || cell_m < 2.0 * detail.least_m()
+            cell_m <= cells.share_of_distance * away_m || cell_m < 2.0 * cells.least_m
         };
         let straight = |bend: Bend| {
-            let away_m = detail.nearest_m().hypot(across_m(&bend.eye()));
+            let away_m = cells.nearest_m.hypot(across_m(&bend.eye()));
             cell_m <= bend.cell_m(away_m)
         };
         self.lamps.iter().all(lit_evenly) && self.key.bend.is_none_or(straight)

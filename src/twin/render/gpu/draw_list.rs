@@ -1,12 +1,13 @@
 //! What a view draws: which triangles in full and which cheaply, at which instants of the exposure,
 //! under which lamps' blinking.
 
+use super::adapter::Gpu;
 use super::bodies::BodyBuffers;
-use super::chunks::{Chunk, Chunks};
-use super::detail::ChunkKey;
+use super::chunks::Chunk;
 use super::layout::{Mirrored, Placement};
 use super::smear::{Rectangle, Smear};
 use super::textures;
+use super::upload::{NumberTable, Upload};
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::paint;
@@ -14,6 +15,7 @@ use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Grey levels below which paint and blinking do not show: less than the read noise, since paint
 /// changes them by half at most.
@@ -35,7 +37,7 @@ const BAND: f32 = 0.01;
 /// Triangles of one mesh with one painting.
 pub struct DrawCall {
     /// The chunk that they are of; none for bodies.
-    pub chunk: Option<ChunkKey>,
+    pub chunk: Option<Arc<Chunk>>,
     /// Number of their texture.
     pub texture: usize,
     /// Number of their placement.
@@ -50,14 +52,12 @@ pub struct DrawCall {
     pub glossy: Range<u32>,
 }
 
-/// All that a view draws of tunnel and bodies, and the buffers to find it in.
-#[derive(Default)]
+/// All that a view draws of tunnel and bodies.
 pub struct DrawList {
-    keys: Vec<ChunkKey>,
     /// Of the tunnel, near ones first; then of the bodies.
     pub calls: Vec<DrawCall>,
     /// Of every mesh at the first instant, then of every mesh at the second, and so on.
-    pub placements: Vec<Placement>,
+    pub placements: Upload<Placement>,
     /// Number of meshes.
     pub meshes: u32,
     /// Number of instants; the first is the middle of the exposure.
@@ -66,20 +66,31 @@ pub struct DrawList {
     pub moving: Rectangle,
     /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
     /// number; the first row is 1.
-    pub shares: Vec<f32>,
+    pub shares: NumberTable,
     /// Whether any of it differs from 1 so that one can see it.
     pub banded: bool,
     /// Lamps that glossy surfaces mirror.
-    pub mirrored: Vec<Mirrored>,
+    pub mirrored: Upload<Mirrored>,
     /// Rows in which they may be.
     mirror_rows: Range<u32>,
     lamps: Vec<usize>,
 }
 
 impl DrawList {
-    /// The buffer of the chunks in sight, for [`Chunks::in_sight`] to fill first.
-    pub fn keys(&mut self) -> &mut Vec<ChunkKey> {
-        &mut self.keys
+    /// Empty.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            calls: Vec::new(),
+            placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 16),
+            meshes: 0,
+            instants: 1,
+            moving: Rectangle::default(),
+            shares: NumberTable::new(gpu),
+            banded: false,
+            mirrored: Upload::storage(gpu),
+            mirror_rows: 0..0,
+            lamps: Vec::new(),
+        }
     }
 
     /// What it draws of the tunnel: the first of all that it draws.
@@ -87,51 +98,50 @@ impl DrawList {
         self.calls.iter().take_while(|call| call.chunk.is_some())
     }
 
-    /// Finds what to draw of the chunks whose keys were given, and of the bodies.
+    /// Finds what to draw of the chunks in sight and of the bodies, and sends it.
     pub fn fill(
         &mut self,
+        gpu: &Gpu,
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (chunks, bodies): (&Chunks, &BodyBuffers),
+        (chunks, bodies): (&[Arc<Chunk>], &BodyBuffers),
     ) {
         self.calls.clear();
-        self.placements.clear();
+        self.placements.items.clear();
         self.lamps.clear();
         self.mirror_rows = 0..0;
         let rows = framed.view.camera.intrinsics.height_px;
-        self.shares.clear();
-        self.shares.resize(rows as usize, 1.0);
+        self.shares.numbers = vec![1.0; rows as usize];
         let dim_cd_m2 = DIM_GREY / framed.view.grey_per_cd_m2();
         let reference = framed.reference();
-        let keys = std::mem::take(&mut self.keys);
-        for key in &keys {
-            if let Some(chunk) = chunks.get(*key) {
-                self.add_chunk(framed, job, scene, (*key, chunk), dim_cd_m2);
-            }
+        for chunk in chunks {
+            self.add_chunk(framed, job, scene, chunk, dim_cd_m2);
         }
-        self.keys = keys;
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
             self.calls.push(DrawCall {
                 chunk: None,
                 texture: textures::BLANK,
-                mesh: self.placements.len() as u32,
+                mesh: self.placements.items.len() as u32,
                 headlit: !job.headlights.is_empty(),
                 lit: range.clone(),
                 dim: 0..0,
                 glossy: 0..0,
             });
             let place = Point3::from(body.world_from_body.translation.vector);
-            self.placements.push(Placement {
+            self.placements.items.push(Placement {
                 offset_m: single(&(place - reference)),
                 velocity_mps: single(&body.velocity_mps),
                 ..Placement::default()
             });
         }
         // Before those are added that are mirrored alone.
-        self.banded = self.shares.iter().any(|share| (share - 1.0).abs() > BAND);
+        self.banded = (self.shares.numbers.iter()).any(|share| (share - 1.0).abs() > BAND);
         self.mirror(framed, scene.lamps.lamps());
         self.repeat(framed, job, chunks);
+        self.placements.send(gpu);
+        self.shares.send(gpu, rows);
+        self.mirrored.send(gpu);
     }
 
     fn add_chunk(
@@ -139,7 +149,7 @@ impl DrawList {
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (key, chunk): (ChunkKey, &Chunk),
+        chunk: &Arc<Chunk>,
         dim_cd_m2: f64,
     ) {
         let headlit_cd_m2 = (chunk.probes.iter())
@@ -151,7 +161,7 @@ impl DrawList {
         let headlit_grey = headlit_cd_m2 * framed.view.grey_per_cd_m2();
         let floodlit = headlit_grey > FLOODLIT_GREY;
         let mirrors = self.find_mirrors(framed, chunk);
-        let period = key.start_m() / paint::PERIOD_M;
+        let period = chunk.key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
         for part in &chunk.parts {
             let around = part.around.map(|p| chunk.origin + p.cast());
@@ -166,9 +176,9 @@ impl DrawList {
             let border = part.indices.start + 3 * bright as u32;
             let painting = scene.paintings.of_range[part.section];
             self.calls.push(DrawCall {
-                chunk: Some(key),
+                chunk: Some(Arc::clone(chunk)),
                 texture: textures::slanted(painting, away_m),
-                mesh: self.placements.len() as u32,
+                mesh: self.placements.items.len() as u32,
                 headlit: headlit_grey > UNLIT_GREY,
                 lit: part.indices.start..border,
                 dim: border..part.indices.end,
@@ -179,7 +189,7 @@ impl DrawList {
                 Some(lamp) => self.shares_of(framed, scene.lamps.lamps(), lamp, 0..rows),
                 None => 0,
             };
-            self.placements.push(Placement {
+            self.placements.items.push(Placement {
                 offset_m: single(&(chunk.origin - framed.reference())),
                 period_share: (period - period.floor()) as f32,
                 shares,
@@ -215,7 +225,7 @@ impl DrawList {
 
     /// Lists the lamps that what mirrors may show, where anything does.
     fn mirror(&mut self, framed: &Framed<'_>, lamps: &[BlinkingLamp]) {
-        self.mirrored.clear();
+        self.mirrored.items.clear();
         if self.calls.iter().all(|call| call.glossy.is_empty()) {
             return;
         }
@@ -228,7 +238,7 @@ impl DrawList {
             }
             let rows = self.mirror_rows.clone();
             let shares = self.shares_of(framed, lamps, k, rows);
-            self.mirrored.push(Mirrored {
+            self.mirrored.items.push(Mirrored {
                 position_m: single(&away),
                 intensity_cd: (lamp.duty() * lamp.axial_intensity_cd()) as f32,
                 axis: single(&lamp.facing),
@@ -257,7 +267,7 @@ impl DrawList {
             let shutter = &framed.view.camera.shutter;
             let light = &lamps[lamp];
             let mean = light.duty().max(1e-9);
-            self.shares.extend((0..rows).map(|v| {
+            self.shares.numbers.extend((0..rows).map(|v| {
                 if !asked.contains(&v) {
                     return 1.0;
                 }
@@ -269,11 +279,10 @@ impl DrawList {
     }
 
     /// Copies the placements for every instant of the exposure.
-    fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &Chunks) {
-        self.meshes = self.placements.len() as u32;
+    fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &[Arc<Chunk>]) {
+        self.meshes = self.placements.items.len() as u32;
         let smear = Smear::of(framed, job.time);
         let anything = self.calls.iter().any(|d| !d.lit.is_empty());
-        let chunks = self.keys.iter().filter_map(|key| chunks.get(*key));
         self.instants = if anything {
             smear.instants(&job.bodies, chunks)
         } else {
@@ -290,12 +299,12 @@ impl DrawList {
             let k = (k + self.instants / 2) % self.instants;
             let late_s = ((f64::from(k) + 0.5) / count - 0.5) * exposure_s;
             for mesh in 0..self.meshes as usize {
-                self.placements.push(Placement {
+                self.placements.items.push(Placement {
                     late_s: late_s as f32,
-                    ..self.placements[mesh]
+                    ..self.placements.items[mesh]
                 });
             }
         }
-        self.placements.drain(..self.meshes as usize);
+        self.placements.items.drain(..self.meshes as usize);
     }
 }

@@ -4,15 +4,17 @@
 //! Where a lamp stands in the camera's frame is worked out at knots of time 150 us apart, and runs
 //! straight between them: at 20 m/s^2 it strays from that by less than a micrometre.
 
-use super::layout::{Glare, GlareRow, Instant, Lamp, LampRow};
+use super::adapter::Gpu;
+use super::layout::{DiscRow, GlareArea, GlareRow, Instant, Lamp};
 use super::spread::PointSpread;
+use super::upload::Upload;
 use super::view::{Framed, single};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::scene::View;
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
 use std::f64::consts::{PI, TAU};
 
 /// No disc that comes nearer to the camera's plane than this is drawn.
@@ -27,21 +29,18 @@ const MAX_INSTANTS: f64 = 64.0;
 const RIM_POINTS: u32 = 32;
 const RIM_SLACK: f64 = 1.05;
 
-/// Lamps of the view at hand, and the buffers to make them in.
-#[derive(Default)]
+/// Lamps of the view at hand.
 pub struct LampTable {
-    poses: Vec<Isometry3<f64>>,
-    track: Track,
     /// Discs in sight, far ones first.
-    pub lamps: Vec<Lamp>,
+    pub lamps: Upload<Lamp>,
     /// Rows of all of them.
-    pub rows: Vec<LampRow>,
+    pub rows: Upload<DiscRow>,
     /// Instants of all of those.
-    pub instants: Vec<Instant>,
+    pub instants: Upload<Instant>,
     /// Glare in sight.
-    pub glares: Vec<Glare>,
+    pub glares: Upload<GlareArea>,
     /// Rows of all of it.
-    pub glare_rows: Vec<GlareRow>,
+    pub glare_rows: Upload<GlareRow>,
 }
 
 /// A lamp as the camera has it at one time.
@@ -99,13 +98,32 @@ impl SeenLamp {
 }
 
 /// A lamp through a frame.
-#[derive(Default)]
-struct Track {
+struct PassingLamp<'a> {
+    view: &'a View,
+    lamp: &'a BlinkingLamp,
+    /// Share of its light that the air lets through.
+    clear: f64,
+    /// From knot to knot.
     step_s: f64,
     knots: Vec<Option<SeenLamp>>,
 }
 
-impl Track {
+/// `camera_from_world` at the knots of a view, and from knot to knot.
+fn knot_poses(view: &View) -> (Vec<Isometry3<f64>>, f64) {
+    let rows = view.camera.intrinsics.height_px;
+    let span_s = view.camera.shutter.frame_span_s(rows);
+    let steps = if view.motion.poses.len() > 1 {
+        (span_s / KNOT_S).ceil().clamp(1.0, MAX_KNOTS)
+    } else {
+        0.0
+    };
+    let step_s = span_s / steps.max(1.0);
+    let time = |k: u32| view.start.plus(f64::from(k) * step_s);
+    let poses = (0..=steps as u32).map(|k| view.motion.pose_at(time(k)).inverse());
+    (poses.collect(), step_s)
+}
+
+impl PassingLamp<'_> {
     /// At a time after the view's start.
     fn at(&self, t_s: f64) -> Option<SeenLamp> {
         let last = self.knots.len().checked_sub(1)?;
@@ -118,76 +136,32 @@ impl Track {
         Some(a.mix(b, x - k as f64))
     }
 
-    fn most(&self, of: impl Fn(&SeenLamp) -> f64) -> f64 {
-        let knots = self.knots.iter().flatten();
-        knots.map(of).fold(0.0, f64::max)
-    }
-}
-
-impl LampTable {
-    /// Makes the tables of all lamps that the view may see.
-    pub fn fill(&mut self, framed: &Framed<'_>, scene: &LitScene, airlight_cd_m2: f64) {
-        self.lamps.clear();
-        self.rows.clear();
-        self.instants.clear();
-        self.glares.clear();
-        self.glare_rows.clear();
-        let from = framed.reference();
-        let mut near: Vec<(f64, &BlinkingLamp)> = (scene.lamps.lamps().iter())
-            .map(|lamp| ((lamp.centre - from).norm(), lamp))
-            .filter(|(d, _)| *d < LAMP_SIGHT_M)
-            .collect();
-        if near.is_empty() {
-            return;
-        }
-        near.sort_by(|a, b| f64::total_cmp(&b.0, &a.0));
-        self.place_knots(framed.view);
-        for (away_m, lamp) in near {
-            self.follow(framed.view, lamp);
-            if self.track.knots.iter().any(Option::is_some) {
-                let clear = scene.air.transmission(away_m);
-                let exposed = Exposed::new(framed.view, lamp, clear);
-                self.add_disc(&exposed, scene.tunnel.ambient_lx, airlight_cd_m2);
-                self.add_glare(&exposed);
-            }
-        }
+    /// From the view's start to the opening of a row.
+    fn open_s(&self, v: u32) -> f64 {
+        self.view.camera.shutter.delay_s(f64::from(v))
     }
 
-    fn place_knots(&mut self, view: &View) {
-        let rows = view.camera.intrinsics.height_px;
-        let span_s = view.camera.shutter.frame_span_s(rows);
-        let steps = if view.motion.poses.len() > 1 {
-            (span_s / KNOT_S).ceil().clamp(1.0, MAX_KNOTS)
-        } else {
-            0.0
-        };
-        self.track.step_s = span_s / steps.max(1.0);
-        self.poses.clear();
-        self.poses.extend((0..=steps as u32).map(|k| {
-            let t = view.start.plus(f64::from(k) * self.track.step_s);
-            view.motion.pose_at(t).inverse()
-        }));
+    /// In the middle of the exposure of a row.
+    fn in_row(&self, v: u32) -> Option<SeenLamp> {
+        self.at(self.open_s(v) + 0.5 * self.view.camera.shutter.exposure_s)
     }
 
-    fn follow(&mut self, view: &View, lamp: &LampLight) {
-        self.track.knots.clear();
-        let seen = self
-            .poses
-            .iter()
-            .map(|pose| SeenLamp::new(view, lamp, pose));
-        self.track.knots.extend(seen);
+    /// Mean light in a time after the view's start, as a share of that of a good lamp that stays on
+    /// in clear air.
+    fn light(&self, from_s: f64, span_s: f64) -> f64 {
+        let open_s = self.view.start.secs() + from_s;
+        self.clear * self.lamp.share(open_s, open_s + span_s)
     }
 
-    /// The rows within `reach_px` of a lamp, first and last, and the columns.
-    fn bounds(&self, exposed: &Exposed<'_>, reach_px: Vector3<f64>) -> Option<LampBounds> {
-        let lens = &exposed.view.camera.intrinsics;
-        let (width, height) = (f64::from(lens.width_px), lens.height_px);
+    /// The rows within `reach_px` of the lamp, first and last, and the columns.
+    fn bounds(&self, reach_px: Vector2<f64>) -> Option<LampBounds> {
+        let lens = &self.view.camera.intrinsics;
+        let width = f64::from(lens.width_px);
         let mut bounds: Option<LampBounds> = None;
-        for v in 0..height {
-            let Some(lamp) = self.track.at(exposed.mid_s(v)) else {
+        for v in 0..lens.height_px {
+            let Some(at) = self.in_row(v).map(|lamp| lamp.image) else {
                 continue;
             };
-            let at = lamp.image;
             let (left, right) = (at.x - reach_px.x, at.x + reach_px.x);
             let near = (f64::from(v) - at.y).abs() <= reach_px.y;
             if near && right >= -0.5 && left <= width - 0.5 {
@@ -199,85 +173,28 @@ impl LampTable {
                 b.columns = (b.columns.0.min(left), b.columns.1.max(right));
             }
         }
-        if let Some(b) = &mut bounds {
-            b.columns = (
-                b.columns.0.floor().max(0.0) - 0.5,
-                b.columns.1.ceil().min(width - 1.0) + 0.5,
-            );
-        }
-        bounds
-    }
-
-    fn add_disc(&mut self, exposed: &Exposed<'_>, ambient_lx: f64, airlight_cd_m2: f64) {
-        let (view, lamp) = (exposed.view, exposed.lamp);
-        let Some(extent_px) = self.extent_px(exposed) else {
-            return;
-        };
-        let spread = self.spread(exposed);
-        let ends_px = 1.1 * spread.ends_px;
-        let smear = self.smear_px(exposed);
-        let reach_px = extent_px * RIM_SLACK + smear.add_scalar(ends_px + 0.5);
-        let Some(bounds) = self.bounds(exposed, reach_px) else {
-            return;
-        };
-        let count = (smear.norm() / STEP_PX).ceil().clamp(1.0, MAX_INSTANTS) as u32;
-        let direct_cd_m2 = view.lens.direct_share() * lamp.luminance_cd_m2;
-        let axial_e = direct_cd_m2 * view.electrons_per_cd_m2();
-        let dark_cd_m2 = exposed.clear * DARK_DISC_ALBEDO * ambient_lx / PI
-            + (1.0 - exposed.clear) * airlight_cd_m2;
-        let dark_e = dark_cd_m2 * view.electrons_per_cd_m2();
-        let ([low, high], first_row) = bounds.corners();
-        self.lamps.push(Lamp {
-            low,
-            high,
-            first_row,
-            rows_at: self.rows.len() as u32,
-            instants_at: self.instants.len() as u32,
-            instants: count,
-            radius_m: lamp.radius_m as f32,
-            exponent: (lamp.exponent - 1.0) as f32,
-            dark_e: dark_e as f32,
-            sharp: (1.0 / spread.sigma_px) as f32,
-            flat: spread.flat as f32,
-            ends_px: spread.ends_px as f32,
-        });
-        let step_s = view.camera.shutter.exposure_s / f64::from(count);
-        for v in bounds.rows.0..=bounds.rows.1 {
-            let open_s = exposed.open_s(v);
-            for k in 0..count {
-                let from_s = open_s + f64::from(k) * step_s;
-                let part_e = axial_e * exposed.light(from_s, step_s) / f64::from(count);
-                let seen = self.track.at(from_s + 0.5 * step_s);
-                // A disc behind the camera is hit by no ray.
-                let centre = seen.map_or(Vector3::new(0.0, 0.0, -1e3), |s| s.centre);
-                self.instants.push(Instant {
-                    centre: single(&centre),
-                    signal_e: part_e as f32,
-                });
-            }
-            let seen = self.track.at(exposed.mid_s(v));
-            let normal = seen.map_or(-Vector3::z(), |s| s.normal);
-            self.rows.push(LampRow {
-                normal: single(&normal),
-                unused: 0.0,
-            });
-        }
+        let mut bounds = bounds?;
+        let (left, right) = bounds.columns;
+        bounds.columns = (
+            left.floor().max(0.0) - 0.5,
+            right.ceil().min(width - 1.0) + 0.5,
+        );
+        Some(bounds)
     }
 
     /// The spread of the lamp's light, at the depth that it has in the middle of the picture.
-    fn spread(&self, exposed: &Exposed<'_>) -> PointSpread {
-        let view = exposed.view;
-        let middle = exposed.mid_s(view.camera.intrinsics.height_px / 2);
-        let depth_m = self.track.at(middle).map_or(f64::INFINITY, |s| s.centre.z);
-        PointSpread::new(view.lens.blur_px, view.confusion_px(depth_m.max(0.1)))
+    fn spread(&self) -> PointSpread {
+        let middle = self.in_row(self.view.camera.intrinsics.height_px / 2);
+        let depth_m = middle.map_or(f64::INFINITY, |s| s.centre.z);
+        let confusion_px = self.view.confusion_px(depth_m.max(0.1));
+        PointSpread::new(self.view.lens.blur_px, confusion_px)
     }
 
     /// How far the rim reaches from the centre in the image, in the row that sees the centre.
-    fn extent_px(&self, exposed: &Exposed<'_>) -> Option<Vector3<f64>> {
-        let (lens, lamp) = (&exposed.view.camera.intrinsics, exposed.lamp);
-        let rows = (0..lens.height_px).step_by(4);
-        let seen = rows.filter_map(|v| {
-            let seen = self.track.at(exposed.mid_s(v))?;
+    fn extent_px(&self) -> Option<Vector2<f64>> {
+        let lens = &self.view.camera.intrinsics;
+        let seen = (0..lens.height_px).step_by(4).filter_map(|v| {
+            let seen = self.in_row(v)?;
             Some(((seen.image.y - f64::from(v)).abs(), seen))
         });
         let (_, seen) = seen.min_by(|a, b| f64::total_cmp(&a.0, &b.0))?;
@@ -289,52 +206,156 @@ impl LampTable {
             other.normalize()
         };
         let up = seen.normal.cross(&side);
-        let mut extent_px = Vector3::zeros();
+        let mut extent_px = Vector2::zeros();
         for k in 0..RIM_POINTS {
             let (sin, cos) = (TAU * f64::from(k) / f64::from(RIM_POINTS)).sin_cos();
-            let rim = seen.centre + (side * cos + up * sin) * lamp.radius_m;
+            let rim = seen.centre + (side * cos + up * sin) * self.lamp.radius_m;
             let off = lens.project(&Point3::from(rim))? - seen.image;
-            extent_px = extent_px.sup(&Vector3::new(off.x.abs(), off.y.abs(), 0.0));
+            extent_px = extent_px.sup(&off.abs());
         }
         Some(extent_px)
     }
 
     /// How far the image moves in a row's exposure: the most of three rows.
-    fn smear_px(&self, exposed: &Exposed<'_>) -> Vector3<f64> {
-        let last = exposed.view.camera.intrinsics.height_px.max(1) - 1;
-        let exposure_s = exposed.view.camera.shutter.exposure_s;
+    fn smear_px(&self) -> Vector2<f64> {
+        let last = self.view.camera.intrinsics.height_px.max(1) - 1;
+        let exposure_s = self.view.camera.shutter.exposure_s;
         let moved = [0, last / 2, last].into_iter().filter_map(|v| {
-            let open_s = exposed.open_s(v);
-            let (a, b) = (self.track.at(open_s)?, self.track.at(open_s + exposure_s)?);
-            let off = b.image - a.image;
-            Some(Vector3::new(off.x.abs(), off.y.abs(), 0.0))
+            let open_s = self.open_s(v);
+            let off = self.at(open_s + exposure_s)?.image - self.at(open_s)?.image;
+            Some(off.abs())
         });
-        moved.fold(Vector3::zeros(), |a, b| a.sup(&b))
+        moved.fold(Vector2::zeros(), |a, b| a.sup(&b))
+    }
+}
+
+impl LampTable {
+    /// Empty.
+    pub fn new(gpu: &Gpu) -> Self {
+        Self {
+            lamps: Upload::storage(gpu),
+            rows: Upload::storage(gpu),
+            instants: Upload::storage(gpu),
+            glares: Upload::storage(gpu),
+            glare_rows: Upload::storage(gpu),
+        }
     }
 
-    fn add_glare(&mut self, exposed: &Exposed<'_>) {
-        let (view, lamp) = (exposed.view, exposed.lamp);
-        let reach_px = self.track.most(|s| {
-            let glare = view.lens.glare(s.apparent_px, exposed.clear * s.signal_e);
-            glare.reach_px(FAINT_E)
-        });
-        if reach_px <= 0.0 || lamp.level <= 0.0 {
-            return;
+    /// Makes the tables of all lamps that the view may see, and sends them.
+    pub fn fill(&mut self, gpu: &Gpu, framed: &Framed<'_>, scene: &LitScene, airlight_cd_m2: f64) {
+        self.lamps.items.clear();
+        self.rows.items.clear();
+        self.instants.items.clear();
+        self.glares.items.clear();
+        self.glare_rows.items.clear();
+        let from = framed.reference();
+        let mut near: Vec<(f64, &BlinkingLamp)> = (scene.lamps.lamps().iter())
+            .map(|lamp| ((lamp.centre - from).norm(), lamp))
+            .filter(|(d, _)| *d < LAMP_SIGHT_M)
+            .collect();
+        near.sort_by(|a, b| f64::total_cmp(&b.0, &a.0));
+        let (view, (poses, step_s)) = (framed.view, knot_poses(framed.view));
+        for (away_m, lamp) in near {
+            let seen = poses.iter().map(|pose| SeenLamp::new(view, lamp, pose));
+            let passing = PassingLamp {
+                view,
+                lamp,
+                clear: scene.air.transmission(away_m),
+                step_s,
+                knots: seen.collect(),
+            };
+            if passing.knots.iter().any(Option::is_some) {
+                self.add_disc(&passing, scene.tunnel.ambient_lx, airlight_cd_m2);
+                self.add_glare(&passing);
+            }
         }
-        let Some(bounds) = self.bounds(exposed, Vector3::repeat(reach_px)) else {
+        self.lamps.send(gpu);
+        self.rows.send(gpu);
+        self.instants.send(gpu);
+        self.glares.send(gpu);
+        self.glare_rows.send(gpu);
+    }
+
+    fn add_disc(&mut self, passing: &PassingLamp<'_>, ambient_lx: f64, airlight_cd_m2: f64) {
+        let (view, lamp) = (passing.view, passing.lamp);
+        let Some(extent_px) = passing.extent_px() else {
             return;
         };
+        let (spread, smear) = (passing.spread(), passing.smear_px());
+        let ends_px = 1.1 * spread.ends_px;
+        let reach_px = extent_px * RIM_SLACK + smear.add_scalar(ends_px + 0.5);
+        let Some(bounds) = passing.bounds(reach_px) else {
+            return;
+        };
+        let count = (smear.norm() / STEP_PX).ceil().clamp(1.0, MAX_INSTANTS) as u32;
+        let direct_cd_m2 = view.lens.direct_share() * lamp.luminance_cd_m2;
+        let axial_e = direct_cd_m2 * view.electrons_per_cd_m2();
+        let dark_cd_m2 = passing.clear * DARK_DISC_ALBEDO * ambient_lx / PI
+            + (1.0 - passing.clear) * airlight_cd_m2;
+        let dark_e = dark_cd_m2 * view.electrons_per_cd_m2();
         let ([low, high], first_row) = bounds.corners();
-        self.glares.push(Glare {
+        self.lamps.items.push(Lamp {
             low,
             high,
             first_row,
-            rows_at: self.glare_rows.len() as u32,
+            rows_at: self.rows.items.len() as u32,
+            instants_at: self.instants.items.len() as u32,
+            instants: count,
+            radius_m: lamp.radius_m as f32,
+            exponent: (lamp.exponent - 1.0) as f32,
+            dark_e: dark_e as f32,
+            sharp: (1.0 / spread.sigma_px) as f32,
+            flat: spread.flat as f32,
+            ends_px: spread.ends_px as f32,
+        });
+        let step_s = view.camera.shutter.exposure_s / f64::from(count);
+        for v in bounds.rows.0..=bounds.rows.1 {
+            let open_s = passing.open_s(v);
+            for k in 0..count {
+                let from_s = open_s + f64::from(k) * step_s;
+                let part_e = axial_e * passing.light(from_s, step_s) / f64::from(count);
+                let seen = passing.at(from_s + 0.5 * step_s);
+                // A disc behind the camera is hit by no ray.
+                let centre = seen.map_or(Vector3::new(0.0, 0.0, -1e3), |s| s.centre);
+                self.instants.items.push(Instant {
+                    centre: single(&centre),
+                    signal_e: part_e as f32,
+                });
+            }
+            let seen = passing.in_row(v);
+            let normal = seen.map_or(-Vector3::z(), |s| s.normal);
+            self.rows.items.push(DiscRow {
+                normal: single(&normal),
+                unused: 0.0,
+            });
+        }
+    }
+
+    fn add_glare(&mut self, passing: &PassingLamp<'_>) {
+        let (view, lamp) = (passing.view, passing.lamp);
+        let reach_px = |seen: &SeenLamp| {
+            let glare = (view.lens).glare(seen.apparent_px, passing.clear * seen.signal_e);
+            glare.reach_px(FAINT_E)
+        };
+        let reaches_px = passing.knots.iter().flatten().map(reach_px);
+        let reach_px = reaches_px.fold(0.0, f64::max);
+        if reach_px <= 0.0 || lamp.level <= 0.0 {
+            return;
+        }
+        let Some(bounds) = passing.bounds(Vector2::repeat(reach_px)) else {
+            return;
+        };
+        let ([low, high], first_row) = bounds.corners();
+        self.glares.items.push(GlareArea {
+            low,
+            high,
+            first_row,
+            rows_at: self.glare_rows.items.len() as u32,
         });
         let exposure_s = view.camera.shutter.exposure_s;
         for v in bounds.rows.0..=bounds.rows.1 {
-            let row = self.track.at(exposed.mid_s(v)).map(|s| {
-                let light = exposed.light(exposed.open_s(v), exposure_s);
+            let row = passing.in_row(v).map(|s| {
+                let light = passing.light(passing.open_s(v), exposure_s);
                 let wide_px2 = view.lens.veil_px.powi(2) + s.apparent_px.powi(2);
                 GlareRow {
                     centre_px: [s.image.x as f32, s.image.y as f32],
@@ -345,7 +366,7 @@ impl LampTable {
                 }
             });
             // Where the lamp is out of sight there is nothing, of any width.
-            self.glare_rows.push(row.unwrap_or(GlareRow {
+            self.glare_rows.items.push(row.unwrap_or(GlareRow {
                 wide_px2: 1.0,
                 ..GlareRow::default()
             }));
@@ -366,42 +387,5 @@ impl LampBounds {
         let low = [self.columns.0 as f32, first - 0.5];
         let high = [self.columns.1 as f32, last + 0.5];
         ([low, high], self.rows.0 as i32)
-    }
-}
-
-/// A lamp and the times at which rows see it.
-struct Exposed<'a> {
-    view: &'a View,
-    lamp: &'a BlinkingLamp,
-    start_s: f64,
-    /// Share of its light that the air lets through.
-    clear: f64,
-}
-
-impl<'a> Exposed<'a> {
-    fn new(view: &'a View, lamp: &'a BlinkingLamp, clear: f64) -> Self {
-        Self {
-            clear,
-            view,
-            lamp,
-            start_s: view.start.secs(),
-        }
-    }
-
-    /// From the view's start to the opening of a row.
-    fn open_s(&self, v: u32) -> f64 {
-        self.view.camera.shutter.delay_s(f64::from(v))
-    }
-
-    /// To the middle of its exposure.
-    fn mid_s(&self, v: u32) -> f64 {
-        self.open_s(v) + 0.5 * self.view.camera.shutter.exposure_s
-    }
-
-    /// Mean light in a time after the view's start, as a share of that of a good lamp that stays on
-    /// in clear air.
-    fn light(&self, from_s: f64, span_s: f64) -> f64 {
-        let open_s = self.start_s + from_s;
-        self.clear * self.lamp.share(open_s, open_s + span_s)
     }
 }

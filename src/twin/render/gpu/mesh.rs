@@ -131,21 +131,14 @@ impl Mesh {
             });
         };
         let round = |r: f64| sectors(r * fineness.px_per_m);
+        let capsule = |r: f64, h: f64| capsule_profile(r, h, round(r), fineness);
         let grids = match &body.shape {
             Shape::Box(half) => box_grids(half, fineness, &mut corner),
             Shape::Cylinder(r, h) => {
                 turned(&cylinder_profile(*r, *h, fineness), round(*r), &mut corner)
             }
-            Shape::Sphere(r) => turned(
-                &capsule_profile(*r, 0.0, round(*r), fineness),
-                round(*r),
-                &mut corner,
-            ),
-            Shape::Capsule(r, h) => turned(
-                &capsule_profile(*r, *h, round(*r), fineness),
-                round(*r),
-                &mut corner,
-            ),
+            Shape::Sphere(r) => turned(&capsule(*r, 0.0), round(*r), &mut corner),
+            Shape::Capsule(r, h) => turned(&capsule(*r, *h), round(*r), &mut corner),
             Shape::Hull(hull) => {
                 let corners = hull_triangles(hull, fineness, &mut corner);
                 self.indices.extend(corners.iter().map(|k| from + k));

@@ -53,17 +53,18 @@ pub mod layout;
 mod mesh;
 mod passes;
 mod pipeline;
-mod render_pass;
+mod prepared;
+mod recorder;
 mod shaders;
 mod shadows;
 mod smear;
 mod spread;
 mod target;
+mod texture;
 mod textures;
 mod tunnel;
 mod upload;
 mod view;
-mod view_buffers;
 
 pub use adapter::adapters;
 pub use shaders::shader_source;
@@ -71,25 +72,25 @@ pub use shaders::shader_source;
 use super::cache::Cache;
 use super::lit_scene::LitScene;
 use super::pixel_map::{KEPT_MAPS, MapKey};
-use super::scene::{Job, Scene};
-use super::{Backend, RawImage, RenderError, Renderer};
-use crate::bus::Intrinsics;
+use super::scene::{Job, Scene, View};
+use super::{Backend, RawImage, RenderError, Renderer, upper_bits};
 use adapter::Gpu;
-use backdrop::{BackdropKey, Backdrops};
+use backdrop::{BackdropKey, Backdrops, KEPT_BACKDROPS};
 use background::Surfaces;
 use bodies::BodyBuffers;
 use chunks::Chunks;
-use draw_list::DrawList;
 use image::GrayImage;
-use lamps::LampTable;
-use layout::Pose;
-use pipeline::{Develop, Pipelines};
-use shadows::Shadows;
+use pipeline::Pipelines;
+use prepared::PreparedView;
+use recorder::Recorder;
 use std::collections::VecDeque;
-use target::{ReadBack, Target};
+use target::{ReadBack, ViewTarget};
+use texture::Texture;
 use textures::Textures;
 use view::Framed;
-use view_buffers::{ViewBuffers, ViewData};
+
+/// Image sizes whose targets are kept.
+const KEPT_TARGETS: usize = 8;
 
 /// Draws on the preferred graphics adapter. Any number of jobs may be in flight.
 pub struct GpuRenderer {
@@ -99,29 +100,19 @@ pub struct GpuRenderer {
     chunks: Chunks,
     textures: Textures,
     bodies: BodyBuffers,
-    maps: Cache<MapKey, wgpu::TextureView>,
-    views: Vec<Prepared>,
-    targets: Vec<Target>,
+    maps: Cache<MapKey, Texture>,
+    views: Vec<PreparedView>,
+    targets: Cache<(u32, u32), ViewTarget>,
     backdrops: Backdrops,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
 }
 
 struct InFlight {
-    raw: bool,
     images: Vec<ReadBack>,
     /// Of each view's sensor.
     spare_bits: Vec<u32>,
     submission: wgpu::SubmissionIndex,
-}
-
-/// What is found out about a view before it is drawn, and its buffers, used again in every job.
-struct Prepared {
-    buffers: ViewBuffers,
-    poses: Vec<Pose>,
-    list: DrawList,
-    lamps: LampTable,
-    shadows: Shadows,
 }
 
 impl GpuRenderer {
@@ -139,8 +130,8 @@ impl GpuRenderer {
             bodies: BodyBuffers::new(&gpu),
             maps: Cache::new(KEPT_MAPS),
             views: Vec::new(),
-            targets: Vec::new(),
-            backdrops: Backdrops::default(),
+            targets: Cache::new(KEPT_TARGETS),
+            backdrops: Cache::new(KEPT_BACKDROPS),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
             gpu,
@@ -149,118 +140,63 @@ impl GpuRenderer {
 
     /// Records all passes of view `k` and the way back of its image.
     fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job, k: usize) -> ReadBack {
-        let framed = Framed::new(&job.views[k]);
-        self.upload_view(&framed, job, k);
-        let target = self.target_for(&framed.view.camera.intrinsics);
-        let (gpu, target) = (&self.gpu, &self.targets[target]);
-        let Prepared { buffers, list, .. } = &self.views[k];
+        let (gpu, view, headlights) = (&self.gpu, &job.views[k], job.headlights.len());
+        let framed = Framed::new(view);
+        if self.views.len() <= k {
+            self.views.push(PreparedView::new(gpu));
+        }
+        let meshes = (&mut self.chunks, &self.bodies);
+        self.views[k].prepare(gpu, &framed, job, &self.scene, meshes);
+        let size_px = size_px(view);
+        let target = (self.targets).get(size_px, |size_px| ViewTarget::new(&gpu.device, *size_px));
+        let map = (self.maps).get(MapKey::new(view), |key| {
+            target::map_texture(gpu, &key.make_map(), size_px)
+        });
         let surfaces = Surfaces {
-            chunks: &self.chunks,
             bodies: &self.bodies,
             textures: &self.textures,
         };
-        let backgrounds = [0, job.headlights.len()]
-            .map(|headlights| self.pipelines.background(&gpu.device, headlights).clone());
-        let pipelines = &mut self.pipelines;
-        let key = BackdropKey::of(&framed, list);
-        let background = (&*pipelines, &backgrounds);
-        let onto = (target, &mut self.backdrops);
-        buffers.draw_background(gpu, background, encoder, onto, (list, key), &surfaces);
-        (buffers.shadows).draw(gpu, pipelines, encoder, target, &buffers.view);
-        let gloss = &backgrounds[1].gloss;
-        buffers.draw_gloss(gpu, gloss, encoder, target, (list, &surfaces));
-        if framed.defocus_reach_px() > 0 {
-            buffers.blur(gpu, pipelines, encoder, target);
-        }
-        buffers.draw_lamps(gpu, pipelines, encoder, target);
-        buffers.draw_glare(gpu, pipelines, encoder, target);
-        let map = (self.maps).get(MapKey::new(framed.view), |key| {
-            target::map_texture(gpu, &key.make_map(), target.size_px)
-        });
-        let develop = Develop {
-            raw: job.raw,
-            blooming: framed.view.sensor.blooming > 0.0,
+        let mut recorder = Recorder {
+            gpu,
+            pipelines: &self.pipelines,
+            encoder,
+            view: &self.views[k],
+            target,
         };
-        let sensor = pipelines.sensor(&gpu.device, develop);
-        target.copy_signal(encoder);
-        buffers.draw_sensor(gpu, sensor, encoder, (target, map), job.raw);
-        let spare = (self.spare.iter()).position(|b| b.fits(target.size_px, job.raw));
+        let key = BackdropKey::of(&framed, &self.views[k].list);
+        recorder.draw_background(headlights, &surfaces, (&mut self.backdrops, key.as_ref()));
+        recorder.draw_shadows();
+        recorder.draw_gloss(headlights, &surfaces);
+        if framed.defocus_reach_px() > 0 {
+            recorder.blur();
+        }
+        recorder.draw_lamps();
+        recorder.draw_glare();
+        recorder.draw_sensor(map, view.sensor.blooming > 0.0);
+        let spare = self.spare.iter().position(|b| b.size_px == size_px);
         let back = spare.map_or_else(
-            || ReadBack::new(&gpu.device, target.size_px, job.raw),
+            || ReadBack::new(&gpu.device, size_px),
             |at| self.spare.swap_remove(at),
         );
-        target.copy_to(encoder, &back);
+        target.copy_back(&back, encoder);
         back
     }
 
-    /// Number of the target for pictures of a lens.
-    fn target_for(&mut self, lens: &Intrinsics) -> usize {
-        let size_px = (lens.width_px, lens.height_px);
-        let fits = self.targets.iter().position(|t| t.size_px == size_px);
-        fits.unwrap_or_else(|| {
-            (self.targets).push(Target::new(&self.gpu.device, size_px));
-            self.targets.len() - 1
-        })
-    }
-
-    fn upload_view(&mut self, framed: &Framed<'_>, job: &Job, k: usize) {
-        let (gpu, scene) = (&self.gpu, &self.scene);
-        while self.views.len() <= k {
-            self.views.push(Prepared::new(gpu));
-        }
-        let view = &mut self.views[k];
-        let s_m = (self.chunks).in_sight(gpu, scene, framed, view.list.keys());
-        let meshes = (&self.chunks, &self.bodies);
-        view.list.fill(framed, job, scene, meshes);
-        let in_sight = view.list.keys().iter();
-        let in_sight = in_sight.filter_map(|key| Some((*key, self.chunks.get(*key)?)));
-        view.shadows.fill(framed, job, scene, in_sight);
-        let airlight_cd_m2 = scene.airlight_cd_m2(s_m);
-        view.lamps.fill(framed, scene, airlight_cd_m2);
-        let air = (scene.air.extinction_per_m, airlight_cd_m2);
-        let mut constants = framed.constants(job, air, &mut view.poses);
-        constants.mirrored = view.list.mirrored.len() as u32;
-        // Half of what lies beyond the end of what is drawn, as it is seen, is nearer than this.
-        let beyond_m = std::f64::consts::SQRT_2 * chunks::AHEAD_M;
-        let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
-        let data = ViewData {
-            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(layout::BRIGHTEST_E),
-            constants,
-            poses: &view.poses,
-            list: &view.list,
-            lamps: &view.lamps,
-            shadows: &view.shadows,
-        };
-        view.buffers.write(gpu, &data);
-    }
-
     fn finish_oldest(&mut self) -> Result<InFlight, RenderError> {
-        let job = self
-            .in_flight
-            .pop_front()
-            .ok_or(RenderError::NothingSubmitted)?;
-        self.gpu
-            .device
-            .poll(wgpu::PollType::Wait {
-                submission_index: Some(job.submission.clone()),
-                timeout: None,
-            })
-            .map_err(|e| RenderError::Device(e.to_string()))?;
+        let job = (self.in_flight.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(job.submission.clone()),
+            timeout: None,
+        };
+        (self.gpu.device.poll(wait)).map_err(|e| RenderError::Device(e.to_string()))?;
         self.gpu.check()?;
         Ok(job)
     }
 }
 
-impl Prepared {
-    fn new(gpu: &Gpu) -> Self {
-        Self {
-            buffers: ViewBuffers::new(gpu),
-            poses: Vec::new(),
-            list: DrawList::default(),
-            lamps: LampTable::default(),
-            shadows: Shadows::default(),
-        }
-    }
+fn size_px(view: &View) -> (u32, u32) {
+    let lens = &view.camera.intrinsics;
+    (lens.width_px, lens.height_px)
 }
 
 impl Renderer for GpuRenderer {
@@ -288,10 +224,7 @@ impl Renderer for GpuRenderer {
         self.chunks.next_job();
         let scene = &self.scene;
         (self.bodies).write(&self.gpu, job, &scene.lamps, scene.tunnel.ambient_lx);
-        let mut encoder = self
-            .gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         let images: Vec<_> = (0..job.views.len())
             .map(|k| self.record(&mut encoder, job, k))
             .collect();
@@ -301,7 +234,6 @@ impl Renderer for GpuRenderer {
         }
         let spare_bits = job.views.iter().map(|v| v.sensor.spare_bits());
         self.in_flight.push_back(InFlight {
-            raw: job.raw,
             images,
             spare_bits: spare_bits.collect(),
             submission,
@@ -310,19 +242,15 @@ impl Renderer for GpuRenderer {
     }
 
     fn collect(&mut self) -> Result<Vec<GrayImage>, RenderError> {
-        let job = self.finish_oldest()?;
-        let images = job.images.iter().zip(&job.spare_bits);
-        let images = images.map(|(back, spare)| back.image(*spare)).collect();
-        self.spare.extend(job.images);
-        images
+        let spare_bits = (self.in_flight.front()).map_or(Vec::new(), |job| job.spare_bits.clone());
+        let raw = self.collect_raw()?;
+        let images = raw.iter().zip(spare_bits);
+        Ok(images.map(|(raw, spare)| upper_bits(raw, spare)).collect())
     }
 
     fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
-        if self.in_flight.front().is_some_and(|job| !job.raw) {
-            return Err(RenderError::NotRaw);
-        }
         let job = self.finish_oldest()?;
-        let images = job.images.iter().map(ReadBack::raw_image).collect();
+        let images = job.images.iter().map(ReadBack::image).collect();
         self.spare.extend(job.images);
         images
     }

@@ -3,20 +3,17 @@
 use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
 use super::shaders::shader_source;
 use crate::twin::render::sensor::BLOOMING_REACH;
-use std::mem::{offset_of, size_of};
+use std::cell::OnceCell;
+use std::mem::size_of;
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
 pub const SIGNAL: wgpu::TextureFormat = wgpu::TextureFormat::R16Float;
 /// Reversed depth.
 pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
-/// Four grey pixels a texel.
-pub const PACKED: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-
-/// Four raw pixels a texel.
+/// Four pixels of the finished image a texel.
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
 /// Tunnel and bodies.
-#[derive(Clone)]
 pub struct Background {
     /// With their paint and the blinking of lamps.
     pub banded: wgpu::RenderPipeline,
@@ -31,7 +28,7 @@ pub struct Background {
 /// One pipeline a pass.
 pub struct Pipelines {
     /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
-    backgrounds: Vec<Option<Background>>,
+    backgrounds: [OnceCell<Background>; MAX_HEADLIGHTS + 1],
     background: wgpu::ShaderModule,
     gloss: wgpu::ShaderModule,
     /// Mixes a share of one picture into another.
@@ -44,18 +41,9 @@ pub struct Pipelines {
     pub discs: wgpu::RenderPipeline,
     /// Lamps' glare, added up.
     pub glare: wgpu::RenderPipeline,
-    /// The sensor, by its [`Develop`], each made when first asked for.
-    sensors: [Option<wgpu::RenderPipeline>; 4],
+    /// The sensor without and with blooming, each made when first asked for.
+    sensors: [OnceCell<wgpu::RenderPipeline>; 2],
     sensor: wgpu::ShaderModule,
-}
-
-/// What the sensor's pass has to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Develop {
-    /// All bits of the converter instead of eight.
-    pub raw: bool,
-    /// Charge over the full well spills.
-    pub blooming: bool,
 }
 
 struct Stage<'a> {
@@ -84,7 +72,7 @@ impl Pipelines {
         let flags = [0.0, 1.0];
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
         Self {
-            backgrounds: vec![None; MAX_HEADLIGHTS + 1],
+            backgrounds: [const { OnceCell::new() }; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             gloss: shader("gloss"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
@@ -103,45 +91,36 @@ impl Pipelines {
             }),
             discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over), &[]),
             glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over), &[]),
-            sensors: [const { None }; 4],
+            sensors: [const { OnceCell::new() }; 2],
             sensor: shader("sensor"),
         }
     }
 
-    /// The pipeline that draws tunnel and bodies under so many headlights.
-    pub fn background(&mut self, device: &wgpu::Device, headlights: usize) -> &Background {
+    /// The pipelines that draw tunnel and bodies under so many headlights.
+    pub fn background(&self, device: &wgpu::Device, headlights: usize) -> &Background {
         let headlights = headlights.min(MAX_HEADLIGHTS);
-        self.backgrounds[headlights].get_or_insert_with(|| {
+        self.backgrounds[headlights].get_or_init(|| {
+            let headlights = ("HEADLIGHTS", headlights as f64);
             let make = |kind, banded| {
-                let constants = [
-                    ("HEADLIGHTS", headlights as f64),
-                    ("BANDED", f64::from(u8::from(banded))),
-                ];
+                let constants = [headlights, ("BANDED", f64::from(u8::from(banded)))];
                 surface(device, &self.background, kind, &constants, false)
             };
-            let headlights = [("HEADLIGHTS", headlights as f64)];
             Background {
                 banded: make("lit", true),
                 lit: make("lit", false),
                 dim: make("dim", false),
-                gloss: surface(device, &self.gloss, "gloss", &headlights, true),
+                gloss: surface(device, &self.gloss, "gloss", &[headlights], true),
             }
         })
     }
 
-    /// The pipeline that develops a picture.
-    pub fn sensor(&mut self, device: &wgpu::Device, develop: Develop) -> &wgpu::RenderPipeline {
-        let at = usize::from(develop.raw) + 2 * usize::from(develop.blooming);
-        self.sensors[at].get_or_insert_with(|| {
-            let (entry, format) = if develop.raw {
-                ("develop_raw", RAW)
-            } else {
-                ("develop", PACKED)
-            };
-            let reach = if develop.blooming { BLOOMING_REACH } else { 0 };
+    /// The pipeline that develops a picture, where charge over the full well spills or does not.
+    pub fn sensor(&self, device: &wgpu::Device, blooming: bool) -> &wgpu::RenderPipeline {
+        self.sensors[usize::from(blooming)].get_or_init(|| {
+            let reach = if blooming { BLOOMING_REACH } else { 0 };
             let reach = [("BLOOMING_REACH", reach as f64)];
-            let target = target(format, None);
-            flat_pipeline(device, &self.sensor, ["whole", entry], target, &reach)
+            let target = target(RAW, None);
+            flat_pipeline(device, &self.sensor, ["whole", "develop"], target, &reach)
         })
     }
 }
@@ -232,44 +211,17 @@ const fn sum_of(src_factor: wgpu::BlendFactor, dst_factor: wgpu::BlendFactor) ->
     }
 }
 
-const fn attribute(
-    format: wgpu::VertexFormat,
-    offset: usize,
-    shader_location: u32,
-) -> wgpu::VertexAttribute {
-    wgpu::VertexAttribute {
-        format,
-        offset: offset as u64,
-        shader_location,
-    }
-}
+/// The members of [`Vertex`], one after the other.
+const VERTEX: [wgpu::VertexAttribute; 8] = wgpu::vertex_attr_array![
+    0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float32x2, 4 => Float32, 5 => Float32,
+    6 => Float32, 13 => Float32x3
+];
 
-const VERTEX: [wgpu::VertexAttribute; 8] = {
-    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3};
-    [
-        attribute(Float32x3, offset_of!(Vertex, position_m), 0),
-        attribute(Float32x3, offset_of!(Vertex, normal), 1),
-        attribute(Float32x2, offset_of!(Vertex, light_lx), 2),
-        attribute(Float32x2, offset_of!(Vertex, place_m), 3),
-        attribute(Float32, offset_of!(Vertex, paint), 4),
-        attribute(Float32, offset_of!(Vertex, albedo), 5),
-        attribute(Float32, offset_of!(Vertex, luminance_cd_m2), 6),
-        attribute(Float32x3, offset_of!(Vertex, gloss), 13),
-    ]
-};
-
-const PLACEMENT: [wgpu::VertexAttribute; 7] = {
-    use wgpu::VertexFormat::{Float32, Float32x2, Float32x3, Uint32};
-    [
-        attribute(Float32x3, offset_of!(Placement, offset_m), 7),
-        attribute(Float32, offset_of!(Placement, period_share), 8),
-        attribute(Float32x3, offset_of!(Placement, velocity_mps), 9),
-        attribute(Float32, offset_of!(Placement, late_s), 10),
-        attribute(Uint32, offset_of!(Placement, shares), 11),
-        attribute(Float32x2, offset_of!(Placement, paint_per_m), 12),
-        attribute(Float32x3, offset_of!(Placement, along), 14),
-    ]
-};
+/// Those of [`Placement`].
+const PLACEMENT: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
+    7 => Float32x3, 8 => Float32, 9 => Float32x3, 10 => Float32, 11 => Uint32, 12 => Float32x2,
+    14 => Float32x3
+];
 
 fn target(format: wgpu::TextureFormat, blend: Option<wgpu::BlendState>) -> wgpu::ColorTargetState {
     wgpu::ColorTargetState {

@@ -8,27 +8,24 @@ use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::photometry::OFFSET_M;
 use crate::twin::render::pixel_map::{GAIN_STEP, HOT, LEVEL_SHIFT};
 
-macro_rules! file {
-    ($name:literal) => {
-        (
-            $name,
-            include_str!(concat!("../../../../shaders/", $name, ".wgsl")),
-        )
+macro_rules! files {
+    ($($name:literal),*) => {
+        [$(($name, include_str!(concat!("../../../../shaders/", $name, ".wgsl")))),*]
     };
 }
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 10] = [
-    file!("common"),
-    file!("rows"),
-    file!("background"),
-    file!("gloss"),
-    file!("blend"),
-    file!("focus"),
-    file!("lamps"),
-    file!("glare"),
-    file!("sensor"),
-    file!("shadows"),
+const FILES: [(&str, &str); 10] = files![
+    "common",
+    "rows",
+    "background",
+    "gloss",
+    "blend",
+    "focus",
+    "lamps",
+    "glare",
+    "sensor",
+    "shadows"
 ];
 
 /// The complete source of `shaders/<name>.wgsl`: constants, what it shares with others, and the file.

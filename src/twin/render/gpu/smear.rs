@@ -10,6 +10,7 @@ use super::view::Framed;
 use crate::bus::SimTime;
 use crate::twin::geometry::{Body, Solid};
 use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use std::sync::Arc;
 
 /// What moves by less than this within the exposure may be drawn sharp.
 const SHARP_PX: f64 = 0.5;
@@ -87,12 +88,14 @@ impl<'a> Smear<'a> {
     }
 
     /// How many instants of a row's exposure show all motion in it.
-    pub fn instants<'c>(&self, bodies: &[Body], chunks: impl Iterator<Item = &'c Chunk>) -> u32 {
+    pub fn instants(&self, bodies: &[Body], chunks: &[Arc<Chunk>]) -> u32 {
         let most_px = if self.most_px(NEAREST_M) < SHARP_PX {
             0.0
         } else {
             let reference = self.framed.reference();
-            let near = chunks.filter(|c| (c.origin - reference).norm() < PROBED_M);
+            let near = chunks
+                .iter()
+                .filter(|c| (c.origin - reference).norm() < PROBED_M);
             let probes = near.flat_map(|chunk| &chunk.probes);
             let flow_px = probes.filter_map(|probe| self.flow_px(&probe.at));
             BETWEEN_PROBES * flow_px.fold(0.0, f64::max)

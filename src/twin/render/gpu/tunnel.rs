@@ -163,7 +163,7 @@ fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] 
     })
 }
 
-/// The next of the steps by which triangles are told apart, [`STEPS_PER_OCTAVE`] to twice the
+/// The next of the steps of brightness that triangles are sorted by, [`STEPS_PER_OCTAVE`] to twice the
 /// luminance.
 fn step_over(cd_m2: f32) -> f32 {
     let step = (STEPS_PER_OCTAVE * cd_m2.max(1e-6).log2()).ceil();

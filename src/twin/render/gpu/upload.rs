@@ -1,48 +1,65 @@
 //! What goes to the adapter anew for every view.
 
 use super::adapter::Gpu;
-use super::target::texture;
+use super::texture::Texture;
+use std::mem::size_of;
 
-/// A buffer that grows with what is written to it.
-pub struct Upload {
-    pub(super) buffer: wgpu::Buffer,
-    /// So many items were written last.
-    pub(super) count: u32,
-    usage: wgpu::BufferUsages,
+/// A list, and the buffer on the adapter that it is sent to, which grows with it.
+pub struct Upload<T> {
+    /// As they are made for the view at hand.
+    pub items: Vec<T>,
+    /// As they were sent last.
+    pub buffer: wgpu::Buffer,
 }
 
-impl Upload {
-    /// Of at least one item's size, which may not be 0.
-    pub fn new(gpu: &Gpu, usage: wgpu::BufferUsages, size: usize) -> Self {
+impl<T: bytemuck::Pod> Upload<T> {
+    /// With room for so many items, which may not be 0.
+    pub fn new(gpu: &Gpu, usage: wgpu::BufferUsages, room: usize) -> Self {
         let usage = usage | wgpu::BufferUsages::COPY_DST;
         Self {
-            buffer: allocate(gpu, usage, size as u64),
-            count: 0,
-            usage,
+            items: Vec::new(),
+            buffer: buffer(&gpu.device, (room * size_of::<T>()) as u64, usage),
         }
     }
 
+    /// For a shader to read.
+    pub fn storage(gpu: &Gpu) -> Self {
+        Self::new(gpu, wgpu::BufferUsages::STORAGE, 1)
+    }
+
     /// Takes effect before anything submitted later, and after anything submitted before.
-    pub fn write<T: bytemuck::Pod>(&mut self, gpu: &Gpu, items: &[T]) {
-        self.count = items.len() as u32;
-        let bytes: &[u8] = bytemuck::cast_slice(items);
+    pub fn send(&mut self, gpu: &Gpu) {
+        let bytes: &[u8] = bytemuck::cast_slice(&self.items);
         if bytes.is_empty() {
             return;
         }
-        if (bytes.len() as u64) > self.buffer.size() {
-            self.buffer = allocate(gpu, self.usage, (bytes.len() as u64).next_power_of_two());
+        let size = bytes.len() as u64;
+        if size > self.buffer.size() {
+            self.buffer = buffer(&gpu.device, size.next_power_of_two(), self.buffer.usage());
         }
         gpu.queue.write_buffer(&self.buffer, 0, bytes);
     }
 
-    /// All of it.
+    /// Sends a list.
+    pub fn send_all(&mut self, gpu: &Gpu, items: Vec<T>) {
+        self.items = items;
+        self.send(gpu);
+    }
+
+    /// All of it, once for each.
+    pub fn instances(&self) -> std::ops::Range<u32> {
+        0..self.items.len() as u32
+    }
+
+    /// For a shader to read.
     pub fn binding(&self) -> wgpu::BindingResource<'_> {
         self.buffer.as_entire_binding()
     }
 }
 
-fn allocate(gpu: &Gpu, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
-    gpu.device.create_buffer(&wgpu::BufferDescriptor {
+/// Empty.
+pub fn buffer(device: &wgpu::Device, size: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    device.create_buffer(&wgpu::BufferDescriptor {
         label: None,
         size,
         usage,
@@ -52,55 +69,42 @@ fn allocate(gpu: &Gpu, usage: wgpu::BufferUsages, size: u64) -> wgpu::Buffer {
 
 /// Rows of numbers that grow in number. A texture, since software adapters read it for many pixels at
 /// once, but a buffer one pixel after the other.
-pub struct Table {
-    texture: wgpu::Texture,
-    view: wgpu::TextureView,
+pub struct NumberTable {
+    /// As they are made for the view at hand.
+    pub numbers: Vec<f32>,
+    texture: Texture,
 }
 
-impl Table {
+impl NumberTable {
     /// Of one number.
     pub fn new(gpu: &Gpu) -> Self {
-        Self::sized(gpu, (1, 1))
+        Self {
+            numbers: Vec::new(),
+            texture: number_texture(gpu, (1, 1)),
+        }
     }
 
-    fn sized(gpu: &Gpu, size: (u32, u32)) -> Self {
-        let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let texture = texture(&gpu.device, size, wgpu::TextureFormat::R32Float, usage);
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        Self { texture, view }
-    }
-
-    /// Takes rows of `width` numbers each; when, as with [`Upload::write`].
-    pub fn write(&mut self, gpu: &Gpu, numbers: &[f32], width: u32) {
-        let height = numbers.len() as u32 / width.max(1);
+    /// Sends rows of `width` numbers each; when, as with [`Upload::send`].
+    pub fn send(&mut self, gpu: &Gpu, width: u32) {
+        let height = self.numbers.len() as u32 / width.max(1);
         if height == 0 {
             return;
         }
-        let has = (self.texture.width(), self.texture.height());
-        if has.0 < width || has.1 < height {
-            *self = Self::sized(
-                gpu,
-                (has.0.max(width), has.1.max(height.next_power_of_two())),
-            );
+        let (columns, rows) = self.texture.size();
+        if columns < width || rows < height {
+            let size = (columns.max(width), rows.max(height.next_power_of_two()));
+            self.texture = number_texture(gpu, size);
         }
-        gpu.queue.write_texture(
-            self.texture.as_image_copy(),
-            bytemuck::cast_slice(numbers),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * width),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d {
-                width,
-                height,
-                depth_or_array_layers: 1,
-            },
-        );
+        self.texture.write(gpu, &self.numbers, width);
     }
 
-    /// All of it.
+    /// For a shader to read.
     pub fn binding(&self) -> wgpu::BindingResource<'_> {
-        wgpu::BindingResource::TextureView(&self.view)
+        self.texture.binding()
     }
+}
+
+fn number_texture(gpu: &Gpu, size: (u32, u32)) -> Texture {
+    let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
+    Texture::new(&gpu.device, size, wgpu::TextureFormat::R32Float, usage)
 }

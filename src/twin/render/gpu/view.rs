@@ -62,34 +62,36 @@ impl<'a> Framed<'a> {
         Point3::from(self.middle.translation.vector)
     }
 
-    /// Fills the table of poses and gives the view's constants.
-    pub fn constants(
-        &self,
-        job: &Job,
-        (extinction_per_m, airlight_cd_m2): (f64, f64),
-        poses: &mut Vec<Pose>,
-    ) -> layout::View {
-        let (camera, sensor) = (&self.view.camera, &self.view.sensor);
-        let (lens, shutter) = (&camera.intrinsics, &camera.shutter);
-        let span_s = shutter.frame_span_s(lens.height_px).max(1e-9);
-        let steps = if self.view.motion.poses.len() > 1 {
+    /// Steps of the table of poses, and how long each is.
+    fn pose_steps(&self) -> (f64, f64) {
+        let (camera, motion) = (&self.view.camera, &self.view.motion);
+        let span_s = (camera.shutter.frame_span_s(camera.intrinsics.height_px)).max(1e-9);
+        let steps = if motion.poses.len() > 1 {
             (span_s / POSE_STEP_S).ceil().clamp(1.0, MAX_POSES)
         } else {
             1.0
         };
-        let step_s = span_s / steps;
-        let reference = self.reference().coords;
+        (steps, span_s / steps)
+    }
+
+    /// The table of poses.
+    pub fn poses(&self) -> Vec<Pose> {
+        let (steps, step_s) = self.pose_steps();
+        let (view, reference) = (self.view, self.reference().coords);
+        let pose = |k: u32| view.motion.pose_at(view.start.plus(f64::from(k) * step_s));
+        (0..=steps as u32)
+            .map(|k| relative_pose(&pose(k), &reference))
+            .collect()
+    }
+
+    /// The view's constants, but for those of air and mirrors.
+    pub fn constants(&self, job: &Job) -> layout::ViewConstants {
+        let (camera, sensor) = (&self.view.camera, &self.view.sensor);
+        let (lens, shutter) = (&camera.intrinsics, &camera.shutter);
+        let (steps, step_s) = self.pose_steps();
         let (bent, reach) = (lens.distortion.coefficients(), lens.distortion.reach());
-        poses.clear();
-        poses.extend((0..=steps as u32).map(|k| {
-            let pose = self
-                .view
-                .motion
-                .pose_at(self.view.start.plus(f64::from(k) * step_s));
-            relative_pose(&pose, &reference)
-        }));
         let dark = Dark::new(self.view);
-        let mut constants = layout::View {
+        layout::ViewConstants {
             focal_px: [lens.fx_px as f32, lens.fy_px as f32],
             centre_px: [lens.cx_px as f32, lens.cy_px as f32],
             size_px: [lens.width_px as f32, lens.height_px as f32],
@@ -102,7 +104,6 @@ impl<'a> Framed<'a> {
             black_dn: sensor.black_dn() as f32,
             dn_per_e: sensor.cell_dn_per_e().map(|k| k as f32),
             white_dn: f32::from(sensor.white_dn()),
-            grey_per_dn: 1.0 / f32::from(sensor.dn_per_grey()),
             read_noise_e: sensor.read_noise_e as f32,
             full_well_e: sensor.full_well_e as f32,
             blooming: sensor.blooming as f32,
@@ -114,17 +115,14 @@ impl<'a> Framed<'a> {
             frame: self.view.noise.frame,
             radial: [bent.k1, bent.k2, bent.k3, reach.powi(2)].map(|x| x as f32),
             tangential: [bent.p1, bent.p2].map(|x| x as f32),
-            extinction_per_m: extinction_per_m as f32,
-            airlight_e: (airlight_cd_m2 * self.view.electrons_per_cd_m2()) as f32,
             confusion_px_m: (self.view.pupil_m() * lens.fx_px) as f32,
             focus_per_m: self.view.lens.focus_m.map_or(0.0, |m| 1.0 / m) as f32,
             reach_px: self.defocus_reach_px(),
             halo_px: self.view.lens.halo_px as f32,
             saturation_e: self.view.saturation_e() as f32,
-            ..layout::View::default()
-        };
-        self.place_headlights(&job.headlights, &mut constants);
-        constants
+            headlights: self.headlights(&job.headlights),
+            ..layout::ViewConstants::default()
+        }
     }
 
     fn to(&self, light: &Headlight) -> Vector3<f64> {
@@ -139,16 +137,17 @@ impl<'a> Framed<'a> {
         nearest
     }
 
-    fn place_headlights(&self, headlights: &[Headlight], constants: &mut layout::View) {
-        let nearest = self.nearest(headlights);
-        for (slot, light) in constants.headlights.iter_mut().zip(nearest) {
-            *slot = layout::Headlight {
+    fn headlights(&self, headlights: &[Headlight]) -> [layout::ViewHeadlight; MAX_HEADLIGHTS] {
+        let mut slots = [layout::ViewHeadlight::default(); MAX_HEADLIGHTS];
+        for (slot, light) in slots.iter_mut().zip(self.nearest(headlights)) {
+            *slot = layout::ViewHeadlight {
                 position_m: single(&self.to(light)),
                 intensity_cd: light.intensity_cd as f32,
                 axis: single(&light.axis()),
                 exponent: light.exponent as f32,
             };
         }
+        slots
     }
 
     /// Whether any row may see a ball.

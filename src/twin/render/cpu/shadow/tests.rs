@@ -1,10 +1,10 @@
 #![allow(clippy::unwrap_used, reason = "a test may fail by panicking")]
-use super::lists::shadows;
 use super::*;
 use crate::bus::SimTime;
 use crate::twin::geometry::Shape;
+use crate::twin::lights::Headlight;
 use crate::twin::render::constants::SIGHT_M;
-use crate::twin::render::cpu::CpuRenderer;
+use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::sample;
 use nalgebra::{Isometry3, UnitQuaternion};
 use std::f64::consts::PI;
@@ -40,10 +40,8 @@ fn body(shape: Shape, at: Point3<f64>) -> Body {
 }
 
 fn share_at(source: &ShadowLight<'_>, x_m: f64, bodies: &[Body]) -> f64 {
-    let blockers: Vec<_> = (bodies.iter())
-        .map(|b| Blocker::at(b, ball_m(b), 0.0))
-        .collect();
-    source.hidden_share(&Point3::new(x_m, 0.0, 0.0), &Vector3::z(), blockers.iter())
+    let bodies: Vec<_> = bodies.iter().map(|b| BodyBall::at(b, 0.0)).collect();
+    source.hidden_share(&Point3::new(x_m, 0.0, 0.0), &Vector3::z(), bodies.iter())
 }
 
 /// Share of the disc of radius R that a disc of radius r, d away from it, covers (the lens of two
@@ -66,7 +64,7 @@ fn covered(big: f64, r: f64, d: f64) -> f64 {
 #[test]
 fn a_sphere_hides_the_lens_of_two_circles() {
     let lamp = lamp();
-    let source = ShadowLight::lamp(&lamp);
+    let source = ShadowLight::new(LightSource::lamp(&lamp), None);
     for radius_m in [0.03, 0.06, 0.2] {
         let ball = [body(Shape::Sphere(radius_m), Point3::new(0.0, 0.0, 2.0))];
         let (mut worst, mut bias, mut edges) = (0.0f64, 0.0, 0);
@@ -91,7 +89,7 @@ fn a_sphere_hides_the_lens_of_two_circles() {
 #[test]
 fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
     let lamp = lamp();
-    let source = ShadowLight::lamp(&lamp);
+    let source = ShadowLight::new(LightSource::lamp(&lamp), None);
     // Its edge is at x = 0; everything beyond is covered.
     let board = [body(
         Shape::Box(Vector3::new(3.0, 3.0, 0.01)),
@@ -118,7 +116,7 @@ fn the_penumbra_of_an_edge_is_the_disc_seen_through_it() {
 #[test]
 fn bodies_do_not_shade_their_own_lit_side() {
     let lamp = lamp();
-    let source = ShadowLight::lamp(&lamp);
+    let source = ShadowLight::new(LightSource::lamp(&lamp), None);
     for shape in [
         Shape::Sphere(0.5),
         Shape::Box(Vector3::new(0.4, 0.3, 0.5)),
@@ -126,7 +124,7 @@ fn bodies_do_not_shade_their_own_lit_side() {
         Shape::Cylinder(0.4, 0.5),
     ] {
         let own = [body(shape, Point3::new(0.3, -0.2, 1.0))];
-        let blockers = [Blocker::at(&own[0], ball_m(&own[0]), 0.0)];
+        let bodies = [BodyBall::at(&own[0], 0.0)];
         let mut lit = 0;
         for k in 0..400 {
             let target = Point3::new(
@@ -135,7 +133,7 @@ fn bodies_do_not_shade_their_own_lit_side() {
                 1.0,
             );
             let eye = Point3::new(1.0 - 0.004 * f64::from(k), 0.6, 5.0);
-            let Some((t, normal)) = blockers[0].solid.cast(&eye, &(target - eye)) else {
+            let Some((t, normal)) = bodies[0].solid.cast(&eye, &(target - eye)) else {
                 continue;
             };
             let at = eye + (target - eye) * t;
@@ -143,7 +141,7 @@ fn bodies_do_not_shade_their_own_lit_side() {
             // All of the disc above the surface's horizon.
             if places.into_iter().all(|p| normal.dot(&(p - at)) > 0.01) {
                 lit += 1;
-                let share = source.hidden_share(&at, &normal, blockers.iter());
+                let share = source.hidden_share(&at, &normal, bodies.iter());
                 assert!(share.abs() < 1e-12, "{at}");
             }
         }
@@ -155,15 +153,19 @@ fn bodies_do_not_shade_their_own_lit_side() {
 /// board ahead of it does not.
 #[test]
 fn a_train_throws_no_shadow_by_its_own_light() {
-    let job = sample::wayside_job(&sample::tunnel(), 300.0);
     let moving = |shape, at: Point3<f64>| Body {
         velocity_mps: Vector3::new(0.0, 0.0, -20.0),
         ..body(shape, at)
     };
-    let headlight = headlight();
-    let sources = [ShadowLight::headlight(&headlight)];
-    let thrown =
-        |body: &Body| shadows(&sources, &[(body, ball_m(body))], &job, &job.views[0]).len();
+    let (headlight, scene) = (headlight(), CastScene::new(sample::scene()));
+    let thrown = |body: &Body| {
+        let job = Job {
+            bodies: vec![body.clone()],
+            headlights: vec![headlight.clone()],
+            ..Job::default()
+        };
+        BodyShadows::new(&scene, &job, &[]).at(0.0).falling.len()
+    };
     let car = moving(
         Shape::Box(Vector3::new(1.4, 1.4, 10.0)),
         Point3::new(0.0, 0.5, 15.05),
@@ -176,12 +178,12 @@ fn a_train_throws_no_shadow_by_its_own_light() {
     assert_eq!([&car, &lens, &board].map(thrown), [0, 0, 1]);
 }
 
-/// Fails where the lists of segments forget a shadow, or where a body is taken where it was at the
-/// job's time: the same light taken as by all lamps and all bodies together.
+/// Fails where a shadow is forgotten, or where a body is taken where it was at the job's time: the
+/// same light taken as by all lamps and all bodies together.
 #[test]
-fn segments_know_every_shadow_that_falls_on_them() {
+fn every_shadow_is_found() {
     let tunnel = sample::tunnel();
-    let renderer = CpuRenderer::oracle(sample::scene());
+    let scene = CastScene::new(sample::scene());
     let mut job = sample::wayside_job(&tunnel, 300.0);
     job.time = SimTime::from_secs(0.01);
     for body in &mut job.bodies {
@@ -194,35 +196,34 @@ fn segments_know_every_shadow_that_falls_on_them() {
     let view = &job.views[0];
     let pose = view.motion.poses[0];
     let eye = Point3::from(pose.translation.vector);
-    let caster = &renderer.scene.tunnel;
-    let segment = caster.segment_of(&eye, None);
-    let [quick, oracle] =
-        [true, false].map(|quick| BodyShadows::new(&renderer.scene, &job, view, segment, quick));
-    let (mut shaded, mut lights) = (0, 0);
+    let segment = scene.tunnel.segment_of(&eye, None);
+    let shadows = BodyShadows::new(&scene, &job, &scene.lamps_about(view));
+    let all_lamps = scene.lit.lamps.lamps();
+    let blinking = Blinking::steady(all_lamps);
+    let all_lights: Vec<_> = (all_lamps.iter().map(LightSource::lamp))
+        .chain(job.headlights.iter().map(LightSource::headlight))
+        .map(|source| ShadowLight::new(source, None))
+        .collect();
+    let mut shaded = 0;
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
         let ray = pose * view.camera.intrinsics.ray(u, v);
-        let Some(hit) = caster.cast(segment, &eye, &ray, SIGHT_M) else {
+        let Some(hit) = scene.tunnel.cast(segment, &eye, &ray, SIGHT_M) else {
             continue;
         };
-        let at = caster.surface_at(&eye, &ray, &hit);
+        let at = scene.tunnel.surface_at(&eye, &ray, &hit);
         let after_s = view.camera.shutter.row_mid(view.start, v).since(job.time);
-        let blockers = oracle.blockers(after_s);
-        let hidden_lx = |shadows: &BodyShadows<'_>| {
-            shadows.hidden_lx(
-                hit.segment as usize,
-                (&at.position, &at.normal),
-                &blockers,
-                &Blinking::default(),
-            )
+        let bodies: Vec<_> = (job.bodies.iter())
+            .map(|body| BodyBall::at(body, after_s))
+            .collect();
+        let hidden_lx = |light: &ShadowLight<'_>| {
+            let share = light.hidden_share(&at.position, &at.normal, bodies.iter());
+            share * light.source.irradiance_lx(&at.position, &at.normal)
         };
-        let (listed, all) = (hidden_lx(&quick), hidden_lx(&oracle));
-        assert!((listed - all).abs() < 1e-9, "{u} {v}: {listed} {all}");
+        let all: f64 = all_lights.iter().map(hidden_lx).sum();
+        let found = (shadows.at(after_s)).hidden_lx(&at.position, &at.normal, &blinking);
+        assert!((found - all).abs() < 1e-9, "{u} {v}: {found} {all}");
         shaded += usize::from(all > 0.0);
-        let lists = quick.lists.as_ref().unwrap();
-        lights += lists.falling_on(hit.segment as usize).count();
     }
     assert!(shaded > 50, "{shaded}");
-    // And are spared the rest of 61 lights.
-    assert!(lights / 4000 < 6, "{lights}");
 }

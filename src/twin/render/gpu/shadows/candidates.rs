@@ -2,19 +2,19 @@
 //! the shader reads. Lights have the first numbers of a set, then come casts, then once more the
 //! lights, of those that no body hides in whole.
 
-use super::casts::{self, Around, Bodies, Cast, Light};
-use super::occluder::{Cut, End};
+use super::casts::{self, Bodies, Cast, Region};
+use super::occluder::LinesCut;
 use super::tiles::Eyes;
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::light_source::LightSource;
 use crate::twin::render::scene::Job;
 use nalgebra::Point3;
 use std::ops::Range;
 
 /// What matters in a tile, in the lists: where its hidden lights begin, and its shaded ones, from `shaded`
 /// on; others from `plain` on.
-#[derive(Clone, Copy)]
-pub struct List {
+pub struct TileLists {
     pub shaded: u32,
     pub plain: u32,
     pub end: u32,
@@ -24,7 +24,7 @@ pub struct List {
 
 /// The lights and bodies about a view, and which body may throw a shadow of which light.
 pub struct Candidates<'j> {
-    pub lights: Vec<Light<'j>>,
+    pub lights: Vec<LightSource<'j>>,
     pub bodies: Bodies<'j>,
     pub casts: Vec<Cast>,
     pub of_light: Vec<Range<usize>>,
@@ -35,7 +35,7 @@ pub struct Candidates<'j> {
 
 impl<'j> Candidates<'j> {
     /// Of a view; none where nothing may throw a shadow.
-    pub fn of(framed: &Framed<'_>, job: &'j Job, lamps: &LampField) -> Option<Self> {
+    pub fn of(framed: &Framed<'_>, job: &'j Job, lamps: &'j LampField) -> Option<Self> {
         let bodies = casts::bodies(framed, job);
         let lights = casts::lights(framed, job, lamps);
         let (casts, of_light) = casts::casts(&lights, &bodies);
@@ -53,53 +53,39 @@ impl<'j> Candidates<'j> {
         })
     }
 
-    /// Appends those casts, of all or of the list from `first` on, that may fall on anything in a
-    /// ball.
-    pub fn narrow(&self, casts: &mut Vec<usize>, first: Option<usize>, around: Around<'_>) {
-        let (centre, radius_m, normal) = around;
-        let falls = |k: usize| {
-            let cast = &self.casts[k];
-            let light = &self.lights[cast.light];
-            light.may_light(centre, radius_m, normal) && cast.may_fall_on(light, centre, radius_m)
-        };
-        match first {
-            None => casts.extend((0..self.casts.len()).filter(|k| falls(*k))),
-            Some(first) => {
-                for at in first..casts.len() {
-                    if falls(casts[at]) {
-                        casts.push(casts[at]);
-                    }
-                }
-            }
-        }
+    /// Whether a cast may fall on anything in a region.
+    pub fn may_fall_on(&self, cast: usize, region: Region<'_>) -> bool {
+        let cast = &self.casts[cast];
+        let light = &self.lights[cast.light];
+        let Region {
+            centre,
+            radius_m,
+            normal,
+        } = region;
+        light.may_light(centre, radius_m, normal) && cast.may_fall_on(light, centre, radius_m)
     }
 
     /// Makes the set of some casts, and of the lights on a surface in a ball: those casts that fall on it
     /// in part or in whole, the lights, and those lights that no body hides in whole.
-    pub fn collect(&self, casts: &[usize], around: Around<'_>, set: &mut Vec<u64>) {
-        let (centre, radius_m, normal) = around;
+    pub fn collect(&self, casts: &[usize], region: Region<'_>, set: &mut Vec<u64>) {
         let lights = self.lights.len();
         set.clear();
         set.resize((2 * lights + self.casts.len()).div_ceil(64), 0);
         for (k, light) in self.lights.iter().enumerate() {
-            if light.may_light(centre, radius_m, normal) {
+            if light.may_light(region.centre, region.radius_m, region.normal) {
                 put(set, k);
                 put(set, self.open(k));
             }
         }
-        let ball = End { centre, radius_m };
         for k in casts {
             let cast = &self.casts[*k];
             let light = &self.lights[cast.light];
-            let disc = End {
-                centre: &light.centre,
-                radius_m: light.radius_m,
-            };
-            let cut = self.bodies.solids[cast.body].cut(ball, disc);
-            if cut != Cut::None {
+            let disc = Region::around(&light.centre, light.radius_m);
+            let cut = self.bodies.solids[cast.body].cut(region, disc);
+            if cut != LinesCut::None {
                 put(set, lights + k);
             }
-            if cut == Cut::All {
+            if cut == LinesCut::All {
                 take(set, self.open(cast.light));
             }
         }
@@ -110,19 +96,15 @@ impl<'j> Candidates<'j> {
         self.lights.len() + self.casts.len() + light
     }
 
-    /// Whether a body hides all that is in a ball from the camera.
-    pub fn hides(&self, centre: &Point3<f64>, radius_m: f64) -> bool {
-        let ball = End { centre, radius_m };
-        let eye = End {
-            centre: &self.eye.0,
-            radius_m: self.eye.1,
-        };
-        let mut large = self.bodies.solids.iter().filter(|s| s.radius_m > radius_m);
-        large.any(|solid| solid.cut(ball, eye) == Cut::All)
+    /// Whether a body hides all that is in a region from the camera.
+    pub fn hides(&self, region: Region<'_>) -> bool {
+        let eye = Region::around(&self.eye.0, self.eye.1);
+        let mut large = (self.bodies.solids.iter()).filter(|s| s.radius_m > region.radius_m);
+        large.any(|solid| solid.cut(region, eye) == LinesCut::All)
     }
 
     /// Appends the list of a set.
-    pub fn list(&self, set: &[u64], lists: &mut Vec<u32>) -> List {
+    pub fn list(&self, set: &[u64], lists: &mut Vec<u32>) -> TileLists {
         let lights = self.lights.len();
         let (shaded, mut others) = (lists.len() as u32, false);
         let casts_in = |light: usize| {
@@ -151,7 +133,7 @@ impl<'j> Candidates<'j> {
         let border = lists.len() as u32;
         let is_plain = |light: &usize| !is_hidden(light) && !is_shaded(light);
         lists.extend(lit().filter(is_plain).map(|light| light as u32));
-        List {
+        TileLists {
             shaded,
             plain: border,
             end: lists.len() as u32,

@@ -2,11 +2,11 @@
 
 use super::occluder::Occluder;
 use crate::twin::geometry::{Body, Shape};
-use crate::twin::lights::{HEADLIGHT_RADIUS_M, Headlight};
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;
-use crate::twin::render::photometry::{BlinkingLamp, LAMP_REACH_M};
+use crate::twin::render::light_source::LightSource;
+use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
 use std::ops::Range;
@@ -14,19 +14,25 @@ use std::ops::Range;
 /// Bodies and lamps farther than this from the camera throw no shadow that it sees.
 const FAR_M: f64 = 200.0;
 
-/// A lamp or headlight.
-pub struct Light<'j> {
-    pub centre: Point3<f64>,
-    pub axis: Vector3<f64>,
+/// A ball that holds a piece of a surface, a lamp's disc, or where the eye is.
+#[derive(Clone, Copy)]
+pub struct Region<'a> {
+    pub centre: &'a Point3<f64>,
     pub radius_m: f64,
-    pub intensity_cd: f64,
-    pub exponent: f64,
-    pub reach_m: f64,
-    headlight: Option<&'j Headlight>,
+    /// Of the surface, if it has one.
+    pub normal: Option<&'a Vector3<f64>>,
 }
 
-/// Centre and radius of a ball, and the normal of the surface in it if it has one.
-pub type Around<'a> = (&'a Point3<f64>, f64, Option<&'a Vector3<f64>>);
+impl<'a> Region<'a> {
+    /// Of what faces all ways.
+    pub fn around(centre: &'a Point3<f64>, radius_m: f64) -> Self {
+        Self {
+            centre,
+            radius_m,
+            normal: None,
+        }
+    }
+}
 
 /// A ball around a piece of a body, wherever it is in a frame.
 pub struct Ball {
@@ -37,9 +43,9 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// Itself, round.
-    pub fn around(&self) -> Around<'_> {
-        (&self.centre, self.radius_m, None)
+    /// What is in it.
+    pub fn region(&self) -> Region<'_> {
+        Region::around(&self.centre, self.radius_m)
     }
 }
 
@@ -60,73 +66,40 @@ pub struct Cast {
     cones: Vec<Cone>,
 }
 
-impl<'j> Light<'j> {
-    fn lamp(lamp: &BlinkingLamp) -> Self {
-        Self {
-            centre: lamp.centre,
-            axis: lamp.facing.into_inner(),
-            radius_m: lamp.radius_m,
-            intensity_cd: lamp.duty() * lamp.axial_intensity_cd(),
-            exponent: lamp.exponent,
-            reach_m: LAMP_REACH_M,
-            headlight: None,
-        }
-    }
-
-    fn headlight(light: &'j Headlight) -> Self {
-        Self {
-            centre: light.place(),
-            axis: light.axis(),
-            radius_m: HEADLIGHT_RADIUS_M,
-            intensity_cd: light.intensity_cd,
-            exponent: light.exponent,
-            reach_m: 1e6,
-            headlight: Some(light),
-        }
-    }
-
-    /// Whether it may light anything in a ball, whose surface has a normal or is round.
-    pub fn may_light(
-        &self,
-        centre: &Point3<f64>,
-        radius_m: f64,
-        normal: Option<&Vector3<f64>>,
-    ) -> bool {
-        let to = centre - self.centre;
-        to.norm() - radius_m < self.reach_m
-            && self.axis.dot(&to) + radius_m > 0.0
-            && normal.is_none_or(|n| n.dot(&to) < radius_m)
-    }
-
-    fn cone(&self, ball: &Ball) -> Option<Cone> {
-        let wide_m = ball.radius_m + self.radius_m;
-        self.may_light(&ball.centre, wide_m, None).then(|| {
-            let to = ball.centre - self.centre;
-            let distance = to.norm();
-            let sin = wide_m / distance;
+/// The shadow of a ball under a light, if that shines on it.
+fn cone(light: &LightSource<'_>, ball: &Ball) -> Option<Cone> {
+    let wide_m = ball.radius_m + light.radius_m;
+    light.may_light(&ball.centre, wide_m, None).then(|| {
+        let to = ball.centre - light.centre;
+        let distance = to.norm();
+        let nearest_m = distance - wide_m;
+        if nearest_m <= 0.0 {
             // The shadow of a ball around the light is everywhere.
-            let around = distance <= wide_m;
-            Cone {
-                axis: if around {
-                    Vector3::zeros()
-                } else {
-                    to / distance
-                },
-                sin: if around { 0.0 } else { sin },
-                cos: if around {
-                    -1.0
-                } else {
-                    (1.0 - sin * sin).sqrt()
-                },
-                nearest_m: distance - wide_m,
-            }
-        })
-    }
+            return Cone {
+                axis: Vector3::zeros(),
+                sin: 0.0,
+                cos: -1.0,
+                nearest_m,
+            };
+        }
+        let sin = wide_m / distance;
+        Cone {
+            axis: to / distance,
+            sin,
+            cos: (1.0 - sin * sin).sqrt(),
+            nearest_m,
+        }
+    })
 }
 
 impl Cast {
     /// Whether it may fall on anything in a ball that the light lights.
-    pub fn may_fall_on(&self, light: &Light<'_>, centre: &Point3<f64>, radius_m: f64) -> bool {
+    pub fn may_fall_on(
+        &self,
+        light: &LightSource<'_>,
+        centre: &Point3<f64>,
+        radius_m: f64,
+    ) -> bool {
         let to = centre - light.centre;
         let square = to.norm_squared();
         self.cones.iter().any(|cone| {
@@ -138,7 +111,7 @@ impl Cast {
 }
 
 /// The lights about a camera.
-pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &LampField) -> Vec<Light<'j>> {
+pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &'j LampField) -> Vec<LightSource<'j>> {
     let eye = framed.reference();
     let away_m = |lamp: &BlinkingLamp| (lamp.centre - eye).norm();
     let lamps = field.lamps().iter();
@@ -146,8 +119,8 @@ pub fn lights<'j>(framed: &Framed<'_>, job: &'j Job, field: &LampField) -> Vec<L
     lamps.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
     lamps.truncate(MAX_SOURCES - MAX_HEADLIGHTS);
     let headlights = framed.nearest(&job.headlights);
-    (lamps.into_iter().map(Light::lamp))
-        .chain(headlights.into_iter().map(Light::headlight))
+    (lamps.into_iter().map(LightSource::lamp))
+        .chain(headlights.into_iter().map(LightSource::headlight))
         .collect()
 }
 
@@ -227,16 +200,16 @@ fn pieces(shape: &Shape) -> impl Iterator<Item = (Point3<f64>, f64)> {
 }
 
 /// All shadows, by light and within one light by body, and those of each light.
-pub fn casts(lights: &[Light<'_>], bodies: &Bodies<'_>) -> (Vec<Cast>, Vec<Range<usize>>) {
+pub fn casts(lights: &[LightSource<'_>], bodies: &Bodies<'_>) -> (Vec<Cast>, Vec<Range<usize>>) {
     let mut casts = Vec::new();
     let of_light = lights.iter().enumerate().map(|(k, light)| {
         let first = casts.len();
         for of_body in bodies.balls.chunk_by(|a, b| a.body == b.body) {
             let body = bodies.all[of_body[0].body];
-            if light.headlight.is_some_and(|l| l.is_carried_by(body)) {
+            if light.is_carried_by(body) {
                 continue;
             }
-            let cones: Vec<Cone> = of_body.iter().filter_map(|b| light.cone(b)).collect();
+            let cones: Vec<Cone> = of_body.iter().filter_map(|b| cone(light, b)).collect();
             if !cones.is_empty() {
                 casts.push(Cast {
                     light: k,

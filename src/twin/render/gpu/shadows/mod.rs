@@ -9,58 +9,169 @@
 //! Walls that show the blinking of a lamp are shaded as in its mean light, and what moves in the
 //! exposure throws its shadow from where it is in the middle.
 
-mod buffers;
 mod candidates;
 mod casts;
 mod occluder;
 mod shader_data;
 mod tiles;
 
-pub use buffers::ShadowBuffers;
-
+use super::adapter::Gpu;
 use super::chunks::Chunk;
-use super::detail::{CHUNK_M, ChunkKey};
-use super::layout::{Blocker, MAX_SLABS, MAX_WORDS, Slab, Source, Tile};
+use super::detail::CHUNK_M;
+use super::layout::{
+    Blocker, MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS, ShadowSource, Slab, Tile,
+};
+use super::upload::Upload;
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::geometry::Shape;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
-use candidates::{Candidates, List, has};
+use candidates::{Candidates, TileLists, has};
+use casts::{Ball, Region};
 use shader_data::{blocker, source, tile};
 use std::collections::BTreeMap;
-use tiles::{Cell, Marks, TILE_PX};
+use std::sync::Arc;
+use tiles::{Marks, SurfaceCell, TILE_PX};
 
 /// Cells are no finer than they would be at this distance.
 const NEAREST_M: f64 = 1.0;
 
-/// The shadows in a view, and the buffers to find them in.
-#[derive(Default)]
-pub struct Shadows {
-    tiles: Vec<Tile>,
+/// The shadows in a view.
+pub struct ViewShadows {
+    pub tiles: Upload<Tile>,
     /// So many of them have capsules only; they come first.
-    capsule_tiles: usize,
-    others: Vec<Tile>,
-    lists: Vec<u32>,
-    known: BTreeMap<Vec<u64>, List>,
-    sources: Vec<Source>,
-    blockers: Vec<Blocker>,
-    slabs: Vec<Slab>,
+    pub capsule_tiles: usize,
+    pub lists: Upload<u32>,
+    pub sources: Upload<ShadowSource>,
+    pub blockers: Upload<Blocker>,
+    pub slabs: Upload<Slab>,
+}
+
+/// Finds what tiles show.
+struct Marker<'a> {
+    framed: &'a Framed<'a>,
+    candidates: &'a Candidates<'a>,
     marks: Marks,
-    cells: Vec<Cell>,
+    /// A stack of lists of casts, each narrowed from the one under it.
+    casts: Vec<usize>,
     set: Vec<u64>,
 }
 
-impl Shadows {
-    /// Finds the shadows on the chunks in sight and on the bodies.
-    pub fn fill<'c>(
+impl Marker<'_> {
+    /// Puts the casts that may fall on anything in a region on top of the stack, out of those from
+    /// `first` on.
+    fn narrow(&mut self, first: usize, region: Region<'_>) {
+        for at in first..self.casts.len() {
+            if self.candidates.may_fall_on(self.casts[at], region) {
+                self.casts.push(self.casts[at]);
+            }
+        }
+    }
+
+    /// Begins the stack with all casts.
+    fn take_all(&mut self) -> usize {
+        self.casts.clear();
+        self.casts.extend(0..self.candidates.casts.len());
+        self.casts.len()
+    }
+
+    fn mark_tunnel(&mut self, tunnel: &Tunnel, in_sight: &[Arc<Chunk>]) {
+        for chunk in in_sight {
+            let first = self.take_all();
+            self.narrow(0, Region::around(&chunk.origin, chunk.radius_m));
+            if self.casts.len() > first {
+                for cell in SurfaceCell::of(tunnel, chunk.key.start_m(), CHUNK_M) {
+                    self.mark_cell(&cell, first);
+                }
+            }
+        }
+    }
+
+    /// Marks a cell on which may fall what is in `casts` from `first` on.
+    fn mark_cell(&mut self, cell: &SurfaceCell, first: usize) {
+        let (framed, candidates) = (self.framed, self.candidates);
+        let region = cell.region();
+        if !framed.may_see(&cell.centre, region.radius_m)
+            || cell.turns_away(candidates.eye)
+            || candidates.hides(region)
+        {
+            return;
+        }
+        let end = self.casts.len();
+        self.narrow(first, region);
+        if self.casts.len() > end {
+            let away_m = (cell.centre - framed.reference()).norm().max(NEAREST_M);
+            let f_px = framed.view.camera.intrinsics.fx_px;
+            let size_px = 2.0 * f_px * cell.half_diagonal_m() / away_m;
+            if size_px > f64::from(TILE_PX) {
+                // What is large in the picture is looked at in quarters.
+                for quarter in cell.quarters() {
+                    self.mark_cell(&quarter, end);
+                }
+            } else {
+                candidates.collect(&self.casts[end..], region, &mut self.set);
+                (self.marks).add_cell(framed, &candidates.eyes, cell, &self.set);
+            }
+        }
+        self.casts.truncate(end);
+    }
+
+    fn mark_bodies(&mut self) {
+        let (framed, candidates) = (self.framed, self.candidates);
+        for of_body in candidates.bodies.balls.chunk_by(|a, b| a.body == b.body) {
+            let number = of_body[0].body;
+            let body = candidates.bodies.all[number];
+            // Nothing convex shades itself.
+            let falls = |k: &usize| {
+                let mut regions = of_body.iter().map(Ball::region);
+                candidates.casts[*k].body != number
+                    && regions.any(|region| candidates.may_fall_on(*k, region))
+            };
+            self.casts.clear();
+            (self.casts).extend((0..candidates.casts.len()).filter(falls));
+            if self.casts.is_empty() {
+                continue;
+            }
+            if let Shape::Box(half) = &body.shape {
+                for cell in SurfaceCell::of_box(body, half, candidates.bodies.exposed_s) {
+                    self.mark_cell(&cell, 0);
+                }
+            } else {
+                for ball in of_body {
+                    candidates.collect(&self.casts, ball.region(), &mut self.set);
+                    (self.marks).add_body(framed, &candidates.eyes, body, &self.set);
+                }
+            }
+        }
+    }
+}
+
+impl ViewShadows {
+    /// None.
+    pub fn new(gpu: &Gpu) -> Self {
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        Self {
+            tiles: Upload::storage(gpu),
+            capsule_tiles: 0,
+            lists: Upload::new(gpu, uniform, MAX_WORDS),
+            sources: Upload::new(gpu, uniform, MAX_SOURCES),
+            blockers: Upload::new(gpu, uniform, MAX_BLOCKERS),
+            slabs: Upload::new(gpu, uniform, MAX_SLABS),
+        }
+    }
+
+    /// Finds the shadows on the chunks in sight and on the bodies, and sends them.
+    pub fn fill(
         &mut self,
+        gpu: &Gpu,
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        in_sight: impl Iterator<Item = (ChunkKey, &'c Chunk)>,
+        in_sight: &[Arc<Chunk>],
     ) {
-        self.tiles.clear();
+        self.tiles.items.clear();
+        self.capsule_tiles = 0;
         if job.bodies.is_empty() {
             return;
         }
@@ -69,172 +180,78 @@ impl Shadows {
         };
         let lens = &framed.view.camera.intrinsics;
         let numbers = 2 * candidates.lights.len() + candidates.casts.len();
-        self.marks.reset((lens.width_px, lens.height_px), numbers);
-        self.mark_tunnel(framed, &candidates, &scene.tunnel, in_sight);
-        self.mark_bodies(framed, &candidates);
-        self.list(framed, job, &candidates, scene.tunnel.ambient_lx);
-        if !self.tiles.is_empty() {
-            self.place(framed, &candidates);
-        }
-    }
-
-    fn mark_tunnel<'c>(
-        &mut self,
-        framed: &Framed<'_>,
-        candidates: &Candidates<'_>,
-        tunnel: &Tunnel,
-        in_sight: impl Iterator<Item = (ChunkKey, &'c Chunk)>,
-    ) {
-        let mut casts = Vec::new();
-        for (key, chunk) in in_sight {
-            casts.clear();
-            candidates.narrow(&mut casts, None, (&chunk.origin, chunk.radius_m, None));
-            if casts.is_empty() {
-                continue;
-            }
-            Cell::of(tunnel, key.start_m(), CHUNK_M, &mut self.cells);
-            let cells = std::mem::take(&mut self.cells);
-            for cell in &cells {
-                self.mark_cell(framed, candidates, cell, &mut casts, 0);
-            }
-            self.cells = cells;
-        }
-    }
-
-    /// Marks a cell on which may fall what is in `casts` from `first` on.
-    fn mark_cell(
-        &mut self,
-        framed: &Framed<'_>,
-        candidates: &Candidates<'_>,
-        cell: &Cell,
-        casts: &mut Vec<usize>,
-        first: usize,
-    ) {
-        let radius_m = cell.radius_m();
-        if !framed.may_see(&cell.centre, radius_m)
-            || cell.turns_away(candidates.eye)
-            || candidates.hides(&cell.centre, radius_m)
-        {
-            return;
-        }
-        let ball = (&cell.centre, radius_m, cell.normal.as_ref());
-        let end = casts.len();
-        candidates.narrow(casts, Some(first), ball);
-        if casts.len() > end {
-            let away_m = (cell.centre - framed.reference()).norm().max(NEAREST_M);
-            let size_px =
-                2.0 * framed.view.camera.intrinsics.fx_px * cell.half_diagonal_m() / away_m;
-            if size_px > f64::from(TILE_PX) {
-                // What is large in the picture is looked at in quarters.
-                for quarter in cell.quarters() {
-                    self.mark_cell(framed, candidates, &quarter, casts, end);
-                }
-            } else {
-                candidates.collect(&casts[end..], ball, &mut self.set);
-                self.marks
-                    .add_cell(framed, &candidates.eyes, cell, &self.set);
-            }
-        }
-        casts.truncate(end);
-    }
-
-    fn mark_bodies(&mut self, framed: &Framed<'_>, candidates: &Candidates<'_>) {
-        let mut casts = Vec::new();
-        for of_body in candidates.bodies.balls.chunk_by(|a, b| a.body == b.body) {
-            let number = of_body[0].body;
-            let body = candidates.bodies.all[number];
-            casts.clear();
-            for ball in of_body {
-                candidates.narrow(&mut casts, None, ball.around());
-            }
-            casts.sort_unstable();
-            casts.dedup();
-            // Nothing convex shades itself.
-            casts.retain(|k| candidates.casts[*k].body != number);
-            if casts.is_empty() {
-                continue;
-            }
-            if let Shape::Box(half) = &body.shape {
-                Cell::of_box(body, half, candidates.bodies.exposed_s, &mut self.cells);
-                let cells = std::mem::take(&mut self.cells);
-                for cell in &cells {
-                    self.mark_cell(framed, candidates, cell, &mut casts, 0);
-                }
-                self.cells = cells;
-            } else {
-                for ball in of_body {
-                    candidates.collect(&casts, ball.around(), &mut self.set);
-                    self.marks
-                        .add_body(framed, &candidates.eyes, body, &self.set);
-                }
-            }
-        }
+        let mut marker = Marker {
+            framed,
+            candidates: &candidates,
+            marks: Marks::new((lens.width_px, lens.height_px), numbers),
+            casts: Vec::new(),
+            set: Vec::new(),
+        };
+        marker.mark_tunnel(&scene.tunnel, in_sight);
+        marker.mark_bodies();
+        self.list(&marker, job, scene.tunnel.ambient_lx);
+        self.place(framed, &candidates);
+        self.tiles.send(gpu);
+        self.lists.send(gpu);
+        self.sources.send(gpu);
+        self.blockers.send(gpu);
+        self.slabs.send(gpu);
     }
 
     /// Makes the tiles and their lists. What does not fit the lists is not shaded.
-    fn list(
-        &mut self,
-        framed: &Framed<'_>,
-        job: &Job,
-        candidates: &Candidates<'_>,
-        ambient_lx: f64,
-    ) {
-        self.lists.clear();
-        self.known.clear();
+    fn list(&mut self, marker: &Marker<'_>, job: &Job, ambient_lx: f64) {
+        let candidates = marker.candidates;
+        self.lists.items.clear();
+        let mut known: BTreeMap<&[u64], TileLists> = BTreeMap::new();
+        let mut with_others = Vec::new();
         let lights = candidates.lights.len();
-        for (column, row, set) in self.marks.tiles() {
+        for (column, row, set) in marker.marks.tiles() {
             if !(lights..lights + candidates.casts.len()).any(|k| has(set, k)) {
                 continue;
             }
-            let list = match self.known.get(set) {
-                Some(list) => *list,
-                None => {
-                    let list = candidates.list(set, &mut self.lists);
-                    self.known.insert(set.to_vec(), list);
-                    list
-                }
-            };
+            let make = || candidates.list(set, &mut self.lists.items);
+            let list = known.entry(set).or_insert_with(make);
             if list.end as usize > MAX_WORDS {
                 continue;
             }
             let tiles = if list.others {
-                &mut self.others
+                &mut with_others
             } else {
-                &mut self.tiles
+                &mut self.tiles.items
             };
             tiles.push(Tile {
                 shaded: list.shaded,
                 plain: list.plain,
                 end: list.end,
                 ambient_lx: ambient_lx as f32,
-                ..tile(framed, job, column, row)
+                ..tile(marker.framed, job, column, row)
             });
         }
-        self.lists.truncate(MAX_WORDS);
-        self.capsule_tiles = self.tiles.len();
-        self.tiles.append(&mut self.others);
+        self.lists.items.truncate(MAX_WORDS);
+        self.capsule_tiles = self.tiles.items.len();
+        self.tiles.items.append(&mut with_others);
     }
 
     /// Lights and bodies for the shader.
     fn place(&mut self, framed: &Framed<'_>, candidates: &Candidates<'_>) {
         let reference = framed.reference();
-        self.sources.clear();
-        self.blockers.clear();
-        self.slabs.clear();
-        self.sources.extend(
+        self.sources.items.clear();
+        self.blockers.items.clear();
+        self.slabs.items.clear();
+        self.sources.items.extend(
             candidates
                 .lights
                 .iter()
                 .map(|light| source(light, &reference)),
         );
-        for body in &candidates.bodies.all {
-            let mut made = blocker(body, &reference, &mut self.slabs);
-            if self.slabs.len() > MAX_SLABS {
-                self.slabs.truncate(made.first_slab as usize);
+        for (body, occluder) in candidates.bodies.all.iter().zip(&candidates.bodies.solids) {
+            let mut made = blocker(body, occluder, &reference, &mut self.slabs.items);
+            if self.slabs.items.len() > MAX_SLABS {
+                self.slabs.items.truncate(made.first_slab as usize);
                 // Nothing is inside of it.
                 made = Blocker::default();
             }
-            self.blockers.push(made);
+            self.blockers.items.push(made);
         }
     }
 }

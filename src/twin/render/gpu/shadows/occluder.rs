@@ -1,14 +1,17 @@
 //! What convex bodies hide from a light, or from the eye, exactly where balls would be generous.
 
+use super::casts::Region;
 use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Point3, Vector3};
 
+/// Wider than any scene.
+pub const WIDE_M: f64 = 1e6;
 /// Surfaces lie this near to the cells that stand for them, and rays begin this near.
 const SLACK_M: f64 = 5e-3;
 
 /// Of the lines from a ball to a ball, how many a body cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Cut {
+pub enum LinesCut {
     None,
     Some,
     All,
@@ -17,19 +20,13 @@ pub enum Cut {
 /// A body as what lies between pairs of planes: normal, least and largest distance from the centre.
 pub struct Occluder {
     centre: Point3<f64>,
-    slabs: Vec<(Vector3<f64>, f64, f64)>,
+    /// None of spheres and capsules.
+    pub slabs: Vec<(Vector3<f64>, f64, f64)>,
     /// Whether it is all of what lies there.
     is_whole: bool,
     /// How far it goes either way while the view is exposed.
     travel_m: f64,
     /// Radius of the ball around it.
-    pub radius_m: f64,
-}
-
-/// A ball: what is in a cell, on a lamp's disc, where the eye is.
-#[derive(Clone, Copy)]
-pub struct End<'a> {
-    pub centre: &'a Point3<f64>,
     pub radius_m: f64,
 }
 
@@ -45,7 +42,7 @@ impl Occluder {
                 (axes.into_iter().zip(half.iter()).map(slab).collect(), true)
             }
             Shape::Hull(hull) => {
-                let slab = |normal: Vector3<f64>, offset_m| (rotation * normal, f64::MIN, offset_m);
+                let slab = |normal: Vector3<f64>, offset_m| (rotation * normal, -WIDE_M, offset_m);
                 let faces = hull.faces().iter();
                 (faces.map(|f| slab(f.normal, f.offset_m)).collect(), true)
             }
@@ -64,7 +61,7 @@ impl Occluder {
     /// Cuts of all lines from the one ball into the other that begin outside of it. At the share t of the
     /// way, a line is as far from that between the centres as both radii allow; where all that fits
     /// into the body, all lines pass through it, and where nothing of it does, none.
-    pub fn cut(&self, from: End<'_>, to: End<'_>) -> Cut {
+    pub fn cut(&self, from: Region<'_>, to: Region<'_>) -> LinesCut {
         let a = from.centre - self.centre;
         let way = to.centre - from.centre;
         let wide_m = from.radius_m + self.travel_m + SLACK_M;
@@ -80,11 +77,11 @@ impl Occluder {
             }
         }
         if some[0] > some[1] {
-            Cut::None
+            LinesCut::None
         } else if self.is_whole && begins_outside && all[0] <= all[1] {
-            Cut::All
+            LinesCut::All
         } else {
-            Cut::Some
+            LinesCut::Some
         }
     }
 }
@@ -151,23 +148,14 @@ mod tests {
             let to = Point3::from(2.0 * around(1) - from);
             let from = Point3::from(from);
             let (r0, r1) = (0.4 * stream.uniform(17), 0.4 * stream.uniform(18));
-            let cut = solid.cut(
-                End {
-                    centre: &from,
-                    radius_m: r0,
-                },
-                End {
-                    centre: &to,
-                    radius_m: r1,
-                },
-            );
+            let cut = solid.cut(Region::around(&from, r0), Region::around(&to, r1));
             seen[cut as usize] += 1;
             for k in 0..40 {
                 let line = [from + around(2 + 2 * k) * r0, to + around(3 + 2 * k) * r1];
                 match cut {
-                    Cut::None => assert!(!meets(&body, line[0], line[1]), "trial {trial}"),
-                    Cut::All => assert!(meets(&body, line[0], line[1]), "trial {trial}"),
-                    Cut::Some => {}
+                    LinesCut::None => assert!(!meets(&body, line[0], line[1]), "trial {trial}"),
+                    LinesCut::All => assert!(meets(&body, line[0], line[1]), "trial {trial}"),
+                    LinesCut::Some => {}
                 }
             }
         }

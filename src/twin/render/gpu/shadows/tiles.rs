@@ -1,10 +1,11 @@
 //! Tiles of a picture, and what may matter in each: lights, and shadows of bodies.
 
+use super::casts::Region;
 use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
-use crate::twin::geometry::Body;
+use crate::twin::geometry::{Body, Solid};
 use crate::twin::render::gpu::layout::NEAR_M;
 use crate::twin::render::gpu::view::Framed;
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector3};
 
 /// Side of a tile: over so few pixels a lens's distortion is even.
 pub const TILE_PX: u32 = 32;
@@ -16,7 +17,7 @@ const BORDER_PX: f64 = 2.0;
 const POINTS: i32 = 8;
 
 /// A parallelogram of a surface that may be shaded.
-pub struct Cell {
+pub struct SurfaceCell {
     pub centre: Point3<f64>,
     /// Half of its sides.
     half: [Vector3<f64>; 2],
@@ -30,15 +31,14 @@ pub struct Cell {
 /// A rectangle of the picture.
 #[derive(Clone, Copy)]
 struct TileBounds {
-    low_px: [f64; 2],
-    high_px: [f64; 2],
+    low_px: Point2<f64>,
+    high_px: Point2<f64>,
 }
 
 /// Where the camera is while a view is exposed: `camera_from_world`, and when after the job's time.
 pub struct Eyes([(Isometry3<f64>, f64); 3]);
 
 /// Sets of numbers, one a tile.
-#[derive(Default)]
 pub struct Marks {
     columns: u32,
     rows: u32,
@@ -46,7 +46,7 @@ pub struct Marks {
     sets: Vec<u64>,
 }
 
-impl Cell {
+impl SurfaceCell {
     /// That does not move.
     fn still(centre: Point3<f64>, half: [Vector3<f64>; 2], normal: Option<Vector3<f64>>) -> Self {
         Self {
@@ -58,9 +58,13 @@ impl Cell {
         }
     }
 
-    /// Radius of the ball around it, wherever it goes in the exposure.
-    pub fn radius_m(&self) -> f64 {
-        self.half_diagonal_m() + self.travel_m
+    /// What it is in, wherever it goes in the exposure.
+    pub fn region(&self) -> Region<'_> {
+        Region {
+            centre: &self.centre,
+            radius_m: self.half_diagonal_m() + self.travel_m,
+            normal: self.normal.as_ref(),
+        }
     }
 
     /// Half of its longer diagonal.
@@ -86,8 +90,8 @@ impl Cell {
     }
 
     /// All of a stretch of the tunnel, rails too.
-    pub fn of(tunnel: &Tunnel, from_m: f64, length_m: f64, cells: &mut Vec<Self>) {
-        cells.clear();
+    pub fn of(tunnel: &Tunnel, from_m: f64, length_m: f64) -> Vec<Self> {
+        let mut cells = Vec::new();
         let steps = (length_m / CELL_M).ceil().max(1.0);
         let half_m = 0.5 * length_m / steps;
         for k in 0..steps as u32 {
@@ -96,13 +100,14 @@ impl Cell {
                 continue;
             };
             let frame = tunnel.alignment.at(s_m);
-            Self::of_walls(section, &frame, half_m, cells);
+            Self::of_walls(section, &frame, half_m, &mut cells);
             for l_m in [-RAIL_OFFSET_M, RAIL_OFFSET_M] {
                 let [foot, head] = [-0.2, 0.1].map(|h_m| frame.world_from_section(l_m, h_m));
                 let half = [frame.ahead() * half_m, 0.5 * (head - foot)];
                 cells.push(Self::still(nalgebra::center(&foot, &head), half, None));
             }
         }
+        cells
     }
 
     fn of_walls(section: &CrossSection, frame: &TrackFrame, half_m: f64, cells: &mut Vec<Self>) {
@@ -120,13 +125,8 @@ impl Cell {
     }
 
     /// The six sides of a box.
-    pub fn of_box(
-        body: &Body,
-        half: &Vector3<f64>,
-        [mid_s, half_s]: [f64; 2],
-        cells: &mut Vec<Self>,
-    ) {
-        cells.clear();
+    pub fn of_box(body: &Body, half: &Vector3<f64>, [mid_s, half_s]: [f64; 2]) -> Vec<Self> {
+        let mut cells = Vec::new();
         let rotation = body.world_from_body.rotation;
         let centre =
             Point3::from(body.world_from_body.translation.vector + body.velocity_mps * mid_s);
@@ -151,6 +151,7 @@ impl Cell {
                 }
             }
         }
+        cells
     }
 
     fn point(&self, x: f64, y: f64) -> Point3<f64> {
@@ -169,9 +170,7 @@ impl Eyes {
             (view.motion.pose_at(at).inverse(), at.since(job_time))
         }))
     }
-}
 
-impl Eyes {
     /// How far the camera goes from a place, between these rows as it does at them.
     pub fn travel_m(&self, from: &Point3<f64>) -> f64 {
         let away = |(eye, _): &(Isometry3<f64>, f64)| (eye * from).coords.norm();
@@ -180,61 +179,60 @@ impl Eyes {
 }
 
 impl TileBounds {
-    const NONE: Self = Self {
-        low_px: [f64::INFINITY; 2],
-        high_px: [f64::NEG_INFINITY; 2],
-    };
-    const ALL: Self = Self {
-        low_px: [f64::NEG_INFINITY; 2],
-        high_px: [f64::INFINITY; 2],
-    };
-
-    fn add(&mut self, framed: &Framed<'_>, seen: &Point3<f64>) {
-        if let Some(at) = framed.view.camera.intrinsics.project(seen) {
-            for k in 0..2 {
-                self.low_px[k] = self.low_px[k].min(at[k]);
-                self.high_px[k] = self.high_px[k].max(at[k]);
-            }
+    fn around(low_px: f64, high_px: f64) -> Self {
+        Self {
+            low_px: Point2::from([low_px; 2]),
+            high_px: Point2::from([high_px; 2]),
         }
     }
 
-    fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &Cell) -> Self {
-        let mut bounds = Self::NONE;
+    fn none() -> Self {
+        Self::around(f64::INFINITY, f64::NEG_INFINITY)
+    }
+
+    /// Adds places in the camera's frame, and leaves out those behind it; whether there are none of
+    /// these, or nothing else.
+    fn add(&mut self, framed: &Framed<'_>, places: impl IntoIterator<Item = Point3<f64>>) -> bool {
+        let (mut before, mut behind) = (0, 0);
+        for place in places {
+            if place.z <= NEAR_M {
+                behind += 1;
+                continue;
+            }
+            before += 1;
+            if let Some(at) = framed.view.camera.intrinsics.project(&place) {
+                self.low_px = self.low_px.inf(&at);
+                self.high_px = self.high_px.sup(&at);
+            }
+        }
+        before == 0 || behind == 0
+    }
+
+    fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &SurfaceCell) -> Self {
+        let mut bounds = Self::none();
         let mid_s = eyes.0[1].1;
         for (eye, after_s) in &eyes.0 {
             let moved = cell.velocity_mps * (after_s - mid_s);
-            let corner = |x: f64, y: f64| eye * (cell.point(x, y) + moved);
-            let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
-            let seen = corners.map(|(x, y)| corner(x, y));
-            if seen.iter().all(|p| p.z > NEAR_M) {
-                seen.iter().for_each(|p| bounds.add(framed, p));
-            } else if seen.iter().any(|p| p.z > NEAR_M) {
-                let along = |k: i32| 2.0 * f64::from(k) / f64::from(POINTS) - 1.0;
-                (0..=POINTS)
-                    .flat_map(|i| (0..=POINTS).map(move |j| (i, j)))
-                    .map(|(i, j)| corner(along(i), along(j)))
-                    .filter(|p| p.z > NEAR_M)
-                    .for_each(|p| bounds.add(framed, &p));
+            let grid = |steps: i32| {
+                let along = move |k: i32| 2.0 * f64::from(k) / f64::from(steps) - 1.0;
+                let places = (0..=steps).flat_map(move |i| (0..=steps).map(move |j| (i, j)));
+                places.map(move |(i, j)| eye * (cell.point(along(i), along(j)) + moved))
+            };
+            if !bounds.add(framed, grid(1)) {
+                bounds.add(framed, grid(POINTS));
             }
         }
         bounds
     }
 
     fn of_body(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
-        let half = body.shape.half_extents_m();
-        let corner = |k: usize| {
-            let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
-            let corner = half.component_mul(&Vector3::new(sign(0), sign(1), sign(2)));
-            body.world_from_body * Point3::from(corner)
-        };
-        let mut bounds = Self::NONE;
+        let mut bounds = Self::none();
         for (eye, after_s) in &eyes.0 {
-            let seen: [Point3<f64>; 8] =
-                std::array::from_fn(|k| eye * (corner(k) + body.velocity_mps * *after_s));
-            if seen.iter().all(|p| p.z > NEAR_M) {
-                seen.iter().for_each(|p| bounds.add(framed, p));
-            } else if seen.iter().any(|p| p.z > NEAR_M) {
-                return Self::ALL;
+            let corners = Solid::at(body, *after_s)
+                .corners()
+                .map(|corner| eye * corner);
+            if !bounds.add(framed, corners) {
+                return Self::around(f64::NEG_INFINITY, f64::INFINITY);
             }
         }
         bounds
@@ -243,13 +241,15 @@ impl TileBounds {
 
 impl Marks {
     /// Empty sets of so many numbers for a picture.
-    pub fn reset(&mut self, (width_px, height_px): (u32, u32), numbers: usize) {
-        self.columns = width_px.div_ceil(TILE_PX);
-        self.rows = height_px.div_ceil(TILE_PX);
-        self.words = numbers.div_ceil(64);
-        self.sets.clear();
-        self.sets
-            .resize((self.columns * self.rows) as usize * self.words, 0);
+    pub fn new((width_px, height_px): (u32, u32), numbers: usize) -> Self {
+        let (columns, rows) = (width_px.div_ceil(TILE_PX), height_px.div_ceil(TILE_PX));
+        let words = numbers.div_ceil(64);
+        Self {
+            columns,
+            rows,
+            words,
+            sets: vec![0; (columns * rows) as usize * words],
+        }
     }
 
     /// Column, row and set of each tile.
@@ -260,7 +260,13 @@ impl Marks {
     }
 
     /// Adds numbers to all tiles that show a cell.
-    pub fn add_cell(&mut self, framed: &Framed<'_>, eyes: &Eyes, cell: &Cell, numbers: &[u64]) {
+    pub fn add_cell(
+        &mut self,
+        framed: &Framed<'_>,
+        eyes: &Eyes,
+        cell: &SurfaceCell,
+        numbers: &[u64],
+    ) {
         self.add(&TileBounds::of_cell(framed, eyes, cell), numbers);
     }
 

@@ -1,0 +1,100 @@
+//! The passes of one view as they are recorded.
+
+use super::adapter::Gpu;
+use super::pipeline::Pipelines;
+use super::prepared::PreparedView;
+use super::target::ViewTarget;
+use super::texture::Texture;
+use std::ops::Range;
+
+/// Nothing yet.
+pub const BLACK: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Clear(wgpu::Color::BLACK);
+/// What is there already.
+pub const KEEP: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Load;
+
+/// What the passes of a view share.
+pub struct Recorder<'a> {
+    pub gpu: &'a Gpu,
+    pub pipelines: &'a Pipelines,
+    pub encoder: &'a mut wgpu::CommandEncoder,
+    pub view: &'a PreparedView,
+    pub target: &'a ViewTarget,
+}
+
+impl Recorder<'_> {
+    /// The resources of group 0, in the order of their bindings; the first is the view's constants.
+    pub fn bind(
+        &self,
+        pipeline: &wgpu::RenderPipeline,
+        resources: &[wgpu::BindingResource<'_>],
+    ) -> wgpu::BindGroup {
+        let all = std::iter::once(self.view.constants.binding()).chain(resources.iter().cloned());
+        let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
+        let entries: Vec<_> = (0..).zip(all).map(entry).collect();
+        self.gpu
+            .device
+            .create_bind_group(&wgpu::BindGroupDescriptor {
+                label: None,
+                layout: &pipeline.get_bind_group_layout(0),
+                entries: &entries,
+            })
+    }
+
+    /// A pass that draws rectangles of a pipeline whose vertices need no buffers.
+    pub fn draw_rectangles(
+        &mut self,
+        (onto, load): (&Texture, wgpu::LoadOp<wgpu::Color>),
+        pipeline: &wgpu::RenderPipeline,
+        resources: &[wgpu::BindingResource<'_>],
+        instances: Range<u32>,
+    ) {
+        let group = self.bind(pipeline, resources);
+        let mut pass = begin(self.encoder, onto, load, None);
+        if !instances.is_empty() {
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
+            pass.draw(0..6, instances);
+        }
+    }
+}
+
+/// A pass over one colour target, with depths that are there or are cleared.
+pub fn begin<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    colour: &Texture,
+    load: wgpu::LoadOp<wgpu::Color>,
+    depth: Option<(&Texture, wgpu::LoadOp<f32>)>,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: &colour.view,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load,
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        depth_stencil_attachment: depth.map(|(texture, load)| {
+            wgpu::RenderPassDepthStencilAttachment {
+                view: &texture.view,
+                depth_ops: Some(wgpu::Operations {
+                    load,
+                    store: wgpu::StoreOp::Store,
+                }),
+                stencil_ops: None,
+            }
+        }),
+        ..Default::default()
+    })
+}
+
+/// The same in all channels, for blending.
+pub fn grey(share: f64) -> wgpu::Color {
+    wgpu::Color {
+        r: share,
+        g: share,
+        b: share,
+        a: share,
+    }
+}
