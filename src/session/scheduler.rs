@@ -264,7 +264,6 @@ impl<'s> Session<'s> {
             bodies,
             headlights: self.world.headlights(),
             views,
-            ..Job::default()
         };
         observers.show(&Event::Exposure(&Exposure {
             source,
