@@ -111,7 +111,6 @@ fn rig_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
             luminance_cd_m2: 0.0,
         }],
         views: vec![view],
-        ..Job::default()
     }
 }
 

@@ -43,8 +43,8 @@ impl PlanPiece {
         // (n + 1) w[n + 1] = i (curvature w[n] + rate w[n - 1]), position[n + 1] = w[n] / (n + 1)
         let (sin, cos) = heading0.sin_cos();
         let (mut w, mut before) = (Vector2::new(cos, sin), Vector2::zeros());
-        for n in 1..TERMS {
-            position[n] = w / n as f64;
+        for (n, term) in position.iter_mut().enumerate().skip(1) {
+            *term = w / n as f64;
             let turned = w * curvature.start + before * curvature.rate;
             before = w;
             w = Vector2::new(-turned.y, turned.x) / n as f64;
