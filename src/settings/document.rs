@@ -93,6 +93,11 @@ impl Entry {
             shown: table_key.unwrap_or(value.span()),
         }
     }
+
+    fn is_below(&self, table: &Self) -> bool {
+        let rest = self.path.strip_prefix(&table.path);
+        rest.is_some_and(|rest| rest.starts_with(['.', '[']))
+    }
 }
 
 /// All entries of a table, each before those inside it.
@@ -178,28 +183,29 @@ impl Wrong {
     }
 
     /// The entry that an error with a span is about, if it can be taken out.
+    ///
+    /// Spans are exact, unless an enum was read through a buffer: then they are those of the table
+    /// around, and the outermost such key, or the first value that the message quotes, below it is the
+    /// one.
     fn culprit<'e>(&self, entries: &'e [Entry], span: Option<Range<usize>>) -> Option<&'e Entry> {
         let span = span?;
-        let keys = entries.iter().filter(|entry| entry.key.is_some());
-        let is_inside = |own: &Range<usize>| span.start <= own.start && own.end <= span.end;
-        // Spans are exact, unless an enum was read through a buffer: then they are those of the table
-        // around, and the outermost such key, or the first quoted value, in it is the one.
+        let keys = || entries.iter().filter(|entry| entry.key.is_some());
+        let around = innermost(entries, |entry| entry.value == span);
+        let below = || keys().filter(|entry| around.is_some_and(|around| entry.is_below(around)));
         match self {
             Self::MissingKey { .. } => None,
+            Self::UnknownKey { key, .. } => {
+                let exact = keys().find(|entry| entry.key.as_ref() == Some(&span));
+                let named = below().filter(|entry| last_key(&entry.path) == key);
+                exact.or_else(|| named.min_by_key(|entry| entry.path.len()))
+            }
             Self::Value { message } => {
                 let what = message.split(", expected ").next().unwrap_or_default();
                 let is_quoted = |text: &String| {
                     what.contains(&format!("`{text}`")) || what.contains(&format!("\"{text}\""))
                 };
-                let exact = keys.clone().find(|entry| entry.value == span);
-                let mut inside = keys.filter(|entry| is_inside(&entry.value));
-                exact.or_else(|| inside.find(|entry| entry.text.as_ref().is_some_and(is_quoted)))
-            }
-            Self::UnknownKey { key, .. } => {
-                let exact = keys.clone().find(|entry| entry.key.as_ref() == Some(&span));
-                let inside = keys.filter(|entry| entry.key.as_ref().is_some_and(is_inside));
-                let named = inside.filter(|entry| last_key(&entry.path) == key);
-                exact.or_else(|| named.min_by_key(|entry| entry.path.len()))
+                let exact = keys().find(|entry| entry.value == span);
+                exact.or_else(|| below().find(|entry| entry.text.as_ref().is_some_and(is_quoted)))
             }
         }
     }
