@@ -4,10 +4,14 @@ use crate::bus::TrainEnd;
 use crate::scenario::WaysidePost;
 use crate::scenario::file::{ScenarioFile, WaysidePostSettings};
 use crate::settings::{Checker, name_advice};
+use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
 use std::borrow::Cow;
+
+/// By how much the length of a train may be taken wrong.
+const MOST_LENGTH_ERROR_M: f64 = 1.0;
 
 /// Checks against the line, and the wayside devices at their places.
 pub(in crate::scenario) fn in_tunnel(
@@ -197,23 +201,43 @@ impl LineCheck<'_, '_> {
 
     fn rigs(&mut self) {
         let file = self.file;
-        let others = file.onboard.iter().enumerate().filter_map(|(k, onboard)| {
-            let rig = onboard.rig.as_ref()?;
-            Some((format!("onboard[{k}].rig"), onboard.train.into(), rig))
-        });
-        let first = file.rig.iter().map(|rig| ("rig".to_owned(), 0, rig));
-        for (at, train, rig) in first.chain(others) {
-            let running = file.direction(train);
-            let direction = match rig.end {
-                TrainEnd::Front => running,
-                TrainEnd::Rear => running.reversed(),
-            };
-            self.view(&at, rig, direction);
+        if let Some(rig) = &file.rig {
+            self.view("rig", rig, 0);
+            self.rear_rig("stack.protection", rig, 0, &file.stack.protection);
+        }
+        for (k, onboard) in file.onboard.iter().enumerate() {
+            let train = onboard.train.into();
+            if let Some(rig) = &onboard.rig {
+                self.view(&format!("onboard[{k}].rig"), rig, train);
+                let at = format!("onboard[{k}].protection");
+                self.rear_rig(&at, rig, train, &onboard.protection);
+            }
+        }
+    }
+
+    /// From the rear end, the head is found by the length that the equipment takes the train to have.
+    fn rear_rig(&mut self, at: &str, rig: &RigSettings, train: usize, set: &ProtectionSettings) {
+        let train = self.file.trains().nth(train);
+        let Some(train) = train.filter(|_| rig.end == TrainEnd::Rear) else {
+            return;
+        };
+        let (length_m, set_m) = (train.length_m(), set.train_length_m);
+        if (length_m - set_m).abs() > MOST_LENGTH_ERROR_M {
+            self.check.problem(
+                &format!("{at}.train_length_m"),
+                format!("the rig is at the rear end, and the train is {length_m:.2} m long"),
+                format!("give {length_m:.2}, or a measured length within {MOST_LENGTH_ERROR_M} m"),
+            );
         }
     }
 
     /// A rig must see lamps on the way that its train runs.
-    fn view(&mut self, at: &str, rig: &RigSettings, direction: Direction) {
+    fn view(&mut self, at: &str, rig: &RigSettings, train: usize) {
+        let running = self.file.direction(train);
+        let direction = match rig.end {
+            TrainEnd::Front => running,
+            TrainEnd::Rear => running.reversed(),
+        };
         let tunnel = self.tunnel;
         if tunnel.lamps.is_empty() {
             self.check.problem(

@@ -24,6 +24,7 @@ impl ScenarioFile {
             self.physics().check_together(check);
         }
         check_onboard(self, check);
+        check_reach(self, check);
         for (k, post) in self.wayside.iter().enumerate() {
             if self.wayside[..k].iter().any(|p| p.device == post.device) {
                 check.problem(
@@ -37,6 +38,28 @@ impl ScenarioFile {
         check_carrier(self, check);
         check_motion(self, check);
         check_appearances(self, check);
+    }
+}
+
+/// A device that falls silent must be missed over all of the stretch that it watches.
+fn check_reach(file: &ScenarioFile, check: &mut Checker<'_>) {
+    if file.wayside.is_empty() {
+        return;
+    }
+    let watched_m = file.stack.wayside.reach_m;
+    let others = file.onboard.iter().enumerate();
+    let others = others.map(|(k, o)| (format!("onboard[{k}].protection"), &o.protection));
+    let first = file.train.iter();
+    let first = first.map(|_| ("stack.protection".to_owned(), &file.stack.protection));
+    for (at, protection) in first.chain(others) {
+        let reach_m = protection.device_reach_m;
+        if reach_m < watched_m {
+            check.problem(
+                &format!("{at}.device_reach_m"),
+                format!("devices watch {watched_m} m, a silent one is missed over {reach_m} m"),
+                format!("give at least {watched_m}, as stack.wayside.reach_m has it"),
+            );
+        }
     }
 }
 
@@ -108,11 +131,8 @@ fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
     if file.bench.is_none() {
         return;
     }
-    if file
-        .rig
-        .as_ref()
-        .is_some_and(|rig| rig.end == TrainEnd::Rear)
-    {
+    let mut ends = file.rig.iter().map(|rig| rig.end);
+    if ends.any(|end| end == TrainEnd::Rear) {
         check.problem(
             "rig.end",
             "a bench has no train, and so no rear end",

@@ -147,3 +147,27 @@ fn other_trains_are_other_than_a_first_one() {
     let file: ScenarioFile = read_toml(&text).unwrap();
     assert_eq!(file.train_key(0), "other_trains[0]");
 }
+
+/// Fails where the head would be reckoned from the rear end with a wrong length, a rig on a bench has a
+/// rear end, or a silent device is missed over less than it watches.
+#[test]
+fn equipment_knows_its_train_and_its_devices() {
+    let rear = "[rig]\nend = 'rear'\nside = 'right'\nyaw_deg = 141.0\n";
+    assert_eq!(keys(&format!("[bench]\n{rear}")), ["rig.end"]);
+    let short =
+        "[train]\n[[wayside]]\ndevice = 'W1530'\n[stack.protection]\ndevice_reach_m = 79.0\n";
+    assert_eq!(keys(short), ["stack.protection.device_reach_m"]);
+
+    let text = include_str!("../../../tunnels/chengdu_line1.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let keys = |cars: u32| -> Vec<String> {
+        let text = format!(
+            "name = 'test'\ntunnel = 'given'\n[train]\ncars = {cars}\nstart_chainage_m = 300.0\n{rear}"
+        );
+        let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        problems.into_iter().map(|p| p.key).collect()
+    };
+    assert_eq!(keys(6), [""; 0]);
+    assert_eq!(keys(3), ["stack.protection.train_length_m"]);
+}
