@@ -113,19 +113,31 @@ fn a_train_that_runs_down_positions_itself() {
     assert!(wrong.contains("rig.side"), "{wrong}");
 }
 
-/// A rig in the rear cab looks back and runs backwards; what it gives is the chainage of the head.
+/// A rig in the rear cab looks back and runs backwards; what it gives is the chainage of the head, on a
+/// train that runs up and on one that runs down.
 #[test]
 fn a_rig_in_the_rear_cab_gives_the_head() {
-    let summary = stretch(&[
-        "train.start_chainage_m=400.0",
-        "stack.protection.initial_chainage_m=400.0",
-        "rig.end=\"rear\"",
+    let up = [
+        "train.direction=\"up\"",
         "rig.side=\"right\"",
         "rig.yaw_deg=141.0",
-    ]);
-    let paper = &summary.positioning[&Method::Stereo];
-    assert_eq!(paper.wrong_uid, 0);
-    assert!(paper.fixes > 60, "{}", paper.fixes);
-    let error_m = paper.error_m.unwrap();
-    assert!(error_m.p95 < 0.1, "{}", error_m.p95);
+    ];
+    let down = [
+        "train.direction=\"down\"",
+        "train.stop_at_m=100.0",
+        "rig.yaw_deg=39.0",
+    ];
+    for of_direction in [up, down] {
+        let fixed = [
+            "train.start_chainage_m=500.0",
+            "stack.protection.initial_chainage_m=500.0",
+            "rig.end=\"rear\"",
+        ];
+        let summary = stretch(&[&fixed[..], &of_direction[..]].concat());
+        let paper = &summary.positioning[&Method::Stereo];
+        assert_eq!(paper.wrong_uid, 0, "{of_direction:?}");
+        assert!(paper.fixes > 60, "{}", paper.fixes);
+        let error_m = paper.error_m.unwrap();
+        assert!(error_m.p95 < 0.1, "{of_direction:?}: {}", error_m.p95);
+    }
 }

@@ -15,7 +15,7 @@
 use metrotwin::bus::{Content, Method, SimTime};
 use metrotwin::scenario::Scenario;
 use metrotwin::session::{
-    Distribution, End, Event, Observer, ObserverError, RunOptions, Summary, run,
+    End, ErrorStatistics, Event, Observer, ObserverError, RunOptions, Summary, run,
 };
 use std::path::Path;
 
@@ -38,7 +38,7 @@ fn figures(scenario: &Scenario, observer: &mut dyn Observer) -> Summary {
 fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
     let figures = &summary.positioning[&method];
     assert_eq!(figures.wrong_uid, 0, "{method:?}");
-    let Distribution { mean, p95, .. } = figures.error_m.unwrap();
+    let ErrorStatistics { mean, p95, .. } = figures.error_m.unwrap();
     assert!(mean < mean_m, "{method:?}: mean {mean} m");
     assert!(p95 < p95_m, "{method:?}: p95 {p95} m");
     let nees = figures.nees_mean.unwrap();
@@ -198,7 +198,7 @@ fn val_lamps_out() {
         );
         let mut errors = ErrorByTime::default();
         let summary = figures(&scenario, &mut errors);
-        let error = Distribution::of(&mut errors.errors_m).unwrap();
+        let error = ErrorStatistics::of(&mut errors.errors_m).unwrap();
         let paper = &summary.positioning[&Method::Stereo];
         let availability = paper.availability.unwrap();
         println!(

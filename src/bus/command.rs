@@ -1,4 +1,4 @@
-//! What the stack asks of the train, and shows to the driver.
+//! Commands to the train, and the driver's display.
 
 use super::SimTime;
 use serde::{Deserialize, Serialize};
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BrakeDemand {
-    /// The driver drives.
+    /// None.
     #[default]
     None,
     /// Full service brake, traction cut.
@@ -26,18 +26,55 @@ pub struct TrainCommand {
 }
 
 impl TrainCommand {
-    /// The driver drives as he likes.
+    /// No brake, no speed limit.
     pub const UNSUPERVISED: Self = Self {
         brake: BrakeDemand::None,
         permitted_speed_mps: f64::INFINITY,
     };
 
-    /// What obeys both commands.
+    /// The harder brake and the lower speed. A speed that is no number permits none.
     #[must_use]
-    pub fn and(self, other: Self) -> Self {
+    pub fn stricter(self, other: Self) -> Self {
+        let speeds = [self.permitted_speed_mps, other.permitted_speed_mps];
+        let speeds = speeds.map(|speed| if speed.is_nan() { 0.0 } else { speed });
         Self {
             brake: self.brake.max(other.brake),
-            permitted_speed_mps: self.permitted_speed_mps.min(other.permitted_speed_mps),
+            permitted_speed_mps: speeds[0].min(speeds[1]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The order of commands, and a speed that is no number, must not set a train free.
+    #[test]
+    fn two_commands_give_the_stricter_of_each_part() {
+        let slow = TrainCommand {
+            brake: BrakeDemand::None,
+            permitted_speed_mps: 5.0,
+        };
+        let brake = TrainCommand {
+            brake: BrakeDemand::Service,
+            permitted_speed_mps: 20.0,
+        };
+        let both = TrainCommand {
+            brake: BrakeDemand::Service,
+            permitted_speed_mps: 5.0,
+        };
+        assert_eq!(slow.stricter(brake), both);
+        assert_eq!(brake.stricter(slow), both);
+        assert_eq!(both.stricter(TrainCommand::UNSUPERVISED), both);
+        let wrong = TrainCommand {
+            permitted_speed_mps: f64::NAN,
+            ..slow
+        };
+        for both in [
+            wrong.stricter(slow),
+            TrainCommand::UNSUPERVISED.stricter(wrong),
+        ] {
+            assert!(both.permitted_speed_mps.abs() < 1e-12);
         }
     }
 }

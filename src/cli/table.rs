@@ -50,8 +50,8 @@ mod tests {
     use super::*;
     use crate::bus::{CameraFault, Method, SimTime, TrainId};
     use crate::session::{
-        Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning, Protection,
-        TrainFigures, WallShares, Wayside,
+        Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, Physics, Positioning,
+        ProtectionFigures, TrainFigures, WallShares, Wayside,
     };
     use crate::twin::physics::{Damage, Impact};
     use crate::twin::render::Backend;
@@ -97,7 +97,7 @@ mod tests {
             availability: error_m.map(|_| 0.923),
             uid_decode_rate: error_m,
             wrong_uid: 0,
-            error_m: error_m.map(|e| Distribution {
+            error_m: error_m.map(|e| ErrorStatistics {
                 mean: e,
                 p50: e,
                 p75: 2.0 * e,
@@ -155,7 +155,7 @@ mod tests {
             ]
             .into(),
             dark_lamps: (1..=9).map(|k| format!("1-{k}")).collect(),
-            protection: Some(Protection {
+            protection: Some(ProtectionFigures {
                 brake_commanded_s: Some(20.0),
                 stopped_s: Some(30.006),
                 stop_margin_m: Some(-1.25),

@@ -5,7 +5,7 @@
 //! 3-D view follows.
 
 use super::images::WaysidePaths;
-use super::stream::{SIM_TIME, Stream};
+use super::stream::{RowStream, SIM_TIME};
 use super::whole_files::{Result, failed};
 use super::{Contents, images, path_of, plots, scene, texts};
 use crate::bus::TrainId;
@@ -63,7 +63,7 @@ impl Pane {
 }
 
 /// Sends the layout for what this run has.
-pub(super) fn send(stream: &Stream, contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Result {
+pub(super) fn send(stream: &RowStream, contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Result {
     let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
     let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
         .enabled(true)

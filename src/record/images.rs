@@ -4,7 +4,7 @@
 //! an image moves by half a pixel.
 
 use super::palette::{self, ui};
-use super::stream::Stream;
+use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{path_of, slug};
 use crate::bus::{
@@ -101,7 +101,7 @@ impl Rate {
 
 /// The image part of a recording.
 pub(super) struct Images {
-    stream: Stream,
+    stream: RowStream,
     /// Of both eyes.
     eyes: [String; 2],
     quality: u8,
@@ -115,7 +115,7 @@ pub(super) struct Images {
 impl Images {
     /// Of a train, and of so many wayside devices.
     pub(super) fn new(
-        stream: Stream,
+        stream: RowStream,
         settings: &RecordSettings,
         (id, devices): (TrainId, usize),
     ) -> Self {

@@ -58,7 +58,7 @@ use scene::RecordedScene;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
-use stream::{Stream, Target};
+use stream::{RowStream, Target};
 use texts::Texts;
 use whole_files::Result;
 
@@ -129,7 +129,7 @@ impl Recording {
 
 impl Observer for Recording {
     fn open(&mut self, opening: &Opening<'_>) -> Result {
-        let stream = Stream::open(&self.target, opening.scenario, opening.seed)?;
+        let stream = RowStream::open(&self.target, opening.scenario, opening.seed)?;
         self.open = Some(Open::new(stream, opening, &self.settings)?);
         Ok(())
     }
@@ -206,7 +206,7 @@ struct TrainView {
 
 /// A recording in the making.
 struct Open {
-    stream: Stream,
+    stream: RowStream,
     contents: Vec<Contents>,
     first_camera: Option<Isometry3<f64>>,
     laid_out: bool,
@@ -219,7 +219,7 @@ struct Open {
 }
 
 impl Open {
-    fn new(stream: Stream, opening: &Opening<'_>, settings: &RecordSettings) -> Result<Self> {
+    fn new(stream: RowStream, opening: &Opening<'_>, settings: &RecordSettings) -> Result<Self> {
         let contents = Contents::of(opening);
         let scene = Rc::new(RecordedScene::new(opening.tunnel));
         scene.log(&stream, opening, settings)?;

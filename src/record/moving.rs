@@ -2,7 +2,7 @@
 
 use super::palette::{self, ui};
 use super::scene::{HEAD, RecordedScene, turn};
-use super::stream::Stream;
+use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{images, path_of, slug};
 use crate::bus::{DetectedObstacle, LedReport, Method, RigCalibration, SimTime, TrainId};
@@ -45,7 +45,7 @@ impl Poses {
         self.turns.push(turn(pose));
     }
 
-    fn flush(&mut self, stream: &Stream) -> Result {
+    fn flush(&mut self, stream: &RowStream) -> Result {
         if self.times_ns.is_empty() {
             return Ok(());
         }
@@ -62,7 +62,7 @@ impl Poses {
 
 /// The moving part of the 3-D view.
 pub(super) struct Moving {
-    stream: Stream,
+    stream: RowStream,
     id: TrainId,
     scene: Rc<RecordedScene>,
     /// Both eyes, where there is a rig.
@@ -79,7 +79,7 @@ pub(super) struct Moving {
 impl Moving {
     /// Draws a train, and makes ready for its motion.
     pub(super) fn open(
-        stream: Stream,
+        stream: RowStream,
         scene: Rc<RecordedScene>,
         train: Option<&TrainOpening>,
     ) -> Result<Self> {

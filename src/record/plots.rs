@@ -1,6 +1,6 @@
 //! Series over time: speeds, position errors, vibration, distances.
 
-use super::stream::Stream;
+use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{Contents, palette, path_of, slug};
 use crate::bus::{
@@ -179,7 +179,7 @@ struct Series {
 
 /// The series of a recording.
 pub(super) struct Plots {
-    stream: Stream,
+    stream: RowStream,
     id: TrainId,
     curves: Vec<(String, ValueOf)>,
     series: BTreeMap<String, Series>,
@@ -189,7 +189,7 @@ pub(super) struct Plots {
 
 impl Plots {
     /// Names and colours the series.
-    pub(super) fn open(stream: Stream, contents: &Contents) -> Result<Self> {
+    pub(super) fn open(stream: RowStream, contents: &Contents) -> Result<Self> {
         let id = contents.id;
         for group in panes(contents).iter().flatten() {
             let is_there =
@@ -362,7 +362,7 @@ fn faint(colour: Color) -> Color {
     Color::from_rgb(r / 2, g / 2, b / 2)
 }
 
-fn style(stream: &Stream, path: &str, name: &str, colour: Color, width: f32) -> Result {
+fn style(stream: &RowStream, path: &str, name: &str, colour: Color, width: f32) -> Result {
     let style = SeriesLines::new()
         .with_names([name])
         .with_colors([colour])

@@ -2,7 +2,7 @@
 
 use super::images::{WaysidePaths, pinhole};
 use super::palette::{self, ui};
-use super::stream::Stream;
+use super::stream::RowStream;
 use super::whole_files::Result;
 use crate::scenario::RecordSettings;
 use crate::session::Opening;
@@ -74,7 +74,7 @@ impl RecordedScene {
     /// Logs all that stands still.
     pub(super) fn log(
         &self,
-        stream: &Stream,
+        stream: &RowStream,
         opening: &Opening<'_>,
         settings: &RecordSettings,
     ) -> Result {
@@ -96,7 +96,7 @@ impl RecordedScene {
         Ok(())
     }
 
-    fn log_tunnel(&self, stream: &Stream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
+    fn log_tunnel(&self, stream: &RowStream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
         let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
         let mut mesh = Sweep::default();
         for range in &tunnel.sections {
@@ -117,7 +117,7 @@ impl RecordedScene {
         stream.log_static("world/rails", &rails)
     }
 
-    fn log_lamps_and_balises(&self, stream: &Stream, tunnel: &Tunnel) -> Result {
+    fn log_lamps_and_balises(&self, stream: &RowStream, tunnel: &Tunnel) -> Result {
         let lamps = &tunnel.lamps;
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))

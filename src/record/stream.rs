@@ -41,13 +41,13 @@ const VIEWER_BATCH_S: f64 = 1.0;
 
 /// An open stream; clones of it are the same one.
 #[derive(Clone)]
-pub(super) struct Stream {
+pub(super) struct RowStream {
     rerun: RecordingStream,
     file: Option<PathBuf>,
     application: ApplicationId,
 }
 
-impl Stream {
+impl RowStream {
     /// Opens the stream of one run. A file is written beside its final name until [`Self::finish`].
     pub(super) fn open(target: &Target, scenario: &str, seed: u64) -> Result<Self> {
         // Viewers keep one layout an application, and each scenario has its own.

@@ -1,6 +1,6 @@
 //! The event log and the driver's display.
 
-use super::stream::Stream;
+use super::stream::RowStream;
 use super::whole_files::Result;
 use super::{palette, path_of};
 use crate::bus::{
@@ -18,7 +18,7 @@ pub(super) const DISPLAY: &str = "display";
 
 /// Turns what happens into words; says again only what changed.
 pub(super) struct Texts {
-    stream: Stream,
+    stream: RowStream,
     /// Of each train.
     brake: BTreeMap<TrainId, BrakeDemand>,
     /// Of each wayside device, with the number of its obstacles.
@@ -31,7 +31,7 @@ pub(super) struct Texts {
 
 impl Texts {
     /// Begins the log with what is run.
-    pub(super) fn open(stream: Stream, opening: &Opening<'_>) -> Result<Self> {
+    pub(super) fn open(stream: RowStream, opening: &Opening<'_>) -> Result<Self> {
         let tunnel = opening.tunnel;
         let text = format!(
             "{}, seed {}: {:.0} m of line, {} lamps, {} balises",

@@ -6,7 +6,7 @@ use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
-use crate::stack::positioning::LedSettings;
+use crate::stack::led::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
 use crate::twin::air::AirSettings;
@@ -99,6 +99,15 @@ impl Onboard {
 
     /// Of all trains of a file.
     fn of(file: &ScenarioFile) -> Vec<Self> {
+        // A train that starts at speed has run before, and its equipment with it.
+        let protection = |settings: &ProtectionSettings, k: usize| {
+            let train = file.trains().nth(k);
+            let runs = train.is_some_and(|train| train.start_speed_kmh > 0.0);
+            ProtectionSettings {
+                starts_under_way: settings.starts_under_way.or(Some(runs)),
+                ..settings.clone()
+            }
+        };
         let first = (file.train.is_some() || file.bench.is_some()).then(|| Self {
             train: TrainId::default(),
             direction: file.direction(0),
@@ -107,7 +116,7 @@ impl Onboard {
             odometer: file.odometer,
             doppler: file.doppler,
             led: file.stack.led.clone(),
-            protection: file.stack.protection.clone(),
+            protection: protection(&file.stack.protection, 0),
             equipment: match file.bench {
                 Some(_) => vec![OnboardEquipment::Led],
                 None => file.stack.onboard.clone(),
@@ -121,7 +130,7 @@ impl Onboard {
             odometer: other.odometer,
             doppler: other.doppler,
             led: other.led.clone(),
-            protection: other.protection.clone(),
+            protection: protection(&other.protection, other.train.into()),
             equipment: other.equipment.clone(),
         });
         let mut all: Vec<Self> = first.into_iter().chain(others).collect();

@@ -3,7 +3,7 @@
 use super::RecordSettings;
 use super::sampling::StudySettings;
 use crate::settings::settings;
-use crate::stack::positioning::LedSettings;
+use crate::stack::led::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
 use crate::track::Direction;

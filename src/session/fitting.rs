@@ -163,26 +163,26 @@ fn one_of_onboard(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Opt
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
             let rig = onboard.rig.as_ref()?;
-            let (direction, mount) = match rig.end {
-                TrainEnd::Front => (onboard.direction, CabMount::front()),
+            let (mount, map) = match rig.end {
+                TrainEnd::Front => {
+                    let (route, map) = maps.of(onboard.direction);
+                    (CabMount::front(route), map)
+                }
                 TrainEnd::Rear => {
-                    let length_m = onboard.protection.train_length_m;
-                    (onboard.direction.reversed(), CabMount::rear(length_m))
+                    let (route, map) = maps.of(onboard.direction.reversed());
+                    (
+                        CabMount::rear(route, onboard.protection.train_length_m),
+                        map,
+                    )
                 }
             };
-            let (route, map) = maps.of(direction);
-            let at = (node.clone(), route, mount);
-            Box::new(LampPositioning::new(
-                at,
-                &onboard.led,
-                rig.calibration(),
-                map,
-            ))
+            let (node, sheet) = (node.clone(), rig.calibration());
+            Box::new(LampPositioning::new(node, mount, &onboard.led, sheet, map))
         }
         OnboardEquipment::Protection => {
             let (route, map) = maps.of(onboard.direction);
-            let at = (node.clone(), route);
-            Box::new(TrainProtection::new(at, &onboard.protection, map))
+            let (node, settings) = (node.clone(), &onboard.protection);
+            Box::new(TrainProtection::new(node, route, settings, map))
         }
     };
     Some(Fitted {

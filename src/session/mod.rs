@@ -41,8 +41,8 @@ pub use fitting::{Fitted, Fitting, Mounted};
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{
-    CameraFigures, Cost, Distribution, End, FaultSpan, ObstacleScore, Physics, Positioning,
-    Protection, Summary, TrainFigures, TrainSummary, WallShares, Wayside,
+    CameraFigures, Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, Physics, Positioning,
+    ProtectionFigures, Summary, TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

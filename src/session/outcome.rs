@@ -1,6 +1,6 @@
 //! How the train fared: whether it ran, braked for an obstacle, stood, hit something.
 
-use super::summary::Protection;
+use super::summary::ProtectionFigures;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime, TrainId};
 use crate::track::{Alignment, Gauge};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
@@ -55,11 +55,11 @@ impl Outcome {
     }
 
     /// The figures; `None` without a train.
-    pub fn protection(&self, id: TrainId, world: &World) -> Option<Protection> {
+    pub fn protection(&self, id: TrainId, world: &World) -> Option<ProtectionFigures> {
         world.head_m(id)?;
         let impacts = world.impacts().iter().filter(|hit| hit.train == id);
         let impacts: Vec<_> = impacts.cloned().collect();
-        Some(Protection {
+        Some(ProtectionFigures {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.stop_margin_m,

@@ -392,7 +392,7 @@ impl<'s> Session<'s> {
         let of_train = self.commanded.range((id, 0)..=(id, usize::MAX));
         let all = of_train.map(|(_, command)| *command);
         if let Some(current) = self.commands.get_mut(id.index()) {
-            *current = all.fold(TrainCommand::UNSUPERVISED, TrainCommand::and);
+            *current = all.fold(TrainCommand::UNSUPERVISED, TrainCommand::stricter);
         }
     }
 

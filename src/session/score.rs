@@ -1,6 +1,6 @@
 //! The stack's words held against the truth.
 
-use super::summary::{Cost, Distribution, ObstacleScore, Positioning, Wayside};
+use super::summary::{Cost, ErrorStatistics, ObstacleScore, Positioning, Wayside};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Identity, Intrinsics, LedReport, Method, PositionFix, SimTime,
     WaysideReport,
@@ -159,7 +159,7 @@ impl PositioningScore {
                     availability: (pairs > 0.0).then(|| count as f64 / pairs),
                     uid_decode_rate,
                     wrong_uid: e.wrong_uid,
-                    error_m: Distribution::of(&mut e.errors_m),
+                    error_m: ErrorStatistics::of(&mut e.errors_m),
                     ms_per_frame,
                     nees_mean: (count > 0).then(|| e.nees_sum / count as f64),
                 };

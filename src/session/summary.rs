@@ -42,7 +42,7 @@ pub struct Summary {
     /// Lamps that the stack says do not shine, by their UIDs, in the order passed.
     pub dark_lamps: Vec<String>,
     /// Train protection.
-    pub protection: Option<Protection>,
+    pub protection: Option<ProtectionFigures>,
     /// How the train ran.
     pub train: Option<TrainFigures>,
     /// Every train, where there are several; the figures over this list are the first one's.
@@ -64,7 +64,7 @@ pub struct TrainSummary {
     /// Lamps that the equipment says do not shine, by their UIDs, in the order passed.
     pub dark_lamps: Vec<String>,
     /// Train protection.
-    pub protection: Option<Protection>,
+    pub protection: Option<ProtectionFigures>,
     /// How it ran.
     pub train: Option<TrainFigures>,
 }
@@ -157,7 +157,7 @@ pub struct Positioning {
     /// Fixes that rest on the wrong lamp.
     pub wrong_uid: u32,
     /// Error of the chainage.
-    pub error_m: Option<Distribution>,
+    pub error_m: Option<ErrorStatistics>,
     /// Cost of the stack a pair of images (all methods together).
     pub ms_per_frame: Option<Cost>,
     /// Mean of (error/sigma)^2: 1 for an honest sigma.
@@ -167,7 +167,7 @@ pub struct Positioning {
 /// Order statistics.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[allow(missing_docs, reason = "the names say it")]
-pub struct Distribution {
+pub struct ErrorStatistics {
     pub mean: f64,
     pub p50: f64,
     pub p75: f64,
@@ -176,7 +176,7 @@ pub struct Distribution {
     pub max: f64,
 }
 
-impl Distribution {
+impl ErrorStatistics {
     /// Of the values given (sorted in passing); `None` of none.
     pub fn of(values: &mut [f64]) -> Option<Self> {
         values.sort_by(f64::total_cmp);
@@ -298,7 +298,7 @@ pub struct TrainFigures {
 
 /// Train protection.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct Protection {
+pub struct ProtectionFigures {
     /// When the train first braked for an obstacle, by the equipment or by a driver who keeps to the
     /// permitted speed.
     pub brake_commanded_s: Option<f64>,
@@ -321,13 +321,13 @@ mod tests {
     #[test]
     fn distribution_matches_numpy() {
         let mut v = vec![5.0, 1.0, 4.0, 2.0];
-        let d = Distribution::of(&mut v).unwrap_or_else(|| unreachable!());
+        let d = ErrorStatistics::of(&mut v).unwrap_or_else(|| unreachable!());
         assert!((d.mean - 3.0).abs() < 1e-15);
         assert!((d.p50 - 3.0).abs() < 1e-15);
         assert!((d.p75 - 4.25).abs() < 1e-15);
         assert!((d.p95 - 4.85).abs() < 1e-12);
         assert!((d.max - 5.0).abs() < 1e-15);
-        assert_eq!(Distribution::of(&mut []), None);
+        assert_eq!(ErrorStatistics::of(&mut []), None);
         assert_eq!(Cost::of(&mut []), None);
     }
 }

@@ -74,7 +74,7 @@ struct Entry {
     /// Where the key is written; an element has none.
     key: Option<Range<usize>>,
     value: Range<usize>,
-    /// The value, where it is a text.
+    /// The value as messages quote it; a table or list has none.
     text: Option<String>,
     /// What to show of it. A table's own span is its header only when it has one, its key is always
     /// there.
@@ -89,7 +89,7 @@ impl Entry {
             path,
             key,
             value: value.span(),
-            text: value.get_ref().as_str().map(str::to_owned),
+            text: quotable(value.get_ref()),
             shown: table_key.unwrap_or(value.span()),
         }
     }
@@ -98,6 +98,16 @@ impl Entry {
         let rest = self.path.strip_prefix(&table.path);
         rest.is_some_and(|rest| rest.starts_with(['.', '[']))
     }
+}
+
+fn quotable(value: &DeValue<'_>) -> Option<String> {
+    Some(match value {
+        DeValue::String(text) => text.to_string(),
+        DeValue::Integer(number) => number.to_string(),
+        DeValue::Float(number) => number.to_string(),
+        DeValue::Boolean(value) => value.to_string(),
+        _ => return None,
+    })
 }
 
 /// All entries of a table, each before those inside it.

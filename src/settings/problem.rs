@@ -94,7 +94,11 @@ impl<'a> Checker<'a> {
         self.problem(
             key,
             format!("{value}{space}{unit} is out of range"),
-            format!("give {low} to {high}{space}{unit}"),
+            match (low.is_finite(), high.is_finite()) {
+                (true, false) => format!("give at least {low}{space}{unit}"),
+                (false, true) => format!("give at most {high}{space}{unit}"),
+                _ => format!("give {low} to {high}{space}{unit}"),
+            },
         );
     }
 

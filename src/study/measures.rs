@@ -3,7 +3,7 @@
 use crate::bus::{Method, TrainId};
 use crate::record::parquet::Kind;
 use crate::session::{
-    Distribution, Event, Observer, ObserverError, ObstacleScore, Summary, Wayside,
+    ErrorStatistics, Event, Observer, ObserverError, ObstacleScore, Summary, Wayside,
 };
 use Kind::{Flag, Int, Real, Reals};
 use Method::{Mono, Stereo};
@@ -98,7 +98,7 @@ fn of<P, T: Into<Value>>(part: Option<&P>, get: impl Fn(&P) -> Option<T>) -> Val
     part.and_then(get).map_or(Value::Null, Into::into)
 }
 
-fn error(s: &Summary, method: Method, get: fn(&Distribution) -> f64) -> Value {
+fn error(s: &Summary, method: Method, get: fn(&ErrorStatistics) -> f64) -> Value {
     of(s.positioning.get(&method), |p| p.error_m.as_ref().map(get))
 }
 

@@ -11,7 +11,7 @@ use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
 use std::borrow::Cow;
 
 /// By how much the length of a train may be taken wrong.
-const MOST_LENGTH_ERROR_M: f64 = 1.0;
+const MOST_LENGTH_ERROR_M: f64 = 0.1;
 
 /// Checks against the line, and the wayside devices at their places.
 pub(in crate::scenario) fn in_tunnel(

@@ -1,5 +1,6 @@
 //! Lamps in an image: the steps in their order.
 
+use super::LedSettings;
 use super::centroid::{Chord, grey_centre};
 use super::code::{ChipVotes, longest_dark_run};
 use super::ellipse::{EllipseFit, fit_ellipse, roundness};
@@ -13,7 +14,6 @@ use super::spill::SpillTable;
 use super::stripes::{StripeReader, StripeReading};
 use super::wiener::Wiener;
 use crate::bus::{CameraModel, Ellipse, Intrinsics, PixelBox, Spot};
-use crate::stack::positioning::LedSettings;
 use crate::track::LampSite;
 use crate::track::uid::LineCode;
 use image::GrayImage;
@@ -284,12 +284,12 @@ fn middle(bounds: &PixelBox) -> Point2<f64> {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::{World, tunnel};
+    use crate::stack::led::testing::{TestWorld, tunnel};
     use nalgebra::Translation3;
 
     /// Drawn lamps: the found centre's column against the projected one, and the stripes' name.
     fn look(
-        world: &World,
+        world: &TestWorld,
         lamp: &LampSite,
         number: u32,
     ) -> (Vec<LampImage>, [f64; 2], Option<crate::track::uid::Uid>) {
@@ -326,7 +326,7 @@ mod tests {
             let map = tunnel(code);
             for k in (3..190).step_by(23) {
                 let lamp = &map.lamps[k];
-                let world = World::new(&map, lamp.chainage_m - 1.1, 0.0);
+                let world = TestWorld::new(&map, lamp.chainage_m - 1.1, 0.0);
                 let (_, _, uid) = look(&world, lamp, k as u32);
                 assert_eq!(uid, Some(lamp.uid), "{code} {k}");
             }
@@ -341,7 +341,7 @@ mod tests {
         for k in 0..24 {
             let lamp = &map.lamps[7 * k + 3];
             let ahead = 9.0 - 8.2 * k as f64 / 23.0;
-            let world = World::new(&map, lamp.chainage_m - ahead, 0.0);
+            let world = TestWorld::new(&map, lamp.chainage_m - ahead, 0.0);
             let (found, [measured, truth], _) = look(&world, lamp, k as u32);
             assert_eq!(found.len(), 1, "{ahead} m");
             assert!(

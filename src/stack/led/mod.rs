@@ -32,11 +32,11 @@
 //! where a dark stripe touches its end; stripes are rotated only if measurably tilted.
 //!
 //! **What it does not do.** It expects one chip time and one code on a line. Through a global shutter
-//! lamps show no stripes: they are found, but cannot be named. Two lamps whose images overlap are one spot to it. Where
-//! the sensor saturates, fitted outlines are too large (centres are not affected); what is taken
-//! off for it is good to 0.06 px (one sigma) behind a sharp lens, and to 0.1 px behind one that blurs by
-//! half a pixel and a lamp that saturates it fourfold, while the glare beside the lamp stays under the
-//! half of its plateau.
+//! lamps show no stripes: they are found, but cannot be named. Two lamps whose images overlap are one
+//! spot to it. Where the sensor saturates, fitted outlines are too large (centres are not affected);
+//! what is taken off for it is good to 0.06 px (one sigma) behind a sharp lens, and to 0.1 px behind
+//! one that blurs by half a pixel and a lamp that saturates it fourfold, while the glare beside the
+//! lamp stays under the half of its plateau.
 
 mod centroid;
 mod code;
@@ -48,6 +48,7 @@ mod outline;
 mod patch;
 mod profile;
 mod search;
+mod settings;
 mod spill;
 mod stripes;
 #[cfg(test)]
@@ -58,4 +59,5 @@ mod wiener;
 pub use code::{ChipVotes, decode_cyclic};
 pub use ellipse::fit_ellipse;
 pub use finder::{LampFinder, LampImage};
+pub use settings::LedSettings;
 pub use stripes::StripeReading;

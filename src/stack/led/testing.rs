@@ -99,7 +99,7 @@ struct Eye {
 
 /// The world seen from a train on the straight line.
 #[derive(Clone, Debug)]
-pub struct World {
+pub struct TestWorld {
     /// What is seen.
     pub lamps: Vec<LampSite>,
     /// The rig as it is built.
@@ -122,7 +122,7 @@ pub struct World {
     pub halo_share: f64,
 }
 
-impl World {
+impl TestWorld {
     /// At rest at a chainage, or passing it at time 0.
     pub fn new(map: &Tunnel, start_m: f64, speed_mps: f64) -> Self {
         Self {

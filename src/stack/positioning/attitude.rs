@@ -9,9 +9,9 @@
 //! more. Swings slower than the constant are lost with the bias; suspended cars swing at 0.8 Hz
 //! and above. D keeps unit quaternions, so large swings (the paper's -5 to +7.5 deg) are exact.
 
-use super::LedSettings;
 use crate::bus::{ImuSample, SimTime};
 use crate::stack::history::History;
+use crate::stack::led::LedSettings;
 use crate::track::{Alignment, TrackPoint};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 

@@ -3,40 +3,66 @@
 //! Inside, distances are those of the route that the rig's cab looks along; what it says is the
 //! chainage of the train head. A rig in the rear cab runs backwards along the opposite route.
 
-use super::{LedPositioner, LedSettings};
+use super::LedPositioner;
 use crate::bus::{
-    CameraHealth, CameraStatus, Content, EYES, Message, Node, OdometerSample, RigCalibration,
-    SimTime, Ticker, TrainEnd,
+    CameraHealth, CameraStatus, Content, EYES, Message, Node, OdometerSample, PositionFix,
+    RigCalibration, SimTime, StereoPair, Ticker, TrainEnd,
 };
 use crate::stack::Equipment;
+use crate::stack::led::LedSettings;
 use crate::track::{Route, Tunnel};
 use std::sync::Arc;
 
 /// How often a second it is looked whether the rig has fallen silent.
 const WATCH_HZ: f64 = 10.0;
 
+/// One sigma of the way from the rear end to the head along the track, metres: couplers give, and in
+/// curves the cars are chords.
+const LENGTH_SIGMA_M: f64 = 0.05;
+
 /// The cab that the rig is in.
 #[derive(Clone, Copy, Debug)]
 pub struct CabMount {
     end: TrainEnd,
-    /// How far the train head is behind the cab's end, as the cab looks.
+    /// The route that the cab looks along.
+    route: Route,
+    /// How far the train head is behind the cab's end, as the cab looks, with its standard deviation.
     head_behind_m: f64,
+    length_sigma_m: f64,
 }
 
 impl CabMount {
-    /// The leading cab.
-    pub fn front() -> Self {
+    /// The leading cab of a train that runs along a route.
+    pub fn front(route: Route) -> Self {
         Self {
             end: TrainEnd::Front,
+            route,
             head_behind_m: 0.0,
+            length_sigma_m: 0.0,
         }
     }
 
-    /// The rear cab of a train of a length.
-    pub fn rear(train_length_m: f64) -> Self {
+    /// The rear cab of a train of a length that runs against a route.
+    pub fn rear(route: Route, train_length_m: f64) -> Self {
         Self {
             end: TrainEnd::Rear,
+            route,
             head_behind_m: train_length_m,
+            length_sigma_m: LENGTH_SIGMA_M,
+        }
+    }
+
+    /// A fix of the cab, as one of the head.
+    fn of_head(&self, fix: PositionFix, map: &Tunnel) -> PositionFix {
+        let run_m = fix.chainage_m - self.head_behind_m;
+        PositionFix {
+            chainage_m: self.route.chainage_m(run_m),
+            sigma_m: fix.sigma_m.hypot(self.length_sigma_m),
+            position: match self.end {
+                TrainEnd::Front => fix.position,
+                TrainEnd::Rear => map.alignment.at(run_m).origin.into(),
+            },
+            ..fix
         }
     }
 }
@@ -45,30 +71,43 @@ impl CabMount {
 #[derive(Debug)]
 pub struct LampPositioning {
     node: Node,
-    route: Route,
     mount: CabMount,
+    map: Arc<Tunnel>,
     positioner: LedPositioner,
     watch: Ticker,
     reports: Vec<Message>,
 }
 
 impl LampPositioning {
-    /// On a node, with the rig's calibration sheet, and the surveyed map of the route that the cab looks
+    /// On a node, with the rig's calibration sheet, and the surveyed map of the route that its cab looks
     /// along.
     pub fn new(
-        (node, route, mount): (Node, Route, CabMount),
+        node: Node,
+        mount: CabMount,
         settings: &LedSettings,
         rig: RigCalibration,
         map: Arc<Tunnel>,
     ) -> Self {
         Self {
             node,
-            route,
             mount,
-            positioner: LedPositioner::new(settings, rig, map),
+            positioner: LedPositioner::new(settings, rig, map.clone()),
+            map,
             watch: Ticker::new(WATCH_HZ),
             reports: Vec::new(),
         }
+    }
+
+    fn on_pair(&mut self, pair: &StereoPair, received: SimTime) {
+        let mut report = self.positioner.on_pair(pair);
+        let fixes = std::mem::take(&mut report.fixes).into_iter();
+        report.fixes = fixes
+            .map(|fix| self.mount.of_head(fix, &self.map))
+            .collect();
+        self.reports.push(Message {
+            valid_at: report.time,
+            ..Message::own(self.node.clone(), received, Content::Led(report))
+        });
     }
 
     fn silent(&self, now: SimTime) -> impl Iterator<Item = Message> {
@@ -95,18 +134,7 @@ impl Equipment for LampPositioning {
                     speed_mps: sign * sample.speed_mps,
                 });
             }
-            Content::Pair(pair) => {
-                let mut report = self.positioner.on_pair(pair);
-                for fix in &mut report.fixes {
-                    fix.chainage_m = self
-                        .route
-                        .chainage_m(fix.chainage_m - self.mount.head_behind_m);
-                }
-                self.reports.push(Message {
-                    valid_at: report.time,
-                    ..Message::own(self.node.clone(), message.received_at, Content::Led(report))
-                });
-            }
+            Content::Pair(pair) => self.on_pair(pair, message.received_at),
             _ => {}
         }
     }

@@ -6,7 +6,8 @@
 //!
 //! ```
 //! use metrotwin::bus::*;
-//! use metrotwin::stack::positioning::{LedPositioner, LedSettings};
+//! use metrotwin::stack::led::LedSettings;
+//! use metrotwin::stack::positioning::LedPositioner;
 //! use metrotwin::track::Tunnel;
 //! use std::sync::Arc;
 //!
@@ -46,7 +47,7 @@
 //!
 //! **Sigma.** Of each fix along the track, from what its pixels scatter by (the fit of the lamp's
 //! outline tells, in each eye) and from the stated uncertainties of calibration, attitude and survey
-//! ([`LedSettings`]). Nothing is scaled to agree with a result.
+//! ([`LedSettings`](crate::stack::led::LedSettings)). Nothing is scaled to agree with a result.
 //!
 //! **What `mono` shares with `paper`.** Its distance comes from the left eye alone, and it chooses
 //! its lamp by its own sigma. But there is one equipment that names lamps: the name, the position
@@ -68,7 +69,6 @@ mod lamp_presence;
 mod naming;
 mod positioner;
 mod reckoning;
-mod settings;
 mod smear;
 mod stereo;
 #[cfg(test)]
@@ -77,4 +77,3 @@ mod tests;
 
 pub use equipment::{CabMount, LampPositioning};
 pub use positioner::LedPositioner;
-pub use settings::LedSettings;

@@ -1,17 +1,16 @@
 //! The `paper` positioning and its baseline `mono`, from samples to fixes.
 
-use super::LedSettings;
 use super::lamp_presence::LampPresence;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::DeadReckoning;
-use super::smear::Smear;
+use super::smear::LampSmear;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
     CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
     Method, OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
 use crate::stack::camera_watch::CameraWatch;
-use crate::stack::led::{ChipVotes, LampFinder, LampImage};
+use crate::stack::led::{ChipVotes, LampFinder, LampImage, LedSettings};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;
 use image::GrayImage;
@@ -264,7 +263,7 @@ impl LedPositioner {
         let reckoning = &self.reckoning;
         let (head_m, speed_mps) = (reckoning.chainage_m(start), reckoning.speed_mps(start));
         let vehicle_from_left = self.rig.vehicle_from_left;
-        let smear = |eye: &CameraModel, vehicle_from_eye: Isometry3<f64>| Smear {
+        let smear = |eye: &CameraModel, vehicle_from_eye: Isometry3<f64>| LampSmear {
             lens: eye.intrinsics,
             vehicle_from_eye,
             lamps: &self.map.lamps,

@@ -1,9 +1,9 @@
 //! Where the train takes itself to be between fixes: the last fix, carried on by the odometer, and
 //! the leading car's attitude there.
 
-use super::LedSettings;
 use super::attitude::CarAttitude;
 use crate::bus::{ImuSample, OdometerSample, SimTime};
+use crate::stack::led::LedSettings;
 use crate::stack::odometry::Odometry;
 use crate::track::{Alignment, Tunnel};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
@@ -105,5 +105,39 @@ impl DeadReckoning {
         };
         let vehicle = self.vehicle(now, chainage_m);
         vehicle.inv_mul(&self.vehicle(then, chainage_m + run_m))
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::stack::led::testing::tunnel;
+
+    /// While the odometer is silent the train does not know where it is; when it counts again, it
+    /// does.
+    #[test]
+    fn a_position_is_lost_with_the_odometer() {
+        let map = Arc::new(tunnel("manchester"));
+        let mut reckoning = DeadReckoning::new(&LedSettings::default(), map);
+        let counted = |reckoning: &mut DeadReckoning, time_s: f64| {
+            reckoning.on_odometer(&OdometerSample {
+                time: SimTime::from_secs(time_s),
+                distance_m: 50.0 + 10.0 * time_s,
+                speed_mps: 10.0,
+            });
+        };
+        let at_m = |reckoning: &DeadReckoning, time_s: f64| {
+            reckoning.chainage_m(SimTime::from_secs(time_s))
+        };
+        counted(&mut reckoning, 0.0);
+        assert_eq!(at_m(&reckoning, 0.5), None);
+        reckoning.on_fix(SimTime::from_secs(0.5), 100.0);
+        assert!((at_m(&reckoning, 0.9).unwrap() - 104.0).abs() < 1e-9);
+        assert_eq!(at_m(&reckoning, 1.1), None);
+        counted(&mut reckoning, 4.0);
+        assert!((at_m(&reckoning, 4.1).unwrap() - 136.0).abs() < 1e-9);
+        reckoning.forget_fix();
+        assert_eq!(at_m(&reckoning, 4.1), None);
     }
 }

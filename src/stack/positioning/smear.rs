@@ -13,7 +13,7 @@ const LAMPS_WITHIN_M: f64 = 60.0;
 /// at depth W. Here the depth is that of the lamp's line along the pixel's own ray, which also
 /// holds off the axis, and the way is that of its image before and after.
 #[derive(Clone, Copy, Debug)]
-pub struct Smear<'a> {
+pub struct LampSmear<'a> {
     /// The eye's lens.
     pub lens: Intrinsics,
     /// Its mount.
@@ -26,7 +26,7 @@ pub struct Smear<'a> {
     pub travel_m: f64,
 }
 
-impl Smear<'_> {
+impl LampSmear<'_> {
     /// Of a lamp at a pixel, along the row.
     pub fn along_row_px(&self, p: &Point2<f64>) -> f64 {
         let ray = self.lens.ray(p.x, p.y);
@@ -89,7 +89,7 @@ mod tests {
                 let pixel = lens.project(&vehicle_from_eye.inverse_transform_point(&seen));
                 pixel.unwrap_or_else(Point2::origin)
             };
-            let smear = |head_m| Smear {
+            let smear = |head_m| LampSmear {
                 lens,
                 vehicle_from_eye,
                 lamps: &lamps,

@@ -1,11 +1,12 @@
 //! The whole chain on drawn images: raw pixels in, fixes out, held against the truth.
 
-use super::{LedPositioner, LedSettings};
+use super::LedPositioner;
 use crate::bus::{
     CameraFault, CameraModel, Distortion, Identity, ImuSample, Intrinsics, LedReport, Method,
     OdometerSample, RigCalibration, SimTime, StereoPair,
 };
-use crate::stack::led::testing::{SplitMix64, World, rig, tunnel, wide_rig};
+use crate::stack::led::LedSettings;
+use crate::stack::led::testing::{SplitMix64, TestWorld, rig, tunnel, wide_rig};
 use crate::track::Tunnel;
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
@@ -13,7 +14,12 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 /// Drives a world for some pairs from time `from_s` on, 30 pairs a second, and gives the reports.
-fn drive(world: &World, positioner: &mut LedPositioner, from_s: f64, pairs: u32) -> Vec<LedReport> {
+fn drive(
+    world: &TestWorld,
+    positioner: &mut LedPositioner,
+    from_s: f64,
+    pairs: u32,
+) -> Vec<LedReport> {
     let mut reports = Vec::new();
     for k in 0..pairs {
         let start_s = from_s + f64::from(k) / 30.0;
@@ -30,7 +36,7 @@ fn drive(world: &World, positioner: &mut LedPositioner, from_s: f64, pairs: u32)
     reports
 }
 
-fn errors_m(world: &World, reports: &[LedReport], method: Method) -> Vec<f64> {
+fn errors_m(world: &TestWorld, reports: &[LedReport], method: Method) -> Vec<f64> {
     let fixes = reports
         .iter()
         .flat_map(|r| &r.fixes)
@@ -61,7 +67,7 @@ fn val_static_points_stay_within_the_papers_maximum() {
         (96, 1.5),
         (8, 0.7),
     ] {
-        let world = World::new(&map, map.lamps[k].chainage_m - ahead, 0.0);
+        let world = TestWorld::new(&map, map.lamps[k].chainage_m - ahead, 0.0);
         let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
         let reports = drive(&world, &mut positioner, 0.0, 12);
         let paper = errors_m(&world, &reports, Method::Stereo);
@@ -81,7 +87,7 @@ struct Run {
 /// Runs past four lamps after a start between two, and checks that no name is wrong.
 fn run(settings: &LedSettings, code: &str, kmh: f64, clock_ppm: f64) -> Run {
     let map = Arc::new(tunnel(code));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, kmh / 3.6);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, kmh / 3.6);
     world.clock_ppm = clock_ppm;
     let mut positioner = LedPositioner::new(settings, world.rig, map.clone());
     let pairs = (38.0 / world.speed_mps * 30.0) as u32;
@@ -148,7 +154,7 @@ struct Told {
 /// errors with their sigmas.
 fn run_with(told: Told) -> (Vec<f64>, Vec<f64>) {
     let map = Arc::new(tunnel("manchester"));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 100.0 / 3.6);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 100.0 / 3.6);
     world.rig = told.built;
     world.right_later_s = 1e-3;
     world.right_late_s = told.right_late_s;
@@ -244,7 +250,7 @@ fn val_a_real_rig_is_as_good_as_a_straight_one_where_its_sheet_is_right() {
 #[test]
 fn rows_are_timed_by_the_exposure_that_each_frame_says() {
     let map = Arc::new(tunnel("manchester"));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 1.1, 0.0);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 1.1, 0.0);
     let settings = LedSettings {
         agreeing_reads: 1,
         ..LedSettings::default()
@@ -286,7 +292,7 @@ fn rows_are_timed_by_the_exposure_that_each_frame_says() {
 #[test]
 fn a_global_shutter_names_no_lamp() {
     let map = Arc::new(tunnel("manchester"));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 6.0, 15.0);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 6.0, 15.0);
     for eye in [&mut world.rig.left, &mut world.rig.right] {
         eye.shutter.line_time_s = 0.0;
     }
@@ -301,9 +307,9 @@ fn a_global_shutter_names_no_lamp() {
 
 /// The world of a rig whose calibration, mounting and lamp are off by errors drawn with the stack's
 /// own sigmas, and what the map then says of lamp `k`.
-fn drawn_world(map: &Tunnel, k: usize, noise: &mut SplitMix64) -> (World, Tunnel) {
+fn drawn_world(map: &Tunnel, k: usize, noise: &mut SplitMix64) -> (TestWorld, Tunnel) {
     let stated = LedSettings::default();
-    let mut world = World::new(map, 0.0, 0.0);
+    let mut world = TestWorld::new(map, 0.0, 0.0);
     let mut turn = |sigma_deg: f64| {
         let axis_angle = Vector3::from_fn(|_, _| sigma_deg.to_radians() * noise.normal());
         UnitQuaternion::from_scaled_axis(axis_angle)
@@ -392,7 +398,7 @@ fn deblurring_does_no_harm() {
 fn the_gyro_holds_the_position_of_a_swinging_car() {
     const SWING: f64 = 0.07;
     let map = Arc::new(tunnel("manchester"));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     world.yaw_rad = |t| SWING * (TAU * t).sin();
     let mut with_gyro = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
     let mut without = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
@@ -431,7 +437,7 @@ fn the_gyro_holds_the_position_of_a_swinging_car() {
 #[test]
 fn a_contradicting_name_is_not_used_at_once() {
     let map = Arc::new(tunnel("manchester"));
-    let mut world = World::new(&map, map.lamps[30].chainage_m - 3.0, 15.0);
+    let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 3.0, 15.0);
     let stranger = map.lamps[90].uid;
     world.lamps[31].uid = stranger;
     let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
@@ -458,7 +464,7 @@ fn a_contradicting_name_is_not_used_at_once() {
 
 /// Drives past three lamps with each pair worked on before it is read, every odometer sample given.
 fn drive_with(
-    world: &World,
+    world: &TestWorld,
     map: &Arc<Tunnel>,
     pairs: u32,
     mut work: impl FnMut(u32, StereoPair) -> Option<StereoPair>,
@@ -486,7 +492,7 @@ fn drive_with(
 #[test]
 fn a_frozen_rig_gives_no_fix() {
     let map = Arc::new(tunnel("manchester"));
-    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let mut held = None;
     let reports = drive_with(&world, &map, 50, |k, mut pair| {
         if (20..40).contains(&k) {
@@ -512,7 +518,7 @@ fn a_frozen_rig_gives_no_fix() {
 #[test]
 fn one_eye_goes_on_alone() {
     let map = Arc::new(tunnel("manchester"));
-    let alike = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let alike = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let mut unlike = alike.clone();
     let focal_px = 0.9 * unlike.rig.left.intrinsics.fx_px;
     unlike.rig.right.intrinsics = Intrinsics::centred(1280, 720, focal_px);
@@ -563,7 +569,7 @@ fn one_eye_goes_on_alone() {
 #[test]
 fn lost_pairs_are_counted_and_survived() {
     let map = Arc::new(tunnel("manchester"));
-    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let lost = |k: u32| k % 3 == 1 || (30..42).contains(&k);
     let reports = drive_with(&world, &map, 60, |k, pair| (!lost(k)).then_some(pair));
     let told: u32 = reports.iter().map(|r| r.eyes[0].lost).sum();
@@ -578,7 +584,7 @@ fn lost_pairs_are_counted_and_survived() {
 #[test]
 fn a_late_pair_is_a_fix_of_its_time_or_none() {
     let map = Arc::new(tunnel("manchester"));
-    let world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+    let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     for (late_s, used) in [(1.0, true), (8.0, false)] {
         let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
         let mut given = 0;
@@ -613,7 +619,7 @@ fn a_late_pair_is_a_fix_of_its_time_or_none() {
 fn dark_lamps_are_told_and_skipped() {
     let map = Arc::new(tunnel("manchester"));
     for eye_dies in [false, true] {
-        let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
+        let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
         let out = [map.lamps[32].uid, map.lamps[33].uid];
         world.lamps.retain(|lamp| !out.contains(&lamp.uid));
         let reports = drive_with(&world, &map, 120, |k, mut pair| {
@@ -645,7 +651,7 @@ fn val_lamps_out() {
     let mut whole = None;
     for (share, published_m) in [(0.0, 0.09), (0.055, 0.11), (0.11, 0.15), (0.22, 0.18)] {
         let map = tunnel("manchester");
-        let mut world = World::new(&map, map.lamps[30].chainage_m - 8.0, 60.0 / 3.6);
+        let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 60.0 / 3.6);
         let (mut surveyed, mut noise) = (map.clone(), SplitMix64::new(7));
         for lamp in &mut surveyed.lamps {
             let error_m = 0.015 * noise.normal();

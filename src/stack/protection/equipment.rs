@@ -27,11 +27,7 @@ pub struct TrainProtection {
 
 impl TrainProtection {
     /// On a node, with the surveyed map of the route, as the train runs it.
-    pub fn new(
-        (node, route): (Node, Route),
-        settings: &ProtectionSettings,
-        map: Arc<Tunnel>,
-    ) -> Self {
+    pub fn new(node: Node, route: Route, settings: &ProtectionSettings, map: Arc<Tunnel>) -> Self {
         let initial_chainage_m = settings.initial_chainage_m.map(|s_m| route.run_m(s_m));
         let settings = ProtectionSettings {
             initial_chainage_m,
@@ -188,7 +184,7 @@ mod tests {
             ..ProtectionSettings::default()
         };
         let node = Node::Train(TrainId(0));
-        let mut equipment = TrainProtection::new((node.clone(), route), &settings, map);
+        let mut equipment = TrainProtection::new(node.clone(), route, &settings, map);
         let time = SimTime::from_secs(1.0);
         let odometer = OdometerSample {
             time,

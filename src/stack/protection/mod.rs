@@ -51,9 +51,9 @@
 //!
 //! A high danger ends the authority; a low one only tells the driver. Where the permitted speed
 //! has come down to walking pace, the brake stops and holds the train until the device clears the
-//! warning. Warnings outlive silence of the radio; a "clear" does not: until a device of the map is
-//! heard, and again where it has not been heard for `radio_timeout_s`, its stretch counts as
-//! occupied. With no position the train is restricted to `restricted_kmh`, and any high danger stops
+//! warning. Warnings outlive silence of the radio; a "clear" does not: where a device of the map has
+//! not been heard for `radio_timeout_s`, its stretch counts as occupied; so it does after the
+//! equipment is switched on, until the device is heard. With no position the train is restricted to `restricted_kmh`, and any high danger stops
 //! it; with no odometer it stops at once.
 //!
 //! # What it does not do

@@ -1,37 +1,37 @@
-//! What the devices along the line have said, and whether they are heard.
+//! Warnings of wayside devices and of other trains, and whether the devices are heard.
 //!
-//! The last word of each device counts, in the order of issue: by balise and by radio messages
-//! come late, twice, or not at all. A warning stays in force until its own device clears it;
-//! silence clears nothing. The stretch that a device of the map watches counts as occupied from the
-//! start until the device is heard by radio, and again where it has not been heard for too long.
+//! The warning of each source that was issued last counts: by balise and by radio messages come late,
+//! twice, or not at all. A warning stays in force until its own device clears it;
+//! silence clears nothing. The stretch that a device of the map watches counts as occupied until the
+//! device is heard by radio, and again where it has not been heard for too long.
 
 use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
 use crate::track::Tunnel;
 
-/// Who warns: a device of the map, or another train.
+/// A device of the map, or another train.
 #[derive(Clone, Debug)]
-struct Warner {
+struct WarningSource {
     name: String,
     /// The stretch that a device of the map watches.
     watched_m: Option<(f64, f64)>,
     /// Last heard by radio.
-    heard: Option<SimTime>,
-    /// The last word, and when it was received.
-    said: Option<(ObstacleWarning, SimTime)>,
+    last_heard: Option<SimTime>,
+    /// Its last warning, and when it was received.
+    last_warning: Option<(ObstacleWarning, SimTime)>,
 }
 
-impl Warner {
+impl WarningSource {
     fn new(name: &str, watched_m: Option<(f64, f64)>) -> Self {
         Self {
             name: name.to_owned(),
             watched_m,
-            heard: None,
-            said: None,
+            last_heard: None,
+            last_warning: None,
         }
     }
 
-    /// Nobody vouches for the stretch that it watches. What it had warned of counts as well.
+    /// Marks the stretch that it watches as occupied. An earlier warning of it stays in force.
     fn occupy(&mut self, (from_m, to_m): (f64, f64), now: SimTime) {
         let nothing = || ObstacleWarning {
             device: self.name.clone(),
@@ -43,7 +43,7 @@ impl Warner {
             to_chainage_m: to_m,
             blind: true,
         };
-        let (warning, _) = self.said.get_or_insert_with(|| (nothing(), now));
+        let (warning, _) = self.last_warning.get_or_insert_with(|| (nothing(), now));
         if warning.danger == DangerLevel::None {
             (warning.from_chainage_m, warning.to_chainage_m) = (from_m, to_m);
         }
@@ -55,8 +55,10 @@ impl Warner {
 
 #[derive(Clone, Debug, Default)]
 pub(super) struct Obstacles {
-    warners: Vec<Warner>,
+    sources: Vec<WarningSource>,
     silent_after_s: f64,
+    /// The devices were heard up to the first cycle, which is still to come.
+    heard_before: bool,
 }
 
 impl Obstacles {
@@ -65,28 +67,34 @@ impl Obstacles {
         let reach_m = settings.device_reach_m;
         let devices = map.wayside.iter().map(|site| {
             let watched_m = (site.chainage_m - reach_m, site.chainage_m + reach_m);
-            Warner::new(&site.name, Some(watched_m))
+            WarningSource::new(&site.name, Some(watched_m))
         });
         Self {
-            warners: devices.collect(),
+            sources: devices.collect(),
             silent_after_s: settings.radio_timeout_s,
+            heard_before: settings.starts_under_way == Some(true),
         }
     }
 
     /// A device was heard by radio; what counts is when it spoke.
     pub fn on_heard(&mut self, device: &str, sent: SimTime) {
-        for known in self.warners.iter_mut().filter(|w| w.name == device) {
-            known.heard = known.heard.max(Some(sent));
+        for known in self.sources.iter_mut().filter(|w| w.name == device) {
+            known.last_heard = known.last_heard.max(Some(sent));
         }
     }
 
     /// Time passes: the stretches of devices that are silent count as occupied.
     pub fn lapse(&mut self, now: SimTime) {
+        if std::mem::take(&mut self.heard_before) {
+            for source in &mut self.sources {
+                source.last_heard.get_or_insert(now);
+            }
+        }
         let is_current = |heard: SimTime| now.since(heard) <= self.silent_after_s;
-        for warner in &mut self.warners {
-            let silent = !warner.heard.is_some_and(is_current);
-            if let Some(watched_m) = warner.watched_m.filter(|_| silent) {
-                warner.occupy(watched_m, now);
+        for source in &mut self.sources {
+            let silent = !source.last_heard.is_some_and(is_current);
+            if let Some(watched_m) = source.watched_m.filter(|_| silent) {
+                source.occupy(watched_m, now);
             }
         }
     }
@@ -96,23 +104,24 @@ impl Obstacles {
         if warning.danger != DangerLevel::None && ends.iter().any(|x| !x.is_finite()) {
             return;
         }
-        let known = self.warners.iter().position(|w| w.name == warning.device);
+        let known = self.sources.iter().position(|w| w.name == warning.device);
         let known = known.unwrap_or_else(|| {
-            self.warners.push(Warner::new(&warning.device, None));
-            self.warners.len() - 1
+            self.sources.push(WarningSource::new(&warning.device, None));
+            self.sources.len() - 1
         });
-        let said = &mut self.warners[known].said;
+        let last_warning = &mut self.sources[known].last_warning;
         let order = |w: &ObstacleWarning| (w.issued, w.number);
-        if (said.as_ref()).is_none_or(|(last, _)| order(warning) > order(last)) {
-            *said = Some((warning.clone(), received));
+        if (last_warning.as_ref()).is_none_or(|(last, _)| order(warning) > order(last)) {
+            *last_warning = Some((warning.clone(), received));
         }
     }
 
     /// The nearest obstacle of at least `danger` that the train, head at `head_m`, has not yet
     /// passed, and when its device was last heard.
     pub fn ahead(&self, head_m: f64, danger: DangerLevel) -> Option<(&ObstacleWarning, SimTime)> {
-        let said = self.warners.iter().filter_map(|w| w.said.as_ref());
-        said.filter(|(w, _)| w.danger >= danger && w.to_chainage_m >= head_m)
+        let last_warning = self.sources.iter().filter_map(|w| w.last_warning.as_ref());
+        last_warning
+            .filter(|(w, _)| w.danger >= danger && w.to_chainage_m >= head_m)
             .min_by(|(a, _), (b, _)| a.from_chainage_m.total_cmp(&b.from_chainage_m))
             .map(|(warning, received)| (warning, *received))
     }

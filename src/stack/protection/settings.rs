@@ -60,8 +60,12 @@ settings! {
         /// Without odometer samples for this long, the emergency brake is applied, s.
         odometer_timeout_s: f64 = 1.0, in 0.1..=30.0;
         /// A device that has not been heard by radio for this long is silent, s: a warning of it stays
-        /// in force, and where it had said that the track is clear, its stretch counts as occupied.
+        /// in force, and all of the stretch that it watches counts as occupied.
         radio_timeout_s: f64 = 5.0, in 0.1..=600.0;
+        /// The equipment was at work before the start, and had heard every device of the map by radio
+        /// until then. Otherwise it is switched on at the start, and a device is silent until it is
+        /// heard. Default: at work where the train starts at speed, else switched on.
+        starts_under_way: Option<bool> = None;
         /// How far along the line to either side of it a device of the map watches, m.
         device_reach_m: f64 = 80.0, in 5.0..=500.0;
     }

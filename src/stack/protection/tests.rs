@@ -494,7 +494,8 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
         initial_chainage_m: Some(1000.0),
         ..ProtectionSettings::default()
     };
-    let mut protection = Protection::new(&settings, Arc::new(map));
+    let map = Arc::new(map);
+    let mut protection = Protection::new(&settings, map.clone());
     let end_m = |protection: &mut Protection, time_s: f64| {
         let time = SimTime::from_secs(time_s);
         protection.on_odometer(&OdometerSample {
@@ -510,6 +511,14 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
     };
     let watched = Some(1800.0 - 80.0 - settings.safety_distance_m);
     assert_eq!(end_m(&mut protection, 0.0), watched);
+    let under_way = ProtectionSettings {
+        starts_under_way: Some(true),
+        ..settings.clone()
+    };
+    let mut running = Protection::new(&under_way, map.clone());
+    assert_eq!(end_m(&mut running, 0.0), None);
+    assert_eq!(end_m(&mut running, 5.0), None);
+    assert_eq!(end_m(&mut running, 5.1), watched);
     let at = SimTime::from_secs;
     protection.on_heartbeat(&clear(0, 5.1), at(5.1), at(5.6));
     assert_eq!(end_m(&mut protection, 5.6), None);

@@ -65,5 +65,7 @@ impl FaultSettings {
 
 /// A fault must last for a step at least.
 fn check_times(from_s: f64, to_s: Option<f64>, check: &mut Checker<'_>) {
-    check.within("to_s", to_s, from_s + 1e-3..=f64::INFINITY);
+    if from_s.is_finite() {
+        check.within("to_s", to_s, from_s + 1e-3..=f64::INFINITY);
+    }
 }

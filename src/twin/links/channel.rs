@@ -19,7 +19,9 @@ settings! {
 
 impl Outage {
     fn check_order(&self, check: &mut Checker<'_>) {
-        check.within("to_s", self.to_s, self.from_s..=f64::INFINITY);
+        if self.from_s.is_finite() {
+            check.within("to_s", self.to_s, self.from_s + 1e-3..=f64::INFINITY);
+        }
     }
 }
 

@@ -28,12 +28,12 @@ impl VehicleMotion {
 
 /// A ring of motions at equal steps.
 #[derive(Clone, Debug)]
-pub(super) struct History {
+pub(super) struct MotionHistory {
     ring: VecDeque<VehicleMotion>,
     capacity: usize,
 }
 
-impl History {
+impl MotionHistory {
     pub(super) fn new(steps: usize) -> Self {
         let capacity = steps.max(2);
         Self {
@@ -102,7 +102,7 @@ mod tests {
     /// A wrong Hermite basis or a slip by one step shows at once: a step is 28 mm.
     #[test]
     fn interpolation_error() {
-        let mut history = History::new(300);
+        let mut history = MotionHistory::new(300);
         for k in 0..500 {
             history.push(shaken(k * 1_000_000));
         }
@@ -124,7 +124,7 @@ mod tests {
     /// Nothing is said of times outside the ring, and its ends are exact.
     #[test]
     fn ends_of_the_ring() {
-        let mut history = History::new(10);
+        let mut history = MotionHistory::new(10);
         for k in 0..25 {
             history.push(shaken(k * 1_000_000));
         }

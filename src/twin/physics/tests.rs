@@ -10,7 +10,7 @@
 mod directions;
 mod obstacles;
 
-use super::history::History;
+use super::history::MotionHistory;
 use super::*;
 use crate::bus::{BrakeDemand, TrainEnd};
 use crate::settings::Settings;
@@ -159,7 +159,7 @@ fn pose_history_of_a_shaken_train() {
     };
     let mut world = World::new(straight(), &shaken, 1, 0).unwrap();
     run(&mut world, 2.0, &command(BrakeDemand::None, GO));
-    let mut coarse = History::new(300);
+    let mut coarse = MotionHistory::new(300);
     let mut between = Vec::new();
     for k in 0..500 {
         world.step(&[command(BrakeDemand::None, GO)]).unwrap();

@@ -3,7 +3,7 @@
 use super::consist::Consist;
 use super::directed_track::DirectedTrack;
 use super::driver::{AutomaticDriver, Effort, STANDING_MPS};
-use super::history::{History, VehicleMotion};
+use super::history::{MotionHistory, VehicleMotion};
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
@@ -34,7 +34,7 @@ pub(super) struct Train {
     pub track: Arc<DirectedTrack>,
     pub consist: Consist,
     /// Of its front and rear end.
-    histories: [History; 2],
+    histories: [MotionHistory; 2],
     driver: AutomaticDriver,
     pub effort: Effort,
 }
@@ -58,7 +58,10 @@ impl Train {
         Self {
             consist: Consist::new(world, &track, &settings, head_m, id),
             track,
-            histories: [History::new(history_steps), History::new(history_steps)],
+            histories: [
+                MotionHistory::new(history_steps),
+                MotionHistory::new(history_steps),
+            ],
             driver: AutomaticDriver::new(&settings),
             effort: Effort::default(),
         }
@@ -118,7 +121,7 @@ impl Train {
     }
 
     /// The recent past of the vehicle frame of one end.
-    pub(super) fn history(&self, end: TrainEnd) -> &History {
+    pub(super) fn history(&self, end: TrainEnd) -> &MotionHistory {
         match end {
             TrainEnd::Front => &self.histories[0],
             TrainEnd::Rear => &self.histories[1],

@@ -15,7 +15,7 @@
 //! # let _ = speedometer;
 //! ```
 //!
-//! What it does not do: sensors at the rear of a train; clocks that wander; stamps that jump.
+//! What it does not do: odometer, radar or balise antenna at the rear end; clocks that wander; stamps that jump.
 
 mod auto_exposure;
 mod balise_antenna;
@@ -23,6 +23,7 @@ mod camera;
 mod doppler;
 mod imager;
 mod imu;
+mod lamp_view;
 mod lidar;
 mod odometer;
 mod rig;
@@ -35,9 +36,10 @@ pub use balise_antenna::BaliseAntenna;
 pub use camera::{CameraSettings, ReadOut, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
 pub use imu::{Imu, ImuSettings};
+pub use lamp_view::{ever_sees, visible_interval};
 pub use lidar::{Lidar, LidarSettings};
 pub use odometer::{Odometer, OdometerSettings};
-pub use rig::{MountSide, RigError, RigSettings, RightEye, ever_sees, visible_interval};
+pub use rig::{MountSide, RigError, RigSettings, RightEye};
 pub use sensor::{
     Capture, ClockSettings, FrameHeader, Output, Periodic, Sensor, SensorError, SensorSample,
 };

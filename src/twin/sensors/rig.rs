@@ -1,12 +1,11 @@
-//! The stereo rig at an end of a train, from degrees and millimetres to a calibration, and from where
-//! it sees a lamp.
+//! The stereo rig at an end of a train, from degrees and millimetres to a calibration.
 //!
 //! **Why the rig looks where it does.** A lamp 1.7 m to the left and 1.5 m above the left eye is
 //! to be seen whole, by both eyes, over a full unit of 10 m. Without a pitch, psi =
 //! atan(10/1.7) - 64/2 = 49 deg is the smallest that reaches far enough, but then lamps nearer than
 //! 4.3 m are above the picture. A pitch of 22 deg brings them in from 1.0 m on; it also turns the
 //! far lamps outwards, so that psi has to grow to 51 deg (yaw 39). The visible interval is
-//! then 1.04 m to 11.46 m ahead on straight track, 10.4 m of 10 ([`visible_interval`]); with
+//! then 1.04 m to 11.46 m ahead on straight track, 10.4 m of 10 ([`visible_interval`](super::visible_interval)); with
 //! psi = 49 deg no pitch gives more than 8.4 m.
 //!
 //! **Two eyes.** They share a kind of sensor and its timing. Each has a lens of its own: the right
@@ -26,11 +25,10 @@
 
 use super::camera::{CameraSettings, ReadOut, SIDE_PX, check_half, mounted};
 use super::{ClockSettings, ExposureSettings, WaysideError};
-use crate::bus::{CameraModel, DistortionCoefficients, RigCalibration, TrainEnd};
+use crate::bus::{DistortionCoefficients, RigCalibration, TrainEnd};
 use crate::settings::{Checker, settings};
-use crate::track::{LampSite, Tunnel};
 use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
-use nalgebra::{Isometry3, Point3, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -354,91 +352,12 @@ impl RightEye {
     }
 }
 
-/// Train positions, as metres from the head to the lamp, at which both eyes see the whole disc
-/// from its luminous side: the longest stretch, nearest and farthest end. The vehicle stands on
-/// the track without vibration. `None` where the rig never sees the lamp.
-pub fn visible_interval(
-    rig: &RigCalibration,
-    tunnel: &Tunnel,
-    lamp: &LampSite,
-) -> Option<(f64, f64)> {
-    let rim = rim(lamp);
-    let mut best: Option<(f64, f64)> = None;
-    let mut run: Option<(f64, f64)> = None;
-    for k in REACH_STEPS {
-        let ahead_m = f64::from(k) * REACH_STEP_M;
-        if !sees(rig, tunnel, lamp, &rim, lamp.chainage_m - ahead_m) {
-            run = None;
-            continue;
-        }
-        let now = (run.map_or(ahead_m, |r| r.0), ahead_m);
-        run = Some(now);
-        if best.is_none_or(|b| now.1 - now.0 > b.1 - b.0) {
-            best = Some(now);
-        }
-    }
-    best
-}
-
-/// Whether both eyes ever see the whole disc.
-pub fn ever_sees(rig: &RigCalibration, tunnel: &Tunnel, lamp: &LampSite) -> bool {
-    let rim = rim(lamp);
-    REACH_STEPS
-        .step_by(4)
-        .map(|k| lamp.chainage_m - f64::from(k) * REACH_STEP_M)
-        .any(|head_m| sees(rig, tunnel, lamp, &rim, head_m))
-}
-
-/// A lamp is looked for from 5 m behind the head to 80 m ahead of it.
-const REACH_STEPS: std::ops::Range<i32> = -100..1600;
-const REACH_STEP_M: f64 = 0.05;
-
-/// Cosine of the angle to a lamp's axis from where its disc is too narrow to be seen: 80 degrees.
-const GRAZING: f64 = 0.17;
-
-fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
-    let n = lamp.facing.into_inner();
-    let across = n
-        .cross(&n.map(|x| if x.abs() < 0.6 { 1.0 } else { 0.0 }))
-        .normalize();
-    let along = n.cross(&across);
-    std::array::from_fn(|k| {
-        let (sin, cos) = (k as f64 * std::f64::consts::TAU / 16.0).sin_cos();
-        lamp.centre + 0.5 * lamp.diameter_m * (cos * across + sin * along)
-    })
-}
-
-fn sees(
-    rig: &RigCalibration,
-    tunnel: &Tunnel,
-    lamp: &LampSite,
-    rim: &[Point3<f64>],
-    head_m: f64,
-) -> bool {
-    let world_from_left = tunnel.alignment.at(head_m).world_from_rails() * rig.vehicle_from_left;
-    let left_from_world = world_from_left.inverse();
-    let towards = Point3::from(world_from_left.translation.vector) - lamp.centre;
-    let right_from_left = rig.left_from_right.inverse();
-    let inside = |eye: &CameraModel, p: Point3<f64>| {
-        let lens = &eye.intrinsics;
-        p.z > 0.1 && lens.project(&p).is_some_and(|pixel| lens.contains(&pixel))
-    };
-    towards.dot(&lamp.facing) > GRAZING * towards.norm()
-        && rim.iter().all(|p| {
-            let left = left_from_world * p;
-            inside(&rig.left, left) && inside(&rig.right, right_from_left * left)
-        })
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
     use crate::settings::{Problem, Settings};
-
-    fn bench() -> Tunnel {
-        Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml")).unwrap()
-    }
+    use nalgebra::Point3;
 
     /// A turn to the wrong side, pitch before yaw, mirrored camera axes.
     #[test]
@@ -455,33 +374,6 @@ mod tests {
         // Rows stay level: the right hand axis has no height, and points to the right.
         let right = Vector3::new(yaw.sin(), -yaw.cos(), 0.0);
         assert!((vehicle_from_left * Vector3::x() - right).norm() < 1e-12);
-    }
-
-    /// What the defaults are chosen for: a whole unit of 10 m, and the figures of the header.
-    #[test]
-    fn the_reference_rig_sees_a_whole_unit() {
-        let tunnel = bench();
-        let rig = RigSettings::default();
-        let see = |rig: &RigSettings| {
-            visible_interval(&rig.calibration(), &tunnel, &tunnel.lamps[0]).unwrap()
-        };
-        let (near_m, far_m) = see(&rig);
-        // The eye is 0.5 m behind the head; steps of 5 cm.
-        assert!((near_m - (1.04 - 0.5)).abs() < 0.1, "{near_m}");
-        assert!((far_m - (11.46 - 0.5)).abs() < 0.1, "{far_m}");
-        assert!(far_m - near_m > 10.0);
-        // With the paper's psi = 49 deg no pitch does it.
-        for pitch_deg in [0.0, 10.0, 18.0, 22.0, 26.0, 30.0] {
-            let (near_m, far_m) = see(&RigSettings {
-                yaw_deg: 41.0,
-                pitch_deg,
-                ..rig.clone()
-            });
-            assert!(
-                far_m - near_m < 8.5,
-                "pitch {pitch_deg}: {near_m} to {far_m}"
-            );
-        }
     }
 
     /// The errors belong to the rig as built, not to its calibration sheet.
