@@ -43,10 +43,9 @@ pub enum Identity {
     Decoded,
     /// Read from the stripes of several frames joined.
     Joined,
-    /// Read in earlier frames, and the lamp followed from there to this one, which by itself tells
-    /// no name.
+    /// Read in earlier frames; the lamp was followed to this one, in which it cannot be read.
     Followed,
-    /// Never read: the lamp that the map has where earlier fixes let expect one.
+    /// Never read: the lamp of the map nearest to where the last fix predicts one.
     Predicted,
 }
 

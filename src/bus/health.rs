@@ -17,7 +17,7 @@ pub enum CameraFault {
     /// The image is the one before again, bit for bit, which the noise of a real sensor never
     /// gives.
     Frozen,
-    /// It came so late that nobody knows any more where the train was.
+    /// It came so late that the samples of odometer and inertial unit of its time are no longer kept.
     Late,
 }
 

@@ -15,8 +15,8 @@ use super::{
 };
 use serde::{Deserialize, Serialize};
 
-/// A place with equipment, or with something that stores messages. Everything on one node hears
-/// everything else there at once; between nodes messages travel by links.
+/// A place with equipment, or with something that stores messages. Messages on one node reach all its
+/// equipment at once; between nodes they travel by links.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Node {
@@ -73,11 +73,11 @@ pub struct Message {
     pub received_at: SimTime,
     /// By which way it came.
     pub via: Via,
-    /// What it says.
+    /// Its content.
     pub content: Content,
 }
 
-/// What messages say.
+/// Content of a message.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[allow(
@@ -109,13 +109,13 @@ pub enum Content {
     Position(PositionEstimate),
     /// What was found in a wayside frame.
     Wayside(WaysideReport),
-    /// How a camera does that delivers no frames to tell it by.
+    /// State of a camera that delivers no frames.
     Camera(CameraStatus),
     /// A wayside device warns, or takes a warning back.
     Warning(ObstacleWarning),
     /// A wayside device is alive and says what it sees.
     Heartbeat(ObstacleWarning),
-    /// A train tells where it is.
+    /// Position report of a train.
     Train(TrainReport),
     /// A cycle of a train protection.
     Protection(ProtectionReport),

@@ -2,8 +2,8 @@
 
 use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
-use crate::scenario::Scenario;
 use crate::scenario::sampling::{Template, as_written};
+use crate::scenario::{Onboard, Scenario};
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
@@ -65,17 +65,8 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
             bench.points, bench.step_m, bench.first_m, bench.fixes_per_point
         ));
     }
-    if let Some(rig) = scenario.rig() {
-        let calibration = rig.calibration();
-        let rows = frames(&calibration.left, rig.pairs_per_s);
-        let stripes = stripes(&calibration.left, &scenario.tunnel);
-        let pairs = images(scenario.duration_s, rig.pairs_per_s);
-        lines.extend([
-            format!("rig: {rows}"),
-            format!("rig: {}", view(&calibration, scenario)),
-            format!("rig: {stripes}"),
-            format!("about {pairs:.0} pairs of images"),
-        ]);
+    for onboard in &scenario.onboard {
+        lines.extend(rig(onboard, scenario));
     }
     for post in &scenario.wayside {
         let name = &post.calibration.name;
@@ -97,6 +88,25 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
     indented(&lines)
 }
 
+/// The rig of a train, if it has one.
+fn rig(onboard: &Onboard, scenario: &Scenario) -> Vec<String> {
+    let Some(rig) = &onboard.rig else {
+        return Vec::new();
+    };
+    let name = match onboard.train.index() {
+        0 => "rig".to_owned(),
+        _ => format!("rig of {}", onboard.train),
+    };
+    let calibration = rig.calibration();
+    let pairs = images(scenario.duration_s, rig.pairs_per_s);
+    vec![
+        format!("{name}: {}", frames(&calibration.left, rig.pairs_per_s)),
+        format!("{name}: {}", view(&calibration, onboard, scenario)),
+        format!("{name}: {}", stripes(&calibration.left, &scenario.tunnel)),
+        format!("{name}: about {pairs:.0} pairs of images"),
+    ]
+}
+
 fn images(duration_s: f64, per_s: f64) -> f64 {
     (duration_s * per_s).ceil()
 }
@@ -114,8 +124,8 @@ fn frames(camera: &CameraModel, per_s: f64) -> String {
 }
 
 /// Visible interval of the lamp in the middle, and how it changes along the line.
-fn view(rig: &RigCalibration, scenario: &Scenario) -> String {
-    let tunnel = &scenario.tunnel;
+fn view(rig: &RigCalibration, onboard: &Onboard, scenario: &Scenario) -> String {
+    let tunnel = &*onboard.seen_from_rig(&scenario.tunnel);
     let seen = tunnel
         .lamps
         .iter()
@@ -135,7 +145,7 @@ fn view(rig: &RigCalibration, scenario: &Scenario) -> String {
         n => format!("; {n} lamps never"),
     };
     format!(
-        "a lamp is seen whole by both eyes from {} to {} ahead of the head{unseen}",
+        "a lamp is seen whole by both eyes from {} to {} ahead of its end of the train{unseen}",
         text(&near),
         text(&far),
     )

@@ -17,6 +17,7 @@ use crate::twin::sensors::{
     CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
 };
 use crate::twin::survey::SurveySettings;
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -90,6 +91,18 @@ impl Onboard {
     /// The end at which its rig and its inertial unit are.
     pub fn rig_end(&self) -> TrainEnd {
         self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
+    }
+
+    /// A tunnel as the rig's cab looks along it.
+    pub fn seen_from_rig<'t>(&self, tunnel: &'t Tunnel) -> Cow<'t, Tunnel> {
+        let direction = match self.rig_end() {
+            TrainEnd::Front => self.direction,
+            TrainEnd::Rear => self.direction.reversed(),
+        };
+        match direction {
+            Direction::Up => Cow::Borrowed(tunnel),
+            Direction::Down => Cow::Owned(tunnel.reversed()),
+        }
     }
 
     /// Its speed is supervised.

@@ -7,12 +7,11 @@ use crate::bus::{
 };
 use crate::track::uid::Uid;
 use crate::track::{BED_M, Direction, TrackPoint, Tunnel};
-use crate::twin::physics::TrainState;
 use nalgebra::{Isometry3, Point2, Point3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-/// A lamp counts as passed when it was at least this far ahead of the head as the run began, so
+/// A lamp counts as passed when it was at least this far ahead of the rig's end as the run began, so
 /// that the camera had the chance to see the whole approach.
 const APPROACH_M: f64 = 10.0;
 
@@ -23,16 +22,16 @@ struct Errors {
     wrong_uid: u32,
 }
 
-/// A train's head and which way it runs.
+/// The end of a train that its rig is at, and which way the train runs.
 #[derive(Clone, Copy, Debug)]
-struct TrainPlace {
-    head_m: f64,
+struct RigPlace {
+    chainage_m: f64,
     direction: Direction,
 }
 
-impl TrainPlace {
+impl RigPlace {
     fn ahead_m(&self, chainage_m: f64) -> f64 {
-        self.direction.ahead_m(self.head_m, chainage_m)
+        self.direction.ahead_m(self.chainage_m, chainage_m)
     }
 }
 
@@ -44,8 +43,8 @@ pub struct PositioningScore {
     named: BTreeSet<Uid>,
     pairs: u32,
     costs_ms: Vec<f64>,
-    /// Where the head was first, and how far it has run from there.
-    run: Option<(TrainPlace, f64)>,
+    /// Where the rig was first, and how far it has run from there.
+    run: Option<(RigPlace, f64)>,
 }
 
 impl PositioningScore {
@@ -61,16 +60,14 @@ impl PositioningScore {
         }
     }
 
-    /// The head was here.
-    pub fn head_at(&mut self, train: &TrainState) {
-        let (first, run_m) = self.run.get_or_insert((
-            TrainPlace {
-                head_m: train.chainage_m,
-                direction: train.direction,
-            },
-            0.0,
-        ));
-        *run_m = run_m.max(first.ahead_m(train.chainage_m));
+    /// The end of the train that the rig is at was here.
+    pub fn rig_at(&mut self, chainage_m: f64, direction: Direction) {
+        let place = RigPlace {
+            chainage_m,
+            direction,
+        };
+        let (first, run_m) = self.run.get_or_insert((place, 0.0));
+        *run_m = run_m.max(first.ahead_m(chainage_m));
     }
 
     /// One report, the cost of making it, and the true pose of the left eye at a time.

@@ -63,7 +63,10 @@ impl TrainScore {
         self.outcome.on_motion(self.id, train, world, line);
         self.ride.on_motion(train);
         if let Some(positioning) = &mut self.positioning {
-            positioning.head_at(train);
+            let rear = matches!(self.rig, Some((_, TrainEnd::Rear)));
+            let behind_m = world.train_length_m(self.id).filter(|_| rear);
+            let behind_m = train.direction.sign() * behind_m.unwrap_or(0.0);
+            positioning.rig_at(train.chainage_m - behind_m, train.direction);
         }
     }
 

@@ -84,6 +84,7 @@ fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
             continue;
         };
         let remedy = match others {
+            _ if twice => "put all of a train's equipment into one table".to_owned(),
             0 => "add it to [[other_trains]]".to_owned(),
             1 => "give 1: the one of [[other_trains]]".to_owned(),
             most => format!("give 1 to {most}, each once, in the order of [[other_trains]]"),

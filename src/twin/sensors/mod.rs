@@ -15,7 +15,8 @@
 //! # let _ = speedometer;
 //! ```
 //!
-//! What it does not do: odometer, radar or balise antenna at the rear end; clocks that wander; stamps that jump.
+//! What it does not do: odometer, radar or balise antenna at the rear end; a clock drift
+//! that varies; time stamps that jump.
 
 mod auto_exposure;
 mod balise_antenna;
