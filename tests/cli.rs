@@ -202,7 +202,7 @@ fn rig_that_never_sees_a_lamp() {
     let words = [
         "wrong.toml:8",
         "rig.yaw_deg",
-        "never sees a whole lamp",
+        "hardly ever sees a whole lamp",
         "yaw_deg = 39",
     ];
     refused(&folder, &file, &words);
