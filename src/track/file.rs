@@ -1,6 +1,6 @@
 //! Tunnel files as a user writes them: TOML, every key with its unit and default.
 
-use super::furniture::{Balise, BaseStation, StoppingPlace};
+use super::furniture::{Balise, BaseStation, LONGEST_M, StoppingPlace};
 use super::section::Side;
 use super::uid::LineCode;
 use crate::settings::{Checker, Problem, Settings, put_range, settings};
@@ -8,8 +8,6 @@ use schemars::{JsonSchema, Schema, schema_for};
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// No line is longer: chainages stay exact to a nanometre.
-pub(super) const LONGEST_M: f64 = 1e6;
 /// The last of the numbers of 10 bits that lamps have.
 pub(super) const LAST_LAMP: u16 = 1023;
 

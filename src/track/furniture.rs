@@ -1,11 +1,13 @@
 //! What is fixed to the tunnel: lamps, wayside devices, balises, base stations, stopping places.
 
-use super::file::LONGEST_M;
 use super::uid::{LineCode, Uid};
 use crate::settings::settings;
 use nalgebra::{Point3, Unit, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+/// No line is longer: chainages stay exact to a nanometre.
+pub(super) const LONGEST_M: f64 = 1e6;
 
 /// A lamp as surveyed.
 #[derive(Clone, Debug, PartialEq)]

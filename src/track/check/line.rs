@@ -3,7 +3,8 @@
 use super::SAME_M;
 use crate::settings::Checker;
 use crate::track::alignment::{Alignment, Grade, PlanElement};
-use crate::track::file::{LONGEST_M, PlanShape, TunnelFile};
+use crate::track::file::{PlanShape, TunnelFile};
+use crate::track::furniture::LONGEST_M;
 use nalgebra::Point3;
 
 pub(super) fn alignment(file: &TunnelFile, check: &mut Checker<'_>) -> Alignment {

@@ -2,8 +2,9 @@
 //! the shader reads. Lights have the first numbers of a set, then come casts, then once more the
 //! lights, of those that no body hides in whole.
 
-use super::casts::{self, Bodies, Cast, Region};
+use super::casts::{self, Bodies, Cast};
 use super::occluder::LinesCut;
+use super::region::Region;
 use super::tiles::Eyes;
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;

@@ -1,6 +1,7 @@
 //! Which lights may throw the shadow of which body where: by balls and cones, generously.
 
 use super::occluder::Occluder;
+use super::region::Region;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
 use crate::twin::render::gpu::view::Framed;
@@ -13,26 +14,6 @@ use std::ops::Range;
 
 /// Bodies and lamps farther than this from the camera throw no shadow that it sees.
 const FAR_M: f64 = 200.0;
-
-/// A ball that holds a piece of a surface, a lamp's disc, or where the eye is.
-#[derive(Clone, Copy)]
-pub struct Region<'a> {
-    pub centre: &'a Point3<f64>,
-    pub radius_m: f64,
-    /// Of the surface, if it has one.
-    pub normal: Option<&'a Vector3<f64>>,
-}
-
-impl<'a> Region<'a> {
-    /// Of what faces all ways.
-    pub fn around(centre: &'a Point3<f64>, radius_m: f64) -> Self {
-        Self {
-            centre,
-            radius_m,
-            normal: None,
-        }
-    }
-}
 
 /// A ball around a piece of a body, wherever it is in a frame.
 pub struct Ball {

@@ -12,6 +12,7 @@
 mod candidates;
 mod casts;
 mod occluder;
+mod region;
 mod shader_data;
 mod tiles;
 
@@ -28,7 +29,8 @@ use crate::twin::geometry::Shape;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use candidates::{Candidates, TileLists, has};
-use casts::{Ball, Region};
+use casts::Ball;
+use region::Region;
 use shader_data::{blocker, source, tile};
 use std::collections::BTreeMap;
 use std::sync::Arc;

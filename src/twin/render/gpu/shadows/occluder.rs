@@ -1,6 +1,6 @@
 //! What convex bodies hide from a light, or from the eye, exactly where balls would be generous.
 
-use super::casts::Region;
+use super::region::Region;
 use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Point3, Vector3};
 

@@ -1,6 +1,6 @@
 //! Tiles of a picture, and what may matter in each: lights, and shadows of bodies.
 
-use super::casts::Region;
+use super::region::Region;
 use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
 use crate::twin::geometry::{Body, Solid};
 use crate::twin::render::gpu::layout::NEAR_M;
