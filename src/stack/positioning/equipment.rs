@@ -60,7 +60,7 @@ impl CabMount {
             sigma_m: fix.sigma_m.hypot(self.length_sigma_m),
             position: match self.end {
                 TrainEnd::Front => fix.position,
-                TrainEnd::Rear => map.alignment.at(run_m).origin.into(),
+                TrainEnd::Rear => map.alignment.at(run_m).origin,
             },
             ..fix
         }
