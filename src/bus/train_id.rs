@@ -1,5 +1,6 @@
 //! Trains by number.
 
+use crate::track::Direction;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -40,6 +41,14 @@ pub enum TrainEnd {
 }
 
 impl TrainEnd {
+    /// Which way along the track the cab of this end looks, on a train that runs in a direction.
+    pub fn looks(self, running: Direction) -> Direction {
+        match self {
+            Self::Front => running,
+            Self::Rear => running.reversed(),
+        }
+    }
+
     /// 1 where x points in the running direction, -1 where it points back.
     pub fn sign(self) -> f64 {
         match self {

@@ -95,14 +95,7 @@ impl Onboard {
 
     /// A tunnel as the rig's cab looks along it.
     pub fn seen_from_rig<'t>(&self, tunnel: &'t Tunnel) -> Cow<'t, Tunnel> {
-        let direction = match self.rig_end() {
-            TrainEnd::Front => self.direction,
-            TrainEnd::Rear => self.direction.reversed(),
-        };
-        match direction {
-            Direction::Up => Cow::Borrowed(tunnel),
-            Direction::Down => Cow::Owned(tunnel.reversed()),
-        }
+        tunnel.along(self.rig_end().looks(self.direction))
     }
 
     /// Its speed is supervised.

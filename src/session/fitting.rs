@@ -4,7 +4,7 @@
 //!
 #![doc = include_str!("../../docs/extending.md")]
 
-use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainEnd, TrainId};
+use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
 use crate::scenario::{Onboard, OnboardEquipment, Scenario, WaysidePost};
 use crate::stack::Equipment;
 use crate::stack::positioning::{CabMount, LampPositioning};
@@ -163,19 +163,8 @@ fn one_of_onboard(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Opt
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
             let rig = onboard.rig.as_ref()?;
-            let (mount, map) = match rig.end {
-                TrainEnd::Front => {
-                    let (route, map) = maps.of(onboard.direction);
-                    (CabMount::front(route), map)
-                }
-                TrainEnd::Rear => {
-                    let (route, map) = maps.of(onboard.direction.reversed());
-                    (
-                        CabMount::rear(route, onboard.protection.train_length_m),
-                        map,
-                    )
-                }
-            };
+            let (route, map) = maps.of(rig.end.looks(onboard.direction));
+            let mount = CabMount::new(rig.end, route, onboard.protection.train_length_m);
             let (node, sheet) = (node.clone(), rig.calibration());
             Box::new(LampPositioning::new(node, mount, &onboard.led, sheet, map))
         }

@@ -68,10 +68,13 @@ impl CameraWatch {
             None => (frame.number, STARTING_S),
         };
         let lost = frame.number.saturating_sub(expected);
+        // The last image's memory serves again.
+        let mut image = last.map(|l| l.image).unwrap_or_default();
+        image.clone_from(&frame.image);
         self.last = Some(Seen {
             number: frame.number,
             start: frame.start,
-            image: frame.image.clone(),
+            image,
             interval_s: since_last_s / (f64::from(lost) + 1.0),
         });
         CameraHealth { fault, lost }

@@ -38,7 +38,7 @@ const OWN: [Column; 6] = [
 
 /// [`OWN`] columns, and the others by name.
 #[derive(Serialize)]
-struct Cells<'a> {
+struct RowCells<'a> {
     index: u64,
     seed: u64,
     status: Status,
@@ -113,7 +113,7 @@ pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result {
         for (name, event) in &template.events {
             others.insert(name.clone(), row.happened(event).into());
         }
-        table.push(&Cells {
+        table.push(&RowCells {
             index: row.index,
             seed: row.seed,
             status: row.status,

@@ -2,12 +2,21 @@
 //! stands in it stays where it is in the world.
 
 use super::{
-    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, StoppingPlace, Tunnel,
-    WaysideSite,
+    Balise, BaseStation, CrossSection, Direction, LampSite, OutlinePoint, SectionRange,
+    StoppingPlace, Tunnel, WaysideSite,
 };
+use std::borrow::Cow;
 use std::f64::consts::PI;
 
 impl Tunnel {
+    /// The tunnel as met in a direction.
+    pub fn along(&self, direction: Direction) -> Cow<'_, Self> {
+        match direction {
+            Direction::Up => Cow::Borrowed(self),
+            Direction::Down => Cow::Owned(self.reversed()),
+        }
+    }
+
     /// The tunnel in the other direction.
     ///
     /// ```

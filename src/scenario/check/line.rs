@@ -8,8 +8,6 @@ use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
-use std::borrow::Cow;
-
 /// Of so many lamps, evenly along the line, it is found whether a rig sees them.
 const LAMPS_TRIED: usize = 30;
 /// A rig must see one of so many of them.
@@ -238,11 +236,7 @@ impl LineCheck<'_, '_> {
 
     /// A rig must see lamps on the way that its train runs.
     fn view(&mut self, at: &str, rig: &RigSettings, train: usize) {
-        let running = self.file.direction(train);
-        let direction = match rig.end {
-            TrainEnd::Front => running,
-            TrainEnd::Rear => running.reversed(),
-        };
+        let direction = rig.end.looks(self.file.direction(train));
         let tunnel = self.tunnel;
         if tunnel.lamps.is_empty() {
             self.check.problem(
@@ -252,10 +246,7 @@ impl LineCheck<'_, '_> {
             );
             return;
         }
-        let way = match direction {
-            Direction::Up => Cow::Borrowed(tunnel),
-            Direction::Down => Cow::Owned(tunnel.reversed()),
-        };
+        let way = tunnel.along(direction);
         let every = way.lamps.len().div_ceil(LAMPS_TRIED);
         let seen = |rig: &RigSettings| {
             let calibration = rig.calibration();
@@ -270,14 +261,11 @@ impl LineCheck<'_, '_> {
         }
         let asks_for_side = direction == Direction::Down || rig.side == MountSide::Right;
         let better = turned(rig)
-            .into_iter()
-            .map(|turned| (seen(&turned), turned));
+            .map(|turned| (seen(&turned), turned))
+            .into_iter();
         let better = better.max_by_key(|(seen, _)| *seen);
-        let better = better
-            .filter(|(seen, _)| *seen >= enough)
-            .map(|(_, turned)| turned);
-        match better.filter(|_| asks_for_side) {
-            Some(turned) => self.check.problem(
+        match better.filter(|(seen, _)| asks_for_side && *seen >= enough) {
+            Some((_, turned)) => self.check.problem(
                 &format!("{at}.side"),
                 "on a train that runs this way it sees hardly a lamp from its luminous side",
                 format!(

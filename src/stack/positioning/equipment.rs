@@ -32,23 +32,17 @@ pub struct CabMount {
 }
 
 impl CabMount {
-    /// The leading cab of a train that runs along a route.
-    pub fn front(route: Route) -> Self {
+    /// In the cab of an end of a train of a length; `route` is the way that this cab looks.
+    pub fn new(end: TrainEnd, route: Route, train_length_m: f64) -> Self {
+        let (head_behind_m, length_sigma_m) = match end {
+            TrainEnd::Front => (0.0, 0.0),
+            TrainEnd::Rear => (train_length_m, LENGTH_SIGMA_M),
+        };
         Self {
-            end: TrainEnd::Front,
+            end,
             route,
-            head_behind_m: 0.0,
-            length_sigma_m: 0.0,
-        }
-    }
-
-    /// The rear cab of a train of a length that runs against a route.
-    pub fn rear(route: Route, train_length_m: f64) -> Self {
-        Self {
-            end: TrainEnd::Rear,
-            route,
-            head_behind_m: train_length_m,
-            length_sigma_m: LENGTH_SIGMA_M,
+            head_behind_m,
+            length_sigma_m,
         }
     }
 

@@ -11,14 +11,14 @@ const CUT_PX: u32 = 2;
 
 /// One span and one flag a cell.
 #[derive(Clone, Debug)]
-pub(super) struct Cells {
+pub(super) struct GaugeCells {
     wide: usize,
     spans: Vec<Option<GaugeSpan>>,
     blind: Vec<bool>,
     any_blind: bool,
 }
 
-impl Cells {
+impl GaugeCells {
     pub fn new(sight: &Sight, width: usize, height: usize) -> Self {
         let (wide, high) = (width.div_ceil(CELL_PX), height.div_ceil(CELL_PX));
         let middle = |k: usize| (k * CELL_PX) as f64 + (CELL_PX as f64 - 1.0) / 2.0;

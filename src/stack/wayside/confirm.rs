@@ -3,7 +3,7 @@
 //! to clear it late.
 
 use super::WaysideSettings;
-use super::cells::Cells;
+use super::cells::GaugeCells;
 use crate::bus::{DetectedObstacle, PixelBox};
 
 /// A region followed from frame to frame.
@@ -27,7 +27,7 @@ impl Confirmation {
     pub fn update(
         &mut self,
         found: &[DetectedObstacle],
-        cells: &Cells,
+        cells: &GaugeCells,
         settings: &WaysideSettings,
     ) {
         let of = settings.confirm_of.clamp(1, 64);

@@ -9,7 +9,7 @@
 //! gain is only known roughly, so T rises by a share of |g b - b|.
 
 use super::WaysideSettings;
-use super::cells::{CELL_PX, Cells};
+use super::cells::{CELL_PX, GaugeCells};
 use super::rails::Rails;
 use super::reference::Reference;
 
@@ -85,7 +85,7 @@ impl Difference {
         &mut self,
         frame: &[u8],
         reference: &Reference,
-        (cells, rails): (&Cells, &Rails),
+        (cells, rails): (&GaugeCells, &Rails),
         train_near: bool,
     ) {
         let changed = self.measure_gain(frame, &reference.valid);
@@ -290,7 +290,7 @@ mod tests {
                 calibration(&map, w as u32, h as u32),
                 map.clone(),
             );
-            let cells = Cells::new(&sight, w, h);
+            let cells = GaugeCells::new(&sight, w, h);
             let reference = random(w * h, 1, 200);
             let valid = random(w * h, 2, 2);
             let mut learnt = Reference::new(&settings, 0);

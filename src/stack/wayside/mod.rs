@@ -122,7 +122,7 @@ use crate::bus::{
 };
 use crate::track::Tunnel;
 use announce::Announcer;
-use cells::Cells;
+use cells::GaugeCells;
 use confirm::Confirmation;
 use difference::Difference;
 use image::GrayImage;
@@ -149,7 +149,7 @@ pub struct WaysideDetector {
     settings: WaysideSettings,
     sight: Sight,
     vision: Vision,
-    cells: Cells,
+    cells: GaugeCells,
     rails: Rails,
     reference: Reference,
     difference: Difference,
@@ -187,7 +187,7 @@ impl WaysideDetector {
         Self {
             settings: settings.clone(),
             vision: Vision::new(settings, (intrinsics.width_px, intrinsics.height_px)),
-            cells: Cells::new(&sight, width, height),
+            cells: GaugeCells::new(&sight, width, height),
             rails: Rails::new(&sight, width, height),
             sight,
             reference: Reference::new(settings, width * height),

@@ -37,14 +37,14 @@ impl Detail {
         }
     }
 
-    fn cells(self) -> Cells {
+    fn cells(self) -> CellSizes {
         let [nearest_m, step_m, share_of_distance, least_m] = match self {
             Self::Near => [0.0, 0.5 * STATION_STEP_M, 0.25, 0.06],
             Self::Close => [NEAR_M, STATION_STEP_M, 0.3, 0.15],
             Self::Middle => [CLOSE_M, 0.5 * CHUNK_M, 0.5, 0.4],
             Self::Far => [MIDDLE_M, CHUNK_M, 0.5, 0.8],
         };
-        Cells {
+        CellSizes {
             nearest_m,
             step_m,
             share_of_distance,
@@ -59,7 +59,7 @@ impl Detail {
 }
 
 /// The cells of a detail.
-struct Cells {
+struct CellSizes {
     /// A chunk is at least so far from the camera along the line.
     nearest_m: f64,
     step_m: f64,
