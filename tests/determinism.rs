@@ -21,20 +21,25 @@ struct Digest {
 impl Observer for Digest {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Pair(_, pair, report, truths_m) => {
+            Event::Pair {
+                pair,
+                report,
+                true_chainages_m: truths_m,
+                ..
+            } => {
                 pair.left.image.as_raw().hash(&mut self.hasher);
                 pair.right.image.as_raw().hash(&mut self.hasher);
                 format!("{report:?}{truths_m:?}").hash(&mut self.hasher);
                 self.images += 2;
             }
-            Event::Wayside(_, frame, report) => {
+            Event::Wayside { frame, report, .. } => {
                 frame.image.as_raw().hash(&mut self.hasher);
                 let time = frame.start;
                 format!("{time:?}{:?}{:?}", report.blobs, report.obstacles).hash(&mut self.hasher);
                 self.images += 1;
             }
             // Wall time.
-            Event::Cost(..) => {}
+            Event::Cost { .. } => {}
             other => format!("{other:?}").hash(&mut self.hasher),
         }
         Ok(())

@@ -50,7 +50,7 @@ fn hash(image: &image::GrayImage) -> u64 {
 impl Observer for Seen {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Pair(_, pair, report, _) => {
+            Event::Pair { pair, report, .. } => {
                 let images = [hash(&pair.left.image), hash(&pair.right.image)];
                 let faults = report.eyes.map(|eye| eye.fault);
                 assert_eq!(report.number, pair.left.number);
@@ -58,23 +58,31 @@ impl Observer for Seen {
                 (self.pairs).push((pair.left.number, pair.left.start, images, faults));
                 format!("{report:?}{images:?}").hash(&mut self.hasher);
             }
-            Event::Wayside(_, frame, report) => {
+            Event::Wayside { frame, report, .. } => {
                 let fault = report.camera.fault;
                 let (start, image) = (frame.start, hash(&frame.image));
                 (self.frames).push((report.number, start, image, fault, report.blind));
                 image.hash(&mut self.hasher);
             }
-            Event::Camera(time, _, camera, fault) => {
+            Event::Camera {
+                time,
+                camera,
+                fault,
+                ..
+            } => {
                 self.said.push(format!("{time} {camera} {fault:?}"));
             }
-            Event::Message(Node::Train(_), message) => {
+            Event::Message {
+                node: Node::Train(_),
+                message,
+            } => {
                 if let Content::Warning(warning) = &message.content {
                     self.warnings.push((warning.blind, warning.danger));
                 }
                 format!("{message:?}").hash(&mut self.hasher);
             }
-            Event::Train(_, truth, _) => self.now = truth.time,
-            Event::Cost(..) => {}
+            Event::Train { truth, .. } => self.now = truth.time,
+            Event::Cost { .. } => {}
             other => format!("{other:?}").hash(&mut self.hasher),
         }
         Ok(())

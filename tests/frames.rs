@@ -70,11 +70,11 @@ impl Observer for Delivered {
             self.0.insert(name, image.clone());
         };
         match event {
-            Event::Pair(_, pair, ..) => {
+            Event::Pair { pair, .. } => {
                 keep("left", pair.left.number, &pair.left.image);
                 keep("right", pair.right.number, &pair.right.image);
             }
-            Event::Wayside(_, frame, _) => keep("W1530", frame.number, &frame.image),
+            Event::Wayside { frame, .. } => keep("W1530", frame.number, &frame.image),
             _ => {}
         }
         Ok(())

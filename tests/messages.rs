@@ -60,13 +60,18 @@ impl Observer for Copied {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         let own = |node, time, content| Message::own(node, time, content);
         match event {
-            Event::Message(_, message) => self.copy(message),
-            Event::Pair(id, pair, report, _) => {
+            Event::Message { message, .. } => self.copy(message),
+            Event::Pair {
+                train: id,
+                pair,
+                report,
+                ..
+            } => {
                 let (node, time) = (Node::Train(*id), report.time);
                 self.copy(&own(node.clone(), time, Content::Pair((*pair).clone())));
                 self.copy(&own(node, time, Content::Led((*report).clone())));
             }
-            Event::Wayside(_, frame, report) => {
+            Event::Wayside { frame, report, .. } => {
                 let (node, time) = (Node::Post("W1530".into()), report.time);
                 self.copy(&own(node.clone(), time, Content::Frame((*frame).clone())));
                 self.copy(&own(node, time, Content::Wayside((*report).clone())));

@@ -52,7 +52,12 @@ struct ErrorByDistance(Vec<(f64, f64)>);
 
 impl Observer for ErrorByDistance {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        if let Event::Pair(_, _, report, truths_m) = event {
+        if let Event::Pair {
+            report,
+            true_chainages_m: truths_m,
+            ..
+        } = event
+        {
             let fixes = report.fixes.iter().zip(*truths_m);
             self.0
                 .extend(fixes.filter(|(fix, _)| fix.method == Method::Stereo).map(
@@ -156,12 +161,12 @@ struct ErrorByTime {
 impl Observer for ErrorByTime {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         match event {
-            Event::Message(_, message) => {
+            Event::Message { message, .. } => {
                 if let Content::Protection(report) = &message.content {
                     self.said = report.position_m.map(|m| (report.time, m));
                 }
             }
-            Event::Train(_, truth, _) => {
+            Event::Train { truth, .. } => {
                 let settled = truth.time.secs() > 3.0;
                 if let Some((time, said_m)) = self.said.filter(|_| settled)
                     && time == truth.time

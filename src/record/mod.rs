@@ -250,27 +250,39 @@ impl Open {
 
     fn observe(&mut self, event: &Event<'_>) -> Result {
         let time = match *event {
-            Event::Train(id, train, left) => {
-                if let Some(view) = self.view(id) {
-                    view.moving.train(train, left);
-                    view.plots.train(train);
+            Event::Train {
+                train,
+                truth,
+                left_eye,
+            } => {
+                if let Some(view) = self.view(train) {
+                    view.moving.train(truth, left_eye);
+                    view.plots.train(truth);
                 }
-                if id == TrainId::default() {
-                    self.lay_out(Some(&train.world_from_vehicle))?;
+                if train == TrainId::default() {
+                    self.lay_out(Some(&truth.world_from_vehicle))?;
                 }
-                train.time
+                truth.time
             }
-            Event::Message(Node::Train(id), message) => self.message(*id, message)?,
-            Event::Message(..) | Event::Cost(..) => return Ok(()),
-            Event::Bodies(time, bodies) => {
+            Event::Message {
+                node: Node::Train(id),
+                message,
+            } => self.message(*id, message)?,
+            Event::Message { .. } | Event::Cost { .. } => return Ok(()),
+            Event::Bodies { time, bodies } => {
                 self.first.moving.bodies(time, bodies)?;
                 time
             }
             // Its images come when they reach the stack.
             Event::Exposure(_) => return Ok(()),
-            Event::Pair(id, pair, report, true_chainages_m) => {
-                self.texts.dark_lamps(id, report)?;
-                if let Some(view) = self.view(id) {
+            Event::Pair {
+                train,
+                pair,
+                report,
+                true_chainages_m,
+            } => {
+                self.texts.dark_lamps(train, report)?;
+                if let Some(view) = self.view(train) {
                     view.plots.fixes(report, true_chainages_m);
                     view.plots.exposure(RIG_CAMERA, &pair.left);
                     view.images.pair(pair, report)?;
@@ -278,14 +290,18 @@ impl Open {
                 }
                 report.time
             }
-            Event::Wayside(index, frame, report) => {
-                let Some(name) = self.contents[0].devices.get(index) else {
+            Event::Wayside {
+                post,
+                frame,
+                report,
+            } => {
+                let Some(name) = self.contents[0].devices.get(post) else {
                     return Ok(());
                 };
-                let device = (index, name.as_str());
+                let device = (post, name.as_str());
                 let time = frame.start;
                 let view = &mut self.first;
-                view.plots.wayside(index, report);
+                view.plots.wayside(post, report);
                 view.plots.exposure(name, frame);
                 self.texts.wayside(device, report)?;
                 view.images.wayside(device, frame, report)?;
@@ -293,11 +309,16 @@ impl Open {
                 view.moving.obstacles(name, &report.obstacles)?;
                 time
             }
-            Event::Camera(time, node, camera, fault) => {
+            Event::Camera {
+                time,
+                node,
+                camera,
+                fault,
+            } => {
                 self.texts.camera(time, node, camera, fault)?;
                 time
             }
-            Event::Note(time, text) => {
+            Event::Note { time, text } => {
                 self.texts.note(time, text)?;
                 time
             }

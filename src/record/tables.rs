@@ -49,13 +49,18 @@ impl Observer for FixTable {
     }
 
     fn observe(&mut self, event: &Event<'_>) -> Result {
-        let (Some(rows), Event::Pair(train, _, report, true_chainages_m)) = (&mut self.rows, event)
+        let Event::Pair {
+            train,
+            report,
+            true_chainages_m,
+            ..
+        } = event
         else {
             return Ok(());
         };
-        if *train != self.train {
+        let Some(rows) = self.rows.as_mut().filter(|_| *train == self.train) else {
             return Ok(());
-        }
+        };
         for (fix, true_m) in report.fixes.iter().zip(*true_chainages_m) {
             let lamp = fix.lamp_in_camera;
             writeln!(

@@ -225,7 +225,12 @@ fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
 fn message(observer: &mut dyn Observer, time: SimTime, content: Content) {
     let node = Node::Train(TrainId(0));
     let message = Message::own(node.clone(), time, content);
-    observer.observe(&Event::Message(&node, &message)).unwrap();
+    observer
+        .observe(&Event::Message {
+            node: &node,
+            message: &message,
+        })
+        .unwrap();
 }
 
 /// A warning that comes at once.

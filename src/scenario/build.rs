@@ -105,11 +105,14 @@ impl Onboard {
 
     /// Of all trains of a file.
     fn of(file: &ScenarioFile) -> Vec<Self> {
-        // A train that starts at speed has run before, and its equipment with it.
+        // The equipment knows its train's length. A train that starts at speed has run before, and its
+        // equipment with it.
         let protection = |settings: &ProtectionSettings, k: usize| {
             let train = file.trains().nth(k);
             let runs = train.is_some_and(|train| train.start_speed_kmh > 0.0);
+            let length_m = train.map(TrainSettings::length_m);
             ProtectionSettings {
+                train_length_m: settings.train_length_m.or(length_m),
                 starts_under_way: settings.starts_under_way.or(Some(runs)),
                 ..settings.clone()
             }

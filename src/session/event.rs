@@ -90,28 +90,78 @@ pub struct TrainPoint {
 /// One thing that happened. Events come in order of their time of completion.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
-    /// A train as it really is and the pose of its left camera, where it has a rig; 50 times a
-    /// second.
-    Train(TrainId, &'a TrainState, Option<&'a Isometry3<f64>>),
+    /// Where a train really is; 50 times a second.
+    Train {
+        /// Which train.
+        train: TrainId,
+        /// Its state.
+        truth: &'a TrainState,
+        /// Pose `world_from_camera` of its left camera, where it has a rig.
+        left_eye: Option<&'a Isometry3<f64>>,
+    },
     /// A message arrived at a node, or was sent there; those with images come as [`Event::Pair`] and
     /// [`Event::Wayside`].
-    Message(&'a Node, &'a Message),
+    Message {
+        /// Where.
+        node: &'a Node,
+        /// What it says.
+        message: &'a Message,
+    },
     /// Everything solid but the first train, 10 times a second.
-    Bodies(SimTime, &'a [Body]),
+    Bodies {
+        /// When.
+        time: SimTime,
+        /// In world coordinates.
+        bodies: &'a [Body],
+    },
     /// A frame has been taken.
     Exposure(&'a Exposure<'a>),
-    /// A pair of images, what the stack said of it, and the true chainage at each fix's time.
-    Pair(TrainId, &'a StereoPair, &'a LedReport, &'a [f64]),
-    /// A wayside frame and its report; the index is into [`Opening::wayside`].
-    Wayside(usize, &'a Frame, &'a WaysideReport),
-    /// The equipment of a node says that a camera has failed, with another fault than before, or that
-    /// it is well again.
-    Camera(SimTime, &'a Node, &'a str, Option<CameraFault>),
-    /// How long the equipment of a node worked on an image, in milliseconds of wall time. Nothing depends
-    /// on it.
-    Cost(&'a Node, f64),
+    /// A pair of images that reached the equipment of a train.
+    Pair {
+        /// Which train.
+        train: TrainId,
+        /// The images.
+        pair: &'a StereoPair,
+        /// What the equipment said of them.
+        report: &'a LedReport,
+        /// True chainage of the head at the time of each fix of the report, metres.
+        true_chainages_m: &'a [f64],
+    },
+    /// A frame that reached the equipment of a wayside post.
+    Wayside {
+        /// Index into [`Opening::wayside`].
+        post: usize,
+        /// The image.
+        frame: &'a Frame,
+        /// What the equipment said of it.
+        report: &'a WaysideReport,
+    },
+    /// Equipment says that a camera has failed, with another fault than before, or that it is well
+    /// again.
+    Camera {
+        /// When.
+        time: SimTime,
+        /// Where the equipment is.
+        node: &'a Node,
+        /// Name of the camera.
+        camera: &'a str,
+        /// What is wrong with it.
+        fault: Option<CameraFault>,
+    },
+    /// How long the equipment of a node worked on an image. Nothing depends on it.
+    Cost {
+        /// Where the equipment is.
+        node: &'a Node,
+        /// Wall time, milliseconds.
+        cost_ms: f64,
+    },
     /// Anything worth a line in the log.
-    Note(SimTime, &'a str),
+    Note {
+        /// When.
+        time: SimTime,
+        /// The line.
+        text: &'a str,
+    },
 }
 
 /// Something that watches a session. It cannot change what happens.

@@ -164,7 +164,7 @@ fn one_of_onboard(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Opt
         OnboardEquipment::Led => {
             let rig = onboard.rig.as_ref()?;
             let (route, map) = maps.of(rig.end.looks(onboard.direction));
-            let mount = CabMount::new(rig.end, route, onboard.protection.train_length_m);
+            let mount = CabMount::new(rig.end, route, onboard.protection.length_m());
             let (node, sheet) = (node.clone(), rig.calibration());
             Box::new(LampPositioning::new(node, mount, &onboard.led, sheet, map))
         }

@@ -24,15 +24,16 @@ mod fitting;
 mod health;
 mod imaging;
 mod outcome;
+mod positioning_score;
 mod posts;
 mod presence;
 mod ride;
 mod scheduler;
-mod score;
 mod scoring;
 mod speed;
 mod summary;
 mod train_score;
+mod wayside_score;
 
 pub use event::{
     Event, Exposure, Observer, ObserverError, Opening, Source, TrainOpening, TrainPoint,

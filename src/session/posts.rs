@@ -1,9 +1,9 @@
 //! How the wayside posts did, held against the truth.
 
 use super::health::Health;
-use super::presence::FieldOfView;
-use super::score::{Presence, WaysideScore};
+use super::presence::{FieldOfView, Presence};
 use super::summary::Summary;
+use super::wayside_score::WaysideScore;
 use crate::bus::{Node, SimTime, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::twin::physics::World;

@@ -1,16 +1,38 @@
 //! What a wayside device has in view: the truth that its reports are scored against.
 
-use super::score::Presence;
-use crate::bus::WaysideCalibration;
+use crate::bus::{SimTime, WaysideCalibration};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::track::BED_M;
 use crate::twin::geometry::TunnelCaster;
 use crate::twin::physics::World;
-
 use nalgebra::Point3;
 
 /// How far a walking man's limbs reach from his middle.
 const STRIDE_REACH_M: f64 = 0.4;
+
+/// Something in the tunnel that a wayside device may rightly report.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Presence {
+    /// Name in the scenario.
+    pub name: String,
+    /// Largest dimension.
+    pub size_m: f64,
+    /// Chainage of its centre.
+    pub chainage_m: f64,
+    /// Its centre, left of the centreline.
+    pub lateral_m: f64,
+    /// Half its extent along the line.
+    pub half_length_m: f64,
+    /// Half its extent across.
+    pub half_width_m: f64,
+    /// Its lowest point over the bed, as high as it was while the frame was taken: what falls was
+    /// higher when its row was read.
+    pub foot_m: f64,
+    /// Since when it lies still, on its own, where the device has it in view.
+    pub lies_in_view_since: Option<SimTime>,
+    /// It is scored as an obstacle (a worker or a train is not).
+    pub obstacle: bool,
+}
 
 /// What a device can have in view: where it really hangs and looks, and the walls around it.
 pub struct FieldOfView {

@@ -182,7 +182,10 @@ impl<'s> Session<'s> {
         if let Some(Move::To { head_m, given_up_m }) = next {
             if let Some(left_m) = given_up_m {
                 let text = format!("no more fixes with the head at {left_m} m: gone on");
-                observers.show(&Event::Note(now, &text))?;
+                observers.show(&Event::Note {
+                    time: now,
+                    text: &text,
+                })?;
             }
             self.place_rig(head_m);
         }
@@ -196,7 +199,11 @@ impl<'s> Session<'s> {
         let now = self.world.time();
         for hit in &self.world.impacts()[hits..] {
             let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
-            observers.show(&Event::Note(now, &format!("hit {with} at {kmh:.1} km/h")))?;
+            let text = format!("hit {with} at {kmh:.1} km/h");
+            observers.show(&Event::Note {
+                time: now,
+                text: &text,
+            })?;
         }
         self.images.clear();
         self.sample(now, observers)?;
@@ -345,7 +352,10 @@ impl<'s> Session<'s> {
     ) -> Result<(), SessionError> {
         let has_images = matches!(message.content, Content::Pair(_) | Content::Frame(_));
         if !has_images {
-            observers.show(&Event::Message(node, &message))?;
+            observers.show(&Event::Message {
+                node,
+                message: &message,
+            })?;
         }
         let equipment = &mut self.equipment;
         let mut hand_on = || {
@@ -355,7 +365,7 @@ impl<'s> Session<'s> {
         if has_images {
             let cost_s = self.cost.stack.time(hand_on).1;
             let cost_ms = 1e3 * cost_s;
-            observers.show(&Event::Cost(node, cost_ms))?;
+            observers.show(&Event::Cost { node, cost_ms })?;
             self.images.push(Delivered { message, cost_ms });
             return Ok(());
         }

@@ -54,9 +54,15 @@ impl Session<'_> {
                 if let Some(train) = self.trains.get_mut(id) {
                     train.on_protection(now, report);
                 }
-                Ok(observers.show(&Event::Message(sender, message))?)
+                Ok(observers.show(&Event::Message {
+                    node: sender,
+                    message,
+                })?)
             }
-            _ => Ok(observers.show(&Event::Message(sender, message))?),
+            _ => Ok(observers.show(&Event::Message {
+                node: sender,
+                message,
+            })?),
         }
     }
 
@@ -81,7 +87,12 @@ impl Session<'_> {
         });
         if let (Some(train), Some((pair, cost_ms))) = (self.trains.get_mut(&id), delivered) {
             let truths_m = train.on_led(report, cost_ms, world)?;
-            observers.show(&Event::Pair(id, pair, report, &truths_m))?;
+            observers.show(&Event::Pair {
+                train: id,
+                pair,
+                report,
+                true_chainages_m: &truths_m,
+            })?;
         }
         Ok(())
     }
@@ -102,7 +113,11 @@ impl Session<'_> {
         });
         if let Some((frame, cost_ms)) = delivered {
             self.posts.report(post, report, now, cost_ms);
-            observers.show(&Event::Wayside(post, frame, report))?;
+            observers.show(&Event::Wayside {
+                post,
+                frame,
+                report,
+            })?;
         }
         let Node::Post(name) = node else {
             return Ok(());
@@ -124,7 +139,12 @@ impl Session<'_> {
             _ => Some(&mut self.posts.health),
         };
         if all.is_some_and(|all| all.note(camera, time, health)) {
-            observers.show(&Event::Camera(time, node, camera, health.fault))?;
+            observers.show(&Event::Camera {
+                time,
+                node,
+                camera,
+                fault: health.fault,
+            })?;
         }
         Ok(())
     }
@@ -137,16 +157,23 @@ impl Session<'_> {
         if self.truth_ticker.due(now, 0.0).is_some() {
             let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
             for (id, score) in &mut self.trains {
-                if let Some(train) = world.train(*id) {
-                    score.on_motion(&train, world, line);
-                    let left = score.left_eye(world);
-                    observers.show(&Event::Train(*id, &train, left.as_ref()))?;
+                if let Some(truth) = world.train(*id) {
+                    score.on_motion(&truth, world, line);
+                    let left_eye = score.left_eye(world);
+                    observers.show(&Event::Train {
+                        train: *id,
+                        truth: &truth,
+                        left_eye: left_eye.as_ref(),
+                    })?;
                 }
             }
         }
         if self.bodies_ticker.due(now, 0.0).is_some() {
             let (bodies, _) = self.world.owned_bodies(self.world.train_ids().next());
-            observers.show(&Event::Bodies(now, &bodies))?;
+            observers.show(&Event::Bodies {
+                time: now,
+                bodies: &bodies,
+            })?;
         }
         Ok(())
     }

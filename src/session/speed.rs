@@ -117,9 +117,12 @@ impl Observer for Watched {
                 Source::Rig(_) => self.pairs.push(exposure.job.clone()),
                 Source::Wayside(_) => self.frames.push(exposure.job.clone()),
             },
-            Event::Cost(Node::Train(_), ms) => self.led_ms.push(*ms),
-            Event::Cost(Node::Post(_), _) if self.learnt < LEARNING => self.learnt += 1,
-            Event::Cost(Node::Post(_), ms) => self.wayside_ms.push(*ms),
+            Event::Cost {
+                node: Node::Train(_),
+                cost_ms,
+            } => self.led_ms.push(*cost_ms),
+            Event::Cost { .. } if self.learnt < LEARNING => self.learnt += 1,
+            Event::Cost { cost_ms, .. } => self.wayside_ms.push(*cost_ms),
             _ => {}
         }
         Ok(())

@@ -3,8 +3,8 @@
 use super::SessionError;
 use super::health::Health;
 use super::outcome::Outcome;
+use super::positioning_score::PositioningScore;
 use super::ride::Ride;
-use super::score::PositioningScore;
 use super::summary::{Summary, TrainSummary};
 use crate::bus::{
     EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainEnd, TrainId,

@@ -48,10 +48,16 @@ pub struct Fixes {
 
 impl Observer for Fixes {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
-        let Event::Pair(TrainId(0), _, report, truths_m) = event else {
+        let Event::Pair {
+            train: TrainId(0),
+            report,
+            true_chainages_m,
+            ..
+        } = event
+        else {
             return Ok(());
         };
-        for (fix, truth_m) in report.fixes.iter().zip(*truths_m) {
+        for (fix, truth_m) in report.fixes.iter().zip(*true_chainages_m) {
             let range_m = Vector3::norm(&fix.lamp_in_camera);
             self.of_method[fix.method as usize].push((range_m, fix.chainage_m - truth_m));
         }

@@ -345,12 +345,16 @@ impl Observer for DataSet<'_> {
     fn observe(&mut self, event: &Event<'_>) -> Result {
         match *event {
             Event::Exposure(exposure) => self.expose(exposure),
-            Event::Pair(TrainId(0), pair, ..) => {
+            Event::Pair {
+                train: TrainId(0),
+                pair,
+                ..
+            } => {
                 let images = [&pair.left.image, &pair.right.image];
                 self.images(RIG, pair.left.number, &images)?;
             }
-            Event::Wayside(k, frame, _) => {
-                self.images(Source::Wayside(k), frame.number, &[&frame.image])?;
+            Event::Wayside { post, frame, .. } => {
+                self.images(Source::Wayside(post), frame.number, &[&frame.image])?;
             }
             _ => return Ok(()),
         }

@@ -124,7 +124,10 @@ pub(crate) fn play(observer: &mut dyn Observer, extent: Extent) {
         opening: &opening,
         rig: &rig,
     };
-    session.event(&Event::Note(SimTime::ZERO, "scenario made_up begins"));
+    session.event(&Event::Note {
+        time: SimTime::ZERO,
+        text: "scenario made_up begins",
+    });
     // Everything falls on multiples of 1/300 s.
     for tick in 0..=(extent.duration_s * 300.0) as u32 {
         let t_s = f64::from(tick) / 300.0;
@@ -186,7 +189,11 @@ impl Session<'_> {
             ..TrainState::default()
         };
         let left = truth.world_from_vehicle * self.rig.vehicle_from_left;
-        self.event(&Event::Train(TrainId(0), &truth, Some(&left)));
+        self.event(&Event::Train {
+            train: TrainId(0),
+            truth: &truth,
+            left_eye: Some(&left),
+        });
     }
 
     fn bodies(&mut self, t_s: f64) {
@@ -207,7 +214,10 @@ impl Session<'_> {
             let half = Vector3::new(0.4, 0.3, 0.25);
             bodies.push(body(Shape::Box(half), at(0.2, 0.25)));
         }
-        self.event(&Event::Bodies(SimTime::from_secs(t_s), &bodies));
+        self.event(&Event::Bodies {
+            time: SimTime::from_secs(t_s),
+            bodies: &bodies,
+        });
     }
 
     fn protection(&mut self, t_s: f64) {
@@ -281,7 +291,12 @@ impl Session<'_> {
             right: frame(time, number),
         };
         let truths_m = [run(t_s).0; 2];
-        self.event(&Event::Pair(TrainId(0), &pair, &report, &truths_m));
+        self.event(&Event::Pair {
+            train: TrainId(0),
+            pair: &pair,
+            report: &report,
+            true_chainages_m: &truths_m,
+        });
     }
 
     fn wayside(&mut self, t_s: f64, number: u32) {
@@ -305,7 +320,11 @@ impl Session<'_> {
             report.danger = DangerLevel::High;
             report.obstacles.push(obstacle);
         }
-        self.event(&Event::Wayside(0, &frame, &report));
+        self.event(&Event::Wayside {
+            post: 0,
+            frame: &frame,
+            report: &report,
+        });
         if number == 15 {
             let warning = super::warning(&device.name, t_s, DangerLevel::High);
             super::message(self.observer, report.time, warning);

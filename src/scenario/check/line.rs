@@ -8,13 +8,18 @@ use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::TrainSettings;
 use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
+
 /// Of so many lamps, evenly along the line, it is found whether a rig sees them.
 const LAMPS_TRIED: usize = 30;
 /// A rig must see one of so many of them.
 const FEWEST_SEEN_OF: usize = 10;
 
-/// By how much the length of a train may be taken wrong.
-const MOST_LENGTH_ERROR_M: f64 = 0.1;
+/// By how much its equipment may take the length of a train wrong. From the rear end, the head is
+/// found by it.
+const REAR_LENGTH_ERROR_M: f64 = 0.1;
+/// Elsewhere it says which gradients are under the train: a quarter of a car is not a coupler more or
+/// less, but a car forgotten.
+const LENGTH_ERROR_M: f64 = 5.0;
 
 /// Checks against the line, and the wayside devices at their places.
 pub(in crate::scenario) fn in_tunnel(
@@ -33,7 +38,7 @@ pub(in crate::scenario) fn in_tunnel(
     line.obstacles();
     line.cables();
     line.workers();
-    line.rigs();
+    line.onboard();
     let posts = file.wayside.iter().enumerate();
     posts
         .filter_map(|(k, post)| line.post(&format!("wayside[{k}].device"), post))
@@ -202,34 +207,43 @@ impl LineCheck<'_, '_> {
         open
     }
 
-    fn rigs(&mut self) {
+    fn onboard(&mut self) {
         let file = self.file;
-        if let Some(rig) = &file.rig {
-            self.view("rig", rig, 0);
-            self.rear_rig("stack.protection", rig, 0, &file.stack.protection);
-        }
+        let first = file.rig.as_ref();
+        self.equipped("stack", &file.stack.protection, "rig", first, 0);
         for (k, onboard) in file.onboard.iter().enumerate() {
-            let train = onboard.train.into();
-            if let Some(rig) = &onboard.rig {
-                self.view(&format!("onboard[{k}].rig"), rig, train);
-                let at = format!("onboard[{k}].protection");
-                self.rear_rig(&at, rig, train, &onboard.protection);
-            }
+            let (at, rig) = (format!("onboard[{k}]"), onboard.rig.as_ref());
+            let (protection, train) = (&onboard.protection, onboard.train.into());
+            self.equipped(&at, protection, &format!("{at}.rig"), rig, train);
         }
     }
 
-    /// From the rear end, the head is found by the length that the equipment takes the train to have.
-    fn rear_rig(&mut self, at: &str, rig: &RigSettings, train: usize, set: &ProtectionSettings) {
+    /// The rig and the protection settings of a train.
+    fn equipped(
+        &mut self,
+        at: &str,
+        protection: &ProtectionSettings,
+        rig_at: &str,
+        rig: Option<&RigSettings>,
+        train: usize,
+    ) {
+        if let Some(rig) = rig {
+            self.view(rig_at, rig, train);
+        }
         let train = self.file.trains().nth(train);
-        let Some(train) = train.filter(|_| rig.end == TrainEnd::Rear) else {
+        let Some((train, set_m)) = train.zip(protection.train_length_m) else {
             return;
         };
-        let (length_m, set_m) = (train.length_m(), set.train_length_m);
-        if (length_m - set_m).abs() > MOST_LENGTH_ERROR_M {
+        let length_m = train.length_m();
+        let (most_m, why) = match rig.map(|rig| rig.end) {
+            Some(TrainEnd::Rear) => (REAR_LENGTH_ERROR_M, "the rig is at the rear end, and "),
+            _ => (LENGTH_ERROR_M, ""),
+        };
+        if (length_m - set_m).abs() > most_m {
             self.check.problem(
-                &format!("{at}.train_length_m"),
-                format!("the rig is at the rear end, and the train is {length_m:.2} m long"),
-                format!("give {length_m:.2}, or a measured length within {MOST_LENGTH_ERROR_M} m"),
+                &format!("{at}.protection.train_length_m"),
+                format!("{set_m} m, but {why}the train is {length_m:.2} m long"),
+                format!("take it out, or give a measured length within {most_m} m of it"),
             );
         }
     }

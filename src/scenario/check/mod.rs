@@ -9,6 +9,7 @@ use crate::bus::{TrainEnd, TrainId};
 use crate::settings::{Checker, name_advice};
 use crate::twin::faults::rig_cameras;
 use crate::twin::physics::TrainSettings;
+use std::collections::BTreeSet;
 
 impl ScenarioFile {
     /// What needs no tunnel.
@@ -24,6 +25,7 @@ impl ScenarioFile {
             self.physics().check_together(check);
         }
         check_onboard(self, check);
+        check_names(self, check);
         check_reach(self, check);
         for (k, post) in self.wayside.iter().enumerate() {
             if self.wayside[..k].iter().any(|p| p.device == post.device) {
@@ -59,6 +61,29 @@ fn check_reach(file: &ScenarioFile, check: &mut Checker<'_>) {
                 format!("devices watch {watched_m} m, a silent one is missed over {reach_m} m"),
                 format!("give at least {watched_m}, as stack.wayside.reach_m has it"),
             );
+        }
+    }
+}
+
+/// Scores and pictures tell things apart by their names.
+fn check_names(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let obstacles = file.obstacles.iter().map(|o| &o.name);
+    let cables = file.cables.iter().map(|c| &c.name);
+    let workers = file.workers.iter().map(|w| &w.name);
+    let mut names = BTreeSet::new();
+    for (table, names_there) in [
+        ("obstacles", obstacles.collect::<Vec<_>>()),
+        ("cables", cables.collect()),
+        ("workers", workers.collect()),
+    ] {
+        for (k, name) in names_there.into_iter().enumerate() {
+            if !names.insert(name) {
+                check.problem(
+                    &format!("{table}[{k}].name"),
+                    format!("`{name}` is the name of something before it too"),
+                    "give each obstacle, cable and worker a name of its own",
+                );
+            }
         }
     }
 }

@@ -148,8 +148,9 @@ fn other_trains_are_other_than_a_first_one() {
     assert_eq!(file.train_key(0), "other_trains[0]");
 }
 
-/// Fails where the head would be reckoned from the rear end with a wrong length, a rig on a bench has a
-/// rear end, or a silent device is missed over less than it watches.
+/// Fails where equipment takes its train for much longer or shorter than it is (at the rear end, from
+/// which the head is reckoned, at all), a rig on a bench has a rear end, or a silent device is missed
+/// over less than it watches.
 #[test]
 fn equipment_knows_its_train_and_its_devices() {
     let rear = "[rig]\nend = 'rear'\nside = 'right'\nyaw_deg = 141.0\n";
@@ -160,14 +161,31 @@ fn equipment_knows_its_train_and_its_devices() {
 
     let text = include_str!("../../../tunnels/chengdu_line1.toml");
     let tunnel = Tunnel::from_toml(text).unwrap();
-    let keys = |cars: u32| -> Vec<String> {
+    let keys = |train: &str, more: &str| -> Vec<String> {
         let text = format!(
-            "name = 'test'\ntunnel = 'given'\n[train]\ncars = {cars}\nstart_chainage_m = 300.0\n{rear}"
+            "name = 'test'\ntunnel = 'given'\n[train]\n{train}start_chainage_m = 300.0\n{more}"
         );
         let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
         in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         problems.into_iter().map(|p| p.key).collect()
     };
-    assert_eq!(keys(6), [""; 0]);
-    assert_eq!(keys(3), ["stack.protection.train_length_m"]);
+    let length = |length_m: f64| format!("[stack.protection]\ntrain_length_m = {length_m}\n");
+    let given =
+        |cars: &str, rig: &str, length_m: f64| keys(cars, &format!("{rig}{}", length(length_m)));
+    let wrong = ["stack.protection.train_length_m"];
+    // Not given it is the train's, of however many cars.
+    assert_eq!(keys("cars = 3\n", rear), [""; 0]);
+    assert_eq!(given("", rear, 118.1), [""; 0]);
+    assert_eq!(given("", rear, 118.2), wrong);
+    assert_eq!(given("", "", 118.2), [""; 0]);
+    assert_eq!(given("", "", 98.35), wrong);
+}
+
+/// Fails where two things may have the same name, which scores and pictures tell them apart by.
+#[test]
+fn each_thing_has_a_name_of_its_own() {
+    let boxes = "[train]\n[[obstacles]]\n[[obstacles]]\nname = 'bag'\n[[obstacles]]\n";
+    assert_eq!(keys(boxes), ["obstacles[2].name"]);
+    let worker = "[train]\n[[obstacles]]\nname = 'worker'\n[[workers]]\n";
+    assert!(keys(worker).contains(&"workers[0].name".to_owned()));
 }

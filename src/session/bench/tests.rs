@@ -24,7 +24,7 @@ impl Observer for Seen {
                 let with = |v: &View| (v.camera.shutter.exposure_s, v.sensor.gain_db);
                 self.drawn.extend(views.map(with));
             }
-            Event::Pair(_, pair, report, _) => {
+            Event::Pair { pair, report, .. } => {
                 let eyes = [&pair.left, &pair.right];
                 (self.said).extend(eyes.map(|eye| (eye.exposure_s, eye.gain_db)));
                 for fix in &report.fixes {

@@ -65,10 +65,12 @@
 
 mod attitude;
 mod equipment;
+mod lamp_fix;
 mod lamp_presence;
 mod naming;
 mod positioner;
 mod reckoning;
+mod sighting;
 mod smear;
 mod stereo;
 #[cfg(test)]

@@ -3,18 +3,18 @@
 use super::lamp_presence::LampPresence;
 use super::naming::{Expected, Followed, Naming, Verdict};
 use super::reckoning::DeadReckoning;
+use super::sighting::{Measurement, PairLamps, Sighting};
 use super::smear::LampSmear;
-use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{
-    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, Intrinsics, LedReport,
-    Method, OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
+    CameraFault, CameraHealth, CameraModel, Frame, Identity, ImuSample, LedReport, Method,
+    OdometerSample, PositionFix, RigCalibration, SimTime, StereoPair,
 };
 use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, LedSettings};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;
 use image::GrayImage;
-use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
 /// Positions the train from stereo pairs of a lamp, as it would on board: raw images, odometer
@@ -34,39 +34,13 @@ pub struct LedPositioner {
     lamp_presence: LampPresence,
     followed: Vec<Followed>,
     epoch: Option<SimTime>,
-    left: Vec<LampImage>,
-    right: Vec<LampImage>,
+    /// Those of the last pair: their memory serves again.
+    lamps: PairLamps,
     alone: ChipVotes,
 }
 
 /// No camera on a train exposes for as long as this.
 const MOST_EXPOSURE_S: f64 = 1.0;
-
-/// A lamp seen in a pair.
-#[derive(Clone, Copy, Debug)]
-struct Sighting {
-    left: usize,
-    right: Option<usize>,
-    stereo: Option<Pairing>,
-    mono: Option<Vector3<f64>>,
-    time: SimTime,
-    named: Option<(Uid, Identity)>,
-}
-
-impl Sighting {
-    fn lamp_in_camera(&self) -> Option<Vector3<f64>> {
-        self.stereo.map(|s| s.lamp).or(self.mono)
-    }
-}
-
-/// How well a lamp was measured by the rig.
-#[derive(Clone, Copy, Debug)]
-struct LampAccuracy {
-    /// Standard deviation of its distance, as a share of it.
-    distance: f64,
-    /// Standard deviation of its image, pixels.
-    image_px: f64,
-}
 
 impl LedPositioner {
     /// For one rig on one line.
@@ -92,8 +66,7 @@ impl LedPositioner {
             lamp_presence: LampPresence::default(),
             followed: Vec::new(),
             epoch: None,
-            left: Vec::new(),
-            right: Vec::new(),
+            lamps: PairLamps::default(),
         }
     }
 
@@ -194,49 +167,57 @@ impl LedPositioner {
     fn read_pair(&mut self, pair: &StereoPair) -> LedReport {
         let start = pair.left.start;
         let seconds = start.since(*self.epoch.get_or_insert(start));
-        let (mut left, mut right) = (
-            std::mem::take(&mut self.left),
-            std::mem::take(&mut self.right),
-        );
-        self.find(pair, &mut left, &mut right);
+        let mut lamps = std::mem::take(&mut self.lamps);
+        self.find(pair, &mut lamps);
         self.followed
             .retain(|f| seconds - f.seen_s <= self.settings.forget_s);
-        let (mut paper, mut mono) = (None, None);
-        for k in 0..left.len() {
-            let mut sighting = self.sight(pair, &left, &right, k);
-            self.name(pair, &mut sighting, seconds, &left, &right);
-            left[k].spot.uid = sighting.named;
+        let (mut stereo, mut mono) = (None, None);
+        for k in 0..lamps.left.len() {
+            let mut sighting = self.measurement().sight(pair, &lamps, k);
+            sighting.named = self.name(pair, &sighting, seconds, &lamps);
+            lamps.left[k].spot.uid = sighting.named;
             if let Some(r) = sighting.right {
-                right[r].spot.uid = sighting.named;
+                lamps.right[r].spot.uid = sighting.named;
             }
             if self.gives(Method::Stereo) {
-                keep_surer(&mut paper, self.paper_fix(&sighting, &left, &right));
+                let fix = self.measurement().stereo_fix(&sighting, &lamps);
+                keep_surer(&mut stereo, fix);
             }
             if self.gives(Method::Mono) {
-                keep_surer(&mut mono, self.mono_fix(&sighting, &left));
+                let fix = self.measurement().mono_fix(&sighting, &lamps);
+                keep_surer(&mut mono, fix);
             }
         }
         let best = match self.best_method(pair.right.image.is_empty()) {
-            Method::Stereo => &paper,
+            Method::Stereo => &stereo,
             Method::Mono => &mono,
         };
         if let Some(fix) = best {
             self.reckoning.on_fix(fix.time, fix.chainage_m);
         }
-        let fixes = paper.into_iter().chain(mono).collect();
+        let fixes = stereo.into_iter().chain(mono).collect();
         let spots = |lamps: &[LampImage]| lamps.iter().map(|l| l.spot.clone()).collect();
         let report = LedReport {
             time: start,
             number: pair.left.number,
             eyes: [CameraHealth::default(); 2],
             best: Method::Stereo,
-            dark: self.dark_lamps(pair, &left),
-            left: spots(&left),
-            right: spots(&right),
+            dark: self.dark_lamps(pair, &lamps.left),
+            left: spots(&lamps.left),
+            right: spots(&lamps.right),
             fixes,
         };
-        (self.left, self.right) = (left, right);
+        self.lamps = lamps;
         report
+    }
+
+    fn measurement(&self) -> Measurement<'_> {
+        Measurement {
+            settings: &self.settings,
+            rig: &self.rig,
+            map: &self.map,
+            reckoning: &self.reckoning,
+        }
     }
 
     /// Lamps that have gone out of the left eye's sight without ever having been in it.
@@ -258,7 +239,7 @@ impl LedPositioner {
     }
 
     /// Finds the lamps of both eyes' images.
-    fn find(&mut self, pair: &StereoPair, left: &mut Vec<LampImage>, right: &mut Vec<LampImage>) {
+    fn find(&mut self, pair: &StereoPair, lamps: &mut PairLamps) {
         let start = pair.left.start;
         let reckoning = &self.reckoning;
         let (head_m, speed_mps) = (reckoning.chainage_m(start), reckoning.speed_mps(start));
@@ -276,116 +257,33 @@ impl LedPositioner {
             smear(&self.rig.right, from_right),
         ];
         let [of_left, of_right] = &mut self.finders;
-        *left = of_left.find(&pair.left.image, |p| smears[0].along_row_px(p));
-        *right = of_right.find(&pair.right.image, |p| smears[1].along_row_px(p));
-    }
-
-    /// Finds the right eye's image of a lamp and where the lamp is.
-    fn sight(
-        &self,
-        pair: &StereoPair,
-        left: &[LampImage],
-        right: &[LampImage],
-        k: usize,
-    ) -> Sighting {
-        let lamp = &left[k];
-        let height = f64::from(lamp.spot.bounds.v1 - lamp.spot.bounds.v0 + 1);
-        let most = (4.0 + 0.15 * height) / self.rig.left.intrinsics.fy_px;
-        let partner = right
-            .iter()
-            .enumerate()
-            .filter_map(|(r, other)| Some((r, self.put_together(pair, lamp, other)?)))
-            .filter(|(_, pairing)| pairing.miss < most)
-            .min_by(|a, b| a.1.miss.total_cmp(&b.1.miss));
-        let shutter = &self.rig.left.shutter;
-        let time = shutter.row_mid(pair.left.start, lamp.spot.centre.y);
-        Sighting {
-            left: k,
-            right: partner.map(|p| p.0),
-            stereo: partner.map(|p| p.1),
-            mono: self.by_size(lamp, time),
-            time,
-            named: None,
-        }
-    }
-
-    /// Both eyes' images of a lamp, with what the train runs between their rows. The rows' times
-    /// are taken from the images first, then, without their noise, from where the lamp is.
-    fn put_together(
-        &self,
-        pair: &StereoPair,
-        left: &LampImage,
-        right: &LampImage,
-    ) -> Option<Pairing> {
-        let rig = &self.rig;
-        let times = |left_row: f64, right_row: f64| {
-            let left = rig.left.shutter.row_mid(pair.left.start, left_row);
-            (left, rig.right.shutter.row_mid(pair.right.start, right_row))
-        };
-        let (l, r) = (
-            sight(&rig.left.intrinsics, left),
-            sight(&rig.right.intrinsics, right),
-        );
-        let at_rows = |(now, then)| {
-            let left_from_right = self.left_from_right(now, then);
-            Some((left_from_right, triangulate(&left_from_right, &l, &r)?))
-        };
-        let (left_from_right, rough) = at_rows(times(left.spot.centre.y, right.spot.centre.y))?;
-        let lamp = Point3::from(rough.lamp);
-        let left_row = rig.left.intrinsics.project(&lamp)?.y;
-        let seen_right = left_from_right.inverse_transform_point(&lamp);
-        let right_row = rig.right.intrinsics.project(&seen_right)?.y;
-        Some(at_rows(times(left_row, right_row))?.1)
-    }
-
-    /// The right eye at one time in the frame of the left eye at another.
-    fn left_from_right(&self, now: SimTime, then: SimTime) -> Isometry3<f64> {
-        if now == then {
-            return self.rig.left_from_right;
-        }
-        let mount = self.rig.vehicle_from_left;
-        mount.inverse() * self.reckoning.moved(now, then) * mount * self.rig.left_from_right
-    }
-
-    /// Where a lamp is by its size in one image.
-    fn by_size(&self, lamp: &LampImage, time: SimTime) -> Option<Vector3<f64>> {
-        let (camera, outline) = (&self.rig.left, lamp.own_outline?);
-        let diameter_m = self.map.lamps.first()?.diameter_m;
-        let pinhole = pinhole(&camera.intrinsics);
-        let place = |e| from_size(&pinhole, &lamp.centre, e, diameter_m);
-        let run = Vector3::x() * self.reckoning.speed_mps(time);
-        let velocity = -(self.rig.vehicle_from_left.rotation.inverse() * run);
-        place(&at_rest(camera, &outline, &place(&outline)?, &velocity)?)
+        lamps.left = of_left.find(&pair.left.image, |p| smears[0].along_row_px(p));
+        lamps.right = of_right.find(&pair.right.image, |p| smears[1].along_row_px(p));
     }
 
     /// Follows the lamp, reads its stripes, and names it.
     fn name(
         &mut self,
         pair: &StereoPair,
-        sighting: &mut Sighting,
+        sighting: &Sighting,
         seconds: f64,
-        left: &[LampImage],
-        right: &[LampImage],
-    ) {
-        let Some(lamp) = sighting.lamp_in_camera() else {
-            return;
-        };
+        lamps: &PairLamps,
+    ) -> Option<(Uid, Identity)> {
+        let lamp = sighting.lamp_in_camera()?;
         let lamp_m = (self.rig.vehicle_from_left * Point3::from(lamp)).coords;
         let distance_m = self.reckoning.distance_m(sighting.time);
         let k = self.follow(lamp_m, distance_m, seconds);
-        let decoded = self.read(pair, sighting, seconds, k, left, right);
+        let decoded = self.read(pair, sighting, seconds, k, lamps);
         let expected = self.expect(sighting.time, &lamp_m);
-        let verdict = self
-            .naming
-            .judge(&mut self.followed[k], decoded, expected, &self.map);
-        sighting.named = match verdict {
+        let followed = &mut self.followed[k];
+        match (self.naming).judge(followed, decoded, expected, &self.map) {
             Verdict::Named(uid, identity) => Some((uid, identity)),
             Verdict::Moved(uid, identity) => {
                 self.reckoning.forget_fix();
                 Some((uid, identity))
             }
             Verdict::Unknown => None,
-        };
+        }
     }
 
     /// Index of the followed lamp that this is.
@@ -413,13 +311,12 @@ impl LedPositioner {
         sighting: &Sighting,
         seconds: f64,
         k: usize,
-        left: &[LampImage],
-        right: &[LampImage],
+        lamps: &PairLamps,
     ) -> Option<Uid> {
-        let lamp = &left[sighting.left];
-        let whole = |r: &usize| !right[*r].spot.cut;
-        let (eye, frame, lamp) = match sighting.right.filter(whole) {
-            Some(r) if lamp.spot.cut => (1, &pair.right, &right[r]),
+        let lamp = &lamps.left[sighting.left];
+        let right = sighting.right.map(|r| &lamps.right[r]);
+        let (eye, frame, lamp) = match right.filter(|right| !right.spot.cut) {
+            Some(right) if lamp.spot.cut => (1, &pair.right, right),
             _ => (0, &pair.left, lamp),
         };
         let reading = self.finders[eye].read(&frame.image, lamp)?;
@@ -440,107 +337,6 @@ impl LedPositioner {
             lamp_chainage_m: line.track_from_world(&lamp, chainage_m).s_m,
         })
     }
-
-    fn paper_fix(
-        &self,
-        sighting: &Sighting,
-        left: &[LampImage],
-        right: &[LampImage],
-    ) -> Option<PositionFix> {
-        let (stereo, r) = (sighting.stereo?, sighting.right?);
-        let (l, r) = (&left[sighting.left], &right[r]);
-        let baseline_mm = 1e3 * self.rig.baseline_m();
-        let focal_px = |eye: &CameraModel| eye.intrinsics.fx_px;
-        let sigma = (l.sigma_px / focal_px(&self.rig.left))
-            .hypot(r.sigma_px / focal_px(&self.rig.right))
-            .hypot(self.vergence_sigma(stereo.right_x));
-        let spread = LampAccuracy {
-            distance: (sigma / stereo.disparity)
-                .hypot(self.settings.baseline_sigma_mm / baseline_mm),
-            image_px: l.sigma_px,
-        };
-        self.fix(Method::Stereo, sighting, stereo.lamp, spread)
-    }
-
-    /// What the right eye's yaw against the left makes of its x at depth 1: x = tan(angle), so
-    /// dx = (1 + tan^2) d(angle).
-    fn vergence_sigma(&self, right_x: f64) -> f64 {
-        (1.0 + right_x * right_x) * self.settings.vergence_sigma_deg.to_radians()
-    }
-
-    fn mono_fix(&self, sighting: &Sighting, left: &[LampImage]) -> Option<PositionFix> {
-        let lamp = &left[sighting.left];
-        let spread = LampAccuracy {
-            distance: lamp.axis_sigma_px / lamp.own_outline?.semi_major_px,
-            image_px: lamp.sigma_px,
-        };
-        self.fix(Method::Mono, sighting, sighting.mono?, spread)
-    }
-
-    /// Train = lamp - R (lamp in the vehicle's frame).
-    fn fix(
-        &self,
-        method: Method,
-        sighting: &Sighting,
-        lamp: Vector3<f64>,
-        spread: LampAccuracy,
-    ) -> Option<PositionFix> {
-        let (uid, identity) = sighting.named?;
-        let site = self.map.lamp(uid)?;
-        let line = &self.map.alignment;
-        let vehicle = self.rig.vehicle_from_left * Point3::from(lamp);
-        let expected = self.reckoning.chainage_m(sighting.time);
-        let mut chainage_m = expected.unwrap_or(site.chainage_m - vehicle.x);
-        let mut position = site.centre;
-        // The attitude depends on the place, weakly: twice is enough.
-        for _ in 0..2 {
-            let turn = self.reckoning.attitude(sighting.time, chainage_m);
-            position = site.centre - turn * vehicle.coords;
-            chainage_m = line.track_from_world(&position, chainage_m).s_m;
-        }
-        let turn = self.reckoning.attitude(sighting.time, chainage_m);
-        let heading = line.at(chainage_m).heading_rad;
-        let sigma_m = self.sigma_m(&lamp, &vehicle, &turn, heading, spread);
-        (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
-            time: sighting.time,
-            method,
-            chainage_m,
-            sigma_m,
-            position,
-            uid,
-            identity,
-            lamp_in_camera: lamp,
-        })
-    }
-
-    /// One sigma along the track: of distance and bearing (`spread`: what the images scatter by and,
-    /// of the rig's calibration, what enters the disparity), of the rest of the calibration (focal
-    /// length, attitude of the mount; an error of the first scales depths alone, as x = (u - cx) b /
-    /// d), of the car's attitude, and of the survey.
-    fn sigma_m(
-        &self,
-        lamp: &Vector3<f64>,
-        vehicle: &Point3<f64>,
-        turn: &UnitQuaternion<f64>,
-        heading_rad: f64,
-        spread: LampAccuracy,
-    ) -> f64 {
-        let along = Vector3::new(heading_rad.cos(), heading_rad.sin(), 0.0);
-        let world_from_camera = turn * self.rig.vehicle_from_left.rotation;
-        let in_world = world_from_camera * lamp;
-        let depth = world_from_camera * Vector3::new(0.0, 0.0, lamp.z);
-        let turned_by = |arm: &Vector3<f64>, deg: f64| along.cross(arm).norm() * deg.to_radians();
-        let s = &self.settings;
-        let terms = [
-            along.dot(&in_world) * spread.distance,
-            spread.image_px * lamp.z / self.rig.left.intrinsics.fx_px,
-            along.dot(&depth) * s.focal_sigma_share,
-            turned_by(&in_world, s.mount_sigma_deg),
-            turned_by(&(turn * vehicle.coords), s.attitude_sigma_deg),
-            s.survey_sigma_m,
-        ];
-        terms.iter().map(|t| t * t).sum::<f64>().sqrt()
-    }
 }
 
 /// The frame of an eye that has delivered nothing.
@@ -560,9 +356,4 @@ fn keep_surer(best: &mut Option<PositionFix>, fix: Option<PositionFix>) {
     if let Some(fix) = fix.filter(surer) {
         *best = Some(fix);
     }
-}
-
-/// Line of sight of a lamp's centre in an eye's frame, at depth 1.
-fn sight(lens: &Intrinsics, lamp: &LampImage) -> Vector3<f64> {
-    pinhole(lens).ray(lamp.centre.x, lamp.centre.y)
 }

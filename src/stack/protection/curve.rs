@@ -37,7 +37,7 @@ pub(super) struct Grades {
 impl Grades {
     /// From the map, with a kilometre beyond both ends.
     pub fn new(map: &Tunnel, settings: &ProtectionSettings) -> Self {
-        let steps = (settings.train_length_m.clamp(STEP_M, 1000.0) / STEP_M).round() as usize;
+        let steps = (settings.length_m().clamp(STEP_M, 1000.0) / STEP_M).round() as usize;
         let first_m = -BEYOND_M;
         let count = ((map.alignment.length_m() + 2.0 * BEYOND_M) / STEP_M).clamp(2.0, 1e6) as usize;
         let rail: Vec<f64> = (0..count + steps)

@@ -142,7 +142,7 @@ impl Equipment for TrainProtection {
                 track: self.route.track,
                 chainage_m,
                 sigma_m: report.sigma_m.unwrap_or_default(),
-                length_m: self.protection.settings.train_length_m,
+                length_m: self.protection.settings.length_m(),
                 direction: self.route.direction,
                 speed_mps: report.speed_mps,
                 time: now,

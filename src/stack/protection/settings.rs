@@ -48,8 +48,8 @@ settings! {
         service_mps2: f64 = 0.8, in 0.4..=3.0;
         /// Rotating mass as a share of the train's mass.
         rotating_mass: f64 = 0.08, in 0.0..=0.5;
-        /// Train length, m.
-        train_length_m: f64 = 118.0, in 5.0..=500.0;
+        /// Length that the equipment takes its train to have, m. Default: that of the train.
+        train_length_m: Option<f64> = None, in 5.0..=500.0;
         /// Time that the driver has from the permitted speed, where he is warned, to the
         /// intervention, s.
         driver_time_s: f64 = 4.0, in 0.0..=20.0;
@@ -72,7 +72,15 @@ settings! {
     also check_order
 }
 
+/// Length of six cars of class B (GB 50157), metres.
+const SIX_CARS_M: f64 = 118.0;
+
 impl ProtectionSettings {
+    /// Length of the train, metres; six cars of class B where nothing is said.
+    pub fn length_m(&self) -> f64 {
+        self.train_length_m.unwrap_or(SIX_CARS_M)
+    }
+
     fn check_order(&self, check: &mut Checker<'_>) {
         let danger_m = self.danger_distance_m.max(0.0);
         check.within(
