@@ -56,15 +56,28 @@ impl Followed {
         near.then(|| miss.norm())
     }
 
-    /// Notes that a name was read, and how many pairs in a row read the same.
-    fn note(&mut self, uid: Uid) -> u32 {
+    /// Notes the name that all readings so far give, and how many pairs in a row gave it. A pair that
+    /// read nothing gives none again.
+    fn note(&mut self, uid: Uid, reading: PairReading) -> u32 {
+        let more = u32::from(reading != PairReading::Nothing);
         let times = match self.read {
-            Some((last, times)) if last == uid => times + 1,
-            _ => 1,
+            Some((last, times)) if last == uid => times + more,
+            _ => more,
         };
         self.read = Some((uid, times));
         times
     }
+}
+
+/// What one pair's stripes say of a lamp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PairReading {
+    /// They cannot be read.
+    Nothing,
+    /// A part of its code.
+    Chips,
+    /// All of its name.
+    Name(Uid),
 }
 
 /// What is expected at the time of a pair.
@@ -95,22 +108,25 @@ pub struct Naming {
 }
 
 impl Naming {
-    /// Names a followed lamp. `decoded` is the name in this pair's stripes alone.
+    /// Names a followed lamp. `reading` is what this pair's stripes alone say.
     pub fn judge(
         &self,
         followed: &mut Followed,
-        decoded: Option<Uid>,
+        reading: PairReading,
         expected: Option<Expected>,
         map: &Tunnel,
     ) -> Verdict {
         let on_map = |uid: &Uid| map.lamp(*uid).is_some();
-        let own = decoded.filter(on_map).map(|uid| (uid, Identity::Decoded));
+        let own = match reading {
+            PairReading::Name(uid) if on_map(&uid) => Some((uid, Identity::Decoded)),
+            _ => None,
+        };
         let joined = || followed.votes.decode().filter(on_map);
         let read = own.or_else(|| joined().map(|uid| (uid, Identity::Joined)));
         let Some((uid, identity)) = read else {
             return self.without_reading(followed, expected, map);
         };
-        let proven = followed.note(uid) >= self.agreeing_reads;
+        let proven = followed.note(uid, reading) >= self.agreeing_reads;
         let verdict = match expected {
             Some(e) if self.stands_there(uid, e, map) => Verdict::Named(uid, identity),
             Some(_) if proven => Verdict::Moved(uid, identity),
@@ -170,6 +186,7 @@ fn spacing_m(map: &Tunnel, k: usize) -> f64 {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::stack::led::StripeReading;
     use crate::stack::led::testing::tunnel;
     use crate::track::uid::LineCode;
 
@@ -195,20 +212,20 @@ mod tests {
         let s = map.lamps[20].chainage_m;
         let mut lamp = followed();
         assert_eq!(
-            NAMING.judge(&mut lamp, Some(b), at(s + 1.0), &map),
+            NAMING.judge(&mut lamp, PairReading::Name(b), at(s + 1.0), &map),
             Verdict::Unknown
         );
         assert_eq!(
-            NAMING.judge(&mut lamp, Some(a), at(s + 1.0), &map),
+            NAMING.judge(&mut lamp, PairReading::Name(a), at(s + 1.0), &map),
             Verdict::Named(a, Identity::Decoded)
         );
         assert_eq!(
-            NAMING.judge(&mut lamp, Some(b), None, &map),
+            NAMING.judge(&mut lamp, PairReading::Name(b), None, &map),
             Verdict::Unknown
         );
         let stranger = Uid { line: 9, lamp: 3 };
         assert_eq!(
-            NAMING.judge(&mut followed(), Some(stranger), None, &map),
+            NAMING.judge(&mut followed(), PairReading::Name(stranger), None, &map),
             Verdict::Unknown
         );
     }
@@ -224,14 +241,42 @@ mod tests {
         ] {
             let mut lamp = followed();
             assert_eq!(
-                NAMING.judge(&mut lamp, Some(uid), expected, &map),
+                NAMING.judge(&mut lamp, PairReading::Name(uid), expected, &map),
                 Verdict::Unknown
             );
-            assert_eq!(NAMING.judge(&mut lamp, Some(uid), expected, &map), verdict);
+            assert_eq!(
+                NAMING.judge(&mut lamp, PairReading::Name(uid), expected, &map),
+                verdict
+            );
             // Once believed it keeps its name while it is followed.
-            let kept = NAMING.judge(&mut lamp, None, expected, &map);
+            let kept = NAMING.judge(&mut lamp, PairReading::Nothing, expected, &map);
             assert_eq!(kept, Verdict::Named(uid, Identity::Followed));
         }
+    }
+
+    /// Fails where chips of long ago count as a reading of every later pair.
+    #[test]
+    fn what_was_joined_once_is_one_reading() {
+        let map = tunnel("manchester");
+        let uid = map.lamps[20].uid;
+        let expected = at(map.lamps[90].chainage_m);
+        let mut lamp = followed();
+        let frame = uid.frame(LineCode::Manchester);
+        let reading = StripeReading {
+            phase_s: 0.0,
+            chips: (0..frame.len).map(|k| Some(frame.is_on(k))).collect(),
+            coherence: 0.9,
+            edges: 20,
+        };
+        lamp.votes.add(0.0, &reading);
+        assert_eq!(lamp.votes.decode(), Some(uid));
+        let mut judge = |reading| NAMING.judge(&mut lamp, reading, expected, &map);
+        assert_eq!(judge(PairReading::Chips), Verdict::Unknown);
+        for _ in 0..10 {
+            assert_eq!(judge(PairReading::Nothing), Verdict::Unknown);
+        }
+        let moved = Verdict::Moved(uid, Identity::Joined);
+        assert_eq!(judge(PairReading::Chips), moved);
     }
 
     /// Within the gate the expected lamp, between two lamps none.
@@ -242,16 +287,16 @@ mod tests {
         let named = Verdict::Named(map.lamps[20].uid, Identity::Predicted);
         for off in [-3.9, 0.0, 3.9] {
             assert_eq!(
-                NAMING.judge(&mut followed(), None, at(s + off), &map),
+                NAMING.judge(&mut followed(), PairReading::Nothing, at(s + off), &map),
                 named
             );
         }
         assert_eq!(
-            NAMING.judge(&mut followed(), None, at(s + 4.5), &map),
+            NAMING.judge(&mut followed(), PairReading::Nothing, at(s + 4.5), &map),
             Verdict::Unknown
         );
         assert_eq!(
-            NAMING.judge(&mut followed(), None, None, &map),
+            NAMING.judge(&mut followed(), PairReading::Nothing, None, &map),
             Verdict::Unknown
         );
     }

@@ -1,7 +1,7 @@
 //! The `paper` positioning and its baseline `mono`, from samples to fixes.
 
 use super::lamp_presence::LampPresence;
-use super::naming::{Expected, Followed, Naming, Verdict};
+use super::naming::{Expected, Followed, Naming, PairReading, Verdict};
 use super::reckoning::DeadReckoning;
 use super::sighting::{Measurement, PairLamps, Sighting};
 use super::smear::LampSmear;
@@ -273,10 +273,10 @@ impl LedPositioner {
         let lamp_m = (self.rig.vehicle_from_left * Point3::from(lamp)).coords;
         let distance_m = self.reckoning.distance_m(sighting.time);
         let k = self.follow(lamp_m, distance_m, seconds);
-        let decoded = self.read(pair, sighting, seconds, k, lamps);
+        let reading = self.read(pair, sighting, seconds, k, lamps);
         let expected = self.expect(sighting.time, &lamp_m);
         let followed = &mut self.followed[k];
-        match (self.naming).judge(followed, decoded, expected, &self.map) {
+        match (self.naming).judge(followed, reading, expected, &self.map) {
             Verdict::Named(uid, identity) => Some((uid, identity)),
             Verdict::Moved(uid, identity) => {
                 self.reckoning.forget_fix();
@@ -312,19 +312,21 @@ impl LedPositioner {
         seconds: f64,
         k: usize,
         lamps: &PairLamps,
-    ) -> Option<Uid> {
+    ) -> PairReading {
         let lamp = &lamps.left[sighting.left];
         let right = sighting.right.map(|r| &lamps.right[r]);
         let (eye, frame, lamp) = match right.filter(|right| !right.spot.cut) {
             Some(right) if lamp.spot.cut => (1, &pair.right, right),
             _ => (0, &pair.left, lamp),
         };
-        let reading = self.finders[eye].read(&frame.image, lamp)?;
+        let Some(reading) = self.finders[eye].read(&frame.image, lamp) else {
+            return PairReading::Nothing;
+        };
         let seconds = seconds + frame.start.since(pair.left.start);
         self.followed[k].votes.add(seconds, &reading);
         self.alone.clear();
         self.alone.add(seconds, &reading);
-        self.alone.decode()
+        (self.alone.decode()).map_or(PairReading::Chips, PairReading::Name)
     }
 
     /// Chainage where this lamp must stand, from where the train takes itself to be.

@@ -5,14 +5,17 @@
 //! distance and not to its root: sigma^2 = sigma_fix^2 + (drift x distance)^2. A fix is taken at
 //! the time when it was true, by the odometer's reading then, and fused by inverse variance; one
 //! too far off is refused. Five refused ones in a row that agree with each other mean that the
-//! train is not where it was thought to be: the last of them is taken.
+//! train is not where it was thought to be: the last of them is taken. They must be of two lamps: of one
+//! lamp that is taken for another, all fixes agree.
 
 use super::ProtectionSettings;
 use crate::bus::{PositionFix, PositionSource, SimTime};
 use crate::stack::odometry::Odometry;
+use crate::track::uid::Uid;
 
-/// Refused fixes in a row that overrule the estimate.
+/// Refused fixes in a row that overrule the estimate, and of how many lamps after each other.
 const OVERRULE: u32 = 5;
+const OVERRULE_LAMPS: u32 = 2;
 
 /// Where the train head is.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,9 +49,15 @@ pub(super) struct Position {
     gate: f64,
     pub odometry: Odometry,
     anchor: Option<HeadPosition>,
-    /// Refused in a row, and the last of them.
-    refused: u32,
-    refused_anchor: Option<HeadPosition>,
+    refused: Refused,
+}
+
+/// Refused fixes in a row that agree with each other.
+#[derive(Clone, Copy, Debug, Default)]
+struct Refused {
+    fixes: u32,
+    lamps: u32,
+    last: Option<(HeadPosition, Uid)>,
 }
 
 impl Position {
@@ -64,14 +73,14 @@ impl Position {
                 distance_m: 0.0,
                 source: PositionSource::Setting,
             }),
-            refused: 0,
-            refused_anchor: None,
+            refused: Refused::default(),
         }
     }
 
     /// A position that may be wrong (from the lamps).
     pub fn on_fix(&mut self, fix: &PositionFix) {
         let (time, chainage_m, sigma_m) = (fix.time, fix.chainage_m, fix.sigma_m);
+        let lamp = fix.uid;
         if !(chainage_m.is_finite() && sigma_m.is_finite() && sigma_m >= 0.0) {
             return;
         }
@@ -88,7 +97,7 @@ impl Position {
         let predicted = anchor.carried(fix.distance_m, self.drift);
         let off_m = fix.chainage_m - predicted.chainage_m;
         if off_m.abs() > self.gate * predicted.sigma_m.hypot(fix.sigma_m) {
-            self.refuse(fix);
+            self.refuse(fix, lamp);
             return;
         }
         let (p, r) = (predicted.sigma_m.powi(2), fix.sigma_m.powi(2));
@@ -113,19 +122,26 @@ impl Position {
 
     fn accept(&mut self, anchor: HeadPosition) {
         self.anchor = Some(anchor);
-        self.refused = 0;
-        self.refused_anchor = None;
+        self.refused = Refused::default();
     }
 
-    fn refuse(&mut self, fix: HeadPosition) {
-        let agrees = self.refused_anchor.is_some_and(|before| {
+    fn refuse(&mut self, fix: HeadPosition, lamp: Uid) {
+        let agrees = |before: &HeadPosition| {
             let expected = before.carried(fix.distance_m, self.drift);
             (expected.chainage_m - fix.chainage_m).abs()
                 <= self.gate * expected.sigma_m.hypot(fix.sigma_m)
-        });
-        self.refused = if agrees { self.refused + 1 } else { 1 };
-        self.refused_anchor = Some(fix);
-        if self.refused >= OVERRULE {
+        };
+        let Refused { fixes, lamps, last } = self.refused;
+        let (fixes, lamps) = match last.filter(|(before, _)| agrees(before)) {
+            Some((_, before)) => (fixes + 1, lamps + u32::from(before != lamp)),
+            None => (1, 1),
+        };
+        self.refused = Refused {
+            fixes,
+            lamps,
+            last: Some((fix, lamp)),
+        };
+        if fixes >= OVERRULE && lamps >= OVERRULE_LAMPS {
             self.accept(fix);
         }
     }
@@ -180,7 +196,8 @@ mod tests {
         assert!((e.chainage_m - 719.8).abs() < 1e-9);
     }
 
-    /// Fusion by inverse variance, one outlier refused, five that agree believed.
+    /// Fusion by inverse variance, one outlier refused, any number of one lamp refused, five of two
+    /// lamps that agree believed.
     #[test]
     fn fixes_are_gated() {
         let mut p = driven(&ProtectionSettings::default(), 1.0, 0.0);
@@ -190,11 +207,13 @@ mod tests {
         let e = p.at(t).unwrap();
         assert!((e.chainage_m - 102.4).abs() < 1e-9);
         assert!((e.sigma_m - 0.8f64.sqrt()).abs() < 1e-9);
-        for _ in 0..4 {
+        for _ in 0..20 {
             p.on_fix(&fix(t, 160.0, 1.0));
         }
         assert!((p.at(t).unwrap().chainage_m - 102.4).abs() < 1e-9);
-        p.on_fix(&fix(t, 160.0, 1.0));
+        let mut of_next = fix(t, 160.0, 1.0);
+        of_next.uid.lamp += 1;
+        p.on_fix(&of_next);
         assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
         // Not a number changes nothing.
         p.on_fix(&fix(t, f64::NAN, 1.0));

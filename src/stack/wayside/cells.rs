@@ -51,6 +51,11 @@ impl GaugeCells {
         }
     }
 
+    /// Whether the cell of a pixel is blind.
+    pub fn is_blind(&self, (u, v): (usize, usize)) -> bool {
+        self.blind.get(v / CELL_PX * self.wide + u / CELL_PX) == Some(&true)
+    }
+
     pub fn any_blind(&self) -> bool {
         self.any_blind
     }

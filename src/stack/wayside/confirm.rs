@@ -1,6 +1,7 @@
 //! Confirmation over frames: an obstacle counts when it was found in k of the last n frames, and
-//! is gone when it was found in none of a longer time: to clear the line too early is worse than
-//! to clear it late.
+//! is gone when over a longer time every frame showed the clear bed in its place: to clear the line too
+//! early is worse than to clear it late. A frame that shows neither the obstacle nor the bed, because
+//! the light is another than that of the reference, says nothing.
 
 use super::WaysideSettings;
 use super::cells::GaugeCells;
@@ -22,13 +23,15 @@ pub(super) struct Confirmation {
 }
 
 impl Confirmation {
-    /// Takes what one frame shows. What a train hides or dazzles, if only in part, stays as it was
-    /// seen whole until it passed: the part that is left says nothing of the rest.
+    /// Takes what one frame shows; `is_clear` tells whether it shows the clear bed in a place. What a
+    /// train hides or dazzles, if only in part, stays as it was seen whole until it passed: the part
+    /// that is left says nothing of the rest.
     pub fn update(
         &mut self,
         found: &[DetectedObstacle],
         cells: &GaugeCells,
         settings: &WaysideSettings,
+        is_clear: impl Fn(&PixelBox) -> bool,
     ) {
         let of = settings.confirm_of.clamp(1, 64);
         let needed = settings.confirm_frames.clamp(1, of);
@@ -42,11 +45,12 @@ impl Confirmation {
                 take_parts(&bounds, found, &mut taken);
                 continue;
             }
-            candidate.history <<= 1;
             if let Some(k) = best_match(&bounds, found, &taken) {
                 taken[k] = true;
-                candidate.history |= 1;
+                candidate.history = candidate.history << 1 | 1;
                 candidate.obstacle = found[k].clone();
+            } else if !candidate.confirmed || is_clear(&bounds) {
+                candidate.history <<= 1;
             }
             candidate.confirmed |= (candidate.history & memory).count_ones() >= needed;
         }

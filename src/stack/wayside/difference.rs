@@ -42,6 +42,8 @@ pub(super) struct Difference {
     ratio: Vec<f64>,
     gain: Vec<f64>,
     gain_row: Vec<u16>,
+    /// The last frame was compared with the reference times the gain.
+    compensated: bool,
     raw: Vec<u8>,
     votes: Vec<u8>,
     /// |id|.
@@ -66,6 +68,7 @@ impl Difference {
             ratio: vec![1.0; tiles],
             gain: vec![1.0; tiles],
             gain_row: vec![0; width],
+            compensated: false,
             raw: vec![0; width * height],
             votes: vec![0; width],
             absolute: vec![0; width * height],
@@ -89,7 +92,8 @@ impl Difference {
         train_near: bool,
     ) {
         let changed = self.measure_gain(frame, &reference.valid);
-        if train_near || changed {
+        self.compensated = train_near || changed;
+        if self.compensated {
             self.smooth_gain();
             // What blinds the camera while a train is near is its lamps.
             let dazzle = if train_near { self.saturated } else { u8::MAX };
@@ -139,6 +143,19 @@ impl Difference {
                 *raw = u8::from(d >= limit) & u8::from(f <= dazzle) & ok;
             }
         }
+    }
+
+    /// What the light of the last frame makes of a grey level of the reference about a pixel, and by
+    /// how much a body must differ from that to be found.
+    pub fn expected(&self, (u, v): (usize, usize), grey: f64) -> (f64, f64) {
+        let threshold = f64::from(self.threshold);
+        if !self.compensated {
+            return (grey, threshold);
+        }
+        let gain = f64::from(self.gain_at(u / CELL_PX * CELL_PX, v / CELL_PX * CELL_PX)) / UNIT;
+        let expected = (grey * gain).min(255.0);
+        let distrust = f64::from(self.distrust) / 256.0;
+        (expected, threshold + (expected - grey).abs() * distrust)
     }
 
     /// Gains of the pixels of the band of cells at row `v`, fixed point.

@@ -94,6 +94,7 @@
 //! rail's head and no wider it takes for a reflection; one in a wet bed it takes for an obstacle.
 
 mod announce;
+mod bed;
 mod cells;
 mod confirm;
 mod difference;
@@ -122,6 +123,7 @@ use crate::bus::{
 };
 use crate::track::Tunnel;
 use announce::Announcer;
+use bed::{BedLight, ClearBed};
 use cells::GaugeCells;
 use confirm::Confirmation;
 use difference::Difference;
@@ -154,6 +156,9 @@ pub struct WaysideDetector {
     reference: Reference,
     difference: Difference,
     shadows: ShadowFilter,
+    bed_light: BedLight,
+    /// The reference is learnt, and showed the bed.
+    bed_was_seen: bool,
     confirmation: Confirmation,
     announcer: Announcer,
     /// Of the last good frame.
@@ -189,6 +194,8 @@ impl WaysideDetector {
             vision: Vision::new(settings, (intrinsics.width_px, intrinsics.height_px)),
             cells: GaugeCells::new(&sight, width, height),
             rails: Rails::new(&sight, width, height),
+            bed_light: BedLight::new(&sight),
+            bed_was_seen: false,
             sight,
             reference: Reference::new(settings, width * height),
             difference: Difference::new(settings, width, height),
@@ -213,16 +220,20 @@ impl WaysideDetector {
         let seen = WaysideReport {
             time: frame.start,
             number: frame.number,
-            camera: self.vision.look(frame, &self.settings),
+            camera: self.vision.look(frame),
             ..WaysideReport::default()
         };
         let trains = reckoned(trains, frame.start);
         if !seen.camera.is_good() {
+            self.vision.note(false, frame.start, &self.settings);
             return self.report(seen, &trains);
         }
         if !self.reference.ready() {
             self.learn(grey);
-            return self.report(seen, &trains);
+            if !self.reference.ready() {
+                self.vision.note(true, frame.start, &self.settings);
+                return self.report(seen, &trains);
+            }
         }
         self.number = frame.number;
         let occupied_m: Vec<_> = trains.iter().map(|t| self.occupied_m(t)).collect();
@@ -230,6 +241,10 @@ impl WaysideDetector {
         let train_near = trains.iter().any(|t| self.may_light(t));
         let places = (&self.cells, &self.rails);
         (self.difference).run(grey, &self.reference, places, train_near);
+        let unseen_m = (self.bed_light).unseen_m(&self.difference, &self.cells, &self.settings);
+        let sees = unseen_m <= self.settings.unseen_bed_m;
+        self.bed_was_seen |= sees;
+        self.vision.note(sees, frame.start, &self.settings);
         let binary = &mut self.difference.binary;
         if self.settings.reject_shadows {
             let images = (grey, self.reference.mean.as_slice());
@@ -243,7 +258,13 @@ impl WaysideDetector {
             scan,
         };
         let found: Vec<_> = blobs.iter().filter_map(|b| placer.place(b)).collect();
-        (self.confirmation).update(&found, &self.cells, &self.settings);
+        let bed = ClearBed {
+            frame: grey,
+            reference: &self.reference,
+            width_px,
+            threshold: self.settings.threshold_grey,
+        };
+        (self.confirmation).update(&found, &self.cells, &self.settings, |b| bed.shows_in(b));
         let mut report = self.report(WaysideReport { blobs, ..seen }, &trains);
         if self.settings.keep_images {
             let (w, h) = frame.image.dimensions();
@@ -285,6 +306,7 @@ impl WaysideDetector {
             let cells = &self.cells;
             self.reference.restrict(width, |u, v| cells.in_gauge(u, v));
             self.difference.set_reference(&self.reference);
+            self.bed_light.set_reference(&self.reference.mean, width);
         }
     }
 
@@ -331,7 +353,7 @@ impl WaysideDetector {
         let found = obstacles.iter().map(|o| o.danger);
         let danger = found.chain(of_blindness).max().unwrap_or_default();
         let distances = self.nearest_m(trains, &obstacles);
-        let learning = !self.reference.ready();
+        let learning = !self.bed_was_seen;
         WaysideReport {
             blind,
             learning,

@@ -20,6 +20,12 @@ settings! {
         gain_distrust: f64 = 0.35, in 0.0..=1.0;
         /// Leave out what only dims the floor: regions in which its texture still shows.
         reject_shadows: bool = true;
+        /// What differs in grey from the bed by this share of the bed's grey must be found: where the
+        /// light is so little, or so different from that of the reference, that the threshold is higher,
+        /// the bed counts as unseen.
+        least_contrast: f64 = 0.5, in 0.05..=1.0;
+        /// Length of bed that may be unseen before the device counts as blind, m.
+        unseen_bed_m: f64 = 10.0, in 0.0..=500.0;
         /// Smallest region, pixels.
         min_area_px: u32 = 24, in 1.0..=1e6;
         /// Smallest extent of an obstacle, the larger of width and height, m.
@@ -47,8 +53,8 @@ settings! {
         /// A heartbeat is sent after each frame that comes this long after the last one, s. Trains take
         /// silence for an occupied track.
         heartbeat_s: f64 = 1.0, in 0.05..=60.0;
-        /// When no good frame has come for this long, the stretch that the camera watches counts as
-        /// occupied, s.
+        /// When no good frame that shows the bed has come for this long, the stretch that the camera
+        /// watches counts as occupied, s.
         blind_after_s: f64 = 1.0, in 0.1..=60.0;
         /// What is said to the trains then: `high` stops them before the stretch, `low` warns the
         /// driver, who then runs on sight.

@@ -607,3 +607,59 @@ fn a_device_that_never_sees_warns() {
         assert!(report.passage_possible && d.message(&report).is_none());
     }
 }
+
+/// Fails where a change of light takes an alarm back: a crate that can no longer be told from the bed
+/// stays confirmed, and is gone only when the bed is seen in its place, in the light of the reference.
+#[test]
+fn a_change_of_light_clears_nothing() {
+    let scene = TestScene::new(640, 360);
+    let item = Crate::on_bed(182.0, 0.0, 0.6);
+    // Nothing is found in so little light; a light crate, dimmed, is as grey as the bed was.
+    for (light, grey) in [(0.3, 45.0), (0.6, 140.0)] {
+        let mut d = taught(&scene, &quiet());
+        let crate_there = [(item, grey)];
+        let mut missed = 0;
+        for n in 10..150u32 {
+            let things = if n < 90 { &crate_there[..] } else { &[] };
+            let frame = match n {
+                30..120 => scene.frame(n, |_, _| light, things),
+                _ => scene.frame(n, STEADY, things),
+            };
+            let report = d.on_frame(&frame, None, &[]);
+            missed += u32::from((30..90).contains(&n) && report.blobs.is_empty());
+            let danger = if (12..129).contains(&n) {
+                DangerLevel::High
+            } else {
+                DangerLevel::None
+            };
+            assert_eq!(report.danger, danger, "frame {n}");
+        }
+        // The frames must have been such that the crate was not found in them.
+        assert!(missed > 50, "{missed}");
+    }
+}
+
+/// Fails where a camera that sees nothing for want of light says that the track is clear, from the
+/// start or when the lamps go out; when they are lit again the device sees again.
+#[test]
+fn a_dark_tunnel_is_not_clear() {
+    let scene = TestScene::new(640, 360);
+    let dark = |_: u32, _: u32| 0.12;
+    let mut d = detector(&scene, &quiet());
+    for n in 0..40u32 {
+        let report = d.on_frame(&scene.frame(n, dark, &[]), None, &[]);
+        assert!(!report.passage_possible, "frame {n}");
+        assert_eq!(report.blind, n >= 19, "frame {n}");
+    }
+    let mut d = taught(&scene, &quiet());
+    for n in 10..80u32 {
+        let frame = match n {
+            20..50 => scene.frame(n, dark, &[]),
+            _ => scene.frame(n, STEADY, &[]),
+        };
+        let report = d.on_frame(&frame, None, &[]);
+        // A second after the last frame that showed the bed, until five have shown it again.
+        assert_eq!(report.blind, (30..54).contains(&n), "frame {n}");
+        assert!(report.obstacles.is_empty());
+    }
+}

@@ -3,7 +3,8 @@
 //! The driver aims at the lowest of cruise speed, permitted speed (less a margin) and the way to
 //! the stop mark, with limited acceleration and jerk. The protection's demands go past him:
 //! traction is cut at once and the brake builds up in its time; an emergency brake stays until
-//! the train stands, even where the demand is gone earlier.
+//! the train stands, even where the demand is gone earlier. After it the driver waits: he may start
+//! again when he has asked.
 
 use super::settings::TrainSettings;
 use crate::bus::{BrakeDemand, TrainCommand};
@@ -45,6 +46,8 @@ pub(super) struct AutomaticDriver {
     /// Deceleration that the protection's demand has built up.
     demanded_mps2: f64,
     emergency: bool,
+    /// After an emergency stop: when the driver may start again, seconds.
+    may_start_s: f64,
 }
 
 impl AutomaticDriver {
@@ -60,6 +63,7 @@ impl AutomaticDriver {
             },
             demanded_mps2: 0.0,
             emergency: false,
+            may_start_s: f64::NEG_INFINITY,
         }
     }
 
@@ -68,6 +72,7 @@ impl AutomaticDriver {
         let standing = now.speed_mps.abs() < STANDING_MPS;
         self.emergency = command.brake == BrakeDemand::Emergency || self.emergency && !standing;
         let demand = if self.emergency {
+            self.may_start_s = now.time_s + self.settings.restart_after_s;
             BrakeDemand::Emergency
         } else {
             command.brake
@@ -122,9 +127,56 @@ impl AutomaticDriver {
                 wanted = wanted.min(now.resistance_mps2 - needed);
             }
         }
+        if now.time_s < self.may_start_s {
+            target = 0.0;
+        }
         if target < STANDING_MPS && now.speed_mps < 0.1 {
             return -s.service_brake_mps2;
         }
         wanted.clamp(-s.service_brake_mps2, s.accel_mps2)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Fails where a train that an emergency brake has stopped starts again by itself as soon as the
+    /// demand is gone.
+    #[test]
+    fn after_an_emergency_stop_the_driver_waits() {
+        let settings = TrainSettings {
+            restart_after_s: 20.0,
+            ..TrainSettings::default()
+        };
+        let mut driver = AutomaticDriver::new(&settings);
+        let (mut speed_mps, mut started_s) = (10.0, None);
+        for k in 0..60_000u32 {
+            let now = Instruments {
+                time_s: 1e-3 * f64::from(k),
+                chainage_m: 0.0,
+                speed_mps,
+                resistance_mps2: 0.0,
+            };
+            let mut command = TrainCommand::UNSUPERVISED;
+            // One cycle of the demand is enough.
+            if (1000..1100).contains(&k) {
+                command.brake = BrakeDemand::Emergency;
+            }
+            let effort = driver.step(&now, &command, 1e-3);
+            let net_mps2 = effort.traction_mps2 - effort.brake_mps2;
+            speed_mps = f64::max(0.0, speed_mps + 1e-3 * net_mps2);
+            if k > 1100 && effort.traction_mps2 > 0.0 {
+                started_s.get_or_insert(now.time_s);
+            }
+            if started_s.is_none() {
+                assert!(k < 12_000 || speed_mps < STANDING_MPS, "{k} {speed_mps}");
+            }
+        }
+        // It stands after some 9 s, and starts 20 s later.
+        assert!(
+            started_s.is_some_and(|s| (28.0..32.0).contains(&s)),
+            "{started_s:?}"
+        );
     }
 }
