@@ -24,6 +24,10 @@
 //! on a train or in a wayside box. The feature `cli` adds the commands that need no world, the feature
 //! `twin` (on by default) the rest.
 
+// Tests of rooms and those in `tests` share files that name the library as its users do.
+#[cfg(all(test, feature = "twin"))]
+extern crate self as metrotwin;
+
 pub mod bus;
 pub mod settings;
 pub mod stack;
