@@ -29,6 +29,7 @@
 extern crate self as metrotwin;
 
 pub mod bus;
+mod numerics;
 pub mod settings;
 pub mod stack;
 pub mod track;

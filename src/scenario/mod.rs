@@ -40,7 +40,6 @@ mod meshes;
 mod overrides;
 mod recording;
 pub mod sampling;
-pub mod schema;
 
 pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
 pub(crate) use build::{parse_vehicle, read};

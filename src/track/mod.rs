@@ -59,10 +59,10 @@ pub mod uid;
 pub mod waveform;
 
 pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
-pub use file::{TunnelFile, tunnel_schema};
+pub use file::TunnelFile;
 pub use furniture::{Balise, BaseStation, LampSite, StoppingPlace, WaysideSite};
 pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
-pub use place::{Direction, Place, TrackId};
+pub use place::{Direction, TrackId};
 pub use route::Route;
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,

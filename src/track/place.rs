@@ -1,11 +1,10 @@
-//! Where something is on the railway, and which way it runs.
+//! The tracks of a railway, and which way something runs.
 //!
 //! ```
-//! use metrotwin::track::{Direction, Place, TrackId};
-//! let head = Place { track: TrackId::default(), s_m: 1200.0 };
-//! let obstacle = Place { s_m: 1150.0, ..head };
+//! use metrotwin::track::Direction;
+//! let (head_m, obstacle_m) = (1200.0, 1150.0);
 //! // A train that runs down the line has it 50 m ahead.
-//! assert!((Direction::Down.ahead_m(head.s_m, obstacle.s_m) - 50.0).abs() < 1e-9);
+//! assert!((Direction::Down.ahead_m(head_m, obstacle_m) - 50.0).abs() < 1e-9);
 //! ```
 
 use schemars::JsonSchema;
@@ -16,15 +15,6 @@ use serde::{Deserialize, Serialize};
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
 pub struct TrackId(pub u16);
-
-/// A chainage of a track.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Place {
-    /// Which track.
-    pub track: TrackId,
-    /// Chainage along its centreline.
-    pub s_m: f64,
-}
 
 /// Which way along a track.
 #[derive(

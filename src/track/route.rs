@@ -4,7 +4,7 @@
 //! its driver, its equipment and the physics under it. [`Route`] goes between that and the chainage
 //! of the track, which is what trains, posts and people tell each other.
 
-use super::{Direction, Place, TrackId, Tunnel};
+use super::{Direction, TrackId, Tunnel};
 
 /// The whole of one track, run in one direction.
 ///
@@ -12,7 +12,7 @@ use super::{Direction, Place, TrackId, Tunnel};
 /// use metrotwin::track::{Direction, Route, TrackId};
 /// let down = Route { track: TrackId::default(), direction: Direction::Down, length_m: 3000.0 };
 /// assert!((down.run_m(2900.0) - 100.0).abs() < 1e-9);
-/// assert!((down.place(100.0).s_m - 2900.0).abs() < 1e-9);
+/// assert!((down.chainage_m(100.0) - 2900.0).abs() < 1e-9);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Route {
@@ -54,14 +54,6 @@ impl Route {
         match self.direction {
             Direction::Up => (from_m, to_m),
             Direction::Down => (self.run_m(to_m), self.run_m(from_m)),
-        }
-    }
-
-    /// Place at a distance along the route.
-    pub fn place(&self, run_m: f64) -> Place {
-        Place {
-            track: self.track,
-            s_m: self.chainage_m(run_m),
         }
     }
 }
