@@ -41,7 +41,7 @@ mod overrides;
 mod recording;
 pub mod sampling;
 
-pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
+pub use build::{Scenario, ScenarioError, WaysidePost};
 pub(crate) use build::{parse_vehicle, read};
 pub use file::{
     BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
