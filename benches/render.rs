@@ -12,11 +12,15 @@
     reason = "a benchmark measures time and prints its figures, and may fail by panicking"
 )]
 
+#[allow(dead_code, reason = "tests use the rest of it")]
+#[path = "../tests/common/sample.rs"]
+mod sample;
+
 use metrotwin::bus::Intrinsics;
 use metrotwin::track::Tunnel;
 use metrotwin::twin::lights::{Headlight, LampLight};
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Job, Renderer, sample};
+use metrotwin::twin::render::{Job, Renderer};
 use nalgebra::Vector3;
 use std::time::Instant;
 

@@ -24,7 +24,12 @@
 //! on a train or in a wayside box. The feature `cli` adds the commands that need no world, the feature
 //! `twin` (on by default) the rest.
 
+// Tests of rooms and those in `tests` share files that name the library as its users do.
+#[cfg(all(test, feature = "twin"))]
+extern crate self as metrotwin;
+
 pub mod bus;
+mod numerics;
 pub mod settings;
 pub mod stack;
 pub mod track;

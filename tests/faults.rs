@@ -10,7 +10,7 @@
 
 mod common;
 
-use common::{Make, cpu, gpu, small_scenario};
+use common::{Make, cpu, gpu, sample, small_scenario};
 use metrotwin::bus::{CameraFault, Content, DangerLevel, Intrinsics, Node, SimTime};
 use metrotwin::session::{
     Event, Observer, ObserverError, RendererChoice, RunOptions, Summary, run,
@@ -18,7 +18,7 @@ use metrotwin::session::{
 use metrotwin::settings::read_toml;
 use metrotwin::twin::faults::{FaultSettings, age};
 use metrotwin::twin::lights::LampLight;
-use metrotwin::twin::render::{Job, Renderer, Scene, sample};
+use metrotwin::twin::render::{Job, Renderer, Scene};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Number and start of a pair, hashes of its images, faults of its eyes.

@@ -43,7 +43,7 @@ fn scenario(seed: u64) -> Scenario {
     let path = Path::new(REPOSITORY).join("scenarios/forgotten_toolbox.toml");
     let overrides: Vec<_> = SMALL.iter().map(|o| o.parse().unwrap()).collect();
     let mut scenario = Scenario::load(&path, &overrides).unwrap();
-    scenario.seed = seed;
+    scenario.file.seed = seed;
     scenario
 }
 

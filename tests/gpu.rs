@@ -9,7 +9,7 @@
 
 mod common;
 
-use common::{dark_scene, draw, gpu, quick};
+use common::{dark_scene, draw, gpu, quick, sample};
 use metrotwin::bus::SimTime;
 use metrotwin::track::TrackPoint;
 use metrotwin::track::uid::ChipFrame;
@@ -17,7 +17,7 @@ use metrotwin::twin::air::Air;
 use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{Job, Pattern, SensorSettings, View, sample};
+use metrotwin::twin::render::{Job, Pattern, SensorSettings, View};
 use nalgebra::{Isometry3, Point3, Vector3};
 
 const SPEED_MPS: f64 = 100.0 / 3.6;

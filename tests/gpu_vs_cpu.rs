@@ -30,14 +30,14 @@
 
 mod common;
 
-use common::{Make, cpu, draw, gpu};
+use common::{Make, cpu, draw, gpu, sample};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{TrackPoint, Tunnel};
 use metrotwin::twin::geometry::{Body, Hull, Shape};
 use metrotwin::twin::lights::{Headlight, LampLight};
 use metrotwin::twin::reflectance::Wet;
-use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View};
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
 

@@ -14,7 +14,7 @@
 
 mod common;
 
-use common::{Make, RENDERERS, dark_scene, draw};
+use common::{Make, RENDERERS, dark_scene, draw, sample};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, SimTime};
 use metrotwin::track::TrackPoint;
@@ -22,7 +22,7 @@ use metrotwin::track::uid::{ChipFrame, LineCode, Uid};
 use metrotwin::track::waveform::{Ripple, Waveform};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::constants::FAINT_E;
-use metrotwin::twin::render::{CameraMotion, Job, View, sample};
+use metrotwin::twin::render::{CameraMotion, Job, View};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 use std::f64::consts::TAU;
 

@@ -14,13 +14,11 @@
 
 mod common;
 
-use common::{RENDERERS, dark_scene};
+use common::{RENDERERS, dark_scene, sample};
 use metrotwin::bus::Intrinsics;
 use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::random::Stream;
-use metrotwin::twin::render::{
-    Job, Pattern, RawImage, Renderer, SensorSettings, View, sample, upper_bits,
-};
+use metrotwin::twin::render::{Job, Pattern, RawImage, Renderer, SensorSettings, View, upper_bits};
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::TAU;
 

@@ -10,14 +10,14 @@
 
 mod common;
 
-use common::{cpu, draw, gpu};
+use common::{cpu, draw, gpu, sample};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
 use metrotwin::track::TrackPoint;
 use metrotwin::twin::geometry::{Body, Hull, Shape};
 use metrotwin::twin::lights::Headlight;
 use metrotwin::twin::render::photometry::BlinkingLamp;
-use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View};
 use nalgebra::{Isometry3, Point3, Unit, Vector3};
 use std::f64::consts::PI;
 

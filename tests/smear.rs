@@ -13,12 +13,12 @@
 
 mod common;
 
-use common::{Make, RENDERERS, cpu, dark_scene, draw, gpu};
+use common::{Make, RENDERERS, cpu, dark_scene, draw, gpu, sample};
 use image::GrayImage;
 use metrotwin::bus::Intrinsics;
 use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::render::cpu::CpuRenderer;
-use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View, sample};
+use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View};
 use nalgebra::Vector3;
 
 fn brute_force(scene: Scene) -> Box<dyn Renderer> {

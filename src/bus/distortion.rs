@@ -1,5 +1,6 @@
 //! Distortion of a lens, there and back.
 
+use crate::numerics::bisected;
 use nalgebra::{Matrix2, Vector2};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -188,16 +189,7 @@ fn reach(c: &DistortionCoefficients) -> f64 {
     let Some(beyond) = (1..=steps).find(|k| !least(radius(*k))) else {
         return MAX_RADIUS;
     };
-    let (mut low, mut high) = (radius(beyond - 1), radius(beyond));
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if least(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
+    bisected((radius(beyond - 1), radius(beyond)), 50, least).0
 }
 
 impl Default for Distortion {

@@ -39,10 +39,3 @@ pub struct PositionEstimate {
     /// What it rests on.
     pub sources: Vec<PositionSource>,
 }
-
-impl PositionEstimate {
-    /// One sigma along the track.
-    pub fn sigma_m(&self) -> f64 {
-        self.covariance[0][0].max(0.0).sqrt()
-    }
-}

@@ -26,12 +26,8 @@ impl Method {
 }
 
 impl fmt::Display for Method {
-    /// As in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Stereo => "paper",
-            Self::Mono => "mono",
-        })
+        self.serialize(f)
     }
 }
 
@@ -50,14 +46,8 @@ pub enum Identity {
 }
 
 impl fmt::Display for Identity {
-    /// As in files.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.pad(match self {
-            Self::Decoded => "decoded",
-            Self::Joined => "joined",
-            Self::Followed => "followed",
-            Self::Predicted => "predicted",
-        })
+        self.serialize(f)
     }
 }
 

@@ -77,7 +77,7 @@ pub(super) struct FramesArgs {
 pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let text = scenario::read(&args.scenario)?;
     let mut scenario = Scenario::from_text(&args.scenario, &text, &args.overrides)?;
-    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
     let plan = plan(args, &scenario)?;
     make_room(&args.out, args.force)?;
 
@@ -91,7 +91,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
             .collect(),
     };
     let progress = ProgressBar::new(RUN_BAR);
-    let to_s = plan.to_s.min(scenario.duration_s);
+    let to_s = plan.to_s.min(scenario.file.duration_s);
     let mut set = DataSet::new(&args.out, &scenario, plan, provenance, renderer, &STOP);
     let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
@@ -132,12 +132,12 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
         ));
     }
     let to_s = args.to.unwrap_or(f64::INFINITY);
-    let begins = args.from >= 0.0 && args.from < scenario.duration_s;
+    let begins = args.from >= 0.0 && args.from < scenario.file.duration_s;
     if !begins || to_s < args.from {
         return Err(Failure::input(
             format!(
                 "--from {} --to {to_s}: no frame of the scenario, which lasts {} s, is between them",
-                args.from, scenario.duration_s
+                args.from, scenario.file.duration_s
             ),
             "give seconds since the scenario's start, the earlier one as --from",
         ));

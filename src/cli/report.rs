@@ -3,7 +3,7 @@
 use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::sampling::{Template, as_written};
-use crate::scenario::{Onboard, Scenario};
+use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
@@ -34,10 +34,13 @@ pub(super) fn vehicle(vehicle: &VehicleFile) -> String {
 /// What it runs, what the rig sees, how many images to expect.
 pub(super) fn scenario(scenario: &Scenario) -> String {
     let mut lines = vec![
-        format!("scenario `{}`: {}", scenario.name, scenario.description),
+        format!(
+            "scenario `{}`: {}",
+            scenario.file.name, scenario.file.description
+        ),
         format!(
             "{:.1} s on `{}`, seed {}",
-            scenario.duration_s, scenario.tunnel.name, scenario.seed
+            scenario.file.duration_s, scenario.tunnel.name, scenario.file.seed
         ),
     ];
     for (k, train) in scenario.physics.trains.iter().enumerate() {
@@ -59,7 +62,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
             train.cruise_speed_kmh
         ));
     }
-    if let Some(bench) = &scenario.bench {
+    if let Some(bench) = &scenario.file.bench {
         lines.push(format!(
             "bench: {} points {} m apart from {} m, {} fixes each",
             bench.points, bench.step_m, bench.first_m, bench.fixes_per_point
@@ -72,7 +75,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         let name = &post.calibration.name;
         let rate = post.camera.frames_per_s;
         let rows = frames(&post.calibration.camera, rate);
-        let count = images(scenario.duration_s, rate);
+        let count = images(scenario.file.duration_s, rate);
         let lidar = post.lidar.as_ref().map_or("", |_| ", with lidar");
         lines.push(format!("{name}: {rows}"));
         lines.push(format!("{name}: about {count:.0} images{lidar}"));
@@ -89,16 +92,16 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
 }
 
 /// The rig of a train, if it has one.
-fn rig(onboard: &Onboard, scenario: &Scenario) -> Vec<String> {
+fn rig(onboard: &OnboardSettings, scenario: &Scenario) -> Vec<String> {
     let Some(rig) = &onboard.rig else {
         return Vec::new();
     };
-    let name = match onboard.train.index() {
+    let name = match onboard.id().index() {
         0 => "rig".to_owned(),
-        _ => format!("rig of {}", onboard.train),
+        _ => format!("rig of {}", onboard.id()),
     };
     let calibration = rig.calibration();
-    let pairs = images(scenario.duration_s, rig.pairs_per_s);
+    let pairs = images(scenario.file.duration_s, rig.pairs_per_s);
     vec![
         format!("{name}: {}", frames(&calibration.left, rig.pairs_per_s)),
         format!("{name}: {}", view(&calibration, onboard, scenario)),
@@ -124,7 +127,7 @@ fn frames(camera: &CameraModel, per_s: f64) -> String {
 }
 
 /// Visible interval of the lamp in the middle, and how it changes along the line.
-fn view(rig: &RigCalibration, onboard: &Onboard, scenario: &Scenario) -> String {
+fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) -> String {
     let tunnel = &*onboard.seen_from_rig(&scenario.tunnel);
     let seen = tunnel
         .lamps

@@ -99,7 +99,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
         End::Interrupted => Err(Failure::Run(anyhow::anyhow!(
             "the run was broken off at {:.1} s of {:.1} s",
             summary.simulated_s,
-            scenario.duration_s
+            scenario.file.duration_s
         ))),
         End::Failed(why) => Err(Failure::Run(anyhow::anyhow!(
             "the run failed at {:.3} s: {why}",
@@ -123,9 +123,9 @@ fn task(args: &RunArgs) -> Result<Task, Failure> {
     }
     let path = args.scenario.as_deref().unwrap_or(Path::new(""));
     let mut scenario = Scenario::load(path, &args.overrides)?;
-    scenario.seed = args.seed.unwrap_or(scenario.seed);
+    scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
     Ok(Task {
-        out: Path::new("out").join(&scenario.name),
+        out: Path::new("out").join(&scenario.file.name),
         scenario,
         of_study: None,
     })
@@ -187,16 +187,16 @@ fn observed(
     errors: &mut Fixes,
 ) -> Result<Summary, Failure> {
     let mut file = (!args.no_recording)
-        .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.record));
+        .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.file.record));
     let rigs = scenario.onboard.iter().filter(|o| o.rig.is_some());
-    let mut fixes: Vec<_> = rigs.map(|o| FixTable::to_folder(out, o.train)).collect();
+    let mut fixes: Vec<_> = rigs.map(|o| FixTable::to_folder(out, o.id())).collect();
     let mut observers: Vec<&mut dyn Observer> = vec![errors];
     observers.extend(file.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(live.as_mut().map(|r| r as &mut dyn Observer));
     observers.extend(fixes.iter_mut().map(|t| t as &mut dyn Observer));
 
     let progress = ProgressBar::new(RUN_BAR);
-    let show = |now_s| progress.show_run(now_s, scenario.duration_s);
+    let show = |now_s| progress.show_run(now_s, scenario.file.duration_s);
     let options = RunOptions {
         renderer: args.renderer,
         stop: Some(&STOP),
@@ -210,12 +210,12 @@ fn observed(
 /// The recording that a viewer shows while it is made.
 fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failure> {
     if let Some(address) = &args.connect {
-        return Ok(Some(Recording::connect(address, &scenario.record)));
+        return Ok(Some(Recording::connect(address, &scenario.file.record)));
     }
     if !args.view {
         return Ok(None);
     }
-    Recording::view(&scenario.record)
+    Recording::view(&scenario.file.record)
         .map(Some)
         .map_err(|error| {
             Failure::input(
@@ -229,7 +229,7 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
 /// summary.
 fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
     let recording = args.no_recording.then(|| "recording.rrd".to_owned());
-    let has_rig = |id| (scenario.onboard.iter()).any(|o| o.train == id && o.rig.is_some());
+    let has_rig = |id| (scenario.onboard.iter()).any(|o| o.id() == id && o.rig.is_some());
     let without_rig = (0..TrainId::MOST)
         .map(TrainId::from_index)
         .filter(|id| !has_rig(*id));

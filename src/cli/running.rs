@@ -1,36 +1,12 @@
 //! What subcommands that run a scenario share.
 
 use super::fault::Failure;
-use crate::session::RendererChoice;
-use clap::ValueEnum;
-use clap::builder::PossibleValue;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
 use std::fs;
 use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-impl ValueEnum for RendererChoice {
-    fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Auto, Self::Gpu, Self::Cpu]
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let (name, help) = match self {
-            Self::Auto => (
-                "auto",
-                "The graphics adapter, or the plain renderer where there is none",
-            ),
-            Self::Gpu => (
-                "gpu",
-                "The graphics adapter (a GPU, or a software adapter) or nothing",
-            ),
-            Self::Cpu => ("cpu", "The plain renderer, on the CPU alone"),
-        };
-        Some(PossibleValue::new(name).help(help))
-    }
-}
 
 /// Set by the first Ctrl-C, or when there is nothing more to do.
 pub(super) static STOP: AtomicBool = AtomicBool::new(false);

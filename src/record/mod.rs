@@ -212,9 +212,8 @@ struct Open {
     laid_out: bool,
     flush_at: SimTime,
     scene: Rc<RecordedScene>,
-    /// Of the first train, with what belongs to none.
-    first: TrainView,
-    others: BTreeMap<TrainId, TrainView>,
+    /// With the first train goes what belongs to none.
+    views: BTreeMap<TrainId, TrainView>,
     texts: Texts,
 }
 
@@ -232,12 +231,9 @@ impl Open {
                 images: Images::new(stream.clone(), settings, (id, devices)),
             })
         };
-        let others = contents.iter().skip(1);
+        let views = contents.iter().map(|c| Ok((c.id, view(c)?)));
         Ok(Self {
-            first: view(&contents[0])?,
-            others: others
-                .map(|c| Ok((c.id, view(c)?)))
-                .collect::<Result<_>>()?,
+            views: views.collect::<Result<_>>()?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
             flush_at: SimTime::ZERO.plus(stream.batch_s()),
@@ -270,7 +266,9 @@ impl Open {
             } => self.message(*id, message)?,
             Event::Message { .. } | Event::Cost { .. } => return Ok(()),
             Event::Bodies { time, bodies } => {
-                self.first.moving.bodies(time, bodies)?;
+                if let Some(view) = self.view(TrainId::default()) {
+                    view.moving.bodies(time, bodies)?;
+                }
                 time
             }
             // Its images come when they reach the stack.
@@ -295,12 +293,13 @@ impl Open {
                 frame,
                 report,
             } => {
-                let Some(name) = self.contents[0].devices.get(post) else {
+                let name = self.contents[0].devices.get(post);
+                let view = self.views.get_mut(&TrainId::default());
+                let (Some(name), Some(view)) = (name, view) else {
                     return Ok(());
                 };
                 let device = (post, name.as_str());
                 let time = frame.start;
-                let view = &mut self.first;
                 view.plots.wayside(post, report);
                 view.plots.exposure(name, frame);
                 self.texts.wayside(device, report)?;
@@ -353,10 +352,7 @@ impl Open {
     }
 
     fn view(&mut self, id: TrainId) -> Option<&mut TrainView> {
-        if id == TrainId::default() {
-            return Some(&mut self.first);
-        }
-        self.others.get_mut(&id)
+        self.views.get_mut(&id)
     }
 
     /// Sends the layout, once: with the first truth, which says where to look.
@@ -374,8 +370,7 @@ impl Open {
     fn flush(&mut self) -> Result {
         self.lay_out(None)?;
         self.stream.flush()?;
-        let views = std::iter::once(&mut self.first).chain(self.others.values_mut());
-        for view in views {
+        for view in self.views.values_mut() {
             view.moving.flush()?;
             view.plots.flush()?;
         }

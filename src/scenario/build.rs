@@ -1,22 +1,13 @@
 //! From a file to a checked scenario.
 
-use super::RecordSettings;
-use super::file::{BenchSettings, OnboardEquipment, ScenarioFile, StackSettings};
+use super::file::{OnboardEquipment, OnboardSettings, ScenarioFile};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
-use crate::stack::led::LedSettings;
-use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
-use crate::twin::air::AirSettings;
-use crate::twin::faults::FaultSettings;
-use crate::twin::links::RadioSettings;
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
-use crate::twin::sensors::{
-    CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
-};
-use crate::twin::survey::SurveySettings;
+use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -24,65 +15,25 @@ use std::sync::Arc;
 /// A scenario, checked and ready to run.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Short name, fit for a folder.
-    pub name: String,
-    /// What it shows.
-    pub description: String,
-    /// Everything random follows from it.
-    pub seed: u64,
-    /// Simulated time; of a bench run, until the last pair of images is taken.
-    pub duration_s: f64,
-    /// End earlier, once the train has run and then stood for this long.
-    pub stop_after_standstill_s: Option<f64>,
+    /// As written, without its study; a bench run lasts until its last pair of images is taken.
+    pub file: ScenarioFile,
     /// The line as it really is.
     pub tunnel: Arc<Tunnel>,
-    /// How well the stack's map of it was surveyed.
-    pub survey: SurveySettings,
     /// Train, track, obstacles, workers.
     pub physics: PhysicsSettings,
-    /// A still rig moved from point to point, in place of a train.
-    pub bench: Option<BenchSettings>,
     /// Sensors and equipment of the trains that have any, in the order of their numbers; of a bench,
     /// those of its rig.
-    pub onboard: Vec<Onboard>,
+    pub onboard: Vec<OnboardSettings>,
     /// Wayside devices in use.
     pub wayside: Vec<WaysidePost>,
-    /// The radio.
-    pub radio: RadioSettings,
-    /// What one sees through.
-    pub air: AirSettings,
-    /// Lamps and cameras that are out of order.
-    pub faults: FaultSettings,
-    /// The stack's settings.
-    pub stack: StackSettings,
-    /// What goes into the recording.
-    pub record: RecordSettings,
 }
 
-/// Sensors and equipment of one train.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Onboard {
+impl OnboardSettings {
     /// Which train.
-    pub train: TrainId,
-    /// Which way it runs.
-    pub direction: Direction,
-    /// The stereo rig.
-    pub rig: Option<RigSettings>,
-    /// The inertial unit.
-    pub imu: ImuSettings,
-    /// The odometer.
-    pub odometer: OdometerSettings,
-    /// The Doppler radar.
-    pub doppler: Option<DopplerSettings>,
-    /// Positioning by lamps.
-    pub led: LedSettings,
-    /// Warning and control.
-    pub protection: ProtectionSettings,
-    /// Equipment, in the order in which it works.
-    pub equipment: Vec<OnboardEquipment>,
-}
+    pub fn id(&self) -> TrainId {
+        TrainId(self.train)
+    }
 
-impl Onboard {
     /// It finds its position by lamps.
     pub fn positions(&self) -> bool {
         self.rig.is_some() && self.equipment.contains(&OnboardEquipment::Led)
@@ -103,47 +54,42 @@ impl Onboard {
         self.equipment.contains(&OnboardEquipment::Protection)
     }
 
-    /// Of all trains of a file.
-    fn of(file: &ScenarioFile) -> Vec<Self> {
-        // The equipment knows its train's length. A train that starts at speed has run before, and its
-        // equipment with it.
-        let protection = |settings: &ProtectionSettings, k: usize| {
-            let train = file.trains().nth(k);
-            let runs = train.is_some_and(|train| train.start_speed_kmh > 0.0);
-            let length_m = train.map(TrainSettings::length_m);
-            ProtectionSettings {
-                train_length_m: settings.train_length_m.or(length_m),
-                starts_under_way: settings.starts_under_way.or(Some(runs)),
-                ..settings.clone()
-            }
-        };
-        let first = (file.train.is_some() || file.bench.is_some()).then(|| Self {
-            train: TrainId::default(),
-            direction: file.direction(0),
+    /// Of the first train, or of a bench.
+    fn first(file: &ScenarioFile) -> Self {
+        Self {
+            train: 0,
+            direction: Direction::default(),
             rig: file.rig.clone(),
             imu: file.imu,
             odometer: file.odometer,
             doppler: file.doppler,
             led: file.stack.led.clone(),
-            protection: protection(&file.stack.protection, 0),
+            protection: file.stack.protection.clone(),
             equipment: match file.bench {
                 Some(_) => vec![OnboardEquipment::Led],
                 None => file.stack.onboard.clone(),
             },
-        });
-        let others = file.onboard.iter().map(|other| Self {
-            train: TrainId(other.train),
-            direction: file.direction(other.train.into()),
-            rig: other.rig.clone(),
-            imu: other.imu,
-            odometer: other.odometer,
-            doppler: other.doppler,
-            led: other.led.clone(),
-            protection: protection(&other.protection, other.train.into()),
-            equipment: other.equipment.clone(),
-        });
+        }
+    }
+
+    /// Of all trains of a file.
+    fn all(file: &ScenarioFile) -> Vec<Self> {
+        let has_first = file.train.is_some() || file.bench.is_some();
+        let first = has_first.then(|| Self::first(file));
+        let others = file.onboard.iter().cloned();
         let mut all: Vec<Self> = first.into_iter().chain(others).collect();
         all.sort_by_key(|onboard| onboard.train);
+        for onboard in &mut all {
+            let number = onboard.train.into();
+            onboard.direction = file.direction(number);
+            let train = file.trains().nth(number);
+            let protection = &mut onboard.protection;
+            let length_m = train.map(TrainSettings::length_m);
+            protection.train_length_m = protection.train_length_m.or(length_m);
+            // A train that starts at speed has run before, and its equipment with it.
+            let runs = train.is_some_and(|train| train.start_speed_kmh > 0.0);
+            protection.starts_under_way.get_or_insert(runs);
+        }
         all
     }
 }
@@ -275,10 +221,8 @@ impl Scenario {
     }
 
     /// Sensors and equipment of the first train, or of a bench.
-    pub fn first(&self) -> Option<&Onboard> {
-        self.onboard
-            .first()
-            .filter(|o| o.train == TrainId::default())
+    pub fn first(&self) -> Option<&OnboardSettings> {
+        self.onboard.first().filter(|onboard| onboard.train == 0)
     }
 
     /// The rig of the first train, or of a bench.
@@ -289,7 +233,7 @@ impl Scenario {
     /// The map of the line that the stack is given: its lamps as surveyed, and the wayside devices that
     /// are in use.
     pub fn map(&self) -> Arc<Tunnel> {
-        let mut map = self.survey.map(&self.tunnel, self.seed);
+        let mut map = self.file.survey.map(&self.tunnel, self.file.seed);
         let in_use = |name: &str| {
             self.wayside
                 .iter()
@@ -301,7 +245,7 @@ impl Scenario {
 
     /// In its tunnel, unless there are problems already, or are then.
     fn in_tunnel(
-        file: ScenarioFile,
+        mut file: ScenarioFile,
         tunnel: Tunnel,
         mut problems: Vec<Problem>,
     ) -> Result<Self, FileError> {
@@ -309,31 +253,21 @@ impl Scenario {
         if !problems.is_empty() {
             return Err(FileError::Problems(problems));
         }
-        let onboard = Onboard::of(&file);
         let physics = PhysicsSettings {
             history_s: history_s(&file),
             ..file.physics()
         };
+        let onboard = OnboardSettings::all(&file);
+        if let (Some(bench), Some(rig)) = (&file.bench, &file.rig) {
+            file.duration_s = bench.duration_s(rig.pairs_per_s);
+        }
+        file.study = None;
         Ok(Self {
-            duration_s: match (&file.bench, &file.rig) {
-                (Some(bench), Some(rig)) => bench.duration_s(rig.pairs_per_s),
-                _ => file.duration_s,
-            },
-            name: file.name,
-            description: file.description,
-            seed: file.seed,
-            stop_after_standstill_s: file.stop_after_standstill_s,
+            file,
             tunnel: Arc::new(tunnel),
-            survey: file.survey,
             physics,
-            bench: file.bench,
             onboard,
             wayside,
-            radio: file.radio,
-            air: file.air,
-            faults: file.faults,
-            stack: file.stack,
-            record: file.record,
         })
     }
 }

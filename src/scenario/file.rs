@@ -33,7 +33,7 @@ settings! {
         /// Tunnel file; a relative path counts from this file's folder.
         tunnel: String;
         /// Everything random follows from it.
-        #[serde(default = "default_seed")]
+        #[serde(default = "crate::settings::one::<u64>")]
         seed: u64;
         /// Simulated time, s. A bench run ends after its last point instead.
         #[serde(default = "default_duration_s")]
@@ -104,10 +104,6 @@ settings! {
     also check_together
 }
 
-fn default_seed() -> u64 {
-    1
-}
-
 fn default_duration_s() -> f64 {
     60.0
 }
@@ -122,6 +118,9 @@ settings! {
     pub struct OnboardSettings {
         /// Which train: 1 is the first of `other_trains`.
         train: u8;
+        /// Which way that train runs; whoever reads the scenario puts it here.
+        #[serde(skip)]
+        direction: Direction;
         /// Its stereo rig. Default: none.
         rig: Option<RigSettings>, nested;
         /// Its inertial unit.

@@ -40,9 +40,8 @@ mod meshes;
 mod overrides;
 mod recording;
 pub mod sampling;
-pub mod schema;
 
-pub use build::{Onboard, Scenario, ScenarioError, WaysidePost};
+pub use build::{Scenario, ScenarioError, WaysidePost};
 pub(crate) use build::{parse_vehicle, read};
 pub use file::{
     BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,

@@ -5,7 +5,7 @@
 #![doc = include_str!("../../docs/extending.md")]
 
 use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
-use crate::scenario::{Onboard, OnboardEquipment, Scenario, WaysidePost};
+use crate::scenario::{OnboardEquipment, OnboardSettings, Scenario, WaysidePost};
 use crate::stack::Equipment;
 use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
@@ -83,23 +83,29 @@ impl Fitting {
         nodes
     }
 
-    fn add_train(&mut self, scenario: &Scenario, onboard: &Onboard, world: &World, maps: &Maps) {
-        let (train, seed) = (onboard.train, train_seed(scenario.seed, onboard.train));
+    fn add_train(
+        &mut self,
+        scenario: &Scenario,
+        onboard: &OnboardSettings,
+        world: &World,
+        maps: &Maps,
+    ) {
+        let (train, seed) = (onboard.id(), train_seed(scenario.file.seed, onboard.id()));
         let node = Node::Train(train);
-        if scenario.bench.is_none() {
+        if scenario.file.bench.is_none() {
             self.add_motion_sensors(onboard, &node, seed);
             let antenna = BaliseAntenna::new(train, scenario.tunnel.clone(), world);
             self.add_sensor(node.clone(), antenna);
         }
         if let Some(rig) = &onboard.rig {
-            let camera = StereoCamera::new(train, rig, &scenario.faults.cameras, seed);
+            let camera = StereoCamera::new(train, rig, &scenario.file.faults.cameras, seed);
             self.add_sensor(node.clone(), camera);
         }
         self.equipment.extend(onboard_equipment(onboard, maps));
     }
 
-    fn add_motion_sensors(&mut self, onboard: &Onboard, node: &Node, seed: u64) {
-        let train = onboard.train;
+    fn add_motion_sensors(&mut self, onboard: &OnboardSettings, node: &Node, seed: u64) {
+        let train = onboard.id();
         let end = onboard.rig_end();
         let mut imu = Imu::new(&onboard.imu, seed, 0);
         let read = move |world: &World, time| {
@@ -132,16 +138,16 @@ impl Fitting {
         let name = &post.calibration.name;
         let node = Node::Post(name.clone());
         if let (Some(settings), Some(pose)) = (&post.lidar, post.actual.world_from_lidar) {
-            let stream = Stream::new(scenario.seed, 0, &format!("wayside_lidar/{name}"));
+            let stream = Stream::new(scenario.file.seed, 0, &format!("wayside_lidar/{name}"));
             let lidar = Lidar::new(settings, &scenario.tunnel, &pose, stream);
-            let delay_s = 1e-3 * scenario.stack.latency_ms;
+            let delay_s = 1e-3 * scenario.file.stack.latency_ms;
             let lidar = WaysideLidar::new(lidar, delay_s);
             self.add_sensor(node.clone(), lidar);
         }
-        let faults = &scenario.faults.cameras;
-        let camera = WaysideCamera::new(&post.actual, &post.camera, faults, scenario.seed);
+        let faults = &scenario.file.faults.cameras;
+        let camera = WaysideCamera::new(&post.actual, &post.camera, faults, scenario.file.seed);
         self.add_sensor(node.clone(), camera);
-        let (settings, calibration) = (&scenario.stack.wayside, post.calibration.clone());
+        let (settings, calibration) = (&scenario.file.stack.wayside, post.calibration.clone());
         let detection = WaysideDetection::new(settings, calibration, maps.up.clone());
         self.equipment.push(Fitted {
             node,
@@ -152,14 +158,18 @@ impl Fitting {
 }
 
 /// The equipment of a train.
-pub fn onboard_equipment(onboard: &Onboard, maps: &Maps) -> impl Iterator<Item = Fitted> {
+pub fn onboard_equipment(onboard: &OnboardSettings, maps: &Maps) -> impl Iterator<Item = Fitted> {
     let kinds = onboard.equipment.iter();
     kinds.filter_map(|kind| one_of_onboard(*kind, onboard, maps))
 }
 
 /// A piece of equipment of a train; `None` where the train lacks what it needs.
-fn one_of_onboard(kind: OnboardEquipment, onboard: &Onboard, maps: &Maps) -> Option<Fitted> {
-    let node = Node::Train(onboard.train);
+fn one_of_onboard(
+    kind: OnboardEquipment,
+    onboard: &OnboardSettings,
+    maps: &Maps,
+) -> Option<Fitted> {
+    let node = Node::Train(onboard.id());
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
             let rig = onboard.rig.as_ref()?;

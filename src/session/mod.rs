@@ -58,14 +58,14 @@ use crate::twin::sensors::SensorError;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What draws the images.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum RendererChoice {
     /// The graphics adapter, or the plain renderer where there is none.
     #[default]
     Auto,
-    /// The graphics adapter or nothing.
+    /// The graphics adapter (a GPU, or a software adapter) or nothing.
     Gpu,
-    /// The plain renderer.
+    /// The plain renderer, on the CPU alone.
     Cpu,
 }
 
@@ -136,7 +136,7 @@ pub fn run_with(
     options: &RunOptions<'_>,
     observers: &mut [&mut dyn Observer],
 ) -> Result<Summary, SessionError> {
-    scheduler::Session::new(scenario, renderer, add)?.run(options, observers)
+    scheduler::Session::new(scenario, renderer, add, observers)?.run(options)
 }
 
 /// The renderer of a scenario, as [`run`] uses it; says so once where it has to fall back on the plain one.
@@ -164,7 +164,7 @@ pub fn renderer(
 /// What stands still in a scenario.
 pub fn scene(scenario: &Scenario) -> Scene {
     let tunnel = scenario.tunnel.clone();
-    let lamps = lamps::shining(&tunnel, &scenario.faults.lamps, scenario.seed);
+    let lamps = lamps::shining(&tunnel, &scenario.file.faults.lamps, scenario.file.seed);
     let everywhere = f64::NEG_INFINITY..f64::INFINITY;
     let zones = scenario.physics.track.rail_zones.iter();
     let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));
@@ -172,7 +172,7 @@ pub fn scene(scenario: &Scenario) -> Scene {
     Scene {
         tunnel,
         lamps,
-        air: scenario.air.air(),
+        air: scenario.file.air.air(),
         wet: Wet {
             ranges: rails
                 .map(|(range, rail)| (range, rail == RailState::Wet))

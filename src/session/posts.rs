@@ -2,7 +2,7 @@
 
 use super::health::Health;
 use super::presence::{FieldOfView, Presence};
-use super::summary::Summary;
+use super::summary::Wayside;
 use super::wayside_score::WaysideScore;
 use crate::bus::{Node, SimTime, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
@@ -14,7 +14,8 @@ pub struct Posts {
     posts: Vec<Post>,
     /// How their cameras do, by what the equipment says.
     pub health: Health,
-    frames: u32,
+    /// Frames that they reported on.
+    pub frames: u32,
 }
 
 struct Post {
@@ -28,13 +29,11 @@ struct Post {
 impl Posts {
     /// Before the first frame.
     pub fn new(scenario: &Scenario) -> Self {
-        let mut health = Health::default();
-        let names = scenario.wayside.iter().map(|post| &post.calibration.name);
-        names.for_each(|name| health.expect(name));
         let posts = scenario.wayside.iter();
+        let names = posts.clone().map(|post| post.calibration.name.as_str());
         Self {
             posts: posts.map(|post| Post::new(scenario, post)).collect(),
-            health,
+            health: Health::of(names),
             frames: 0,
         }
     }
@@ -67,17 +66,14 @@ impl Posts {
         }
     }
 
-    /// A summary with their figures.
-    pub fn finish(self, mut summary: Summary) -> Summary {
+    /// What all of them found.
+    pub fn finish(self) -> Option<Wayside> {
         let scores = self.posts.into_iter().map(|post| post.score);
         let all = scores.reduce(|mut a, b| {
             a.add(b);
             a
         });
-        summary.wayside = all.map(WaysideScore::finish);
-        summary.wayside_frames = self.frames;
-        summary.cameras.extend(self.health.finish());
-        summary
+        all.map(WaysideScore::finish)
     }
 }
 

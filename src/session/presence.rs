@@ -53,7 +53,7 @@ impl FieldOfView {
             segment: walls.segment_of(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
             span_s: post.camera.longest_span_s(),
-            reach_m: scenario.stack.wayside.reach_m,
+            reach_m: scenario.file.stack.wayside.reach_m,
             walls,
         }
     }

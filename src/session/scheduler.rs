@@ -13,7 +13,7 @@ use super::{
 use crate::bus::{
     Content, Message, Node, Receiver, SimTime, Ticker, TrainCommand, TrainEnd, TrainId,
 };
-use crate::scenario::{Onboard, Scenario};
+use crate::scenario::{OnboardSettings, Scenario};
 use crate::twin::links::Links;
 use crate::twin::physics::{PhysicsError, World};
 use crate::twin::random::Stream;
@@ -27,7 +27,7 @@ const TRUTH_HZ: f64 = 50.0;
 const BODIES_HZ: f64 = 10.0;
 
 /// One session under way.
-pub struct Session<'s> {
+pub struct Session<'s, 'o> {
     pub(super) scenario: &'s Scenario,
     /// All that is true.
     pub(super) world: World,
@@ -50,6 +50,7 @@ pub struct Session<'s> {
     pub(super) truth_ticker: Ticker,
     pub(super) bodies_ticker: Ticker,
     pub(super) cost: Costs,
+    pub(super) observers: Observers<'s, 'o>,
 }
 
 /// What trains are commanded before their equipment's first cycle: those without a protection, to run
@@ -58,7 +59,7 @@ fn first_commands(scenario: &Scenario) -> Vec<TrainCommand> {
     let mut commands = vec![TrainCommand::UNSUPERVISED; TrainId::MOST];
     let protected = scenario.onboard.iter().filter(|o| o.protects());
     for onboard in protected {
-        if let Some(command) = commands.get_mut(onboard.train.index()) {
+        if let Some(command) = commands.get_mut(onboard.id().index()) {
             *command = TrainCommand::default();
         }
     }
@@ -71,34 +72,35 @@ pub(super) struct Delivered {
     pub cost_ms: f64,
 }
 
-impl<'s> Session<'s> {
+impl<'s, 'o> Session<'s, 'o> {
     /// At time zero, with the equipment of the scenario and whatever `add` puts in.
     pub fn new(
         scenario: &'s Scenario,
         renderer: &'s mut dyn Renderer,
         add: &dyn Fn(&mut Fitting),
+        observers: &'s mut [&'o mut dyn Observer],
     ) -> Result<Self, SessionError> {
-        let seed = scenario.seed;
+        let seed = scenario.file.seed;
         let world = World::new(scenario.tunnel.clone(), &scenario.physics, seed, 0)?;
         let mut fitting = Fitting::new(scenario, &world);
         add(&mut fitting);
         let stations = &scenario.tunnel.base_stations;
         let radio = Stream::new(seed, 0, "radio");
-        let links = Links::new(&scenario.radio, stations, fitting.nodes(), radio);
-        let latency_ms = match scenario.bench {
+        let links = Links::new(&scenario.file.radio, stations, fitting.nodes(), radio);
+        let latency_ms = match scenario.file.bench {
             // The rig goes on when its pairs have been read.
             Some(_) => 0.0,
-            None => scenario.stack.latency_ms,
+            None => scenario.file.stack.latency_ms,
         };
-        let onboard = |id| scenario.onboard.iter().find(|o| o.train == id);
+        let onboard = |id| scenario.onboard.iter().find(|o| o.id() == id);
         let ids = world
             .train_ids()
-            .chain(scenario.onboard.iter().map(|o| o.train));
+            .chain(scenario.onboard.iter().map(|o| o.id()));
         let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id))));
         Ok(Self {
             trains: trains.collect(),
             posts: Posts::new(scenario),
-            bench: scenario.bench.map(|bench| Bench::new(&bench)),
+            bench: scenario.file.bench.map(|bench| Bench::new(&bench)),
             commands: first_commands(scenario),
             commanded: BTreeMap::new(),
             scenario,
@@ -113,19 +115,15 @@ impl<'s> Session<'s> {
             truth_ticker: Ticker::new(TRUTH_HZ),
             bodies_ticker: Ticker::new(BODIES_HZ),
             cost: Costs::default(),
+            observers: Observers::new(observers),
         })
     }
 
     /// To the end of the scenario. A failure of the world ends it as [`End::Failed`].
-    pub fn run(
-        mut self,
-        options: &RunOptions<'_>,
-        observers: &mut [&mut dyn Observer],
-    ) -> Result<Summary, SessionError> {
-        let mut observers = Observers::new(observers);
-        self.open(&mut observers)?;
-        let end = self.steps(options, &mut observers);
-        observers.each(|o| o.close())?;
+    pub fn run(mut self, options: &RunOptions<'_>) -> Result<Summary, SessionError> {
+        self.open()?;
+        let end = self.steps(options);
+        self.observers.each(|o| o.close())?;
         let derailed = match &end {
             Err(SessionError::Physics(PhysicsError::Derailed { train, .. })) => Some(*train),
             _ => None,
@@ -135,28 +133,24 @@ impl<'s> Session<'s> {
             Err(SessionError::Physics(error)) => End::Failed(error.to_string()),
             Err(other) => return Err(other),
         };
-        Ok(self.summary(end, derailed, &observers))
+        Ok(self.summary(end, derailed))
     }
 
-    fn steps(
-        &mut self,
-        options: &RunOptions<'_>,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<End, SessionError> {
+    fn steps(&mut self, options: &RunOptions<'_>) -> Result<End, SessionError> {
         let mut next_progress_s = 0.0;
         loop {
             let time_s = self.world.time().secs();
             if options.stopped() {
                 return Ok(End::Interrupted);
             }
-            if self.bench_is_over(observers)? || self.is_over(time_s) {
+            if self.bench_is_over()? || self.is_over(time_s) {
                 return Ok(End::Complete);
             }
             if let Some(progress) = options.progress.filter(|_| time_s >= next_progress_s) {
                 progress(time_s);
                 next_progress_s = time_s + 0.1;
             }
-            self.step(observers)?;
+            self.step()?;
         }
     }
 
@@ -167,22 +161,22 @@ impl<'s> Session<'s> {
         }
         let stood_long = |limit_s: f64| {
             let now = self.world.time();
-            let mut equipped = self.scenario.onboard.iter().map(|o| &self.trains[&o.train]);
+            let mut equipped = self.scenario.onboard.iter().map(|o| &self.trains[&o.id()]);
             !self.scenario.onboard.is_empty()
                 && equipped.all(|train| train.stood_s(now).is_some_and(|s| s >= limit_s))
         };
-        let standstill = self.scenario.stop_after_standstill_s;
-        time_s >= self.scenario.duration_s || standstill.is_some_and(stood_long)
+        let standstill = self.scenario.file.stop_after_standstill_s;
+        time_s >= self.scenario.file.duration_s || standstill.is_some_and(stood_long)
     }
 
     /// A bench goes on to its next point where it is done with one; whether it was the last.
-    fn bench_is_over(&mut self, observers: &mut Observers<'_, '_>) -> Result<bool, SessionError> {
+    fn bench_is_over(&mut self) -> Result<bool, SessionError> {
         let (now, fixes) = (self.world.time(), self.fixes());
         let next = self.bench.as_mut().map(|bench| bench.next(now, fixes));
         if let Some(Move::To { head_m, given_up_m }) = next {
             if let Some(left_m) = given_up_m {
                 let text = format!("no more fixes with the head at {left_m} m: gone on");
-                observers.show(&Event::Note {
+                self.observers.show(&Event::Note {
                     time: now,
                     text: &text,
                 })?;
@@ -192,7 +186,7 @@ impl<'s> Session<'s> {
         Ok(next == Some(Move::Over))
     }
 
-    fn step(&mut self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
+    fn step(&mut self) -> Result<(), SessionError> {
         let (world, commands) = (&mut self.world, &self.commands);
         let hits = world.impacts().len();
         self.cost.physics.time(|| world.step(commands)).0?;
@@ -200,29 +194,25 @@ impl<'s> Session<'s> {
         for hit in &self.world.impacts()[hits..] {
             let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
             let text = format!("hit {with} at {kmh:.1} km/h");
-            observers.show(&Event::Note {
+            self.observers.show(&Event::Note {
                 time: now,
                 text: &text,
             })?;
         }
         self.images.clear();
-        self.sample(now, observers)?;
-        self.receive(now, observers)?;
-        self.read_out(now, observers)?;
-        self.work(now, observers)?;
-        self.show_truth(now, observers)
+        self.sample(now)?;
+        self.receive(now)?;
+        self.read_out(now)?;
+        self.work(now)?;
+        self.show_truth(now)
     }
 
     /// Every sensor gives what is due.
-    fn sample(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn sample(&mut self, now: SimTime) -> Result<(), SessionError> {
         for k in 0..self.sensors.len() {
             for output in self.sensors[k].sensor.sample(&self.world)? {
                 match output {
-                    Output::Capture(capture) => self.submit(k, now, capture, observers)?,
+                    Output::Capture(capture) => self.submit(k, now, capture)?,
                     Output::Sample(sample) => {
                         let node = self.sensors[k].node.clone();
                         let due = now.plus(sample.delay_s);
@@ -235,7 +225,7 @@ impl<'s> Session<'s> {
                             self.delayed_so_far += 1;
                             self.delayed.insert((due, number), (node, message));
                         } else {
-                            self.deliver(&node, message, observers)?;
+                            self.deliver(&node, message)?;
                         }
                     }
                 }
@@ -250,7 +240,6 @@ impl<'s> Session<'s> {
         sensor: usize,
         now: SimTime,
         capture: Capture,
-        observers: &mut Observers<'_, '_>,
     ) -> Result<(), SessionError> {
         let Capture {
             header,
@@ -272,7 +261,7 @@ impl<'s> Session<'s> {
             headlights: self.world.headlights(),
             views,
         };
-        observers.show(&Event::Exposure(&Exposure {
+        self.observers.show(&Event::Exposure(&Exposure {
             source,
             number: header.number,
             job: &job,
@@ -293,8 +282,8 @@ impl<'s> Session<'s> {
     /// A train at a time of the recent past, by the speed that it has now, and the end of it that its
     /// rig is at.
     fn train_at(&self, id: TrainId, time: SimTime) -> Option<TrainPoint> {
-        let onboard = self.scenario.onboard.iter().find(|o| o.train == id);
-        let end = onboard.map_or(TrainEnd::Front, Onboard::rig_end);
+        let onboard = self.scenario.onboard.iter().find(|o| o.id() == id);
+        let end = onboard.map_or(TrainEnd::Front, OnboardSettings::rig_end);
         Some(TrainPoint {
             chainage_m: self.world.chainage_at(id, time)?,
             speed_mps: self.world.train(id)?.speed_mps,
@@ -303,14 +292,10 @@ impl<'s> Session<'s> {
     }
 
     /// What comes by links, and samples that took their time.
-    fn receive(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn receive(&mut self, now: SimTime) -> Result<(), SessionError> {
         while let Some(first) = self.delayed.first_entry().filter(|e| e.key().0 <= now) {
             let (node, message) = first.remove();
-            self.deliver(&node, message, observers)?;
+            self.deliver(&node, message)?;
         }
         loop {
             let world = &self.world;
@@ -318,17 +303,13 @@ impl<'s> Session<'s> {
                 return Ok(());
             };
             if let Receiver::Node(node) = message.receiver.clone() {
-                self.deliver(&node, message, observers)?;
+                self.deliver(&node, message)?;
             }
         }
     }
 
     /// Images that are due.
-    fn read_out(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn read_out(&mut self, now: SimTime) -> Result<(), SessionError> {
         while let Some((pending, images)) = self.imaging.due(now, &mut self.cost)? {
             let Mounted { node, sensor } = &mut self.sensors[pending.sensor];
             let node = node.clone();
@@ -337,22 +318,17 @@ impl<'s> Session<'s> {
                     valid_at: pending.header.start,
                     ..Message::own(node.clone(), now, content)
                 };
-                self.deliver(&node, message, observers)?;
+                self.deliver(&node, message)?;
             }
         }
         Ok(())
     }
 
     /// Hands a message to all equipment of a node.
-    fn deliver(
-        &mut self,
-        node: &Node,
-        message: Message,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn deliver(&mut self, node: &Node, message: Message) -> Result<(), SessionError> {
         let has_images = matches!(message.content, Content::Pair(_) | Content::Frame(_));
         if !has_images {
-            observers.show(&Event::Message {
+            self.observers.show(&Event::Message {
                 node,
                 message: &message,
             })?;
@@ -365,7 +341,7 @@ impl<'s> Session<'s> {
         if has_images {
             let cost_s = self.cost.stack.time(hand_on).1;
             let cost_ms = 1e3 * cost_s;
-            observers.show(&Event::Cost { node, cost_ms })?;
+            self.observers.show(&Event::Cost { node, cost_ms })?;
             self.images.push(Delivered { message, cost_ms });
             return Ok(());
         }
@@ -373,23 +349,19 @@ impl<'s> Session<'s> {
         if let (Content::BalisePassed(name), Node::Train(id)) = (&message.content, node)
             && let Some(telegram) = self.links.read_balise(message.received_at, name, *id)
         {
-            self.deliver(node, telegram, observers)?;
+            self.deliver(node, telegram)?;
         }
         Ok(())
     }
 
     /// Every piece of equipment does what is due; what it says reaches those after it on its node in
     /// this cycle, and those before it in the next.
-    fn work(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn work(&mut self, now: SimTime) -> Result<(), SessionError> {
         for k in 0..self.equipment.len() {
             let equipment = &mut self.equipment[k].equipment;
             let messages = self.cost.stack.time(|| equipment.cycle(now)).0;
             for message in messages {
-                self.score_message(now, &message, observers)?;
+                self.score_message(now, &message)?;
                 self.send(k, message);
             }
         }

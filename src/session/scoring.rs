@@ -1,36 +1,37 @@
 //! What a session writes down as it goes: what equipment says is held against the truth, and shown to
 //! observers.
 
-use super::costs::Observers;
 use super::scheduler::Session;
 use super::train_score::TrainScore;
-use super::{End, Event, Opening, SessionError, Summary, TrainOpening};
+use super::{
+    End, Event, Opening, Physics, SessionError, Summary, TrainOpening, TrainSummary, WallShares,
+};
 use crate::bus::{
     CameraHealth, Content, EYES, LedReport, Message, Node, SimTime, TrainId, WaysideReport,
 };
-use crate::scenario::Onboard;
+use crate::scenario::OnboardSettings;
 
-impl Session<'_> {
-    pub(super) fn open(&self, observers: &mut Observers<'_, '_>) -> Result<(), SessionError> {
+impl Session<'_, '_> {
+    pub(super) fn open(&mut self) -> Result<(), SessionError> {
         let posts = self.scenario.wayside.iter();
         let calibrations: Vec<_> = posts.map(|post| post.calibration.clone()).collect();
-        let opening = |onboard: &Onboard| TrainOpening {
-            id: onboard.train,
+        let opening = |onboard: &OnboardSettings| TrainOpening {
+            id: onboard.id(),
             rig: onboard.rig.as_ref().map(|rig| rig.calibration()),
-            car_half_extents_m: (self.world.car_half_extents_m(onboard.train)).unwrap_or_default(),
-            cars: (self.world.train(onboard.train)).map_or(0, |t| t.world_from_cars.len()),
+            car_half_extents_m: (self.world.car_half_extents_m(onboard.id())).unwrap_or_default(),
+            cars: (self.world.train(onboard.id())).map_or(0, |t| t.world_from_cars.len()),
             radar: onboard.doppler.is_some(),
             protection: onboard.protects(),
         };
         let trains: Vec<_> = self.scenario.onboard.iter().map(opening).collect();
         let opening = Opening {
-            scenario: &self.scenario.name,
-            seed: self.scenario.seed,
+            scenario: &self.scenario.file.name,
+            seed: self.scenario.file.seed,
             tunnel: &self.scenario.tunnel,
             trains: &trains,
             wayside: &calibrations,
         };
-        observers.each(|o| o.open(&opening))?;
+        self.observers.each(|o| o.open(&opening))?;
         Ok(())
     }
 
@@ -39,42 +40,34 @@ impl Session<'_> {
         &mut self,
         now: SimTime,
         message: &Message,
-        observers: &mut Observers<'_, '_>,
     ) -> Result<(), SessionError> {
         let sender = &message.sender;
         match (&message.content, sender) {
-            (Content::Led(report), Node::Train(id)) => self.score_led(*id, report, observers),
-            (Content::Wayside(report), Node::Post(_)) => {
-                self.score_wayside(now, sender, report, observers)
-            }
+            (Content::Led(report), Node::Train(id)) => self.score_led(*id, report),
+            (Content::Wayside(report), Node::Post(_)) => self.score_wayside(now, sender, report),
             (Content::Camera(status), _) => {
-                self.note_camera(sender, &status.camera, now, status.health, observers)
+                self.note_camera(sender, &status.camera, now, status.health)
             }
             (Content::Protection(report), Node::Train(id)) => {
                 if let Some(train) = self.trains.get_mut(id) {
                     train.on_protection(now, report);
                 }
-                Ok(observers.show(&Event::Message {
+                Ok(self.observers.show(&Event::Message {
                     node: sender,
                     message,
                 })?)
             }
-            _ => Ok(observers.show(&Event::Message {
+            _ => Ok(self.observers.show(&Event::Message {
                 node: sender,
                 message,
             })?),
         }
     }
 
-    fn score_led(
-        &mut self,
-        id: TrainId,
-        report: &LedReport,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    fn score_led(&mut self, id: TrainId, report: &LedReport) -> Result<(), SessionError> {
         let node = Node::Train(id);
         for (eye, health) in EYES.into_iter().zip(report.eyes) {
-            self.note_camera(&node, eye, report.time, health, observers)?;
+            self.note_camera(&node, eye, report.time, health)?;
         }
         let (world, images) = (&self.world, &self.images);
         let delivered = images.iter().find_map(|d| match &d.message.content {
@@ -87,7 +80,7 @@ impl Session<'_> {
         });
         if let (Some(train), Some((pair, cost_ms))) = (self.trains.get_mut(&id), delivered) {
             let truths_m = train.on_led(report, cost_ms, world)?;
-            observers.show(&Event::Pair {
+            self.observers.show(&Event::Pair {
                 train: id,
                 pair,
                 report,
@@ -102,7 +95,6 @@ impl Session<'_> {
         now: SimTime,
         node: &Node,
         report: &WaysideReport,
-        observers: &mut Observers<'_, '_>,
     ) -> Result<(), SessionError> {
         let post = self.posts.index(node);
         let delivered = self.images.iter().find_map(|d| match &d.message.content {
@@ -113,7 +105,7 @@ impl Session<'_> {
         });
         if let Some((frame, cost_ms)) = delivered {
             self.posts.report(post, report, now, cost_ms);
-            observers.show(&Event::Wayside {
+            self.observers.show(&Event::Wayside {
                 post,
                 frame,
                 report,
@@ -122,7 +114,7 @@ impl Session<'_> {
         let Node::Post(name) = node else {
             return Ok(());
         };
-        self.note_camera(node, name, report.time, report.camera, observers)
+        self.note_camera(node, name, report.time, report.camera)
     }
 
     /// Takes down what equipment says of a camera, and shows it where it is new.
@@ -132,14 +124,13 @@ impl Session<'_> {
         camera: &str,
         time: SimTime,
         health: CameraHealth,
-        observers: &mut Observers<'_, '_>,
     ) -> Result<(), SessionError> {
         let all = match node {
             Node::Train(id) => self.trains.get_mut(id).map(|train| &mut train.health),
             _ => Some(&mut self.posts.health),
         };
         if all.is_some_and(|all| all.note(camera, time, health)) {
-            observers.show(&Event::Camera {
+            self.observers.show(&Event::Camera {
                 time,
                 node,
                 camera,
@@ -149,18 +140,14 @@ impl Session<'_> {
         Ok(())
     }
 
-    pub(super) fn show_truth(
-        &mut self,
-        now: SimTime,
-        observers: &mut Observers<'_, '_>,
-    ) -> Result<(), SessionError> {
+    pub(super) fn show_truth(&mut self, now: SimTime) -> Result<(), SessionError> {
         if self.truth_ticker.due(now, 0.0).is_some() {
             let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
             for (id, score) in &mut self.trains {
                 if let Some(truth) = world.train(*id) {
                     score.on_motion(&truth, world, line);
                     let left_eye = score.left_eye(world);
-                    observers.show(&Event::Train {
+                    self.observers.show(&Event::Train {
                         train: *id,
                         truth: &truth,
                         left_eye: left_eye.as_ref(),
@@ -170,7 +157,7 @@ impl Session<'_> {
         }
         if self.bodies_ticker.due(now, 0.0).is_some() {
             let (bodies, _) = self.world.owned_bodies(self.world.train_ids().next());
-            observers.show(&Event::Bodies {
+            self.observers.show(&Event::Bodies {
                 time: now,
                 bodies: &bodies,
             })?;
@@ -190,22 +177,50 @@ impl Session<'_> {
         })
     }
 
-    pub(super) fn summary(
-        self,
-        end: End,
-        derailed: Option<TrainId>,
-        observers: &Observers<'_, '_>,
-    ) -> Summary {
+    pub(super) fn summary(mut self, end: End, derailed: Option<TrainId>) -> Summary {
         let simulated_s = match &self.bench {
             Some(_) => self.pairs_s(),
             None => self.world.time().secs(),
         };
-        let (backend, cost) = (self.imaging.backend(), &self.cost);
-        let summary = Summary::new(self.scenario, end, simulated_s, backend, cost, observers);
-        let world = &self.world;
+        let (scenario, world, cost) = (&self.scenario.file, &self.world, &self.cost);
+        let wall_s = self.observers.wall_s();
         let trains = self.trains.into_iter();
         let trains = trains.map(|(id, score)| score.finish(world, derailed == Some(id)));
-        let trains = trains.collect();
-        self.posts.finish(summary).with_trains(trains)
+        let mut trains: Vec<TrainSummary> = trains.collect();
+        let first = trains.first().cloned().unwrap_or_default();
+        // One train has no list beside the figures at the top.
+        if trains.len() == 1 {
+            trains.clear();
+        }
+        let mut cameras = std::mem::take(&mut self.posts.health.cameras);
+        cameras.extend(first.cameras);
+        Summary {
+            scenario: scenario.name.clone(),
+            seed: scenario.seed,
+            end,
+            simulated_s,
+            wall_s,
+            real_time_factor: simulated_s / wall_s,
+            renderer: self.imaging.backend(),
+            stereo_frames: first.stereo_frames,
+            wayside_frames: self.posts.frames,
+            physics: Physics {
+                us_per_step: 1e6 * cost.physics.total_s / cost.physics.times.max(1) as f64,
+            },
+            wall_shares_s: WallShares {
+                physics_s: cost.physics.total_s,
+                submit_s: cost.submit.total_s,
+                wait_s: cost.wait.total_s,
+                stack_s: cost.stack.total_s,
+                record_s: self.observers.watch.total_s,
+            },
+            positioning: first.positioning,
+            wayside: self.posts.finish(),
+            cameras,
+            dark_lamps: first.dark_lamps,
+            protection: first.protection,
+            train: first.train,
+            trains,
+        }
     }
 }

@@ -131,7 +131,12 @@ impl Observer for Watched {
 
 /// Means of [`STEPS`] steps of the world.
 fn step_seconds(scenario: &Scenario) -> Result<Vec<f64>, Error> {
-    let mut world = World::new(scenario.tunnel.clone(), &scenario.physics, scenario.seed, 0)?;
+    let mut world = World::new(
+        scenario.tunnel.clone(),
+        &scenario.physics,
+        scenario.file.seed,
+        0,
+    )?;
     let command = TrainCommand {
         permitted_speed_mps: 80.0 / 3.6,
         ..TrainCommand::default()
@@ -184,7 +189,7 @@ mod tests {
         assert!(scene(TRAIN, 1).unwrap().rig().is_some());
         let post = scene(POST, 1).unwrap();
         assert_eq!(post.wayside.len(), 1);
-        assert_eq!(post.stack.wayside.reference_frames as usize, LEARNING);
+        assert_eq!(post.file.stack.wayside.reference_frames as usize, LEARNING);
     }
 
     /// A median over a torn round, or the worst instead of the best.

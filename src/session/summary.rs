@@ -1,8 +1,6 @@
 //! What a session comes to, as `summary.json` has it.
 
-use super::costs::{Costs, Observers};
 use crate::bus::{CameraFault, Method, TrainId};
-use crate::scenario::Scenario;
 use crate::twin::physics::{EnergyBook, Impact};
 use crate::twin::render::Backend;
 use serde::Serialize;
@@ -51,7 +49,7 @@ pub struct Summary {
 }
 
 /// The figures of one train, as in [`Summary`].
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub struct TrainSummary {
     /// Its number.
     pub id: TrainId,
@@ -67,48 +65,6 @@ pub struct TrainSummary {
     pub protection: Option<ProtectionFigures>,
     /// How it ran.
     pub train: Option<TrainFigures>,
-}
-
-impl Summary {
-    /// Of a run of which nothing but its speed is known.
-    pub(super) fn new(
-        scenario: &Scenario,
-        end: End,
-        simulated_s: f64,
-        renderer: Backend,
-        cost: &Costs,
-        observers: &Observers<'_, '_>,
-    ) -> Self {
-        let wall_s = observers.wall_s();
-        Self {
-            scenario: scenario.name.clone(),
-            seed: scenario.seed,
-            end,
-            simulated_s,
-            wall_s,
-            real_time_factor: simulated_s / wall_s,
-            renderer,
-            stereo_frames: 0,
-            wayside_frames: 0,
-            physics: Physics {
-                us_per_step: 1e6 * cost.physics.total_s / cost.physics.times.max(1) as f64,
-            },
-            wall_shares_s: WallShares {
-                physics_s: cost.physics.total_s,
-                submit_s: cost.submit.total_s,
-                wait_s: cost.wait.total_s,
-                stack_s: cost.stack.total_s,
-                record_s: observers.watch.total_s,
-            },
-            positioning: BTreeMap::new(),
-            wayside: None,
-            cameras: BTreeMap::new(),
-            dark_lamps: Vec::new(),
-            protection: None,
-            train: None,
-            trains: Vec::new(),
-        }
-    }
 }
 
 /// How a run ended.

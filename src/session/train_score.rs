@@ -5,11 +5,11 @@ use super::health::Health;
 use super::outcome::Outcome;
 use super::positioning_score::PositioningScore;
 use super::ride::Ride;
-use super::summary::{Summary, TrainSummary};
+use super::summary::TrainSummary;
 use crate::bus::{
     EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainEnd, TrainId,
 };
-use crate::scenario::{Onboard, Scenario};
+use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::Alignment;
 use crate::twin::physics::{TrainState, World};
 use crate::twin::sensors::SensorError;
@@ -34,19 +34,17 @@ pub struct TrainScore {
 
 impl TrainScore {
     /// Before the first step.
-    pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&Onboard>) -> Self {
+    pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&OnboardSettings>) -> Self {
         let train = scenario.physics.trains.get(id.index());
         let rig = onboard.and_then(|onboard| onboard.rig.as_ref());
         let positioning = onboard
             .filter(|o| o.positions())
             .map(|onboard| PositioningScore::new(scenario.tunnel.clone(), &onboard.led.methods));
-        let mut health = Health::default();
-        if positioning.is_some() {
-            EYES.iter().for_each(|eye| health.expect(eye));
-        }
+        let eyes = EYES.into_iter().filter(|_| positioning.is_some());
         Self {
             id,
             rig: rig.map(|rig| (rig.actual(), rig.end)),
+            health: Health::of(eyes),
             positioning,
             outcome: Outcome::default(),
             ride: Ride::default(),
@@ -54,7 +52,6 @@ impl TrainScore {
             stereo_frames: 0,
             aim_mps: train.map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6),
             stop_at_m: train.and_then(|t| t.stop_at_m),
-            health,
         }
     }
 
@@ -130,7 +127,7 @@ impl TrainScore {
             id: self.id,
             stereo_frames: self.stereo_frames,
             positioning: positioning.unwrap_or_default(),
-            cameras: self.health.finish(),
+            cameras: self.health.cameras,
             dark_lamps: self.dark_lamps,
             protection: self.outcome.protection(self.id, world),
             train: self.ride.finish(self.id, world, self.stop_at_m, derailed),
@@ -146,24 +143,4 @@ fn head_at(world: &World, id: TrainId, time: SimTime) -> Option<f64> {
         let ahead_s = time.since(train.time);
         (ahead_s > 0.0).then_some(train.chainage_m + train.speed_mps * ahead_s)
     })
-}
-
-impl Summary {
-    /// With the figures of the trains: the first one's at the top, and all in a list where there are
-    /// several.
-    #[must_use]
-    pub fn with_trains(mut self, trains: Vec<TrainSummary>) -> Self {
-        if let Some(first) = trains.first().cloned() {
-            self.stereo_frames = first.stereo_frames;
-            self.positioning = first.positioning;
-            self.cameras.extend(first.cameras);
-            self.dark_lamps = first.dark_lamps;
-            self.protection = first.protection;
-            self.train = first.train;
-        }
-        if trains.len() > 1 {
-            self.trains = trains;
-        }
-        self
-    }
 }

@@ -13,6 +13,7 @@ mod unit;
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
 pub use document::{did_you_mean, locate, name_advice, read_toml};
+pub(crate) use numbers::one;
 pub use numbers::{Numbers, put_range};
 pub use problem::{Checker, FileError, Problem, key_below};
 pub use unit::unit_in;

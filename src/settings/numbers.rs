@@ -40,6 +40,11 @@ impl<N: Numbers> Numbers for &N {
     }
 }
 
+/// The default of a scale or a count.
+pub(crate) fn one<N: From<u8>>() -> N {
+    N::from(1)
+}
+
 /// Puts a range into the schema of a number, or of the numbers of a list.
 pub fn put_range(range: RangeInclusive<f64>) -> impl FnMut(&mut Schema) {
     let (low, high) = range.into_inner();

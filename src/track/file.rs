@@ -1,10 +1,10 @@
 //! Tunnel files as a user writes them: TOML, every key with its unit and default.
 
-use super::furniture::{Balise, BaseStation, LONGEST_M, StoppingPlace};
+use super::furniture::{Balise, BaseStation, LONGEST_M, StoppingPlace, WaysideSite};
 use super::section::Side;
 use super::uid::LineCode;
 use crate::settings::{Checker, Problem, Settings, put_range, settings};
-use schemars::{JsonSchema, Schema, schema_for};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
@@ -17,7 +17,7 @@ settings! {
         /// Short name.
         name: String;
         /// Line number, the first part of every lamp's UID.
-        #[serde(default = "one")]
+        #[serde(default = "crate::settings::one::<u8>")]
         line_number: u8, in 0.0..=15.0;
         /// Light that reaches every surface after many reflections, lux.
         #[serde(default = "two_lux")]
@@ -40,7 +40,7 @@ settings! {
         lamp: Vec<LampEntry>, nested;
         /// Wayside devices: a camera and a lidar on the tunnel wall.
         #[serde(default)]
-        wayside: Vec<WaysideEntry>, nested;
+        wayside: Vec<WaysideSite>, nested;
         /// Balises between the rails.
         #[serde(default)]
         balises: Vec<Balise>;
@@ -60,10 +60,6 @@ impl TunnelFile {
             check.problem("name", "is empty", "give the tunnel a name");
         }
     }
-}
-
-fn one() -> u8 {
-    1
 }
 
 fn two_lux() -> f64 {
@@ -271,31 +267,6 @@ settings! {
     }
 }
 
-settings! {
-    /// A wayside device.
-    pub struct WaysideEntry {
-        /// Name.
-        name: String;
-        /// Chainage, metres.
-        chainage_m: f64;
-        /// Left of the centreline, metres.
-        lateral_m: f64;
-        /// Above top of rail, metres.
-        height_m: f64;
-        /// Turn of its axis from up the line, to the left, degrees (180 looks down the line).
-        yaw_deg: f64, in -360.0..=360.0;
-        /// Tilt of its axis, up positive, degrees.
-        pitch_deg: f64, in -90.0..=90.0;
-        /// Name of the balise that gets its messages.
-        balise: String;
-    }
-}
-
-/// JSON Schema of tunnel files, for editors that complete and check TOML.
-pub fn tunnel_schema() -> Schema {
-    schema_for!(TunnelFile)
-}
-
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
@@ -305,7 +276,7 @@ mod tests {
     /// unknown keys are let through.
     #[test]
     fn every_key_of_the_schema_is_described() {
-        let schema = tunnel_schema();
+        let schema = schemars::schema_for!(TunnelFile);
         let root = schema.as_value();
         let definitions = root["$defs"].as_object().unwrap().values();
         let mut keys = 0;

@@ -38,23 +38,25 @@ pub struct LampSite {
     pub code: LineCode,
 }
 
-/// A wayside device: a camera and a lidar on the tunnel wall.
-#[derive(Clone, Debug, PartialEq)]
-pub struct WaysideSite {
-    /// Name.
-    pub name: String,
-    /// Chainage.
-    pub chainage_m: f64,
-    /// Left of the centreline.
-    pub lateral_m: f64,
-    /// Above top of rail.
-    pub height_m: f64,
-    /// Turn of its axis from up the line, to the left.
-    pub yaw_rad: f64,
-    /// Tilt of its axis, up positive.
-    pub pitch_rad: f64,
-    /// Name of the balise that gets its messages.
-    pub balise: String,
+settings! {
+    /// A wayside device.
+    #[schemars(rename = "WaysideEntry")]
+    pub struct WaysideSite {
+        /// Name.
+        name: String;
+        /// Chainage, metres.
+        chainage_m: f64;
+        /// Left of the centreline, metres.
+        lateral_m: f64;
+        /// Above top of rail, metres.
+        height_m: f64;
+        /// Turn of its axis from up the line, to the left, degrees (180 looks down the line).
+        yaw_deg: f64, in -360.0..=360.0;
+        /// Tilt of its axis, up positive, degrees.
+        pitch_deg: f64, in -90.0..=90.0;
+        /// Name of the balise that gets its messages.
+        balise: String;
+    }
 }
 
 /// A balise between the rails.

@@ -59,7 +59,7 @@ pub mod uid;
 pub mod waveform;
 
 pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, TrackPoint};
-pub use file::{TunnelFile, tunnel_schema};
+pub use file::TunnelFile;
 pub use furniture::{Balise, BaseStation, LampSite, StoppingPlace, WaysideSite};
 pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use place::{Direction, Place, TrackId};

@@ -6,7 +6,6 @@ use super::{
     StoppingPlace, Tunnel, WaysideSite,
 };
 use std::borrow::Cow;
-use std::f64::consts::PI;
 
 impl Tunnel {
     /// The tunnel as met in a direction.
@@ -34,7 +33,7 @@ impl Tunnel {
         let turned_site = |site: &WaysideSite| WaysideSite {
             chainage_m: from_end(site.chainage_m),
             lateral_m: -site.lateral_m,
-            yaw_rad: site.yaw_rad - PI.copysign(site.yaw_rad),
+            yaw_deg: site.yaw_deg - 180f64.copysign(site.yaw_deg),
             ..site.clone()
         };
         let turned_balise = |balise: &Balise| Balise {
@@ -130,7 +129,7 @@ mod tests {
         for site in &tunnel.wayside {
             let same = reversed.wayside.iter().find(|s| s.name == site.name);
             let axis = |line: &crate::track::Alignment, site: &WaysideSite| {
-                let heading = line.at(site.chainage_m).heading_rad + site.yaw_rad;
+                let heading = line.at(site.chainage_m).heading_rad + site.yaw_deg.to_radians();
                 let place = TrackPoint {
                     s_m: site.chainage_m,
                     l_m: site.lateral_m,

@@ -58,19 +58,6 @@ impl Waveform {
     pub fn period_s(&self) -> f64 {
         self.chip_s * f64::from(self.frame.len)
     }
-
-    /// Whether the lamp is switched on at a time.
-    pub fn on_at(&self, t_s: f64) -> bool {
-        let chip = ((t_s - self.phase_s) / self.chip_s).floor();
-        self.frame
-            .is_on(chip.rem_euclid(f64::from(self.frame.len)) as u32)
-    }
-
-    /// Mean light from `open_s` to `close_s`, as a share of the light of a lamp that stays on.
-    /// Many windows of one lamp are cheaper with [`LightCurve`].
-    pub fn on_share(&self, open_s: f64, close_s: f64) -> f64 {
-        LightCurve::new(self, Ripple::default()).mean(open_s, close_s)
-    }
 }
 
 /// What the mains leave in a lamp's light: a factor 1 + depth sin(2 pi frequency t + phase).
@@ -242,6 +229,21 @@ fn geometric(turn: f64, n: f64) -> Complex<f64> {
         (n * half).sin() / half.sin()
     };
     Complex::cis((n - 1.0) * half) * ratio
+}
+
+#[cfg(test)]
+impl Waveform {
+    /// Whether the lamp is switched on at a time.
+    pub fn on_at(&self, t_s: f64) -> bool {
+        let chip = ((t_s - self.phase_s) / self.chip_s).floor();
+        self.frame
+            .is_on(chip.rem_euclid(f64::from(self.frame.len)) as u32)
+    }
+
+    /// Mean light from `open_s` to `close_s`, as a share of the light of a lamp that stays on.
+    pub fn on_share(&self, open_s: f64, close_s: f64) -> f64 {
+        LightCurve::new(self, Ripple::default()).mean(open_s, close_s)
+    }
 }
 
 #[cfg(test)]

@@ -7,6 +7,8 @@
     reason = "no test uses all of it, and a test fails by panicking"
 )]
 
+pub mod sample;
+
 use image::GrayImage;
 use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::settings::read_toml;
@@ -16,7 +18,7 @@ use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::reflectance::Wet;
 use metrotwin::twin::render::cpu::CpuRenderer;
 use metrotwin::twin::render::gpu::GpuRenderer;
-use metrotwin::twin::render::{Job, Renderer, Scene, sample};
+use metrotwin::twin::render::{Job, Renderer, Scene};
 
 /// Makes a renderer.
 pub type Make = fn(Scene) -> Box<dyn Renderer>;

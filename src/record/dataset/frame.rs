@@ -3,6 +3,7 @@
 
 use crate::record::parquet::table_rows;
 use crate::record::slug;
+use crate::scenario::ScenarioFile;
 use crate::session::TrainPoint;
 use crate::twin::render::View;
 use crate::twin::render::labels::Projection;
@@ -126,36 +127,17 @@ table_rows! {
     }
 }
 
-/// Which frame of the run it is.
-pub(super) struct FrameName {
-    pub frame_id: i64,
-    pub scenario: String,
-    pub seed: u64,
-    pub camera: String,
-    pub number: u32,
-}
-
-impl FrameName {
-    /// Its file in one of the folders, relative to the data set's and the same on all systems.
-    pub fn file(&self, folder: &str, extension: &str) -> String {
-        format!(
-            "{folder}/{}/{:06}.{extension}",
-            slug(&self.camera),
-            self.number
-        )
-    }
-}
-
 impl FrameRow {
-    /// Still without its labels' files.
+    /// Of a camera's frame with this id and number, still without files.
     pub fn new(
-        name: &FrameName,
+        (frame_id, camera, number): (i64, &str, u32),
+        scenario: &ScenarioFile,
         sight: &Projection<'_>,
         left: Option<&View>,
         train: Option<&TrainPoint>,
     ) -> Self {
         let view = sight.view;
-        let (camera, shutter) = (&view.camera.intrinsics, &view.camera.shutter);
+        let (lens, shutter) = (&view.camera.intrinsics, &view.camera.shutter);
         let mid = view.mid();
         let pose = view.motion.pose_at(mid);
         let left_from_camera = left.map(|left| left.motion.pose_at(mid).inverse() * pose);
@@ -164,15 +146,15 @@ impl FrameRow {
             train.world_from_vehicle.inverse() * left.motion.pose_at(left.mid())
         });
         let vehicle_from_camera = vehicle_from_left.zip(left_from_camera).map(|(a, b)| a * b);
-        let distortion = camera.distortion.coefficients();
+        let distortion = lens.distortion.coefficients();
         let sensor = &view.sensor;
         Self {
-            frame_id: name.frame_id,
-            scenario: name.scenario.clone(),
-            seed: name.seed as i64,
-            camera: name.camera.clone(),
-            number: name.number,
-            image: name.file("images", "png"),
+            frame_id,
+            scenario: scenario.name.clone(),
+            seed: scenario.seed as i64,
+            camera: camera.to_owned(),
+            number,
+            image: String::new(),
             raw: None,
             clean: None,
             depth: None,
@@ -183,12 +165,12 @@ impl FrameRow {
             exposure_s: shutter.exposure_s,
             line_time_s: shutter.line_time_s,
             first_row: shutter.first_row,
-            width_px: camera.width_px,
-            height_px: camera.height_px,
-            fx_px: camera.fx_px,
-            fy_px: camera.fy_px,
-            cx_px: camera.cx_px,
-            cy_px: camera.cy_px,
+            width_px: lens.width_px,
+            height_px: lens.height_px,
+            fx_px: lens.fx_px,
+            fy_px: lens.fy_px,
+            cx_px: lens.cx_px,
+            cy_px: lens.cy_px,
             k1: distortion.k1,
             k2: distortion.k2,
             p1: distortion.p1,
@@ -209,6 +191,12 @@ impl FrameRow {
             f_number: view.lens.f_number,
             gain_db: sensor.gain_db,
         }
+    }
+
+    /// Its file in one of the folders, relative to the data set's and the same on all systems.
+    pub fn file(&self, folder: &str, extension: &str) -> String {
+        let camera = slug(&self.camera);
+        format!("{folder}/{camera}/{:06}.{extension}", self.number)
     }
 }
 

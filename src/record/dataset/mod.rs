@@ -181,7 +181,7 @@ impl<'a> DataSet<'a> {
 
     /// Names of the cameras of which a scenario takes images, in the order of their numbers.
     pub fn cameras_of(scenario: &Scenario) -> Vec<String> {
-        let bench = scenario.bench.is_some();
+        let bench = scenario.file.bench.is_some();
         let rides = bench || !scenario.physics.trains.is_empty();
         let rig = scenario
             .rig()
@@ -270,15 +270,14 @@ impl<'a> DataSet<'a> {
         let scenario = self.scenario;
         let cameras = self.cameras.iter();
         let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
-        let labels = self.plan.labels.0.iter().map(|label| label.word());
         let finite = |s: f64| s.is_finite().then_some(s);
         json!({
             "format": "metrotwin frames",
             "format_version": 1,
             "metrotwin": env!("CARGO_PKG_VERSION"),
-            "scenario": scenario.name,
-            "description": scenario.description,
-            "seed": scenario.seed,
+            "scenario": scenario.file.name,
+            "description": scenario.file.description,
+            "seed": scenario.file.seed,
             "overrides": self.provenance.overrides,
             // Of the scenario as checked, with all that it names.
             "inputs_sha256": sha256(format!("{scenario:?}").as_bytes()),
@@ -290,7 +289,7 @@ impl<'a> DataSet<'a> {
                 "from_s": self.plan.from_s,
                 "to_s": finite(self.plan.to_s),
                 "limit": self.plan.limit,
-                "labels": labels.collect::<Vec<_>>(),
+                "labels": self.plan.labels.0,
             },
         })
     }
@@ -379,7 +378,7 @@ impl Observer for DataSet<'_> {
         frames.close()?;
         let meta = self.meta();
         if self.plan.has(LabelKind::Obstacles) {
-            let set = coco::document(&self.scenario.name, &self.images, &self.annotations);
+            let set = coco::document(&self.scenario.file.name, &self.images, &self.annotations);
             self.write_json("coco.json", &set)?;
         }
         let text = readme::of(&self.plan, &meta).map_err(failed("writing README.md"))?;

@@ -1,10 +1,13 @@
 //! Which frames go into a data set, and what of each.
 
+use clap::ValueEnum;
+use serde::Serialize;
 use std::collections::BTreeSet;
 use std::str::FromStr;
 
 /// What a frame comes with, besides its image and its row in `frames.parquet`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, ValueEnum)]
+#[serde(rename_all = "kebab-case")]
 pub enum LabelKind {
     /// Digital numbers of the converter.
     Raw,
@@ -25,24 +28,6 @@ pub enum LabelKind {
 }
 
 impl LabelKind {
-    /// All, with the words that name them.
-    pub const ALL: [(&'static str, Self); 8] = [
-        ("raw", Self::Raw),
-        ("clean", Self::Clean),
-        ("depth", Self::Depth),
-        ("mask", Self::Mask),
-        ("flow", Self::Flow),
-        ("rows", Self::Rows),
-        ("lamps", Self::Lamps),
-        ("obstacles", Self::Obstacles),
-    ];
-
-    /// Its word.
-    pub fn word(self) -> &'static str {
-        let named = Self::ALL.iter().find(|(_, label)| *label == self);
-        named.map_or("", |(word, _)| word)
-    }
-
     /// It needs the surface of every pixel.
     fn needs_rays(self) -> bool {
         matches!(
@@ -52,7 +37,7 @@ impl LabelKind {
     }
 }
 
-/// A word that is none of [`LabelKind::ALL`].
+/// A word that names no [`LabelKind`].
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error(
     "there are no labels `{0}`; give raw, clean, depth, mask, flow, rows, lamps, obstacles, all or none"
@@ -74,10 +59,8 @@ impl FromStr for LabelKinds {
         }
         let words = text.split(',').map(str::trim);
         let label = |word: &str| {
-            let named = LabelKind::ALL.iter().find(|(name, _)| *name == word);
-            named
-                .map(|(_, label)| *label)
-                .ok_or_else(|| UnknownLabel(word.to_owned()))
+            <LabelKind as ValueEnum>::from_str(word, false)
+                .map_err(|_| UnknownLabel(word.to_owned()))
         };
         words.map(label).collect::<Result<_, _>>().map(Self)
     }
@@ -85,7 +68,7 @@ impl FromStr for LabelKinds {
 
 impl Default for LabelKinds {
     fn default() -> Self {
-        Self(LabelKind::ALL.iter().map(|(_, label)| *label).collect())
+        Self(LabelKind::value_variants().iter().copied().collect())
     }
 }
 
@@ -157,9 +140,11 @@ mod tests {
         let labels = |text: &str| text.parse::<LabelKinds>();
         assert_eq!(labels("all").unwrap(), LabelKinds::default());
         assert!(labels("none").unwrap().0.is_empty());
-        for (word, part) in LabelKind::ALL {
-            assert_eq!(labels(word).unwrap().0, BTreeSet::from([part]));
-            assert_eq!(part.word(), word);
+        for label in LabelKind::value_variants() {
+            // What is written down names the same label to the command line.
+            let word = serde_json::to_value(label).unwrap();
+            let word = word.as_str().unwrap();
+            assert_eq!(labels(word).unwrap().0, BTreeSet::from([*label]));
         }
         assert_eq!(labels("mask, depth").unwrap().0.len(), 2);
         assert!(

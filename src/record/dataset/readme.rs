@@ -6,16 +6,17 @@ use super::obstacles::ObstacleRow;
 use super::{FramePlan, LabelKind};
 use crate::record::parquet::describe;
 use crate::record::render;
+use clap::ValueEnum;
 use minijinja::Error;
 use serde_json::{Value, json};
 
 /// The text for one set.
 pub(super) fn of(plan: &FramePlan, meta: &Value) -> Result<String, Error> {
-    let labels = LabelKind::ALL.into_iter();
-    let missing = labels.filter(|(_, label)| !plan.has(*label));
+    let labels = LabelKind::value_variants().iter();
+    let missing = labels.filter(|label| !plan.has(**label));
     let values = json!({
         "meta": meta,
-        "missing": missing.map(|(word, _)| word).collect::<Vec<_>>(),
+        "missing": missing.collect::<Vec<_>>(),
         "frame_columns": describe(FrameRow::COLUMNS),
         "row_columns": describe(ImageRow::COLUMNS),
         "lamp_columns": describe(LampRow::COLUMNS),

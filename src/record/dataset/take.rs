@@ -3,7 +3,7 @@
 use super::clean::clean;
 use super::coco::Annotation;
 use super::files::{write_npy, write_png};
-use super::frame::{FrameName, FrameRow, ImageRow};
+use super::frame::{FrameRow, ImageRow};
 use super::lamps::LampRow;
 use super::obstacles::{self, ObstacleRow};
 use super::{DataSet, ExposedFrame, LabelKind};
@@ -23,7 +23,6 @@ const INSTANCES: i64 = 65_536;
 
 /// What is kept of a frame until the camera's next one is there, for the flow.
 pub(super) struct LastFrame {
-    name: FrameName,
     /// Place of its row among those of `frames.parquet`.
     row: usize,
     exposed: ExposedFrame,
@@ -39,7 +38,7 @@ struct Pictures {
 
 /// A frame of one camera, and what its labels are made from.
 struct Frame<'a> {
-    name: FrameName,
+    id: i64,
     exposed: &'a ExposedFrame,
     sight: Projection<'a>,
     labels: Option<Labels>,
@@ -114,20 +113,16 @@ impl DataSet<'_> {
         let sight = Projection::new(&job.views[camera.view], job.time);
         let needs_rays = self.plan.needs_rays();
         let frame = Frame {
-            name: FrameName {
-                frame_id: FRAMES * k as i64 + i64::from(exposed.number),
-                scenario: self.scenario.name.clone(),
-                seed: self.scenario.seed,
-                camera: camera.name.clone(),
-                number: exposed.number,
-            },
+            id: FRAMES * k as i64 + i64::from(exposed.number),
             exposed,
             labels: needs_rays.then(|| self.labeller.look(job, &sight)),
             sight,
         };
-        self.write_flow(k, &frame)?;
         let left = matches!(exposed.source, Source::Rig(_)).then(|| &job.views[0]);
-        let mut row = FrameRow::new(&frame.name, &frame.sight, left, exposed.train.as_ref());
+        let name = (frame.id, camera.name.as_str(), exposed.number);
+        let (scenario, train) = (&self.scenario.file, exposed.train.as_ref());
+        let mut row = FrameRow::new(name, scenario, &frame.sight, left, train);
+        self.write_flow(k, &frame)?;
         self.write_pictures(&frame, &mut row, image, pictures)?;
         self.push_tables(k, &frame)?;
         self.images.push(json!({
@@ -141,7 +136,6 @@ impl DataSet<'_> {
         self.cameras[k].written += 1;
         let labels = frame.labels.filter(|_| self.plan.has(LabelKind::Flow));
         self.cameras[k].last = labels.map(|labels| LastFrame {
-            name: frame.name,
             row: self.frames.len() - 1,
             exposed: exposed.clone(),
             labels,
@@ -166,11 +160,11 @@ impl DataSet<'_> {
             |body| goes_on[usize::from(body)],
         );
         let [height, width] = frame.size();
-        let file = last.name.file("flow", "npy");
+        let file = self.frames[last.row].file("flow", "npy");
         let numbers = flow.into_iter().flatten();
         write_npy(&self.out.join(&file), &[height, width, 2], numbers)?;
         let row = &mut self.frames[last.row];
-        (row.flow, row.flow_to) = (Some(file), Some(frame.name.frame_id));
+        (row.flow, row.flow_to) = (Some(file), Some(frame.id));
         Ok(())
     }
 
@@ -184,11 +178,11 @@ impl DataSet<'_> {
     ) -> Result {
         let labels = |kind| frame.labels.as_ref().filter(|_| self.plan.has(kind));
         let (depth, mask) = (labels(LabelKind::Depth), labels(LabelKind::Mask));
-        let name = &frame.name;
-        row.raw = pictures.raw.as_ref().map(|_| name.file("raw", "png"));
-        row.clean = pictures.clean.as_ref().map(|_| name.file("clean", "png"));
-        row.depth = depth.map(|_| name.file("depth", "npy"));
-        row.mask = mask.map(|_| name.file("mask", "png"));
+        row.image = row.file("images", "png");
+        row.raw = pictures.raw.as_ref().map(|_| row.file("raw", "png"));
+        row.clean = pictures.clean.as_ref().map(|_| row.file("clean", "png"));
+        row.depth = depth.map(|_| row.file("depth", "npy"));
+        row.mask = mask.map(|_| row.file("mask", "png"));
         let (row, out) = (&*row, &self.out);
         let at = |file: &Option<String>| out.join(file.as_deref().unwrap_or_default());
         let mut writes: Vec<Write<'_>> = vec![Box::new(|| write_png(&out.join(&row.image), image))];
@@ -215,7 +209,7 @@ impl DataSet<'_> {
 
     fn push_tables(&mut self, k: usize, frame: &Frame<'_>) -> Result {
         let tables = &mut self.tables;
-        let (frame_id, sight, job) = (frame.name.frame_id, &frame.sight, &frame.exposed.job);
+        let (frame_id, sight, job) = (frame.id, &frame.sight, &frame.exposed.job);
         if let Some(table) = &mut tables.rows {
             ImageRow::all(frame_id, sight).try_for_each(|row| table.push(&row))?;
         }

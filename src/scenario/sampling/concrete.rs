@@ -2,7 +2,6 @@
 //! it means.
 
 use super::{ScenarioSample, Template};
-use crate::scenario::schema;
 use crate::scenario::{ScenarioError, ScenarioFile};
 use crate::settings::key_below;
 use serde_json::Value as Json;
@@ -60,7 +59,7 @@ impl Template {
 fn complete(file: &ScenarioFile) -> String {
     let document = Table::try_from(file).unwrap_or_default();
     let writer = Writer {
-        schema: schema::scenario(),
+        schema: schemars::schema_for!(ScenarioFile).to_value(),
     };
     let mut text = String::new();
     writer.table(&mut text, &document, &writer.schema, "");

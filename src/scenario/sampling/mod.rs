@@ -27,7 +27,7 @@
 //! let draw = template.sample(12)?;
 //! assert_eq!(draw, template.sample(12)?); // whatever came before
 //! let scenario = template.scenario(&draw)?;
-//! assert_eq!(scenario.seed, draw.seed);
+//! assert_eq!(scenario.file.seed, draw.seed);
 //! # std::fs::remove_dir_all(&folder)?;
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -66,7 +66,7 @@ settings! {
         from: Distribution, nested;
         /// What the keys get is `offset + scale * value`: a distance ahead of a device at chainage
         /// 1530 m has scale -1 and offset 1530. Default 1.
-        #[serde(default = "one")]
+        #[serde(default = "crate::settings::one::<f64>")]
         scale: f64, in -1e12..=1e12;
         /// See `scale`. Default 0.
         #[serde(default)]
@@ -80,10 +80,6 @@ settings! {
         label: String;
     }
     also check_together
-}
-
-fn one() -> f64 {
-    1.0
 }
 
 /// A distribution. `min` and `max` are in the unit of the key.

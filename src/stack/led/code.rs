@@ -70,7 +70,6 @@ pub struct ChipVotes {
     anchor: Option<(f64, i64)>,
     sum: [f64; 64],
     weight: [f64; 64],
-    frames: u32,
 }
 
 impl ChipVotes {
@@ -82,18 +81,12 @@ impl ChipVotes {
             anchor: None,
             sum: [0.0; 64],
             weight: [0.0; 64],
-            frames: 0,
         }
     }
 
     /// Forgets all votes.
     pub fn clear(&mut self) {
         *self = Self::new(self.code, self.chip_s);
-    }
-
-    /// Images that voted.
-    pub fn frames(&self) -> u32 {
-        self.frames
     }
 
     /// Adds the chips of an image whose row 0 opened `start_s` after a time of the caller's
@@ -113,7 +106,6 @@ impl ChipVotes {
         let expected = time + elapsed * self.chip_s;
         let first = (place + elapsed as i64).rem_euclid(n);
         self.anchor = Some((expected + LOOP_GAIN * (phase_s - expected), first));
-        self.frames += 1;
         for (k, level) in reading.chips.iter().enumerate() {
             if let Some(on) = level {
                 let chip = ((first + k as i64) % n) as usize;

@@ -12,6 +12,7 @@
 //! steepest descent on the way is taken.
 
 use super::ProtectionSettings;
+use crate::numerics::bisected;
 use crate::track::Tunnel;
 
 /// Standard gravity.
@@ -161,16 +162,8 @@ impl BrakeModel {
     /// Greatest speed with which a train at `at_m` stops before `target_m`, when it runs on for
     /// `wait_s` first; 0 where not even a standing train is safe.
     pub fn speed_mps(&self, grades: &Grades, at_m: f64, target_m: f64, wait_s: f64) -> f64 {
-        let (mut low, mut high) = (0.0, FASTEST_MPS);
-        for _ in 0..36 {
-            let mid = 0.5 * (low + high);
-            if self.stops(grades, at_m + mid * wait_s, mid, target_m) {
-                low = mid;
-            } else {
-                high = mid;
-            }
-        }
-        low
+        let stops = |speed_mps| self.stops(grades, at_m + speed_mps * wait_s, speed_mps, target_m);
+        bisected((0.0, FASTEST_MPS), 36, stops).0
     }
 
     /// Stopping distance on a constant gradient.
@@ -198,17 +191,9 @@ fn phase(from: Run, time_s: f64, (a0, a1): (f64, f64)) -> Run {
         };
     }
     // The speed is a parabola that ends at or under 0: the last root from above.
-    let (mut low, mut high) = (0.0, time_s);
-    for _ in 0..40 {
-        let mid = 0.5 * (low + high);
-        if speed(mid) > 0.0 {
-            low = mid;
-        } else {
-            high = mid;
-        }
-    }
+    let (_, stopped_s) = bisected((0.0, time_s), 40, |t| speed(t) > 0.0);
     Run {
-        way_m: from.way_m + way(high).max(0.0),
+        way_m: from.way_m + way(stopped_s).max(0.0),
         speed_mps: 0.0,
     }
 }

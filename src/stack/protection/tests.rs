@@ -486,8 +486,8 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
         chainage_m: 1800.0,
         lateral_m: -2.0,
         height_m: 3.0,
-        yaw_rad: 3.0,
-        pitch_rad: 0.0,
+        yaw_deg: 170.0,
+        pitch_deg: 0.0,
         balise: "B7".into(),
     });
     let settings = ProtectionSettings {

@@ -7,6 +7,7 @@
 
 use super::WaysideSettings;
 use crate::bus::WaysideCalibration;
+use crate::numerics::bisected;
 use crate::track::{CrossSection, Edge, TrackPoint, Tunnel};
 use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
@@ -302,16 +303,8 @@ fn crossing(a: TrackPoint, b: TrackPoint, profile: &Profile) -> Option<TrackPoin
         l_m: a.l_m + (b.l_m - a.l_m) * x,
         h_m: a.h_m + (b.h_m - a.h_m) * x,
     };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..30 {
-        let mid = 0.5 * (low + high);
-        if profile.contains(at(mid)) {
-            low = mid;
-        } else {
-            high = mid;
-        }
-    }
-    let p = at(low);
+    let (inside, _) = bisected((0.0, 1.0), 30, |x| profile.contains(at(x)));
+    let p = at(inside);
     let (floor, _) = profile.at(p.l_m)?;
     // A side wall is left at any height over the floor, the floor only at its own.
     (p.h_m - floor < 0.05).then_some(p)

@@ -3,38 +3,22 @@
 use super::{free_standing, on_line};
 use crate::settings::{Checker, did_you_mean};
 use crate::track::Tunnel;
-use crate::track::file::{TunnelFile, WaysideEntry};
 use crate::track::furniture::WaysideSite;
 use crate::track::section::OutlinePoint;
 
-/// Wayside devices, checked against rock, gauge and balises.
-pub(super) fn wayside(
-    file: &TunnelFile,
-    tunnel: &Tunnel,
-    check: &mut Checker<'_>,
-) -> Vec<WaysideSite> {
-    let mut sites = Vec::with_capacity(file.wayside.len());
-    for (k, w) in file.wayside.iter().enumerate() {
+/// Checks wayside devices against rock, gauge and balises.
+pub(super) fn check_wayside(tunnel: &Tunnel, check: &mut Checker<'_>) {
+    for (k, w) in tunnel.wayside.iter().enumerate() {
         let device = format!("wayside[{k}]");
         if on_line(&format!("{device}.chainage_m"), w.chainage_m, tunnel, check) {
             let place = [OutlinePoint::new(w.lateral_m, w.height_m)];
             free_standing(&device, tunnel, w.chainage_m, &place, check);
         }
         check_balise(&format!("{device}.balise"), w, tunnel, check);
-        sites.push(WaysideSite {
-            name: w.name.clone(),
-            chainage_m: w.chainage_m,
-            lateral_m: w.lateral_m,
-            height_m: w.height_m,
-            yaw_rad: w.yaw_deg.to_radians(),
-            pitch_rad: w.pitch_deg.to_radians(),
-            balise: w.balise.clone(),
-        });
     }
-    sites
 }
 
-fn check_balise(key: &str, w: &WaysideEntry, tunnel: &Tunnel, check: &mut Checker<'_>) {
+fn check_balise(key: &str, w: &WaysideSite, tunnel: &Tunnel, check: &mut Checker<'_>) {
     match tunnel.balise(&w.balise) {
         None => {
             let names: Vec<String> = tunnel.balises.iter().map(|b| b.name.clone()).collect();

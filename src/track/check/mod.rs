@@ -39,7 +39,7 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
         alignment,
         sections,
         lamps: Vec::new(),
-        wayside: Vec::new(),
+        wayside: file.wayside.clone(),
         balises: file.balises.clone(),
         base_stations: file.base_stations.clone(),
         line_number: file.line_number,
@@ -47,7 +47,7 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
         ambient_lx: file.ambient_lx,
     };
     tunnel.lamps = lamps::place(file, &tunnel, check);
-    tunnel.wayside = devices::wayside(file, &tunnel, check);
+    devices::check_wayside(&tunnel, check);
     devices::check_named(&tunnel, check);
     tunnel
 }

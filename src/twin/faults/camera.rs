@@ -35,7 +35,7 @@ settings! {
         /// the pair comes without it.
         Drop {
             /// This share of them, 0 to 1, each drawn from the seed.
-            #[serde(default = "all")]
+            #[serde(default = "crate::settings::one::<f64>")]
             share: f64, in 0.0..=1.0;
             /// Only those with these numbers. Default: any.
             frames: Option<Vec<u32>>;
@@ -48,10 +48,6 @@ settings! {
             by_ms: f64, in 0.0..=MAX_LATE_MS;
         },
     }
-}
-
-fn all() -> f64 {
-    1.0
 }
 
 /// What the cameras of a train's rig are called: both eyes together, the left one, the right one.

@@ -20,7 +20,7 @@ settings! {
         to_m: Option<f64>, in -1e6..=1e6;
         /// This share of them, 0 to 1, drawn from the seed: of n lamps, the whole number nearest to
         /// share x n. Default 1: all.
-        #[serde(default = "all")]
+        #[serde(default = "crate::settings::one::<f64>")]
         share: f64, in 0.0..=1.0;
         /// What is wrong with them.
         fault: LampFaultKind, nested;
@@ -31,10 +31,6 @@ settings! {
         to_s: Option<f64>;
     }
     also check_stretches
-}
-
-fn all() -> f64 {
-    1.0
 }
 
 settings! {

@@ -1,5 +1,6 @@
 //! The curve of a hanging cable: y = a cosh(x / a), a = horizontal tension over weight per metre.
 
+use crate::numerics::bisected;
 use nalgebra::{Point3, Vector3};
 
 /// The catenary of a given length between two points.
@@ -29,15 +30,7 @@ impl Catenary {
         let length_m = length_m.max(reach.norm() * (1.0 + LEAST_SLACK));
         // sinh(u) / u = sqrt(L^2 - v^2) / d with u = d / 2a grows with u, so bisection finds u.
         let wanted = ((length_m.powi(2) - reach.z.powi(2)).sqrt() / span_m).max(1.0);
-        let (mut low, mut high) = (1e-6, 50.0);
-        for _ in 0..100 {
-            let u: f64 = 0.5 * (low + high);
-            if u.sinh() / u < wanted {
-                low = u;
-            } else {
-                high = u;
-            }
-        }
+        let (low, high) = bisected((1e-6, 50.0), 100, |u| u.sinh() / u < wanted);
         let a_m = 0.5 * span_m / (0.5 * (low + high));
         Self {
             from,

@@ -90,13 +90,9 @@ settings! {
         /// It comes back after this many metres: the length of a rail. Default: only once.
         every_m: Option<f64>, in 0.1..=1e5;
         /// How many there are, where they come back.
-        #[serde(default = "one")]
+        #[serde(default = "crate::settings::one::<u32>")]
         count: u32, in 1.0..=1e5;
     }
-}
-
-fn one() -> u32 {
-    1
 }
 
 /// One defect where it is, with the depth of each rail's share.

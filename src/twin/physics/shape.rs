@@ -42,7 +42,7 @@ settings! {
             /// the length, y the width to the left, z up.
             file: String;
             /// Metres that a unit of the file stands for.
-            #[serde(default = "one")]
+            #[serde(default = "crate::settings::one::<f64>")]
             scale: f64;
             /// What the file holds, unscaled; whoever reads the scenario puts it here.
             #[serde(skip)]
@@ -54,10 +54,6 @@ settings! {
 
 /// Smallest and largest extent.
 const SIZE_M: RangeInclusive<f64> = 0.01..=10.0;
-
-fn one() -> f64 {
-    1.0
-}
 
 /// Corners of a rock before the hull is drawn around them.
 const ROCK_POINTS: u32 = 22;

@@ -53,11 +53,6 @@ impl World {
         train.state(&self.tunnel.alignment, self.step_s)
     }
 
-    /// Which way it runs.
-    pub fn direction(&self, id: TrainId) -> Option<Direction> {
-        Some(self.get(id)?.track.direction)
-    }
-
     /// Pose of the vehicle frame of one of its ends at a time of the recent past; `None` after now, and
     /// before what is kept.
     pub fn vehicle_at(&self, id: TrainId, end: TrainEnd, time: SimTime) -> Option<Isometry3<f64>> {

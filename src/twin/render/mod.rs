@@ -17,6 +17,8 @@ mod lit_scene;
 pub mod paint;
 pub mod photometry;
 pub mod pixel_map;
+#[cfg(test)]
+#[path = "../../../tests/common/sample.rs"]
 pub mod sample;
 mod scene;
 pub mod sensor;

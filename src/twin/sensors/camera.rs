@@ -357,16 +357,11 @@ impl CameraSettings {
         tunnel: &Tunnel,
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
-        let balise = tunnel.balises.iter().find(|b| b.name == site.balise)?;
-        let world_from_housing = world_from_housing(site, tunnel);
-        Some(WaysideCalibration {
-            name: site.name.clone(),
-            camera: self.camera(),
-            world_from_camera: world_from_housing * forward_from_camera(),
-            world_from_lidar: with_lidar.then(|| world_from_housing * forward_from_lidar()),
-            chainage_m: site.chainage_m,
-            balise_chainage_m: balise.chainage_m,
-        })
+        let sheet = Self {
+            calibration_error: WaysideError::default(),
+            ..*self
+        };
+        sheet.actual(site, tunnel, with_lidar)
     }
 
     /// The device as it really hangs and looks, through which the world is drawn.
@@ -376,17 +371,29 @@ impl CameraSettings {
         tunnel: &Tunnel,
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
+        let balise = tunnel.balise(&site.balise)?;
         let error = self.calibration_error;
-        let camera = self.actual_camera();
-        let site = WaysideSite {
-            chainage_m: site.chainage_m + error.chainage_m,
-            lateral_m: site.lateral_m + error.lateral_m,
-            height_m: site.height_m + error.height_m,
-            yaw_rad: site.yaw_rad + error.yaw_deg.to_radians(),
-            pitch_rad: site.pitch_rad + error.pitch_deg.to_radians(),
-            ..site.clone()
+        let place = TrackPoint {
+            s_m: site.chainage_m + error.chainage_m,
+            l_m: site.lateral_m + error.lateral_m,
+            h_m: site.height_m + error.height_m,
         };
-        camera.calibration(&site, tunnel, with_lidar)
+        let yaw_rad = site.yaw_deg.to_radians() + error.yaw_deg.to_radians();
+        let pitch_rad = site.pitch_deg.to_radians() + error.pitch_deg.to_radians();
+        let heading_rad = tunnel.alignment.at(place.s_m).heading_rad + yaw_rad;
+        // Forward, left, up at the device's axis.
+        let world_from_housing = Isometry3::from_parts(
+            Translation3::from(tunnel.alignment.world_from_track(place)),
+            yaw_pitch(heading_rad, pitch_rad),
+        );
+        Some(WaysideCalibration {
+            name: site.name.clone(),
+            camera: self.actual_camera().camera(),
+            world_from_camera: world_from_housing * forward_from_camera(),
+            world_from_lidar: with_lidar.then(|| world_from_housing * forward_from_lidar()),
+            chainage_m: place.s_m,
+            balise_chainage_m: balise.chainage_m,
+        })
     }
 
     /// This camera as it really is; its errors are now in its values.
@@ -432,20 +439,6 @@ impl CameraSettings {
 pub(super) fn check_half(key: &str, error: f64, calibrated: f64, check: &mut Checker<'_>) {
     let half = 0.5 * calibrated.abs();
     check.within(key, error, -half..=half);
-}
-
-/// Forward, left, up at the device's axis.
-fn world_from_housing(site: &WaysideSite, tunnel: &Tunnel) -> Isometry3<f64> {
-    let place = TrackPoint {
-        s_m: site.chainage_m,
-        l_m: site.lateral_m,
-        h_m: site.height_m,
-    };
-    let heading = tunnel.alignment.at(site.chainage_m).heading_rad + site.yaw_rad;
-    Isometry3::from_parts(
-        Translation3::from(tunnel.alignment.world_from_track(place)),
-        yaw_pitch(heading, site.pitch_rad),
-    )
 }
 
 /// A camera at `place` of a frame with x forward, y left, z up.
@@ -587,9 +580,12 @@ mod tests {
         let axis = device.world_from_camera * Vector3::z();
         let lidar = device.world_from_lidar.unwrap();
         assert!((axis - lidar * Vector3::y()).norm() < 1e-12);
-        assert!((axis.z - site.pitch_rad.sin()).abs() < 1e-12);
+        assert!((axis.z - site.pitch_deg.to_radians().sin()).abs() < 1e-12);
         let line = tunnel.alignment.at(site.chainage_m).world_from_line() * Vector3::x();
         let along = axis.dot(&Vector3::new(line.x, line.y, 0.0).normalize());
-        assert!((along - site.pitch_rad.cos() * site.yaw_rad.cos()).abs() < 1e-9);
+        assert!(
+            (along - site.pitch_deg.to_radians().cos() * site.yaw_deg.to_radians().cos()).abs()
+                < 1e-9
+        );
     }
 }

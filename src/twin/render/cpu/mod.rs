@@ -5,16 +5,32 @@
 //! an exposure of 30 us, it follows one ray in 64 (see `dim.rs`).
 //!
 //! ```
-//! use metrotwin::bus::Intrinsics;
-//! use metrotwin::twin::render::{Renderer, cpu::CpuRenderer, sample};
+//! use metrotwin::bus::{Intrinsics, SimTime};
+//! use metrotwin::scenario::Scenario;
+//! use metrotwin::session::scene;
+//! use metrotwin::twin::random::Stream;
+//! use metrotwin::twin::render::cpu::CpuRenderer;
+//! use metrotwin::twin::render::{CameraMotion, Job, NoiseKey, Renderer, View};
 //!
-//! let mut renderer = CpuRenderer::oracle(sample::scene());
-//! let mut job = sample::wayside_job(&sample::tunnel(), 100.0);
-//! job.views[0].camera.intrinsics = Intrinsics::centred(96, 54, 55.0);
+//! let scenario = Scenario::load("scenarios/forgotten_toolbox.toml".as_ref(), &[])?;
+//! let post = &scenario.wayside[0];
+//! let mut view = View {
+//!     camera: post.actual.camera,
+//!     start: SimTime::ZERO,
+//!     motion: CameraMotion::still(post.actual.world_from_camera),
+//!     pixel_m: 1e-6 * post.camera.pixel_um,
+//!     lens: post.camera.lens,
+//!     sensor: post.camera.sensor,
+//!     noise: NoiseKey { stream: Stream::new(1, 0, "my camera"), frame: 0 },
+//! };
+//! view.camera.intrinsics = Intrinsics::centred(96, 54, 55.0);
+//! let job = Job { views: vec![view], ..Job::default() };
+//!
+//! let mut renderer = CpuRenderer::oracle(scene(&scenario));
 //! renderer.submit(&job)?;
 //! let images = renderer.collect()?;
 //! assert_eq!(images[0].dimensions(), (96, 54));
-//! # Ok::<(), metrotwin::twin::render::RenderError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! What it computes for a pixel:

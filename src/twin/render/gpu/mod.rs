@@ -1,15 +1,18 @@
 //! The renderer on a graphics adapter, off screen.
 //!
 //! ```no_run
-//! use metrotwin::twin::render::{Renderer, gpu::GpuRenderer, sample};
-//! let scene = sample::scene();
-//! let job = sample::stereo_job(&scene.tunnel, 40.0, 60.0 / 3.6);
-//! let mut renderer = GpuRenderer::new(scene)?;
+//! use metrotwin::scenario::Scenario;
+//! use metrotwin::session::scene;
+//! use metrotwin::twin::render::{Job, Renderer, gpu::GpuRenderer};
+//!
+//! let scenario = Scenario::load("scenarios/line_run.toml".as_ref(), &[])?;
+//! let mut renderer = GpuRenderer::new(scene(&scenario))?;
+//! // A view for each image; the plain renderer's page shows how one is made.
+//! let job = Job::default();
 //! renderer.submit(&job)?;
 //! // ... other work ...
 //! let images = renderer.collect()?;
-//! images[0].save("left.png").unwrap();
-//! # Ok::<(), metrotwin::twin::render::RenderError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! # How a picture is made

@@ -5,15 +5,15 @@
 //! are at that time. A camera that stands still keeps what it sees of the tunnel.
 //!
 //! ```
-//! use metrotwin::bus::Intrinsics;
 //! use metrotwin::twin::render::labels::{Labeller, Projection};
-//! use metrotwin::twin::render::sample;
+//! use metrotwin::twin::render::{Job, Scene};
 //!
-//! let mut job = sample::wayside_job(&sample::tunnel(), 100.0);
-//! job.views[0].camera.intrinsics = Intrinsics::centred(96, 54, 55.0);
-//! let projection = Projection::new(&job.views[0], job.time);
-//! let labels = Labeller::new(&sample::scene()).look(&job, &projection);
-//! assert_eq!(labels.depth_m.len(), 96 * 54);
+//! /// How far away the nearest surface is that the first camera of a job sees, metres.
+//! fn nearest_m(scene: &Scene, job: &Job) -> f64 {
+//!     let projection = Projection::new(&job.views[0], job.time);
+//!     let labels = Labeller::new(scene).look(job, &projection);
+//!     labels.depth_m.into_iter().fold(f64::INFINITY, f64::min)
+//! }
 //! ```
 //!
 //! Not here: what is between surface and camera (mist, dirt on the glass), and mixed pixels: a

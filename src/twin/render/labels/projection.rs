@@ -12,13 +12,14 @@
 //! 2 m beside a camera at 60 km/h, far less than the 1 at which a picture would tear.
 //!
 //! ```
-//! use metrotwin::twin::render::{labels::Projection, sample};
-//! let job = sample::stereo_job(&sample::tunnel(), 100.0, 20.0);
-//! let projection = Projection::new(&job.views[0], job.time);
-//! let lamp = &sample::scene().lamps[10];
-//! let seen = projection.of(&lamp.centre).ok_or("not seen")?;
-//! assert!(seen.depth_m > 0.0);
-//! # Ok::<(), &str>(())
+//! use metrotwin::twin::render::{Job, Scene, labels::Projection};
+//!
+//! /// In which row the first camera of a job sees each lamp.
+//! fn rows(scene: &Scene, job: &Job) -> Vec<Option<f64>> {
+//!     let projection = Projection::new(&job.views[0], job.time);
+//!     let seen = scene.lamps.iter().map(|lamp| projection.of(&lamp.centre));
+//!     seen.map(|seen| Some(seen?.pixel.y)).collect()
+//! }
 //! ```
 
 use crate::bus::SimTime;

@@ -1,24 +1,19 @@
 //! A small line to draw without any file: 300 m of straight, then 300 m of left-hand arc of radius
-//! 300 m, a circular tunnel with a flat bed, lamps every 10 m on the left wall. For tests, and for
-//! timing a machine.
-//!
-//! ```
-//! use metrotwin::twin::render::sample;
-//! let scene = sample::scene();
-//! assert_eq!(scene.lamps.len(), 60);
-//! ```
+//! 300 m, a circular tunnel with a flat bed, lamps every 10 m on the left wall.
 
-use super::{CameraMotion, Job, LensSettings, NoiseKey, Scene, SensorSettings, View};
-use crate::bus::{CameraModel, Intrinsics, Shutter, SimTime};
-use crate::track::uid::{LineCode, Uid};
-use crate::track::{
+use metrotwin::bus::{CameraModel, Intrinsics, Shutter, SimTime};
+use metrotwin::track::uid::{LineCode, Uid};
+use metrotwin::track::{
     Alignment, BED_M, CrossSection, LampSite, PlanElement, SectionRange, TrackPoint, Tunnel,
 };
-use crate::twin::air::Air;
-use crate::twin::geometry::{Body, Shape};
-use crate::twin::lights::LampLight;
-use crate::twin::random::Stream;
-use crate::twin::reflectance::Wet;
+use metrotwin::twin::air::Air;
+use metrotwin::twin::geometry::{Body, Shape};
+use metrotwin::twin::lights::LampLight;
+use metrotwin::twin::random::Stream;
+use metrotwin::twin::reflectance::Wet;
+use metrotwin::twin::render::{
+    CameraMotion, Job, LensSettings, NoiseKey, Scene, SensorSettings, View,
+};
 use nalgebra::{Isometry3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use std::sync::Arc;
 
