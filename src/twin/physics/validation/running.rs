@@ -235,7 +235,10 @@ fn val_braking_distance() {
     ] {
         for slope in [0.0, -0.03, 0.03] {
             let tunnel = in_tunnel(line(&[PlanElement::straight(3000.0)], slope));
-            let train = train(2, 80.0);
+            let train = TrainSettings {
+                restart_after_s: 0.0,
+                ..train(2, 80.0)
+            };
             let mut world = World::new(tunnel.clone(), &smooth(&train), 1, 0).unwrap();
             run(&mut world, 40.0, &command(brake, 200.0));
             let state = world.train(TRAIN).unwrap();
