@@ -171,7 +171,7 @@ impl MirroredLight {
         let away = source.centre - place;
         let distance_m = away.norm();
         let cos = (-source.axis.dot(&away) / distance_m.max(1e-9)).max(0.0);
-        let towards_cd = axial_cd * cos.powf(source.exponent());
+        let towards_cd = axial_cd * cos.powf(source.exponent);
         Self {
             away,
             intensity_cd: towards_cd * air.transmission(distance_m),

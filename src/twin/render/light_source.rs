@@ -14,6 +14,10 @@ pub struct LightSource<'a> {
     pub axis: Vector3<f64>,
     /// Radius of its disc.
     pub radius_m: f64,
+    /// Mean intensity along its axis.
+    pub intensity_cd: f64,
+    /// Exponent of its pattern.
+    pub exponent: f64,
     /// It does not light what is farther.
     pub reach_m: f64,
 }
@@ -31,6 +35,8 @@ impl<'a> LightSource<'a> {
             centre: lamp.centre,
             axis: lamp.facing.into_inner(),
             radius_m: lamp.radius_m,
+            intensity_cd: lamp.duty() * lamp.axial_intensity_cd(),
+            exponent: lamp.exponent,
             reach_m: LAMP_REACH_M,
         }
     }
@@ -42,23 +48,9 @@ impl<'a> LightSource<'a> {
             centre: light.place(),
             axis: light.axis(),
             radius_m: HEADLIGHT_RADIUS_M,
+            intensity_cd: light.intensity_cd,
+            exponent: light.exponent,
             reach_m: 1e6,
-        }
-    }
-
-    /// Mean intensity along its axis.
-    pub fn intensity_cd(&self) -> f64 {
-        match self.kind {
-            LightKind::Lamp(lamp) => lamp.duty() * lamp.axial_intensity_cd(),
-            LightKind::Headlight(light) => light.intensity_cd,
-        }
-    }
-
-    /// Exponent of its pattern.
-    pub fn exponent(&self) -> f64 {
-        match self.kind {
-            LightKind::Lamp(lamp) => lamp.exponent,
-            LightKind::Headlight(light) => light.exponent,
         }
     }
 

@@ -214,9 +214,7 @@ impl<'a> RowRays<'a> {
             self.draw_solid(&body.solid, buffers);
         }
         self.veil(buffers);
-        let RowBuffers {
-            depths, luminances, ..
-        } = buffers;
+        let RowBuffers { depths, luminances } = buffers;
         for lamp in lamps {
             let depth = |u| self.depth(u, depths);
             lamps::draw_disc(
@@ -235,9 +233,7 @@ impl<'a> RowRays<'a> {
     }
 
     fn draw_tunnel(&self, buffers: &mut RowBuffers) {
-        let RowBuffers {
-            depths, luminances, ..
-        } = buffers;
+        let RowBuffers { depths, luminances } = buffers;
         depths.clear();
         luminances.clear();
         let width = self.view.camera.intrinsics.width_px as usize;

@@ -1,7 +1,7 @@
 //! The passes that draw tunnel and bodies, and what they mirror.
 
 use super::backdrop::{BackdropKey, Backdrops};
-use super::bodies::BodyBuffers;
+use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
 use super::pipeline::Background;
 use super::prepared::PreparedView;
@@ -13,7 +13,7 @@ use super::textures::Textures;
 /// Tunnel and bodies on the adapter.
 pub struct Surfaces<'a> {
     /// Meshes of the bodies.
-    pub bodies: &'a BodyBuffers,
+    pub bodies: &'a BodyMeshes,
     /// What is painted on the tunnel.
     pub textures: &'a Textures,
 }
@@ -23,7 +23,7 @@ impl Surfaces<'_> {
     fn set_buffers(&self, pass: &mut wgpu::RenderPass<'_>, call: &DrawCall) {
         let (vertices, indices) = match &call.chunk {
             Some(chunk) => (&chunk.vertices, &chunk.indices),
-            None => (&self.bodies.vertices.buffer, &self.bodies.indices.buffer),
+            None => (&self.bodies.vertices, &self.bodies.indices),
         };
         pass.set_vertex_buffer(0, vertices.slice(..));
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
@@ -41,8 +41,8 @@ struct Bound<'a> {
 
 impl<'a> Recorder<'a> {
     fn bound(&self, background: &'a Background, textures: &Textures) -> Bound<'a> {
-        let (poses, list) = (self.view.poses.binding(), &self.view.list);
-        let lit = if list.banded {
+        let (view, poses) = (self.view, self.view.poses.as_entire_binding());
+        let lit = if view.list.banded {
             &background.banded
         } else {
             &background.lit
@@ -50,7 +50,7 @@ impl<'a> Recorder<'a> {
         let painted = (textures.all.iter()).map(|painting| {
             let resources = [
                 poses.clone(),
-                list.shares.binding(),
+                view.shares.binding(),
                 painting.binding(),
                 wgpu::BindingResource::Sampler(&textures.sampler),
             ];
@@ -136,10 +136,11 @@ impl<'a> Recorder<'a> {
             return;
         }
         let background = (self.pipelines).background(&self.gpu.device, headlights);
+        let mirrored = self.gpu.storage(&list.mirrored);
         let resources = [
-            view.poses.binding(),
-            list.shares.binding(),
-            list.mirrored.binding(),
+            view.poses.as_entire_binding(),
+            view.shares.binding(),
+            mirrored.as_entire_binding(),
         ];
         let group = self.bind(&background.gloss, &resources);
         let depth = Some((&layers.depth, wgpu::LoadOp::Load));
@@ -147,7 +148,7 @@ impl<'a> Recorder<'a> {
         pass.set_pipeline(&background.gloss);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));
-        pass.set_vertex_buffer(1, list.placements.buffer.slice(..));
+        pass.set_vertex_buffer(1, view.placements.slice(..));
         for call in glossy {
             surfaces.set_buffers(&mut pass, call);
             for instant in 0..list.instants {
@@ -167,7 +168,7 @@ impl PreparedView {
         surfaces: &Surfaces<'_>,
         instant: u32,
     ) {
-        pass.set_vertex_buffer(1, self.list.placements.buffer.slice(..));
+        pass.set_vertex_buffer(1, self.placements.slice(..));
         for call in calls {
             surfaces.set_buffers(pass, call);
             let at = instant * self.list.meshes + call.mesh;

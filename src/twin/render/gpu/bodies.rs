@@ -1,44 +1,36 @@
 //! The bodies of a job on the adapter.
 
 use super::adapter::Gpu;
-use super::layout::Vertex;
 use super::mesh::{Fineness, Mesh};
-use super::upload::Upload;
-use crate::twin::render::lamp_field::LampField;
+use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use std::ops::Range;
 
 /// The triangles of all bodies of a job.
-pub struct BodyBuffers {
+pub struct BodyMeshes {
     /// Corners.
-    pub vertices: Upload<Vertex>,
+    pub vertices: wgpu::Buffer,
     /// Triangles.
-    pub indices: Upload<u32>,
+    pub indices: wgpu::Buffer,
     /// Range of indices of each body.
     pub ranges: Vec<Range<u32>>,
 }
 
-impl BodyBuffers {
-    /// Empty.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self {
-            vertices: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 1 << 12),
-            indices: Upload::new(gpu, wgpu::BufferUsages::INDEX, 1 << 12),
-            ranges: Vec::new(),
-        }
-    }
-
-    /// Takes the bodies of the next job.
-    pub fn write(&mut self, gpu: &Gpu, job: &Job, lamps: &LampField, ambient_lx: f64) {
+impl BodyMeshes {
+    /// Of a job.
+    pub fn new(gpu: &Gpu, job: &Job, scene: &LitScene) -> Self {
         let mut mesh = Mesh::default();
-        self.ranges.clear();
+        let mut ranges = Vec::new();
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
             let fineness = Fineness::of(body, &job.views);
-            mesh.add_body(body, lamps, ambient_lx, fineness);
-            self.ranges.push(first..mesh.indices.len() as u32);
+            mesh.add_body(body, &scene.lamps, scene.tunnel.ambient_lx, fineness);
+            ranges.push(first..mesh.indices.len() as u32);
         }
-        self.vertices.send_all(gpu, mesh.vertices);
-        self.indices.send_all(gpu, mesh.indices);
+        Self {
+            vertices: gpu.upload(wgpu::BufferUsages::VERTEX, &mesh.vertices, 1),
+            indices: gpu.upload(wgpu::BufferUsages::INDEX, &mesh.indices, 1),
+            ranges,
+        }
     }
 }

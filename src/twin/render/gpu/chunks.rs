@@ -11,7 +11,6 @@ use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use wgpu::util::DeviceExt;
 
 /// Range drawn before and behind a camera.
 pub const AHEAD_M: f64 = 160.0;
@@ -160,27 +159,13 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
     } = chunk_mesh(scene, key);
     let heading_rad = scene.tunnel.alignment.at(key.start_m()).heading_rad;
     let (sin, cos) = heading_rad.sin_cos();
-    let buffer = |contents: &[u8], usage| {
-        gpu.device
-            .create_buffer_init(&wgpu::util::BufferInitDescriptor {
-                label: Some("tunnel"),
-                contents,
-                usage,
-            })
-    };
     let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
     Chunk {
         key,
         origin,
         radius_m: mesh.radius_m(),
-        vertices: buffer(
-            bytemuck::cast_slice(&mesh.vertices),
-            wgpu::BufferUsages::VERTEX,
-        ),
-        indices: buffer(
-            bytemuck::cast_slice(&mesh.indices),
-            wgpu::BufferUsages::INDEX,
-        ),
+        vertices: gpu.upload(wgpu::BufferUsages::VERTEX, &mesh.vertices, 1),
+        indices: gpu.upload(wgpu::BufferUsages::INDEX, &mesh.indices, 1),
         lamp,
         parts,
         probes: (mesh.vertices.iter().step_by(PROBE_EVERY))

@@ -1,13 +1,11 @@
 //! What a view draws: which triangles in full and which cheaply, at which instants of the exposure,
 //! under which lamps' blinking.
 
-use super::adapter::Gpu;
-use super::bodies::BodyBuffers;
+use super::bodies::BodyMeshes;
 use super::chunks::Chunk;
 use super::layout::{Mirrored, Placement};
 use super::smear::{Rectangle, Smear};
 use super::textures;
-use super::upload::{NumberTable, Upload};
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::paint;
@@ -53,11 +51,12 @@ pub struct DrawCall {
 }
 
 /// All that a view draws of tunnel and bodies.
+#[derive(Default)]
 pub struct DrawList {
     /// Of the tunnel, near ones first; then of the bodies.
     pub calls: Vec<DrawCall>,
     /// Of every mesh at the first instant, then of every mesh at the second, and so on.
-    pub placements: Upload<Placement>,
+    pub placements: Vec<Placement>,
     /// Number of meshes.
     pub meshes: u32,
     /// Number of instants; the first is the middle of the exposure.
@@ -66,82 +65,61 @@ pub struct DrawList {
     pub moving: Rectangle,
     /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
     /// number; the first row is 1.
-    pub shares: NumberTable,
+    pub shares: Vec<f32>,
     /// Whether any of it differs from 1 so that one can see it.
     pub banded: bool,
     /// Lamps that glossy surfaces mirror.
-    pub mirrored: Upload<Mirrored>,
+    pub mirrored: Vec<Mirrored>,
     /// Rows in which they may be.
     mirror_rows: Range<u32>,
     lamps: Vec<usize>,
 }
 
 impl DrawList {
-    /// Empty.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self {
-            calls: Vec::new(),
-            placements: Upload::new(gpu, wgpu::BufferUsages::VERTEX, 16),
-            meshes: 0,
-            instants: 1,
-            moving: Rectangle::default(),
-            shares: NumberTable::new(gpu),
-            banded: false,
-            mirrored: Upload::storage(gpu),
-            mirror_rows: 0..0,
-            lamps: Vec::new(),
-        }
-    }
-
     /// What it draws of the tunnel: the first of all that it draws.
     pub fn tunnel(&self) -> impl Iterator<Item = &DrawCall> {
         self.calls.iter().take_while(|call| call.chunk.is_some())
     }
 
-    /// Finds what to draw of the chunks in sight and of the bodies, and sends it.
-    pub fn fill(
-        &mut self,
-        gpu: &Gpu,
+    /// Of the chunks in sight and of the bodies.
+    pub fn new(
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (chunks, bodies): (&[Arc<Chunk>], &BodyBuffers),
-    ) {
-        self.calls.clear();
-        self.placements.items.clear();
-        self.lamps.clear();
-        self.mirror_rows = 0..0;
+        (chunks, bodies): (&[Arc<Chunk>], &BodyMeshes),
+    ) -> Self {
         let rows = framed.view.camera.intrinsics.height_px;
-        self.shares.numbers = vec![1.0; rows as usize];
+        let mut list = Self {
+            shares: vec![1.0; rows as usize],
+            ..Self::default()
+        };
         let dim_cd_m2 = DIM_GREY / framed.view.grey_per_cd_m2();
         let reference = framed.reference();
         for chunk in chunks {
-            self.add_chunk(framed, job, scene, chunk, dim_cd_m2);
+            list.add_chunk(framed, job, scene, chunk, dim_cd_m2);
         }
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
-            self.calls.push(DrawCall {
+            list.calls.push(DrawCall {
                 chunk: None,
                 texture: textures::BLANK,
-                mesh: self.placements.items.len() as u32,
+                mesh: list.placements.len() as u32,
                 headlit: !job.headlights.is_empty(),
                 lit: range.clone(),
                 dim: 0..0,
                 glossy: 0..0,
             });
             let place = Point3::from(body.world_from_body.translation.vector);
-            self.placements.items.push(Placement {
+            list.placements.push(Placement {
                 offset_m: single(&(place - reference)),
                 velocity_mps: single(&body.velocity_mps),
                 ..Placement::default()
             });
         }
         // Before those are added that are mirrored alone.
-        self.banded = (self.shares.numbers.iter()).any(|share| (share - 1.0).abs() > BAND);
-        self.mirror(framed, scene.lamps.lamps());
-        self.repeat(framed, job, chunks);
-        self.placements.send(gpu);
-        self.shares.send(gpu, rows);
-        self.mirrored.send(gpu);
+        list.banded = (list.shares.iter()).any(|share| (share - 1.0).abs() > BAND);
+        list.mirror(framed, scene.lamps.lamps());
+        list.repeat(framed, job, chunks);
+        list
     }
 
     fn add_chunk(
@@ -178,7 +156,7 @@ impl DrawList {
             self.calls.push(DrawCall {
                 chunk: Some(Arc::clone(chunk)),
                 texture: textures::slanted(painting, away_m),
-                mesh: self.placements.items.len() as u32,
+                mesh: self.placements.len() as u32,
                 headlit: headlit_grey > UNLIT_GREY,
                 lit: part.indices.start..border,
                 dim: border..part.indices.end,
@@ -189,7 +167,7 @@ impl DrawList {
                 Some(lamp) => self.shares_of(framed, scene.lamps.lamps(), lamp, 0..rows),
                 None => 0,
             };
-            self.placements.items.push(Placement {
+            self.placements.push(Placement {
                 offset_m: single(&(chunk.origin - framed.reference())),
                 period_share: (period - period.floor()) as f32,
                 shares,
@@ -225,7 +203,6 @@ impl DrawList {
 
     /// Lists the lamps that what mirrors may show, where anything does.
     fn mirror(&mut self, framed: &Framed<'_>, lamps: &[BlinkingLamp]) {
-        self.mirrored.items.clear();
         if self.calls.iter().all(|call| call.glossy.is_empty()) {
             return;
         }
@@ -238,7 +215,7 @@ impl DrawList {
             }
             let rows = self.mirror_rows.clone();
             let shares = self.shares_of(framed, lamps, k, rows);
-            self.mirrored.items.push(Mirrored {
+            self.mirrored.push(Mirrored {
                 position_m: single(&away),
                 intensity_cd: (lamp.duty() * lamp.axial_intensity_cd()) as f32,
                 axis: single(&lamp.facing),
@@ -267,7 +244,7 @@ impl DrawList {
             let shutter = &framed.view.camera.shutter;
             let light = &lamps[lamp];
             let mean = light.duty().max(1e-9);
-            self.shares.numbers.extend((0..rows).map(|v| {
+            self.shares.extend((0..rows).map(|v| {
                 if !asked.contains(&v) {
                     return 1.0;
                 }
@@ -280,7 +257,7 @@ impl DrawList {
 
     /// Copies the placements for every instant of the exposure.
     fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &[Arc<Chunk>]) {
-        self.meshes = self.placements.items.len() as u32;
+        self.meshes = self.placements.len() as u32;
         let smear = Smear::of(framed, job.time);
         let anything = self.calls.iter().any(|d| !d.lit.is_empty());
         self.instants = if anything {
@@ -299,12 +276,12 @@ impl DrawList {
             let k = (k + self.instants / 2) % self.instants;
             let late_s = ((f64::from(k) + 0.5) / count - 0.5) * exposure_s;
             for mesh in 0..self.meshes as usize {
-                self.placements.items.push(Placement {
+                self.placements.push(Placement {
                     late_s: late_s as f32,
-                    ..self.placements.items[mesh]
+                    ..self.placements[mesh]
                 });
             }
         }
-        self.placements.items.drain(..self.meshes as usize);
+        self.placements.drain(..self.meshes as usize);
     }
 }

@@ -4,10 +4,8 @@
 //! Where a lamp stands in the camera's frame is worked out at knots of time 150 us apart, and runs
 //! straight between them: at 20 m/s^2 it strays from that by less than a micrometre.
 
-use super::adapter::Gpu;
 use super::layout::{DiscRow, GlareArea, GlareRow, Instant, Lamp};
 use super::spread::PointSpread;
-use super::upload::Upload;
 use super::view::{Framed, single};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
@@ -29,18 +27,19 @@ const MAX_INSTANTS: f64 = 64.0;
 const RIM_POINTS: u32 = 32;
 const RIM_SLACK: f64 = 1.05;
 
-/// Lamps of the view at hand.
+/// Lamps of a view.
+#[derive(Default)]
 pub struct LampTable {
     /// Discs in sight, far ones first.
-    pub lamps: Upload<Lamp>,
+    pub lamps: Vec<Lamp>,
     /// Rows of all of them.
-    pub rows: Upload<DiscRow>,
+    pub rows: Vec<DiscRow>,
     /// Instants of all of those.
-    pub instants: Upload<Instant>,
+    pub instants: Vec<Instant>,
     /// Glare in sight.
-    pub glares: Upload<GlareArea>,
+    pub glares: Vec<GlareArea>,
     /// Rows of all of it.
-    pub glare_rows: Upload<GlareRow>,
+    pub glare_rows: Vec<GlareRow>,
 }
 
 /// A lamp as the camera has it at one time.
@@ -230,24 +229,9 @@ impl PassingLamp<'_> {
 }
 
 impl LampTable {
-    /// Empty.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self {
-            lamps: Upload::storage(gpu),
-            rows: Upload::storage(gpu),
-            instants: Upload::storage(gpu),
-            glares: Upload::storage(gpu),
-            glare_rows: Upload::storage(gpu),
-        }
-    }
-
-    /// Makes the tables of all lamps that the view may see, and sends them.
-    pub fn fill(&mut self, gpu: &Gpu, framed: &Framed<'_>, scene: &LitScene, airlight_cd_m2: f64) {
-        self.lamps.items.clear();
-        self.rows.items.clear();
-        self.instants.items.clear();
-        self.glares.items.clear();
-        self.glare_rows.items.clear();
+    /// Of all lamps that the view may see.
+    pub fn new(framed: &Framed<'_>, scene: &LitScene, airlight_cd_m2: f64) -> Self {
+        let mut table = Self::default();
         let from = framed.reference();
         let mut near: Vec<(f64, &BlinkingLamp)> = (scene.lamps.lamps().iter())
             .map(|lamp| ((lamp.centre - from).norm(), lamp))
@@ -265,15 +249,11 @@ impl LampTable {
                 knots: seen.collect(),
             };
             if passing.knots.iter().any(Option::is_some) {
-                self.add_disc(&passing, scene.tunnel.ambient_lx, airlight_cd_m2);
-                self.add_glare(&passing);
+                table.add_disc(&passing, scene.tunnel.ambient_lx, airlight_cd_m2);
+                table.add_glare(&passing);
             }
         }
-        self.lamps.send(gpu);
-        self.rows.send(gpu);
-        self.instants.send(gpu);
-        self.glares.send(gpu);
-        self.glare_rows.send(gpu);
+        table
     }
 
     fn add_disc(&mut self, passing: &PassingLamp<'_>, ambient_lx: f64, airlight_cd_m2: f64) {
@@ -294,12 +274,12 @@ impl LampTable {
             + (1.0 - passing.clear) * airlight_cd_m2;
         let dark_e = dark_cd_m2 * view.electrons_per_cd_m2();
         let ([low, high], first_row) = bounds.corners();
-        self.lamps.items.push(Lamp {
+        self.lamps.push(Lamp {
             low,
             high,
             first_row,
-            rows_at: self.rows.items.len() as u32,
-            instants_at: self.instants.items.len() as u32,
+            rows_at: self.rows.len() as u32,
+            instants_at: self.instants.len() as u32,
             instants: count,
             radius_m: lamp.radius_m as f32,
             exponent: (lamp.exponent - 1.0) as f32,
@@ -317,14 +297,14 @@ impl LampTable {
                 let seen = passing.at(from_s + 0.5 * step_s);
                 // A disc behind the camera is hit by no ray.
                 let centre = seen.map_or(Vector3::new(0.0, 0.0, -1e3), |s| s.centre);
-                self.instants.items.push(Instant {
+                self.instants.push(Instant {
                     centre: single(&centre),
                     signal_e: part_e as f32,
                 });
             }
             let seen = passing.in_row(v);
             let normal = seen.map_or(-Vector3::z(), |s| s.normal);
-            self.rows.items.push(DiscRow {
+            self.rows.push(DiscRow {
                 normal: single(&normal),
                 unused: 0.0,
             });
@@ -346,11 +326,11 @@ impl LampTable {
             return;
         };
         let ([low, high], first_row) = bounds.corners();
-        self.glares.items.push(GlareArea {
+        self.glares.push(GlareArea {
             low,
             high,
             first_row,
-            rows_at: self.glare_rows.items.len() as u32,
+            rows_at: self.glare_rows.len() as u32,
         });
         let exposure_s = view.camera.shutter.exposure_s;
         for v in bounds.rows.0..=bounds.rows.1 {
@@ -366,7 +346,7 @@ impl LampTable {
                 }
             });
             // Where the lamp is out of sight there is nothing, of any width.
-            self.glare_rows.items.push(row.unwrap_or(GlareRow {
+            self.glare_rows.push(row.unwrap_or(GlareRow {
                 wide_px2: 1.0,
                 ..GlareRow::default()
             }));

@@ -80,7 +80,7 @@ use super::{Backend, RawImage, RenderError, Renderer, upper_bits};
 use adapter::Gpu;
 use backdrop::{BackdropKey, Backdrops, KEPT_BACKDROPS};
 use background::Surfaces;
-use bodies::BodyBuffers;
+use bodies::BodyMeshes;
 use chunks::Chunks;
 use image::GrayImage;
 use pipeline::Pipelines;
@@ -102,9 +102,7 @@ pub struct GpuRenderer {
     scene: LitScene,
     chunks: Chunks,
     textures: Textures,
-    bodies: BodyBuffers,
     maps: Cache<MapKey, Texture>,
-    views: Vec<PreparedView>,
     targets: Cache<(u32, u32), ViewTarget>,
     backdrops: Backdrops,
     spare: Vec<ReadBack>,
@@ -130,9 +128,7 @@ impl GpuRenderer {
             chunks: Chunks::default(),
             textures: Textures::new(&gpu, &scene.paintings),
             scene,
-            bodies: BodyBuffers::new(&gpu),
             maps: Cache::new(KEPT_MAPS),
-            views: Vec::new(),
             targets: Cache::new(KEPT_TARGETS),
             backdrops: Cache::new(KEPT_BACKDROPS),
             spare: Vec::new(),
@@ -141,32 +137,34 @@ impl GpuRenderer {
         })
     }
 
-    /// Records all passes of view `k` and the way back of its image.
-    fn record(&mut self, encoder: &mut wgpu::CommandEncoder, job: &Job, k: usize) -> ReadBack {
-        let (gpu, view, headlights) = (&self.gpu, &job.views[k], job.headlights.len());
+    /// Records all passes of a view and the way back of its image.
+    fn record(
+        &mut self,
+        encoder: &mut wgpu::CommandEncoder,
+        (job, view): (&Job, &View),
+        bodies: &BodyMeshes,
+    ) -> ReadBack {
+        let (gpu, headlights) = (&self.gpu, job.headlights.len());
         let framed = Framed::new(view);
-        if self.views.len() <= k {
-            self.views.push(PreparedView::new(gpu));
-        }
-        let meshes = (&mut self.chunks, &self.bodies);
-        self.views[k].prepare(gpu, &framed, job, &self.scene, meshes);
+        let meshes = (&mut self.chunks, bodies);
+        let prepared = PreparedView::new(gpu, &framed, job, &self.scene, meshes);
         let size_px = size_px(view);
         let target = (self.targets).get(size_px, |size_px| ViewTarget::new(&gpu.device, *size_px));
         let map = (self.maps).get(MapKey::new(view), |key| {
             target::map_texture(gpu, &key.make_map(), size_px)
         });
         let surfaces = Surfaces {
-            bodies: &self.bodies,
+            bodies,
             textures: &self.textures,
         };
         let mut recorder = Recorder {
             gpu,
             pipelines: &self.pipelines,
             encoder,
-            view: &self.views[k],
+            view: &prepared,
             target,
         };
-        let key = BackdropKey::of(&framed, &self.views[k].list);
+        let key = BackdropKey::of(&framed, &prepared.list);
         recorder.draw_background(headlights, &surfaces, (&mut self.backdrops, key.as_ref()));
         recorder.draw_shadows();
         recorder.draw_gloss(headlights, &surfaces);
@@ -183,17 +181,6 @@ impl GpuRenderer {
         );
         target.copy_back(&back, encoder);
         back
-    }
-
-    fn finish_oldest(&mut self) -> Result<InFlight, RenderError> {
-        let job = (self.in_flight.pop_front()).ok_or(RenderError::NothingSubmitted)?;
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(job.submission.clone()),
-            timeout: None,
-        };
-        (self.gpu.device.poll(wait)).map_err(|e| RenderError::Device(e.to_string()))?;
-        self.gpu.check()?;
-        Ok(job)
     }
 }
 
@@ -213,7 +200,6 @@ impl Renderer for GpuRenderer {
         }
         self.chunks = Chunks::default();
         self.backdrops.clear();
-        self.views.clear();
         self.targets.clear();
         self.spare.clear();
         self.in_flight.clear();
@@ -225,11 +211,10 @@ impl Renderer for GpuRenderer {
             self.backdrops.clear();
         }
         self.chunks.next_job();
-        let scene = &self.scene;
-        (self.bodies).write(&self.gpu, job, &scene.lamps, scene.tunnel.ambient_lx);
+        let bodies = BodyMeshes::new(&self.gpu, job, &self.scene);
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
-        let images: Vec<_> = (0..job.views.len())
-            .map(|k| self.record(&mut encoder, job, k))
+        let images: Vec<_> = (job.views.iter())
+            .map(|view| self.record(&mut encoder, (job, view), &bodies))
             .collect();
         let submission = self.gpu.queue.submit([encoder.finish()]);
         for image in &images {
@@ -252,7 +237,13 @@ impl Renderer for GpuRenderer {
     }
 
     fn collect_raw(&mut self) -> Result<Vec<RawImage>, RenderError> {
-        let job = self.finish_oldest()?;
+        let job = (self.in_flight.pop_front()).ok_or(RenderError::NothingSubmitted)?;
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(job.submission),
+            timeout: None,
+        };
+        (self.gpu.device.poll(wait)).map_err(|e| RenderError::Device(e.to_string()))?;
+        self.gpu.check()?;
         let images = job.images.iter().map(ReadBack::image).collect();
         self.spare.extend(job.images);
         images

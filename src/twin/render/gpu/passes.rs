@@ -1,23 +1,32 @@
 //! The passes over the finished background: shadows, focus, lamps, glare and sensor.
 
+use super::layout::{MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS};
 use super::recorder::{BLACK, KEEP, Recorder};
 use super::texture::Texture;
+use wgpu::Buffer;
 
 impl Recorder<'_> {
     /// Fades the background where bodies hide its light.
     pub fn draw_shadows(&mut self) {
-        let (target, shadows) = (self.target, &self.view.shadows);
-        let resources = [
-            target.layers.depth.binding(),
-            shadows.tiles.binding(),
-            shadows.lists.binding(),
-            shadows.sources.binding(),
-            shadows.blockers.binding(),
-            shadows.slabs.binding(),
+        let (gpu, target, shadows) = (self.gpu, self.target, &self.view.shadows);
+        if shadows.tiles.is_empty() {
+            return;
+        }
+        let uniform = wgpu::BufferUsages::UNIFORM;
+        let tables = [
+            gpu.storage(&shadows.tiles),
+            gpu.upload(uniform, &shadows.lists, MAX_WORDS),
+            gpu.upload(uniform, &shadows.sources, MAX_SOURCES),
+            gpu.upload(uniform, &shadows.blockers, MAX_BLOCKERS),
+            gpu.upload(uniform, &shadows.slabs, MAX_SLABS),
         ];
-        let (all, pipelines) = (shadows.tiles.instances(), &self.pipelines.shadows);
-        let border = shadows.capsule_tiles as u32;
-        for (pipeline, tiles) in pipelines.iter().zip([0..border, border..all.end]) {
+        let [tiles, lists, sources, blockers, slabs] =
+            tables.each_ref().map(Buffer::as_entire_binding);
+        let depth = target.layers.depth.binding();
+        let resources = [depth, tiles, lists, sources, blockers, slabs];
+        let pipelines = &self.pipelines.shadows;
+        let (border, end) = (shadows.capsule_tiles as u32, shadows.tiles.len() as u32);
+        for (pipeline, tiles) in pipelines.iter().zip([0..border, border..end]) {
             if !tiles.is_empty() {
                 self.draw_rectangles((&target.layers.signal, KEEP), pipeline, &resources, tiles);
             }
@@ -39,25 +48,27 @@ impl Recorder<'_> {
 
     /// Discs over the background.
     pub fn draw_lamps(&mut self) {
-        let (target, table) = (self.target, &self.view.lamps);
-        if table.lamps.items.is_empty() {
+        let (gpu, target, table) = (self.gpu, self.target, &self.view.lamps);
+        if table.lamps.is_empty() {
             return;
         }
-        let resources = [
-            table.lamps.binding(),
-            table.rows.binding(),
-            table.instants.binding(),
-            target.layers.depth.binding(),
+        let tables = [
+            gpu.storage(&table.lamps),
+            gpu.storage(&table.rows),
+            gpu.storage(&table.instants),
         ];
-        let (discs, all) = (&self.pipelines.discs, table.lamps.instances());
+        let [lamps, rows, instants] = tables.each_ref().map(Buffer::as_entire_binding);
+        let resources = [lamps, rows, instants, target.layers.depth.binding()];
+        let (discs, all) = (&self.pipelines.discs, 0..table.lamps.len() as u32);
         self.draw_rectangles((&target.layers.signal, KEEP), discs, &resources, all);
     }
 
     /// Glare, in its own texture.
     pub fn draw_glare(&mut self) {
-        let table = &self.view.lamps;
-        let resources = [table.glares.binding(), table.glare_rows.binding()];
-        let (glare, all) = (&self.pipelines.glare, table.glares.instances());
+        let (gpu, table) = (self.gpu, &self.view.lamps);
+        let tables = [gpu.storage(&table.glares), gpu.storage(&table.glare_rows)];
+        let resources = tables.each_ref().map(Buffer::as_entire_binding);
+        let (glare, all) = (&self.pipelines.glare, 0..table.glares.len() as u32);
         self.draw_rectangles((&self.target.glare, BLACK), glare, &resources, all);
     }
 

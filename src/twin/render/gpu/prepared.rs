@@ -1,24 +1,30 @@
 //! All that one view needs on the adapter.
 
 use super::adapter::Gpu;
-use super::bodies::BodyBuffers;
+use super::bodies::BodyMeshes;
 use super::chunks::{AHEAD_M, Chunks};
 use super::draw_list::DrawList;
 use super::lamps::LampTable;
-use super::layout::{BRIGHTEST_E, Pose, ViewConstants};
+use super::layout::{BRIGHTEST_E, ViewConstants};
 use super::shadows::ViewShadows;
-use super::upload::Upload;
+use super::texture::Texture;
 use super::view::Framed;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use std::f64::consts::SQRT_2;
 
-/// What is found out about a view before it is drawn, with its buffers, used again in every job.
+/// What is found out about a view before it is drawn. What several passes read is on the adapter;
+/// lists of one pass go there with it.
 pub struct PreparedView {
     /// Its constants.
-    pub constants: Upload<ViewConstants>,
+    pub constants: wgpu::Buffer,
     /// Poses of its rows.
-    pub poses: Upload<Pose>,
+    pub poses: wgpu::Buffer,
+    /// Those of the list.
+    pub placements: wgpu::Buffer,
+    /// Those of the list: a texture, since software adapters read it for many pixels at once, but a
+    /// buffer one pixel after the other.
+    pub shares: Texture,
     /// Tunnel and bodies.
     pub list: DrawList,
     /// Lamps' discs and glare.
@@ -30,43 +36,42 @@ pub struct PreparedView {
 }
 
 impl PreparedView {
-    /// Empty.
-    pub fn new(gpu: &Gpu) -> Self {
-        Self {
-            constants: Upload::new(gpu, wgpu::BufferUsages::UNIFORM, 1),
-            poses: Upload::storage(gpu),
-            list: DrawList::new(gpu),
-            lamps: LampTable::new(gpu),
-            shadows: ViewShadows::new(gpu),
-            beyond_e: 0.0,
-        }
-    }
-
-    /// Takes a view of the next job.
-    pub fn prepare(
-        &mut self,
+    /// Of a job.
+    pub fn new(
         gpu: &Gpu,
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (chunks, bodies): (&mut Chunks, &BodyBuffers),
-    ) {
+        (chunks, bodies): (&mut Chunks, &BodyMeshes),
+    ) -> Self {
         let (s_m, chunks) = chunks.in_sight(gpu, scene, framed);
-        self.list.fill(gpu, framed, job, scene, (&chunks, bodies));
-        self.shadows.fill(gpu, framed, job, scene, &chunks);
+        let list = DrawList::new(framed, job, scene, (&chunks, bodies));
         let airlight_cd_m2 = scene.airlight_cd_m2(s_m);
-        self.lamps.fill(gpu, framed, scene, airlight_cd_m2);
-        self.poses.send_all(gpu, framed.poses());
+        let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         let constants = ViewConstants {
             extinction_per_m: scene.air.extinction_per_m as f32,
-            airlight_e: (airlight_cd_m2 * framed.view.electrons_per_cd_m2()) as f32,
-            mirrored: self.list.mirrored.items.len() as u32,
+            airlight_e: air_e as f32,
+            mirrored: list.mirrored.len() as u32,
             ..framed.constants(job)
         };
-        self.constants.send_all(gpu, vec![constants]);
         // Half of what lies beyond the end of what is drawn, as it is seen, is nearer than this.
         let beyond_m = SQRT_2 * AHEAD_M;
-        let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
-        self.beyond_e = ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E);
+        let rows = framed.view.camera.intrinsics.height_px.max(1);
+        Self {
+            constants: gpu.upload(wgpu::BufferUsages::UNIFORM, &[constants], 1),
+            poses: gpu.storage(&framed.poses()),
+            placements: gpu.upload(wgpu::BufferUsages::VERTEX, &list.placements, 1),
+            shares: Texture::filled(
+                gpu,
+                (rows, list.shares.len() as u32 / rows),
+                1,
+                wgpu::TextureFormat::R32Float,
+                bytemuck::cast_slice(&list.shares),
+            ),
+            lamps: LampTable::new(framed, scene, airlight_cd_m2),
+            shadows: ViewShadows::new(framed, job, scene, &chunks),
+            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
+            list,
+        }
     }
 }

@@ -28,7 +28,8 @@ impl Recorder<'_> {
         pipeline: &wgpu::RenderPipeline,
         resources: &[wgpu::BindingResource<'_>],
     ) -> wgpu::BindGroup {
-        let all = std::iter::once(self.view.constants.binding()).chain(resources.iter().cloned());
+        let all = std::iter::once(self.view.constants.as_entire_binding())
+            .chain(resources.iter().cloned());
         let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
         let entries: Vec<_> = (0..).zip(all).map(entry).collect();
         self.gpu

@@ -89,7 +89,7 @@ impl<'a> Smear<'a> {
 
     /// How many instants of a row's exposure show all motion in it.
     pub fn instants(&self, bodies: &[Body], chunks: &[Arc<Chunk>]) -> u32 {
-        let most_px = if self.most_px(NEAREST_M) < SHARP_PX {
+        let most_px = if self.most_px() < SHARP_PX {
             0.0
         } else {
             let reference = self.framed.reference();
@@ -115,7 +115,7 @@ impl<'a> Smear<'a> {
             size: size_px,
         };
         // A lens that bends lines lets edges bulge beyond their ends.
-        if self.most_px(NEAREST_M) > STILL_PX || !lens.distortion.is_none() {
+        if self.most_px() > STILL_PX || !lens.distortion.is_none() {
             return whole;
         }
         let (mut low, mut high) = (Point2::from([f64::MAX; 2]), Point2::from([f64::MIN; 2]));
@@ -148,10 +148,10 @@ impl<'a> Smear<'a> {
         f_px * self.open.rotation.angle_to(&self.close.rotation)
     }
 
-    /// What stands still and is farther away than that moves by no more than this.
-    fn most_px(&self, nearest_m: f64) -> f64 {
+    /// What stands still and is farther away than [`NEAREST_M`] moves by no more than this.
+    fn most_px(&self) -> f64 {
         let f_px = self.framed.view.camera.intrinsics.fx_px;
-        self.turned_px() + f_px * self.travel().norm() / nearest_m
+        self.turned_px() + f_px * self.travel().norm() / NEAREST_M
     }
 
     /// By how much a place that stands still moves, if it is in the picture.

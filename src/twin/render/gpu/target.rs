@@ -3,7 +3,7 @@
 use super::adapter::Gpu;
 use super::pipeline::{DEPTH, RAW, SIGNAL};
 use super::texture::Texture;
-use super::upload::buffer;
+use super::upload::empty_buffer;
 use crate::twin::render::constants::GLARE_STEP_PX;
 use crate::twin::render::pixel_map::PixelMap;
 use crate::twin::render::{RawImage, RenderError};
@@ -66,7 +66,7 @@ impl ViewTarget {
             size_px,
             layers: SurfaceLayers::new(device, size_px),
             glare: texture(glare_columns, SIGNAL, wgpu::TextureUsages::TEXTURE_BINDING),
-            signal_words: buffer(
+            signal_words: empty_buffer(
                 device,
                 u64::from(signal_stride(size_px)) * u64::from(size_px.1),
                 wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
@@ -102,7 +102,7 @@ impl ReadBack {
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
         Self {
             size_px,
-            buffer: buffer(device, size, usage),
+            buffer: empty_buffer(device, size, usage),
         }
     }
 

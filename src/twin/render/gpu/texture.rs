@@ -45,32 +45,9 @@ impl Texture {
         }
     }
 
-    /// Width and height.
-    pub fn size(&self) -> (u32, u32) {
-        (self.texture.width(), self.texture.height())
-    }
-
     /// For a shader to read.
     pub fn binding(&self) -> wgpu::BindingResource<'_> {
         wgpu::BindingResource::TextureView(&self.view)
-    }
-
-    /// Takes rows of `width` numbers each.
-    pub fn write(&self, gpu: &Gpu, numbers: &[f32], width: u32) {
-        gpu.queue.write_texture(
-            self.texture.as_image_copy(),
-            bytemuck::cast_slice(numbers),
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(4 * width),
-                rows_per_image: None,
-            },
-            wgpu::Extent3d {
-                width,
-                height: numbers.len() as u32 / width,
-                depth_or_array_layers: 1,
-            },
-        );
     }
 
     /// Copies it to another of the same size.

@@ -54,8 +54,7 @@ pub struct ChunkSide {
 struct Site<'a> {
     scene: &'a LitScene,
     lamp: Option<&'a BlinkingLamp>,
-    near: Vec<TrackPoint>,
-    key: ChunkKey,
+    cutting: Cutting<'a>,
     origin: Point3<f64>,
 }
 
@@ -66,13 +65,13 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
     let middle_m = from_m + 0.5 * CHUNK_M;
     let middle = tunnel.alignment.at(middle_m).origin;
     let lamp = strongest(field, &middle);
+    let near: Vec<_> = (field.near(&middle))
+        .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
+        .collect();
     let site = Site {
         scene,
         lamp: lamp.map(|k| &field.lamps()[k]),
-        near: (field.near(&middle))
-            .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
-            .collect(),
-        key,
+        cutting: Cutting { key, lamps: &near },
         origin: tunnel.alignment.at(from_m).origin,
     };
     let mut mesh = Mesh::default();
@@ -85,7 +84,7 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         let rail_q_m = (paintings.of_range.get(section))
             .and_then(|k| paintings.all.get(*k))
             .map_or(0.0, Painting::rail_q_m);
-        let facets = facets_of(range, rail_q_m, site.cutting());
+        let facets = facets_of(range, rail_q_m, site.cutting);
         for side in FacetSide::ALL {
             let first = mesh.indices.len();
             for facet in facets.iter().filter(|f| FacetSide::of(f, range) == side) {
@@ -185,18 +184,11 @@ impl Vertex {
 }
 
 impl Site<'_> {
-    fn cutting(&self) -> Cutting<'_> {
-        Cutting {
-            key: self.key,
-            lamps: &self.near,
-        }
-    }
-
     fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
         let first = mesh.vertices.len() as u32;
         let sides = facet
             .ends
-            .map(|end| finer_stations(stations, end, self.cutting()));
+            .map(|end| finer_stations(stations, end, self.cutting));
         for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
             for &s_m in side {
                 mesh.vertices.push(self.vertex(facet, *end, q_m, s_m));
@@ -207,21 +199,22 @@ impl Site<'_> {
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
         let normal = facet_normal(&self.scene.tunnel, facet, s_m);
-        let p = ruled(&self.scene.tunnel, s_m, end, self.key.detail);
+        let p = ruled(&self.scene.tunnel, s_m, end, self.cutting.key.detail);
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
         let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.scene.tunnel.ambient_lx;
         // What begins or ends with the chunk does so for all of it.
-        let inside_m = s_m - self.key.start_m();
-        let within_m = self.key.start_m() + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
+        let start_m = self.cutting.key.start_m();
+        let inside_m = s_m - start_m;
+        let within_m = start_m + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
         let gloss = Gloss::of(facet.material, self.scene.wet.at(within_m), &normal);
         let paint = self.scene.wet.albedo_factor(facet.material, within_m);
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
-            place_m: [(s_m - self.key.start_m()) as f32, q_m as f32],
+            place_m: [inside_m as f32, q_m as f32],
             paint: paint as f32,
             albedo: (paint * mean_albedo(facet.material)) as f32,
             luminance_cd_m2: 0.0,

@@ -11,7 +11,6 @@ use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::light_source::LightSource;
 use crate::twin::render::scene::Job;
 use nalgebra::Point3;
-use std::ops::Range;
 
 /// What matters in a tile, in the lists: where its hidden lights begin, and its shaded ones, from `shaded`
 /// on; others from `plain` on.
@@ -28,7 +27,6 @@ pub struct Candidates<'j> {
     pub lights: Vec<LightSource<'j>>,
     pub bodies: Bodies<'j>,
     pub casts: Vec<Cast>,
-    pub of_light: Vec<Range<usize>>,
     pub eyes: Eyes,
     /// Where the camera is in the middle of the frame, and how far it goes from there.
     pub eye: (Point3<f64>, f64),
@@ -39,7 +37,7 @@ impl<'j> Candidates<'j> {
     pub fn of(framed: &Framed<'_>, job: &'j Job, lamps: &'j LampField) -> Option<Self> {
         let bodies = casts::bodies(framed, job);
         let lights = casts::lights(framed, job, lamps);
-        let (casts, of_light) = casts::casts(&lights, &bodies);
+        let casts = casts::casts(&lights, &bodies);
         if casts.is_empty() {
             return None;
         }
@@ -48,48 +46,48 @@ impl<'j> Candidates<'j> {
             lights,
             bodies,
             casts,
-            of_light,
             eye: (framed.reference(), eyes.travel_m(&framed.reference())),
             eyes,
         })
     }
 
     /// Whether a cast may fall on anything in a region.
-    pub fn may_fall_on(&self, cast: usize, region: Region<'_>) -> bool {
+    pub fn may_fall_on(&self, cast: usize, region: &Region) -> bool {
         let cast = &self.casts[cast];
         let light = &self.lights[cast.light];
-        let Region {
-            centre,
-            radius_m,
-            normal,
-        } = region;
-        light.may_light(centre, radius_m, normal) && cast.may_fall_on(light, centre, radius_m)
+        region.may_be_lit(light) && cast.may_fall_on(light, region)
+    }
+
+    /// Those of some casts that may fall on anything in a region.
+    pub fn falling_on(&self, casts: &[usize], region: &Region) -> Vec<usize> {
+        let casts = casts.iter().copied();
+        casts.filter(|k| self.may_fall_on(*k, region)).collect()
     }
 
     /// Makes the set of some casts, and of the lights on a surface in a ball: those casts that fall on it
     /// in part or in whole, the lights, and those lights that no body hides in whole.
-    pub fn collect(&self, casts: &[usize], region: Region<'_>, set: &mut Vec<u64>) {
+    pub fn collect(&self, casts: &[usize], region: &Region) -> Vec<u64> {
         let lights = self.lights.len();
-        set.clear();
-        set.resize((2 * lights + self.casts.len()).div_ceil(64), 0);
+        let mut set = vec![0; (2 * lights + self.casts.len()).div_ceil(64)];
         for (k, light) in self.lights.iter().enumerate() {
-            if light.may_light(region.centre, region.radius_m, region.normal) {
-                put(set, k);
-                put(set, self.open(k));
+            if region.may_be_lit(light) {
+                put(&mut set, k);
+                put(&mut set, self.open(k));
             }
         }
         for k in casts {
             let cast = &self.casts[*k];
             let light = &self.lights[cast.light];
-            let disc = Region::around(&light.centre, light.radius_m);
-            let cut = self.bodies.solids[cast.body].cut(region, disc);
+            let disc = Region::around(light.centre, light.radius_m);
+            let cut = self.bodies.solids[cast.body].cut(region, &disc);
             if cut != LinesCut::None {
-                put(set, lights + k);
+                put(&mut set, lights + k);
             }
             if cut == LinesCut::All {
-                take(set, self.open(cast.light));
+                take(&mut set, self.open(cast.light));
             }
         }
+        set
     }
 
     /// The number of a light that is not hidden in whole.
@@ -98,10 +96,10 @@ impl<'j> Candidates<'j> {
     }
 
     /// Whether a body hides all that is in a region from the camera.
-    pub fn hides(&self, region: Region<'_>) -> bool {
-        let eye = Region::around(&self.eye.0, self.eye.1);
+    pub fn hides(&self, region: &Region) -> bool {
+        let eye = Region::around(self.eye.0, self.eye.1);
         let mut large = (self.bodies.solids.iter()).filter(|s| s.radius_m > region.radius_m);
-        large.any(|solid| solid.cut(region, eye) == LinesCut::All)
+        large.any(|solid| solid.cut(region, &eye) == LinesCut::All)
     }
 
     /// Appends the list of a set.
@@ -109,10 +107,11 @@ impl<'j> Candidates<'j> {
         let lights = self.lights.len();
         let (shaded, mut others) = (lists.len() as u32, false);
         let casts_in = |light: usize| {
-            let casts = self.of_light[light].clone();
-            casts
-                .filter(|k| has(set, lights + k))
-                .map(|k| &self.casts[k])
+            let first = self.casts.partition_point(|cast| cast.light < light);
+            (self.casts[first..].iter().zip(first..))
+                .take_while(move |(cast, _)| cast.light == light)
+                .filter(|(_, k)| has(set, lights + k))
+                .map(|(cast, _)| cast)
         };
         let lit = || (0..lights).filter(|k| has(set, *k));
         let is_hidden = |light: &usize| !has(set, self.open(*light));

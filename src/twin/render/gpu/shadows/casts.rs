@@ -10,25 +10,9 @@ use crate::twin::render::light_source::LightSource;
 use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
-use std::ops::Range;
 
 /// Bodies and lamps farther than this from the camera throw no shadow that it sees.
 const FAR_M: f64 = 200.0;
-
-/// A ball around a piece of a body, wherever it is in a frame.
-pub struct Ball {
-    /// The body's number.
-    pub body: usize,
-    pub centre: Point3<f64>,
-    pub radius_m: f64,
-}
-
-impl Ball {
-    /// What is in it.
-    pub fn region(&self) -> Region<'_> {
-        Region::around(&self.centre, self.radius_m)
-    }
-}
 
 /// The shadow of a ball.
 struct Cone {
@@ -48,7 +32,7 @@ pub struct Cast {
 }
 
 /// The shadow of a ball under a light, if that shines on it.
-fn cone(light: &LightSource<'_>, ball: &Ball) -> Option<Cone> {
+fn cone(light: &LightSource<'_>, ball: &Region) -> Option<Cone> {
     let wide_m = ball.radius_m + light.radius_m;
     light.may_light(&ball.centre, wide_m, None).then(|| {
         let to = ball.centre - light.centre;
@@ -74,14 +58,9 @@ fn cone(light: &LightSource<'_>, ball: &Ball) -> Option<Cone> {
 }
 
 impl Cast {
-    /// Whether it may fall on anything in a ball that the light lights.
-    pub fn may_fall_on(
-        &self,
-        light: &LightSource<'_>,
-        centre: &Point3<f64>,
-        radius_m: f64,
-    ) -> bool {
-        let to = centre - light.centre;
+    /// Whether it may fall on anything in a region that the light lights.
+    pub fn may_fall_on(&self, light: &LightSource<'_>, region: &Region) -> bool {
+        let (to, radius_m) = (region.centre - light.centre, region.radius_m);
         let square = to.norm_squared();
         self.cones.iter().any(|cone| {
             let along = to.dot(&cone.axis);
@@ -110,8 +89,8 @@ pub struct Bodies<'j> {
     pub all: Vec<&'j Body>,
     /// The first so many of them are capsules.
     pub capsules: usize,
-    /// Balls around their pieces, wherever they go while the view is exposed.
-    pub balls: Vec<Ball>,
+    /// Balls around the pieces of each, wherever they go while the view is exposed.
+    pub balls: Vec<Vec<Region>>,
     /// What each of them hides.
     pub solids: Vec<Occluder>,
     /// The middle of the exposure after the job's time, and half of how long it lasts.
@@ -138,24 +117,21 @@ pub fn bodies<'j>(framed: &Framed<'_>, job: &'j Job) -> Bodies<'j> {
     let ends = [0.0, last_row].map(|v| shutter.row_mid(framed.view.start, v).since(job.time));
     let mid_s = 0.5 * (ends[0] + ends[1]);
     let half_s = 0.5 * ((ends[1] - ends[0]).abs() + shutter.exposure_s);
-    let mut balls = Vec::new();
-    for (number, body) in bodies.iter().enumerate() {
-        for (place, radius_m) in pieces(&body.shape) {
-            balls.push(Ball {
-                body: number,
-                centre: body.world_from_body * place + body.velocity_mps * mid_s,
-                radius_m: radius_m + body.velocity_mps.norm() * half_s,
-            });
-        }
-    }
+    let balls = |body: &&Body| {
+        let ball = |(place, radius_m)| {
+            let centre = body.world_from_body * place + body.velocity_mps * mid_s;
+            Region::around(centre, radius_m + body.velocity_mps.norm() * half_s)
+        };
+        pieces(&body.shape).map(ball).collect()
+    };
     Bodies {
+        balls: bodies.iter().map(balls).collect(),
         solids: bodies
             .iter()
             .map(|b| Occluder::of(b, mid_s, half_s))
             .collect(),
         all: bodies,
         capsules,
-        balls,
         exposed_s: [mid_s, half_s],
     }
 }
@@ -180,27 +156,23 @@ fn pieces(shape: &Shape) -> impl Iterator<Item = (Point3<f64>, f64)> {
     })
 }
 
-/// All shadows, by light and within one light by body, and those of each light.
-pub fn casts(lights: &[LightSource<'_>], bodies: &Bodies<'_>) -> (Vec<Cast>, Vec<Range<usize>>) {
+/// All shadows, by light and within one light by body.
+pub fn casts(lights: &[LightSource<'_>], bodies: &Bodies<'_>) -> Vec<Cast> {
     let mut casts = Vec::new();
-    let of_light = lights.iter().enumerate().map(|(k, light)| {
-        let first = casts.len();
-        for of_body in bodies.balls.chunk_by(|a, b| a.body == b.body) {
-            let body = bodies.all[of_body[0].body];
-            if light.is_carried_by(body) {
+    for (k, light) in lights.iter().enumerate() {
+        for (body, balls) in bodies.balls.iter().enumerate() {
+            if light.is_carried_by(bodies.all[body]) {
                 continue;
             }
-            let cones: Vec<Cone> = of_body.iter().filter_map(|b| cone(light, b)).collect();
+            let cones: Vec<Cone> = balls.iter().filter_map(|b| cone(light, b)).collect();
             if !cones.is_empty() {
                 casts.push(Cast {
                     light: k,
-                    body: of_body[0].body,
+                    body,
                     cones,
                 });
             }
         }
-        first..casts.len()
-    });
-    let of_light = of_light.collect();
-    (casts, of_light)
+    }
+    casts
 }

@@ -61,7 +61,7 @@ impl Occluder {
     /// Cuts of all lines from the one ball into the other that begin outside of it. At the share t of the
     /// way, a line is as far from that between the centres as both radii allow; where all that fits
     /// into the body, all lines pass through it, and where nothing of it does, none.
-    pub fn cut(&self, from: Region<'_>, to: Region<'_>) -> LinesCut {
+    pub fn cut(&self, from: &Region, to: &Region) -> LinesCut {
         let a = from.centre - self.centre;
         let way = to.centre - from.centre;
         let wide_m = from.radius_m + self.travel_m + SLACK_M;
@@ -148,7 +148,7 @@ mod tests {
             let to = Point3::from(2.0 * around(1) - from);
             let from = Point3::from(from);
             let (r0, r1) = (0.4 * stream.uniform(17), 0.4 * stream.uniform(18));
-            let cut = solid.cut(Region::around(&from, r0), Region::around(&to, r1));
+            let cut = solid.cut(&Region::around(from, r0), &Region::around(to, r1));
             seen[cut as usize] += 1;
             for k in 0..40 {
                 let line = [from + around(2 + 2 * k) * r0, to + around(3 + 2 * k) * r1];

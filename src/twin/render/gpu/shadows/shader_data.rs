@@ -46,9 +46,9 @@ pub fn source(light: &LightSource<'_>, reference: &Point3<f64>) -> ShadowSource 
     let aside = (places.next().unwrap_or(light.centre) - light.centre) * 32f64.sqrt();
     ShadowSource {
         position_m: single(&(light.centre - reference)),
-        intensity_cd: light.intensity_cd() as f32,
+        intensity_cd: light.intensity_cd as f32,
         axis: single(&light.axis),
-        exponent: light.exponent() as f32,
+        exponent: light.exponent as f32,
         aside_m: single(&aside),
         reach_m: light.reach_m as f32,
         up_m: single(&aside.cross(&light.axis)),

@@ -30,7 +30,7 @@ pub struct SurfaceCell {
 
 /// A rectangle of the picture.
 #[derive(Clone, Copy)]
-struct TileBounds {
+pub struct TileBounds {
     low_px: Point2<f64>,
     high_px: Point2<f64>,
 }
@@ -59,11 +59,11 @@ impl SurfaceCell {
     }
 
     /// What it is in, wherever it goes in the exposure.
-    pub fn region(&self) -> Region<'_> {
+    pub fn region(&self) -> Region {
         Region {
-            centre: &self.centre,
+            centre: self.centre,
             radius_m: self.half_diagonal_m() + self.travel_m,
-            normal: self.normal.as_ref(),
+            normal: self.normal,
         }
     }
 
@@ -208,7 +208,8 @@ impl TileBounds {
         before == 0 || behind == 0
     }
 
-    fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &SurfaceCell) -> Self {
+    /// Where a cell may be seen.
+    pub fn of_cell(framed: &Framed<'_>, eyes: &Eyes, cell: &SurfaceCell) -> Self {
         let mut bounds = Self::none();
         let mid_s = eyes.0[1].1;
         for (eye, after_s) in &eyes.0 {
@@ -225,7 +226,8 @@ impl TileBounds {
         bounds
     }
 
-    fn of_body(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
+    /// Where a body may be seen.
+    pub fn of_body(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
         let mut bounds = Self::none();
         for (eye, after_s) in &eyes.0 {
             let corners = Solid::at(body, *after_s)
@@ -259,23 +261,8 @@ impl Marks {
             .map(|(set, k)| (k % self.columns, k / self.columns, set))
     }
 
-    /// Adds numbers to all tiles that show a cell.
-    pub fn add_cell(
-        &mut self,
-        framed: &Framed<'_>,
-        eyes: &Eyes,
-        cell: &SurfaceCell,
-        numbers: &[u64],
-    ) {
-        self.add(&TileBounds::of_cell(framed, eyes, cell), numbers);
-    }
-
-    /// Adds numbers to all tiles that show a body.
-    pub fn add_body(&mut self, framed: &Framed<'_>, eyes: &Eyes, body: &Body, numbers: &[u64]) {
-        self.add(&TileBounds::of_body(framed, eyes, body), numbers);
-    }
-
-    fn add(&mut self, bounds: &TileBounds, numbers: &[u64]) {
+    /// Adds numbers to all tiles that show anything within bounds.
+    pub fn add(&mut self, bounds: &TileBounds, numbers: &[u64]) {
         let range = |k: usize, count: u32| {
             let tile = |px: f64| (px / f64::from(TILE_PX)).floor();
             let first = tile(bounds.low_px[k] + 0.5 - BORDER_PX).max(0.0);
