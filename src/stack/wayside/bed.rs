@@ -19,6 +19,11 @@ const CLEAR_SHARE: f64 = 0.9;
 /// In light as that of the reference the mean grey of a place differs by less than this share of the
 /// threshold.
 const KNOWN_LIGHT_SHARE: f64 = 0.25;
+/// Texture can be told from noise where its variance is so many times that of the noise.
+const TEXTURE_OVER_NOISE: f64 = 4.0;
+/// In another light the bed's texture must show at least this strongly: less than half is a veil, or
+/// something else.
+const LEAST_SLOPE: f64 = 0.5;
 
 /// A place on the bed, and the cell that shows it.
 #[derive(Clone, Debug)]
@@ -118,56 +123,102 @@ pub(super) struct ClearBed<'a> {
     pub threshold: f64,
 }
 
-/// Of some pixels: how many can be compared, how many are as in the reference, and the sum of the
-/// differences.
+/// Of some pixels: how many can be compared, how many are as in the reference, and sums for the
+/// straight line that turns the reference into the frame.
 #[derive(Clone, Copy, Default)]
 struct Compared {
-    pixels: u32,
-    alike: u32,
-    sum: i64,
+    pixels: f64,
+    alike: f64,
+    frame: f64,
+    reference: f64,
+    squares: f64,
+    products: f64,
 }
 
 impl Compared {
     fn light_is_known(&self, threshold: f64) -> bool {
-        let mean = self.sum as f64 / f64::from(self.pixels.max(1));
+        let mean = (self.frame - self.reference) / self.pixels.max(1.0);
         mean.abs() < KNOWN_LIGHT_SHARE * threshold
+    }
+
+    /// The reference's variance, grey levels squared, and the line of least squares from the reference to
+    /// the frame: slope and grey level at 0.
+    fn line(&self) -> (f64, f64, f64) {
+        let n = self.pixels.max(1.0);
+        let (f, b) = (self.frame / n, self.reference / n);
+        let variance = self.squares / n - b * b;
+        let slope = (self.products / n - f * b) / variance.max(f64::MIN_POSITIVE);
+        (variance, slope, f - slope * b)
     }
 }
 
 impl ClearBed<'_> {
-    /// Whether the frame shows the bed of the reference in a box and around it. In the same light
-    /// everything must look the same; in another light a body may look as the bed did before, but what is
-    /// around it then does not.
+    /// Whether the frame shows the bed of the reference in a box.
     pub fn shows_in(&self, bounds: &PixelBox) -> bool {
+        self.is_as_before(bounds) || self.shows_texture(bounds)
+    }
+
+    /// In the light of the reference everything must look the same. In another light a body may look as
+    /// the bed did, but what is around it then does not.
+    fn is_as_before(&self, bounds: &PixelBox) -> bool {
         let margin = |low: u32, high: u32| (high - low) / 2 + CELL_PX as u32;
         let wide = bounds.widened(margin(bounds.u0, bounds.u1), margin(bounds.v0, bounds.v1));
         let (inside, all) = (self.compare(bounds), self.compare(&wide));
         let around = Compared {
             pixels: all.pixels - inside.pixels,
-            alike: all.alike - inside.alike,
-            sum: all.sum - inside.sum,
+            frame: all.frame - inside.frame,
+            reference: all.reference - inside.reference,
+            ..all
         };
-        inside.pixels > 0
-            && f64::from(inside.alike) >= CLEAR_SHARE * f64::from(inside.pixels)
+        inside.pixels > 0.0
+            && inside.alike >= CLEAR_SHARE * inside.pixels
             && inside.light_is_known(self.threshold)
             && around.light_is_known(self.threshold)
     }
 
-    fn compare(&self, bounds: &PixelBox) -> Compared {
-        let mut compared = Compared::default();
-        let columns = bounds.u0 as usize..(bounds.u1 as usize + 1).min(self.width_px);
-        for v in bounds.v0 as usize..=bounds.v1 as usize {
-            let row = v * self.width_px + columns.start..v * self.width_px + columns.end;
-            let pixels = (self.frame.get(row.clone()).unwrap_or_default().iter())
-                .zip(self.reference.mean.get(row.clone()).unwrap_or_default())
-                .zip(self.reference.valid.get(row).unwrap_or_default());
-            for ((&f, &b), _) in pixels.filter(|(_, valid)| **valid != 0) {
-                let difference = i32::from(f) - i32::from(b);
-                compared.pixels += 1;
-                compared.alike += u32::from(f64::from(difference.abs()) < self.threshold);
-                compared.sum += i64::from(difference);
-            }
+    /// In another light, the texture of the bed must show: the frame is the reference times a factor,
+    /// plus a constant. A body hides the texture, and the factor is then 0.
+    fn shows_texture(&self, bounds: &PixelBox) -> bool {
+        let (variance, slope, at_0) = self.compare(bounds).line();
+        let mut pixels = 0.0;
+        let (mut alike, mut noise) = (0.0, 0.0);
+        for (f, b) in self.pixels(bounds) {
+            let expected = at_0 + slope * b;
+            pixels += 1.0;
+            alike += f64::from((f - expected).abs() < 0.5 * self.threshold);
+            noise += self.reference.noise.variance(b);
         }
-        compared
+        slope >= LEAST_SLOPE
+            && pixels > 0.0
+            && variance >= TEXTURE_OVER_NOISE * noise / pixels
+            && alike >= CLEAR_SHARE * pixels
+    }
+
+    fn compare(&self, bounds: &PixelBox) -> Compared {
+        let mut sums = Compared::default();
+        for (f, b) in self.pixels(bounds) {
+            sums.pixels += 1.0;
+            sums.alike += f64::from((f - b).abs() < self.threshold);
+            sums.frame += f;
+            sums.reference += b;
+            sums.squares += b * b;
+            sums.products += f * b;
+        }
+        sums
+    }
+
+    /// Grey levels, in the frame and in the reference, of the pixels of a box that can be compared.
+    fn pixels(&self, bounds: &PixelBox) -> impl Iterator<Item = (f64, f64)> {
+        let columns = bounds.u0 as usize..(bounds.u1 as usize + 1).min(self.width_px);
+        let rows = bounds.v0 as usize..=bounds.v1 as usize;
+        rows.flat_map(move |v| {
+            let row = v * self.width_px + columns.start..v * self.width_px + columns.end;
+            let frame = self.frame.get(row.clone()).unwrap_or_default().iter();
+            let mean = self.reference.mean.get(row.clone()).unwrap_or_default();
+            let valid = self.reference.valid.get(row).unwrap_or_default();
+            let pixels = frame.zip(mean).zip(valid);
+            let pixels = pixels.filter(|(_, valid)| **valid != 0);
+            pixels.map(|((&f, &b), _)| (f64::from(f), f64::from(b)))
+        })
     }
 }

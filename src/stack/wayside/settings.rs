@@ -23,7 +23,7 @@ settings! {
         /// What differs in grey from the bed by this share of the bed's grey must be found: where the
         /// light is so little, or so different from that of the reference, that the threshold is higher,
         /// the bed counts as unseen.
-        least_contrast: f64 = 0.5, in 0.05..=1.0;
+        least_contrast: f64 = 0.6, in 0.05..=1.0;
         /// Length of bed that may be unseen before the device counts as blind, m.
         unseen_bed_m: f64 = 10.0, in 0.0..=500.0;
         /// Smallest region, pixels.
