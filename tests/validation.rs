@@ -138,8 +138,8 @@ fn val_forgotten_toolbox() {
     // The camera hangs 0.05 deg off its calibration, which is 0.2 m there. Measured: 0.30 m.
     assert!(toolbox.distance_error_m.unwrap().abs() < 0.45);
     // What of the worker's shadows cannot be told from bodies, for the 27 s that he is there, half of
-    // it a frame; and his last image, held for ten frames after he left. Measured: 155.
-    assert!(wayside.false_alarms <= 180, "{}", wayside.false_alarms);
+    // it a frame; and his last images, each held until ten frames have shown the bed there. Measured: 182.
+    assert!(wayside.false_alarms <= 210, "{}", wayside.false_alarms);
     assert_eq!(wayside.obstacles.len(), 1);
     let protection = summary.protection.unwrap();
     assert!(!protection.collision);

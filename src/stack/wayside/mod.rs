@@ -66,6 +66,7 @@
 //! | `difference` | difference, threshold, 3x3 median; compensation of headlights |
 //! | `rails` | rail heads, which mirror any light |
 //! | `shadows` | shadows, which are no bodies: the texture of the floor shows in them |
+//! | `bed` | whether the light lets the bed be seen, and where it is seen to be clear |
 //! | `regions` | connected regions |
 //! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
 //! | `place` | region to obstacle: place, width, height; fused with lidar echoes |
@@ -82,7 +83,8 @@
 //! [`HEADLIGHT_M`] of the device, grey levels are compensated by the local gain (see
 //! `difference`). Where the train is reported to be, and in the glare of its lamps ahead, lines of
 //! sight that pass the gauge are blind: nothing is found by them, and what was confirmed there
-//! stays confirmed until they see again. Without reports of the train it is an obstacle like any other.
+//! stays confirmed until they see again. Elsewhere too an alarm ends only where the clear bed is seen, and
+//! where the light shows too little of the bed the device is blind. Without reports of the train it is an obstacle like any other.
 //!
 //! # What it does not do
 //!
