@@ -83,8 +83,9 @@
 //! [`HEADLIGHT_M`] of the device, grey levels are compensated by the local gain (see
 //! `difference`). Where the train is reported to be, and in the glare of its lamps ahead, lines of
 //! sight that pass the gauge are blind: nothing is found by them, and what was confirmed there
-//! stays confirmed until they see again. Elsewhere too an alarm ends only where the clear bed is seen, and
-//! where the light shows too little of the bed the device is blind. Without reports of the train it is an obstacle like any other.
+//! stays confirmed until they see again. Elsewhere too an alarm ends only where the clear bed is seen,
+//! and where the light shows too little of the bed the device is blind. Without reports of the train it
+//! is an obstacle like any other.
 //!
 //! # What it does not do
 //!
