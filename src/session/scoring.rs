@@ -42,20 +42,16 @@ impl Session<'_, '_> {
         message: &Message,
     ) -> Result<(), SessionError> {
         let sender = &message.sender;
+        if let (Content::Protection(report), Node::Train(id)) = (&message.content, sender)
+            && let Some(train) = self.trains.get_mut(id)
+        {
+            train.on_protection(now, report);
+        }
         match (&message.content, sender) {
             (Content::Led(report), Node::Train(id)) => self.score_led(*id, report),
             (Content::Wayside(report), Node::Post(_)) => self.score_wayside(now, sender, report),
             (Content::Camera(status), _) => {
                 self.note_camera(sender, &status.camera, now, status.health)
-            }
-            (Content::Protection(report), Node::Train(id)) => {
-                if let Some(train) = self.trains.get_mut(id) {
-                    train.on_protection(now, report);
-                }
-                Ok(self.observers.show(&Event::Message {
-                    node: sender,
-                    message,
-                })?)
             }
             _ => Ok(self.observers.show(&Event::Message {
                 node: sender,

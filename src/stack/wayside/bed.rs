@@ -155,15 +155,16 @@ impl Compared {
 impl ClearBed<'_> {
     /// Whether the frame shows the bed of the reference in a box.
     pub fn shows_in(&self, bounds: &PixelBox) -> bool {
-        self.is_as_before(bounds) || self.shows_texture(bounds)
+        let inside = self.compare(bounds);
+        self.is_as_before(bounds, &inside) || self.shows_texture(bounds, &inside)
     }
 
     /// In the light of the reference everything must look the same. In another light a body may look as
     /// the bed did, but what is around it then does not.
-    fn is_as_before(&self, bounds: &PixelBox) -> bool {
+    fn is_as_before(&self, bounds: &PixelBox, inside: &Compared) -> bool {
         let margin = |low: u32, high: u32| (high - low) / 2 + CELL_PX as u32;
         let wide = bounds.widened(margin(bounds.u0, bounds.u1), margin(bounds.v0, bounds.v1));
-        let (inside, all) = (self.compare(bounds), self.compare(&wide));
+        let all = self.compare(&wide);
         let around = Compared {
             pixels: all.pixels - inside.pixels,
             frame: all.frame - inside.frame,
@@ -178,20 +179,18 @@ impl ClearBed<'_> {
 
     /// In another light, the texture of the bed must show: the frame is the reference times a factor,
     /// plus a constant. A body hides the texture, and the factor is then 0.
-    fn shows_texture(&self, bounds: &PixelBox) -> bool {
-        let (variance, slope, at_0) = self.compare(bounds).line();
-        let mut pixels = 0.0;
+    fn shows_texture(&self, bounds: &PixelBox, inside: &Compared) -> bool {
+        let (variance, slope, at_0) = inside.line();
         let (mut alike, mut noise) = (0.0, 0.0);
         for (f, b) in self.pixels(bounds) {
             let expected = at_0 + slope * b;
-            pixels += 1.0;
             alike += f64::from((f - expected).abs() < 0.5 * self.threshold);
             noise += self.reference.noise.variance(b);
         }
         slope >= LEAST_SLOPE
-            && pixels > 0.0
-            && variance >= TEXTURE_OVER_NOISE * noise / pixels
-            && alike >= CLEAR_SHARE * pixels
+            && inside.pixels > 0.0
+            && variance >= TEXTURE_OVER_NOISE * noise / inside.pixels
+            && alike >= CLEAR_SHARE * inside.pixels
     }
 
     fn compare(&self, bounds: &PixelBox) -> Compared {

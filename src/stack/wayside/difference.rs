@@ -145,14 +145,14 @@ impl Difference {
         }
     }
 
-    /// What the light of the last frame makes of a grey level of the reference about a pixel, and by
-    /// how much a body must differ from that to be found.
+    /// What the light of the last frame makes of a grey level of the reference in the cell whose first
+    /// pixel is given, and by how much a body must differ from that to be found.
     pub fn expected(&self, (u, v): (usize, usize), grey: f64) -> (f64, f64) {
         let threshold = f64::from(self.threshold);
         if !self.compensated {
             return (grey, threshold);
         }
-        let gain = f64::from(self.gain_at(u / CELL_PX * CELL_PX, v / CELL_PX * CELL_PX)) / UNIT;
+        let gain = f64::from(self.gain_at(u, v)) / UNIT;
         let expected = (grey * gain).min(255.0);
         let distrust = f64::from(self.distrust) / 256.0;
         (expected, threshold + (expected - grey).abs() * distrust)
