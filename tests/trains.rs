@@ -7,9 +7,11 @@
     reason = "a test fails by panicking"
 )]
 
-use metrotwin::bus::Method;
+use metrotwin::bus::{Content, Method, Node, TrainId};
 use metrotwin::scenario::{Override, Scenario, ScenarioFile};
-use metrotwin::session::{RendererChoice, RunOptions, Summary, run};
+use metrotwin::session::{
+    Event, Observer, ObserverError, RendererChoice, RunOptions, Summary, run,
+};
 use metrotwin::settings::read_toml;
 use metrotwin::track::Tunnel;
 use std::path::Path;
@@ -59,6 +61,102 @@ fn the_second_train_stops_behind_the_first() {
         let speed_kmh = 3.6 * protection.impacts[0].speed_mps;
         assert!((40.0..50.0).contains(&speed_kmh), "{speed_kmh} km/h");
     }
+}
+
+/// What the equipment of a train takes its place to be, held against the truth.
+#[derive(Default)]
+struct Placed {
+    true_m: Option<f64>,
+    /// Largest error, in sigmas.
+    worst_sigmas: f64,
+    slid: bool,
+    may_not_stop: bool,
+}
+
+impl Observer for Placed {
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match event {
+            Event::Train { train, truth, .. } if train.0 == 1 => {
+                self.true_m = Some(truth.chainage_m);
+            }
+            Event::Message {
+                node: Node::Train(TrainId(1)),
+                message,
+            } => {
+                if let Content::Protection(report) = &message.content
+                    && let (Some(true_m), Some(m), Some(sigma_m)) =
+                        (self.true_m, report.position_m, report.sigma_m)
+                {
+                    let off_m = (true_m - m).abs();
+                    self.worst_sigmas = self.worst_sigmas.max(off_m / sigma_m);
+                    self.slid |= report.wheels_slide;
+                    self.may_not_stop |= !report.stops_in_time;
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// A train comes at 60 km/h towards the tail of one that stands, `gap_m` ahead of it.
+fn on_slippery_rails(rails: &str, gap_m: f64) -> (Summary, Placed) {
+    let text = format!(
+        r#"
+        name = "slippery"
+        tunnel = "chengdu_line1.toml"
+        duration_s = 80.0
+        stop_after_standstill_s = 2.0
+        track = {rails}
+        train = {{ start_chainage_m = 1650.0, cruise_speed_kmh = 0.0, stop_at_m = 1650.0 }}
+        stack = {{ protection = {{ initial_chainage_m = 1650.0, initial_sigma_m = 1.0 }} }}
+        [[other_trains]]
+        start_chainage_m = {start_m}
+        start_speed_kmh = 60.0
+        cruise_speed_kmh = 60.0
+        [[onboard]]
+        train = 1
+        protection = {{ initial_chainage_m = {start_m}, initial_sigma_m = 1.0 }}
+        "#,
+        start_m = 1532.0 - gap_m
+    );
+    let tunnel = Tunnel::from_toml(include_str!("../tunnels/chengdu_line1.toml")).unwrap();
+    let scenario = Scenario::new(read_toml(&text).unwrap(), tunnel).unwrap();
+    let mut placed = Placed::default();
+    let options = RunOptions::default();
+    let summary = run(&scenario, &options, &mut [&mut placed]).unwrap();
+    (summary, placed)
+}
+
+/// Warned 410 m ahead, a train must stop on a film of leaves, everywhere or on its way, although it learns
+/// of the film by its wheels only; and its place must be within what it says, although they slide. Where
+/// no brake can do it any more, it must say so.
+#[test]
+fn a_train_stops_on_leaves_or_says_that_it_cannot() {
+    let film = r#"{ rail = "leaf_film" }"#;
+    let stretch = r#"{ rail_zones = [{ from_m = 1200.0, to_m = 1560.0, rail = "leaf_film" }] }"#;
+    for (rails, slides) in [(film, true), (stretch, false)] {
+        let (summary, placed) = on_slippery_rails(rails, 410.0);
+        let protection = summary.trains[1].protection.clone().unwrap();
+        eprintln!(
+            "{rails}: stands {:?} m before, position off by at most {:.1} sigma",
+            protection.stop_margin_m, placed.worst_sigmas
+        );
+        assert!(!protection.collision, "{rails}");
+        // On the stretch it is slow by then, and brakes by what the film bears.
+        assert_eq!(placed.slid, slides, "{rails}");
+        assert!(
+            placed.worst_sigmas < 3.0,
+            "{rails}: {}",
+            placed.worst_sigmas
+        );
+    }
+    let (summary, placed) = on_slippery_rails(film, 250.0);
+    assert!(summary.trains[1].protection.clone().unwrap().collision);
+    assert!(placed.may_not_stop);
+    let (summary, placed) = on_slippery_rails(r#"{ rail = "dry" }"#, 250.0);
+    assert!(!summary.trains[1].protection.clone().unwrap().collision);
+    assert!(!placed.slid && !placed.may_not_stop);
 }
 
 /// A stretch of `line_run` at 60 km/h.

@@ -143,6 +143,11 @@ pub struct ProtectionReport {
     pub supervision: Supervision,
     /// Where the movement authority ends, while something limits it.
     pub authority_end_m: Option<f64>,
+    /// The wheelset of the odometer slides or slips.
+    pub wheels_slide: bool,
+    /// The emergency brake is held to stop the train before the nearest high danger, by the rate that is
+    /// guaranteed on rails as the wheels found them; true without one.
+    pub stops_in_time: bool,
     /// What goes to the train.
     pub command: TrainCommand,
     /// What the driver sees.

@@ -3,7 +3,7 @@
 //! ```
 //! use metrotwin::bus::{Content, Message, Node, OdometerSample, Receiver, SimTime, TrainId, Via};
 //! let time = SimTime::from_secs(1.0);
-//! let sample = OdometerSample { time, distance_m: 12.0, speed_mps: 6.0 };
+//! let sample = OdometerSample { time, distance_m: 12.0, speed_mps: 6.0, slides: false };
 //! let message = Message::own(Node::Train(TrainId(0)), time, Content::Odometer(sample));
 //! assert_eq!((message.receiver, message.via), (Receiver::Own, Via::Wire));
 //! ```

@@ -24,6 +24,8 @@ pub struct OdometerSample {
     pub distance_m: f64,
     /// Speed between the last edges of pulses.
     pub speed_mps: f64,
+    /// The slide and slip protection of the wheelset is at work: what it counts is not what the train runs.
+    pub slides: bool,
 }
 
 /// What a Doppler radar says of the speed over ground.

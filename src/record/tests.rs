@@ -300,6 +300,7 @@ fn sensors_of_motion_become_series() {
                 time,
                 distance_m: f64::from(k),
                 speed_mps: 10.0,
+                slides: false,
             };
             message(&mut recording, time, Content::Odometer(odometer));
             let doppler = DopplerSample {

@@ -15,9 +15,25 @@ const SPEED_WINDOW_S: f64 = 0.5;
 /// The odometer's latest samples.
 #[derive(Clone, Debug, Default)]
 pub struct Odometry {
-    samples: History<OdometerSample>,
+    samples: History<Reading>,
     /// What the odometer had counted at the first sample.
     first_m: Option<f64>,
+}
+
+/// A sample, and what had been counted until then while the wheelset slid.
+#[derive(Clone, Copy, Debug)]
+struct Reading {
+    sample: OdometerSample,
+    slid_m: f64,
+}
+
+/// What was run since the first sample, metres.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Run {
+    /// As the odometer counted it.
+    pub distance_m: f64,
+    /// That part of it, always positive, which was counted while the wheelset slid or slipped.
+    pub slid_m: f64,
 }
 
 impl Odometry {
@@ -25,31 +41,59 @@ impl Odometry {
     pub fn on_sample(&mut self, sample: &OdometerSample) {
         if sample.distance_m.is_finite() && sample.speed_mps.is_finite() {
             self.first_m.get_or_insert(sample.distance_m);
-            self.samples.push(sample.time, *sample);
+            let slid_m = self.samples.latest().map_or(0.0, |(_, last)| {
+                let counted_m = (sample.distance_m - last.sample.distance_m).abs();
+                last.slid_m + if sample.slides { counted_m } else { 0.0 }
+            });
+            let reading = Reading {
+                sample: *sample,
+                slid_m,
+            };
+            self.samples.push(sample.time, reading);
         }
     }
 
     /// Distance run from the first sample to a time, metres; 0 before it.
     pub fn distance_m(&self, time: SimTime) -> f64 {
-        let counted_m = match self.samples.latest() {
-            Some((latest, sample)) if time >= latest => {
-                sample.distance_m + sample.speed_mps * time.since(latest).min(RUN_ON_S)
-            }
-            _ => {
-                let around = self.samples.around(time);
-                around.map_or(0.0, |(a, b, share)| {
-                    a.distance_m + share * (b.distance_m - a.distance_m)
-                })
-            }
+        self.run(time).distance_m
+    }
+
+    /// The same, with what of it was counted on a sliding wheel.
+    pub fn run(&self, time: SimTime) -> Run {
+        let Some((latest, last)) = self.samples.latest() else {
+            return Run::default();
         };
-        counted_m - self.first_m.unwrap_or(0.0)
+        let first_m = self.first_m.unwrap_or(0.0);
+        if time >= latest {
+            let on_m = last.sample.speed_mps * time.since(latest).min(RUN_ON_S);
+            let slid_m = if last.sample.slides { on_m.abs() } else { 0.0 };
+            return Run {
+                distance_m: last.sample.distance_m + on_m - first_m,
+                slid_m: last.slid_m + slid_m,
+            };
+        }
+        let around = self.samples.around(time);
+        around.map_or(Run::default(), |(a, b, share)| {
+            let between = |a: f64, b: f64| a + share * (b - a);
+            Run {
+                distance_m: between(a.sample.distance_m, b.sample.distance_m) - first_m,
+                slid_m: between(a.slid_m, b.slid_m),
+            }
+        })
+    }
+
+    /// Whether the wheelset slid or slipped when it was heard last.
+    pub fn slides(&self) -> bool {
+        let latest = self.samples.latest();
+        latest.is_some_and(|(_, last)| last.sample.slides)
     }
 
     /// Speed at a time between samples, the first and the last one's outside; 0 without any.
     pub fn speed_mps(&self, time: SimTime) -> f64 {
         let around = self.samples.around(time);
         around.map_or(0.0, |(a, b, share)| {
-            a.speed_mps + share * (b.speed_mps - a.speed_mps)
+            let (a, b) = (a.sample.speed_mps, b.sample.speed_mps);
+            a + share * (b - a)
         })
     }
 
@@ -57,9 +101,10 @@ impl Odometry {
     /// gives one pulse every 21 mm or so: over a single interval of 20 ms that would be steps of 1
     /// m/s, and no deceleration could be seen in them. The lag is on the safe side while braking.
     pub fn mean_speed_mps(&self) -> Option<f64> {
-        let (latest, last) = self.samples.latest()?;
+        let (latest, Reading { sample: last, .. }) = self.samples.latest()?;
         let age_s = |s: &OdometerSample| latest.since(s.time);
-        let samples = self.samples.newest_first().map(|(_, sample)| sample);
+        let samples = self.samples.newest_first();
+        let samples = samples.map(|(_, reading)| reading.sample);
         let old = samples
             .take_while(|s| age_s(s) <= SPEED_WINDOW_S)
             .last()
@@ -101,6 +146,7 @@ mod tests {
                 time: SimTime::from_nanos(k * 10_000_000),
                 distance_m: counted_m + 0.1 * k as f64,
                 speed_mps: 10.0,
+                slides: false,
             });
         }
         odometry
@@ -119,6 +165,26 @@ mod tests {
         }
     }
 
+    /// What is counted on a sliding wheel must not be lost, nor what is counted on a rolling one added to
+    /// it: 2 s at 10 m/s from the second second on.
+    #[test]
+    fn what_was_counted_on_a_sliding_wheel_is_known() {
+        let mut odometry = Odometry::default();
+        for k in 0..=40 {
+            odometry.on_sample(&OdometerSample {
+                time: SimTime::from_secs(0.1 * f64::from(k)),
+                distance_m: f64::from(k),
+                speed_mps: 10.0,
+                slides: (11..=30).contains(&k),
+            });
+        }
+        for (time_s, slid_m) in [(1.0, 0.0), (2.05, 10.5), (3.0, 20.0), (5.0, 20.0)] {
+            let run = odometry.run(SimTime::from_secs(time_s));
+            assert!((run.slid_m - slid_m).abs() < 1e-9, "{run:?} at {time_s} s");
+        }
+        assert!(!odometry.slides());
+    }
+
     /// The last speed is believed for a second, and what is no number or no news not at all.
     #[test]
     fn silence_and_bad_samples() {
@@ -132,6 +198,7 @@ mod tests {
                 time,
                 distance_m,
                 speed_mps: 10.0,
+                slides: false,
             });
         }
         assert!((odometry.distance_m(at(20.0)) - 200.0).abs() < 1e-9);

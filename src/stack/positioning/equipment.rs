@@ -126,6 +126,7 @@ impl Equipment for LampPositioning {
                     time: sample.time,
                     distance_m: sign * sample.distance_m,
                     speed_mps: sign * sample.speed_mps,
+                    slides: false,
                 });
             }
             Content::Pair(pair) => self.on_pair(pair, message.received_at),

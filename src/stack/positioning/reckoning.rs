@@ -125,6 +125,7 @@ mod tests {
                 time: SimTime::from_secs(time_s),
                 distance_m: 50.0 + 10.0 * time_s,
                 speed_mps: 10.0,
+                slides: false,
             });
         };
         let at_m = |reckoning: &DeadReckoning, time_s: f64| {

@@ -29,6 +29,7 @@ fn drive(
                 time: SimTime::from_secs(time_s),
                 distance_m: world.speed_mps * time_s,
                 speed_mps: world.speed_mps,
+                slides: false,
             });
         }
         reports.push(positioner.on_pair(&world.pair(k, start_s)));
@@ -361,6 +362,7 @@ fn val_sigma_is_what_fixes_scatter_by() {
                 time: SimTime::from_secs(time_s),
                 distance_m: -ahead_m,
                 speed_mps: 0.0,
+                slides: false,
             });
             let report = positioner.on_pair(&world.pair(number, time_s));
             let paper = report.fixes.iter().find(|f| f.method == Method::Stereo);
@@ -411,6 +413,7 @@ fn the_gyro_holds_the_position_of_a_swinging_car() {
                 time: SimTime::from_secs(time_s),
                 distance_m: world.speed_mps * time_s,
                 speed_mps: world.speed_mps,
+                slides: false,
             };
             with_gyro.on_odometer(&odometer);
             without.on_odometer(&odometer);
@@ -479,6 +482,7 @@ fn drive_with(
                 time: SimTime::from_secs(time_s),
                 distance_m: world.speed_mps * time_s,
                 speed_mps: world.speed_mps,
+                slides: false,
             });
         }
         let pair = work(k, world.pair(k, start_s));
@@ -596,6 +600,7 @@ fn a_late_pair_is_a_fix_of_its_time_or_none() {
                     time: SimTime::from_secs(time_s),
                     distance_m: world.speed_mps * time_s,
                     speed_mps: world.speed_mps,
+                    slides: false,
                 });
             }
             let report = positioner.on_pair(&world.pair(k, start_s));
@@ -675,6 +680,7 @@ fn val_lamps_out() {
                     time: SimTime::from_secs(time_s),
                     distance_m: odometer_m(time_s),
                     speed_mps: 1.005 * world.speed_mps,
+                    slides: false,
                 });
             }
             let report = positioner.on_pair(&world.pair(k, start_s));

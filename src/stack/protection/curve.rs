@@ -122,12 +122,22 @@ impl BrakeModel {
         }
     }
 
-    /// The service brake as it is expected to work, after the driver's time.
+    /// The service brake as an obstacle is approached by it, after the driver's time: what the rails
+    /// ahead bear is not known.
     pub fn service(s: &ProtectionSettings) -> Self {
         Self {
             traction_mps2: 0.0,
-            rate_mps2: s.service_mps2,
+            rate_mps2: s.service_mps2.min(s.low_adhesion_mps2),
             ..Self::emergency(s)
+        }
+    }
+
+    /// The same brake, already on.
+    pub fn is_on(self) -> Self {
+        Self {
+            reaction_s: 0.0,
+            buildup_s: 0.0,
+            ..self.traction_is_cut()
         }
     }
 
@@ -203,12 +213,13 @@ fn phase(from: Run, time_s: f64, (a0, a1): (f64, f64)) -> Run {
 /// distance (speed error in, traction cut) exceeds what is left of a service stop.
 pub(super) fn overlap_m(settings: &ProtectionSettings, speed_error_mps: f64) -> f64 {
     let emergency = BrakeModel::emergency(settings).traction_is_cut();
+    let service = BrakeModel::service(settings);
     let climb = -G_MPS2 * STEEP / (1.0 + settings.rotating_mass.max(0.0));
     (0..=240)
         .map(|k| f64::from(k) * 0.25)
         .flat_map(|v| [0.0, climb].map(|pull| (v, pull)))
         .map(|(v, pull)| {
-            let left = v * v / (2.0 * (settings.service_mps2 - pull));
+            let left = v * v / (2.0 * (service.rate_mps2 - pull));
             emergency.distance_m(v + speed_error_mps, pull) - left
         })
         .fold(0.0, f64::max)

@@ -9,6 +9,7 @@ pub(super) struct Situation {
     pub obstacle: Option<Ahead>,
     pub brake_failed: bool,
     pub odometer_lost: bool,
+    pub wheels_slide: bool,
     pub radio_timeout_s: f64,
 }
 
@@ -54,6 +55,7 @@ fn text(report: &ProtectionReport, s: &Situation) -> String {
         Supervision::Warning => ", too fast",
         Supervision::Permitted => "",
     };
+    let slide = if s.wheels_slide { ", wheels slide" } else { "" };
     match s.obstacle {
         Some(ahead) => {
             let what = match (ahead.blind, ahead.danger) {
@@ -66,9 +68,20 @@ fn text(report: &ProtectionReport, s: &Situation) -> String {
             } else {
                 String::new()
             };
-            format!("{what} in {:.0} m{action}{radio}", ahead.distance_m)
+            let late = if report.stops_in_time {
+                ""
+            } else {
+                ", MAY NOT STOP BEFORE IT"
+            };
+            format!(
+                "{what} in {:.0} m{action}{late}{slide}{radio}",
+                ahead.distance_m
+            )
         }
-        None if report.position_m.is_none() => format!("Position unknown{action}"),
-        None => format!("Permitted {:.0} km/h{action}", report.permitted_mps * 3.6),
+        None if report.position_m.is_none() => format!("Position unknown{action}{slide}"),
+        None => format!(
+            "Permitted {:.0} km/h{action}{slide}",
+            report.permitted_mps * 3.6
+        ),
     }
 }

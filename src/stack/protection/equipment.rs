@@ -190,6 +190,7 @@ mod tests {
             time,
             distance_m: 0.0,
             speed_mps: 0.0,
+            slides: false,
         };
         equipment.on(&Message::own(node, time, Content::Odometer(odometer)));
         equipment

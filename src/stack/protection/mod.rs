@@ -15,7 +15,7 @@
 //! let settings = ProtectionSettings { initial_chainage_m: Some(500.0), ..Default::default() };
 //! let mut protection = Protection::new(&settings, map);
 //! let time = SimTime::from_secs(1.0);
-//! protection.on_odometer(&OdometerSample { time, distance_m: 0.0, speed_mps: 20.0 });
+//! protection.on_odometer(&OdometerSample { time, distance_m: 0.0, speed_mps: 20.0, slides: false });
 //! assert_eq!(protection.cycle(time).command.brake, BrakeDemand::None);
 //! // A device reports an obstacle 150 m ahead: too near for the service brake.
 //! let warning = ObstacleWarning { device: "W1".into(), number: 0, issued: time,
@@ -45,7 +45,8 @@
 //!
 //! The danger point lies `danger_distance_m` before the obstacle. The emergency curve takes the
 //! train's head k sigma further ahead and its speed higher than measured, with traction on until
-//! it is cut. The service curve ends `safety_distance_m` before the obstacle, or earlier where a
+//! it is cut; where wheels have slid, with the rate that slippery rails leave (see `adhesion`). What the
+//! rails ahead bear is not known: the service curve takes the rate of the poorest rails. The service curve ends `safety_distance_m` before the obstacle, or earlier where a
 //! large sigma asks for it. Up to the permitted speed nothing happens; over it the driver is
 //! warned, and has `driver_time_s` until the service brake intervenes.
 //!
@@ -59,9 +60,10 @@
 //! # What it does not do
 //!
 //! It does not supervise running backwards, speed restrictions of single sections, or doors. A train
-//! ahead is an obstacle that stands where it last said to be ([`TrainProtection`]). It trusts the odometer's speed within its stated error: a sliding wheel is not
-//! recognised.
+//! ahead is an obstacle that stands where it last said to be ([`TrainProtection`]). It trusts the odometer's speed within its stated error, and what the slide
+//! protection of the odometer's wheelset says: a wheel that slides unnoticed puts the train too far back.
 
+mod adhesion;
 mod curve;
 mod display;
 mod equipment;
@@ -81,6 +83,7 @@ use crate::bus::{
     PositionFix, PositionSource, ProtectionReport, SimTime, TrainCommand,
 };
 use crate::track::{Direction, TrackId, Tunnel};
+use adhesion::Adhesion;
 use curve::Grades;
 use display::{Ahead, Situation};
 use monitor::BrakeMonitor;
@@ -100,6 +103,7 @@ pub struct Protection {
     grades: Grades,
     position: Position,
     obstacles: Obstacles,
+    adhesion: Adhesion,
     supervisor: Supervisor,
     monitor: BrakeMonitor,
     brake: BrakeDemand,
@@ -113,6 +117,7 @@ impl Protection {
             grades: Grades::new(&map, settings),
             position: Position::new(settings),
             obstacles: Obstacles::new(settings, &map),
+            adhesion: Adhesion::default(),
             supervisor: Supervisor::new(settings),
             monitor: BrakeMonitor::default(),
             brake: BrakeDemand::None,
@@ -178,7 +183,10 @@ impl Protection {
         let odometer_lost = self.odometer_lost(time);
         let head_m = train.map(|t| t.chainage_m);
         let (grades, settings) = (&self.grades, &self.settings);
-        let failed = (self.monitor).update(time, self.brake, speed_mps, head_m, grades, settings);
+        let odometry = &self.position.odometry;
+        let grip = (self.adhesion).update(odometry, odometry.distance_m(time), settings);
+        let failed =
+            (self.monitor).update(time, self.brake, speed_mps, head_m, grades, settings, grip);
 
         // With no position every obstacle may be the next one.
         let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| self.rearmost_m(t));
@@ -190,14 +198,22 @@ impl Protection {
             Some(_) => settings.line_speed_kmh,
             None => settings.restricted_kmh.min(settings.line_speed_kmh),
         };
-        let limits = (self.supervisor).limits(grades, ceiling_kmh / 3.6, train, end_m);
+        let limits = (self.supervisor).limits(grades, ceiling_kmh / 3.6, train, end_m, grip);
         let lost = train.is_none() && end_m.is_some();
         let at_once = odometer_lost || failed;
         let supervision = self.supervisor.step(limits, speed, lost, at_once);
         self.brake = supervision::demand(supervision);
 
+        let stops = |train, obstacle_m| {
+            let fastest_mps = speed_mps + grip.speed_error_mps - settings.speed_error_kmh / 3.6;
+            (self.supervisor).stops(grades, train, fastest_mps, obstacle_m, grip)
+        };
+        let stops_in_time = train
+            .zip(end_m)
+            .is_none_or(|(train, at_m)| stops(train, at_m));
         let situation = Situation {
             obstacle: self.nearest(time, train, rearmost_m),
+            wheels_slide: grip.slides,
             brake_failed: failed,
             odometer_lost,
             radio_timeout_s: self.settings.radio_timeout_s,
@@ -212,6 +228,8 @@ impl Protection {
             emergency_mps: limits.emergency_mps,
             supervision,
             authority_end_m: end_m.map(|m| m - self.settings.safety_distance_m),
+            wheels_slide: grip.slides,
+            stops_in_time,
             command: TrainCommand {
                 brake: self.brake,
                 permitted_speed_mps: limits.permitted_mps,

@@ -1,7 +1,9 @@
 //! Whether the brake does what was demanded: after the time that it needs to build up, the
-//! measured deceleration must be at least half of what is expected.
+//! measured deceleration must be at least half of what is expected. While the wheelset slides its
+//! deceleration says nothing of the train's.
 
 use super::ProtectionSettings;
+use super::adhesion::Grip;
 use super::curve::Grades;
 use crate::bus::{BrakeDemand, SimTime};
 
@@ -30,6 +32,7 @@ impl BrakeMonitor {
         at_m: Option<f64>,
         grades: &Grades,
         settings: &ProtectionSettings,
+        grip: Grip,
     ) -> bool {
         if demand != self.demand {
             self.demand = demand;
@@ -38,10 +41,10 @@ impl BrakeMonitor {
         }
         let rate = match demand {
             BrakeDemand::None => return self.failed,
-            BrakeDemand::Service => settings.service_mps2,
-            BrakeDemand::Emergency => settings.emergency_mps2,
+            BrakeDemand::Service => settings.service_mps2.min(grip.emergency_mps2),
+            BrakeDemand::Emergency => grip.emergency_mps2,
         };
-        if speed_mps < SLOWEST_MPS {
+        if grip.slides || speed_mps < SLOWEST_MPS {
             self.window = None;
             self.failed &= speed_mps > 0.1;
             return self.failed;

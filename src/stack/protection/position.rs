@@ -2,15 +2,15 @@
 //! grows with the distance run.
 //!
 //! The odometer's error is mostly one of scale (wheel diameter), so it grows in proportion to the
-//! distance and not to its root: sigma^2 = sigma_fix^2 + (drift x distance)^2. A fix is taken at
-//! the time when it was true, by the odometer's reading then, and fused by inverse variance; one
+//! distance and not to its root: sigma^2 = sigma_fix^2 + (drift x distance + slide x slid)^2, where
+//! slid is the distance that was counted on a sliding wheel. A fix is taken at the time when it was true, by the odometer's reading then, and fused by inverse variance; one
 //! too far off is refused. Five refused ones in a row that agree with each other mean that the
 //! train is not where it was thought to be: the last of them is taken. They must be of two lamps: of one
 //! lamp that is taken for another, all fixes agree.
 
 use super::ProtectionSettings;
 use crate::bus::{PositionFix, PositionSource, SimTime};
-use crate::stack::odometry::Odometry;
+use crate::stack::odometry::{Odometry, Run};
 use crate::track::uid::Uid;
 
 /// Refused fixes in a row that overrule the estimate, and of how many lamps after each other.
@@ -23,28 +23,37 @@ pub(super) struct HeadPosition {
     pub chainage_m: f64,
     /// One sigma of it.
     pub sigma_m: f64,
-    /// The distance run by then.
-    pub distance_m: f64,
+    /// What was run by then.
+    pub run: Run,
     /// The last source besides the odometer.
     pub source: PositionSource,
 }
 
 impl HeadPosition {
     /// Carried on by the odometer.
-    fn carried(&self, distance_m: f64, drift: f64) -> Self {
-        let run_m = distance_m - self.distance_m;
+    fn carried(&self, run: Run, error: OdometerError) -> Self {
+        let run_m = run.distance_m - self.run.distance_m;
+        let slid_m = (run.slid_m - self.run.slid_m).abs();
+        let error_m = error.drift * run_m.abs() + error.slide * slid_m;
         Self {
             chainage_m: self.chainage_m + run_m,
-            sigma_m: self.sigma_m.hypot(drift * run_m),
-            distance_m,
+            sigma_m: self.sigma_m.hypot(error_m),
+            run,
             ..*self
         }
     }
 }
 
+/// One sigma of the odometer, as shares of what it counted, and of what of it on a sliding wheel.
+#[derive(Clone, Copy, Debug)]
+struct OdometerError {
+    drift: f64,
+    slide: f64,
+}
+
 #[derive(Clone, Debug)]
 pub(super) struct Position {
-    drift: f64,
+    error: OdometerError,
     floor_m: f64,
     gate: f64,
     pub odometry: Odometry,
@@ -63,14 +72,17 @@ struct Refused {
 impl Position {
     pub fn new(settings: &ProtectionSettings) -> Self {
         Self {
-            drift: settings.odometer_drift,
+            error: OdometerError {
+                drift: settings.odometer_drift,
+                slide: settings.slide_error,
+            },
             floor_m: settings.sigma_floor_m,
             gate: settings.gate_sigmas,
             odometry: Odometry::default(),
             anchor: settings.initial_chainage_m.map(|chainage_m| HeadPosition {
                 chainage_m,
                 sigma_m: settings.initial_sigma_m,
-                distance_m: 0.0,
+                run: Run::default(),
                 source: PositionSource::Setting,
             }),
             refused: Refused::default(),
@@ -87,14 +99,14 @@ impl Position {
         let fix = HeadPosition {
             chainage_m,
             sigma_m: sigma_m.max(self.floor_m),
-            distance_m: self.odometry.distance_m(time),
+            run: self.odometry.run(time),
             source: PositionSource::Lamp(fix.method),
         };
         let Some(anchor) = self.anchor else {
             self.anchor = Some(fix);
             return;
         };
-        let predicted = anchor.carried(fix.distance_m, self.drift);
+        let predicted = anchor.carried(fix.run, self.error);
         let off_m = fix.chainage_m - predicted.chainage_m;
         if off_m.abs() > self.gate * predicted.sigma_m.hypot(fix.sigma_m) {
             self.refuse(fix, lamp);
@@ -111,11 +123,10 @@ impl Position {
 
     /// A position that is right within its sigma (from a balise).
     pub fn reset(&mut self, time: SimTime, chainage_m: f64, sigma_m: f64) {
-        let distance_m = self.odometry.distance_m(time);
         self.accept(HeadPosition {
             chainage_m,
             sigma_m,
-            distance_m,
+            run: self.odometry.run(time),
             source: PositionSource::Balise,
         });
     }
@@ -127,7 +138,7 @@ impl Position {
 
     fn refuse(&mut self, fix: HeadPosition, lamp: Uid) {
         let agrees = |before: &HeadPosition| {
-            let expected = before.carried(fix.distance_m, self.drift);
+            let expected = before.carried(fix.run, self.error);
             (expected.chainage_m - fix.chainage_m).abs()
                 <= self.gate * expected.sigma_m.hypot(fix.sigma_m)
         };
@@ -148,7 +159,7 @@ impl Position {
 
     pub fn at(&self, time: SimTime) -> Option<HeadPosition> {
         self.anchor
-            .map(|a| a.carried(self.odometry.distance_m(time), self.drift))
+            .map(|a| a.carried(self.odometry.run(time), self.error))
     }
 }
 
@@ -167,6 +178,7 @@ mod tests {
                 time: SimTime::from_secs(t),
                 distance_m: 1000.0 + speed_mps * t,
                 speed_mps,
+                slides: false,
             });
         }
         p

@@ -25,6 +25,9 @@ settings! {
         position_sigmas: f64 = 3.0, in 0.0..=10.0;
         /// Odometer error, share of the distance run (wheel wear, slip).
         odometer_drift: f64 = 0.02, in 0.0..=0.5;
+        /// One sigma of the odometer's distance and speed while the wheelset slides or slips, share of
+        /// what it says. Slide protection acts at some 15 %, and wheels slide deeper until it does.
+        slide_error: f64 = 0.1, in 0.0..=1.0;
         /// Odometer speed error, km/h.
         speed_error_kmh: f64 = 3.0, in 0.0..=20.0;
         /// No fix makes the position better than this, m, one sigma (survey and mounting errors do
@@ -46,6 +49,11 @@ settings! {
         emergency_mps2: f64 = 1.0, in 0.4..=3.0;
         /// Rate of the full service brake on level track, m/s^2.
         service_mps2: f64 = 0.8, in 0.4..=3.0;
+        /// Rate that the brakes reach on the poorest rails that the operator reckons with, m/s^2: the train
+        /// approaches every obstacle by it, since what the rails ahead bear is not known, and the emergency
+        /// brake is held to reach no more where wheels have slid. A film of leaves (friction 0.05) leaves
+        /// some 0.4.
+        low_adhesion_mps2: f64 = 0.4, in 0.1..=3.0;
         /// Rotating mass as a share of the train's mass.
         rotating_mass: f64 = 0.08, in 0.0..=0.5;
         /// Length that the equipment takes its train to have, m. Default: that of the train.

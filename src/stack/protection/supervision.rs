@@ -1,6 +1,7 @@
 //! The decision of one cycle: limits at this place, and what the speed means against them.
 
 use super::ProtectionSettings;
+use super::adhesion::Grip;
 use super::curve::{BrakeModel, Grades, overlap_m};
 use super::position::HeadPosition;
 use crate::bus::{BrakeDemand, Supervision};
@@ -26,19 +27,16 @@ pub(super) struct Supervisor {
     service: BrakeModel,
     emergency: BrakeModel,
     overlap_m: f64,
-    speed_error_mps: f64,
     settings: ProtectionSettings,
     state: Supervision,
 }
 
 impl Supervisor {
     pub fn new(settings: &ProtectionSettings) -> Self {
-        let speed_error_mps = settings.speed_error_kmh / 3.6;
         Self {
             service: BrakeModel::service(settings),
             emergency: BrakeModel::emergency(settings),
-            overlap_m: overlap_m(settings, speed_error_mps),
-            speed_error_mps,
+            overlap_m: overlap_m(settings, settings.speed_error_kmh / 3.6),
             settings: settings.clone(),
             state: Supervision::Permitted,
         }
@@ -51,6 +49,7 @@ impl Supervisor {
         ceiling_mps: f64,
         train: Option<HeadPosition>,
         obstacle_m: Option<f64>,
+        grip: Grip,
     ) -> Limits {
         let s = &self.settings;
         let line = Limits {
@@ -67,14 +66,14 @@ impl Supervisor {
         let ahead_m = s.position_sigmas * train.sigma_m;
         let danger_m = obstacle_m - s.danger_distance_m;
         let stop_m = (obstacle_m - s.safety_distance_m).min(danger_m - ahead_m - self.overlap_m);
-        let braking = matches!(self.state, Supervision::Service | Supervision::Emergency);
-        let emergency = if braking {
-            self.emergency.traction_is_cut()
+        let emergency = self.emergency_on(grip);
+        let emergency = if self.brakes() {
+            emergency.traction_is_cut()
         } else {
-            self.emergency
+            emergency
         };
         let fastest = emergency.speed_mps(grades, train.chainage_m + ahead_m, danger_m, 0.0);
-        let emergency_mps = (fastest - self.speed_error_mps).max(0.0);
+        let emergency_mps = (fastest - grip.speed_error_mps).max(0.0);
         let service_mps = self
             .service
             .speed_mps(grades, train.chainage_m, stop_m, 0.0)
@@ -88,6 +87,36 @@ impl Supervisor {
             service_mps: line.service_mps.min(service_mps),
             emergency_mps: line.emergency_mps.min(emergency_mps),
             by_obstacle: permitted_mps < line.permitted_mps,
+        }
+    }
+
+    /// Whether the emergency brake stops a train of this place and speed before an obstacle.
+    pub fn stops(
+        &self,
+        grades: &Grades,
+        train: HeadPosition,
+        speed_mps: f64,
+        obstacle_m: f64,
+        grip: Grip,
+    ) -> bool {
+        let emergency = self.emergency_on(grip);
+        let emergency = if self.brakes() {
+            emergency.is_on()
+        } else {
+            emergency
+        };
+        emergency.stops(grades, train.chainage_m, speed_mps, obstacle_m)
+    }
+
+    fn brakes(&self) -> bool {
+        matches!(self.state, Supervision::Service | Supervision::Emergency)
+    }
+
+    /// The emergency brake on the rails as they are.
+    fn emergency_on(&self, grip: Grip) -> BrakeModel {
+        BrakeModel {
+            rate_mps2: grip.emergency_mps2,
+            ..self.emergency
         }
     }
 

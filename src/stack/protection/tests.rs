@@ -157,7 +157,7 @@ struct Outcome {
     stopped: bool,
 }
 
-/// Drives until standstill (or 200 s); the warning comes at the start.
+/// Drives until standstill (or 400 s); the warning comes at the start.
 fn drive(
     settings: &ProtectionSettings,
     mut train: Train,
@@ -174,7 +174,7 @@ fn drive(
     let danger = warning(0, SimTime::ZERO, DangerLevel::High, obstacle_m);
     protection.on_warning(&danger, danger.issued);
     let dt = 0.01;
-    for k in 0..20_000 {
+    for k in 0..40_000 {
         let time = SimTime::from_secs(f64::from(k) * dt);
         // As a wheel with 128 pulses a turn gives it, 50 times a second: distance in whole
         // pulses, speed in pulses an interval.
@@ -184,6 +184,7 @@ fn drive(
                 time,
                 distance_m: counted,
                 speed_mps: (counted - before_m) / 0.02,
+                slides: false,
             });
             before_m = counted;
         }
@@ -225,7 +226,7 @@ fn well_known(chainage_m: f64) -> ProtectionSettings {
 
 /// Every speed and gradient, a driver who ignores everything and keeps powering, brakes as the
 /// specification has them: the service brake alone stops the train between the end of the
-/// authority and 10 m before it, and the emergency brake never joins in.
+/// authority and 15 m before it (at 1 m/s downhill, the rate of slippery rails takes that), and the emergency brake never joins in.
 #[test]
 fn the_service_brake_stops_before_the_obstacle() {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
@@ -244,7 +245,7 @@ fn the_service_brake_stops_before_the_obstacle() {
             most = most.max(out.margin_m);
         }
     }
-    assert!(least >= 25.0 && most < 35.0, "{least} to {most} m");
+    assert!(least >= 25.0 && most < 40.0, "{least} to {most} m");
 }
 
 /// A driver who keeps to the permitted speed is never braked but for the last metres, and stops
@@ -266,7 +267,7 @@ fn an_obedient_driver_stops_at_the_end_of_the_authority() {
             most = most.max(out.margin_m);
         }
     }
-    assert!(least >= 25.0 && most < 35.0, "{least} to {most} m");
+    assert!(least >= 25.0 && most < 40.0, "{least} to {most} m");
 }
 
 /// Everything at its worst at once: the guaranteed rate only, slowest answer, odometer short by
@@ -331,6 +332,7 @@ impl Bench {
             time: self.time,
             distance_m,
             speed_mps,
+            slides: false,
         });
         self.protection.cycle(self.time)
     }
@@ -469,6 +471,7 @@ fn nonsense_changes_nothing() {
         time: b.time.plus(0.05),
         distance_m: f64::NAN,
         speed_mps: f64::NAN,
+        slides: false,
     });
     let r = b.cycle(0.0, 0.0);
     assert_eq!(r.command.brake, BrakeDemand::Service);
@@ -502,6 +505,7 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
             time,
             distance_m: 0.0,
             speed_mps: 0.0,
+            slides: false,
         });
         protection.cycle(time).authority_end_m
     };

@@ -104,6 +104,11 @@ impl World {
         Some(self.get(id)?.consist.wheelsets.get(axle)?.rolled_m)
     }
 
+    /// Whether slide and slip protection of an axle, counted from 0 at the head, holds effort back.
+    pub fn wheel_protected(&self, id: TrainId, axle: usize) -> Option<bool> {
+        Some(self.get(id)?.consist.wheelsets.get(axle)?.is_protected())
+    }
+
     /// What the worst of its wheels has been through.
     pub fn wheel_extremes(&self, id: TrainId) -> Option<WheelExtremes> {
         let wheelsets = self.get(id)?.consist.wheelsets.iter();

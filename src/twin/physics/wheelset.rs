@@ -177,6 +177,11 @@ impl Wheelset {
         self.off_m.abs() > RAIL_HEAD_M || self.over_m > FLANGE_HEIGHT_M
     }
 
+    /// Slide and slip protection holds effort back.
+    pub(super) fn is_protected(&self) -> bool {
+        self.effort_share < 1.0
+    }
+
     /// The rails under the axle, a step on.
     fn follow(&mut self, track: &DirectedTrack, state: &BodyState, dt_s: f64) -> Rails {
         // Predicted to some micrometres; the rest is a step along the tangent.

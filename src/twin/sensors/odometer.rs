@@ -3,7 +3,8 @@
 //! It counts whole pulses of the wheelset's turn. Distance is their number times what one pulse
 //! is worth on the radius set in the box; the true radius differs by a tolerance and by the
 //! wear since, and that is a scale error. Whatever the wheelset does it takes for travel: slip and
-//! slide of the axle that it sits on are errors of its distance and speed.
+//! slide of the axle that it sits on are errors of its distance and speed. While the slide and slip
+//! protection of that axle holds effort back, its samples say so.
 //!
 //! Speed comes from the pulses' edges: so many pulses from the last edge of one interval to the
 //! last edge of the next, over the time between these (the M/T method: Ohmae et al., IEEE Trans.
@@ -89,7 +90,11 @@ impl Odometer {
     /// A sample now; `None` without the train that carries it, or without that wheelset.
     pub fn sample(&mut self, world: &World, train: TrainId) -> Option<OdometerSample> {
         let axle = (self.settings.axle as usize).saturating_sub(1);
-        Some(self.read(world.time(), world.wheel_run_m(train, axle)?))
+        let sample = self.read(world.time(), world.wheel_run_m(train, axle)?);
+        Some(OdometerSample {
+            slides: world.wheel_protected(train, axle)?,
+            ..sample
+        })
     }
 
     /// What the box says when its wheelset's tread has rolled `run_m` since the start.
@@ -113,6 +118,7 @@ impl Odometer {
             time,
             distance_m: reading.count * pulse_m,
             speed_mps: reading.speed_mps,
+            slides: false,
         }
     }
 
