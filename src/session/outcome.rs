@@ -12,7 +12,10 @@ pub struct Outcome {
     slowed_by_obstacle: bool,
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
-    stop_margin_m: Option<f64>,
+    /// Closest that the head came to what was ahead of it.
+    closest_m: Option<f64>,
+    /// Chainage of the head when the train first hit something.
+    hit_at_m: Option<f64>,
     standing: bool,
     has_run: bool,
     standing_since: Option<SimTime>,
@@ -31,6 +34,7 @@ impl Outcome {
 
     /// Follows whether the train has run, and since when it stands.
     pub fn on_motion(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
+        self.approach(id, train, world, line);
         self.standing = train.standing;
         self.has_run |= !train.standing;
         if !train.standing {
@@ -44,8 +48,24 @@ impl Outcome {
         self.standing_since.get_or_insert(train.time);
         if self.brake_commanded.is_some() && self.stopped.is_none() {
             self.stopped = Some(train.time);
-            self.stop_margin_m = margin_m(id, train, world, line);
         }
+    }
+
+    /// Follows how near the train comes to what is ahead of it, and how far it runs on after a hit.
+    fn approach(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
+        let hit = world.impacts().iter().find(|hit| hit.train == id);
+        if let (None, Some(hit)) = (self.hit_at_m, hit) {
+            let head_m = world.chainage_at(id, hit.time);
+            self.hit_at_m = Some(head_m.unwrap_or(train.chainage_m));
+        }
+        let now_m = match self.hit_at_m {
+            Some(hit_m) => Some(train.direction.ahead_m(train.chainage_m, hit_m).min(0.0)),
+            None => ahead_m(id, train, world, line).map(|ahead_m| ahead_m.max(0.0)),
+        };
+        self.closest_m = [self.closest_m, now_m]
+            .into_iter()
+            .flatten()
+            .reduce(f64::min);
     }
 
     /// For how long the train has stood again after it ran.
@@ -62,30 +82,30 @@ impl Outcome {
         Some(ProtectionFigures {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
-            stop_margin_m: self.stop_margin_m,
+            stop_margin_m: self.closest_m,
             collision: !impacts.is_empty(),
             impacts,
         })
     }
 }
 
-/// From the head to the nearest obstacle or train that it would meet. A little behind the head counts
-/// too: that is what a train has hit and not pushed away.
-fn margin_m(id: TrainId, train: &TrainState, world: &World, line: &Alignment) -> Option<f64> {
-    let ahead_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
+/// From the head to the nearest obstacle or train that it would meet. What has fallen just behind the
+/// head counts too.
+fn ahead_m(id: TrainId, train: &TrainState, world: &World, line: &Alignment) -> Option<f64> {
+    let to_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
     let obstacles = world.obstacles().filter(|o| fouls(line, o));
     let near_end_m =
-        |o: ObstacleTruth<'_>| ahead_m(o.chainage_m - train.direction.sign() * o.half_extents_m.x);
+        |o: ObstacleTruth<'_>| to_m(o.chainage_m - train.direction.sign() * o.half_extents_m.x);
     let obstacles = obstacles.map(near_end_m);
     let others = world.train_ids().filter(|other| *other != id);
     let trains = others.filter_map(|other| {
         let (state, length_m) = (world.train(other)?, world.train_length_m(other)?);
         let tail_m = state.chainage_m - state.direction.sign() * length_m;
-        Some(ahead_m(state.chainage_m).min(ahead_m(tail_m)))
+        Some(to_m(state.chainage_m).min(to_m(tail_m)))
     });
     obstacles
         .chain(trains)
-        .filter(|margin_m| *margin_m > -1.0)
+        .filter(|ahead_m| *ahead_m > -1.0)
         .min_by(f64::total_cmp)
 }
 
@@ -146,6 +166,59 @@ mod tests {
         }
     }
 
+    /// A run that ends in a hit, one that stops short, and one that ends before it comes near must all have
+    /// a closest approach: of the hit less than 0, by as much as the train ran on.
+    #[test]
+    fn every_run_has_a_closest_approach() {
+        let text = include_str!("../../tunnels/test_bench.toml");
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let train = TrainSettings {
+            start_chainage_m: 150.0,
+            start_speed_kmh: 40.0,
+            ..TrainSettings::default()
+        };
+        let closest = |obstacle_m, for_s: f64| {
+            let obstacle = ObstacleSettings {
+                chainage_m: obstacle_m,
+                ..ObstacleSettings::default()
+            };
+            let settings = PhysicsSettings {
+                trains: vec![train.clone()],
+                obstacles: vec![obstacle],
+                ..PhysicsSettings::default()
+            };
+            let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
+            let command = TrainCommand {
+                brake: BrakeDemand::Emergency,
+                ..TrainCommand::default()
+            };
+            let mut outcome = Outcome::default();
+            while world.time().secs() < for_s {
+                world.step(&[command]).unwrap();
+                let train = world.train(TrainId(0)).unwrap();
+                outcome.on_motion(TrainId(0), &train, &world, &tunnel.alignment);
+            }
+            let figures = outcome.protection(TrainId(0), &world).unwrap();
+            let head_m = world.train(TrainId(0)).unwrap().chainage_m;
+            (figures.stop_margin_m.unwrap(), figures.collision, head_m)
+        };
+        let (hit_m, collision, head_m) = closest(175.0, 15.0);
+        // The box's near face is where the head was at the hit.
+        assert!(
+            collision && (hit_m - (175.0 - 0.15 - head_m)).abs() < 0.3,
+            "{hit_m}"
+        );
+        assert!(hit_m < -10.0);
+        for (obstacle_m, for_s) in [(260.0, 15.0), (260.0, 1.0)] {
+            let (margin_m, collision, head_m) = closest(obstacle_m, for_s);
+            assert!(!collision && margin_m > 0.0);
+            assert!(
+                (margin_m - (obstacle_m - 0.15 - head_m)).abs() < 0.3,
+                "{margin_m}"
+            );
+        }
+    }
+
     /// Fails where what stands beside the gauge, or lies behind the train, counts as in its way.
     #[test]
     fn the_margin_is_to_what_is_in_the_way() {
@@ -170,7 +243,7 @@ mod tests {
             ..TrainState::default()
         };
         let line = &tunnel.alignment;
-        let margin_m = |head_m| margin_m(TrainId(0), &head_at(head_m), &world, line);
+        let margin_m = |head_m| ahead_m(TrainId(0), &head_at(head_m), &world, line);
         let margin = margin_m(180.0).unwrap();
         assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");
         assert_eq!(margin_m(202.0), None);

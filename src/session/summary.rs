@@ -260,8 +260,9 @@ pub struct ProtectionFigures {
     pub brake_commanded_s: Option<f64>,
     /// When the train first stood after that: slower than 0.01 m/s.
     pub stopped_s: Option<f64>,
-    /// From the head of the train, at that moment, to the nearest obstacle ahead that is within the
-    /// gauge across the track.
+    /// Closest approach, whether the train stopped or not: the least distance from its head to an obstacle
+    /// within the gauge, or a train, ahead of it; where it hit something, less than 0: so far its head ran
+    /// on from where it was at the first hit. `null` where nothing was ever ahead.
     pub stop_margin_m: Option<f64>,
     /// The train hit something.
     pub collision: bool,

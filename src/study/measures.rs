@@ -172,7 +172,7 @@ pub const MEASURES: &[Measure] = positioning![
         |s, _| of(s.protection.as_ref(), |p| p.brake_commanded_s)),
     measure_of("stopped_s", Real, "s", "when it first stood after that",
         |s, _| of(s.protection.as_ref(), |p| p.stopped_s)),
-    measure_of("stop_margin_m", Real, "m", "from its head, then, to the obstacle",
+    measure_of("stop_margin_m", Real, "m", "closest approach of its head to an obstacle or a train; below 0: run on after the first hit",
         |s, _| of(s.protection.as_ref(), |p| p.stop_margin_m)),
     measure_of("collision", Flag, "1", "the train hit something",
         |s, _| of(s.protection.as_ref(), |p| Some(p.collision))),
