@@ -2,7 +2,7 @@
 
 use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration};
-use crate::scenario::sampling::{Template, as_written};
+use crate::scenario::sampling::Template;
 use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::VehicleFile;
@@ -180,7 +180,7 @@ pub(super) fn study(template: &Template) -> String {
     };
     let mut text = format!("\n  study: {runs} runs{of_cells}, seed {}", settings.seed);
     for (name, variable) in &settings.variables {
-        text += &format!("\n    {name}: {}", as_written(&variable.from));
+        text += &format!("\n    {name}: {}", variable.from.in_a_line());
         if !variable.keys.is_empty() {
             text += &format!(" -> {}", variable.keys.join(", "));
         }

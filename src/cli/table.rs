@@ -130,6 +130,7 @@ mod tests {
             size_m: 0.4,
             first_detected_s,
             latency_s: None,
+            placed_latency_s: None,
             distance_error_m: first_detected_s,
         };
         Summary {
@@ -141,6 +142,7 @@ mod tests {
             wayside: Some(Wayside {
                 obstacles: vec![obstacle(Some(4.25)), obstacle(None)],
                 false_alarms: 2,
+                misplaced_alarms: 3,
                 ms_per_frame: None,
             }),
             cameras: [
@@ -188,8 +190,8 @@ mod tests {
         for line in [
             "paper           12  92.3 %   1.2 %      1.2    2.5    3.7    4.9 cm 0.01 ms",
             "mono            12       -       -        -      -      -      - cm       -",
-            "toolbox      0.40 m      4.25 s        -       4.25 m",
-            "2 false alarms, - a frame",
+            "toolbox      0.40 m      4.25 s        -            -       4.25 m",
+            "false alarms: 2 by the picture, 3 by place; - a frame",
             "camera W1530: 3 frames lost, no image from 1.00 to 2.50 s, too late from 1.00 s to the end, \
              no image from 1.00 to 2.50 s, too late from 1.00 s to the end, 5 faults in all",
             "9 dark lamps: 1-1, 1-2, 1-3, 1-4, 1-5, 1-6, 1-7, 1-8, ...",

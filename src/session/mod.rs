@@ -24,6 +24,7 @@ mod fitting;
 mod health;
 mod imaging;
 mod outcome;
+mod outline;
 mod positioning_score;
 mod posts;
 mod presence;

@@ -6,6 +6,7 @@ use super::summary::Wayside;
 use super::wayside_score::WaysideScore;
 use crate::bus::{Node, SimTime, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
+use crate::track::Alignment;
 use crate::twin::physics::World;
 use std::collections::VecDeque;
 
@@ -45,9 +46,9 @@ impl Posts {
     }
 
     /// A frame of a post is over.
-    pub fn expose(&mut self, post: usize, number: u32, world: &World) {
+    pub fn expose(&mut self, post: usize, number: u32, world: &World, line: &Alignment) {
         if let Some(post) = self.posts.get_mut(post) {
-            let present = post.view.present(world);
+            let present = post.view.present(world, line);
             post.exposed.push_back((number, present));
         }
     }
@@ -79,15 +80,10 @@ impl Posts {
 
 impl Post {
     fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
-        let camera = &post.actual.world_from_camera.translation.vector;
-        let line = &scenario.tunnel.alignment;
         Self {
             node: Node::Post(post.calibration.name.clone()),
             view: FieldOfView::new(scenario, post),
-            score: WaysideScore::new(
-                line.track_from_world(&(*camera).into(), post.actual.chainage_m),
-                post.actual.camera.intrinsics.height_px,
-            ),
+            score: WaysideScore::default(),
             exposed: VecDeque::new(),
         }
     }

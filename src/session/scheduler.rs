@@ -269,7 +269,8 @@ impl<'s, 'o> Session<'s, 'o> {
             train,
         }))?;
         if let Source::Wayside(post) = source {
-            self.posts.expose(post, header.number, &self.world);
+            let line = &self.scenario.tunnel.alignment;
+            self.posts.expose(post, header.number, &self.world, line);
         }
         let pending = Pending {
             sensor,

@@ -198,14 +198,16 @@ pub struct FaultSpan {
 /// Wayside detection.
 #[derive(Clone, Debug, Serialize)]
 pub struct Wayside {
-    /// Every obstacle that came to lie in view of a device (in its picture, within the detector's
-    /// reach, not behind a wall), or was reported while it moved.
+    /// Every obstacle that came to lie in view of a device (in its picture, not behind a
+    /// wall; however small and far away), or was reported while it moved.
     pub obstacles: Vec<ObstacleScore>,
-    /// Dangers reported, counted once a frame, where nothing real is: not within the error that
-    /// is expected of the device at that distance, along the line and across. What is still
-    /// reported after it has gone or left the picture counts too. A thing in the air is not one,
-    /// although the device takes it to stand on the bed and so puts it too far away.
+    /// Dangers reported, counted once a frame, whose region in the picture is of nothing that is there:
+    /// less than half of the smaller of region and outline is common to both. What is still reported after
+    /// it has gone or left the picture counts too.
     pub false_alarms: u32,
+    /// Dangers reported, counted once a frame, with no thing, worker or train within 2.5 m along the line
+    /// and 0.5 m across of the place reported.
+    pub misplaced_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
 }
@@ -223,9 +225,11 @@ pub struct ObstacleScore {
     /// From when it lay visible (at rest, in view) to the first report given from then on; of a
     /// thing reported on its way already, to the next report of it, not below 0. The detector's
     /// confirmation over several frames is part of it, and so is all the time for which a worker or
-    /// a train stood before it or beside it, where nobody can tell which of the two was seen. `null`
-    /// where it never lay, or was not reported after that.
+    /// a train stood before it. A report is of it by its region in the picture. `null` where it never lay,
+    /// or was not reported after that.
     pub latency_s: Option<f64>,
+    /// The same to the first report of its place: within 2.5 m along the line and 0.5 m across.
+    pub placed_latency_s: Option<f64>,
     /// Reported less true distance along the line, mean over the frames that report it at rest.
     pub distance_error_m: Option<f64>,
 }

@@ -160,8 +160,14 @@ pub const MEASURES: &[Measure] = positioning![
         |s, _| of(s.wayside.as_ref(), |w| {
             Some(w.obstacles.iter().filter(|o| o.latency_s.is_none()).count())
         })),
-    measure_of("false_alarms", Int, "1", "dangers reported where nothing is, counted once a frame",
+    measure_of("not_placed", Int, "1", "of these, how many were never reported at their place once they lay there",
+        |s, _| of(s.wayside.as_ref(), |w| {
+            Some(w.obstacles.iter().filter(|o| o.placed_latency_s.is_none()).count())
+        })),
+    measure_of("false_alarms", Int, "1", "dangers reported where nothing is in the picture, counted once a frame",
         |s, _| of(s.wayside.as_ref(), |w| Some(w.false_alarms))),
+    measure_of("misplaced_alarms", Int, "1", "dangers reported at a place where nothing is, counted once a frame",
+        |s, _| of(s.wayside.as_ref(), |w| Some(w.misplaced_alarms))),
     measure_of("detection_latency_s", Real, "s",
         "from lying in view to the report, of the obstacle with the longest",
         |s, _| of(s.wayside.as_ref(), |w| worst(w, |o| o.latency_s))),

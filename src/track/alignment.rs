@@ -239,6 +239,25 @@ impl Alignment {
         }
     }
 
+    /// The same line with another cant: more by `more_m` of the chainage, which is taken at the ends of the
+    /// plan's pieces and is linear between them.
+    #[must_use]
+    pub fn canted_more(&self, more_m: impl Fn(f64) -> f64) -> Self {
+        let mut line = self.clone();
+        for k in 0..line.plan.len() {
+            let from_m = line.plan[k].s0;
+            let to_m = line.plan.get(k + 1).map(|next| next.s0);
+            let piece = &mut line.plan[k];
+            let start = more_m(from_m);
+            piece.cant.start += start;
+            // The lead-in has no beginning, the lead-out no end.
+            if let Some(to_m) = to_m.filter(|to_m| k > 0 && *to_m > from_m) {
+                piece.cant.rate += (more_m(to_m) - start) / (to_m - from_m);
+            }
+        }
+        line
+    }
+
     /// Length in plan.
     pub fn length_m(&self) -> f64 {
         self.length_m

@@ -10,15 +10,23 @@
 //! 20 mm of that, the larger figure along the track. The shipped line scenarios take 15 mm along
 //! and 10 mm across and up. By default there is no error: a bench measures its one lamp itself.
 //!
-//! **What it does not do.** Errors of neighbouring lamps are independent: a shift that many lamps
-//! share (a control point that has moved) is not modelled, nor are errors of track and balises.
+//! Control points stand every [`CONTROL_M`]; where one has moved, everything that was measured from it
+//! is off along the track, and between two of them by what lies on the line between their errors. The
+//! cant of the map is that of the last track measurement, some millimetres off; balises are placed to
+//! some decimetres.
+//!
+//! **What it does not do.** Plan and profile of the map's track are right: what a survey leaves of
+//! them is millimetres over the length of a train.
 
 use super::random::Stream;
 use crate::settings::settings;
 use crate::track::{TrackPoint, Tunnel};
 
+/// Distance of the control points.
+const CONTROL_M: f64 = 120.0;
+
 settings! {
-    /// How well the map's lamps were surveyed: one sigma of the normal error of each lamp's place.
+    /// How well the map was surveyed: one sigma of normal errors.
     #[derive(Copy)]
     pub struct SurveySettings {
         /// Along the track, m. What the stack takes it to be is `stack.led.survey_sigma_m`.
@@ -28,6 +36,14 @@ settings! {
         across_sigma_m: f64 = 0.0, in 0.0..=0.5;
         /// In height, m.
         height_sigma_m: f64 = 0.0, in 0.0..=0.5;
+        /// Of the control points that lamps are measured from, along the track, m: neighbouring lamps
+        /// share it.
+        control_sigma_m: f64 = 0.0, in 0.0..=0.5;
+        /// Of the cant, mm.
+        cant_sigma_mm: f64 = 0.0, in 0.0..=20.0;
+        /// Of the balises' places along the track, m. What the stack takes it to be is
+        /// `stack.protection.balise_sigma_m`.
+        balise_sigma_m: f64 = 0.0, in 0.0..=5.0;
     }
 }
 
@@ -35,12 +51,23 @@ impl SurveySettings {
     /// The map of a tunnel as it was surveyed, with the errors of a run's seed.
     pub fn map(&self, tunnel: &Tunnel, seed: u64) -> Tunnel {
         let mut map = tunnel.clone();
+        let controls = Stream::new(seed, 0, "survey/control points");
+        let cants = Stream::new(seed, 0, "survey/cant");
+        if self.cant_sigma_mm > 0.0 {
+            let more_m = |s_m| 1e-3 * self.cant_sigma_mm * between_controls(&cants, s_m);
+            map.alignment = tunnel.alignment.canted_more(more_m);
+        }
+        for balise in &mut map.balises {
+            let stream = Stream::new(seed, 0, &format!("survey/{}", balise.name));
+            balise.chainage_m += self.balise_sigma_m * stream.normal(0);
+        }
         for lamp in &mut map.lamps {
             let stream = Stream::new(seed, 0, &format!("survey/{}", lamp.uid));
-            lamp.chainage_m += self.along_sigma_m * stream.normal(0);
+            let shared_m = self.control_sigma_m * between_controls(&controls, lamp.chainage_m);
+            lamp.chainage_m += shared_m + self.along_sigma_m * stream.normal(0);
             lamp.lateral_m += self.across_sigma_m * stream.normal(1);
             lamp.height_m += self.height_sigma_m * stream.normal(2);
-            lamp.centre = tunnel.alignment.world_from_track(TrackPoint {
+            lamp.centre = map.alignment.world_from_track(TrackPoint {
                 s_m: lamp.chainage_m,
                 l_m: lamp.lateral_m,
                 h_m: lamp.height_m,
@@ -48,6 +75,13 @@ impl SurveySettings {
         }
         map
     }
+}
+
+/// Linear between numbers of the control points on either side: normal ones of sigma 1.
+fn between_controls(stream: &Stream, s_m: f64) -> f64 {
+    let x = (s_m / CONTROL_M).max(0.0);
+    let [before, after] = [x.floor(), x.floor() + 1.0].map(|k| stream.normal(k as u64));
+    before + (x - x.floor()) * (after - before)
 }
 
 #[cfg(test)]
@@ -59,6 +93,9 @@ mod tests {
         along_sigma_m: 0.015,
         across_sigma_m: 0.010,
         height_sigma_m: 0.005,
+        control_sigma_m: 0.0,
+        cant_sigma_mm: 0.0,
+        balise_sigma_m: 0.0,
     };
 
     fn line() -> Tunnel {
@@ -90,6 +127,59 @@ mod tests {
             let off = (square / n).sqrt() / sigma - 1.0;
             assert!(off.abs() < 4.0 / (2.0 * n).sqrt(), "{sigma} m: {off}");
         }
+    }
+
+    /// Lamps that stand together share the error of their control points and others do not, the map's cant
+    /// is off by some millimetres and its lamps go with it, and balises are off.
+    #[test]
+    fn control_points_cant_and_balises_have_errors() {
+        let tunnel = line();
+        let settings = SurveySettings {
+            control_sigma_m: 0.05,
+            cant_sigma_mm: 4.0,
+            balise_sigma_m: 0.3,
+            ..SurveySettings::default()
+        };
+        let (mut near, mut all, mut cants, mut balises) = (0.0, 0.0, 0.0, 0.0);
+        let seeds = 40u32;
+        for seed in 0..u64::from(seeds) {
+            let map = settings.map(&tunnel, seed);
+            let lamps = tunnel.lamps.iter().zip(&map.lamps);
+            let errors: Vec<f64> = lamps
+                .map(|(is, said)| said.chainage_m - is.chainage_m)
+                .collect();
+            let mean_square = |x: f64, n: usize| x * x / n as f64;
+            let steps = errors.windows(2);
+            near += steps
+                .map(|w| mean_square(w[1] - w[0], errors.len() - 1))
+                .sum::<f64>();
+            all += errors
+                .iter()
+                .map(|e| mean_square(*e, errors.len()))
+                .sum::<f64>();
+            let line = (&tunnel.alignment, &map.alignment);
+            for k in 0..20u32 {
+                let s_m = 600.0 + 50.0 * f64::from(k);
+                let turned_rad = line.1.at(s_m).roll_rad - line.0.at(s_m).roll_rad;
+                cants += mean_square(1.5 * turned_rad, 20);
+            }
+            for (is, said) in tunnel.balises.iter().zip(&map.balises) {
+                balises += mean_square(said.chainage_m - is.chainage_m, tunnel.balises.len());
+            }
+            for lamp in &map.lamps {
+                let at = map
+                    .alignment
+                    .track_from_world(&lamp.centre, lamp.chainage_m);
+                assert!((at.h_m - lamp.height_m).abs() < 1e-6);
+            }
+        }
+        let rms = |sum: f64| (sum / f64::from(seeds)).sqrt();
+        // Between two control points the mean square of what is shared is 2/3 of theirs.
+        let shared = rms(all) / 0.05;
+        assert!((0.70..0.95).contains(&shared), "{shared}");
+        assert!(rms(near) < 0.2 * rms(all), "{} of {}", rms(near), rms(all));
+        assert!((2e-3..5e-3).contains(&rms(cants)), "{}", rms(cants));
+        assert!((0.2..0.4).contains(&rms(balises)), "{}", rms(balises));
     }
 
     /// Fails where a lamp's error depends on what other lamps there are, or not on the seed.

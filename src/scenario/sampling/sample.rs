@@ -238,6 +238,15 @@ impl VariableSettings {
 
     /// What a value of it changes in the scenario.
     pub(super) fn overrides(&self, value: &Value) -> Vec<Override> {
+        if let Distribution::Cases(cases) = &self.from {
+            let case = cases.iter().find(|c| value.as_str() == Some(&c.name));
+            let set = case.into_iter().flat_map(|case| &case.set);
+            let of = |(key, value): (&String, &Value)| Override {
+                key: key.clone(),
+                value: value.clone(),
+            };
+            return set.map(of).collect();
+        }
         let value = match number(value) {
             Some(x) if self.is_rescaled() => Value::Float(self.offset + self.scale * x),
             _ => value.clone(),

@@ -160,6 +160,9 @@ pub enum Distribution {
         #[schemars(with = "Vec<serde_json::Value>")]
         values: Vec<toml::Value>,
     },
+    /// Named cases, swept: each sets keys of its own, to values of their own. The variable has no `keys`
+    /// then; its value is the case's name.
+    Cases(Vec<CaseSettings>),
     /// Swept in equal steps.
     Grid {
         /// First value.
@@ -169,6 +172,18 @@ pub enum Distribution {
         /// Number of values, both ends counted.
         count: u32,
     },
+}
+
+/// One of the cases of a variable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CaseSettings {
+    /// What the results call it.
+    pub name: String,
+    /// What it changes of the scenario, by dotted keys: `{ "radio.loss" = 1.0 }`. Default: nothing.
+    #[serde(default)]
+    #[schemars(with = "BTreeMap<String, serde_json::Value>")]
+    pub set: BTreeMap<String, toml::Value>,
 }
 
 /// Variables that go together: their normal scores have these correlations (a Gaussian copula), and
@@ -200,6 +215,19 @@ settings! {
         of: String;
         /// Half the width of its 95 % interval, in the unit of the column.
         half_width: f64, in 1e-300..=1e300;
+    }
+}
+
+impl Distribution {
+    /// In one line, for reports: as a file has it, but of cases their names only.
+    pub fn in_a_line(&self) -> String {
+        match self {
+            Self::Cases(cases) => {
+                let names: Vec<&str> = cases.iter().map(|case| case.name.as_str()).collect();
+                format!("{} cases: {}", names.len(), names.join("; "))
+            }
+            other => as_written(other),
+        }
     }
 }
 
@@ -239,7 +267,7 @@ impl StudySettings {
     fn check_keys(&self, check: &mut Checker<'_>) {
         let mut seen: Vec<(&str, &str)> = Vec::new();
         for (name, variable) in &self.variables {
-            for key in &variable.keys {
+            for key in variable.all_keys() {
                 let clash = seen
                     .iter()
                     .find(|(_, other)| is_within(key, other) || is_within(other, key));
@@ -312,7 +340,29 @@ fn check_name(key: &str, name: &str, check: &mut Checker<'_>) {
 }
 
 impl VariableSettings {
+    /// The keys that it sets, in any of its cases.
+    fn all_keys(&self) -> Vec<&str> {
+        let mut of_cases: Vec<&str> = match &self.from {
+            Distribution::Cases(cases) => {
+                let keys = cases.iter().flat_map(|case| case.set.keys());
+                keys.map(String::as_str).collect()
+            }
+            _ => Vec::new(),
+        };
+        of_cases.sort_unstable();
+        of_cases.dedup();
+        let own = self.keys.iter().map(String::as_str);
+        own.chain(of_cases).collect()
+    }
+
     fn check_together(&self, check: &mut Checker<'_>) {
+        if !self.keys.is_empty() && matches!(self.from, Distribution::Cases(_)) {
+            check.problem(
+                "keys",
+                "say nothing: each case sets keys of its own",
+                "leave `keys` out",
+            );
+        }
         if self.is_rescaled() && !self.from.is_of_numbers() {
             check.problem(
                 "scale",

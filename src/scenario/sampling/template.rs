@@ -110,13 +110,15 @@ impl Template {
         };
         add(self.file.clone());
         for variable in self.settings.variables.values() {
-            let listed: &[Value] = match &variable.from {
-                Distribution::Choice { values, .. } | Distribution::Sweep { values } => values,
-                Distribution::Table { file, column } => self.tables.values(file, column),
-                _ => &[],
+            let listed = match &variable.from {
+                Distribution::Choice { values, .. } => values.clone(),
+                Distribution::Table { file, column } => self.tables.values(file, column).to_vec(),
+                // A grid's numbers name no files.
+                Distribution::Grid { .. } => Vec::new(),
+                from => from.swept(),
             };
             for value in listed {
-                let changes = variable.overrides(value);
+                let changes = variable.overrides(&value);
                 if let Ok(file) = overridden(&self.path, &self.text, &changes) {
                     add(file);
                 }
@@ -213,13 +215,18 @@ fn check_keys(
     problems: &mut Vec<Problem>,
 ) {
     for (name, variable) in &settings.variables {
-        let middle = match &variable.from {
-            Distribution::Table { file, column } => tables.value(file, column, 0.5),
+        let tried: Vec<Value> = match &variable.from {
+            Distribution::Table { file, column } => {
+                tables.value(file, column, 0.5).into_iter().collect()
+            }
+            Distribution::Cases(_) => variable.from.swept(),
             from => from
                 .quantile(0.5)
-                .or_else(|| from.swept().into_iter().next()),
+                .or_else(|| from.swept().into_iter().next())
+                .into_iter()
+                .collect(),
         };
-        for change in middle.iter().flat_map(|value| variable.overrides(value)) {
+        for change in tried.iter().flat_map(|value| variable.overrides(value)) {
             if let Err(error) = overridden(path, text, std::slice::from_ref(&change)) {
                 let what = match error {
                     ScenarioError::Overridden { source, .. } => source.to_string(),

@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use super::*;
+use crate::scenario::ScenarioFile;
 use crate::settings::read_toml;
 use crate::track::Tunnel;
 
@@ -20,27 +21,30 @@ const SCENARIO: &str = r#"
     name = "behind the device"
     chainage_m = 1536.0
     [[obstacles]]
-    name = "beyond its reach"
+    name = "far away"
     chainage_m = 1440.0
 "#;
 
-/// Fails where a device answers for what it cannot see, or the world is looked at through the
+/// Fails where a device answers for what it cannot see, does not answer for what its detector was told not
+/// to look at, or the world is looked at through the
 /// calibration instead of the device.
 #[test]
 fn a_device_answers_for_what_it_has_in_view() {
     let tunnel = Tunnel::from_toml(TUNNEL).unwrap();
-    let scenario = Scenario::new(read_toml(SCENARIO).unwrap(), tunnel).unwrap();
+    let mut file: ScenarioFile = read_toml(SCENARIO).unwrap();
+    file.stack.wayside.reach_m = 50.0;
+    let scenario = Scenario::new(file, tunnel).unwrap();
     let mut world = World::new(scenario.tunnel.clone(), &scenario.physics, 1, 0).unwrap();
     while world.time().secs() < 2.0 {
         world.step(&[]).unwrap();
     }
     let post = &scenario.wayside[0];
     let view = FieldOfView::new(&scenario, post);
-    let lying: Vec<_> = (view.present(&world).into_iter())
+    let lying: Vec<_> = (view.present(&world, &scenario.tunnel.alignment).into_iter())
         .filter(|p| p.lies_in_view_since.is_some())
         .collect();
-    assert_eq!(lying.len(), 1, "{lying:?}");
-    assert_eq!(lying[0].name, "seen");
+    let names: Vec<_> = lying.iter().map(|p| p.name.as_str()).collect();
+    assert_eq!(names, ["seen", "far away"]);
     // It fell from 0.67 m over the bed, and is still since it came to rest.
     let since_s = lying[0].lies_in_view_since.unwrap().secs();
     assert!((0.3..1.7).contains(&since_s), "{since_s}");

@@ -57,7 +57,7 @@ pub fn page(study: &Study, digest: &Digest, plots: &[Plot], rows: &[Row]) -> Res
         name,
         label: &v.label,
         keys: &v.keys,
-        from: as_written(&v.from),
+        from: v.from.in_a_line(),
     });
     let page = Page {
         title: &study.template.file.name,

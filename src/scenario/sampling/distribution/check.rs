@@ -1,7 +1,7 @@
 //! Distributions that are none.
 
 use super::TruncatedNormal;
-use crate::scenario::sampling::Distribution;
+use crate::scenario::sampling::settings::{CaseSettings, Distribution};
 use crate::settings::{Problem, Settings};
 
 /// A truncated distribution must leave this much of the whole.
@@ -71,6 +71,7 @@ impl Distribution {
             Self::Sweep { values } => {
                 (values.is_empty()).then(|| ("there is nothing to sweep".into(), "give `values`"))
             }
+            Self::Cases(list) => cases(list),
             Self::Grid { min, max, count } => order(*min, *max).or_else(|| {
                 let what = || format!("{count} steps");
                 (!(2..=MOST_STEPS).contains(count)).then(|| (what(), "give a count of 2 to 100000"))
@@ -97,6 +98,19 @@ fn left(normal: TruncatedNormal) -> Option<Flaw> {
     let enough = normal.share() >= LEAST_SHARE && normal.share().is_finite();
     let what = "min and max leave nothing of it";
     (!enough).then(|| (what.into(), "give limits nearer to its middle"))
+}
+
+fn cases(cases: &[CaseSettings]) -> Option<Flaw> {
+    let twice = |k: usize| cases[..k].iter().any(|c| c.name == cases[k].name);
+    if cases.is_empty() {
+        return Some((
+            "there are no cases".into(),
+            "give one or more, each with a `name`",
+        ));
+    }
+    let k = (0..cases.len()).find(|k| cases[*k].name.is_empty() || twice(*k))?;
+    let what = format!("case {} has no name of its own: `{}`", k + 1, cases[k].name);
+    Some((what, "give each case a name that no other has"))
 }
 
 fn choice(values: usize, weights: &[f64]) -> Option<Flaw> {

@@ -11,7 +11,10 @@ use truncated::TruncatedNormal;
 impl Distribution {
     /// Whether it is swept, not drawn.
     pub fn is_swept(&self) -> bool {
-        matches!(self, Self::Sweep { .. } | Self::Grid { .. })
+        matches!(
+            self,
+            Self::Sweep { .. } | Self::Grid { .. } | Self::Cases(_)
+        )
     }
 
     /// Whether it has a density, and so can be weighted against another one.
@@ -62,6 +65,7 @@ impl Distribution {
             Self::Choice { values, .. } | Self::Sweep { values } => {
                 values.iter().all(|v| v.is_integer() || v.is_float())
             }
+            Self::Cases(_) => false,
             _ => true,
         }
     }
@@ -70,6 +74,10 @@ impl Distribution {
     pub fn swept(&self) -> Vec<Value> {
         match self {
             Self::Sweep { values } => values.clone(),
+            Self::Cases(cases) => {
+                let names = cases.iter().map(|case| Value::String(case.name.clone()));
+                names.collect()
+            }
             Self::Grid { min, max, count } => (0..*count)
                 .map(|k| {
                     let share = f64::from(k) / f64::from(count - 1);

@@ -183,6 +183,11 @@ fn wrong_distributions_say_why() {
         ("choice = { values = [1, 2], weights = [1.0] }", "weights"),
         ("sweep = { values = [] }", "nothing"),
         ("grid = { min = 0.0, max = 1.0, count = 1 }", "steps"),
+        ("cases = []", "no cases"),
+        (
+            r#"cases = [{ name = "a" }, { name = "a" }]"#,
+            "name of its own",
+        ),
     ];
     for (text, why) in wrong {
         let distribution: Distribution = toml::from_str(text).unwrap();
