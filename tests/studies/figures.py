@@ -1,4 +1,5 @@
-"""Figures that src/study/stats/tests.rs and src/scenario/sampling hold against: run with scipy 1.x.
+"""Figures that src/study/stats/tests.rs, src/scenario/sampling and src/session/summary.rs hold against: run with
+scipy 1.x.
 
     pip install scipy && python3 tests/studies/figures.py
 """
@@ -46,3 +47,4 @@ show("ln density of lognormal 2 0.5 at 3", float(lognorm(0.5, scale=2).logpdf(3)
 show("ln density of triangular 1 2 5 at 3", float(triang(0.25, 1, 4).logpdf(3)))
 show("Sobol points", [[float(v) for v in row] for row in qmc.Sobol(5, scramble=False).random(16)])
 show("P(N(0, 2) > 6.0316)", float(norm.sf(6.0316 / 2**0.5)))
+show("percentiles of 5 1 4 2", [float(v) for v in np.percentile([5, 1, 4, 2], [50, 75, 95])])
