@@ -8,8 +8,8 @@ use crate::record::render;
 use crate::scenario::sampling::Template;
 use crate::session::RendererChoice;
 use crate::study::{
-    self, Digest, MEASURES, MOST_SHARDS, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
-    Submission,
+    self, Digest, MEASURES, MOST_SHARDS, Options, Progress, RUN_LIMIT_S, Row, Shard, Study,
+    StudyError, Submission,
 };
 use clap::{Subcommand, ValueEnum};
 use std::cmp::Reverse;

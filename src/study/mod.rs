@@ -24,6 +24,7 @@
 //!
 //! Schedule over machines: `submit` hands the shards to Slurm as a job array.
 
+mod collected;
 mod compare;
 mod digest;
 mod folder;
@@ -35,6 +36,7 @@ mod pool;
 mod report;
 mod row;
 mod runner;
+mod scale;
 mod shard;
 mod slurm;
 pub mod stats;
@@ -42,8 +44,8 @@ mod stop;
 mod table;
 mod worker;
 
-pub use compare::{Comparison, compare};
-pub use digest::{Digest, EventDigest, FigureDigest, QUANTILES, Sensitivity};
+pub use compare::{Comparison, Difference, compare};
+pub use digest::{Digest, EarlyStop, EventDigest, FigureDigest, QUANTILES, Sensitivity, WorstCase};
 pub use folder::Study;
 pub use journal::read as read_rows;
 pub use manifest::{INPUTS, MANIFEST, Manifest};
