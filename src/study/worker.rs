@@ -170,7 +170,7 @@ mod tests {
             .session(&without_images(scenario), &mut images)
             .unwrap();
         assert!(
-            images.0 > 5 && images.1 == 0,
+            images.0 > 3 && images.1 == 0,
             "{} frames, {} images",
             images.0,
             images.1
