@@ -136,7 +136,7 @@ fn an_early_stop_is_marked() {
         of,
         half_width: 0.2,
     });
-    let hit = |k: u64| json!({"collision": k % 2 == 0});
+    let hit = |k: u64| json!({"collision": k.is_multiple_of(2)});
     let rows: Vec<Row> = (0..30).map(|k| row(k, Status::Complete, hit(k))).collect();
     let early = Digest::of(&template, &rows).early.unwrap();
     assert_eq!(early.of, "hit");

@@ -129,8 +129,7 @@ impl EarlyStop {
         let when = template.settings.stop.when.as_ref()?;
         let mut look = Look::new(Precision::of(template).ok()??);
         rows.iter().for_each(|row| look.at(row));
-        let is_early =
-            look.enough()? as u64 <= rows.len() as u64 && (rows.len() as u64) < template.runs();
+        let is_early = look.enough().is_some() && (rows.len() as u64) < template.runs();
         is_early.then(|| Self {
             of: when.of.clone(),
             half_width: when.half_width,
