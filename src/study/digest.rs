@@ -127,8 +127,7 @@ impl Digest {
 impl EarlyStop {
     fn of(template: &Template, rows: &[Row]) -> Option<Self> {
         let when = template.settings.stop.when.as_ref()?;
-        let mut look = Look::new(Precision::of(template).ok()??);
-        rows.iter().for_each(|row| look.at(row));
+        let look = Look::over(Precision::of(template).ok()??, rows);
         let is_early = look.enough().is_some() && (rows.len() as u64) < template.runs();
         is_early.then(|| Self {
             of: when.of.clone(),

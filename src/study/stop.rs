@@ -59,13 +59,8 @@ impl Precision {
 
     /// Leaves out the rows, which are in order, after the one at which the figure is known.
     pub fn truncate(self, rows: &mut Vec<Row>) {
-        let mut look = Look::new(self);
-        let whole = rows
-            .iter()
-            .zip(0u64..)
-            .take_while(|(row, k)| row.index == *k);
-        whole.for_each(|(row, _)| look.at(row));
-        rows.truncate(look.enough().unwrap_or(usize::MAX));
+        let enough = Look::over(self, rows).enough();
+        rows.truncate(enough.unwrap_or(usize::MAX));
     }
 }
 
@@ -89,6 +84,15 @@ impl Look {
             moments: Moments::default(),
             enough: None,
         }
+    }
+
+    /// Over rows in order, as far as none is missing.
+    pub fn over(precision: Precision, rows: &[Row]) -> Self {
+        let mut look = Self::new(precision);
+        let whole = rows.iter().zip(0u64..);
+        let whole = whole.take_while(|(row, k)| row.index == *k);
+        whole.for_each(|(row, _)| look.at(row));
+        look
     }
 
     /// Looks at the next row.
