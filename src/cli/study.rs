@@ -8,8 +8,8 @@ use crate::record::render;
 use crate::scenario::sampling::Template;
 use crate::session::RendererChoice;
 use crate::study::{
-    self, Digest, MEASURES, Options, Progress, RUN_LIMIT_S, Row, Shard, Study, StudyError,
-    Submission,
+    self, Digest, MEASURES, MOST_SHARDS, Options, Progress, RUN_LIMIT_S, Row, Shard, Study,
+    StudyError, Submission,
 };
 use clap::{Subcommand, ValueEnum};
 use std::cmp::Reverse;
@@ -133,7 +133,7 @@ struct SubmitArgs {
     /// Scenario file with a [study]
     study: PathBuf,
     /// Tasks of the array
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_SHARDS))]
     shards: u64,
     /// Cores of each task
     #[arg(long, value_name = "C", default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..))]

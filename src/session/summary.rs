@@ -278,7 +278,8 @@ pub struct ProtectionFigures {
 mod tests {
     use super::*;
 
-    /// Off-by-one in the quantiles, mean over the wrong count. Figures from numpy.percentile.
+    /// Off-by-one in the quantiles, mean over the wrong count. Figures from numpy.percentile
+    /// (tests/studies/figures.py).
     #[test]
     fn distribution_matches_numpy() {
         let mut v = vec![5.0, 1.0, 4.0, 2.0];

@@ -2,7 +2,7 @@
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
 use super::digest::is_weighted;
-use super::stats::{IntervalEstimate, mean, weighted_mean};
+use super::stats::{Bounds, IntervalEstimate, bounded_mean, weighted_mean};
 use super::{MEASURES, Result, Row, Study};
 use crate::record::parquet::Kind;
 use serde::Serialize;
@@ -13,15 +13,30 @@ use std::path::Path;
 pub struct Comparison {
     /// Rows of the first.
     pub rows: usize,
-    /// Runs that are complete in both, by their indexes.
+    /// Runs that both have, by their indexes.
+    pub both: usize,
+    /// Of these, those that are complete in both.
     pub pairs: usize,
     /// Of these, how many were not drawn alike: then pairs are no pairs, and weighted runs, whose weights
     /// are then two, have no differences.
     pub sampled_otherwise: usize,
-    /// Name, unit, and mean difference of each figure and event that differs in some run.
-    pub differences: Vec<(String, String, IntervalEstimate)>,
+    /// Each figure and event that differs in some run.
+    pub differences: Vec<Difference>,
     /// The first thing in which they are not the same, value by value, wall times aside.
     pub first_difference: Option<String>,
+}
+
+/// A figure that differs.
+#[derive(Clone, Debug, Serialize)]
+pub struct Difference {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// The mean difference.
+    pub mean: IntervalEstimate,
+    /// Pairs that it is of.
+    pub pairs: usize,
 }
 
 /// Compares the studies of two folders.
@@ -32,8 +47,9 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
     let pairs = rows_a
         .iter()
         .filter_map(|row| Some((row, &rows_b[of_b(row)?])));
-    let pairs = pairs.filter(|(a, b)| a.is_complete() && b.is_complete());
-    let pairs: Vec<(&Row, &Row)> = pairs.collect();
+    let mut pairs: Vec<(&Row, &Row)> = pairs.collect();
+    let both = pairs.len();
+    pairs.retain(|(a, b)| a.is_complete() && b.is_complete());
     let alike = |a: &Row, b: &Row| {
         a.seed == b.seed && a.values == b.values && a.ln_weight.to_bits() == b.ln_weight.to_bits()
     };
@@ -41,29 +57,40 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
 
     let weighted = is_weighted(&a.template) || is_weighted(&b.template);
     let mut differences = Vec::new();
-    let mut add = |name: &str, unit: &str, of: &dyn Fn(&Row) -> Option<f64>| {
+    let mut add = |name: &str, unit: &str, bounds: Bounds, of: &dyn Fn(&Row) -> Option<f64>| {
         let both = pairs
             .iter()
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
         let both: Vec<(f64, f64)> = both.collect();
         let estimate = if weighted {
-            weighted_mean(&both).filter(|_| sampled_otherwise == 0)
+            weighted_mean(&both, bounds).filter(|_| sampled_otherwise == 0)
         } else {
-            mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>())
+            bounded_mean(&both.iter().map(|(_, d)| *d).collect::<Vec<_>>(), bounds)
         };
         let differs = both.iter().any(|(_, d)| d.abs() > 0.0);
         let estimate = estimate.filter(|_| differs);
-        differences.extend(estimate.map(|e| (name.to_owned(), unit.to_owned(), e)));
+        differences.extend(estimate.map(|mean| Difference {
+            name: name.to_owned(),
+            unit: unit.to_owned(),
+            pairs: mean.n,
+            mean,
+        }));
     };
     for (name, condition) in &a.template.events {
         let happened = |row: &Row| row.happened(condition).map(f64::from);
-        add(&format!("rate of {name}"), "1", &happened);
+        let bounds = Bounds::SHARE_DIFFERENCE;
+        add(&format!("rate of {name}"), "1", bounds, &happened);
     }
     for m in MEASURES
         .iter()
         .filter(|m| m.kind != Kind::Reals && !m.is_wall_time())
     {
-        add(m.name, m.unit, &|row: &Row| row.number(m.name));
+        let bounds = if m.range() == Bounds::SHARE {
+            Bounds::SHARE_DIFFERENCE
+        } else {
+            Bounds::NONE
+        };
+        add(m.name, m.unit, bounds, &|row: &Row| row.number(m.name));
     }
     let lengths = (rows_a.len() != rows_b.len())
         .then(|| format!("{} rows and {}", rows_a.len(), rows_b.len()));
@@ -71,6 +98,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
     let row = |(a, b): (&Row, &Row)| Some(format!("run {}: {}", a.index, a.difference(b)?));
     Ok(Comparison {
         rows: rows_a.len(),
+        both,
         pairs: pairs.len(),
         sampled_otherwise,
         differences,

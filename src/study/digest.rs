@@ -1,12 +1,13 @@
 //! What the rows of a study come to.
 
 use super::stats::{
-    IntervalEstimate, Rate, Weighted, effective_runs, first_order, first_order_of_groups, mean,
-    quantile, rank_correlation, rate, weighted_mean, weighted_rate,
+    IntervalEstimate, LEAST_WORTH, Rate, Tally, Weighted, bounded_mean, effective_runs,
+    first_order, first_order_of_groups, quantile, rank_correlation, weighted_mean, weighted_rate,
 };
+use super::stop::{Look, Precision};
 use super::{MEASURES, Measure, Row};
 use crate::record::parquet::Kind;
-use crate::scenario::sampling::{Distribution, Template};
+use crate::scenario::sampling::{Condition, Distribution, Template};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
@@ -18,8 +19,11 @@ pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
 pub struct Digest {
     /// Rows there are.
     pub runs: usize,
-    /// Of these, complete ones; the rest gives its reasons in the table.
+    /// Of these, complete ones; the rest gives its reasons in the table. No denominator leaves the rest
+    /// out.
     pub complete: usize,
+    /// Where the study ended before all of its runs, because a figure was known well enough.
+    pub early: Option<EarlyStop>,
     /// Draws that did not meet the conditions.
     pub rejected: u64,
     /// Kish's effective number of runs, where they are weighted.
@@ -30,6 +34,16 @@ pub struct Digest {
     pub figures: Vec<FigureDigest>,
 }
 
+/// The figure that a study stopped by.
+#[derive(Clone, Debug, Serialize)]
+pub struct EarlyStop {
+    /// Name of the event or figure. Its interval was looked at until it was short enough, and holds the
+    /// truth somewhat less often than 95 %.
+    pub of: String,
+    /// Half the width that was asked for.
+    pub half_width: f64,
+}
+
 /// An event.
 #[derive(Clone, Debug, Serialize)]
 pub struct EventDigest {
@@ -37,12 +51,14 @@ pub struct EventDigest {
     pub name: String,
     /// Its condition.
     pub condition: String,
-    /// Runs that have the figures that it names.
+    /// Runs, those included of which it is not known whether it happened.
     pub runs: usize,
-    /// How often it happened in these.
+    /// How often it happened in these; `None` where runs are weighted, and where nothing is known.
     pub rate: Option<Rate>,
     /// The rate of the distributions that were asked for, where runs are weighted.
     pub weighted: Option<Weighted>,
+    /// What weighted runs in which it happened must be worth for a rate.
+    pub least_worth: f64,
 }
 
 /// A figure.
@@ -50,15 +66,28 @@ pub struct EventDigest {
 pub struct FigureDigest {
     /// Which.
     pub measure: &'static Measure,
-    /// How many runs have it.
+    /// How many complete runs have it: its mean and quantiles are over these.
     pub runs: usize,
-    /// Its mean.
+    /// How many runs have it not, or only of a part of the run.
+    pub lacking: usize,
+    /// The worst of all runs, those included that are not complete.
+    pub worst: Option<WorstCase>,
+    /// Its mean, of flags the rate.
     pub mean: Option<IntervalEstimate>,
     /// Its [`QUANTILES`].
     pub quantiles: [Option<IntervalEstimate>; QUANTILES.len()],
     /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
     /// no quantiles and drivers: theirs are not those of the distributions that were asked for.
     pub drivers: Vec<Sensitivity>,
+}
+
+/// The run in which a figure is worst.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct WorstCase {
+    /// The figure.
+    pub value: f64,
+    /// Which run.
+    pub index: u64,
 }
 
 /// A variable as the cause of a figure.
@@ -76,36 +105,52 @@ impl Digest {
     /// Of rows in order.
     pub fn of(template: &Template, rows: &[Row]) -> Self {
         let weighted = is_weighted(template);
-        let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
-        let ln_weights: Vec<f64> = complete.iter().map(|r| r.ln_weight).collect();
-        // Weights have mean 1 by themselves only if no condition cut draws off and no run is missing.
-        let cut_off = !template.settings.require.is_empty();
-        let events = template.events.iter().map(|(name, condition)| {
-            let known = complete
-                .iter()
-                .filter_map(|r| Some((r.ln_weight, r.happened(condition)?)));
-            let known: Vec<(f64, bool)> = known.collect();
-            let happened = known.iter().filter(|k| k.1).count() as u64;
-            EventDigest {
-                name: name.clone(),
-                condition: condition.text().to_owned(),
-                runs: known.len(),
-                rate: rate(happened, known.len() as u64),
-                weighted: weighted
-                    .then(|| weighted_rate(&known, cut_off || known.len() < rows.len()))
-                    .flatten(),
-            }
-        });
+        let ln_weights: Vec<f64> = rows.iter().map(|r| r.ln_weight).collect();
+        let events = template.events.iter();
         let shown = MEASURES.iter().filter(|m| is_shown(m));
         Self {
             runs: rows.len(),
-            complete: complete.len(),
+            complete: rows.iter().filter(|r| r.is_complete()).count(),
+            early: EarlyStop::of(template, rows),
             rejected: rows.iter().map(|r| u64::from(r.rejected)).sum(),
             effective_runs: weighted.then(|| effective_runs(&ln_weights)),
-            events: events.collect(),
-            figures: shown
-                .filter_map(|m| FigureDigest::of(template, m, &complete))
+            events: events
+                .map(|(name, condition)| EventDigest::of(template, name, condition, rows))
                 .collect(),
+            figures: shown
+                .filter_map(|m| FigureDigest::of(template, m, rows))
+                .collect(),
+        }
+    }
+}
+
+impl EarlyStop {
+    fn of(template: &Template, rows: &[Row]) -> Option<Self> {
+        let when = template.settings.stop.when.as_ref()?;
+        let look = Look::over(Precision::of(template).ok()??, rows);
+        let is_early = look.enough().is_some() && (rows.len() as u64) < template.runs();
+        is_early.then(|| Self {
+            of: when.of.clone(),
+            half_width: when.half_width,
+        })
+    }
+}
+
+impl EventDigest {
+    fn of(template: &Template, name: &str, condition: &Condition, rows: &[Row]) -> Self {
+        let outcomes = || rows.iter().map(|r| (r.ln_weight, r.outcome(condition)));
+        // Weights have mean 1 by themselves only if no condition cut draws off.
+        let cut_off = !template.settings.require.is_empty();
+        let is_weighted = is_weighted(template);
+        let weighted = || weighted_rate(&outcomes().collect::<Vec<_>>(), cut_off);
+        let rate = || Tally::of(outcomes().map(|o| o.1)).rate();
+        Self {
+            name: name.to_owned(),
+            condition: condition.text().to_owned(),
+            runs: rows.len(),
+            rate: (!is_weighted).then(rate).flatten(),
+            weighted: is_weighted.then(weighted),
+            least_worth: LEAST_WORTH,
         }
     }
 }
@@ -135,36 +180,74 @@ fn is_shown(measure: &Measure) -> bool {
 
 impl FigureDigest {
     /// `None` of a figure that no run has, or that is the same in all.
-    fn of(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Option<Self> {
-        let known = rows
+    fn of(template: &Template, measure: &'static Measure, rows: &[Row]) -> Option<Self> {
+        let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
+        let known = complete
             .iter()
             .filter_map(|r| Some((r.ln_weight, r.number(measure.name)?)));
         let known: Vec<(f64, f64)> = known.collect();
-        let first = known.first()?.1.to_bits();
-        if known.iter().all(|(_, x)| x.to_bits() == first) {
+        let worst = WorstCase::of(measure, rows)?;
+        let is_same = |x: f64| x.to_bits() == worst.value.to_bits();
+        let lacking = rows.len() - known.len();
+        if lacking == 0 && known.iter().all(|(_, x)| is_same(*x)) {
             return None;
         }
+        let bare = Self {
+            measure,
+            runs: known.len(),
+            lacking,
+            worst: Some(worst),
+            mean: None,
+            quantiles: [None; QUANTILES.len()],
+            drivers: Vec::new(),
+        };
         if is_weighted(template) {
-            return Some(Self {
-                measure,
-                runs: known.len(),
-                mean: weighted_mean(&known),
-                quantiles: [None; QUANTILES.len()],
-                drivers: Vec::new(),
-            });
+            let mean = weighted_mean(&known, measure.range());
+            return Some(Self { mean, ..bare });
         }
         let mut sample: Vec<f64> = known.into_iter().map(|(_, x)| x).collect();
-        let mean = mean(&sample);
+        let mean = measure.mean(&sample);
         sample.sort_by(f64::total_cmp);
         let variables = template.settings.variables.keys();
-        let drivers = variables.map(|name| Sensitivity::of(template, name, measure, rows));
+        let drivers = variables.map(|name| Sensitivity::of(template, name, measure, &complete));
+        let is_flag = measure.kind == Kind::Flag;
         Some(Self {
-            measure,
-            runs: sample.len(),
             mean,
-            quantiles: QUANTILES.map(|p| quantile(&sample, p)),
+            quantiles: QUANTILES.map(|p| quantile(&sample, p).filter(|_| !is_flag)),
             drivers: drivers.collect(),
+            ..bare
         })
+    }
+}
+
+impl WorstCase {
+    fn of(measure: &Measure, rows: &[Row]) -> Option<Self> {
+        let known = rows.iter().filter_map(|row| {
+            let value = row.number(measure.name)?;
+            let index = row.index;
+            Some(Self { value, index })
+        });
+        let badness = |case: &Self| measure.badness(case.value);
+        // The first of several that are equal.
+        known.reduce(|worst, case| {
+            if badness(&case) > badness(&worst) {
+                case
+            } else {
+                worst
+            }
+        })
+    }
+}
+
+impl Measure {
+    /// The mean of its values in runs, of a flag the rate.
+    pub fn mean(&self, values: &[f64]) -> Option<IntervalEstimate> {
+        if self.kind == Kind::Flag {
+            return Tally::of(values.iter().map(|x| Some(*x > 0.5)))
+                .rate()
+                .map(|r| r.wilson);
+        }
+        bounded_mean(values, self.range())
     }
 }
 

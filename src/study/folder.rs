@@ -1,7 +1,7 @@
 //! A study's folder, opened once for all that is asked of it.
 
 use super::stop::Precision;
-use super::{INPUTS, Manifest, Result, Row, StudyError, journal};
+use super::{INPUTS, MANIFEST, Manifest, Result, Row, StudyError, journal};
 use crate::scenario::sampling::Template;
 use std::path::{Path, PathBuf};
 
@@ -22,7 +22,7 @@ impl Study {
         let manifest =
             Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
         let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
-        template.settings.runs = (manifest.runs / template.cells()) as u32;
+        template.settings.runs = runs_of_cell(folder, &manifest, &template)?;
         Ok(Self {
             folder: folder.to_owned(),
             manifest,
@@ -38,4 +38,15 @@ impl Study {
         }
         Ok(rows)
     }
+}
+
+/// The number of runs for each combination of swept values.
+fn runs_of_cell(folder: &Path, manifest: &Manifest, template: &Template) -> Result<u32> {
+    let (runs, cells) = (manifest.runs, template.cells());
+    let of_cell = runs.checked_div(cells).and_then(|n| u32::try_from(n).ok());
+    let of_cell = of_cell.filter(|_| runs.is_multiple_of(cells));
+    of_cell.ok_or_else(|| StudyError::Manifest {
+        path: folder.join(MANIFEST),
+        what: format!("`runs` is {runs}, no multiple of the {cells} combinations that are swept"),
+    })
 }

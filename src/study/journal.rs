@@ -82,10 +82,9 @@ pub fn sort(rows: &mut Vec<Row>) {
 /// The rows, and how many bytes hold them.
 fn parse(path: &Path, text: &[u8]) -> Result<(Vec<Row>, usize)> {
     let whole = text.iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
-    let lines = text[..whole]
-        .split(|b| *b == b'\n')
-        .filter(|line| !line.is_empty());
-    let rows = lines.enumerate().map(|(k, line)| {
+    let lines = text[..whole].split(|b| *b == b'\n').enumerate();
+    let rows = lines.filter(|(_, line)| !line.is_empty());
+    let rows = rows.map(|(k, line)| {
         serde_json::from_slice(line).map_err(|e| StudyError::Journal {
             path: path.to_owned(),
             line: k + 1,

@@ -1,68 +1,20 @@
 //! The manifest `study.json`: SHA-256 of every input and of the program, and the renderer, that the rows of a
-//! folder were made with; and shards.
+//! folder were made with.
 
-use super::{Result, StudyError, write_whole};
-use crate::scenario::sampling::{Inputs, Template, sha256};
+use super::{Result, Shard, StudyError, write_whole};
+use crate::scenario::sampling::{Inputs, MOST_RUNS, Template, sha256};
 use crate::session::RendererChoice;
 use crate::twin::render::{Backend, gpu};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::str::FromStr;
+use std::path::{Component, Path, PathBuf};
 
 /// Name of the file in a study's folder.
 pub const MANIFEST: &str = "study.json";
 /// Folder for copies of all inputs.
 pub const INPUTS: &str = "inputs";
-
-/// One of several parts of a study, each run by itself: runs are dealt in turn, so that shard I of N has
-/// those with index = I - 1 modulo N.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Shard {
-    /// Which, counted from 1.
-    pub number: u64,
-    /// Of how many.
-    pub of: u64,
-}
-
-impl Shard {
-    /// Whether a run is a part of it.
-    pub fn holds(self, index: u64) -> bool {
-        index % self.of == self.number - 1
-    }
-
-    /// Name of its folder below the study's.
-    pub fn folder(self) -> String {
-        format!("shard-{}-of-{}", self.number, self.of)
-    }
-}
-
-impl FromStr for Shard {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || format!("`{text}` is no shard: give I/N with 1 <= I <= N, as in 2/4");
-        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
-        let parse = |t: &str| t.trim().parse::<u64>().map_err(|_| wrong());
-        let shard = Self {
-            number: parse(number)?,
-            of: parse(of)?,
-        };
-        if (1..=shard.of).contains(&shard.number) {
-            Ok(shard)
-        } else {
-            Err(wrong())
-        }
-    }
-}
-
-impl fmt::Display for Shard {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.number, self.of)
-    }
-}
 
 /// Everything that a row depends on. A study goes on only while all of it is the same.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -81,6 +33,12 @@ pub struct Manifest {
     pub renderer: Backend,
     /// The part of the study that this folder holds; all of it where there is none.
     pub shard: Option<Shard>,
+}
+
+/// Whether a path leads below the folder that it is joined to.
+fn is_below(path: &Path) -> bool {
+    let mut parts = path.components().peekable();
+    parts.peek().is_some() && parts.all(|part| matches!(part, Component::Normal(_)))
 }
 
 /// What draws the images on this machine, by a choice.
@@ -124,10 +82,36 @@ impl Manifest {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             other => other.map_err(|source| StudyError::file(&path, source))?,
         };
-        let manifest = serde_json::from_slice(&text);
+        let manifest: Result<Self, String> =
+            serde_json::from_slice(&text).map_err(|e| e.to_string());
+        let manifest = manifest.and_then(Self::checked);
         manifest
             .map(Some)
-            .map_err(|e| StudyError::file(&path, e.into()))
+            .map_err(|what| StudyError::Manifest { path, what })
+    }
+
+    /// What no `study run` writes is refused: the file was edited by hand.
+    fn checked(self) -> Result<Self, String> {
+        if !is_below(&self.study) {
+            let study = self.study.display();
+            return Err(format!(
+                "`study` is `{study}`, not a path below {INPUTS} without `..`"
+            ));
+        }
+        let is_input = |file: &&String| {
+            let file = Path::new(file);
+            file.is_absolute() || is_below(file)
+        };
+        if let Some(file) = self.inputs.keys().find(|file| !is_input(file)) {
+            return Err(format!(
+                "`inputs` names `{file}`, which is neither absolute nor a path below {INPUTS} without `..`"
+            ));
+        }
+        if !(1..=MOST_RUNS).contains(&self.runs) {
+            let runs = self.runs;
+            return Err(format!("`runs` is {runs}, not from 1 to {MOST_RUNS}"));
+        }
+        Ok(self)
     }
 
     /// Writes it into a folder, whole or not at all.
@@ -145,7 +129,10 @@ impl Manifest {
             .iter()
             .filter(|(file, _)| Path::new(file).is_absolute());
         let is_other = |file: &str, hash: &str| {
-            fs::read(file).map(|b| sha256(&b)).ok().as_deref() != Some(hash)
+            // A device may have no end.
+            let is_file = fs::metadata(file).is_ok_and(|m| m.is_file());
+            let read = || fs::read(file).map(|b| sha256(&b)).ok();
+            is_file.then(read).flatten().as_deref() != Some(hash)
         };
         let changed = outside.find(|(file, hash)| is_other(file, hash));
         changed.map(|(file, _)| file.as_str())

@@ -149,7 +149,7 @@ macro_rules! positioning {
     };
 }
 
-/// All figures, in the order of columns.
+/// All figures, in the order of columns. What they lie between and which side is worse stands in `scale`.
 pub const MEASURES: &[Measure] = positioning![
     Stereo "paper", Mono "mono";
     measure_of("dark_lamps", Int, "1", "lamps that the stack says do not shine",

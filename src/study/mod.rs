@@ -24,6 +24,7 @@
 //!
 //! Schedule over machines: `submit` hands the shards to Slurm as a job array.
 
+mod collected;
 mod compare;
 mod digest;
 mod folder;
@@ -35,22 +36,25 @@ mod pool;
 mod report;
 mod row;
 mod runner;
+mod scale;
+mod shard;
 mod slurm;
 pub mod stats;
 mod stop;
 mod table;
 mod worker;
 
-pub use compare::{Comparison, compare};
-pub use digest::{Digest, EventDigest, FigureDigest, QUANTILES, Sensitivity};
+pub use compare::{Comparison, Difference, compare};
+pub use digest::{Digest, EarlyStop, EventDigest, FigureDigest, QUANTILES, Sensitivity, WorstCase};
 pub use folder::Study;
 pub use journal::read as read_rows;
-pub use manifest::{INPUTS, MANIFEST, Manifest, Shard};
+pub use manifest::{INPUTS, MANIFEST, Manifest};
 pub use measures::{Fixes, MEASURES, Measure, measure};
 pub use merge::merge;
 pub use report::{REPORT, report};
 pub use row::{Row, Status};
 pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
+pub use shard::{MOST_SHARDS, Shard};
 pub use slurm::{Submission, Submitted};
 pub use worker::{ScenarioRunner, serve};
 
@@ -86,6 +90,17 @@ pub enum StudyError {
         line: usize,
         /// What the parser says.
         why: String,
+    },
+    /// A manifest that no study has written.
+    #[error(
+        "{}: {what}; put the file back as `study run` wrote it, or run the study into another folder",
+        path.display()
+    )]
+    Manifest {
+        /// The manifest.
+        path: PathBuf,
+        /// What is wrong with which of its keys.
+        what: String,
     },
     /// The folder holds a study already.
     #[error("{} holds {rows} rows of this study already; give --resume to go on, or another --out", path.display())]

@@ -1,5 +1,6 @@
 //! Runs what a study still lacks.
 
+use super::collected::CollectedRows;
 use super::journal::{self, Journal};
 use super::pool::{Next, Pool};
 use super::stop::Precision;
@@ -87,25 +88,26 @@ pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<
     let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
     let is_wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k)) && !done.contains(k);
     let lacking: Vec<u64> = (0..template.runs()).filter(is_wanted).collect();
+    let (before, of) = (rows.len() as u64, (rows.len() + lacking.len()) as u64);
+    let mut collected = CollectedRows::new(precision);
+    rows.into_iter().for_each(|row| collected.add(row));
     let now = clock();
     let mut collector = Collector {
         template,
         folder,
         options,
         journal,
-        precision,
         begin: now,
         table_written: now,
-        checked: 0,
-        before: rows.len() as u64,
-        of: (rows.len() + lacking.len()) as u64,
-        rows,
+        before,
+        of,
+        rows: collected,
     };
-    if !collector.is_precise() {
+    if !collector.rows.are_enough() {
         let next = |row| collector.next(row);
         pool(folder, &manifest, options)?.work(template, lacking, next)?;
     }
-    let rows = collector.into_rows();
+    let rows = collector.rows.into_rows();
     table::write(folder, template, &rows)?;
     Ok(rows)
 }
@@ -192,37 +194,19 @@ struct Collector<'a> {
     folder: &'a Path,
     options: &'a Options<'a>,
     journal: Journal,
-    rows: Vec<Row>,
-    precision: Option<Precision>,
+    rows: CollectedRows,
     begin: Instant,
     table_written: Instant,
-    /// Rows whose precision has been checked.
-    checked: usize,
     before: u64,
     of: u64,
 }
 
 impl Collector<'_> {
-    fn is_precise(&mut self) -> bool {
-        journal::sort(&mut self.rows);
-        let (rows, checked) = (&self.rows, &mut self.checked);
-        (self.precision.as_ref()).is_some_and(|p| p.enough(rows, checked).is_some())
-    }
-
-    /// In order, up to where the study stops.
-    fn into_rows(mut self) -> Vec<Row> {
-        journal::sort(&mut self.rows);
-        if let Some(precision) = &self.precision {
-            precision.truncate(&mut self.rows);
-        }
-        self.rows
-    }
-
     fn next(&mut self, row: Option<Row>) -> Result<Next> {
         let has_come = row.is_some();
         row.map_or(Ok(()), |row| self.add(row))?;
         self.show_progress();
-        if has_come && self.is_precise() {
+        if has_come && self.rows.are_enough() {
             return Ok(Next::End);
         }
         let after_s = self.template.settings.stop.after_s;
@@ -237,10 +221,9 @@ impl Collector<'_> {
 
     fn add(&mut self, row: Row) -> Result {
         self.journal.add(&row)?;
-        self.rows.push(row);
+        self.rows.add(row);
         if self.table_written.elapsed() > TABLE_EVERY {
-            journal::sort(&mut self.rows);
-            table::write(self.folder, self.template, &self.rows)?;
+            table::write(self.folder, self.template, self.rows.iter())?;
             self.table_written = clock();
         }
         Ok(())
@@ -250,13 +233,12 @@ impl Collector<'_> {
         let Some(show) = self.options.progress else {
             return;
         };
-        let done = self.rows.len() as u64;
+        let done = self.rows.len();
         let minutes = self.begin.elapsed().as_secs_f64() / 60.0;
-        let failed = self.rows.iter().filter(|r| !r.is_complete()).count();
         show(&Progress {
             done,
             of: self.of,
-            failed: failed as u64,
+            failed: self.rows.incomplete(),
             per_minute: (done - self.before) as f64 / minutes.max(1e-9),
         });
     }

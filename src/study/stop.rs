@@ -1,10 +1,10 @@
 //! Stopping when a figure is known well enough, at the same run for any number of workers.
 //!
-//! An interval that was checked at again and again until it was short holds the truth somewhat less often
-//! than it says, the more so the skewer the figure is.
+//! An interval that was looked at again and again until it was short holds the truth somewhat less often
+//! than it says, the more so the skewer the figure is: reports mark it.
 
 use super::digest::is_weighted;
-use super::stats::{IntervalEstimate, mean, rate};
+use super::stats::{IntervalEstimate, Moments, Tally};
 use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
@@ -23,7 +23,7 @@ pub struct Precision {
 
 #[derive(Clone, Debug)]
 enum Figure {
-    Mean(String),
+    Mean(&'static Measure),
     Rate(Condition),
 }
 
@@ -45,48 +45,87 @@ impl Precision {
                     .into(),
             ));
         }
+        let known = || measure(&when.of).filter(|m| can_be_known(m));
         let figure = match template.events.get(&when.of) {
-            Some(condition) => Figure::Rate(condition.clone()),
-            None if measure(&when.of).is_some_and(can_be_known) => Figure::Mean(when.of.clone()),
-            None => return Err(StudyError::NoFigure(when.of.clone())),
+            Some(condition) => Some(Figure::Rate(condition.clone())),
+            None => known().map(Figure::Mean),
         };
+        let figure = figure.ok_or_else(|| StudyError::NoFigure(when.of.clone()))?;
         Ok(Some(Self {
             figure,
             half_width: when.half_width,
         }))
     }
 
-    /// After how many of these rows, which are in order, the figure is known. Rows are looked at only
-    /// as far as none is missing. `checked` is how far earlier looks came, and found nothing.
-    pub fn enough(&self, rows: &[Row], checked: &mut usize) -> Option<usize> {
-        let gap = rows.iter().zip(0u64..).position(|(row, k)| row.index != k);
-        let whole = gap.unwrap_or(rows.len());
-        let looks = (AT_LEAST..=whole).step_by(EVERY).filter(|n| *n > *checked);
-        let found = looks.into_iter().find(|n| self.is_known(&rows[..*n]));
-        *checked = whole;
-        found
+    /// Leaves out the rows, which are in order, after the one at which the figure is known.
+    pub fn truncate(self, rows: &mut Vec<Row>) {
+        let enough = Look::over(self, rows).enough();
+        rows.truncate(enough.unwrap_or(usize::MAX));
     }
+}
 
-    /// Leaves out the rows after that.
-    pub fn truncate(&self, rows: &mut Vec<Row>) {
-        if let Some(n) = self.enough(rows, &mut 0) {
-            rows.truncate(n);
+/// Looks at the rows of a study one by one, from run 0 on without a gap.
+#[derive(Debug)]
+pub struct Look {
+    precision: Precision,
+    rows: usize,
+    tally: Tally,
+    moments: Moments,
+    enough: Option<usize>,
+}
+
+impl Look {
+    /// Before the first row.
+    pub fn new(precision: Precision) -> Self {
+        Self {
+            precision,
+            rows: 0,
+            tally: Tally::default(),
+            moments: Moments::default(),
+            enough: None,
         }
     }
 
-    fn is_known(&self, rows: &[Row]) -> bool {
-        let rows = || rows.iter().filter(|r| r.is_complete());
-        let estimate: Option<IntervalEstimate> = match &self.figure {
-            Figure::Mean(name) => mean(&rows().filter_map(|r| r.number(name)).collect::<Vec<_>>()),
-            Figure::Rate(condition) => {
-                let happened: Vec<bool> = rows().filter_map(|r| r.happened(condition)).collect();
-                let events = happened.iter().filter(|h| **h).count();
-                rate(events as u64, happened.len() as u64).map(|r| r.wilson)
+    /// Over rows in order, as far as none is missing.
+    pub fn over(precision: Precision, rows: &[Row]) -> Self {
+        let mut look = Self::new(precision);
+        let whole = rows.iter().zip(0u64..);
+        let whole = whole.take_while(|(row, k)| row.index == *k);
+        whole.for_each(|(row, _)| look.at(row));
+        look
+    }
+
+    /// Looks at the next row.
+    pub fn at(&mut self, row: &Row) {
+        self.rows += 1;
+        match &self.precision.figure {
+            Figure::Mean(measure) => {
+                if let Some(x) = row.number(measure.name).filter(|_| row.is_complete()) {
+                    self.moments.add(x);
+                }
             }
+            Figure::Rate(condition) => self.tally.add(row.outcome(condition)),
+        }
+        let is_time = self.rows >= AT_LEAST && (self.rows - AT_LEAST).is_multiple_of(EVERY);
+        if is_time && self.enough.is_none() && self.is_known() {
+            self.enough = Some(self.rows);
+        }
+    }
+
+    /// After how many rows the figure was known.
+    pub fn enough(&self) -> Option<usize> {
+        self.enough
+    }
+
+    fn is_known(&self) -> bool {
+        let estimate = match self.precision.figure {
+            Figure::Mean(measure) => self.moments.mean(measure.range()),
+            Figure::Rate(_) => self.tally.rate().map(|r| r.wilson),
         };
         // A figure that has not varied yet is not known at all.
-        let known =
-            |e: IntervalEstimate| e.high > e.low && 0.5 * (e.high - e.low) <= self.half_width;
+        let known = |e: IntervalEstimate| {
+            e.high > e.low && 0.5 * (e.high - e.low) <= self.precision.half_width
+        };
         estimate.is_some_and(known)
     }
 }

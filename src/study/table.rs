@@ -75,10 +75,21 @@ impl Row {
     pub fn happened(&self, event: &Condition) -> Option<bool> {
         event.holds(|name| Ok(self.number(name))).ok().flatten()
     }
+
+    /// The same for rates: `None` too of a run that is not complete, whose figures are those of a part
+    /// of it.
+    pub fn outcome(&self, event: &Condition) -> Option<bool> {
+        self.happened(event).filter(|_| self.is_complete())
+    }
 }
 
-/// Writes all rows, in order.
-pub fn write(folder: &Path, template: &Template, rows: &[Row]) -> Result {
+/// Writes all rows, which are in order.
+pub fn write<'a>(
+    folder: &Path,
+    template: &Template,
+    rows: impl IntoIterator<Item = &'a Row>,
+) -> Result {
+    let rows: Vec<&Row> = rows.into_iter().collect();
     let variables = template.settings.variables.iter().map(|(name, variable)| {
         let keys = variable.keys.join(", ");
         let meaning = format!("drawn: {}", if keys.is_empty() { name } else { &keys });

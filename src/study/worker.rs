@@ -5,7 +5,7 @@ use super::pool::READY;
 use super::{Result, Row, Status, Study, StudyError};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{ScenarioSample, Template};
-use crate::session::{self, RendererChoice, RunOptions, SessionError, Summary};
+use crate::session::{self, Observer, RendererChoice, RunOptions, SessionError, Summary};
 use crate::twin::render::Renderer;
 use std::io::{self, BufRead, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -93,7 +93,7 @@ impl ScenarioRunner {
     fn run_sample(&mut self, template: &Template, sample: &ScenarioSample) -> Row {
         let without = |status, reason| Row::without_figures(sample, status, reason);
         let scenario = match template.scenario(sample) {
-            Ok(scenario) => scenario,
+            Ok(scenario) => without_images(scenario),
             Err(error) => return without(Status::Invalid, error.to_string()),
         };
         let mut fixes = Fixes::default();
@@ -106,7 +106,11 @@ impl ScenarioRunner {
         }
     }
 
-    fn session(&mut self, scenario: &Scenario, fixes: &mut Fixes) -> Result<Summary, SessionError> {
+    fn session(
+        &mut self,
+        scenario: &Scenario,
+        observer: &mut dyn Observer,
+    ) -> Result<Summary, SessionError> {
         let renderer = match &mut self.renderer {
             Some(renderer) => {
                 renderer.set_scene(session::scene(scenario));
@@ -118,7 +122,58 @@ impl ScenarioRunner {
             scenario,
             renderer.as_mut(),
             &RunOptions::default(),
-            &mut [fixes],
+            &mut [observer],
         )
+    }
+}
+
+/// No figure is made of the images that wayside reports carry for a recording, and a study has none.
+fn without_images(mut scenario: Scenario) -> Scenario {
+    scenario.file.stack.wayside.keep_images = false;
+    scenario
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::bus::WaysideReport;
+    use crate::session::{Event, ObserverError};
+
+    struct Images(u32, u32);
+
+    impl Observer for Images {
+        fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+            if let Event::Wayside { report, .. } = event {
+                let WaysideReport {
+                    difference, binary, ..
+                } = report;
+                self.0 += 1;
+                self.1 += u32::from(difference.is_some()) + u32::from(binary.is_some());
+            }
+            Ok(())
+        }
+    }
+
+    /// Two copies of every wayside frame that nobody looks at.
+    #[test]
+    fn a_run_of_a_study_copies_no_images() {
+        let template =
+            Template::load(Path::new("scenarios/studies/wayside_detection.toml")).unwrap();
+        let mut sample = template.sample(0).unwrap();
+        sample.index = 0;
+        let mut scenario = template.scenario(&sample).unwrap();
+        scenario.file.duration_s = 1.0;
+        let mut images = Images(0, 0);
+        let mut runner = ScenarioRunner::new(RendererChoice::Cpu);
+        runner
+            .session(&without_images(scenario), &mut images)
+            .unwrap();
+        assert!(
+            images.0 > 3 && images.1 == 0,
+            "{} frames, {} images",
+            images.0,
+            images.1
+        );
     }
 }

@@ -1,9 +1,11 @@
-"""Figures that src/study/stats/tests.rs and src/scenario/sampling hold against: run with scipy 1.x.
+"""Figures that src/study/stats/tests.rs, src/scenario/sampling and src/session/summary.rs hold against: run with
+scipy 1.x.
 
     pip install scipy && python3 tests/studies/figures.py
 """
 import numpy as np
 from scipy import stats
+from scipy.special import expit, logit
 from scipy.stats import binomtest, norm, truncnorm, triang, lognorm, qmc, beta
 
 def show(name, value):
@@ -14,6 +16,13 @@ x = [round(float(v), 6) for v in stats.gamma(2).ppf((np.arange(40) + 0.5) / 40)]
 show("sample", x)
 a = np.array(x)
 show("mean", (a.mean(), *stats.t.interval(0.95, len(a) - 1, a.mean(), stats.sem(a))))
+# The same within bounds: even in the logarithm, and in the logit (delta method).
+t = stats.t.ppf(0.975, len(a) - 1)
+m, half = a.mean(), t * stats.sem(a)
+shares = np.exp(-0.05 * a)
+ms, slope = shares.mean(), 1 / (shares.mean() * (1 - shares.mean()))
+ends = [float(expit(logit(ms) + sign * t * stats.sem(shares) * slope)) for sign in (-1, 1)]
+show("bounded", [float(m * np.exp(-half / m)), float(m * np.exp(half / m)), float(ms), *ends])
 for p in (0.5, 0.9, 0.95):
     r = stats.quantile_test(a, q=0, p=p).confidence_interval(0.95)
     show(f"quantile {p}", (float(np.quantile(a, p)), r.low, r.high))
@@ -46,3 +55,4 @@ show("ln density of lognormal 2 0.5 at 3", float(lognorm(0.5, scale=2).logpdf(3)
 show("ln density of triangular 1 2 5 at 3", float(triang(0.25, 1, 4).logpdf(3)))
 show("Sobol points", [[float(v) for v in row] for row in qmc.Sobol(5, scramble=False).random(16)])
 show("P(N(0, 2) > 6.0316)", float(norm.sf(6.0316 / 2**0.5)))
+show("percentiles of 5 1 4 2", [float(v) for v in np.percentile([5, 1, 4, 2], [50, 75, 95])])

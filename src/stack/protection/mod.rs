@@ -128,9 +128,12 @@ impl Protection {
     }
 
     /// Takes a position from the positioning stack. The caller passes the fixes of one method;
-    /// they may come late.
+    /// they may come late. One that is not on the line, or does not say where on it, is none.
     pub fn on_fix(&mut self, fix: &PositionFix) {
-        self.position.on_fix(fix);
+        let length_m = self.map.alignment.length_m();
+        if (0.0..=length_m).contains(&fix.chainage_m) && fix.sigma_m <= length_m {
+            self.position.on_fix(fix);
+        }
     }
 
     /// Takes a sample of the odometer.
@@ -147,15 +150,20 @@ impl Protection {
         }
     }
 
-    /// Takes a warning, received by balise or by radio.
+    /// Takes a warning, received by balise or by radio. None was issued after it was received: a clock
+    /// that is ahead would make all that is issued later old.
     pub fn on_warning(&mut self, warning: &ObstacleWarning, received: SimTime) {
-        self.obstacles.on_warning(warning, received);
+        let warning = ObstacleWarning {
+            issued: warning.issued.min(received),
+            ..warning.clone()
+        };
+        self.obstacles.on_warning(&warning, received);
     }
 
     /// Takes what a device said by radio: it is alive, and this holds.
     pub fn on_heartbeat(&mut self, state: &ObstacleWarning, sent: SimTime, received: SimTime) {
-        self.obstacles.on_heard(&state.device, sent);
-        self.obstacles.on_warning(state, received);
+        self.obstacles.on_heard(&state.device, sent.min(received));
+        self.on_warning(state, received);
     }
 
     /// Position and speed on the route, as the protection takes them to be.
@@ -265,6 +273,8 @@ impl Protection {
 
     fn odometer_lost(&mut self, time: SimTime) -> bool {
         let since_start = time.since(*self.first_cycle.get_or_insert(time));
-        self.position.odometry.age_s(time).unwrap_or(since_start) > self.settings.odometer_timeout_s
+        let age_s = self.position.odometry.age_s(time).unwrap_or(since_start);
+        // A sample from the future would hold off all that follow.
+        age_s.abs() > self.settings.odometer_timeout_s
     }
 }

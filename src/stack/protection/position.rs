@@ -112,11 +112,13 @@ impl Position {
             self.refuse(fix, lamp);
             return;
         }
-        let (p, r) = (predicted.sigma_m.powi(2), fix.sigma_m.powi(2));
-        let gain = p / (p + r);
+        // Shares of the two in their common sigma: squares of very large ones would be infinite.
+        let both_m = predicted.sigma_m.hypot(fix.sigma_m);
+        let gain = (predicted.sigma_m / both_m).powi(2);
+        let sigma_m = predicted.sigma_m * (fix.sigma_m / both_m);
         self.accept(HeadPosition {
             chainage_m: predicted.chainage_m + gain * off_m,
-            sigma_m: (p * r / (p + r)).sqrt().max(self.floor_m),
+            sigma_m: sigma_m.max(self.floor_m),
             ..fix
         });
     }

@@ -5,7 +5,7 @@ use super::plot::{Plot, PlotLayers};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
 use crate::study::digest::is_weighted;
-use crate::study::stats::{mean, quantile, rank_correlation, rate};
+use crate::study::stats::{Tally, quantile, rank_correlation};
 use crate::study::table::unit_of;
 use crate::study::{Digest, FigureDigest, Measure, Row};
 use std::collections::BTreeSet;
@@ -54,7 +54,7 @@ impl<'a> Input<'a> {
     }
 
     /// Pairs of the value and of what `of` gives for a run.
-    fn pairs(&self, rows: &[&Row], of: impl Fn(&Row) -> Option<f64>) -> Vec<(f64, f64)> {
+    fn pairs<T>(&self, rows: &[&Row], of: impl Fn(&Row) -> Option<T>) -> Vec<(f64, T)> {
         let pairs = rows.iter().filter_map(|r| Some((self.value(r)?, of(r)?)));
         let mut pairs: Vec<_> = pairs.collect();
         pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -63,8 +63,8 @@ impl<'a> Input<'a> {
 }
 
 /// Pairs sorted by x in groups: of one value each, or of about as many runs each.
-fn groups(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
-    let same = |a: &(f64, f64), b: &(f64, f64)| a.0.total_cmp(&b.0).is_eq();
+fn groups<T>(pairs: &[(f64, T)]) -> Vec<&[(f64, T)]> {
+    let same = |a: &(f64, T), b: &(f64, T)| a.0.total_cmp(&b.0).is_eq();
     if pairs.chunk_by(same).count() <= MOST_GROUPS {
         pairs.chunk_by(same).collect()
     } else {
@@ -72,15 +72,16 @@ fn groups(pairs: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
     }
 }
 
-fn middle(group: &[(f64, f64)]) -> f64 {
+fn middle<T>(group: &[(f64, T)]) -> f64 {
     group.iter().map(|p| p.0).sum::<f64>() / group.len() as f64
 }
 
 /// All plots of a study.
 pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
-    let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
+    let rows: Vec<&Row> = rows.iter().collect();
+    let complete: Vec<&Row> = rows.iter().copied().filter(|r| r.is_complete()).collect();
     let names = template.settings.variables.keys();
-    let inputs: Vec<_> = names.map(|n| Input::of(template, n, &complete)).collect();
+    let inputs: Vec<_> = names.map(|n| Input::of(template, n, &rows)).collect();
     // Weighed runs lie where they were proposed, not where nature has them: only maps show that.
     let weighted = is_weighted(template);
     let mut plots = Vec::new();
@@ -91,21 +92,21 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
             continue;
         }
         let groups = inputs.iter().filter(|_| !weighted);
-        plots.extend(groups.filter_map(|i| event_plot(i, name, condition, &complete)));
-        plots.extend(event_map(&inputs, name, condition, &complete));
+        plots.extend(groups.filter_map(|i| event_plot(i, name, condition, &rows)));
+        plots.extend(event_map(&inputs, name, condition, &rows));
     }
     for figure in digest
         .figures
         .iter()
         .filter(|f| is_worth_plotting(f.measure) && !weighted)
     {
-        plots.extend(distribution(figure.measure, &complete));
-        plots.extend(convergence(figure.measure, &complete));
+        plots.extend(distribution(figure, &complete));
+        plots.extend(convergence(figure, &complete));
         let strongest = strongest(figure);
         let shown = inputs
             .iter()
             .filter(|i| strongest.contains(&i.name) || !i.axis.names.is_empty());
-        plots.extend(shown.filter_map(|i| figure_plot(i, figure.measure, &complete)));
+        plots.extend(shown.filter_map(|i| figure_plot(i, figure, &complete)));
     }
     for method in ["paper", "mono"].into_iter().filter(|_| !weighted) {
         plots.extend(error_by_range(method, &complete));
@@ -150,13 +151,21 @@ fn label(measure: &Measure) -> String {
     }
 }
 
+/// How many runs a plot of a figure lacks.
+fn without(figure: &FigureDigest) -> String {
+    let (lacking, runs) = (figure.lacking, figure.runs + figure.lacking);
+    match lacking {
+        0 => String::new(),
+        _ => format!(", without {lacking} of {runs} runs that lack it"),
+    }
+}
+
 /// How often an event happens at each value of a variable.
 fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
-    let pairs = input.pairs(rows, |r| r.happened(event).map(f64::from));
+    let pairs = input.pairs(rows, |r| Some(r.outcome(event)));
     let bars = groups(&pairs).into_iter().filter_map(|group| {
-        let happened = group.iter().filter(|p| p.1 > 0.5).count() as u64;
-        let e = rate(happened, group.len() as u64)?.wilson;
-        Some((middle(group), e))
+        let rate = Tally::of(group.iter().map(|p| p.1)).rate()?;
+        Some((middle(group), rate.wilson))
     });
     let layers = PlotLayers {
         bars: bars.collect(),
@@ -175,14 +184,14 @@ fn event_plot(input: &Input<'_>, name: &str, event: &Condition, rows: &[&Row]) -
 /// Where in the plane of two variables an event happened: the two that drive it most.
 fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row]) -> Option<Plot> {
     let strength = |input: &&Input<'_>| {
-        let pairs = input.pairs(rows, |r| r.happened(event).map(f64::from));
+        let pairs = input.pairs(rows, |r| r.outcome(event).map(f64::from));
         rank_correlation(&pairs).map_or(0.0, |c| c.value.abs())
     };
     let mut order: Vec<_> = inputs.iter().filter(|i| i.axis.names.is_empty()).collect();
     order.sort_by(|a, b| strength(b).total_cmp(&strength(a)));
     let [x, y] = [order.first()?, order.get(1)?];
     let of = |wanted: bool| {
-        let runs = rows.iter().filter(|r| r.happened(event) == Some(wanted));
+        let runs = rows.iter().filter(|r| r.outcome(event) == Some(wanted));
         runs.filter_map(|r| Some((x.value(r)?, y.value(r)?)))
             .collect::<Vec<_>>()
     };
@@ -194,15 +203,21 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
     if layers.marked.is_empty() {
         return None;
     }
-    let title = format!("{name}: red where it happened");
+    let unknown = rows.iter().filter(|r| r.outcome(event).is_none()).count();
+    let without = match unknown {
+        0 => String::new(),
+        n => format!(", without {n} runs that lack what it asks for"),
+    };
+    let title = format!("{name}: red where it happened{without}");
     layers.plot(format!("map_{name}"), &title, [&x.axis, &y.axis])
 }
 
 /// A figure of every run against a variable, with the mean of each group.
-fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+fn figure_plot(input: &Input<'_>, figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
+    let measure = figure.measure;
     let pairs = input.pairs(rows, |r| r.number(measure.name));
     let bars = groups(&pairs).into_iter().filter_map(|group| {
-        let e = mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
+        let e = measure.mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
         Some((middle(group), e))
     });
     let layers = PlotLayers {
@@ -211,13 +226,14 @@ fn figure_plot(input: &Input<'_>, measure: &Measure, rows: &[&Row]) -> Option<Pl
         ..PlotLayers::default()
     };
     let y = Axis::new(label(measure));
-    let (figure, variable) = (measure.name, input.name);
-    let title = format!("{figure} against {variable}");
-    layers.plot(format!("{figure}_{variable}"), &title, [&input.axis, &y])
+    let (name, variable) = (measure.name, input.name);
+    let title = format!("{name} against {variable}{}", without(figure));
+    layers.plot(format!("{name}_{variable}"), &title, [&input.axis, &y])
 }
 
 /// Share of runs that lie below each value.
-fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+fn distribution(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
+    let measure = figure.measure;
     let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
     sample.sort_by(f64::total_cmp);
     let n = sample.len() as f64;
@@ -240,15 +256,16 @@ fn distribution(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
     let x = Axis::new(label(measure));
     let y = Axis::new("share of runs below, with 95 % band");
     let name = measure.name;
-    let title = format!("Distribution of {name}");
+    let title = format!("Distribution of {name}{}", without(figure));
     layers.plot(format!("{name}_cdf"), &title, [&x, &y])
 }
 
 /// The mean after each run, with its interval.
-fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
+fn convergence(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
+    let measure = figure.measure;
     let sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
     let looks = (4..=sample.len()).step_by((sample.len() / 200).max(1));
-    let after = looks.filter_map(|n| Some((n as f64, mean(&sample[..n])?)));
+    let after = looks.filter_map(|n| Some((n as f64, measure.mean(&sample[..n])?)));
     let after: Vec<_> = after.collect();
     let layers = PlotLayers {
         line: after.iter().map(|(n, e)| (*n, e.value)).collect(),
@@ -260,7 +277,7 @@ fn convergence(measure: &Measure, rows: &[&Row]) -> Option<Plot> {
         Axis::new(format!("mean of {}", label(measure))),
     );
     let name = measure.name;
-    let title = format!("Convergence of {name}");
+    let title = format!("Convergence of {name}{}", without(figure));
     layers.plot(format!("{name}_convergence"), &title, [&x, &y])
 }
 

@@ -60,11 +60,19 @@ fn ranges([x, y]: [&Axis; 2], layers: &PlotLayers) -> Option<[Range<f64>; 2]> {
     let bars = || layers.bars.iter();
     let band = || layers.band.iter();
     let xs = points().map(|p| p.0).chain(bars().map(|b| b.0));
-    let ends = bars().flat_map(|(_, e)| [e.value, e.low, e.high]);
-    let ys = points().map(|p| p.1).chain(ends);
+    // An interval from a few runs may end far out: it is cut off where points would be too small to see.
+    let seen = y.range(points().map(|p| p.1));
+    let (low, high) = seen.map_or((f64::NEG_INFINITY, f64::INFINITY), |r| {
+        let width = r.end - r.start;
+        (r.start - width, r.end + width)
+    });
+    let ends = bars().flat_map(|(_, e)| [e.low, e.high]);
+    let ends = ends.chain(band().flat_map(|b| [b.1, b.2]));
+    let ends = ends.map(|end| end.clamp(low, high));
+    let values = bars().map(|(_, e)| e.value);
     Some([
         x.range(xs.chain(band().map(|b| b.0)))?,
-        y.range(ys.chain(band().flat_map(|b| [b.1, b.2])))?,
+        y.range(points().map(|p| p.1).chain(values).chain(ends))?,
     ])
 }
 

@@ -9,6 +9,8 @@ use statrs::distribution::{Beta, ContinuousCDF};
 pub struct Rate {
     /// Times that it happened.
     pub events: u64,
+    /// Runs of which it is not known whether it did.
+    pub unknown: u64,
     /// Wilson's score interval: right on average, short.
     pub wilson: IntervalEstimate,
     /// Clopper and Pearson's: right at least, for proofs.
@@ -21,12 +23,8 @@ pub fn rate(events: u64, n: u64) -> Option<Rate> {
         return None;
     }
     let (k, m) = (events as f64, n as f64);
-    let p = k / m;
-    let z = z();
-    let middle = (p + z * z / (2.0 * m)) / (1.0 + z * z / m);
-    let half = z / (1.0 + z * z / m) * (p * (1.0 - p) / m + z * z / (4.0 * m * m)).sqrt();
     let estimate = |low: f64, high: f64| IntervalEstimate {
-        value: p,
+        value: k / m,
         low,
         high,
         n: n as usize,
@@ -37,14 +35,66 @@ pub fn rate(events: u64, n: u64) -> Option<Rate> {
         beta(k, m - k + 1.0, TAIL).unwrap_or(0.0),
         beta(k + 1.0, m - k, 1.0 - TAIL).unwrap_or(1.0),
     );
+    let (low, high) = wilson(k / m, m);
     // Rounding would miss the ends.
     let wilson = estimate(
-        if events == 0 { 0.0 } else { middle - half },
-        if events == n { 1.0 } else { middle + half },
+        if events == 0 { 0.0 } else { low },
+        if events == n { 1.0 } else { high },
     );
     Some(Rate {
         events,
+        unknown: 0,
         wilson,
         exact,
     })
+}
+
+/// Wilson's interval of a rate `p` that is as well known as by `n` independent runs.
+pub(super) fn wilson(p: f64, n: f64) -> (f64, f64) {
+    let z = z();
+    let middle = (p + z * z / (2.0 * n)) / (1.0 + z * z / n);
+    let half = z / (1.0 + z * z / n) * (p * (1.0 - p) / n + z * z / (4.0 * n * n)).sqrt();
+    ((middle - half).max(0.0), (middle + half).min(1.0))
+}
+
+/// How often something happened, did not, and is not known to have.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Tally {
+    happened: u64,
+    known: u64,
+    runs: u64,
+}
+
+impl Tally {
+    /// Of outcomes; `None` is one that is not known.
+    pub fn of(outcomes: impl IntoIterator<Item = Option<bool>>) -> Self {
+        let mut tally = Self::default();
+        outcomes.into_iter().for_each(|outcome| tally.add(outcome));
+        tally
+    }
+
+    /// Takes the outcome of a run.
+    pub fn add(&mut self, outcome: Option<bool>) {
+        self.happened += u64::from(outcome == Some(true));
+        self.known += u64::from(outcome.is_some());
+        self.runs += 1;
+    }
+
+    /// The rate in all runs. Those that are not known count as if it had not happened in them; the
+    /// intervals reach from there to as if it had in all of them. `None` where nothing is known.
+    pub fn rate(&self) -> Option<Rate> {
+        let unknown = self.runs - self.known;
+        let least = rate(self.happened, self.runs).filter(|_| self.known > 0)?;
+        let most = rate(self.happened + unknown, self.runs)?;
+        let to = |low: IntervalEstimate, high: IntervalEstimate| IntervalEstimate {
+            high: high.high,
+            ..low
+        };
+        Some(Rate {
+            unknown,
+            wilson: to(least.wilson, most.wilson),
+            exact: to(least.exact, most.exact),
+            ..least
+        })
+    }
 }

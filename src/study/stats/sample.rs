@@ -1,27 +1,74 @@
 //! Means and quantiles.
 
-use super::{IntervalEstimate, TAIL};
+use super::{Bounds, IntervalEstimate, TAIL};
 use crate::session::quantile as interpolated;
 use statrs::distribution::{Binomial, ContinuousCDF, DiscreteCDF, StudentsT};
 
-/// The mean; `None` of fewer than two numbers.
+/// The mean of numbers that nothing bounds; `None` of fewer than two.
 pub fn mean(sample: &[f64]) -> Option<IntervalEstimate> {
-    let n = sample.len();
-    if n < 2 {
-        return None;
+    bounded_mean(sample, Bounds::NONE)
+}
+
+/// The mean of numbers between bounds, which its interval does not leave; `None` of fewer than two.
+pub fn bounded_mean(sample: &[f64], bounds: Bounds) -> Option<IntervalEstimate> {
+    let mut moments = Moments::default();
+    sample.iter().for_each(|x| moments.add(*x));
+    moments.mean(bounds)
+}
+
+/// Mean and variance of numbers that come one by one (Welford, Technometrics 4 (1962)).
+#[derive(Clone, Copy, Debug)]
+pub struct Moments {
+    n: usize,
+    mean: f64,
+    /// Sum of squares about the mean.
+    squares: f64,
+    least: f64,
+    most: f64,
+}
+
+impl Default for Moments {
+    fn default() -> Self {
+        Self {
+            n: 0,
+            mean: 0.0,
+            squares: 0.0,
+            least: f64::INFINITY,
+            most: f64::NEG_INFINITY,
+        }
     }
-    let value = sample.iter().sum::<f64>() / n as f64;
-    let squares: f64 = sample.iter().map(|x| (x - value).powi(2)).sum();
-    let sigma = (squares / (n - 1) as f64 / n as f64).sqrt();
-    let t = StudentsT::new(0.0, 1.0, (n - 1) as f64)
-        .ok()?
-        .inverse_cdf(1.0 - TAIL);
-    Some(IntervalEstimate {
-        value,
-        low: value - t * sigma,
-        high: value + t * sigma,
-        n,
-    })
+}
+
+impl Moments {
+    /// Takes a number.
+    pub fn add(&mut self, x: f64) {
+        self.n += 1;
+        let off = x - self.mean;
+        self.mean += off / self.n as f64;
+        self.squares += off * (x - self.mean);
+        (self.least, self.most) = (self.least.min(x), self.most.max(x));
+    }
+
+    /// The mean by Student's t, as [`bounded_mean`] gives it. Bounds that the numbers do not keep are none.
+    pub fn mean(&self, bounds: Bounds) -> Option<IntervalEstimate> {
+        let n = self.n;
+        if n < 2 {
+            return None;
+        }
+        let sigma = (self.squares / (n - 1) as f64 / n as f64).sqrt();
+        let t = StudentsT::new(0.0, 1.0, (n - 1) as f64)
+            .ok()?
+            .inverse_cdf(1.0 - TAIL);
+        let is_kept = bounds.hold(self.least) && bounds.hold(self.most);
+        let bounds = if is_kept { bounds } else { Bounds::NONE };
+        let (low, high) = bounds.interval(self.mean, t * sigma);
+        Some(IntervalEstimate {
+            value: self.mean,
+            low,
+            high,
+            n,
+        })
+    }
 }
 
 /// The quantile p of sorted numbers, interpolated between order statistics as numpy does by default,

@@ -42,7 +42,8 @@ fn ranks(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 /// First-order Sobol index: the share of the variance of y that x alone explains. The estimator
 /// of Gamboa, Gremaud, Klein and Lagnoux puts the runs in the order of x and looks how alike the y of
-/// neighbours are. `None` where y does not vary, or of fewer than ten pairs.
+/// neighbours are. By chance that is below 0 where x explains little: 0 is given then. `None` where y does not
+/// vary, or of fewer than ten pairs.
 pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
     let n = pairs.len();
     if n < 10 {
@@ -58,12 +59,12 @@ pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
     let y = |k: usize| sorted[k % n].1 - mean;
     let variance: f64 = (0..n).map(|k| y(k) * y(k)).sum();
     let alike: f64 = (0..n).map(|k| y(k) * y(k + 1)).sum();
-    (variance > 0.0).then(|| alike / variance)
+    (variance > 0.0).then(|| (alike / variance).max(0.0))
 }
 
 /// The same of an input that has names, not numbers, or that was tried at a few values: the share of the
 /// variance of y that lies between the groups, less what chance alone puts there (Kelley's epsilon
-/// squared, Proc. Natl. Acad. Sci. 21 (1935)). `None` of fewer than ten runs, of one group, where every
+/// squared, Proc. Natl. Acad. Sci. 21 (1935)), and 0 where it is less. `None` of fewer than ten runs, of one group, where every
 /// run is a group, or where y does not vary.
 pub fn first_order_of_groups(pairs: &[(usize, f64)]) -> Option<f64> {
     let n = pairs.len();
@@ -82,5 +83,5 @@ pub fn first_order_of_groups(pairs: &[(usize, f64)]) -> Option<f64> {
     let total = squares(&all) / (n - 1) as f64;
     let within: f64 = groups.values().map(|g| squares(g)).sum();
     let within = within / (n - groups.len()) as f64;
-    (total > 0.0).then(|| 1.0 - within / total)
+    (total > 0.0).then(|| (1.0 - within / total).max(0.0))
 }

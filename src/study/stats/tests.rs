@@ -1,9 +1,19 @@
 //! Against scipy (tests/studies/figures.py makes the numbers), and against known truth.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+use super::rate as rate_of;
 use super::*;
 use crate::twin::random::Stream;
 use statrs::distribution::{ContinuousCDF, Normal};
+
+/// `bounded` of figures.py.
+const BOUNDED: [f64; 5] = [
+    1.5925437047951803,
+    2.488182526559991,
+    0.9073374453751386,
+    0.8860348306254748,
+    0.9249952086824607,
+];
 
 const SAMPLE: [f64; 40] = [
     0.167106, 0.302529, 0.403527, 0.491043, 0.571163, 0.646683, 0.719183, 0.789671, 0.85885,
@@ -182,19 +192,25 @@ fn val_first_order_of_groups() {
     assert!(first_order_of_groups(&[(0, 1.0); 12]).is_none());
 }
 
-/// Means under N(0, 1) of runs drawn from N(shift, 1), of numbers far from zero: those that are given hold
-/// the truth nearly as often as they say, and where a few runs decide, none is given. An unweighted sample
-/// has its plain mean; weights that are all 0 have none.
+/// Runs of N(0, 1) drawn from N(shift, 1): logarithm of the weight, and the number.
+fn proposed(shift: f64, trial: u64, n: u64) -> Vec<(f64, f64)> {
+    let normal = Normal::standard();
+    let stream = Stream::new(7, trial, "weights");
+    let x = |k| shift + normal.inverse_cdf(stream.uniform(k));
+    let run = |x: f64| (shift * (0.5 * shift - x), x);
+    (0..n).map(|k| run(x(k))).collect()
+}
+
+/// Means of numbers far from zero: those that are given hold the truth nearly as often as they say, and
+/// where a few runs decide, none is given. An unweighted sample has its plain mean; weights that are all 0
+/// have none.
 #[test]
 fn weighted_means_are_those_of_the_distributions() {
-    let normal = Normal::standard();
-    let sample = |shift: f64, trial: u64| -> Vec<(f64, f64)> {
-        let stream = Stream::new(7, trial, "weights");
-        let x = |k| shift + normal.inverse_cdf(stream.uniform(k));
-        let run = |x: f64| (shift * (0.5 * shift - x), 100.0 + x);
-        (0..400).map(|k| run(x(k))).collect()
-    };
-    let given = |shift| (0..400).filter_map(move |trial| weighted_mean(&sample(shift, trial)));
+    let sample = |shift, trial| proposed(shift, trial, 400).into_iter();
+    let far = |shift, trial| sample(shift, trial).map(|(ln, x)| (ln, 100.0 + x));
+    let estimate =
+        |shift, trial| weighted_mean(&far(shift, trial).collect::<Vec<_>>(), Bounds::NONE);
+    let given = |shift| (0..400).filter_map(move |trial| estimate(shift, trial));
     for (shift, least) in [(0.5, 0.92), (1.0, 0.88)] {
         let all: Vec<IntervalEstimate> = given(shift).collect();
         let held = all.iter().filter(|e| (e.low..=e.high).contains(&100.0));
@@ -207,15 +223,167 @@ fn weighted_means_are_those_of_the_distributions() {
     }
     assert_eq!(given(3.0).count(), 0);
     let plain: Vec<(f64, f64)> = (0..400).map(|k| (0.0, f64::from(k))).collect();
-    assert!((weighted_mean(&plain).unwrap().value - 199.5).abs() < 1e-9);
+    assert!((weighted_mean(&plain, Bounds::NONE).unwrap().value - 199.5).abs() < 1e-9);
     let nothing = [(f64::MIN, 1.0); 200];
-    assert!(weighted_mean(&nothing).is_none());
-    assert!(weighted_rate(&nothing.map(|(ln, _)| (ln, true)), false).is_none());
+    assert!(weighted_mean(&nothing, Bounds::NONE).is_none());
+    let always = nothing.map(|(ln, _)| (ln, Some(true)));
+    assert!(weighted_rate(&always, false).rate.is_none());
     assert!(effective_runs(&[f64::MIN; 200]).abs() < 1e-12);
-    // An event that happens always is no rarer than always.
-    let always: Vec<(f64, bool)> = sample(2.0, 0).iter().map(|(ln, _)| (*ln, true)).collect();
-    let rate = weighted_rate(&always, false).unwrap().rate;
-    assert!(rate.value <= 1.0 && rate.high <= 1.0, "{rate:?}");
+}
+
+/// A rate that a few heavy runs decide, one that was never or always seen, and an interval that leaves
+/// [0, 1] are none; those that are given hold the truth as often as they say. x > 2 has the probability
+/// 0.02275, x > -1 0.84134.
+#[test]
+fn weighted_rates_are_guarded_and_bounded() {
+    let rate = |shift: f64, over: f64, trial: u64| {
+        let runs = proposed(shift, trial, 600).into_iter();
+        let runs: Vec<_> = runs.map(|(ln, x)| (ln, Some(x > over))).collect();
+        weighted_rate(&runs, false)
+    };
+    for (shift, over, truth) in [
+        (2.0, 2.0, 0.022_750_13),
+        (3.0, 3.5, 2.326_3e-4),
+        (0.5, -1.0, 0.841_345),
+    ] {
+        let all: Vec<_> = (0..1000)
+            .filter_map(|t| rate(shift, over, t).rate)
+            .collect();
+        let held = all.iter().filter(|e| (e.low..=e.high).contains(&truth));
+        let share = held.count() as f64 / all.len() as f64;
+        assert!(
+            all.len() > 400 && (0.93..0.98).contains(&share),
+            "{shift}: {share} of {}",
+            all.len()
+        );
+        assert!(
+            all.iter()
+                .all(|e| e.low >= 0.0 && e.high <= 1.0 && e.low < e.value)
+        );
+    }
+    // Proposed on the wrong side: what is seen of x > 2 is a run or two of large weights.
+    for trial in 0..200 {
+        let wrong = rate(-1.0, 2.0, trial);
+        assert!(wrong.rate.is_none() && wrong.events < 20, "{wrong:?}");
+        assert!(rate(2.0, 60.0, trial).rate.is_none(), "never seen");
+        assert!(rate(2.0, -60.0, trial).rate.is_none(), "always seen");
+    }
+    // Without weights it is Wilson's.
+    let runs: Vec<_> = (0..4000).map(|k| (0.0, Some(k % 20 == 0))).collect();
+    let (weighted, plain) = (
+        weighted_rate(&runs, true).rate.unwrap(),
+        rate_of(200, 4000).unwrap().wilson,
+    );
+    assert!((weighted.low - plain.low).abs() < 1e-5 && (weighted.high - plain.high).abs() < 1e-5);
+    // What is not known counts either way.
+    let runs: Vec<_> = runs
+        .into_iter()
+        .enumerate()
+        .map(|(k, r)| (r.0, r.1.filter(|_| k % 20 != 1)))
+        .collect();
+    let partly = weighted_rate(&runs, true);
+    assert_eq!(partly.unknown, 200);
+    let (partly, all) = (partly.rate.unwrap(), rate_of(400, 4000).unwrap().wilson);
+    assert!((partly.low - plain.low).abs() < 1e-5 && (partly.high - all.high).abs() < 1e-5);
+}
+
+/// Runs that failed: they stay in the denominator, and the interval holds the rate however they would have
+/// come out.
+#[test]
+fn a_rate_is_of_all_runs() {
+    let outcomes = |k: u64| match k {
+        0..3 => Some(true),
+        3..15 => Some(false),
+        _ => None,
+    };
+    let rate = Tally::of((0..20).map(outcomes)).rate().unwrap();
+    assert_eq!((rate.events, rate.unknown, rate.wilson.n), (3, 5, 20));
+    assert!((rate.wilson.value - 0.15).abs() < 1e-12);
+    let (least, most) = (rate_of(3, 20).unwrap(), rate_of(8, 20).unwrap());
+    for (e, low, high) in [
+        (rate.wilson, least.wilson, most.wilson),
+        (rate.exact, least.exact, most.exact),
+    ] {
+        assert_eq!(
+            (e.low.to_bits(), e.high.to_bits()),
+            (low.low.to_bits(), high.high.to_bits())
+        );
+    }
+    assert!(Tally::of([None; 9]).rate().is_none());
+}
+
+/// scipy's t in the scale of figures.py; no end leaves the bounds, of few runs neither; numbers that do not
+/// keep the bounds have the plain interval.
+#[test]
+fn val_means_of_what_is_bounded_are_scipys() {
+    let e = bounded_mean(&SAMPLE, Bounds::NOT_NEGATIVE).unwrap();
+    close(e, 1.990612825, BOUNDED[0], BOUNDED[1]);
+    let shares = SAMPLE.map(|x| (-0.05 * x).exp());
+    let e = bounded_mean(&shares, Bounds::SHARE).unwrap();
+    close(e, BOUNDED[2], BOUNDED[3], BOUNDED[4]);
+    for few in [&[0.999, 1.0][..], &[1.0, 0.0], &[1e-9, 0.4, 0.2]] {
+        let e = bounded_mean(few, Bounds::SHARE).unwrap();
+        assert!(
+            0.0 <= e.low && e.low < e.value && e.value < e.high && e.high <= 1.0,
+            "{e:?}"
+        );
+        let e = bounded_mean(few, Bounds::NOT_NEGATIVE).unwrap();
+        assert!(0.0 <= e.low && e.low < e.value, "{e:?}");
+    }
+    let outside = [0.5, 1.5, -3.0];
+    assert_eq!(bounded_mean(&outside, Bounds::SHARE), mean(&outside));
+    let same = bounded_mean(&[1.0; 9], Bounds::SHARE).unwrap();
+    assert_eq!([same.low, same.high].map(f64::to_bits), [1f64.to_bits(); 2]);
+}
+
+/// Coverage of means of skew errors (exponential; a hundredth of them ten times larger), of availabilities
+/// near 1, and after stopping by precision, where intervals are known to hold less often than they say.
+#[test]
+fn intervals_of_what_is_bounded_cover_the_truth() {
+    const TRIALS: u64 = 2000;
+    let mut held = [0u32; 4];
+    for trial in 0..TRIALS {
+        let stream = Stream::new(9, trial, "bounded");
+        let exponential = |k: u64| -stream.uniform(k).ln();
+        let holds = |e: IntervalEstimate, truth: f64| u32::from((e.low..=e.high).contains(&truth));
+        let of = |x: &dyn Fn(u64) -> f64, n: u64, bounds| {
+            bounded_mean(&(0..n).map(x).collect::<Vec<_>>(), bounds).unwrap()
+        };
+        held[0] += holds(of(&exponential, 40, Bounds::NOT_NEGATIVE), 1.0);
+        held[1] += holds(of(&exponential, 5, Bounds::NOT_NEGATIVE), 1.0);
+        // 1 - u^4 / 2: mean 0.9, most of them near 1.
+        let available = |k: u64| 1.0 - 0.5 * stream.uniform(k).powi(4);
+        held[2] += holds(of(&available, 20, Bounds::SHARE), 0.9);
+        let mut moments = Moments::default();
+        let known = |m: &Moments| {
+            m.mean(Bounds::NOT_NEGATIVE)
+                .filter(|e| e.high - e.low <= 0.5)
+        };
+        let after = (0..4000u64).find_map(|k| {
+            moments.add(exponential(k));
+            known(&moments).filter(|e| e.n >= 30 && e.n % 10 == 0)
+        });
+        held[3] += holds(after.unwrap(), 1.0);
+    }
+    let share = held.map(|n| f64::from(n) / TRIALS as f64);
+    assert!((0.93..0.97).contains(&share[0]), "40 errors {share:?}");
+    assert!((0.92..0.99).contains(&share[1]), "5 errors {share:?}");
+    assert!((0.93..0.97).contains(&share[2]), "availability {share:?}");
+    assert!((0.90..0.96).contains(&share[3]), "stopped {share:?}");
+}
+
+/// What explains nothing has the share 0, never less.
+#[test]
+fn no_share_is_below_zero() {
+    let stream = Stream::new(8, 0, "nothing");
+    let y = |k: u64| stream.uniform(k);
+    let pairs = |seed: u64| (0..30).map(move |k| (y(1000 * seed + k), y(1000 * seed + 500 + k)));
+    let shares: Vec<f64> = (0..50)
+        .map(|s| first_order(&pairs(s).collect::<Vec<_>>()).unwrap())
+        .collect();
+    assert!(shares.iter().all(|s| (0.0..0.6).contains(s)), "{shares:?}");
+    let groups = |seed: u64| (0..30).map(move |k| (k as usize % 3, y(1000 * seed + k)));
+    assert!((0..50).all(|s| first_order_of_groups(&groups(s).collect::<Vec<_>>()).unwrap() >= 0.0));
 }
 
 /// Weights that are not those of the densities, and effective numbers of runs.

@@ -1,67 +1,107 @@
 //! Importance sampling: runs drawn from elsewhere, weighted by the ratio of densities.
 
-use super::{IntervalEstimate, z};
+use super::rate::wilson;
+use super::{Bounds, IntervalEstimate, z};
 use serde::Serialize;
 
 /// A rate from weighted runs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Weighted {
-    /// The rate.
-    pub rate: IntervalEstimate,
+    /// The rate; `None` where too few runs decide it.
+    pub rate: Option<IntervalEstimate>,
     /// Kish's effective number of the runs in which it happened: so many unweighted ones would be as
-    /// precise. If few, do not trust the interval.
+    /// precise.
     pub effective_events: f64,
     /// Runs in which it happened.
     pub events: usize,
+    /// Runs of which it is not known whether it did.
+    pub unknown: usize,
 }
 
-/// Weighted runs that are worth fewer than this give no mean: a few of them decide it, and intervals hold
-/// the truth far less often than they say.
-const LEAST_WORTH: f64 = 100.0;
+/// Weighted runs that are worth fewer than this give no figure: a few of them decide it, and intervals
+/// hold the truth far less often than they say.
+pub const LEAST_WORTH: f64 = 100.0;
 
 /// The mean over the distributions that were asked for, of the natural logarithm of each run's weight
 /// and a number. Weights are brought to mean 1, so that it does not depend on where the numbers' zero is;
-/// the interval is that of a ratio (delta method). `None` of runs worth fewer than 100.
-pub fn weighted_mean(runs: &[(f64, f64)]) -> Option<IntervalEstimate> {
+/// the interval is that of a ratio (delta method), within the bounds that the numbers keep. `None` of
+/// runs worth fewer than [`LEAST_WORTH`].
+pub fn weighted_mean(runs: &[(f64, f64)], bounds: Bounds) -> Option<IntervalEstimate> {
     let ln_weights: Vec<f64> = runs.iter().map(|r| r.0).collect();
     if effective_runs(&ln_weights) < LEAST_WORTH {
         return None;
     }
-    estimate(runs, true)
-}
-
-/// How often something happens over the distributions that were asked for. The weights have mean 1 by
-/// themselves, so that the estimate is without bias; where runs are missing or conditions cut draws off
-/// (`normalise`), they are brought to mean 1 over what is left. `None` of fewer than two runs.
-pub fn weighted_rate(runs: &[(f64, bool)], normalise: bool) -> Option<Weighted> {
-    let numbers = runs.iter().map(|(ln, h)| (*ln, f64::from(*h)));
-    let mean = estimate(&numbers.collect::<Vec<_>>(), normalise)?;
-    let happened: Vec<f64> = (runs.iter())
-        .filter(|(ln, h)| *h && ln.exp() > 0.0)
-        .map(|r| r.0)
-        .collect();
-    Some(Weighted {
-        rate: IntervalEstimate {
-            value: mean.value.min(1.0),
-            low: mean.low.max(0.0),
-            // Where it was never seen, nothing bounds it.
-            high: if happened.is_empty() {
-                1.0
-            } else {
-                mean.high.min(1.0)
-            },
-            ..mean
-        },
-        effective_events: effective_runs(&happened),
-        events: happened.len(),
+    let (value, sigma) = estimate(runs, true)?;
+    let is_kept = runs.iter().all(|r| bounds.hold(r.1));
+    let bounds = if is_kept { bounds } else { Bounds::NONE };
+    let (low, high) = bounds.interval(value, z() * sigma);
+    Some(IntervalEstimate {
+        value,
+        low,
+        high,
+        n: runs.len(),
     })
 }
 
-fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<IntervalEstimate> {
+/// How often something happens over the distributions that were asked for, of the natural logarithm of
+/// each run's weight and whether it happened there, `None` where that is not known: the interval reaches
+/// from as if it had not to as if it had.
+///
+/// The weights have mean 1 by themselves, so that the estimate is without bias; where conditions cut draws
+/// off (`normalise`), and of what is no rare event, they are brought to mean 1. The rate is given only
+/// where the runs in which it happened are worth [`LEAST_WORTH`], and with weights that were brought to
+/// mean 1 all runs.
+pub fn weighted_rate(runs: &[(f64, Option<bool>)], normalise: bool) -> Weighted {
+    let happened: Vec<f64> = (runs.iter())
+        .filter(|(ln, h)| *h == Some(true) && ln.exp() > 0.0)
+        .map(|r| r.0)
+        .collect();
+    let effective_events = effective_runs(&happened);
+    let as_if = |unknown: bool| {
+        let runs = runs
+            .iter()
+            .map(|(ln, h)| (*ln, f64::from(h.unwrap_or(unknown))));
+        interval_of_rate(&runs.collect::<Vec<_>>(), normalise)
+    };
+    let rate = as_if(false).filter(|_| effective_events >= LEAST_WORTH);
+    let rate = rate.map(|(value, low, _)| IntervalEstimate {
+        value,
+        low,
+        high: as_if(true).map_or(1.0, |(_, _, high)| high),
+        n: runs.len(),
+    });
+    Weighted {
+        rate,
+        effective_events,
+        events: happened.len(),
+        unknown: runs.iter().filter(|r| r.1.is_none()).count(),
+    }
+}
+
+/// Value and ends of a rate: Wilson's interval of as many runs as would know it as well without weights,
+/// n = p (1 - p) / sigma^2 (Korn and Graubard, Survey Methodology 24 (1998)).
+fn interval_of_rate(runs: &[(f64, f64)], normalise: bool) -> Option<(f64, f64, f64)> {
+    const RARE: f64 = 0.1;
+    let plain = estimate(runs, false).filter(|(value, _)| !normalise && *value < RARE);
+    let ln_weights = || runs.iter().map(|r| r.0).collect::<Vec<_>>();
+    let (value, sigma) = plain.or_else(|| {
+        let is_worth = effective_runs(&ln_weights()) >= LEAST_WORTH;
+        estimate(runs, true).filter(|_| is_worth)
+    })?;
+    let n = value * (1.0 - value) / (sigma * sigma);
+    if !n.is_finite() || n <= 0.0 {
+        return None;
+    }
+    let (low, high) = wilson(value, n);
+    Some((value, low, high))
+}
+
+/// Value and standard deviation of a mean.
+fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<(f64, f64)> {
     let n = runs.len();
     let weights: Vec<f64> = runs.iter().map(|(ln, _)| ln.exp()).collect();
     let sum: f64 = weights.iter().sum();
-    if n < 2 || sum <= 0.0 {
+    if n < 2 || sum <= 0.0 || !sum.is_finite() {
         return None;
     }
     let scale = if normalise { n as f64 / sum } else { 1.0 };
@@ -75,14 +115,7 @@ fn estimate(runs: &[(f64, f64)], normalise: bool) -> Option<IntervalEstimate> {
         }
     };
     let squares: f64 = (0..n).map(|k| (share(k) - centre(k)).powi(2)).sum();
-    let sigma = (squares / (n - 1) as f64 / n as f64).sqrt();
-    let z = z();
-    Some(IntervalEstimate {
-        value,
-        low: value - z * sigma,
-        high: value + z * sigma,
-        n,
-    })
+    Some((value, (squares / (n - 1) as f64 / n as f64).sqrt()))
 }
 
 /// Kish's effective number of runs of logarithms of weights: (sum w)^2 / sum w^2.

@@ -1,0 +1,195 @@
+//! What the rows of a study come to: no run is left out of a denominator, the worst is shown, what was
+//! stopped by is marked.
+#![cfg(feature = "twin")]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use metrotwin::scenario::sampling::{PrecisionSettings, ScenarioSample, Template};
+use metrotwin::study::{
+    Digest, FigureDigest, INPUTS, MANIFEST, Row, Status, Study, compare, report,
+};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+const SMALL: &str = "tests/studies/small.toml";
+
+/// A folder of a test with the inputs of the small study.
+fn folder(name: &str) -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("metrotwin-{}-{name}", std::process::id()));
+    fs::remove_dir_all(&folder).ok();
+    for file in [
+        SMALL,
+        "tests/studies/steps.csv",
+        "tunnels/chengdu_line1.toml",
+    ] {
+        let to = folder.join(INPUTS).join(file);
+        fs::create_dir_all(to.parent().unwrap()).unwrap();
+        fs::copy(file, to).unwrap();
+    }
+    folder
+}
+
+/// The small study, with events about how it ends.
+fn template(folder: &Path) -> Template {
+    let path = folder.join(INPUTS).join(SMALL);
+    let text = fs::read_to_string(&path).unwrap();
+    let (head, _) = text.split_once("[study.events]").unwrap();
+    let events = "hit = \"collision\"\nslow = \"most_slip_mps > 1\"";
+    fs::write(&path, format!("{head}[study.events]\n{events}\n")).unwrap();
+    Template::load(&path).unwrap()
+}
+
+fn row(index: u64, status: Status, figures: Value) -> Row {
+    let sample = ScenarioSample {
+        index,
+        ..ScenarioSample::default()
+    };
+    let mut row = Row::without_figures(&sample, status, "why".into());
+    row.figures = figures.as_object().unwrap().clone();
+    row
+}
+
+/// Of 20 runs three hit, and five came to no end: one failed after it had hit at full speed, one
+/// crashed, one could not be drawn, two lack the figures.
+fn rows() -> Vec<Row> {
+    let stopped = |k: u64| json!({"collision": false, "impact_speed_mps": 0.0, "stop_margin_m": 10.0 + k as f64});
+    let hit =
+        |k: u64| json!({"collision": true, "impact_speed_mps": k as f64, "stop_margin_m": -0.5});
+    let complete =
+        (0..15).map(|k| row(k, Status::Complete, if k < 3 { hit(k) } else { stopped(k) }));
+    let rest = [
+        row(15, Status::Failed, hit(16)),
+        row(16, Status::Crashed, json!({})),
+        row(17, Status::Invalid, json!({})),
+        row(18, Status::Complete, json!({})),
+        row(19, Status::Complete, json!({})),
+    ];
+    complete.chain(rest).collect()
+}
+
+fn figure<'a>(digest: &'a Digest, name: &str) -> &'a FigureDigest {
+    digest
+        .figures
+        .iter()
+        .find(|f| f.measure.name == name)
+        .unwrap()
+}
+
+/// "16 m, of 2 runs" where two of three hit: a mean and a rate over those that came to a good end.
+#[test]
+fn no_run_is_left_out_of_a_denominator() {
+    let base = folder("denominator");
+    let digest = Digest::of(&template(&base), &rows());
+    fs::remove_dir_all(base).ok();
+    assert_eq!((digest.runs, digest.complete), (20, 17));
+    let hit = digest.events[0].rate.unwrap();
+    assert_eq!((digest.events[0].runs, hit.events, hit.unknown), (20, 3, 5));
+    assert!((hit.wilson.value - 0.15).abs() < 1e-12);
+    // Wilson's of 3 of 20, and of 8 of 20 (tests/studies/figures.py has the first).
+    assert!(
+        (hit.wilson.low - 0.0524).abs() < 1e-4 && (hit.wilson.high - 0.6134).abs() < 1e-4,
+        "{hit:?}"
+    );
+    assert!(digest.events[1].rate.is_none(), "nothing is known of it");
+
+    let margin = figure(&digest, "stop_margin_m");
+    assert_eq!((margin.runs, margin.lacking), (15, 5));
+    assert!((margin.worst.unwrap().value + 0.5).abs() < 1e-12);
+    // The run that failed counts here: it is the worst of all.
+    let impact = figure(&digest, "impact_speed_mps");
+    let worst = impact.worst.unwrap();
+    assert_eq!((worst.index, impact.runs, impact.lacking), (15, 15, 5));
+    let mean = impact.mean.unwrap();
+    assert!(mean.low >= 0.0 && mean.low < mean.value, "{mean:?}");
+    let flag = figure(&digest, "collision").mean.unwrap();
+    assert!(
+        (flag.value - 0.2).abs() < 1e-12 && flag.low > 0.0 && flag.high < 1.0,
+        "{flag:?}"
+    );
+}
+
+/// A figure that is the same wherever it is known, and known in two runs of twenty.
+#[test]
+fn a_figure_that_most_runs_lack_is_shown() {
+    let mut rows = rows();
+    for row in &mut rows {
+        row.figures.remove("stop_margin_m");
+    }
+    for k in [4, 5] {
+        rows[k].figures.insert("stop_margin_m".into(), json!(16.0));
+    }
+    let base = folder("lacking");
+    let digest = Digest::of(&template(&base), &rows);
+    fs::remove_dir_all(base).ok();
+    let margin = figure(&digest, "stop_margin_m");
+    assert_eq!((margin.runs, margin.lacking), (2, 18));
+}
+
+/// The mark of a study that ended by the precision of a figure, and none of one that ran to its end.
+#[test]
+fn an_early_stop_is_marked() {
+    let base = folder("early");
+    let mut template = template(&base).with(None, Some(500));
+    fs::remove_dir_all(base).ok();
+    let of = "hit".to_owned();
+    template.settings.stop.when = Some(PrecisionSettings {
+        of,
+        half_width: 0.2,
+    });
+    let hit = |k: u64| json!({"collision": k.is_multiple_of(2)});
+    let rows: Vec<Row> = (0..30).map(|k| row(k, Status::Complete, hit(k))).collect();
+    let early = Digest::of(&template, &rows).early.unwrap();
+    assert_eq!(early.of, "hit");
+    assert!(Digest::of(&template, &rows[..20]).early.is_none());
+    let whole = template.with(None, Some(15));
+    assert_eq!(whole.runs(), 30);
+    assert!(Digest::of(&whole, &rows).early.is_none());
+}
+
+/// Makes a folder one that a study has left.
+fn leave(folder: &Path, rows: &[Row]) {
+    let lines = rows
+        .iter()
+        .map(|row| serde_json::to_string(row).unwrap() + "\n");
+    fs::write(folder.join("rows.jsonl"), lines.collect::<String>()).unwrap();
+    let manifest = json!({
+        "metrotwin": "0", "program": "0", "study": SMALL, "inputs": {}, "runs": 20,
+        "renderer": {"backend": "cpu", "adapter": "none"}, "shard": null
+    });
+    fs::write(folder.join(MANIFEST), manifest.to_string()).unwrap();
+}
+
+/// What people read says of how many, how many without, and which is the worst; and the mean of few
+/// differences of a flag leaves neither -1 nor 1.
+#[test]
+fn the_page_says_how_many_runs_lack_a_figure() {
+    let folders = [folder("page-a"), folder("page-b")];
+    let all = rows();
+    let mut others = all.clone();
+    for row in &mut others {
+        (row.figures).insert("collision".into(), json!(row.index != 3));
+    }
+    for (folder, rows) in folders.iter().zip([&all, &others]) {
+        template(folder);
+        leave(folder, rows);
+    }
+    let study = Study::open(&folders[0]).unwrap();
+    let digest = Digest::of(&study.template, &all);
+    let page = fs::read_to_string(report(&study, &digest, &all).unwrap()).unwrap();
+    for said in [
+        "3 of 20, 5 unknown",
+        ">15</td><td class=\"n\">5</td>",
+        "-0.5000 (run 0)",
+    ] {
+        assert!(page.contains(said), "no `{said}` in the page");
+    }
+    let found = compare(&folders[0], &folders[1]).unwrap();
+    assert_eq!((found.both, found.pairs), (20, 17));
+    let mut differences = found.differences.iter();
+    let collision = differences.find(|d| d.name == "collision").unwrap();
+    let mean = collision.mean;
+    assert!(collision.pairs == 15 && mean.high < 1.0, "{mean:?}");
+    for folder in folders {
+        fs::remove_dir_all(folder).ok();
+    }
+}
