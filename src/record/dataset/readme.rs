@@ -28,7 +28,6 @@ pub(super) fn of(plan: &FramePlan, meta: &Value, period_s: f64) -> Result<String
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use nalgebra::Vector2;
 
     /// As many steps as the example asks OpenCV for, and OpenCV's iteration, bring the corners of a wide

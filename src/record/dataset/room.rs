@@ -2,7 +2,7 @@
 //! of files that every set has from its beginning.
 
 use super::files::FILES;
-use crate::record::listing::{Listing, foreign, is_empty};
+use crate::record::listing::{LIST, Listing, foreign, is_empty};
 use serde_json::Value;
 use std::fs;
 use std::io;
@@ -40,18 +40,15 @@ pub(super) fn make_room(folder: &Path, meta: &Value, force: bool) -> Result<(), 
     let kept = fs::read(folder.join("meta.json")).ok();
     let kept = kept.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
     let kept = kept.filter(|kept| kept["format"] == FORMAT && listed.is_some());
-    match kept {
-        Some(kept) if force || !goes_on(&kept, meta) => {
-            if !force {
-                return Err(RoomError::Occupied);
-            }
-            Listing::clear(folder, COMMAND)?;
-        }
-        Some(_) => {}
+    match (kept, listed) {
+        (Some(_), _) if force => Listing::clear(folder, COMMAND)?,
+        (Some(kept), _) if goes_on(&kept, meta) => {}
+        (Some(_), _) => return Err(RoomError::Occupied),
         // A kill before the first file leaves a list alone.
-        None if listed.is_some_and(|l| l.iter().all(|name| !folder.join(name).exists())) => {}
-        None if !force && !is_empty(folder)? => return Err(RoomError::NotEmpty),
-        None => {}
+        (None, Some(listed)) if listed.iter().all(|name| !folder.join(name).exists()) => {}
+        (None, Some(_)) => return Err(RoomError::Taken(folder.join(LIST))),
+        (None, None) if !force && !is_empty(folder)? => return Err(RoomError::NotEmpty),
+        (None, None) => {}
     }
     let taken = foreign(folder, COMMAND, FILES)?;
     taken.map_or(Ok(()), |name| Err(RoomError::Taken(folder.join(name))))
