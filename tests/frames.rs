@@ -376,19 +376,137 @@ fn the_command_refuses_what_is_wrong_and_keeps_what_is_there() {
         .collect();
     let expected = [
         "README.md",
+        "files.txt",
         "frames.parquet",
         "images/left/000000.png",
+        "inputs/scenarios/forgotten_toolbox.toml",
+        "inputs/tunnels/chengdu_line1.toml",
         "meta.json",
         "scenario.toml",
     ];
     assert_eq!(names, expected);
 
     fs::write(out.join("mine.txt"), "kept").unwrap();
+    fs::write(out.join("images/holiday.jpg"), "kept").unwrap();
     let refused = frames(&some);
     assert_eq!(refused.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
     let forced = [&some[..], &["--force", "--from", "0.1"]].concat();
     assert_eq!(frames(&forced).status.code(), Some(0));
     assert!(!out.join("images/left/000000.png").exists());
-    assert!(out.join("images/left/000001.png").exists() && out.join("mine.txt").exists());
+    for there in ["images/left/000001.png", "mine.txt", "images/holiday.jpg"] {
+        assert!(out.join(there).exists(), "no {there}");
+    }
+}
+
+/// Fails where `--force` removes files in a folder that holds no data set, or that a set there does not
+/// list; or where one of its own would be written over somebody's.
+#[test]
+fn files_of_others_survive_force() {
+    let base = folder("others");
+    let theirs = [
+        "README.md",
+        "meta.json",
+        "images/holiday.jpg",
+        "flow/river.txt",
+    ];
+    let some = [
+        "--labels",
+        "none",
+        "--limit",
+        "1",
+        "--cameras",
+        "left",
+        "--force",
+    ];
+    for left_out in [&[][..], &["README.md", "meta.json"]] {
+        let out = base.join(left_out.len().to_string());
+        let theirs = || theirs.iter().filter(|name| !left_out.contains(name));
+        for name in theirs() {
+            let path = out.join(name);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, name).unwrap();
+        }
+        let made = frames(&[&["--out", out.to_str().unwrap()], &some[..]].concat());
+        let said = String::from_utf8_lossy(&made.stderr);
+        if left_out.is_empty() {
+            assert_eq!(made.status.code(), Some(2), "{said}");
+            assert!(
+                said.contains("README.md") || said.contains("meta.json"),
+                "{said}"
+            );
+            assert!(!out.join("files.txt").exists());
+        } else {
+            assert_eq!(made.status.code(), Some(0), "{said}");
+        }
+        for name in theirs() {
+            assert_eq!(fs::read_to_string(out.join(name)).unwrap(), *name);
+        }
+    }
+}
+
+/// Fails where the scenario of a set names files that are not there, or lacks the changes that the set
+/// was made with.
+#[test]
+fn the_scenario_of_a_set_makes_the_set_again() {
+    let base = folder("again");
+    let [first, again] = ["first", "again"].map(|name| base.join(name));
+    // A mesh and a vehicle are files too.
+    let mesh =
+        "obstacles=[{name='spanner', body={shape='mesh', file='spanner.obj'}, chainage_m=1512}]";
+    let change = [
+        "--set",
+        mesh,
+        "--set",
+        "train.vehicle='vehicles/metro_b1_crush.toml'",
+        "--seed",
+        "7",
+    ];
+    let some = [
+        "--labels",
+        "obstacles",
+        "--limit",
+        "2",
+        "--cameras",
+        "left,W1530",
+    ];
+    let made = frames(&[&["--out", first.to_str().unwrap()], &some[..], &change].concat());
+    assert_eq!(
+        made.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
+    command.args([
+        "frames",
+        "first/scenario.toml",
+        "--renderer",
+        "cpu",
+        "--out",
+        "again",
+    ]);
+    let made = command.args(some).current_dir(&base).output().unwrap();
+    assert_eq!(
+        made.status.code(),
+        Some(0),
+        "{}",
+        String::from_utf8_lossy(&made.stderr)
+    );
+    let [a, b] = [&first, &again].map(|out| {
+        let mut all = BTreeMap::new();
+        content(out, out, &mut all);
+        all.retain(|path, _| !path.starts_with("inputs"));
+        // These two tell of changes and list the inputs.
+        all.retain(|path, _| path != Path::new("meta.json") && path != Path::new("files.txt"));
+        all
+    });
+    assert!(a.len() > 8);
+    assert!(a.keys().eq(b.keys()));
+    for (path, bytes) in a
+        .iter()
+        .filter(|(path, _)| *path != Path::new("scenario.toml"))
+    {
+        assert!(*bytes == b[path], "{}", path.display());
+    }
 }

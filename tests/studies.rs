@@ -370,6 +370,25 @@ fn a_merge_keeps_what_counts() {
     fs::remove_dir_all(base).ok();
 }
 
+/// A merge that ended between its files, here for want of a table: the next one goes on.
+#[test]
+fn a_merge_that_was_cut_off_does_not_block_the_next() {
+    let base = folder("cut_off");
+    for k in 1..=2 {
+        let out = base.join(format!("shard-{k}-of-2"));
+        succeeds(&study(&out, &format!("--runs 1 --shard {k}/2")));
+    }
+    let merge = || run(&format!("study merge {}", base.display()));
+    let in_the_way = base.join("rows.parquet.part");
+    fs::create_dir(&in_the_way).unwrap();
+    assert!(!merge().status.success());
+    assert!(base.join("rows.jsonl").exists());
+    fs::remove_dir(&in_the_way).unwrap();
+    succeeds(&merge());
+    assert_eq!(read_rows(&base).unwrap().len(), 2);
+    fs::remove_dir_all(base).ok();
+}
+
 /// The end of a study ends its workers, whatever they are at: this one was asked for a run of minutes.
 #[cfg(target_os = "linux")]
 #[test]
@@ -456,6 +475,49 @@ fn generated_scenarios_stand_by_themselves() {
     assert!(
         index.starts_with("index,file,seed,rejected,weight,cars,gap_m,rail,speed_kmh,step_s\n")
     );
+    fs::remove_dir_all(base).ok();
+}
+
+/// Scenarios of an earlier, larger draw that stay, or files of others that do not.
+#[test]
+fn scenarios_drawn_again_leave_no_stale_ones() {
+    let out = folder("stale");
+    fs::write(out.join("mine.toml"), "kept").unwrap();
+    let generate = |more: &str| run(&format!("generate {SMALL} --out {} {more}", out.display()));
+    let drawn = || {
+        let all = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name());
+        let all = all.map(|name| name.into_string().unwrap());
+        all.filter(|name| name.starts_with("small_")).count()
+    };
+    succeeds(&generate("-n 9"));
+    refuses(&generate("-n 2"), "--force");
+    assert_eq!(drawn(), 9);
+    succeeds(&generate("-n 2 --force"));
+    assert_eq!(drawn(), 2);
+    assert_eq!(fs::read_to_string(out.join("mine.toml")).unwrap(), "kept");
+    // A file of this name that `generate` has not written.
+    fs::write(out.join("small_000002.toml"), "kept").unwrap();
+    refuses(&generate("-n 9 --force"), "small_000002.toml");
+    assert_eq!(
+        fs::read_to_string(out.join("small_000002.toml")).unwrap(),
+        "kept"
+    );
+    fs::remove_dir_all(out).ok();
+}
+
+/// A script of which a part of a path would be run, or filled in by Slurm.
+#[test]
+fn submit_refuses_what_a_script_would_read_otherwise() {
+    let base = folder("submit");
+    for name in ["a\ntouch x #", "a'b", "50%"] {
+        let out = base.join(name);
+        let mut command = metrotwin(&format!("study submit {SMALL} --shards 2 --dry-run --out"));
+        refuses(
+            &command.arg(&out).output().unwrap(),
+            "cannot stand in a script",
+        );
+        assert!(!out.exists());
+    }
     fs::remove_dir_all(base).ok();
 }
 

@@ -2,8 +2,9 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_ctrl_c};
-use crate::record::dataset::{self, DataSet, FramePlan, LabelKinds, Provenance};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
+use crate::record::dataset::{DataSet, FramePlan, LabelKinds, Provenance, RoomError};
+use crate::scenario::sampling::Inputs;
 use crate::scenario::{self, Override, Scenario};
 use crate::session::{self, End, RendererChoice, RunOptions, Summary};
 use std::path::{Path, PathBuf};
@@ -11,14 +12,15 @@ use std::path::{Path, PathBuf};
 const AFTER: &str = "\
 Into the folder go, for each frame of each camera, the image as the stack gets it, and
   raw        digital numbers of the converter, 16-bit PNG
-  clean      the same picture without noise, smear and glare
+  clean      the same picture without noise, glare and most of the smear
   depth      metres, float32 .npy; with flow the largest and slowest: 11 MB for 1280 x 720
   mask       16-bit PNG, the number of the obstacle that a pixel shows
   flow       pixels to the camera's next frame in the set, float32 .npy
   rows       rows.parquet: time and pose of every row of every image
   lamps      lamps.parquet: outline, name, light and code phase of every lamp in view
   obstacles  obstacles.parquet and coco.json: boxes in the image and in space
-and frames.parquet, README.md (describes every file and column), scenario.toml and meta.json.
+and frames.parquet, README.md (describes every file and column), scenario.toml (as it was run), inputs/
+(copies of what it names), meta.json and files.txt (the list of all files).
 --labels takes some of these words, separated by commas.
 
 The images are those of `metrotwin run` with the same scenario and seed; all that is taken is what
@@ -30,7 +32,8 @@ Examples:
   metrotwin frames scenarios/line_run.toml --out out/left --cameras left --to 30 --labels clean,depth
   metrotwin frames scenarios/forgotten_toolbox.toml --out out/day2 --seed 2 --cameras W1530
 
-Ctrl-C ends it cleanly: what has been taken is a whole, smaller set. A second Ctrl-C ends it at once.
+Ctrl-C, SIGTERM and SIGHUP end it cleanly: what has been taken is a whole, smaller set. A second Ctrl-C
+ends it at once; the same command then begins the set anew.
 Exit code 0 for a whole set, 1 where the run failed or was broken off, 2 for wrong input.";
 
 /// Images + labels of a scenario as a data set
@@ -69,7 +72,8 @@ pub(super) struct FramesArgs {
     /// What to write beside the images: all, none, or words from the list below
     #[arg(long, value_name = "WORD,...", default_value = "all")]
     labels: LabelKinds,
-    /// Write into a folder that is not empty; an earlier data set there is removed
+    /// Write into a folder that is not empty; of an earlier data set there, the files that it lists are
+    /// removed, and nothing else
     #[arg(long)]
     force: bool,
 }
@@ -79,13 +83,12 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let mut scenario = Scenario::from_text(&args.scenario, &text, &args.overrides)?;
     scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
     let plan = plan(args, &scenario)?;
-    make_room(&args.out, args.force)?;
 
-    stop_on_ctrl_c();
+    stop_on_signals();
     let renderer = session::renderer(&scenario, args.renderer).map_err(Failure::run)?;
     let overrides = args.overrides.iter();
     let provenance = Provenance {
-        scenario: text,
+        inputs: Some(Inputs::of_scenario(&args.scenario, &scenario.file).map_err(Failure::run)?),
         overrides: overrides
             .map(|o| format!("{}={}", o.key, o.value))
             .collect(),
@@ -93,6 +96,9 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let progress = ProgressBar::new(RUN_BAR);
     let to_s = plan.to_s.min(scenario.file.duration_s);
     let mut set = DataSet::new(&args.out, &scenario, plan, provenance, renderer, &STOP);
+    set.make_room(args.force)
+        .map_err(|e| no_room(&args.out, &e))?;
+    prepare(&args.out)?;
     let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
         renderer: args.renderer,
@@ -152,22 +158,17 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
     })
 }
 
-/// An empty folder, or one that the user allows to be written into.
-fn make_room(out: &Path, force: bool) -> Result<(), Failure> {
-    let refused = |error: std::io::Error| {
-        let what = format!("cannot use {}: {error}", out.display());
-        Failure::input(what, "choose another folder with --out")
+/// What is said of a folder that cannot be used.
+fn no_room(out: &Path, error: &RoomError) -> Failure {
+    let remedy = match error {
+        RoomError::Occupied | RoomError::NotEmpty => {
+            "choose another folder with --out, or give --force: of an earlier data set there, the files \
+             that it lists are then removed, and nothing else"
+        }
+        RoomError::Taken(_) => "choose another folder with --out, or move that file away",
+        RoomError::Io(_) => "choose another folder with --out",
     };
-    if force {
-        dataset::clear(out).map_err(refused)?;
-    } else if !dataset::is_empty(out).map_err(refused)? {
-        return Err(Failure::input(
-            format!("{} is not empty", out.display()),
-            "choose another folder with --out, or give --force: an earlier data set there is \
-             then removed, and nothing else",
-        ));
-    }
-    prepare(out)
+    Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }
 
 /// What there is now, and how fast it came.

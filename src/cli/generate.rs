@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::print;
 use super::running::prepare;
-use crate::record;
+use crate::record::{self, Listing};
 use crate::scenario::sampling::{Inputs, ScenarioSample, Template};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -14,7 +14,9 @@ Into the output folder go:
   <name>_000000.toml ...   complete scenarios, every key with its value and what it means
   index.csv                file, seed and drawn values of each
   inputs/                  copies of the tunnel and all other files that they name
-The same seed and number give the same file for ever.
+  files.txt                the list of these files
+The same seed and number give the same file for ever. Scenarios that an earlier command has drawn into
+the folder are replaced with --force; files that are not its own stay as they are.
 
 Examples:
   metrotwin generate scenarios/studies/led_accuracy.toml -n 20 --out out/generated
@@ -35,7 +37,17 @@ pub(super) struct GenerateArgs {
     /// Folder for the scenarios
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
+    /// Replace scenarios drawn earlier; only files that `generate` has listed there are removed
+    #[arg(long)]
+    force: bool,
 }
+
+/// Whose files are listed.
+const COMMAND: &str = "metrotwin generate";
+/// Folder for the copies of what the scenarios name.
+const INPUTS: &str = "inputs";
+/// The table of all scenarios: it is written last.
+const INDEX: &str = "index.csv";
 
 pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let template = Template::load(&args.scenario)?.with(args.seed, Some(args.number));
@@ -45,17 +57,16 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
         samples.map_err(|e| Failure::input(e, "ease the conditions under study.require"))?;
     // Nothing is written unless all of them can be.
     let inputs = Inputs::of(&template).map_err(Failure::run)?;
-    let place = |name: &str| match inputs.place_of(name) {
-        Some(place) => Path::new("inputs")
-            .join(place)
-            .to_string_lossy()
-            .into_owned(),
-        None => name.to_owned(),
-    };
-    let texts = samples.iter().map(|sample| template.text_of(sample, place));
+    let texts = samples.iter();
+    let texts = texts.map(|sample| template.text_of(sample, &inputs, Path::new(INPUTS)));
     let texts = texts.collect::<Result<Vec<_>, _>>()?;
+    let copies = inputs.copies(Path::new(INPUTS));
+    let copies = copies.map(|path| path.to_string_lossy().into_owned());
+    let names: Vec<String> = samples.iter().map(|s| file_name(&template, s)).collect();
+    let all: Vec<String> = copies.chain(names).chain([INDEX.to_owned()]).collect();
+    make_room(args, &all)?;
     prepare(&args.out)?;
-    write(&args.out, &template, &inputs, &samples, &texts)
+    write(&args.out, all, &template, &inputs, &samples, &texts)
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write the scenarios")))?;
     let rejected: u64 = samples.iter().map(|d| u64::from(d.rejected)).sum();
     print(&format!(
@@ -65,26 +76,68 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     ))
 }
 
+fn file_name(template: &Template, sample: &ScenarioSample) -> String {
+    format!("{}_{:06}.toml", template.file.name, sample.index)
+}
+
+/// Refuses to write over files of others, and to replace a whole set of scenarios without `--force`. One
+/// whose table is missing was interrupted: it is gone on with.
+fn make_room(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
+    let out = args.out.display();
+    let unusable = |error: io::Error| {
+        let what = format!("cannot use {out}: {error}");
+        Failure::input(what, "choose another folder with --out")
+    };
+    let names = names.iter().map(String::as_str);
+    if let Some(name) = record::foreign(&args.out, COMMAND, names).map_err(unusable)? {
+        return Err(Failure::input(
+            format!("{out} holds a file {name} that `generate` has not listed there"),
+            "choose another folder with --out, or move that file away",
+        ));
+    }
+    if args.out.join(INDEX).exists() && !args.force {
+        return Err(Failure::input(
+            format!("{out} holds scenarios drawn earlier"),
+            "choose another folder with --out, or give --force to replace them",
+        ));
+    }
+    Ok(())
+}
+
+/// Writes all files, of which `names` are the names.
 fn write(
     out: &Path,
+    names: Vec<String>,
     template: &Template,
     inputs: &Inputs,
     samples: &[ScenarioSample],
     texts: &[String],
 ) -> io::Result<()> {
-    inputs.copy_to(&out.join("inputs"))?;
+    let mut listing = Listing::open(out, COMMAND)?;
+    listing.announce(names)?;
+    record::remove(&out.join(INDEX))?;
+    inputs.copy_to(&out.join(INPUTS), record::write_whole)?;
+    for (sample, text) in samples.iter().zip(texts) {
+        let path = out.join(file_name(template, sample));
+        record::write_whole(&path, text.as_bytes())?;
+    }
+    listing.close()?;
+    let index = index(template, samples).map_err(io::Error::other)?;
+    record::write_whole(&out.join(INDEX), &index)
+}
+
+/// The table of all scenarios, as comma-separated values.
+fn index(template: &Template, samples: &[ScenarioSample]) -> Result<Vec<u8>, csv::Error> {
     let mut index = csv::Writer::from_writer(Vec::new());
     let variables = template.settings.variables.keys().map(String::as_str);
     let head = ["index", "file", "seed", "rejected", "weight"]
         .into_iter()
         .chain(variables);
     index.write_record(head)?;
-    for (sample, text) in samples.iter().zip(texts) {
-        let file = format!("{}_{:06}.toml", template.file.name, sample.index);
-        record::write_whole(&out.join(&file), text.as_bytes())?;
+    for sample in samples {
         let about = [
             sample.index.to_string(),
-            file,
+            file_name(template, sample),
             sample.seed.to_string(),
             sample.rejected.to_string(),
             sample.ln_weight.exp().to_string(),
@@ -95,8 +148,5 @@ fn write(
         });
         index.write_record(about.into_iter().chain(values))?;
     }
-    let text = index
-        .into_inner()
-        .map_err(|e| io::Error::other(e.to_string()))?;
-    record::write_whole(&out.join("index.csv"), &text)
+    index.into_inner().map_err(|e| e.into_error().into())
 }

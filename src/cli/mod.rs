@@ -35,6 +35,8 @@ mod running;
 #[cfg(feature = "twin")]
 mod scenario_fault;
 #[cfg(feature = "twin")]
+mod signals;
+#[cfg(feature = "twin")]
 mod study;
 #[cfg(feature = "twin")]
 mod table;

@@ -1,7 +1,7 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
 use super::{print, table};
 use crate::bus::TrainId;
 use crate::record::{self, FixTable, Recording};
@@ -9,7 +9,6 @@ use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
 use crate::study::{self, Fixes, Row, Study, StudyError};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -18,7 +17,8 @@ Into the output folder go:
   recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
   summary.json    the figures
   fixes.csv       every position, with its truth (of train k: fixes_train_k.csv)
-Each is written under a temporary name and renamed when it is complete.
+Each is written under a temporary name, .part, and renamed when it is complete. A run that is killed
+leaves recording.rrd.part, up to its last second: renamed, it opens in the viewer.
 
 Examples:
   metrotwin run scenarios/line_run.toml
@@ -28,7 +28,7 @@ Examples:
   metrotwin run scenarios/static_bench.toml --no-recording --json | jq .positioning
   metrotwin run --from-study out/led_accuracy --index 17
 
-Ctrl-C ends a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at once.
+Ctrl-C, SIGTERM and SIGHUP end a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at once.
 Exit code 0 for a whole run, 1 for one that failed or was broken off, 2 for wrong input.";
 
 /// Run a scenario: recording, summary, fixes
@@ -77,7 +77,7 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let out = args.out.clone().unwrap_or_else(|| task.out.clone());
     prepare(&out)?;
 
-    stop_on_ctrl_c();
+    stop_on_signals();
     let mut fixes = Fixes::default();
     let summary = observed(args, scenario, live, &out, &mut fixes)?;
     remove_stale(args, scenario, &out).map_err(|e| {
@@ -228,12 +228,14 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
 /// What this run did not write, but an earlier one into the same folder, would not belong to its
 /// summary.
 fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
-    let recording = args.no_recording.then(|| "recording.rrd".to_owned());
+    // The second is what the end of a recording is written under.
+    let recording = ["recording.rrd", "recording.rrd.indexed"].map(str::to_owned);
+    let recording = args.no_recording.then_some(recording);
     let has_rig = |id| (scenario.onboard.iter()).any(|o| o.id() == id && o.rig.is_some());
     let without_rig = (0..TrainId::MOST)
         .map(TrainId::from_index)
         .filter(|id| !has_rig(*id));
     let fixes = without_rig.map(FixTable::file_name);
-    let mut stale = recording.into_iter().chain(fixes);
-    stale.try_for_each(|name| record::gone(fs::remove_file(out.join(name))))
+    let mut stale = recording.into_iter().flatten().chain(fixes);
+    stale.try_for_each(|name| record::remove(&out.join(name)))
 }

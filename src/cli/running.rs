@@ -1,44 +1,38 @@
 //! What subcommands that run a scenario share.
 
 use super::fault::Failure;
+use super::signals::{self, Signal};
+use crate::record;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
-use std::fs;
-use std::io;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Set by the first Ctrl-C, or when there is nothing more to do.
+/// Set by the first signal to end, or when there is nothing more to do.
 pub(super) static STOP: AtomicBool = AtomicBool::new(false);
 
-pub(super) fn stop_on_ctrl_c() {
-    let handler = || {
-        if STOP.swap(true, Ordering::Relaxed) {
-            std::process::exit(1);
-        }
-        eprintln!("ending the run; Ctrl-C again ends it at once");
-    };
-    if let Err(error) = ctrlc::set_handler(handler) {
-        tracing::warn!("Ctrl-C will end the run at once: {error}");
-    }
+/// From now on Ctrl-C, SIGTERM (Slurm, containers) and SIGHUP (a terminal that is closed) set [`STOP`].
+/// A second Ctrl-C ends the process at once; the others are sent twice by some, so that a second one
+/// says nothing.
+pub(super) fn stop_on_signals() {
+    signals::handle(
+        |signal| match (STOP.swap(true, Ordering::Relaxed), signal) {
+            (false, _) => eprintln!("ending the run; Ctrl-C again ends it at once"),
+            (true, Signal::CtrlC) => std::process::exit(1),
+            (true, Signal::Ended) => {}
+        },
+    );
 }
 
 /// Makes the folder for results, and makes sure that files can be written there.
 pub(super) fn prepare(out: &Path) -> Result<(), Failure> {
-    probe(out).map_err(|error| {
+    record::probe(out).map_err(|error| {
         let what = format!("cannot write into {}: {error}", out.display());
         Failure::input(
             what,
             "choose another folder with --out, or make that one writable",
         )
     })
-}
-
-fn probe(out: &Path) -> io::Result<()> {
-    fs::create_dir_all(out)?;
-    let probe = out.join(".metrotwin-probe");
-    fs::write(&probe, b"")?;
-    fs::remove_file(&probe)
 }
 
 /// How far something is: a bar on a terminal, else a line for every tenth.

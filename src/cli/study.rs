@@ -1,8 +1,8 @@
 //! `metrotwin study`: many runs, and what they come to.
 
 use super::fault::Failure;
-use super::print;
-use super::running::{ProgressBar, STOP, prepare, stop_on_ctrl_c};
+use super::running::{ProgressBar, STOP, prepare, stop_on_signals};
+use super::{print, signals};
 use crate::record::parquet::Kind;
 use crate::record::render;
 use crate::scenario::sampling::Template;
@@ -61,8 +61,9 @@ Into the output folder go:
   rows.jsonl     the same as they came, appended and synced: a kill loses the runs in flight at most
   study.json     hashes of all inputs, version, renderer; a study goes on only while they are the same
   inputs/        copies of all inputs, from which any run can be made again
+  study.lock     locked while a command writes there
 
-Ctrl-C begins no more runs and waits for those in flight; --resume goes on later.";
+Ctrl-C, SIGTERM and SIGHUP begin no more runs and wait for those in flight; --resume goes on later.";
 
 /// Run what a folder lacks of a study
 #[derive(clap::Args)]
@@ -186,7 +187,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
         StudyCommand::Figures => figures(),
         StudyCommand::Worker(args) => {
             // The study's own process is the one that decides when to stop.
-            ctrlc::set_handler(|| {}).ok();
+            signals::handle(|_| {});
             let input = std::io::BufReader::new(std::io::stdin());
             let output = std::io::stdout().lock();
             Ok(study::serve(&args.folder, args.renderer, input, output)?)
@@ -202,7 +203,7 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
             .map_or(out.clone(), |shard| out.join(shard.folder()))
     });
     prepare(&out)?;
-    stop_on_ctrl_c();
+    stop_on_signals();
     let bar = ProgressBar::new("{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go");
     let show = |progress: &Progress| show(&bar, progress);
     let options = Options {
@@ -268,7 +269,6 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
         .out
         .clone()
         .unwrap_or_else(|| Path::new("out").join(&name));
-    prepare(&out)?;
     let whole = |path: &Path| std::path::absolute(path).map_err(Failure::run);
     let runs = args
         .runs
@@ -288,6 +288,8 @@ fn submit(args: &SubmitArgs) -> Result<(), Failure> {
         arguments: runs.chain(renderer).collect(),
         sbatch: args.sbatch.clone(),
     };
+    submission.check()?;
+    prepare(&out)?;
     if args.dry_run {
         let [array, merge] = submission.write()?;
         return print(&format!("{}\n{}", array.display(), merge.display()));

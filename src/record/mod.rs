@@ -19,8 +19,9 @@
 //! What is true and what was estimated are siblings: `world/train`, `world/bodies` against
 //! `world/estimate/...`. What belongs to the first train or to none has these paths; of train `k`
 //! the same lie below `world/train_k` and `train_k`. Two runs with one seed give equal recordings (`rerun rrd compare`): ids
-//! of files come from scenario and seed, no row carries the wall clock, and batches are cut every ten
-//! seconds of simulated time. Nothing older than that is held in memory.
+//! of files come from scenario and seed, no row carries the wall clock, and batches are cut every 0.8
+//! seconds of simulated time. Nothing older than that is held in memory or lost when the process is
+//! killed: `<path>.part` then has all before it. A finished file has batches of ten seconds.
 //!
 //! Coordinates are the world's, relative to a point in the middle of the line; rerun's transforms
 //! are single precision (<https://rerun.io/docs/concepts/logging-and-ingestion/transforms>).
@@ -31,10 +32,12 @@
 mod blueprint;
 pub mod dataset;
 mod images;
+mod listing;
 mod moving;
 mod palette;
 pub mod parquet;
 mod plots;
+mod recording_file;
 mod scene;
 mod stream;
 mod tables;
@@ -42,9 +45,10 @@ mod template;
 mod texts;
 mod whole_files;
 
+pub(crate) use listing::{Listing, foreign};
 pub use tables::FixTable;
 pub(crate) use template::render;
-pub(crate) use whole_files::{gone, write_whole};
+pub(crate) use whole_files::{create_new, probe, remove, write_whole};
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;
@@ -58,7 +62,7 @@ use scene::RecordedScene;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
-use stream::{RowStream, Target};
+use stream::{BATCH_S, RowStream, Target};
 use texts::Texts;
 use whole_files::Result;
 
@@ -236,7 +240,7 @@ impl Open {
             views: views.collect::<Result<_>>()?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
-            flush_at: SimTime::ZERO.plus(stream.batch_s()),
+            flush_at: SimTime::ZERO.plus(BATCH_S),
             texts: Texts::open(stream.clone(), opening)?,
             stream,
             contents,
@@ -323,7 +327,7 @@ impl Open {
             }
         };
         if time >= self.flush_at {
-            self.flush_at = time.plus(self.stream.batch_s());
+            self.flush_at = time.plus(BATCH_S);
             self.flush()?;
         }
         Ok(())

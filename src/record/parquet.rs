@@ -1,7 +1,7 @@
 //! Parquet tables whose columns say what they are: the same list makes the file and its
 //! description. Rows are anything that serialises to an object with the columns' names.
 
-use super::whole_files::{Result, broken, finish, part_name};
+use super::whole_files::{PartFile, Result, broken};
 use arrow::datatypes::{DataType, Field, Schema};
 use arrow::json::ReaderBuilder;
 use arrow::json::reader::Decoder;
@@ -12,7 +12,6 @@ use parquet::file::properties::WriterProperties;
 use serde::Serialize;
 use serde_json::json;
 use std::borrow::Cow;
-use std::fs::File;
 use std::path::PathBuf;
 use std::slice;
 use std::sync::Arc;
@@ -157,7 +156,7 @@ pub fn describe(columns: &[Column]) -> String {
 pub struct ParquetTable {
     path: PathBuf,
     rows: Decoder,
-    writer: ArrowWriter<File>,
+    writer: ArrowWriter<PartFile>,
 }
 
 impl ParquetTable {
@@ -175,7 +174,7 @@ impl ParquetTable {
             .set_created_by(format!("metrotwin {}", env!("CARGO_PKG_VERSION")))
             .build();
         let rows = ReaderBuilder::new(schema.clone()).with_strict_mode(true);
-        let file = File::create(part_name(&path)).map_err(broken(&path))?;
+        let file = PartFile::create(&path).map_err(broken(&path))?;
         let writer = ArrowWriter::try_new(file, schema, Some(settings));
         Ok(Self {
             rows: rows.build_decoder().map_err(broken(&path))?,
@@ -204,8 +203,8 @@ impl ParquetTable {
     /// Writes the rest and gives the file its name.
     pub fn close(mut self) -> Result {
         self.flush()?;
-        self.writer.close().map_err(broken(&self.path))?;
-        finish(&self.path)
+        let part = self.writer.into_inner().map_err(broken(&self.path))?;
+        part.finish().map_err(broken(&self.path))
     }
 }
 

@@ -5,7 +5,8 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
-use super::whole_files::{Result, failed, finish, make_folder_of, part_name};
+use super::recording_file::RecordingFile;
+use super::whole_files::{Result, failed};
 use crate::bus::SimTime;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
 use rerun::log::ChunkBatcherConfig;
@@ -33,17 +34,16 @@ pub(super) enum Target {
     Viewer(String),
 }
 
-/// Simulated time between batches of a file. The sdk keeps some kilobytes of index a batch in
-/// memory until the file's end: with batches of one second, long runs grow without bound.
-const FILE_BATCH_S: f64 = 10.0;
-/// Simulated time between batches to a viewer, which shows them as they come.
-const VIEWER_BATCH_S: f64 = 1.0;
+/// Simulated time between batches: no more of a recording is lost with a process that is killed, and
+/// a viewer shows them as they come. With what passes until the next event it is less than a second. A
+/// finished file has larger ones.
+pub(super) const BATCH_S: f64 = 0.8;
 
 /// An open stream; clones of it are the same one.
 #[derive(Clone)]
 pub(super) struct RowStream {
     rerun: RecordingStream,
-    file: Option<PathBuf>,
+    file: Option<RecordingFile>,
     application: ApplicationId,
 }
 
@@ -67,8 +67,11 @@ impl RowStream {
             .batcher_config(ChunkBatcherConfig::NEVER);
         let (rerun, file) = match target {
             Target::File(path) => {
-                make_folder_of(path)?;
-                (builder.save(part_name(path)), Some(path.clone()))
+                let file = RecordingFile::create(path)?;
+                let (_, store, properties, batches, hooks, _) = builder.into_args();
+                let sink = Box::new(file.clone());
+                let stream = RecordingStream::new(store, properties, batches, hooks, sink);
+                (stream, Some(file))
             }
             Target::Viewer(url) => (builder.connect_grpc_opts(url.as_str()), None),
         };
@@ -138,14 +141,6 @@ impl RowStream {
         self.rerun.send_blueprint(messages, activation);
     }
 
-    /// How often to [`Self::flush`].
-    pub(super) fn batch_s(&self) -> f64 {
-        match self.file {
-            Some(_) => FILE_BATCH_S,
-            None => VIEWER_BATCH_S,
-        }
-    }
-
     /// Cuts the batches here and passes them on.
     pub(super) fn flush(&self) -> Result {
         let (flushed, doing) = match self.file {
@@ -158,13 +153,15 @@ impl RowStream {
         flushed.map_err(failed(doing))
     }
 
-    /// Ends the stream; a file gets its index and its final name.
+    /// Ends the stream; a file gets its name.
     pub(super) fn finish(self) -> Result {
         self.flush()?;
-        self.rerun.finalize_deferred_sinks();
         match self.file {
-            Some(path) => finish(&path),
-            None => Ok(()),
+            Some(file) => file.finish(),
+            None => {
+                self.rerun.finalize_deferred_sinks();
+                Ok(())
+            }
         }
     }
 }

@@ -1,9 +1,8 @@
 //! Tables for other programs.
 
-use super::whole_files::{Result, broken, finish, make_folder_of, part_name};
+use super::whole_files::{PartFile, Result, broken, make_folder_of};
 use crate::bus::TrainId;
 use crate::session::{Event, Observer, Opening};
-use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -16,7 +15,7 @@ const HEADER: &str = "time_s,method,uid,identity,chainage_m,true_chainage_m,erro
 pub struct FixTable {
     train: TrainId,
     path: PathBuf,
-    rows: Option<BufWriter<File>>,
+    rows: Option<BufWriter<PartFile>>,
 }
 
 impl FixTable {
@@ -41,7 +40,7 @@ impl FixTable {
 impl Observer for FixTable {
     fn open(&mut self, _: &Opening<'_>) -> Result {
         make_folder_of(&self.path)?;
-        let file = File::create(part_name(&self.path)).map_err(broken(&self.path))?;
+        let file = PartFile::create(&self.path).map_err(broken(&self.path))?;
         let mut rows = BufWriter::new(file);
         writeln!(rows, "{HEADER}").map_err(broken(&self.path))?;
         self.rows = Some(rows);
@@ -80,14 +79,15 @@ impl Observer for FixTable {
             )
             .map_err(broken(&self.path))?;
         }
-        Ok(())
+        // What has been found is kept when the process is killed.
+        rows.flush().map_err(broken(&self.path))
     }
 
     fn close(&mut self) -> Result {
-        let Some(mut rows) = self.rows.take() else {
+        let Some(rows) = self.rows.take() else {
             return Ok(());
         };
-        rows.flush().map_err(broken(&self.path))?;
-        finish(&self.path)
+        let part = rows.into_inner().map_err(|e| e.into_error());
+        part.and_then(PartFile::finish).map_err(broken(&self.path))
     }
 }

@@ -363,3 +363,62 @@ fn fixes_become_rows() {
         assert!(number(10) > 0.0, "the lamp is in front of the camera");
     }
 }
+
+/// Watches a session with a recording, and reads from time to time what a kill would leave of it.
+struct Killed<'a> {
+    recording: Recording,
+    path: &'a Path,
+    looks: usize,
+}
+
+/// The last time of any row of an entity, s; of a file whose end is missing.
+fn last_time_s(path: &Path, entity: &str) -> f64 {
+    let file = BufReader::new(File::open(path).unwrap());
+    let whole = DecoderApp::decode_lazy(file).map_while(Result::ok);
+    let rows = whole.filter_map(|message| match message {
+        LogMsg::ArrowMsg(_, rows) => Some(Chunk::from_arrow_msg(&rows).unwrap()),
+        _ => None,
+    });
+    let rows = rows.filter(|chunk| chunk.entity_path().to_string() == entity);
+    let times = rows.filter_map(|chunk| {
+        let times = chunk.timelines().get(&"sim_time".into())?;
+        Some(1e-9 * times.time_range().max().as_i64() as f64)
+    });
+    times.fold(0.0, f64::max)
+}
+
+impl Observer for Killed<'_> {
+    fn open(&mut self, opening: &Opening<'_>) -> super::Result {
+        self.recording.open(opening)
+    }
+
+    fn observe(&mut self, event: &Event<'_>) -> super::Result {
+        if let Event::Train { truth, .. } = event {
+            let now_s = truth.time.secs();
+            if (10.0 * now_s).round() as usize > self.looks {
+                self.looks += 1;
+                let last_s = last_time_s(&part_name(self.path), "/plots/speed/true");
+                assert!(
+                    now_s - last_s < 1.0,
+                    "{last_s} s of {now_s} s are in the file"
+                );
+            }
+        }
+        self.recording.observe(event)
+    }
+}
+
+/// Fails where rows wait in memory for longer than a second, or in a buffer of the file.
+#[test]
+fn a_kill_loses_less_than_a_second() {
+    let folder = Folder::new("killed");
+    let path = folder.file("run.rrd");
+    let mut killed = Killed {
+        recording: Recording::to_file(&path, &RecordSettings::default()),
+        path: &path,
+        looks: 0,
+    };
+    play(&mut killed, SMALL);
+    assert!(killed.looks > 25, "{}", killed.looks);
+    drop(killed);
+}

@@ -1,9 +1,9 @@
-//! Files that are whole or not there: each is written under a temporary name and renamed.
+//! Files that are whole or not there: each is written under a temporary name, synced, and renamed.
 
 use crate::session::ObserverError;
 use std::error::Error;
-use std::fs;
-use std::io;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// What observers give.
@@ -16,24 +16,117 @@ pub(super) fn part_name(path: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
+/// A file that is being written under its temporary name. Where it is dropped before
+/// [`Self::finish`], or the process is killed, it keeps that name.
+#[derive(Debug)]
+pub(super) struct PartFile {
+    path: PathBuf,
+    file: File,
+}
+
+impl PartFile {
+    /// Begins a file. What a killed process has left under the temporary name is replaced; what a
+    /// living one writes there is an error.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let part = part_name(path);
+        if fs::symlink_metadata(&part).is_ok_and(|about| about.is_file()) {
+            let earlier = File::open(&part)?;
+            if let Err(TryLockError::WouldBlock) = earlier.try_lock() {
+                let what = format!("another process is writing {}", path.display());
+                return Err(io::Error::new(ErrorKind::ResourceBusy, what));
+            }
+        }
+        let file = create_new(&part)?;
+        // File systems without locks lose only the check above.
+        _ = file.try_lock();
+        let path = path.to_owned();
+        Ok(Self { path, file })
+    }
+
+    /// Gives the file its name, once its content is on the disk.
+    pub fn finish(self) -> io::Result<()> {
+        let path = self.path.clone();
+        self.finish_as(&path)
+    }
+
+    /// Gives the file another name in the same folder.
+    pub fn finish_as(self, path: &Path) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(part_name(&self.path), path)?;
+        sync_folder_of(path)
+    }
+}
+
+impl Write for PartFile {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// A new, empty file. A file or a link of that name is removed; what the link points to stays.
+pub(crate) fn create_new(path: &Path) -> io::Result<File> {
+    gone(fs::remove_file(path))?;
+    let mut options = OpenOptions::new();
+    options.write(true).create_new(true).open(path)
+}
+
+/// Makes sure that the names in a file's folder outlast a loss of power.
+fn sync_folder_of(path: &Path) -> io::Result<()> {
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    // Folders cannot be opened everywhere, nor synced on every file system.
+    let Ok(folder) = File::open(folder.unwrap_or(Path::new("."))) else {
+        return Ok(());
+    };
+    match folder.sync_all() {
+        Err(error)
+            if !matches!(
+                error.kind(),
+                ErrorKind::InvalidInput | ErrorKind::Unsupported
+            ) =>
+        {
+            Err(error)
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Writes a whole file.
 pub(crate) fn write_whole(path: &Path, content: &[u8]) -> io::Result<()> {
-    let part = part_name(path);
-    fs::write(&part, content)?;
-    fs::rename(&part, path)
+    let mut part = PartFile::create(path)?;
+    let written = part.write_all(content).and_then(|()| part.finish());
+    if written.is_err() {
+        fs::remove_file(part_name(path)).ok();
+    }
+    written
+}
+
+/// Name of the file by which [`probe`] tries a folder.
+pub(super) const PROBE: &str = ".metrotwin-probe";
+
+/// Makes a folder, and makes sure that files can be written there.
+pub(crate) fn probe(folder: &Path) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let probe = folder.join(PROBE);
+    create_new(&probe)?;
+    fs::remove_file(&probe)
 }
 
 /// What is gone already need not be removed.
 pub(crate) fn gone(removed: io::Result<()>) -> io::Result<()> {
     match removed {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+        Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
         _ => Ok(()),
     }
 }
 
-/// Gives a file that has been written its name.
-pub(super) fn finish(path: &Path) -> Result {
-    fs::rename(part_name(path), path).map_err(broken(path))
+/// Removes a file, and what an interrupted process left of it.
+pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    gone(fs::remove_file(part_name(path)))?;
+    gone(fs::remove_file(path))
 }
 
 /// Makes the folder of a file.
@@ -57,5 +150,36 @@ pub(super) fn failed<E: Into<Box<dyn Error + Send + Sync>>>(
     move |source| ObserverError {
         what,
         source: source.into(),
+    }
+}
+
+#[cfg(all(test, unix))]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::symlink;
+
+    /// Fails where a link that lies under a temporary name leads to another file being written over,
+    /// or two processes write one file.
+    #[test]
+    fn a_temporary_name_that_is_a_link_is_not_followed() {
+        let folder = std::env::temp_dir().join(format!("metrotwin-part-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let [theirs, ours] = ["theirs", "ours"].map(|name| folder.join(name));
+        fs::write(&theirs, "kept").unwrap();
+        symlink(&theirs, part_name(&ours)).unwrap();
+        write_whole(&ours, b"new").unwrap();
+        symlink(&theirs, folder.join(PROBE)).unwrap();
+        probe(&folder).unwrap();
+        assert_eq!(fs::read(&theirs).unwrap(), b"kept");
+        assert_eq!(fs::read(&ours).unwrap(), b"new");
+        assert!(fs::symlink_metadata(&ours).unwrap().is_file());
+
+        let first = PartFile::create(&ours).unwrap();
+        let second = PartFile::create(&ours).unwrap_err();
+        assert_eq!(second.kind(), ErrorKind::ResourceBusy);
+        drop(first);
+        PartFile::create(&ours).unwrap().finish().unwrap();
+        fs::remove_dir_all(&folder).unwrap();
     }
 }

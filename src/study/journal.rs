@@ -8,38 +8,38 @@ use std::path::{Path, PathBuf};
 
 /// Name of the file in a study's folder.
 pub const JOURNAL: &str = "rows.jsonl";
+/// The file that whoever writes into the folder has locked. It is never renamed or removed: a lock on
+/// the journal would be lost when a merge puts another file in its place.
+pub const LOCK: &str = "study.lock";
 
 /// The rows of a study, open to be added to.
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
     file: File,
+    /// Held until it is closed, by whatever end of the process.
+    _lock: File,
 }
 
 impl Journal {
-    /// Opens the journal of a folder, new or to go on with; gives the rows that it has.
+    /// Opens the journal of a folder, new or to go on with, and locks the folder; gives the rows that
+    /// it has.
     pub fn open(folder: &Path) -> Result<(Self, Vec<Row>)> {
+        let lock = lock(folder)?;
         let path = folder.join(JOURNAL);
         let failed = |source| StudyError::file(&path, source);
-        let mut file = OpenOptions::new()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(false)
-            .open(&path)
-            .map_err(failed)?;
-        // Held until the file is closed, by whatever end of the process.
-        match file.try_lock() {
-            Ok(()) => {}
-            Err(TryLockError::WouldBlock) => return Err(StudyError::Busy(folder.to_owned())),
-            Err(TryLockError::Error(source)) => return Err(failed(source)),
-        }
+        let mut file = open(&path).map_err(failed)?;
         let mut text = Vec::new();
         file.read_to_end(&mut text).map_err(failed)?;
         let (rows, whole) = parse(&path, &text)?;
         file.set_len(whole as u64).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
-        Ok((Self { path, file }, rows))
+        let journal = Self {
+            path,
+            file,
+            _lock: lock,
+        };
+        Ok((journal, rows))
     }
 
     /// Adds a row. One that could not be written whole is taken away again.
@@ -61,6 +61,24 @@ impl Journal {
         });
         written.map_err(|source| StudyError::file(&self.path, source))
     }
+}
+
+fn lock(folder: &Path) -> Result<File> {
+    let path = folder.join(LOCK);
+    let failed = |source| StudyError::file(&path, source);
+    let file = open(&path).map_err(failed)?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StudyError::Busy(folder.to_owned())),
+        Err(TryLockError::Error(source)) => Err(failed(source)),
+    }
+}
+
+/// A file to be read and written, made where there is none.
+fn open(path: &Path) -> io::Result<File> {
+    let mut options = OpenOptions::new();
+    options.read(true).write(true).create(true).truncate(false);
+    options.open(path)
 }
 
 /// The rows of a folder, in the order of their indexes; those that were run twice once.
@@ -143,6 +161,20 @@ mod tests {
             Journal::open(&folder),
             Err(StudyError::Journal { line: 1, .. })
         ));
+        std::fs::remove_dir_all(&folder).ok();
+    }
+
+    /// A merge puts another file in the journal's place while a study runs there: whoever comes then must
+    /// still find the folder locked.
+    #[test]
+    fn a_folder_stays_locked_when_its_journal_is_replaced() {
+        let folder = std::env::temp_dir().join(format!("metrotwin-lock-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (journal, _) = Journal::open(&folder).unwrap();
+        super::super::write_whole(&folder.join(JOURNAL), b"").unwrap();
+        assert!(matches!(Journal::open(&folder), Err(StudyError::Busy(_))));
+        drop(journal);
+        assert!(Journal::open(&folder).is_ok());
         std::fs::remove_dir_all(&folder).ok();
     }
 }

@@ -2,6 +2,7 @@
 
 use super::journal::{self, JOURNAL, Journal};
 use super::{INPUTS, Manifest, Result, Row, Shard, Status, Study, StudyError, table, write_whole};
+use crate::record;
 use crate::scenario::sampling::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
@@ -47,7 +48,7 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>> {
             missing.join(", ")
         ));
     }
-    // The journal is locked, so that no study runs there meanwhile.
+    // The folder is locked, so that no study runs there meanwhile.
     let (_journal, there) = Journal::open(folder)?;
     let kept = Manifest::read(folder)?;
     check_free(folder, kept.as_ref(), first, &there)?;
@@ -121,7 +122,10 @@ fn write(folder: &Path, shard: &Path, manifest: &Manifest, mut rows: Vec<Row>) -
     let template = Study::open(shard)?.template;
     let failed = |e| StudyError::file(folder, e);
     let inputs = Inputs::of(&template).map_err(failed)?;
-    inputs.copy_to(&folder.join(INPUTS)).map_err(failed)?;
+    let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
+    copied.map_err(failed)?;
+    // Before the rows: a folder that holds rows belongs to a study.
+    manifest.write(folder)?;
     let mut text = Vec::new();
     for row in &rows {
         serde_json::to_writer(&mut text, row).map_err(|e| failed(e.into()))?;
@@ -129,6 +133,5 @@ fn write(folder: &Path, shard: &Path, manifest: &Manifest, mut rows: Vec<Row>) -
     }
     write_whole(&folder.join(JOURNAL), &text)?;
     table::write(folder, &template, &rows)?;
-    manifest.write(folder)?;
     Ok(rows)
 }

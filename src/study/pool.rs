@@ -1,9 +1,10 @@
 //! Workers: processes that each run one scenario after the other.
 
 use super::{Result, Row, Status, StudyError};
+use crate::record;
 use crate::scenario::sampling::Template;
 use std::collections::VecDeque;
-use std::fs::{self, File};
+use std::fs;
 use std::io::{self, BufRead, BufReader, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, Command, Stdio};
@@ -57,6 +58,7 @@ impl Pool<'_> {
         todo: impl IntoIterator<Item = u64>,
         mut next: impl FnMut(Option<Row>) -> Result<Next>,
     ) -> Result {
+        self.remove_empty_logs();
         let todo = Mutex::new(todo.into_iter().collect::<VecDeque<_>>());
         let halt = AtomicBool::new(false);
         let (rows, arriving) = channel();
@@ -89,6 +91,18 @@ impl Pool<'_> {
             halt.store(true, Ordering::Relaxed);
             result
         })
+    }
+
+    /// Logs that workers of a killed study have left, without a word in them.
+    fn remove_empty_logs(&self) {
+        let is_log = |path: &Path| {
+            let name = path.file_name().and_then(|name| name.to_str());
+            let number = name.and_then(|n| n.strip_prefix("worker-")?.strip_suffix(".log"));
+            number.is_some_and(|n| n.parse::<usize>().is_ok())
+        };
+        let files = fs::read_dir(self.folder).into_iter().flatten().flatten();
+        let logs = files.map(|file| file.path()).filter(|path| is_log(path));
+        logs.for_each(|log| remove_if_empty(&log));
     }
 
     /// Keeps one worker running: a new one is started when the last has died.
@@ -144,7 +158,7 @@ impl Worker {
             .arg(pool.folder)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
-            .stderr(File::create(&log)?);
+            .stderr(record::create_new(&log)?);
         // A worker is a core's work: none beside the driver's own thread.
         for (variable, threads) in [("LP_NUM_THREADS", "0"), ("RAYON_NUM_THREADS", "1")] {
             if std::env::var_os(variable).is_none() {
@@ -209,8 +223,12 @@ impl Worker {
     fn finish(mut self) {
         drop(self.to);
         self.child.wait().ok();
-        if fs::metadata(&self.log).is_ok_and(|log| log.len() == 0) {
-            fs::remove_file(&self.log).ok();
-        }
+        remove_if_empty(&self.log);
+    }
+}
+
+fn remove_if_empty(log: &Path) {
+    if fs::metadata(log).is_ok_and(|log| log.len() == 0) {
+        fs::remove_file(log).ok();
     }
 }

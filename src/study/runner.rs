@@ -5,6 +5,7 @@ use super::journal::{self, Journal};
 use super::pool::{Next, Pool};
 use super::stop::Precision;
 use super::{INPUTS, Manifest, Result, Row, Shard, Status, StudyError, table};
+use crate::record;
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
 use std::collections::BTreeSet;
@@ -137,7 +138,8 @@ fn prepare(
     if kept.is_none() {
         let unreadable = |e| StudyError::file(folder, e);
         let inputs = Inputs::of(template).map_err(unreadable)?;
-        inputs.copy_to(&folder.join(INPUTS)).map_err(unreadable)?;
+        let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
+        copied.map_err(unreadable)?;
     }
     // With fewer runs than it has, a study keeps those that it has.
     let runs = kept.map_or(0, |kept| kept.runs).max(manifest.runs);

@@ -41,8 +41,29 @@ pub struct Submitted {
 }
 
 impl Submission {
+    /// Whether scripts can be made of it: what they name is read by the shell and by Slurm, each by rules
+    /// of its own, and is refused where these give any character another meaning.
+    pub fn check(&self) -> Result {
+        let paths = [&self.program, &self.study, &self.folder].map(|path| path.to_str());
+        let arguments = self.arguments.iter().map(|a| Some(a.as_str()));
+        let mut all = [Some(self.name.as_str())]
+            .into_iter()
+            .chain(paths)
+            .chain(arguments);
+        let is_wrong = |c: char| c.is_control() || "'\"`%\\\u{fffd}".contains(c);
+        let has_wrong = |text: &Option<&str>| text.is_none_or(|text| text.contains(is_wrong));
+        match all.find(has_wrong) {
+            None => Ok(()),
+            Some(text) => Err(StudyError::Unusable(format!(
+                "{:?} cannot stand in a script for Slurm: give names and paths without quotes, `%`, \
+                 backslashes and control characters",
+                text.unwrap_or("a path that is not UTF-8")
+            ))),
+        }
+    }
+
     /// Script of one task of the array.
-    pub fn array_script(&self) -> String {
+    fn array_script(&self) -> String {
         let Self { shards, cores, .. } = self;
         let arguments: Vec<String> = self.arguments.iter().map(|a| quoted(a)).collect();
         format!(
@@ -59,7 +80,7 @@ impl Submission {
     }
 
     /// Script of the job that merges.
-    pub fn merge_script(&self) -> String {
+    fn merge_script(&self) -> String {
         format!(
             "{}exec {} study merge {}\n",
             self.head("merge_%j"),
@@ -83,6 +104,7 @@ impl Submission {
 
     /// Writes both scripts, and gives their paths.
     pub fn write(&self) -> Result<[PathBuf; 2]> {
+        self.check()?;
         let folder = self.scripts();
         fs::create_dir_all(&folder).map_err(|e| StudyError::file(&folder, e))?;
         let write = |name: &str, text: String| {
@@ -139,33 +161,82 @@ impl Submission {
     }
 }
 
-/// For the shell.
+/// For the shell: what [`Submission::check`] lets pass has no quotes.
 fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', "'\\''"))
+    format!("'{text}'")
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 mod tests {
     use super::*;
 
-    /// Paths that the shell would cut up.
-    #[test]
-    fn scripts_quote_what_they_name() {
-        let submission = Submission {
+    fn submission() -> Submission {
+        Submission {
             name: "speeds".into(),
             program: "/opt/a b/metrotwin".into(),
-            study: "/data/o'clock.toml".into(),
+            study: "/data/speeds $HOME.toml".into(),
             folder: "/data/out".into(),
             shards: 4,
             cores: 2,
             arguments: vec!["--renderer".into(), "cpu".into()],
             sbatch: Vec::new(),
-        };
+        }
+    }
+
+    /// A line break that begins a command of its own, a quote that ends a path, a `%` that Slurm fills
+    /// in.
+    #[test]
+    fn what_means_something_to_shell_or_slurm_is_refused() {
+        assert!(submission().check().is_ok());
+        for wrong in [
+            "a\ntouch x #",
+            "o'clock",
+            "\"a\"",
+            "`a`",
+            "50%",
+            "a\\b",
+            "a\u{7f}",
+        ] {
+            let folder = Submission {
+                folder: wrong.into(),
+                ..submission()
+            };
+            let study = Submission {
+                study: wrong.into(),
+                ..submission()
+            };
+            let program = Submission {
+                program: wrong.into(),
+                ..submission()
+            };
+            let name = Submission {
+                name: wrong.into(),
+                ..submission()
+            };
+            let arguments = Submission {
+                arguments: vec![wrong.into()],
+                ..submission()
+            };
+            for submission in [folder, study, program, name, arguments] {
+                let error = submission.write().unwrap_err().to_string();
+                assert!(
+                    error.contains("cannot stand in a script"),
+                    "{wrong:?}: {error}"
+                );
+            }
+        }
+    }
+
+    /// Paths that the shell would cut up.
+    #[test]
+    fn scripts_quote_what_they_name() {
+        let submission = submission();
         let script = submission.array_script();
         assert!(script.starts_with("#!/bin/bash\n"), "{script}");
         assert!(script.contains("#SBATCH --array=1-4\n"), "{script}");
         assert!(
-            script.contains("'/opt/a b/metrotwin' study run '/data/o'\\''clock.toml'"),
+            script.contains("'/opt/a b/metrotwin' study run '/data/speeds $HOME.toml'"),
             "{script}"
         );
         assert!(

@@ -1,7 +1,9 @@
 //! The picture that a better camera would have taken: same place, same rows, no flaws.
 //!
 //! Every row keeps its own instant, the middle of its exposure, so labels fit both pictures alike.
-//! What goes is noise, smear by motion, and glare. Focus and brightness stay.
+//! What goes is noise and glare, and smear by motion where the exposure is shorter than a period of the
+//! lamps' code; a longer one is cut to one period, and keeps the smear of that time. Focus and
+//! brightness stay.
 
 use crate::twin::render::View;
 

@@ -1,15 +1,14 @@
 //! Files of a data set.
 
-use crate::record::whole_files::{Result, broken, finish, gone, part_name, write_whole};
+use crate::record::whole_files::{PartFile, Result, broken, write_whole};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{EncodableLayout, ImageBuffer, Luma, PixelWithColorType};
-use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::ops::Deref;
 use std::path::Path;
 
-/// Files that a data set has, besides [`FOLDERS`].
-pub const FILES: [&str; 8] = [
+/// Files that a data set may have, besides those in [`FOLDERS`] and the copies of its inputs.
+pub(super) const FILES: [&str; 8] = [
     "frames.parquet",
     "rows.parquet",
     "lamps.parquet",
@@ -21,29 +20,7 @@ pub const FILES: [&str; 8] = [
 ];
 
 /// Folders with a file for each frame.
-pub const FOLDERS: [&str; 6] = ["images", "raw", "clean", "depth", "mask", "flow"];
-
-/// Whether a folder holds anything at all.
-pub fn is_empty(folder: &Path) -> io::Result<bool> {
-    match fs::read_dir(folder) {
-        Ok(mut entries) => Ok(entries.next().is_none()),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(true),
-        Err(error) => Err(error),
-    }
-}
-
-/// Takes away what a data set has written into a folder, and nothing else.
-pub fn clear(folder: &Path) -> io::Result<()> {
-    for name in FILES {
-        let path = folder.join(name);
-        gone(fs::remove_file(part_name(&path)))?;
-        gone(fs::remove_file(path))?;
-    }
-    for name in FOLDERS {
-        gone(fs::remove_dir_all(folder.join(name)))?;
-    }
-    Ok(())
-}
+pub(super) const FOLDERS: [&str; 6] = ["images", "raw", "clean", "depth", "mask", "flow"];
 
 /// A picture of 8 or 16 bits as PNG, without loss.
 pub(super) fn write_png<T, C>(path: &Path, image: &ImageBuffer<Luma<T>, C>) -> Result
@@ -75,15 +52,14 @@ pub(super) fn write_npy(
     header += &" ".repeat(spaces);
     header.push('\n');
     let write = || -> io::Result<()> {
-        let mut file = BufWriter::with_capacity(1 << 18, File::create(part_name(path))?);
+        let mut file = BufWriter::with_capacity(1 << 18, PartFile::create(path)?);
         file.write_all(b"\x93NUMPY\x01\x00")?;
         file.write_all(&(header.len() as u16).to_le_bytes())?;
         file.write_all(header.as_bytes())?;
         for number in numbers {
             file.write_all(&number.to_le_bytes())?;
         }
-        file.flush()
+        file.into_inner().map_err(|e| e.into_error())?.finish()
     };
-    write().map_err(broken(path))?;
-    finish(path)
+    write().map_err(broken(path))
 }

@@ -45,21 +45,23 @@ mod lamps;
 mod obstacles;
 mod plan;
 mod readme;
+mod room;
 mod take;
 
-pub use files::{clear, is_empty};
 pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
+pub use room::RoomError;
 
 use crate::bus::TrainId;
+use crate::record::listing::Listing;
 use crate::record::parquet::{Column, ParquetTable};
 use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
-use crate::scenario::sampling::sha256;
+use crate::scenario::sampling::{Inputs, complete, sha256};
 use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::Labeller;
 use crate::twin::render::{Job, Renderer};
-use files::FOLDERS;
+use files::{FILES, FOLDERS};
 use frame::{FrameRow, ImageRow};
 use image::GrayImage;
 use lamps::LampRow;
@@ -72,13 +74,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use take::LastFrame;
 
 /// Where a data set comes from, to be written down with it.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default)]
 pub struct Provenance {
-    /// The scenario file's text.
-    pub scenario: String,
+    /// The scenario's file and all that it names, of which the set gets copies.
+    pub inputs: Option<Inputs>,
     /// Changes to it, `key=value`.
     pub overrides: Vec<String>,
 }
+
+/// Folder of a data set for the copies of its inputs.
+const INPUTS: &str = "inputs";
 
 /// Writes a data set.
 pub struct DataSet<'a> {
@@ -99,6 +104,8 @@ pub struct DataSet<'a> {
     annotations: Vec<coco::Annotation>,
     enough: &'a AtomicBool,
     complete: bool,
+    /// While it is being written.
+    listing: Option<Listing>,
 }
 
 #[derive(Default)]
@@ -166,7 +173,14 @@ impl<'a> DataSet<'a> {
             annotations: Vec::new(),
             enough,
             complete: false,
+            listing: None,
         }
+    }
+
+    /// Makes room in the folder. An earlier data set there is removed by `force`, and nothing else ever
+    /// is; without it, what is there is left alone, unless it is the beginning of this same set.
+    pub fn make_room(&self, force: bool) -> Result<(), RoomError> {
+        room::make_room(&self.out, &self.meta(false), force)
     }
 
     /// All frames of the plan have been taken, before the scenario's end.
@@ -266,14 +280,63 @@ impl<'a> DataSet<'a> {
         self.write(name, &format!("{text}\n"))
     }
 
-    fn meta(&self) -> serde_json::Value {
+    /// Lists files before they are written.
+    fn announce(&mut self, names: impl IntoIterator<Item = String>) -> Result {
+        let listing = self.listing.as_mut();
+        let listed = listing.map_or(Ok(()), |listing| listing.announce(names));
+        listed.map_err(failed("listing the files of the data set"))
+    }
+
+    /// Lists and writes what the set has from its beginning: that it is not finished, and from what it
+    /// is made.
+    fn begin(&mut self) -> Result {
+        let doing = || failed("beginning the data set");
+        fs::create_dir_all(&self.out).map_err(doing())?;
+        self.listing = Some(Listing::open(&self.out, room::COMMAND).map_err(doing())?);
+        let inputs = self.provenance.inputs.clone();
+        let copies = inputs.iter().flat_map(|i| i.copies(Path::new(INPUTS)));
+        let copies = copies.map(|path| path.to_string_lossy().into_owned());
+        let own = FILES.iter().filter(|name| self.has_file(name));
+        let names: Vec<_> = own.map(|name| (*name).to_owned()).chain(copies).collect();
+        self.announce(names)?;
+        self.write_json("meta.json", &self.meta(false))?;
+        let copied = inputs.map_or(Ok(()), |i| i.copy_to(&self.out.join(INPUTS), write_whole));
+        copied.map_err(failed("copying the inputs"))
+    }
+
+    /// Whether one of [`FILES`] will be in the set.
+    fn has_file(&self, name: &str) -> bool {
+        match name {
+            "rows.parquet" => self.plan.has(LabelKind::Rows),
+            "lamps.parquet" => self.plan.has(LabelKind::Lamps),
+            "obstacles.parquet" | "coco.json" => self.plan.has(LabelKind::Obstacles),
+            _ => true,
+        }
+    }
+
+    /// The scenario as it was run, by itself: with all changes, and with the paths of its inputs' copies.
+    fn scenario_text(&self) -> String {
+        let mut file = self.scenario.file.clone();
+        if let Some(inputs) = &self.provenance.inputs {
+            inputs.rename(&mut file, Path::new(INPUTS));
+        }
+        let head = format!(
+            "# {}, seed {}, as it was run: every key stands here, with what it means.\n\n",
+            file.name, file.seed
+        );
+        head + &complete(&file)
+    }
+
+    fn meta(&self, finished: bool) -> serde_json::Value {
         let scenario = self.scenario;
         let cameras = self.cameras.iter();
         let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
         let finite = |s: f64| s.is_finite().then_some(s);
         json!({
-            "format": "metrotwin frames",
-            "format_version": 1,
+            "format": room::FORMAT,
+            "format_version": 2,
+            // Not while it is being made, nor after a kill.
+            "finished": finished,
             "metrotwin": env!("CARGO_PKG_VERSION"),
             "scenario": scenario.file.name,
             "description": scenario.file.description,
@@ -302,6 +365,7 @@ const EYES: [&str; 2] = ["left", "right"];
 
 impl Observer for DataSet<'_> {
     fn open(&mut self, opening: &Opening<'_>) -> Result {
+        self.begin()?;
         let camera = |name: &str, source, view, chainage_m| Camera {
             name: name.to_owned(),
             source,
@@ -376,14 +440,18 @@ impl Observer for DataSet<'_> {
             frames.push(row)?;
         }
         frames.close()?;
-        let meta = self.meta();
+        let meta = self.meta(true);
         if self.plan.has(LabelKind::Obstacles) {
             let set = coco::document(&self.scenario.file.name, &self.images, &self.annotations);
             self.write_json("coco.json", &set)?;
         }
-        let text = readme::of(&self.plan, &meta).map_err(failed("writing README.md"))?;
+        let text =
+            readme::of(&self.plan, &meta, self.period_s).map_err(failed("writing README.md"))?;
         self.write("README.md", &text)?;
-        self.write("scenario.toml", &self.provenance.scenario)?;
+        self.write("scenario.toml", &self.scenario_text())?;
+        let listing = self.listing.take().map_or(Ok(()), Listing::close);
+        listing.map_err(failed("listing the files of the data set"))?;
+        // The last one: it says that all others are whole.
         self.write_json("meta.json", &meta)
     }
 }

@@ -123,7 +123,8 @@ impl DataSet<'_> {
         let (scenario, train) = (&self.scenario.file, exposed.train.as_ref());
         let mut row = FrameRow::new(name, scenario, &frame.sight, left, train);
         self.write_flow(k, &frame)?;
-        self.write_pictures(&frame, &mut row, image, pictures)?;
+        self.name_pictures(&frame, &mut row, pictures)?;
+        self.write_pictures(&frame, &row, image, pictures)?;
         self.push_tables(k, &frame)?;
         self.images.push(json!({
             "id": row.frame_id,
@@ -161,6 +162,7 @@ impl DataSet<'_> {
         );
         let [height, width] = frame.size();
         let file = self.frames[last.row].file("flow", "npy");
+        self.announce([file.clone()])?;
         let numbers = flow.into_iter().flatten();
         write_npy(&self.out.join(&file), &[height, width, 2], numbers)?;
         let row = &mut self.frames[last.row];
@@ -168,12 +170,12 @@ impl DataSet<'_> {
         Ok(())
     }
 
-    /// Image, raw, clean, depth and mask, each where it is wanted. The row gets their names.
-    fn write_pictures(
-        &self,
+    /// Image, raw, clean, depth and mask, each where it is wanted: the row gets their names, and they
+    /// are listed.
+    fn name_pictures(
+        &mut self,
         frame: &Frame<'_>,
         row: &mut FrameRow,
-        image: &GrayImage,
         pictures: &Pictures,
     ) -> Result {
         let labels = |kind| frame.labels.as_ref().filter(|_| self.plan.has(kind));
@@ -183,7 +185,22 @@ impl DataSet<'_> {
         row.clean = pictures.clean.as_ref().map(|_| row.file("clean", "png"));
         row.depth = depth.map(|_| row.file("depth", "npy"));
         row.mask = mask.map(|_| row.file("mask", "png"));
-        let (row, out) = (&*row, &self.out);
+        let others = [&row.raw, &row.clean, &row.depth, &row.mask];
+        let names = others.into_iter().flatten().chain([&row.image]).cloned();
+        self.announce(names.collect::<Vec<_>>())
+    }
+
+    /// Writes what has been named.
+    fn write_pictures(
+        &self,
+        frame: &Frame<'_>,
+        row: &FrameRow,
+        image: &GrayImage,
+        pictures: &Pictures,
+    ) -> Result {
+        let named = |name: &Option<String>| frame.labels.as_ref().filter(|_| name.is_some());
+        let (depth, mask) = (named(&row.depth), named(&row.mask));
+        let out = &self.out;
         let at = |file: &Option<String>| out.join(file.as_deref().unwrap_or_default());
         let mut writes: Vec<Write<'_>> = vec![Box::new(|| write_png(&out.join(&row.image), image))];
         if let Some(raw) = &pictures.raw {

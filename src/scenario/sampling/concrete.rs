@@ -1,27 +1,27 @@
 //! A drawn scenario as a file by itself: complete, every key with its value, and every key with what
 //! it means.
 
-use super::{ScenarioSample, Template};
+use super::{Inputs, ScenarioSample, Template};
 use crate::scenario::{ScenarioError, ScenarioFile};
 use crate::settings::key_below;
 use serde_json::Value as Json;
 use std::fmt::Write;
+use std::path::Path;
 use toml::{Table, Value};
 
 /// Width of comment lines.
 const WIDTH: usize = 96;
 
 impl Template {
-    /// The text of a draw's scenario file. `place` gives the paths of the files that it names.
+    /// The text of a draw's scenario file, which names the copies of its inputs below a folder.
     pub fn text_of(
         &self,
         sample: &ScenarioSample,
-        place: impl Fn(&str) -> String,
+        inputs: &Inputs,
+        folder: &Path,
     ) -> Result<String, ScenarioError> {
         let mut file = self.concrete(sample)?;
-        for name in file.files_mut() {
-            *name = place(name);
-        }
+        inputs.rename(&mut file, folder);
         let name = format!("{}_{:06}", file.name, sample.index);
         let head = self.heading(sample, &name);
         file.name = name;
@@ -55,8 +55,8 @@ impl Template {
     }
 }
 
-/// All keys of a file with their values and their documentation.
-fn complete(file: &ScenarioFile) -> String {
+/// The text of a file with all its keys, their values and their documentation.
+pub fn complete(file: &ScenarioFile) -> String {
     let document = Table::try_from(file).unwrap_or_default();
     let writer = Writer {
         schema: schemars::schema_for!(ScenarioFile).to_value(),

@@ -1,6 +1,7 @@
 //! The files that a study is made of, kept together so that any of its runs can be made again.
 
 use super::Template;
+use crate::scenario::ScenarioFile;
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -21,10 +22,21 @@ pub struct Inputs {
 impl Inputs {
     /// Of a study. Files that are named by absolute paths are not copied, but hashed.
     pub fn of(template: &Template) -> io::Result<Self> {
-        let study = plain(&std::path::absolute(&template.path)?);
+        Self::of_files(&template.path, template.files())
+    }
+
+    /// Of a scenario in a file.
+    pub fn of_scenario(path: &Path, file: &ScenarioFile) -> io::Result<Self> {
+        let mut file = file.clone();
+        let names = file.files_mut();
+        Self::of_files(path, names.into_iter().map(|name| PathBuf::from(&*name)))
+    }
+
+    fn of_files(path: &Path, files: impl IntoIterator<Item = PathBuf>) -> io::Result<Self> {
+        let study = plain(&std::path::absolute(path)?);
         let folder = study.parent().unwrap_or(Path::new("/")).to_owned();
         let (absolute, relative): (Vec<_>, Vec<_>) =
-            template.files().into_iter().partition(|f| f.is_absolute());
+            files.into_iter().partition(|f| f.is_absolute());
         let mut files: Vec<_> = relative.iter().map(|f| plain(&folder.join(f))).collect();
         files.push(study.clone());
         let root = files.iter().fold(folder, |root, file| common(&root, file));
@@ -49,20 +61,39 @@ impl Inputs {
         self.files.iter().map(hash).collect()
     }
 
-    /// Copies all files below a folder.
-    pub fn copy_to(&self, folder: &Path) -> io::Result<()> {
+    /// Paths of the copies that [`Self::copy_to`] makes below a folder.
+    pub fn copies(&self, folder: &Path) -> impl Iterator<Item = PathBuf> {
+        let relative = self.files.iter().filter(|file| file.is_relative());
+        relative.map(move |file| folder.join(file))
+    }
+
+    /// Copies all files below a folder, each by `write`.
+    pub fn copy_to(
+        &self,
+        folder: &Path,
+        write: impl Fn(&Path, &[u8]) -> io::Result<()>,
+    ) -> io::Result<()> {
         for file in self.files.iter().filter(|f| f.is_relative()) {
             let to = folder.join(file);
             if let Some(parent) = to.parent() {
                 fs::create_dir_all(parent)?;
             }
-            fs::write(to, fs::read(self.root.join(file))?)?;
+            write(&to, &fs::read(self.root.join(file))?)?;
         }
         Ok(())
     }
 
+    /// Lets a scenario name the copies below a folder; absolute paths stay.
+    pub fn rename(&self, file: &mut ScenarioFile, folder: &Path) {
+        for name in file.files_mut() {
+            if let Some(place) = self.place_of(name) {
+                *name = folder.join(place).to_string_lossy().into_owned();
+            }
+        }
+    }
+
     /// Where a file that the study's scenario names lies below the root; `None` of absolute paths.
-    pub fn place_of(&self, name: &str) -> Option<PathBuf> {
+    fn place_of(&self, name: &str) -> Option<PathBuf> {
         if Path::new(name).is_absolute() {
             return None;
         }

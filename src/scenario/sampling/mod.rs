@@ -62,6 +62,7 @@ mod settings;
 mod tables;
 mod template;
 
+pub use concrete::complete;
 pub use condition::{Condition, ConditionError};
 pub use inputs::{Inputs, sha256};
 pub use sample::{SampleError, ScenarioSample};

@@ -1,0 +1,226 @@
+//! Which files of a folder a command has written: a list in the folder, `files.txt`, that names each
+//! file before it is begun. So it holds after a kill too, and nothing that it does not name is ever
+//! removed or written over.
+
+use super::whole_files::{PROBE, remove, write_whole};
+use std::collections::BTreeSet;
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, ErrorKind, Write};
+use std::path::{Component, Path, PathBuf};
+
+/// Name of the list in its folder.
+pub(crate) const LIST: &str = "files.txt";
+
+/// The list of a folder, being written.
+#[derive(Debug)]
+pub(crate) struct Listing {
+    folder: PathBuf,
+    command: &'static str,
+    file: File,
+    /// What an interrupted command before this one has listed.
+    earlier: BTreeSet<String>,
+    /// What this one has.
+    announced: BTreeSet<String>,
+}
+
+impl Listing {
+    /// What the command has listed in a folder before; `None` where it has not.
+    pub fn read(folder: &Path, command: &str) -> io::Result<Option<BTreeSet<String>>> {
+        let path = folder.join(LIST);
+        match fs::symlink_metadata(&path) {
+            Ok(about) if about.is_file() => {}
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
+            _ => return Ok(None),
+        }
+        let text = fs::read(&path)?;
+        let text = String::from_utf8_lossy(&text);
+        // A last line without an end was cut by a loss of power, before its files were begun.
+        let lines = text.strip_prefix(&heading(command));
+        let lines = lines.map(|text| text.rsplit_once('\n').map_or("", |(whole, _)| whole));
+        Ok(lines.map(|text| {
+            let names = text.lines().filter(|name| is_plain(name));
+            names.map(str::to_owned).collect()
+        }))
+    }
+
+    /// Goes on with the list of a folder, or begins one. `command` is the one whose files they are.
+    pub fn open(folder: &Path, command: &'static str) -> io::Result<Self> {
+        let path = folder.join(LIST);
+        let earlier = Self::read(folder, command)?;
+        if earlier.is_none() && path.symlink_metadata().is_ok() {
+            return Err(taken(&path));
+        }
+        let earlier = earlier.unwrap_or_default();
+        write_whole(&path, text(command, &earlier).as_bytes())?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            command,
+            file: OpenOptions::new().append(true).open(&path)?,
+            earlier,
+            announced: BTreeSet::new(),
+        })
+    }
+
+    /// Lists files that are about to be written, by their paths below the folder. One that is there and
+    /// not listed is somebody else's, and an error.
+    pub fn announce(&mut self, names: impl IntoIterator<Item = String>) -> io::Result<()> {
+        let mut lines = String::new();
+        for name in names {
+            if !is_plain(&name) {
+                let what = format!("`{}` is no name that can be listed", name.escape_debug());
+                return Err(io::Error::new(ErrorKind::InvalidInput, what));
+            }
+            if !self.earlier.contains(&name) && !self.announced.contains(&name) {
+                let path = self.folder.join(&name);
+                if path.symlink_metadata().is_ok() {
+                    return Err(taken(&path));
+                }
+                lines += &format!("{name}\n");
+            }
+            self.announced.insert(name);
+        }
+        if !lines.is_empty() {
+            self.file.write_all(lines.as_bytes())?;
+            self.file.sync_data()?;
+        }
+        Ok(())
+    }
+
+    /// Removes what is listed and was not announced this time, and lists the rest in order.
+    pub fn close(self) -> io::Result<()> {
+        let stale = self.earlier.difference(&self.announced);
+        remove_all(&self.folder, &stale.cloned().collect())?;
+        let text = text(self.command, &self.announced);
+        write_whole(&self.folder.join(LIST), text.as_bytes())
+    }
+
+    /// Removes all that the command has listed in a folder, and the list; folders that are empty then
+    /// go too.
+    pub fn clear(folder: &Path, command: &str) -> io::Result<()> {
+        if let Some(listed) = Self::read(folder, command)? {
+            remove_all(folder, &listed)?;
+            remove(&folder.join(LIST))?;
+        }
+        Ok(())
+    }
+}
+
+/// The first of some names below a folder that is taken by a file which the command has not listed.
+pub(crate) fn foreign<'a>(
+    folder: &Path,
+    command: &str,
+    names: impl IntoIterator<Item = &'a str>,
+) -> io::Result<Option<&'a str>> {
+    let listed = Listing::read(folder, command)?;
+    let is_ours = |name: &str| match &listed {
+        Some(listed) => name == LIST || listed.contains(name),
+        None => false,
+    };
+    let mut names = names.into_iter().chain([LIST]);
+    Ok(names.find(|name| folder.join(name).symlink_metadata().is_ok() && !is_ours(name)))
+}
+
+/// Whether a folder holds nothing, or is not there.
+pub(crate) fn is_empty(folder: &Path) -> io::Result<bool> {
+    match fs::read_dir(folder) {
+        Ok(entries) => Ok(entries.flatten().all(|entry| entry.file_name() == PROBE)),
+        Err(error) if error.kind() == ErrorKind::NotFound => Ok(true),
+        Err(error) => Err(error),
+    }
+}
+
+fn taken(path: &Path) -> io::Error {
+    let what = format!("{} is there already, and is not ours", path.display());
+    io::Error::new(ErrorKind::AlreadyExists, what)
+}
+
+fn heading(command: &str) -> String {
+    format!("# Written here by {command}, which may remove it again:\n")
+}
+
+fn text(command: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+    let names = names.into_iter();
+    names.fold(heading(command), |text, name| text + name.as_ref() + "\n")
+}
+
+/// A path that leads to below the folder, on one line.
+fn is_plain(name: &str) -> bool {
+    let parts = Path::new(name).components();
+    !name.is_empty()
+        && !name.contains(char::is_control)
+        && parts
+            .into_iter()
+            .all(|part| matches!(part, Component::Normal(_)))
+}
+
+/// Removes files below a folder, and the folders that are empty then. Nothing is reached through a
+/// link.
+fn remove_all(folder: &Path, names: &BTreeSet<String>) -> io::Result<()> {
+    let mut folders = BTreeSet::new();
+    for name in names {
+        let above: Vec<_> = Path::new(name).ancestors().skip(1).collect();
+        let above = above.iter().filter(|path| !path.as_os_str().is_empty());
+        let mut above = above.map(|path| folder.join(path));
+        let is_link = |path: &PathBuf| path.symlink_metadata().is_ok_and(|a| a.is_symlink());
+        if above.clone().any(|path| is_link(&path)) {
+            continue;
+        }
+        remove(&folder.join(name))?;
+        folders.extend(&mut above);
+    }
+    // The deepest first. One that is not empty stays.
+    for folder in folders.iter().rev() {
+        fs::remove_dir(folder).ok();
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    /// Fails where a foreign file is removed or written over, a stale one stays, a list leads out of its
+    /// folder, or a list that was cut is not read.
+    #[test]
+    fn only_what_is_listed_is_removed() {
+        let base = std::env::temp_dir().join(format!("metrotwin-list-{}", std::process::id()));
+        let folder = base.join("folder");
+        fs::create_dir_all(folder.join("images/left")).unwrap();
+        let write = |name: &str| fs::write(folder.join(name), name).unwrap();
+        write("images/holiday.jpg");
+        write("notes.txt");
+        fs::write(base.join("outside"), "kept").unwrap();
+        let names = ["images/left/1.png", "images/left/2.png", "meta.json"].map(str::to_owned);
+
+        let mut first = Listing::open(&folder, "one").unwrap();
+        first.announce(names.clone()).unwrap();
+        names.iter().for_each(|name| write(name));
+        assert!(first.announce(["notes.txt".to_owned()]).is_err());
+        assert!(first.announce(["../outside".to_owned()]).is_err());
+        drop(first);
+        // As after a kill: the list goes on, and another command does not take it for its own.
+        assert!(Listing::open(&folder, "two").is_err());
+        let list = fs::read_to_string(folder.join(LIST)).unwrap();
+        fs::write(folder.join(LIST), list.clone() + "../outside\nimages/ho").unwrap();
+        let mut second = Listing::open(&folder, "one").unwrap();
+        second.announce([names[0].clone()]).unwrap();
+        second.close().unwrap();
+        let there = |name: &str| folder.join(name).exists();
+        assert!(there(&names[0]) && !there(&names[1]) && !there(&names[2]));
+        assert_eq!(
+            foreign(&folder, "one", ["notes.txt"]).unwrap(),
+            Some("notes.txt")
+        );
+        assert_eq!(
+            foreign(&folder, "one", [&*names[0], &names[1]]).unwrap(),
+            None
+        );
+
+        Listing::clear(&folder, "one").unwrap();
+        assert!(!there("images/left") && !there(LIST));
+        assert!(there("images/holiday.jpg") && there("notes.txt"));
+        assert!(base.join("outside").exists());
+        fs::remove_dir_all(&base).unwrap();
+    }
+}
