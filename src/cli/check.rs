@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::file_kind::FileKind;
 use super::{print, tunnel};
-use crate::settings::FileError;
+use crate::settings::{FileError, ReadLimit, read_text};
 use crate::track::Tunnel;
 use std::path::{Path, PathBuf};
 
@@ -75,7 +75,7 @@ fn other(path: &Path, text: &str, _: FileKind) -> Result<String, Failure> {
 }
 
 fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|source| {
+    read_text(path, ReadLimit::TOML).map_err(|source| {
         let path = path.to_owned();
         Failure::file(&path.clone(), "", FileError::Read { path, source })
     })

@@ -13,6 +13,7 @@
 //! ```
 
 mod check;
+mod excerpt;
 mod fault;
 mod file_kind;
 mod tunnel;

@@ -26,6 +26,7 @@ fn fault(error: ScenarioError) -> Fault {
             );
             Fault::of_file(heading, (&path, ""), source, &changed_by(&overrides))
         }
+        ScenarioError::Files(errors) => Fault::several(errors.into_iter().map(fault)),
         ScenarioError::File {
             path,
             text,

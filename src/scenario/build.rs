@@ -4,7 +4,9 @@ use super::file::{OnboardEquipment, OnboardSettings, ScenarioFile};
 use super::meshes::read_meshes;
 use super::{Override, OverrideError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
-use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
+use crate::settings::{
+    Checker, FileError, Problem, ReadLimit, Settings, key_below, read_text, read_toml,
+};
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
@@ -137,6 +139,14 @@ pub enum ScenarioError {
         /// What is wrong.
         source: FileError,
     },
+    /// Several files are wrong: the scenario, and what it names.
+    #[error("{}", lines(.0))]
+    Files(Vec<ScenarioError>),
+}
+
+fn lines(errors: &[ScenarioError]) -> String {
+    let lines: Vec<String> = errors.iter().map(ScenarioError::to_string).collect();
+    lines.join("\n")
 }
 
 impl ScenarioError {
@@ -181,36 +191,17 @@ impl Scenario {
             file = overridden(path, text, overrides)?;
         }
 
-        let mut problems = Vec::new();
+        let mut parts = Parts::default();
         let folder = path.parent().unwrap_or(Path::new(""));
-        let keys: Vec<_> = (0..file.trains().count())
-            .map(|k| file.train_key(k))
-            .collect();
-        let trains = file.train.iter_mut().chain(&mut file.other_trains);
-        for (at, train) in keys.iter().zip(trains) {
-            let key = key_below(at, "vehicle");
-            load_vehicle(folder, (key, train), &mut problems)?;
-        }
-        read_meshes(&mut file, folder, &mut problems);
-        // What could not be read would be missed once more.
-        if problems.is_empty() {
-            file.check("", &mut problems);
-        }
-        let tunnel_path = folder.join(&file.tunnel);
-        let tunnel = match std::fs::read_to_string(&tunnel_path) {
-            Ok(text) => Some(parse_tunnel(&tunnel_path, &text)),
-            Err(error) => {
-                problems.push(unreadable("tunnel", &tunnel_path, "tunnel", &error));
-                None
-            }
+        parts.read_vehicles(&mut file, folder);
+        read_meshes(&mut file, folder, &mut parts.problems);
+        file.check("", &mut parts.problems);
+        let tunnel = parts.read_tunnel(&file.tunnel, folder);
+        let checked = match tunnel {
+            Some(tunnel) => Self::in_tunnel(file, tunnel, parts.problems),
+            None => Err(FileError::Problems(parts.problems)),
         };
-        let tunnel = match tunnel {
-            // The scenario's own problems first: the tunnel may be the wrong one.
-            Some(tunnel) if problems.is_empty() => tunnel?,
-            Some(Ok(tunnel)) => tunnel,
-            _ => return Err(wrong(FileError::Problems(problems))),
-        };
-        Self::in_tunnel(file, tunnel, problems).map_err(wrong)
+        all_errors(checked.map_err(wrong), parts.wrong_files)
     }
 
     /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
@@ -272,21 +263,89 @@ impl Scenario {
     }
 }
 
-/// Reads the vehicle file that a train names; a name without `.toml` is one of the program's own.
-fn load_vehicle(
-    folder: &Path,
-    (key, train): (String, &mut TrainSettings),
-    problems: &mut Vec<Problem>,
-) -> Result<(), ScenarioError> {
-    if Path::new(&train.vehicle).extension().is_none() {
-        return Ok(());
+/// What reading the files that a scenario names comes to.
+#[derive(Default)]
+struct Parts {
+    /// Of the scenario itself.
+    problems: Vec<Problem>,
+    wrong_files: Vec<ScenarioError>,
+}
+
+impl Parts {
+    /// Reads the vehicle files that trains name; a name without `.toml` is one of the program's own.
+    fn read_vehicles(&mut self, file: &mut ScenarioFile, folder: &Path) {
+        let keys = 0..file.trains().count();
+        let keys: Vec<String> = keys.map(|k| key_below(&file.train_key(k), "vehicle")).collect();
+        let trains = file.train.iter_mut().chain(&mut file.other_trains);
+        for (key, train) in keys.into_iter().zip(trains) {
+            if Path::new(&train.vehicle).extension().is_some() {
+                let path = folder.join(&train.vehicle);
+                train.vehicle_file = self.read(&key, &path, "vehicle", parse_vehicle);
+            }
+        }
     }
-    let path = folder.join(&train.vehicle);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => train.vehicle_file = Some(parse_vehicle(&path, &text)?),
-        Err(error) => problems.push(unreadable(&key, &path, "vehicle", &error)),
+
+    fn read_tunnel(&mut self, name: &str, folder: &Path) -> Option<Tunnel> {
+        self.read("tunnel", &folder.join(name), "tunnel", parse_tunnel)
     }
-    Ok(())
+
+    /// A file of a kind that the scenario names under a key.
+    fn read<T>(
+        &mut self,
+        key: &str,
+        path: &Path,
+        kind: &str,
+        parse: impl Fn(&Path, &str) -> Result<T, ScenarioError>,
+    ) -> Option<T> {
+        let parsed = match read_text(path, ReadLimit::TOML) {
+            Ok(text) => parse(path, &text),
+            Err(error) => {
+                self.problems.push(unreadable(key, path, kind, &error));
+                return None;
+            }
+        };
+        match parsed {
+            Ok(part) => Some(part),
+            Err(error) => {
+                // It keeps what follows from the wrong file from being told of the key too.
+                self.problems.push(Problem::new(key, WRONG_FILE, ""));
+                self.wrong_files.push(error);
+                None
+            }
+        }
+    }
+}
+
+/// Stands under a key whose file is wrong, which is told with that file.
+const WRONG_FILE: &str = "names a file that cannot be used";
+
+/// A scenario, or all that is wrong: first with its own file.
+fn all_errors(
+    own: Result<Scenario, ScenarioError>,
+    wrong_files: Vec<ScenarioError>,
+) -> Result<Scenario, ScenarioError> {
+    let mut own = match own {
+        Ok(scenario) => return Ok(scenario),
+        Err(own) => own,
+    };
+    let is_of_its_own = match &mut own {
+        ScenarioError::File {
+            source: FileError::Problems(problems),
+            ..
+        } => {
+            problems.retain(|problem| problem.what != WRONG_FILE);
+            !problems.is_empty()
+        }
+        _ => true,
+    };
+    let mut errors: Vec<_> = wrong_files;
+    if is_of_its_own {
+        errors.insert(0, own);
+    }
+    match errors.len() {
+        1 => Err(errors.remove(0)),
+        _ => Err(ScenarioError::Files(errors)),
+    }
 }
 
 fn unreadable(key: &str, path: &Path, kind: &str, error: &std::io::Error) -> Problem {
@@ -309,7 +368,7 @@ pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioEr
 
 /// Reads a file's text.
 pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(path).map_err(|source| {
+    read_text(path, ReadLimit::TOML).map_err(|source| {
         let file = path.to_owned();
         ScenarioError::file(path, "", FileError::Read { path: file, source })
     })

@@ -198,7 +198,7 @@ settings! {
         /// Number of points.
         points: u32 = 20, in 1.0..=1e5;
         /// Chainage of the train head at the first point, m.
-        first_m: f64 = 0.0;
+        first_m: f64 = 0.0, in -1e6..=1e6;
         /// From point to point, m.
         step_m: f64 = 0.5, in -1e3..=1e3;
         /// Fixes to take at each point, or as many as 5 s yield.
@@ -213,6 +213,11 @@ impl BenchSettings {
             first_m, step_m, ..
         } = *self;
         (0..self.points).map(move |k| first_m + f64::from(k) * step_m)
+    }
+
+    /// Chainage of the head at the last point.
+    pub fn last_m(&self) -> f64 {
+        self.first_m + f64::from(self.points.saturating_sub(1)) * self.step_m
     }
 
     /// Time that all pairs of images take.

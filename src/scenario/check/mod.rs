@@ -27,8 +27,9 @@ impl ScenarioFile {
         check_onboard(self, check);
         check_names(self, check);
         check_reach(self, check);
+        let mut devices = BTreeSet::new();
         for (k, post) in self.wayside.iter().enumerate() {
-            if self.wayside[..k].iter().any(|p| p.device == post.device) {
+            if !devices.insert(&post.device) {
                 check.problem(
                     &format!("wayside[{k}].device"),
                     format!("`{}` is in use already", post.device),
@@ -98,9 +99,10 @@ fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
         }
     }
     let others = file.other_trains.len();
+    let mut equipped = BTreeSet::new();
     for (k, onboard) in file.onboard.iter().enumerate() {
         let number = usize::from(onboard.train);
-        let twice = file.onboard[..k].iter().any(|o| o.train == onboard.train);
+        let twice = !equipped.insert(onboard.train);
         let what = if twice {
             format!("train {number} has its equipment already")
         } else if number == 0 || number > others {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::settings::{Problem, did_you_mean, locate};
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]
