@@ -38,7 +38,11 @@ impl Excerpt {
         let (marked, tail) = (line.get(..end)?, line.get(end..)?);
 
         let skipped = match head.chars().count() + line.chars().count() > WIDEST {
-            true => head.char_indices().rev().nth(BEFORE - 1).map_or(0, |(k, _)| k),
+            true => head
+                .char_indices()
+                .rev()
+                .nth(BEFORE - 1)
+                .map_or(0, |(k, _)| k),
             false => 0,
         };
         let above = lines_above.lines().next_back();
@@ -74,7 +78,10 @@ impl SourceCode for Excerpt {
         lines_before: usize,
         lines_after: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        let shown = self.text.as_str().read_span(span, lines_before, lines_after)?;
+        let shown = self
+            .text
+            .as_str()
+            .read_span(span, lines_before, lines_after)?;
         let left_out = match shown.column() {
             0 => 0,
             _ => self.bytes_left_out,
@@ -97,7 +104,9 @@ mod tests {
 
     fn line_and_column(text: &str, span: Range<usize>) -> (usize, usize, String) {
         let excerpt = Excerpt::around("x.toml".to_owned(), text, span).unwrap();
-        let contents = excerpt.read_span(&excerpt.place.clone().into(), 0, 0).unwrap();
+        let contents = excerpt
+            .read_span(&excerpt.place.clone().into(), 0, 0)
+            .unwrap();
         let marked = excerpt.text[excerpt.place.clone()].to_owned();
         (contents.line(), contents.column(), marked)
     }
@@ -109,7 +118,11 @@ mod tests {
         let text = "a = 1\nb = 2\nc = 3\nd = 4\n";
         assert_eq!(line_and_column(text, 16..17), (2, 4, "3".to_owned()));
         assert_eq!(line_and_column(text, 0..1), (0, 0, "a".to_owned()));
-        let long = format!("a = 1\n{}b = [{}]\n", " ".repeat(70_000), "7, ".repeat(1000));
+        let long = format!(
+            "a = 1\n{}b = [{}]\n",
+            " ".repeat(70_000),
+            "7, ".repeat(1000)
+        );
         let (line, column, marked) = line_and_column(&long, 70_006..70_007);
         assert_eq!((line, column, marked.as_str()), (1, 70_000, "b"));
         let excerpt = Excerpt::around(String::new(), &long, 70_010..73_000).unwrap();

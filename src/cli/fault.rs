@@ -93,7 +93,9 @@ impl Fault {
     /// Of several wrong files: the first, and then the others.
     pub(super) fn several(faults: impl Iterator<Item = Self>) -> Self {
         let mut faults = faults;
-        let mut first = faults.next().unwrap_or_else(|| Self::new("nothing is wrong"));
+        let mut first = faults
+            .next()
+            .unwrap_or_else(|| Self::new("nothing is wrong"));
         for mut other in faults {
             let related = std::mem::take(&mut other.others);
             first.others.push(other);

@@ -24,6 +24,8 @@ mod check_scenario;
 #[cfg(feature = "twin")]
 mod doctor;
 #[cfg(feature = "twin")]
+mod driver_noise;
+#[cfg(feature = "twin")]
 mod frames;
 #[cfg(feature = "twin")]
 mod generate;
@@ -91,6 +93,10 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     start_messages(cli.verbose);
+    #[cfg(feature = "twin")]
+    if !matches!(cli.command, Command::Check(_) | Command::Generate(_)) {
+        driver_noise::silence();
+    }
     let result = match cli.command {
         #[cfg(feature = "twin")]
         Command::Run(args) => run::run(&args),

@@ -2,10 +2,11 @@
 
 use super::file::{OnboardEquipment, OnboardSettings, ScenarioFile};
 use super::meshes::read_meshes;
+use super::overrides::is_within;
 use super::{Override, OverrideError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{
-    Checker, FileError, Problem, ReadLimit, Settings, key_below, read_text, read_toml,
+    Checker, FileError, Problem, ReadLimit, Settings, key_below, read_settings, read_text,
 };
 use crate::track::{Direction, Tunnel};
 use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
@@ -159,6 +160,48 @@ impl ScenarioError {
             source,
         }
     }
+
+    /// Whether any of its problems is at or below a key.
+    pub(super) fn is_at(&self, key: &str) -> bool {
+        match self {
+            Self::Files(errors) => errors.iter().any(|error| error.is_at(key)),
+            Self::File {
+                source: FileError::Problems(problems),
+                ..
+            } => problems.iter().any(|problem| is_within(&problem.key, key)),
+            _ => false,
+        }
+    }
+
+    /// With more problems of a file.
+    pub(super) fn joined(
+        error: Option<Self>,
+        path: &Path,
+        text: &str,
+        more: Vec<Problem>,
+    ) -> Option<Self> {
+        let mut errors = match error {
+            Some(Self::Files(errors)) => errors,
+            error => error.into_iter().collect(),
+        };
+        let mut of_file = errors.iter_mut().filter_map(|error| match error {
+            Self::File {
+                path: other,
+                source: FileError::Problems(problems),
+                ..
+            } if other == path => Some(problems),
+            _ => None,
+        });
+        match of_file.next() {
+            Some(problems) => problems.extend(more),
+            None if more.is_empty() => {}
+            None => errors.insert(0, Self::file(path, text, FileError::Problems(more))),
+        }
+        match errors.len() {
+            0 | 1 => errors.pop(),
+            _ => Some(Self::Files(errors)),
+        }
+    }
 }
 
 fn list(overrides: &[Override]) -> String {
@@ -186,7 +229,7 @@ impl Scenario {
         };
         // The file must be right by itself, so that its errors are not taken for those
         // of the command line.
-        let mut file: ScenarioFile = read_toml(text).map_err(wrong)?;
+        let mut file: ScenarioFile = read_settings(text).map_err(wrong)?;
         if !overrides.is_empty() {
             file = overridden(path, text, overrides)?;
         }
@@ -275,7 +318,9 @@ impl Parts {
     /// Reads the vehicle files that trains name; a name without `.toml` is one of the program's own.
     fn read_vehicles(&mut self, file: &mut ScenarioFile, folder: &Path) {
         let keys = 0..file.trains().count();
-        let keys: Vec<String> = keys.map(|k| key_below(&file.train_key(k), "vehicle")).collect();
+        let keys: Vec<String> = keys
+            .map(|k| key_below(&file.train_key(k), "vehicle"))
+            .collect();
         let trains = file.train.iter_mut().chain(&mut file.other_trains);
         for (key, train) in keys.into_iter().zip(trains) {
             if Path::new(&train.vehicle).extension().is_some() {
@@ -396,7 +441,7 @@ pub(super) fn overridden(
         change.apply(&mut document)?;
     }
     let text = toml::to_string(&document).map_err(|e| wrong(syntax(e.to_string())))?;
-    read_toml(&text).map_err(wrong)
+    read_settings(&text).map_err(wrong)
 }
 
 /// Poses are asked for until the last row of a frame has closed.

@@ -60,9 +60,8 @@ fn read_hull(path: &Path) -> Result<Hull, (String, String)> {
     let triangles: usize = meshes().map(|mesh| mesh.indices.len() / 3).sum();
     let points: usize = meshes().map(|mesh| mesh.positions.len() / 3).sum();
     if triangles.max(points) > MAX_TRIANGLES {
-        let what = format!(
-            "it has {triangles} triangles of {points} points, more than {MAX_TRIANGLES}"
-        );
+        let what =
+            format!("it has {triangles} triangles of {points} points, more than {MAX_TRIANGLES}");
         return Err(failed(what, "simplify it: only its convex hull is used"));
     }
     let points: Vec<Point3<f64>> = meshes()

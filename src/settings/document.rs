@@ -1,6 +1,7 @@
 //! TOML into a typed struct, with every wrong key named.
 
-use super::problem::FileError;
+use super::declaration::Settings;
+use super::problem::{FileError, Problem};
 use super::search::Search;
 use serde::de::DeserializeOwned;
 use toml::de::DeTable;
@@ -19,12 +20,26 @@ use toml::de::DeTable;
 /// assert!(error.to_string().contains("did you mean `spacing_m`"));
 /// ```
 pub fn read_toml<T: DeserializeOwned>(text: &str) -> Result<T, FileError> {
+    read(text, |_: &T, _| {})
+}
+
+/// As [`read_toml`], of settings: where keys are wrong, numbers out of their range are told with
+/// them. Where none are, `check` is left to the caller, who may know more.
+pub fn read_settings<T: DeserializeOwned + Settings>(text: &str) -> Result<T, FileError> {
+    read(text, |settings: &T, problems| settings.check("", problems))
+}
+
+fn read<T: DeserializeOwned>(
+    text: &str,
+    check: impl Fn(&T, &mut Vec<Problem>),
+) -> Result<T, FileError> {
     let document = DeTable::parse(text).map_err(|e| FileError::Syntax {
         message: e.message().to_owned(),
         span: e.span(),
     })?;
     T::deserialize(toml::Deserializer::from(document.clone())).map_err(|error| {
-        FileError::Problems(Search::of(document, text.len()).problems::<T>(error))
+        let search = Search::of(document, text.len());
+        FileError::Problems(search.problems(error, check))
     })
 }
 

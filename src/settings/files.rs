@@ -102,7 +102,10 @@ mod tests {
             }
         }
         fs::write(folder.join("right.toml"), "a = 1").unwrap();
-        assert_eq!(read_text(&folder.join("right.toml"), ReadLimit::TOML).unwrap(), "a = 1");
+        assert_eq!(
+            read_text(&folder.join("right.toml"), ReadLimit::TOML).unwrap(),
+            "a = 1"
+        );
         fs::remove_dir_all(&folder).unwrap();
     }
 }

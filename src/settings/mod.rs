@@ -17,7 +17,7 @@ mod wrong;
 
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
-pub use document::read_toml;
+pub use document::{read_settings, read_toml};
 pub use entries::locate;
 pub use files::{ReadLimit, read_bytes, read_text};
 pub use names::{did_you_mean, name_advice};

@@ -29,6 +29,11 @@ impl Problem {
         }
     }
 
+    /// A number is out of its range: nothing else can be the reason.
+    pub(super) fn is_of_range(&self) -> bool {
+        self.what.ends_with(OUT_OF_RANGE)
+    }
+
     /// Key and what is wrong with it, for people.
     pub fn said(&self) -> String {
         match self.key.as_str() {
@@ -38,6 +43,7 @@ impl Problem {
     }
 }
 
+const OUT_OF_RANGE: &str = "is out of range";
 /// Letters that are shown of what is wrong, and of what would be right.
 const LONGEST_TEXT: usize = 1000;
 /// Letters that are shown of a key.
@@ -119,25 +125,13 @@ impl<'a> Checker<'a> {
         let space = if unit.is_empty() { "" } else { " " };
         self.problem(
             key,
-            format!("{value}{space}{unit} is out of range"),
+            format!("{value}{space}{unit} {OUT_OF_RANGE}"),
             match (low.is_finite(), high.is_finite()) {
                 (true, false) => format!("give at least {low}{space}{unit}"),
                 (false, true) => format!("give at most {high}{space}{unit}"),
                 _ => format!("give {low} to {high}{space}{unit}"),
             },
         );
-    }
-
-    /// Adds a problem unless a number is greater than 0; `usual` is one that is.
-    pub fn positive(&mut self, key: &str, value: f64, usual: f64) {
-        if !(value.is_finite() && value > 0.0) {
-            let unit = of_key(key);
-            self.problem(
-                key,
-                format!("{value} {unit} is not greater than 0"),
-                format!("give a positive number of {unit}, usually {usual}"),
-            );
-        }
     }
 
     /// Nothing is wrong at or below one of its keys.
@@ -194,7 +188,11 @@ const MOST_SHOWN: usize = 20;
 pub fn shown(problems: &[Problem]) -> (&[Problem], Option<String>) {
     let shown = problems.get(..MOST_SHOWN).unwrap_or(problems);
     let more = problems.len() - shown.len();
-    let least = if problems.len() < MOST_PROBLEMS { "" } else { "at least " };
+    let least = if problems.len() < MOST_PROBLEMS {
+        ""
+    } else {
+        "at least "
+    };
     let rest = format!("{least}{more} more problems are not shown");
     (shown, (more > 0).then_some(rest))
 }

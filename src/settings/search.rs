@@ -38,6 +38,8 @@ pub(super) struct Search<'t> {
     entries: Entries,
     problems: Vec<Problem>,
     stand_in: Option<StandIn>,
+    /// Missing keys.
+    put_in: BTreeSet<String>,
     /// Keys that are missing only because they were taken out, or are there by a wrong name.
     taken: BTreeSet<String>,
     /// Tables whose kind is not known, and lists with elements taken out: what serde says of them
@@ -54,6 +56,7 @@ impl<'t> Search<'t> {
             document,
             problems: Vec::new(),
             stand_in: None,
+            put_in: BTreeSet::new(),
             taken: BTreeSet::new(),
             unsure: Vec::new(),
             text_len,
@@ -62,7 +65,12 @@ impl<'t> Search<'t> {
     }
 
     /// All problems, the first of which serde told.
-    pub(super) fn problems<T: DeserializeOwned>(mut self, first: Error) -> Vec<Problem> {
+    /// `check` finds what is wrong with the values of what could be read.
+    pub(super) fn problems<T: DeserializeOwned>(
+        mut self,
+        first: Error,
+        check: impl Fn(&T, &mut Vec<Problem>),
+    ) -> Vec<Problem> {
         let turns = (MOST_BYTES / self.text_len.max(1)).clamp(1, MOST_TURNS);
         let mut error = first;
         for _ in 0..turns {
@@ -73,7 +81,12 @@ impl<'t> Search<'t> {
                 return self.problems;
             }
             match self.read::<T>() {
-                Ok(_) => return self.problems,
+                Ok(mended) => {
+                    let mut more = Vec::new();
+                    check(&mended, &mut more);
+                    self.add_ranges(more);
+                    return self.problems;
+                }
                 Err(next) => error = next,
             }
         }
@@ -83,6 +96,16 @@ impl<'t> Search<'t> {
             "correct these first",
         ));
         self.problems
+    }
+
+    /// Adds numbers out of their range, unless they were put in, or taken out and have a default. What
+    /// else a mended document is wrong about may follow from its mending.
+    fn add_ranges(&mut self, found: Vec<Problem>) {
+        for problem in found.into_iter().filter(Problem::is_of_range) {
+            if !self.put_in.contains(&problem.key) && !self.taken.contains(&problem.key) {
+                self.note(problem);
+            }
+        }
     }
 
     fn read<T: DeserializeOwned>(&self) -> Result<T, Error> {
@@ -119,6 +142,7 @@ impl<'t> Search<'t> {
         if table.start <= self.text_len {
             let path = self.entries.path(self.entries.table_at(&table));
             let path = key_below(&path, key);
+            self.put_in.insert(path.clone());
             if !self.taken.contains(&path) {
                 self.note(wrong.problem(path, Vec::new()));
             }
@@ -243,7 +267,9 @@ impl<'t> Search<'t> {
 }
 
 /// Tables directly inside a value.
-fn tables_in<'a, 't>(value: &'a mut Spanned<DeValue<'t>>) -> Vec<(Range<usize>, &'a mut DeTable<'t>)> {
+fn tables_in<'a, 't>(
+    value: &'a mut Spanned<DeValue<'t>>,
+) -> Vec<(Range<usize>, &'a mut DeTable<'t>)> {
     let span = value.span();
     match value.get_mut() {
         DeValue::Table(table) => vec![(span, table)],
@@ -288,7 +314,10 @@ fn replace<'t>(table: &mut DeTable<'t>, key: &Range<usize>, value: &mut Option<D
 
 /// Takes the entry out whose key has a span, or an element of a list by the span of its value.
 fn remove(table: &mut DeTable<'_>, key: Option<&Range<usize>>, value: &Range<usize>) -> bool {
-    let found = table.keys().find(|other| Some(&other.span()) == key).cloned();
+    let found = table
+        .keys()
+        .find(|other| Some(&other.span()) == key)
+        .cloned();
     if let Some(found) = found {
         return table.remove(&found).is_some();
     }

@@ -139,9 +139,7 @@ fn what_is_expected(expected: &str) -> String {
         _ if array.is_some() => {
             return format!("a list of {} elements", array.unwrap_or_default());
         }
-        _ if expected.starts_with("struct") => {
-            "a table of keys, in { } or under a heading in [ ]"
-        }
+        _ if expected.starts_with("struct") => "a table of keys, in { } or under a heading in [ ]",
         _ if expected.contains("variant") || expected.contains("string or") => {
             "the name of a choice, in quotes"
         }

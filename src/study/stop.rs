@@ -5,9 +5,11 @@
 
 use super::digest::is_weighted;
 use super::stats::{IntervalEstimate, mean, rate};
+use super::table::meant;
 use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
+use crate::settings::Problem;
 
 /// Runs between two looks.
 const EVERY: usize = 10;
@@ -48,7 +50,15 @@ impl Precision {
         let figure = match template.events.get(&when.of) {
             Some(condition) => Figure::Rate(condition.clone()),
             None if measure(&when.of).is_some_and(can_be_known) => Figure::Mean(when.of.clone()),
-            None => return Err(StudyError::NoFigure(when.of.clone())),
+            None => {
+                let name = &when.of;
+                let what =
+                    format!("`{name}` is no event of this study and no single figure of a run");
+                let key = "study.stop.when.of";
+                return Err(template
+                    .wrong(Problem::new(key, what, meant(name, template)))
+                    .into());
+            }
         };
         Ok(Some(Self {
             figure,

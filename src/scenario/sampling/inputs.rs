@@ -76,7 +76,9 @@ impl Inputs {
 fn read_input(path: &Path) -> io::Result<Vec<u8>> {
     let kinds = [ReadLimit::TOML, ReadLimit::CSV, ReadLimit::OBJ];
     let ending = path.extension().unwrap_or_default();
-    let kind = kinds.into_iter().find(|k| ending.eq_ignore_ascii_case(k.ending));
+    let kind = kinds
+        .into_iter()
+        .find(|k| ending.eq_ignore_ascii_case(k.ending));
     read_bytes(path, kind.unwrap_or(ReadLimit::TOML))
 }
 

@@ -81,7 +81,10 @@ fn read(path: &Path) -> Result<Columns, String> {
     let headers = reader.headers().map_err(failed)?;
     if headers.len() > MOST_COLUMNS {
         let count = headers.len();
-        return Err(format!("{} has {count} columns, more than {MOST_COLUMNS}", path.display()));
+        return Err(format!(
+            "{} has {count} columns, more than {MOST_COLUMNS}",
+            path.display()
+        ));
     }
     let headers = headers.iter();
     let mut columns: Columns = headers.map(|h| (h.to_owned(), Vec::new())).collect();

@@ -7,7 +7,7 @@ use super::settings::{Distribution, PlanSettings, StudySettings};
 use super::tables::Tables;
 use crate::scenario::build::{overridden, read};
 use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
-use crate::settings::{FileError, Problem, read_toml};
+use crate::settings::{FileError, Problem, read_settings};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -42,15 +42,24 @@ impl Template {
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
         let text = read(path)?;
         let wrong = |source| ScenarioError::file(path, &text, source);
-        Scenario::from_text(path, &text, &[])?;
-        let file: ScenarioFile = read_toml(&text).map_err(wrong)?;
+        let own = Scenario::from_text(path, &text, &[]).err();
+        let file: ScenarioFile = match read_settings(&text) {
+            Ok(file) => file,
+            Err(source) => return Err(own.unwrap_or_else(|| wrong(source))),
+        };
         let settings = file.study.clone().ok_or_else(|| {
             wrong(FileError::Problems(vec![Problem::new(
                 "study",
                 "is missing: nothing is said to vary",
                 "add a table [study]; scenarios/studies has examples",
             )]))
-        })?;
+        });
+        // What else is wrong with a study is found by drawing from it.
+        let settings = match own {
+            Some(ref own) if settings.is_ok() && !own.is_at("study") => settings?,
+            Some(own) => return Err(own),
+            None => settings?,
+        };
         let mut problems = Vec::new();
         let folder = path.parent().unwrap_or(Path::new(""));
         let tables = Tables::read(&settings, folder, &mut problems);
@@ -59,8 +68,8 @@ impl Template {
         check_keys(path, &text, &settings, &tables, &mut problems);
         let coordinates = coordinates(&settings);
         check_size(&settings, coordinates.len(), &mut problems);
-        if !problems.is_empty() {
-            return Err(wrong(FileError::Problems(problems)));
+        if let Some(error) = ScenarioError::joined(own, path, &text, problems) {
+            return Err(error);
         }
         let swept = settings.variables.iter().filter(|(_, v)| v.from.is_swept());
         Ok(Self {
@@ -78,6 +87,11 @@ impl Template {
             settings,
             text,
         })
+    }
+
+    /// What is wrong with the file, found by whoever knows the figures of a run.
+    pub fn wrong(&self, problem: Problem) -> ScenarioError {
+        ScenarioError::file(&self.path, &self.text, FileError::Problems(vec![problem]))
     }
 
     /// With another seed or number of runs.
