@@ -25,7 +25,7 @@ Examples:
 Exit code 0 where all files are right, 2 where any is wrong.";
 
 /// Check tunnels, vehicles, scenarios and studies: errors and a short report
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct CheckArgs {
     /// Tunnel, vehicle and scenario files
@@ -56,16 +56,25 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
     }
 }
 
+/// What `metrotwin check` says of a text that stands in a file: its report, or its errors as they are
+/// printed.
+pub fn check_text(path: &Path, text: &str) -> Result<String, String> {
+    report_of(path, text, &CheckArgs::default()).map_err(|failure| failure.text())
+}
+
 fn report_on(path: &Path, args: &CheckArgs) -> Result<String, Failure> {
-    let text = read(path)?;
-    match FileKind::of(&text) {
+    report_of(path, &read(path)?, args)
+}
+
+fn report_of(path: &Path, text: &str, args: &CheckArgs) -> Result<String, Failure> {
+    match FileKind::of(text) {
         FileKind::Tunnel => {
             #[cfg(feature = "twin")]
             check_scenario::refuse_overrides(path, &args.overrides)?;
-            let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
+            let tunnel = Tunnel::from_toml(text).map_err(|e| Failure::file(path, text, e))?;
             Ok(tunnel::report(&tunnel))
         }
-        kind => other(path, &text, kind, args),
+        kind => other(path, text, kind, args),
     }
 }
 

@@ -45,10 +45,17 @@ impl Failure {
     }
 
     pub(super) fn print(&self) {
+        if !matches!(self, Self::Reported) {
+            eprintln!("{}", self.text());
+        }
+    }
+
+    /// As it is printed.
+    pub(super) fn text(&self) -> String {
         match self {
-            Self::Input(report) => eprintln!("{report:?}"),
-            Self::Run(error) => eprintln!("error: {error:#}"),
-            Self::Reported => {}
+            Self::Input(report) => format!("{report:?}"),
+            Self::Run(error) => format!("error: {error:#}"),
+            Self::Reported => String::new(),
         }
     }
 }

@@ -42,6 +42,8 @@ mod study;
 #[cfg(feature = "twin")]
 mod table;
 
+pub use check::check_text;
+
 use clap::{ArgAction, Parser, Subcommand};
 use fault::Failure;
 use std::io::{IsTerminal, Write};

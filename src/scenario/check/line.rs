@@ -322,6 +322,15 @@ impl LineCheck<'_, '_> {
         }
         let tunnel = self.tunnel;
         let key = &format!("{at}.device");
+        if post.device.trim().is_empty() {
+            let names = tunnel.wayside.iter().map(|site| site.name.as_str());
+            let remedy = format!(
+                "give the name of one that the tunnel has: {}",
+                names.collect::<Vec<_>>().join(", ")
+            );
+            self.check.problem(key, "names no device", remedy);
+            return None;
+        }
         let Some(site) = tunnel.wayside.iter().find(|site| site.name == post.device) else {
             let names: Vec<_> = tunnel
                 .wayside

@@ -40,7 +40,11 @@ pub struct Template {
 impl Template {
     /// Reads and checks a file, and the scenario that it is as it stands.
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
-        let text = read(path)?;
+        Self::from_text(path, read(path)?)
+    }
+
+    /// As [`Self::load`], of a text already read; `path` is where relative paths count from.
+    pub fn from_text(path: &Path, text: String) -> Result<Self, ScenarioError> {
         let wrong = |source| ScenarioError::file(path, &text, source);
         let own = Scenario::from_text(path, &text, &[]).err();
         let file: ScenarioFile = match read_settings(&text) {
