@@ -103,6 +103,33 @@ fn numbers_are_checked_before_they_are_used() {
     assert!(start.elapsed() < Duration::from_secs(20));
 }
 
+/// Provokes: a scenario that is right, and then cannot begin, or never ends.
+#[test]
+fn what_could_not_be_run_is_refused() {
+    let drift = [
+        "rig.clock.drift_ppm=1000.0",
+        "duration_s=86400",
+        "rig.pairs_per_s=1",
+    ];
+    let drift = drift.iter().flat_map(|change| ["--set", change]);
+    let args: Vec<&str> = ["check", "scenarios/line_run.toml"]
+        .into_iter()
+        .chain(drift)
+        .collect();
+    refused(&args, &["duration_s", "poses are kept for 60 s"]);
+    let bench = [
+        "bench.points=1000",
+        "bench.step_m=0.0",
+        "bench.fixes_per_point=100000",
+    ];
+    let bench = bench.iter().flat_map(|change| ["--set", change]);
+    let args: Vec<&str> = ["check", "scenarios/static_bench.toml"]
+        .into_iter()
+        .chain(bench)
+        .collect();
+    refused(&args, &["bench.fixes_per_point", "86400 s"]);
+}
+
 /// Provokes: a device or a pipe that is read, the first line of any file in a message.
 #[test]
 fn other_files_are_neither_read_nor_shown() {

@@ -50,7 +50,8 @@ pub(super) fn refuse_overrides(path: &Path, overrides: &[Override]) -> Result<()
 /// What is wrong with the first runs that a study draws; each that is no scenario becomes a row that
 /// says so.
 fn invalid_draws(template: &Template) -> String {
-    let looked = template.runs().min(MOST_DRAWN);
+    let affordable = MOST_BYTES_DRAWN / template.text_len().max(1) as u64;
+    let looked = template.runs().min(affordable.clamp(1, MOST_DRAWN));
     let wrong = |k: u64| match template.sample(k) {
         Ok(sample) => template.scenario(&sample).err().map(|e| e.to_string()),
         Err(error) => Some(error.to_string()),
@@ -67,3 +68,5 @@ fn invalid_draws(template: &Template) -> String {
 
 /// Runs of a study that are drawn to see whether they can be run.
 const MOST_DRAWN: u64 = 200;
+/// For each, the whole file is read: so many bytes take less than a second.
+const MOST_BYTES_DRAWN: u64 = 4 << 20;

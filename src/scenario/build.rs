@@ -9,7 +9,7 @@ use crate::settings::{
     Checker, FileError, Problem, ReadLimit, Settings, key_below, read_settings, read_text,
 };
 use crate::track::{Direction, Tunnel};
-use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
+use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings, VehicleFile};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -283,7 +283,9 @@ impl Scenario {
         tunnel: Tunnel,
         mut problems: Vec<Problem>,
     ) -> Result<Self, FileError> {
-        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        let mut check = Checker::new("", &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut check);
+        check_history(&file, &mut check);
         if !problems.is_empty() {
             return Err(FileError::Problems(problems));
         }
@@ -442,6 +444,21 @@ pub(super) fn overridden(
     }
     let text = toml::to_string(&document).map_err(|e| wrong(syntax(e.to_string())))?;
     read_settings(&text).map_err(wrong)
+}
+
+/// Frames, clocks and faults together must not be later than the world remembers.
+fn check_history(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let (needed_s, longest_s) = (history_s(file), *HISTORY_S.end());
+    if needed_s > longest_s {
+        check.problem(
+            "duration_s",
+            format!(
+                "by then images come {needed_s:.0} s after what they show, with long frames, slow \
+                 clocks and late cameras together, and poses are kept for {longest_s} s"
+            ),
+            "give more frames a second, less clock.drift_ppm, or a shorter run",
+        );
+    }
 }
 
 /// Poses are asked for until the last row of a frame has closed.

@@ -37,7 +37,7 @@ settings! {
         seed: u64;
         /// Simulated time, s. A bench run ends after its last point instead.
         #[serde(default = "default_duration_s")]
-        duration_s: f64, in 1e-3..=86_400.0;
+        duration_s: f64, in 1e-3..=LONGEST_RUN_S;
         /// End earlier, once the train has run and then stood for this long, s. Default: never.
         stop_after_standstill_s: Option<f64>, in 0.0..=86_400.0;
         /// Time step of the physics, s.
@@ -103,6 +103,9 @@ settings! {
     }
     also check_together
 }
+
+/// A day: what a line does repeats then.
+pub(super) const LONGEST_RUN_S: f64 = 86_400.0;
 
 fn default_duration_s() -> f64 {
     60.0

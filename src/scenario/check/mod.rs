@@ -4,7 +4,7 @@ mod line;
 
 pub(super) use line::in_tunnel;
 
-use super::file::ScenarioFile;
+use super::file::{LONGEST_RUN_S, ScenarioFile};
 use crate::bus::{TrainEnd, TrainId};
 use crate::settings::{Checker, name_advice};
 use crate::twin::faults::rig_cameras;
@@ -156,8 +156,19 @@ fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
         ),
         _ => {}
     }
-    if file.bench.is_none() {
+    let Some(bench) = &file.bench else {
         return;
+    };
+    let takes_s = file
+        .rig
+        .as_ref()
+        .map(|rig| bench.duration_s(rig.pairs_per_s));
+    if let Some(takes_s) = takes_s.filter(|takes_s| *takes_s > LONGEST_RUN_S) {
+        check.problem(
+            "bench.fixes_per_point",
+            format!("all pairs of images take {takes_s:.0} s"),
+            format!("give fewer points or fixes, for at most {LONGEST_RUN_S} s as other runs have"),
+        );
     }
     let mut ends = file.rig.iter().map(|rig| rig.end);
     if ends.any(|end| end == TrainEnd::Rear) {

@@ -98,6 +98,11 @@ impl Template {
         ScenarioError::file(&self.path, &self.text, FileError::Problems(vec![problem]))
     }
 
+    /// Bytes of the file.
+    pub fn text_len(&self) -> usize {
+        self.text.len()
+    }
+
     /// With another seed or number of runs.
     pub fn with(mut self, seed: Option<u64>, runs: Option<u32>) -> Self {
         self.settings.seed = seed.unwrap_or(self.settings.seed);
@@ -222,6 +227,9 @@ fn check_size(settings: &StudySettings, coordinates: usize, problems: &mut Vec<P
     }
 }
 
+/// For each key that is set the whole file is read: so many bytes take some seconds.
+const MOST_BYTES_SET: usize = 32 << 20;
+
 /// Every key that a variable sets must be there, and take a value of its kind.
 fn check_keys(
     path: &Path,
@@ -230,6 +238,18 @@ fn check_keys(
     tables: &Tables,
     problems: &mut Vec<Problem>,
 ) {
+    let keys: usize = settings.variables.values().map(|v| v.keys.len()).sum();
+    if keys.saturating_mul(text.len()) > MOST_BYTES_SET {
+        problems.push(Problem::new(
+            "study.variables",
+            format!(
+                "they set {keys} keys, too many for a file of {} bytes",
+                text.len()
+            ),
+            "set fewer keys, or whole tables by a `choice`",
+        ));
+        return;
+    }
     for (name, variable) in &settings.variables {
         let middle = match &variable.from {
             Distribution::Table { file, column } => tables.value(file, column, 0.5),

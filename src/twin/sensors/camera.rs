@@ -29,9 +29,9 @@ pub enum ReadOut {
 /// Columns and rows: at most the widest texture that every graphics adapter has.
 pub(super) const SIDE_PX: RangeInclusive<f64> = 16.0..=8192.0;
 
-/// Frames a second. A camera that takes fewer than one in 100 s sees nothing of a run, and more than
-/// one in a step of the physics (1 ms) shows nothing new.
-pub(super) const FRAMES_PER_S: RangeInclusive<f64> = 0.01..=1000.0;
+/// Frames a second. The world remembers poses for a minute at most: twice a frame of 10 s, with all
+/// that makes images late, fits into it. More than one in a step of the physics (1 ms) show nothing new.
+pub(super) const FRAMES_PER_S: RangeInclusive<f64> = 0.1..=1000.0;
 /// Exposures, us: the shortest of electronic shutters is over 0.1 us, and for all of an exposure the
 /// pose of every millisecond is kept.
 pub(super) const EXPOSURE_US: RangeInclusive<f64> = 0.1..=1e7;
