@@ -2,17 +2,15 @@
 
 use super::file::{OnboardEquipment, OnboardSettings, ScenarioFile};
 use super::meshes::read_meshes;
-use super::overrides::is_within;
-use super::{Override, OverrideError, check};
+use super::parts::{Parts, all_errors, read};
+use super::{Override, ScenarioError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
-use crate::settings::{
-    Checker, FileError, Problem, ReadLimit, Settings, key_below, read_settings, read_text,
-};
+use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 use crate::track::{Direction, Tunnel};
-use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings, VehicleFile};
+use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// A scenario, checked and ready to run.
@@ -112,103 +110,6 @@ pub struct WaysidePost {
     pub lidar: Option<LidarSettings>,
 }
 
-/// Why there is no scenario.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// An override that cannot be applied.
-    #[error("--set {0}")]
-    Override(#[from] OverrideError),
-    /// The file is right by itself, but not with these overrides.
-    #[error("{} is right by itself, but not with {}: {source}", path.display(), list(overrides))]
-    Overridden {
-        /// The file.
-        path: PathBuf,
-        /// The overrides.
-        overrides: Vec<Override>,
-        /// What is wrong.
-        source: FileError,
-    },
-    /// A file is wrong: the scenario, or the tunnel that it names.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Its text, empty where it could not be read.
-        text: String,
-        /// Values in it that overrides have replaced.
-        overrides: Vec<Override>,
-        /// What is wrong.
-        source: FileError,
-    },
-    /// Several files are wrong: the scenario, and what it names.
-    #[error("{}", lines(.0))]
-    Files(Vec<ScenarioError>),
-}
-
-fn lines(errors: &[ScenarioError]) -> String {
-    let lines: Vec<String> = errors.iter().map(ScenarioError::to_string).collect();
-    lines.join("\n")
-}
-
-impl ScenarioError {
-    /// Of a file as it stands, without overrides.
-    pub(super) fn file(path: &Path, text: &str, source: FileError) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            text: text.to_owned(),
-            overrides: Vec::new(),
-            source,
-        }
-    }
-
-    /// Whether any of its problems is at or below a key.
-    pub(super) fn is_at(&self, key: &str) -> bool {
-        match self {
-            Self::Files(errors) => errors.iter().any(|error| error.is_at(key)),
-            Self::File {
-                source: FileError::Problems(problems),
-                ..
-            } => problems.iter().any(|problem| is_within(&problem.key, key)),
-            _ => false,
-        }
-    }
-
-    /// With more problems of a file.
-    pub(super) fn joined(
-        error: Option<Self>,
-        path: &Path,
-        text: &str,
-        more: Vec<Problem>,
-    ) -> Option<Self> {
-        let mut errors = match error {
-            Some(Self::Files(errors)) => errors,
-            error => error.into_iter().collect(),
-        };
-        let mut of_file = errors.iter_mut().filter_map(|error| match error {
-            Self::File {
-                path: other,
-                source: FileError::Problems(problems),
-                ..
-            } if other == path => Some(problems),
-            _ => None,
-        });
-        match of_file.next() {
-            Some(problems) => problems.extend(more),
-            None if more.is_empty() => {}
-            None => errors.insert(0, Self::file(path, text, FileError::Problems(more))),
-        }
-        match errors.len() {
-            0 | 1 => errors.pop(),
-            _ => Some(Self::Files(errors)),
-        }
-    }
-}
-
-fn list(overrides: &[Override]) -> String {
-    let list: Vec<String> = overrides.iter().map(Override::to_string).collect();
-    list.join(" ")
-}
-
 impl Scenario {
     /// Reads and checks a scenario file and the tunnel that it names.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ScenarioError> {
@@ -306,119 +207,6 @@ impl Scenario {
             wayside,
         })
     }
-}
-
-/// What reading the files that a scenario names comes to.
-#[derive(Default)]
-struct Parts {
-    /// Of the scenario itself.
-    problems: Vec<Problem>,
-    wrong_files: Vec<ScenarioError>,
-}
-
-impl Parts {
-    /// Reads the vehicle files that trains name; a name without `.toml` is one of the program's own.
-    fn read_vehicles(&mut self, file: &mut ScenarioFile, folder: &Path) {
-        let keys = 0..file.trains().count();
-        let keys: Vec<String> = keys
-            .map(|k| key_below(&file.train_key(k), "vehicle"))
-            .collect();
-        let trains = file.train.iter_mut().chain(&mut file.other_trains);
-        for (key, train) in keys.into_iter().zip(trains) {
-            if Path::new(&train.vehicle).extension().is_some() {
-                let path = folder.join(&train.vehicle);
-                train.vehicle_file = self.read(&key, &path, "vehicle", parse_vehicle);
-            }
-        }
-    }
-
-    fn read_tunnel(&mut self, name: &str, folder: &Path) -> Option<Tunnel> {
-        self.read("tunnel", &folder.join(name), "tunnel", parse_tunnel)
-    }
-
-    /// A file of a kind that the scenario names under a key.
-    fn read<T>(
-        &mut self,
-        key: &str,
-        path: &Path,
-        kind: &str,
-        parse: impl Fn(&Path, &str) -> Result<T, ScenarioError>,
-    ) -> Option<T> {
-        let parsed = match read_text(path, ReadLimit::TOML) {
-            Ok(text) => parse(path, &text),
-            Err(error) => {
-                self.problems.push(unreadable(key, path, kind, &error));
-                return None;
-            }
-        };
-        match parsed {
-            Ok(part) => Some(part),
-            Err(error) => {
-                // It keeps what follows from the wrong file from being told of the key too.
-                self.problems.push(Problem::new(key, WRONG_FILE, ""));
-                self.wrong_files.push(error);
-                None
-            }
-        }
-    }
-}
-
-/// Stands under a key whose file is wrong, which is told with that file.
-const WRONG_FILE: &str = "names a file that cannot be used";
-
-/// A scenario, or all that is wrong: first with its own file.
-fn all_errors(
-    own: Result<Scenario, ScenarioError>,
-    wrong_files: Vec<ScenarioError>,
-) -> Result<Scenario, ScenarioError> {
-    let mut own = match own {
-        Ok(scenario) => return Ok(scenario),
-        Err(own) => own,
-    };
-    let is_of_its_own = match &mut own {
-        ScenarioError::File {
-            source: FileError::Problems(problems),
-            ..
-        } => {
-            problems.retain(|problem| problem.what != WRONG_FILE);
-            !problems.is_empty()
-        }
-        _ => true,
-    };
-    let mut errors: Vec<_> = wrong_files;
-    if is_of_its_own {
-        errors.insert(0, own);
-    }
-    match errors.len() {
-        1 => Err(errors.remove(0)),
-        _ => Err(ScenarioError::Files(errors)),
-    }
-}
-
-fn unreadable(key: &str, path: &Path, kind: &str, error: &std::io::Error) -> Problem {
-    Problem::new(
-        key,
-        format!("cannot read {}: {error}", path.display()),
-        format!("give the path of a {kind} file, counted from the scenario's folder"),
-    )
-}
-
-/// Reads and checks a vehicle file's text; `path` is for the messages.
-pub(crate) fn parse_vehicle(path: &Path, text: &str) -> Result<VehicleFile, ScenarioError> {
-    VehicleFile::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
-}
-
-/// Reads and checks a tunnel's text; `path` is for the messages.
-pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioError> {
-    Tunnel::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
-}
-
-/// Reads a file's text.
-pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
-    read_text(path, ReadLimit::TOML).map_err(|source| {
-        let file = path.to_owned();
-        ScenarioError::file(path, "", FileError::Read { path: file, source })
-    })
 }
 
 /// A file with some of its keys set anew.
