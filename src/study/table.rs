@@ -53,7 +53,8 @@ struct RowCells<'a> {
 pub fn meant(name: &str, template: &Template) -> String {
     let variables = template.settings.variables.keys().cloned();
     let figures = MEASURES.iter().map(|measure| measure.name.to_owned());
-    let known: Vec<String> = variables.chain(figures).collect();
+    let known = variables.chain(figures).filter(|known| known != name);
+    let known: Vec<String> = known.collect();
     match did_you_mean(name, &known) {
         Some(similar) => format!("did you mean `{similar}`?"),
         None => "`metrotwin study figures` lists what may be named, and the signs".to_owned(),
