@@ -131,7 +131,7 @@ fn all_problems_at_once() {
         exposure,
         "expose for at most 17372 us",
         "rig.pixel_um",
-        "3.75",
+        "give 0.1 to 1000 um",
     ];
     refused(&folder, &file, &words);
 }
@@ -276,7 +276,7 @@ fn wrong_override() {
         ),
         (
             "obstacles[0].mass_kg=1",
-            ["--set", "obstacles", "no keys of its own"],
+            ["--set", "no entry in `obstacles`", "[[obstacles]]"],
         ),
         ("train.cars", ["key=value", "train.cars", "--set"]),
     ] {

@@ -371,6 +371,7 @@ impl Ride {
             time,
             distance_m: 8.0 * now_s,
             speed_mps: 8.0,
+            slides: false,
         };
         self.protection
             .on(&Message::own(TRAIN, time, Content::Odometer(odometer)));
@@ -511,6 +512,7 @@ fn messages_from_the_future_set_no_train_free() {
             time,
             distance_m,
             speed_mps: 0.0,
+            slides: false,
         };
         Message::own(TRAIN, time, Content::Odometer(sample))
     };

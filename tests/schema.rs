@@ -39,6 +39,43 @@ fn schemas_are_up_to_date() {
     }
 }
 
+/// Fails when a time, delay or rate may have any value: one that is too long or too short overflows the
+/// clock, or takes any time and memory.
+#[test]
+fn every_time_and_rate_is_bounded() {
+    let mut bounded = 0;
+    for schema in [
+        schema_for!(ScenarioFile),
+        schema_for!(VehicleFile),
+        schema_for!(TunnelFile),
+    ] {
+        times_are_bounded(schema.as_value(), &mut bounded);
+    }
+    assert!(bounded > 50, "{bounded}");
+}
+
+fn times_are_bounded(schema: &Json, bounded: &mut u32) {
+    let of_time = |key: &str| {
+        let unit = settings::unit_in(key);
+        unit.is_some_and(|unit| ["s", "ms", "us", "Hz", "1/s"].contains(&unit))
+    };
+    let properties = schema["properties"].as_object().into_iter().flatten();
+    for (key, property) in properties.filter(|(key, _)| of_time(key)) {
+        let numbers = property.get("items").unwrap_or(property);
+        let kind = numbers["type"].to_string();
+        if kind.contains("number") || kind.contains("integer") {
+            let has = |limit: &str| numbers[limit].is_number();
+            assert!(has("minimum") && has("maximum"), "{key} has no bounds");
+            *bounded += 1;
+        }
+    }
+    match schema {
+        Json::Object(parts) => parts.values().for_each(|p| times_are_bounded(p, bounded)),
+        Json::Array(parts) => parts.iter().for_each(|p| times_are_bounded(p, bounded)),
+        _ => {}
+    }
+}
+
 /// One of everything that has a range: keys that are left out by default are given.
 const SCENARIO: &str = r#"
     name = "all"

@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Integer nanoseconds since the scenario's start: adding steps never drifts, and equal times
-/// compare equal.
+/// compare equal. Times that are 292 years or more from the start are held there: what is so late
+/// never comes, and nothing late is taken for early.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]
@@ -37,12 +38,12 @@ impl SimTime {
     /// This time plus `seconds` (which may be negative).
     #[must_use]
     pub fn plus(self, seconds: f64) -> Self {
-        Self(self.0 + (seconds * 1e9).round() as i64)
+        Self(self.0.saturating_add(Self::from_secs(seconds).0))
     }
 
     /// Seconds from `earlier` to this time.
     pub fn since(self, earlier: Self) -> f64 {
-        (self.0 - earlier.0) as f64 * 1e-9
+        self.0.saturating_sub(earlier.0) as f64 * 1e-9
     }
 }
 
@@ -74,7 +75,7 @@ impl Ticker {
     pub fn next_if(&mut self, due: impl FnOnce(SimTime) -> bool) -> Option<(u32, SimTime)> {
         let (number, time) = self.next();
         due(time).then(|| {
-            self.next += 1;
+            self.next = self.next.saturating_add(1);
             (number, time)
         })
     }
@@ -83,5 +84,22 @@ impl Ticker {
 impl fmt::Display for SimTime {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{:.3} s", self.secs())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Provokes: a sum beyond the longest time that comes out early, and a slow clock that is due at
+    /// every step.
+    #[test]
+    fn what_is_too_late_never_comes() {
+        let late = SimTime::from_secs(5.0).plus(1e10);
+        assert!(late > SimTime::from_secs(1e9));
+        assert!(late.since(SimTime::from_secs(-1e10)) > 9e9);
+        let mut ticker = Ticker::new(1e-10);
+        let due = (0..3).filter_map(|_| ticker.due(SimTime::from_secs(5.0), 0.05));
+        assert_eq!(due.count(), 1);
     }
 }

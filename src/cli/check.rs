@@ -1,9 +1,13 @@
 //! `metrotwin check`: is this file right, and what does it say?
 
+#[cfg(feature = "twin")]
+use super::check_scenario;
 use super::fault::Failure;
 use super::file_kind::FileKind;
 use super::{print, tunnel};
-use crate::settings::FileError;
+#[cfg(feature = "twin")]
+use crate::scenario::Override;
+use crate::settings::{FileError, ReadLimit, read_text};
 use crate::track::Tunnel;
 use std::path::{Path, PathBuf};
 
@@ -16,23 +20,28 @@ vehicle, any other a scenario; of a scenario the files that it names are checked
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
   metrotwin check scenarios/*.toml tunnels/*.toml
+  metrotwin check scenarios/line_run.toml --set train.cruise_speed_kmh=80
 
 Exit code 0 where all files are right, 2 where any is wrong.";
 
 /// Check tunnels, vehicles, scenarios and studies: errors and a short report
-#[derive(clap::Args)]
+#[derive(Default, clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct CheckArgs {
     /// Tunnel, vehicle and scenario files
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
+    /// Check scenarios with a value changed, e.g. train.cruise_speed_kmh=80; may be given again
+    #[cfg(feature = "twin")]
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<Override>,
 }
 
 /// Checks every file, however many before it are wrong.
 pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
     let mut wrong = false;
     for file in &args.files {
-        match report_on(file) {
+        match report_on(file, args) {
             Ok(text) => print(&format!("{}: right\n{text}", file.display()))?,
             Err(error) => {
                 error.print();
@@ -47,24 +56,37 @@ pub(super) fn check(args: &CheckArgs) -> Result<(), Failure> {
     }
 }
 
-fn report_on(path: &Path) -> Result<String, Failure> {
-    let text = read(path)?;
-    match FileKind::of(&text) {
+/// What `metrotwin check` says of a text that stands in a file: its report, or its errors as they are
+/// printed.
+pub fn check_text(path: &Path, text: &str) -> Result<String, String> {
+    report_of(path, text, &CheckArgs::default()).map_err(|failure| failure.text())
+}
+
+fn report_on(path: &Path, args: &CheckArgs) -> Result<String, Failure> {
+    report_of(path, &read(path)?, args)
+}
+
+fn report_of(path: &Path, text: &str, args: &CheckArgs) -> Result<String, Failure> {
+    match FileKind::of(text) {
         FileKind::Tunnel => {
-            let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
+            #[cfg(feature = "twin")]
+            check_scenario::refuse_overrides(path, &args.overrides)?;
+            let tunnel = Tunnel::from_toml(text).map_err(|e| Failure::file(path, text, e))?;
             Ok(tunnel::report(&tunnel))
         }
-        kind => other(path, &text, kind),
+        kind => other(path, text, kind, args),
     }
 }
 
 /// A vehicle, scenario or study.
 #[cfg(feature = "twin")]
-use super::check_scenario::report_on as other;
+fn other(path: &Path, text: &str, kind: FileKind, args: &CheckArgs) -> Result<String, Failure> {
+    check_scenario::report_on(path, text, kind, &args.overrides)
+}
 
 /// The onboard box knows tunnels only.
 #[cfg(not(feature = "twin"))]
-fn other(path: &Path, text: &str, _: FileKind) -> Result<String, Failure> {
+fn other(path: &Path, text: &str, _: FileKind, _: &CheckArgs) -> Result<String, Failure> {
     if let Err(error @ FileError::Syntax { .. }) = Tunnel::from_toml(text) {
         return Err(Failure::file(path, text, error));
     }
@@ -75,7 +97,7 @@ fn other(path: &Path, text: &str, _: FileKind) -> Result<String, Failure> {
 }
 
 fn read(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|source| {
+    read_text(path, ReadLimit::TOML).map_err(|source| {
         let path = path.to_owned();
         Failure::file(&path.clone(), "", FileError::Read { path, source })
     })

@@ -1,7 +1,8 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
-use crate::settings::{FileError, Problem, locate};
-use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, NamedSource, Report};
+use super::excerpt::Excerpt;
+use crate::settings::{FileError, LONGEST_KEY, Problem, locate, shortened, shown};
+use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, Report};
 use std::fmt;
 use std::ops::Range;
 use std::path::Path;
@@ -44,10 +45,17 @@ impl Failure {
     }
 
     pub(super) fn print(&self) {
+        if !matches!(self, Self::Reported) {
+            eprintln!("{}", self.text());
+        }
+    }
+
+    /// As it is printed.
+    pub(super) fn text(&self) -> String {
         match self {
-            Self::Input(report) => eprintln!("{report:?}"),
-            Self::Run(error) => eprintln!("error: {error:#}"),
-            Self::Reported => {}
+            Self::Input(report) => format!("{report:?}"),
+            Self::Run(error) => format!("error: {error:#}"),
+            Self::Reported => String::new(),
         }
     }
 }
@@ -71,7 +79,7 @@ pub(super) struct Fault {
     #[help]
     remedy: Option<String>,
     #[source_code]
-    file: Option<NamedSource<String>>,
+    file: Option<Excerpt>,
     #[label(collection)]
     places: Vec<LabeledSpan>,
     #[related]
@@ -87,6 +95,20 @@ impl Fault {
             places: Vec::new(),
             others: Vec::new(),
         }
+    }
+
+    /// Of several wrong files: the first, and then the others.
+    pub(super) fn several(faults: impl Iterator<Item = Self>) -> Self {
+        let mut faults = faults;
+        let mut first = faults
+            .next()
+            .unwrap_or_else(|| Self::new("nothing is wrong"));
+        for mut other in faults {
+            let related = std::mem::take(&mut other.others);
+            first.others.push(other);
+            first.others.extend(related);
+        }
+        first
     }
 
     /// Of a wrong file; `changed` tells what a key was changed by from outside, if it was.
@@ -109,8 +131,9 @@ impl Fault {
                 vec![fault.at(path, text, span, "here")]
             }
             FileError::Problems(problems) => {
+                let (shown, rest) = shown(&problems);
                 let one = |problem| Self::of_problem((path, text), problem, changed);
-                problems.into_iter().map(one).collect()
+                shown.iter().map(one).chain(rest.map(Self::new)).collect()
             }
         };
         Self {
@@ -121,20 +144,20 @@ impl Fault {
 
     fn of_problem(
         (path, text): (&Path, &str),
-        problem: Problem,
+        problem: &Problem,
         changed: &dyn Fn(&str) -> Option<String>,
     ) -> Self {
-        let Problem { key, what, remedy } = problem;
+        let (key, said) = (problem.key.as_str(), problem.said());
         // A changed value is not in the file: pointing there would mislead.
-        let fault = match changed(&key) {
-            Some(change) => Self::new(format!("{key}: {what} ({change})")),
+        let fault = match changed(key) {
+            Some(change) => Self::new(format!("{said} ({change})")),
             None => {
-                let span = locate(text, &key).filter(|_| !text.is_empty());
-                Self::new(format!("{key}: {what}")).at(path, text, span, &key)
+                let span = locate(text, key).filter(|_| !text.is_empty() && !key.is_empty());
+                Self::new(said).at(path, text, span, &shortened(key, LONGEST_KEY))
             }
         };
         Self {
-            remedy: Some(remedy),
+            remedy: Some(problem.remedy.clone()),
             ..fault
         }
     }
@@ -146,12 +169,11 @@ impl Fault {
             let start = span.start.min(last);
             start..span.end.clamp(start, text.len())
         });
-        if let Some(span) = span.filter(|span| text.get(span.clone()).is_some()) {
-            self.file = Some(NamedSource::new(
-                path.display().to_string(),
-                text.to_owned(),
-            ));
-            self.places = vec![LabeledSpan::at(span, label)];
+        let name = path.display().to_string();
+        let excerpt = span.and_then(|span| Excerpt::around(name, text, span));
+        if let Some(excerpt) = excerpt {
+            self.places = vec![LabeledSpan::at(excerpt.place.clone(), label)];
+            self.file = Some(excerpt);
         }
         self
     }

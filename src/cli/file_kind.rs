@@ -18,9 +18,11 @@ impl FileKind {
     pub(super) fn of(text: &str) -> Self {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let has_any = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
-        if has_any(&TUNNEL_KEYS) {
+        // A scenario names its tunnel, whatever else is wrong with it.
+        let is_scenario = has_any(&["tunnel"]);
+        if !is_scenario && has_any(&TUNNEL_KEYS) {
             Self::Tunnel
-        } else if has_any(&VEHICLE_KEYS) {
+        } else if !is_scenario && has_any(&VEHICLE_KEYS) {
             Self::Vehicle
         } else if has_any(&["study"]) {
             Self::Study

@@ -3,9 +3,10 @@
 use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
+use super::scenario_fault::load_scenario;
 use crate::record::dataset::{DataSet, FramePlan, LabelKinds, Provenance, RoomError};
 use crate::scenario::sampling::Inputs;
-use crate::scenario::{self, Override, Scenario};
+use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, RendererChoice, RunOptions, Summary};
 use std::path::{Path, PathBuf};
 
@@ -79,8 +80,7 @@ pub(super) struct FramesArgs {
 }
 
 pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
-    let text = scenario::read(&args.scenario)?;
-    let mut scenario = Scenario::from_text(&args.scenario, &text, &args.overrides)?;
+    let mut scenario = load_scenario(&args.scenario, &args.overrides)?;
     scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
     let plan = plan(args, &scenario)?;
 

@@ -3,6 +3,7 @@
 use super::fault::Failure;
 use super::print;
 use super::running::prepare;
+use super::scenario_fault::load_template;
 use crate::record::{self, Listing};
 use crate::scenario::sampling::{Inputs, ScenarioSample, Template};
 use std::io;
@@ -50,7 +51,7 @@ const INPUTS: &str = "inputs";
 const INDEX: &str = "index.csv";
 
 pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
-    let template = Template::load(&args.scenario)?.with(args.seed, Some(args.number));
+    let template = load_template(&args.scenario)?.with(args.seed, Some(args.number));
     let samples = (0..u64::from(args.number)).map(|k| template.sample(k));
     let samples = samples.collect::<Result<Vec<_>, _>>();
     let samples =

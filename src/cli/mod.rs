@@ -13,6 +13,7 @@
 //! ```
 
 mod check;
+mod excerpt;
 mod fault;
 mod file_kind;
 mod tunnel;
@@ -22,6 +23,8 @@ mod tunnel;
 mod check_scenario;
 #[cfg(feature = "twin")]
 mod doctor;
+#[cfg(feature = "twin")]
+mod driver_noise;
 #[cfg(feature = "twin")]
 mod frames;
 #[cfg(feature = "twin")]
@@ -40,6 +43,8 @@ mod signals;
 mod study;
 #[cfg(feature = "twin")]
 mod table;
+
+pub use check::check_text;
 
 use clap::{ArgAction, Parser, Subcommand};
 use fault::Failure;
@@ -92,6 +97,10 @@ enum Command {
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
     start_messages(cli.verbose);
+    #[cfg(feature = "twin")]
+    if !matches!(cli.command, Command::Check(_) | Command::Generate(_)) {
+        driver_noise::silence();
+    }
     let result = match cli.command {
         #[cfg(feature = "twin")]
         Command::Run(args) => run::run(&args),

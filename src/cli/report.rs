@@ -91,6 +91,74 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
     indented(&lines)
 }
 
+/// What a user may not expect of a scenario that is right.
+pub(super) fn notes(scenario: &Scenario) -> Vec<String> {
+    let onboard = scenario.onboard.iter();
+    let of_each = onboard.map(|o| [without_position(o, scenario), without_lamps(o, scenario)]);
+    of_each.flatten().flatten().collect()
+}
+
+/// A train that does not know where it is, and by what it may find out.
+fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
+    let protection = &onboard.protection;
+    if !onboard.protects() || protection.initial_chainage_m.is_some() {
+        return None;
+    }
+    let [from_m, to_m] = way_m(onboard, scenario)?;
+    let balises = &scenario.tunnel.balises;
+    let meets_balise = (balises.iter()).any(|b| (from_m..=to_m).contains(&b.chainage_m));
+    let key = match onboard.train {
+        0 => "stack.protection",
+        _ => "the protection of its [[onboard]]",
+    };
+    Some(format!(
+        "{} starts without a position, and its equipment permits {} km/h {}; \
+         initial_chainage_m in {key} gives it one",
+        onboard.id(),
+        protection.restricted_kmh,
+        match (meets_balise, onboard.positions()) {
+            (false, false) => "all the way: it meets no balise and has no positioning by lamps",
+            (true, false) => "until it has read a balise",
+            (false, true) => "until it has found itself by lamps",
+            (true, true) => "until it has read a balise or found itself by lamps",
+        }
+    ))
+}
+
+/// A rig on a train that has all lamps behind it.
+fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
+    onboard.rig.as_ref()?;
+    let [from_m, to_m] = way_m(onboard, scenario)?;
+    let lamps = &scenario.tunnel.lamps;
+    let (first, last) = (lamps.first()?, lamps.last()?);
+    let passes = lamps
+        .iter()
+        .any(|l| (from_m..=to_m).contains(&l.chainage_m));
+    (!passes).then(|| {
+        format!(
+            "no lamp stands on the way of {}, from {from_m:.0} to {to_m:.0} m: those of the line are \
+             from {} to {} m",
+            onboard.id(),
+            first.chainage_m,
+            last.chainage_m
+        )
+    })
+}
+
+/// The stretch from where a train starts to the end of the line, or its stop.
+fn way_m(onboard: &OnboardSettings, scenario: &Scenario) -> Option<[f64; 2]> {
+    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
+    let start_m = train.start_chainage_m;
+    let stop_m = train.stop_at_m;
+    Some(match train.direction {
+        Direction::Up => [
+            start_m,
+            stop_m.unwrap_or(scenario.tunnel.alignment.length_m()),
+        ],
+        Direction::Down => [stop_m.unwrap_or(0.0), start_m],
+    })
+}
+
 /// The rig of a train, if it has one.
 fn rig(onboard: &OnboardSettings, scenario: &Scenario) -> Vec<String> {
     let Some(rig) = &onboard.rig else {
@@ -147,6 +215,16 @@ fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) ->
         0 => String::new(),
         n => format!("; {n} lamps never"),
     };
+    // A rig that looks back past its own end sees lamps that it has passed.
+    if far.iter().all(|m| *m < 0.0) && !far.is_empty() {
+        let behind = |v: &[f64]| v.iter().rev().map(|m| -m).collect::<Vec<f64>>();
+        let (near, far) = (behind(&far), behind(&near));
+        return format!(
+            "a lamp is seen whole by both eyes from {} to {} behind its end of the train{unseen}",
+            text(&near),
+            text(&far),
+        );
+    }
     format!(
         "a lamp is seen whole by both eyes from {} to {} ahead of its end of the train{unseen}",
         text(&near),

@@ -2,7 +2,8 @@
 
 use super::fault::Failure;
 use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
-use super::{print, table};
+use super::scenario_fault::load_scenario;
+use super::{print, report, table};
 use crate::bus::TrainId;
 use crate::record::{self, FixTable, Recording};
 use crate::scenario::sampling::ScenarioSample;
@@ -10,7 +11,9 @@ use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
 use crate::study::{self, Fixes, Row, Study, StudyError};
 use std::io;
+use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 const AFTER: &str = "\
 Into the output folder go:
@@ -121,8 +124,17 @@ fn task(args: &RunArgs) -> Result<Task, Failure> {
     if let (Some(folder), Some(index)) = (&args.from_study, args.index) {
         return from_study(folder, index);
     }
+    if args.index.is_some() {
+        return Err(Failure::input(
+            "--index says which run of a study, but no study is given",
+            "give --from-study DIR in place of a scenario, or leave --index out",
+        ));
+    }
     let path = args.scenario.as_deref().unwrap_or(Path::new(""));
-    let mut scenario = Scenario::load(path, &args.overrides)?;
+    let mut scenario = load_scenario(path, &args.overrides)?;
+    for note in report::notes(&scenario) {
+        eprintln!("note: {note}");
+    }
     scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
     Ok(Task {
         out: Path::new("out").join(&scenario.file.name),
@@ -210,6 +222,12 @@ fn observed(
 /// The recording that a viewer shows while it is made.
 fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failure> {
     if let Some(address) = &args.connect {
+        reach(address).map_err(|error| {
+            Failure::input(
+                format!("--connect {address}: no viewer answers there: {error}"),
+                "start the viewer first (`rerun`), or run without --connect",
+            )
+        })?;
         return Ok(Some(Recording::connect(address, &scenario.file.record)));
     }
     if !args.view {
@@ -224,6 +242,26 @@ fn live(args: &RunArgs, scenario: &Scenario) -> Result<Option<Recording>, Failur
             )
         })
 }
+
+/// Whether anything listens at a viewer's address, `HOST:PORT` or a URL: the recording's own stream
+/// only waits for it.
+fn reach(address: &str) -> io::Result<()> {
+    let place = address
+        .rsplit_once("://")
+        .map_or(address, |(_, place)| place);
+    let place = place.split('/').next().unwrap_or_default();
+    let mut last = io::Error::new(io::ErrorKind::NotFound, "it is no HOST:PORT");
+    for socket in place.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&socket, CONNECT_TIMEOUT) {
+            Ok(_) => return Ok(()),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+/// A viewer on another continent answers in less.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 
 /// What this run did not write, but an earlier one into the same folder, would not belong to its
 /// summary.

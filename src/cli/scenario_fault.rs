@@ -1,8 +1,39 @@
 //! What is wrong with a scenario, or with what `--set` made of it, as the user sees it.
 
 use super::fault::{Failure, Fault};
-use crate::scenario::{Override, ScenarioError, is_within};
+use super::file_kind::FileKind;
+use crate::scenario::sampling::Template;
+use crate::scenario::{self, Override, Scenario, ScenarioError, is_within};
 use miette::Report;
+use std::path::Path;
+
+/// A scenario with its text.
+pub(super) fn load_scenario(path: &Path, overrides: &[Override]) -> Result<Scenario, Failure> {
+    let text = scenario::read(path)?;
+    refuse_other(path, &text)?;
+    Ok(Scenario::from_text(path, &text, overrides)?)
+}
+
+/// A study's scenario.
+pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
+    refuse_other(path, &scenario::read(path)?)?;
+    Ok(Template::load(path)?)
+}
+
+/// Every key of a tunnel or a vehicle would be unknown in a scenario: what it is says more.
+fn refuse_other(path: &Path, text: &str) -> Result<(), Failure> {
+    let (what, key, name) = match FileKind::of(text) {
+        FileKind::Tunnel => ("tunnel", "tunnel", "../tunnels/x.toml"),
+        FileKind::Vehicle => ("vehicle", "train.vehicle", "vehicles/x.toml"),
+        FileKind::Study | FileKind::Scenario => return Ok(()),
+    };
+    Err(Failure::input(
+        format!("{} is a {what}, not a scenario", path.display()),
+        format!(
+            "give a scenario that names it ({key} = \"{name}\"); `metrotwin check` checks it by itself"
+        ),
+    ))
+}
 
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
@@ -26,6 +57,7 @@ fn fault(error: ScenarioError) -> Fault {
             );
             Fault::of_file(heading, (&path, ""), source, &changed_by(&overrides))
         }
+        ScenarioError::Files(errors) => Fault::several(errors.into_iter().map(fault)),
         ScenarioError::File {
             path,
             text,

@@ -2,10 +2,10 @@
 
 use super::fault::Failure;
 use super::running::{ProgressBar, STOP, prepare, stop_on_signals};
+use super::scenario_fault::load_template;
 use super::{print, signals};
 use crate::record::parquet::Kind;
 use crate::record::render;
-use crate::scenario::sampling::Template;
 use crate::session::RendererChoice;
 use crate::study::{
     self, Digest, MEASURES, MOST_SHARDS, Options, Progress, RUN_LIMIT_S, Row, Shard, Study,
@@ -196,7 +196,7 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
 }
 
 fn run(args: &RunArgs) -> Result<(), Failure> {
-    let template = Template::load(&args.study)?.with(None, args.runs);
+    let template = load_template(&args.study)?.with(None, args.runs);
     let out = args.out.clone().unwrap_or_else(|| {
         let out = Path::new("out").join(&template.file.name);
         args.shard
@@ -262,7 +262,7 @@ fn compare(args: &CompareArgs) -> Result<(), Failure> {
 }
 
 fn submit(args: &SubmitArgs) -> Result<(), Failure> {
-    let template = Template::load(&args.study)?.with(None, args.runs);
+    let template = load_template(&args.study)?.with(None, args.runs);
     study::check(&template, true)?;
     let name = template.file.name.clone();
     let out = args
@@ -367,10 +367,6 @@ impl From<StudyError> for Failure {
             StudyError::File { .. } | StudyError::Table(_) | StudyError::Worker(_) => {
                 Self::run(error)
             }
-            error @ (StudyError::Event(_) | StudyError::NoFigure(_)) => Self::input(
-                error,
-                "`metrotwin study figures` lists what may be named, and the signs",
-            ),
             other => Self::input(other, "nothing that was there is lost"),
         }
     }

@@ -1,5 +1,6 @@
 //! What a tunnel file says, in a few lines.
 
+use crate::settings::{LONGEST_KEY, shortened};
 use crate::track::Tunnel;
 
 /// Length, radii, grades, sections, lamps, devices.
@@ -26,23 +27,36 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
         format!("{} stretches of cross-section", tunnel.sections.len()),
         lamps(tunnel),
     ];
-    lines.extend(tunnel.wayside.iter().map(|d| {
-        format!(
-            "wayside device {} at {} m, writes to balise {}",
-            d.name, d.chainage_m, d.balise
-        )
-    }));
-    let named = |what: &str, list: Vec<String>| match list.len() {
-        0 => format!("no {what}"),
-        _ => format!("{what}: {}", list.join(", ")),
-    };
-    let at = |name: &str, chainage_m: f64| format!("{name} at {chainage_m} m");
-    let balises = tunnel.balises.iter().map(|b| at(&b.name, b.chainage_m));
-    let stations = tunnel.stations.iter().map(|s| at(&s.name, s.chainage_m));
+    let devices = tunnel.wayside.iter().map(|d| {
+        let at = place(&d.name, d.chainage_m);
+        format!("{at}, writes to balise {}", d.balise)
+    });
+    let balises = tunnel.balises.iter().map(|b| place(&b.name, b.chainage_m));
+    let stations = tunnel.stations.iter().map(|s| place(&s.name, s.chainage_m));
+    lines.push(named("wayside devices", devices.collect()));
     lines.push(named("balises", balises.collect()));
     lines.push(named("stations", stations.collect()));
     indented(&lines)
 }
+
+fn place(name: &str, chainage_m: f64) -> String {
+    format!("{} at {chainage_m} m", shortened(name, LONGEST_KEY))
+}
+
+/// Of a long list the first.
+fn named(what: &str, list: Vec<String>) -> String {
+    let shown = list.get(..MOST_LISTED).unwrap_or(&list);
+    let more = match list.len() - shown.len() {
+        0 => String::new(),
+        more => format!(", and {more} more"),
+    };
+    match list.len() {
+        0 => format!("no {what}"),
+        _ => format!("{what}: {}{more}", shown.join("; ")),
+    }
+}
+
+const MOST_LISTED: usize = 20;
 
 fn lamps(tunnel: &Tunnel) -> String {
     match (tunnel.lamps.first(), tunnel.lamps.last()) {

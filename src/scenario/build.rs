@@ -2,14 +2,15 @@
 
 use super::file::{OnboardEquipment, OnboardSettings, ScenarioFile};
 use super::meshes::read_meshes;
-use super::{Override, OverrideError, check};
+use super::parts::{Parts, all_errors, read};
+use super::{Override, ScenarioError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
-use crate::settings::{Checker, FileError, Problem, Settings, key_below, read_toml};
+use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 use crate::track::{Direction, Tunnel};
-use crate::twin::physics::{PhysicsSettings, TrainSettings, VehicleFile};
+use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
 use std::borrow::Cow;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// A scenario, checked and ready to run.
@@ -109,53 +110,6 @@ pub struct WaysidePost {
     pub lidar: Option<LidarSettings>,
 }
 
-/// Why there is no scenario.
-#[derive(Debug, thiserror::Error)]
-pub enum ScenarioError {
-    /// An override that cannot be applied.
-    #[error("--set {0}")]
-    Override(#[from] OverrideError),
-    /// The file is right by itself, but not with these overrides.
-    #[error("{} is right by itself, but not with {}: {source}", path.display(), list(overrides))]
-    Overridden {
-        /// The file.
-        path: PathBuf,
-        /// The overrides.
-        overrides: Vec<Override>,
-        /// What is wrong.
-        source: FileError,
-    },
-    /// A file is wrong: the scenario, or the tunnel that it names.
-    #[error("{}: {source}", path.display())]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// Its text, empty where it could not be read.
-        text: String,
-        /// Values in it that overrides have replaced.
-        overrides: Vec<Override>,
-        /// What is wrong.
-        source: FileError,
-    },
-}
-
-impl ScenarioError {
-    /// Of a file as it stands, without overrides.
-    pub(super) fn file(path: &Path, text: &str, source: FileError) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            text: text.to_owned(),
-            overrides: Vec::new(),
-            source,
-        }
-    }
-}
-
-fn list(overrides: &[Override]) -> String {
-    let list: Vec<String> = overrides.iter().map(Override::to_string).collect();
-    list.join(" ")
-}
-
 impl Scenario {
     /// Reads and checks a scenario file and the tunnel that it names.
     pub fn load(path: &Path, overrides: &[Override]) -> Result<Self, ScenarioError> {
@@ -176,41 +130,22 @@ impl Scenario {
         };
         // The file must be right by itself, so that its errors are not taken for those
         // of the command line.
-        let mut file: ScenarioFile = read_toml(text).map_err(wrong)?;
+        let mut file: ScenarioFile = read_settings(text).map_err(wrong)?;
         if !overrides.is_empty() {
             file = overridden(path, text, overrides)?;
         }
 
-        let mut problems = Vec::new();
+        let mut parts = Parts::default();
         let folder = path.parent().unwrap_or(Path::new(""));
-        let keys: Vec<_> = (0..file.trains().count())
-            .map(|k| file.train_key(k))
-            .collect();
-        let trains = file.train.iter_mut().chain(&mut file.other_trains);
-        for (at, train) in keys.iter().zip(trains) {
-            let key = key_below(at, "vehicle");
-            load_vehicle(folder, (key, train), &mut problems)?;
-        }
-        read_meshes(&mut file, folder, &mut problems);
-        // What could not be read would be missed once more.
-        if problems.is_empty() {
-            file.check("", &mut problems);
-        }
-        let tunnel_path = folder.join(&file.tunnel);
-        let tunnel = match std::fs::read_to_string(&tunnel_path) {
-            Ok(text) => Some(parse_tunnel(&tunnel_path, &text)),
-            Err(error) => {
-                problems.push(unreadable("tunnel", &tunnel_path, "tunnel", &error));
-                None
-            }
+        parts.read_vehicles(&mut file, folder);
+        read_meshes(&mut file, folder, &mut parts.problems);
+        file.check("", &mut parts.problems);
+        let tunnel = parts.read_tunnel(&file.tunnel, folder);
+        let checked = match tunnel {
+            Some(tunnel) => Self::in_tunnel(file, tunnel, parts.problems),
+            None => Err(FileError::Problems(parts.problems)),
         };
-        let tunnel = match tunnel {
-            // The scenario's own problems first: the tunnel may be the wrong one.
-            Some(tunnel) if problems.is_empty() => tunnel?,
-            Some(Ok(tunnel)) => tunnel,
-            _ => return Err(wrong(FileError::Problems(problems))),
-        };
-        Self::in_tunnel(file, tunnel, problems).map_err(wrong)
+        all_errors(checked.map_err(wrong), parts.wrong_files)
     }
 
     /// From a file's content and a tunnel that are at hand already; `file.tunnel` is not read.
@@ -249,7 +184,9 @@ impl Scenario {
         tunnel: Tunnel,
         mut problems: Vec<Problem>,
     ) -> Result<Self, FileError> {
-        let wayside = check::in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        let mut check = Checker::new("", &mut problems);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut check);
+        check_history(&file, &mut check);
         if !problems.is_empty() {
             return Err(FileError::Problems(problems));
         }
@@ -270,49 +207,6 @@ impl Scenario {
             wayside,
         })
     }
-}
-
-/// Reads the vehicle file that a train names; a name without `.toml` is one of the program's own.
-fn load_vehicle(
-    folder: &Path,
-    (key, train): (String, &mut TrainSettings),
-    problems: &mut Vec<Problem>,
-) -> Result<(), ScenarioError> {
-    if Path::new(&train.vehicle).extension().is_none() {
-        return Ok(());
-    }
-    let path = folder.join(&train.vehicle);
-    match std::fs::read_to_string(&path) {
-        Ok(text) => train.vehicle_file = Some(parse_vehicle(&path, &text)?),
-        Err(error) => problems.push(unreadable(&key, &path, "vehicle", &error)),
-    }
-    Ok(())
-}
-
-fn unreadable(key: &str, path: &Path, kind: &str, error: &std::io::Error) -> Problem {
-    Problem::new(
-        key,
-        format!("cannot read {}: {error}", path.display()),
-        format!("give the path of a {kind} file, counted from the scenario's folder"),
-    )
-}
-
-/// Reads and checks a vehicle file's text; `path` is for the messages.
-pub(crate) fn parse_vehicle(path: &Path, text: &str) -> Result<VehicleFile, ScenarioError> {
-    VehicleFile::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
-}
-
-/// Reads and checks a tunnel's text; `path` is for the messages.
-pub(crate) fn parse_tunnel(path: &Path, text: &str) -> Result<Tunnel, ScenarioError> {
-    Tunnel::from_toml(text).map_err(|source| ScenarioError::file(path, text, source))
-}
-
-/// Reads a file's text.
-pub(crate) fn read(path: &Path) -> Result<String, ScenarioError> {
-    std::fs::read_to_string(path).map_err(|source| {
-        let file = path.to_owned();
-        ScenarioError::file(path, "", FileError::Read { path: file, source })
-    })
 }
 
 /// A file with some of its keys set anew.
@@ -337,7 +231,22 @@ pub(super) fn overridden(
         change.apply(&mut document)?;
     }
     let text = toml::to_string(&document).map_err(|e| wrong(syntax(e.to_string())))?;
-    read_toml(&text).map_err(wrong)
+    read_settings(&text).map_err(wrong)
+}
+
+/// Frames, clocks and faults together must not be later than the world remembers.
+fn check_history(file: &ScenarioFile, check: &mut Checker<'_>) {
+    let (needed_s, longest_s) = (history_s(file), *HISTORY_S.end());
+    if needed_s > longest_s {
+        check.problem(
+            "duration_s",
+            format!(
+                "by then images come {needed_s:.0} s after what they show, with long frames, slow \
+                 clocks and late cameras together, and poses are kept for {longest_s} s"
+            ),
+            "give more frames a second, less clock.drift_ppm, or a shorter run",
+        );
+    }
 }
 
 /// Poses are asked for until the last row of a frame has closed.

@@ -37,7 +37,7 @@ settings! {
         seed: u64;
         /// Simulated time, s. A bench run ends after its last point instead.
         #[serde(default = "default_duration_s")]
-        duration_s: f64, in 1e-3..=86_400.0;
+        duration_s: f64, in 1e-3..=LONGEST_RUN_S;
         /// End earlier, once the train has run and then stood for this long, s. Default: never.
         stop_after_standstill_s: Option<f64>, in 0.0..=86_400.0;
         /// Time step of the physics, s.
@@ -103,6 +103,9 @@ settings! {
     }
     also check_together
 }
+
+/// A day: what a line does repeats then.
+pub(super) const LONGEST_RUN_S: f64 = 86_400.0;
 
 fn default_duration_s() -> f64 {
     60.0
@@ -198,7 +201,7 @@ settings! {
         /// Number of points.
         points: u32 = 20, in 1.0..=1e5;
         /// Chainage of the train head at the first point, m.
-        first_m: f64 = 0.0;
+        first_m: f64 = 0.0, in -1e6..=1e6;
         /// From point to point, m.
         step_m: f64 = 0.5, in -1e3..=1e3;
         /// Fixes to take at each point, or as many as 5 s yield.
@@ -213,6 +216,11 @@ impl BenchSettings {
             first_m, step_m, ..
         } = *self;
         (0..self.points).map(move |k| first_m + f64::from(k) * step_m)
+    }
+
+    /// Chainage of the head at the last point.
+    pub fn last_m(&self) -> f64 {
+        self.first_m + f64::from(self.points.saturating_sub(1)) * self.step_m
     }
 
     /// Time that all pairs of images take.

@@ -1,7 +1,7 @@
 //! Reads the meshes that obstacles name, so that the physics needs no files.
 
 use super::file::ScenarioFile;
-use crate::settings::Problem;
+use crate::settings::{Problem, ReadLimit, read_bytes};
 use crate::twin::geometry::Hull;
 use crate::twin::physics::ObstacleShape;
 use nalgebra::Point3;
@@ -10,8 +10,6 @@ use std::sync::Arc;
 
 /// More triangles than any obstacle's hull is worth.
 const MAX_TRIANGLES: usize = 200_000;
-/// Larger files are no meshes of so many triangles.
-const MAX_BYTES: u64 = 64 << 20;
 
 /// Reads all meshes; relative paths count from `folder`.
 pub(super) fn read_meshes(file: &mut ScenarioFile, folder: &Path, problems: &mut Vec<Problem>) {
@@ -46,11 +44,7 @@ pub(super) fn read_meshes(file: &mut ScenarioFile, folder: &Path, problems: &mut
 /// The convex hull of all meshes in a Wavefront OBJ file, or what is wrong and a remedy.
 fn read_hull(path: &Path) -> Result<Hull, (String, String)> {
     let failed = |what: String, remedy: &str| (what, remedy.to_owned());
-    let text = std::fs::metadata(path).and_then(|about| match about.len() {
-        ..=MAX_BYTES => std::fs::read(path),
-        _ => Err(std::io::Error::other("larger than 64 MiB")),
-    });
-    let text = text.map_err(|error| {
+    let text = read_bytes(path, ReadLimit::OBJ).map_err(|error| {
         let remedy = "give the path of an OBJ file, counted from the scenario's folder";
         failed(format!("cannot read the mesh: {error}"), remedy)
     })?;
@@ -64,8 +58,10 @@ fn read_hull(path: &Path) -> Result<Hull, (String, String)> {
         .map_err(|error| failed(error.to_string(), "export it as Wavefront OBJ (text) again"))?;
     let meshes = || models.iter().map(|model| &model.mesh);
     let triangles: usize = meshes().map(|mesh| mesh.indices.len() / 3).sum();
-    if triangles > MAX_TRIANGLES {
-        let what = format!("it has {triangles} triangles, more than {MAX_TRIANGLES}");
+    let points: usize = meshes().map(|mesh| mesh.positions.len() / 3).sum();
+    if triangles.max(points) > MAX_TRIANGLES {
+        let what =
+            format!("it has {triangles} triangles of {points} points, more than {MAX_TRIANGLES}");
         return Err(failed(what, "simplify it: only its convex hull is used"));
     }
     let points: Vec<Point3<f64>> = meshes()

@@ -35,18 +35,21 @@
 
 mod build;
 mod check;
+mod error;
 mod file;
 mod meshes;
 mod overrides;
+mod parts;
 mod recording;
 pub mod sampling;
 
-pub use build::{Scenario, ScenarioError, WaysidePost};
-pub(crate) use build::{parse_vehicle, read};
+pub use build::{Scenario, WaysidePost};
+pub use error::ScenarioError;
 pub use file::{
     BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
     WaysidePostSettings,
 };
 pub(crate) use overrides::is_within;
 pub use overrides::{Override, OverrideError};
+pub(crate) use parts::{parse_vehicle, read};
 pub use recording::RecordSettings;

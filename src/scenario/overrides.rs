@@ -29,9 +29,7 @@ pub enum OverrideError {
     #[error("`{0}` is not of the form key=value; give for instance `train.cruise_speed_kmh=80`")]
     Form(String),
     /// A list has no such entry.
-    #[error(
-        "`{key}`: the file has {len} entries in `{list}`, so there is no [{index}]; count from 0"
-    )]
+    #[error("`{key}`: {}", no_entry(list, *len, *index))]
     NoEntry {
         /// The whole key.
         key: String,
@@ -55,6 +53,18 @@ pub enum OverrideError {
         /// What it is.
         kind: &'static str,
     },
+}
+
+fn no_entry(list: &str, len: usize, index: usize) -> String {
+    match len {
+        0 => format!(
+            "the file has no entry in `{list}`, and --set changes entries but adds none; add \
+             [[{list}]] to the file, or set the whole list: {list}=[{{ ... }}]"
+        ),
+        _ => format!(
+            "the file has {len} entries in `{list}`, so there is no [{index}]; count from 0"
+        ),
+    }
 }
 
 /// A list has entries, and they have keys.
@@ -146,6 +156,7 @@ impl Override {
     fn set(&self, root: &mut Value) -> Result<(), OverrideError> {
         let mut place = root;
         let mut path = String::new();
+        let mut is_new = false;
         for step in steps(&self.key).unwrap_or_default() {
             let kind = match place.type_str() {
                 "array" => "a list",
@@ -165,9 +176,18 @@ impl Override {
                 Step::Key(name) => {
                     let table = place.as_table_mut().ok_or_else(|| no_table(&path))?;
                     path = key_below(&path, &name);
+                    is_new = !table.contains_key(&name);
                     table
                         .entry(name)
                         .or_insert_with(|| Value::Table(Table::new()))
+                }
+                Step::Index(index) if is_new => {
+                    return Err(OverrideError::NoEntry {
+                        key: self.key.clone(),
+                        list: path,
+                        len: 0,
+                        index,
+                    });
                 }
                 Step::Index(index) => {
                     let list = place.as_array_mut().ok_or_else(|| no_table(&path))?;
@@ -227,6 +247,8 @@ mod tests {
         assert!(message("obstacles[1].mass_kg=1").contains("1 entries"));
         assert!(message("duration_s.x=1").contains("`duration_s` is a number"));
         assert!(message("obstacles.mass_kg=1").contains("is a list, which has no keys of its own; say which entry, counted from 0: `obstacles[0]`"));
+        let empty = message("workers[0].mass_kg=1");
+        assert!(empty.contains("no entry in `workers`") && empty.contains("[[workers]]"));
         assert!(message("train[0]=1").contains("`train` is a table"));
     }
 }

@@ -6,14 +6,22 @@
 
 mod declaration;
 mod document;
+mod entries;
+mod files;
+mod names;
 mod numbers;
 mod problem;
+mod search;
 mod unit;
+mod wrong;
 
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
-pub use document::{did_you_mean, locate, name_advice, read_toml};
+pub use document::{read_settings, read_toml};
+pub use entries::locate;
+pub use files::{ReadLimit, read_bytes, read_text};
+pub use names::{did_you_mean, name_advice};
 pub(crate) use numbers::one;
 pub use numbers::{Numbers, put_range};
-pub use problem::{Checker, FileError, Problem, key_below};
+pub use problem::{Checker, FileError, LONGEST_KEY, Problem, key_below, shortened, shown};
 pub use unit::unit_in;

@@ -19,19 +19,49 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem at `key`.
+    /// A problem at `key`, which is empty for the whole file. What is wrong may quote a file, whose
+    /// values may have any length: it is cut.
     pub fn new(key: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             key: key.into(),
-            what: what.into(),
-            remedy: remedy.into(),
+            what: shortened(&what.into(), LONGEST_TEXT),
+            remedy: shortened(&remedy.into(), LONGEST_TEXT),
+        }
+    }
+
+    /// A number is out of its range: nothing else can be the reason.
+    pub(super) fn is_of_range(&self) -> bool {
+        self.what.ends_with(OUT_OF_RANGE)
+    }
+
+    /// Key and what is wrong with it, for people.
+    pub fn said(&self) -> String {
+        match self.key.as_str() {
+            "" => self.what.clone(),
+            key => format!("{}: {}", shortened(key, LONGEST_KEY), self.what),
         }
     }
 }
 
+const OUT_OF_RANGE: &str = "is out of range";
+/// Letters that are shown of what is wrong, and of what would be right.
+const LONGEST_TEXT: usize = 1000;
+/// Letters that are shown of a key.
+pub const LONGEST_KEY: usize = 120;
+
+/// A text of a file for a message: its first letters, and none that would steer a terminal.
+pub fn shortened(text: &str, most: usize) -> String {
+    let shown = |c: char| if c.is_control() && c != '\n' { '?' } else { c };
+    let mut short: String = text.chars().take(most).map(shown).collect();
+    if short.len() < text.len() && text.chars().nth(most).is_some() {
+        short += " ...";
+    }
+    short
+}
+
 impl fmt::Display for Problem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}; {}", self.key, self.what, self.remedy)
+        write!(f, "{}; {}", self.said(), self.remedy)
     }
 }
 
@@ -74,10 +104,12 @@ impl<'a> Checker<'a> {
         key_below(&self.at, key)
     }
 
-    /// Adds a problem, unless the key has one already: a second may only follow from the first.
+    /// Adds a problem, unless the key has one already: a second may only follow from the first. Of a
+    /// file with very many only the first [`MOST_PROBLEMS`] are kept.
     pub fn problem(&mut self, key: &str, what: impl Into<String>, remedy: impl Into<String>) {
         let key = self.key(key);
-        if self.problems.iter().all(|p| p.key != key) {
+        let is_full = self.problems.len() >= MOST_PROBLEMS;
+        if !is_full && self.problems.iter().all(|p| p.key != key) {
             self.problems.push(Problem::new(key, what, remedy));
         }
     }
@@ -93,7 +125,7 @@ impl<'a> Checker<'a> {
         let space = if unit.is_empty() { "" } else { " " };
         self.problem(
             key,
-            format!("{value}{space}{unit} is out of range"),
+            format!("{value}{space}{unit} {OUT_OF_RANGE}"),
             match (low.is_finite(), high.is_finite()) {
                 (true, false) => format!("give at least {low}{space}{unit}"),
                 (false, true) => format!("give at most {high}{space}{unit}"),
@@ -102,16 +134,14 @@ impl<'a> Checker<'a> {
         );
     }
 
-    /// Adds a problem unless a number is greater than 0; `usual` is one that is.
-    pub fn positive(&mut self, key: &str, value: f64, usual: f64) {
-        if !(value.is_finite() && value > 0.0) {
-            let unit = of_key(key);
-            self.problem(
-                key,
-                format!("{value} {unit} is not greater than 0"),
-                format!("give a positive number of {unit}, usually {usual}"),
-            );
-        }
+    /// Nothing is wrong at or below one of its keys.
+    pub fn is_right(&self, key: &str) -> bool {
+        let at = self.key(key);
+        let is_below = |p: &Problem| {
+            let rest = p.key.strip_prefix(&at);
+            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
+        };
+        !self.problems.iter().any(is_below)
     }
 
     /// A checker of what stands below one of its keys.
@@ -149,7 +179,26 @@ pub enum FileError {
     Problems(Vec<Problem>),
 }
 
+/// Problems that are kept of a file.
+pub const MOST_PROBLEMS: usize = 1000;
+/// Problems that are shown of a file.
+const MOST_SHOWN: usize = 20;
+
+/// The problems of a file that are shown, and what is said of the others.
+pub fn shown(problems: &[Problem]) -> (&[Problem], Option<String>) {
+    let shown = problems.get(..MOST_SHOWN).unwrap_or(problems);
+    let more = problems.len() - shown.len();
+    let least = if problems.len() < MOST_PROBLEMS {
+        ""
+    } else {
+        "at least "
+    };
+    let rest = format!("{least}{more} more problems are not shown");
+    (shown, (more > 0).then_some(rest))
+}
+
 fn lines(problems: &[Problem]) -> String {
-    let lines: Vec<String> = problems.iter().map(Problem::to_string).collect();
-    lines.join("\n")
+    let (shown, rest) = shown(problems);
+    let lines = shown.iter().map(Problem::to_string).chain(rest);
+    lines.collect::<Vec<String>>().join("\n")
 }

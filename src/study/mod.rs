@@ -60,7 +60,7 @@ pub use worker::{ScenarioRunner, serve};
 
 use crate::record;
 use crate::scenario::ScenarioError;
-use crate::scenario::sampling::{ConditionError, SampleError};
+use crate::scenario::sampling::SampleError;
 use crate::session::ObserverError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -127,15 +127,9 @@ pub enum StudyError {
     /// No run can be drawn.
     #[error(transparent)]
     Sample(#[from] SampleError),
-    /// An event that cannot be worked out.
-    #[error("study.events: {0}")]
-    Event(#[from] ConditionError),
     /// A name or number that cannot be used, shards that are not a whole, or an error of Slurm's.
     #[error("{0}")]
     Unusable(String),
-    /// A name that no interval can be had of.
-    #[error("study.stop.when.of: `{0}` is no event of this study and no single figure of a run")]
-    NoFigure(String),
     /// A copy of the inputs is wrong.
     #[error(transparent)]
     Scenario(#[from] ScenarioError),

@@ -5,9 +5,11 @@
 
 use super::digest::is_weighted;
 use super::stats::{IntervalEstimate, Moments, Tally};
+use super::table::meant;
 use super::{Measure, Result, Row, StudyError, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
+use crate::settings::Problem;
 
 /// Runs between two looks.
 const EVERY: usize = 10;
@@ -50,7 +52,12 @@ impl Precision {
             Some(condition) => Some(Figure::Rate(condition.clone())),
             None => known().map(Figure::Mean),
         };
-        let figure = figure.ok_or_else(|| StudyError::NoFigure(when.of.clone()))?;
+        let figure = figure.ok_or_else(|| {
+            let name = &when.of;
+            let what = format!("`{name}` is no event of this study and no single figure of a run");
+            let key = "study.stop.when.of";
+            template.wrong(Problem::new(key, what, meant(name, template)))
+        })?;
         Ok(Some(Self {
             figure,
             half_width: when.half_width,

@@ -2,8 +2,8 @@
 
 use super::{MEASURES, Result, Row, Status, StudyError, measure};
 use crate::record::parquet::{Column, Kind, ParquetTable, column};
-use crate::scenario::sampling::{Condition, ConditionError, Template, VariableSettings};
-use crate::settings;
+use crate::scenario::sampling::{Condition, Template, VariableSettings};
+use crate::settings::{self, Problem, did_you_mean};
 use serde::Serialize;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -49,14 +49,29 @@ struct RowCells<'a> {
     others: Map<String, Value>,
 }
 
+/// What a wrong name in a condition on results was meant to be.
+pub fn meant(name: &str, template: &Template) -> String {
+    let variables = template.settings.variables.keys().cloned();
+    let figures = MEASURES.iter().map(|measure| measure.name.to_owned());
+    let known = variables.chain(figures).filter(|known| known != name);
+    let known: Vec<String> = known.collect();
+    match did_you_mean(name, &known) {
+        Some(similar) => format!("did you mean `{similar}`?"),
+        None => "`metrotwin study figures` lists what may be named, and the signs".to_owned(),
+    }
+}
+
 /// Whether events name what there is, and no name stands for two columns.
 pub fn check_names(template: &Template) -> Result {
     let settings = &template.settings;
     let known = |name: &str| settings.variables.contains_key(name) || measure(name).is_some();
-    for condition in template.events.values() {
+    for (event, condition) in &template.events {
         if let Some(name) = condition.names().find(|name| !known(name)) {
-            let text = condition.text().to_owned();
-            return Err(ConditionError::Unknown(text, name.to_owned()).into());
+            let what = format!("`{name}` is no variable of this study, and no figure of a run");
+            let key = format!("study.events.{event}");
+            return Err(template
+                .wrong(Problem::new(key, what, meant(name, template)))
+                .into());
         }
     }
     let is_taken =

@@ -1,8 +1,8 @@
 //! Checks against the line: what stands or runs there must fit into its tunnel.
 
-use crate::bus::TrainEnd;
+use crate::bus::{TrainEnd, TrainId};
 use crate::scenario::WaysidePost;
-use crate::scenario::file::{ScenarioFile, WaysidePostSettings};
+use crate::scenario::file::{BenchSettings, ScenarioFile, WaysidePostSettings};
 use crate::settings::{Checker, name_advice};
 use crate::stack::protection::ProtectionSettings;
 use crate::track::{Direction, Tunnel};
@@ -21,7 +21,9 @@ const REAR_LENGTH_ERROR_M: f64 = 0.1;
 /// less, but a car forgotten.
 const LENGTH_ERROR_M: f64 = 5.0;
 
-/// Checks against the line, and the wayside devices at their places.
+/// Checks against the line, and the wayside devices at their places. A part with a wrong value is not
+/// held against the line: what would be said follows from it, and numbers out of their range would
+/// take any time or memory.
 pub(in crate::scenario) fn in_tunnel(
     file: &ScenarioFile,
     tunnel: &Tunnel,
@@ -41,7 +43,7 @@ pub(in crate::scenario) fn in_tunnel(
     line.onboard();
     let posts = file.wayside.iter().enumerate();
     posts
-        .filter_map(|(k, post)| line.post(&format!("wayside[{k}].device"), post))
+        .filter_map(|(k, post)| line.post(&format!("wayside[{k}]"), post))
         .collect()
 }
 
@@ -56,8 +58,15 @@ impl LineCheck<'_, '_> {
     /// Each on the line, and no two in the same place.
     fn trains(&mut self) {
         let file = self.file;
+        // Too many of them are compared with each other for too long.
+        if file.other_trains.len() > TrainId::MOST {
+            return;
+        }
         for (k, train) in file.trains().enumerate() {
             let at = file.train_key(k);
+            if !self.check.is_right(&at) {
+                continue;
+            }
             self.train(&at, train);
             let [from_m, to_m] = stands_m(train);
             let before = file.trains().take(k).position(|other| {
@@ -113,14 +122,12 @@ impl LineCheck<'_, '_> {
     }
 
     fn bench(&mut self) {
-        let Some(bench) = &self.file.bench else {
+        let right = |_: &&BenchSettings| self.check.is_right("bench");
+        let Some(bench) = self.file.bench.as_ref().filter(right) else {
             return;
         };
-        let heads: Vec<f64> = bench.heads_m().collect();
-        for (key, head) in [("first_m", heads.first()), ("points", heads.last())] {
-            if let Some(&head_m) = head {
-                self.is_on_line(&format!("bench.{key}"), "the head", head_m);
-            }
+        for (key, head_m) in [("first_m", bench.first_m), ("points", bench.last_m())] {
+            self.is_on_line(&format!("bench.{key}"), "the head", head_m);
         }
     }
 
@@ -128,7 +135,7 @@ impl LineCheck<'_, '_> {
         let obstacles = self.file.obstacles.iter().enumerate();
         'obstacles: for (k, o) in obstacles {
             let at = format!("obstacles[{k}]");
-            let Some(middle_m) = o.middle_m() else {
+            let Some(middle_m) = o.middle_m().filter(|_| self.check.is_right(&at)) else {
                 continue;
             };
             let [along_m, across_m, up_m] = if o.count > 1 { o.spread_m } else { [0.0; 3] };
@@ -150,6 +157,9 @@ impl LineCheck<'_, '_> {
     fn cables(&mut self) {
         for (k, cable) in self.file.cables.iter().enumerate() {
             let at = format!("cables[{k}]");
+            if !self.check.is_right(&at) {
+                continue;
+            }
             let ends = [("from", &cable.from), ("to", &cable.to)];
             let outside = ends.map(|(key, end)| {
                 let place = [end.chainage_m, end.lateral_m, end.height_m];
@@ -163,6 +173,9 @@ impl LineCheck<'_, '_> {
 
     fn workers(&mut self) {
         for (k, worker) in self.file.workers.iter().enumerate() {
+            if !self.check.is_right(&format!("workers[{k}]")) {
+                continue;
+            }
             let middle_m = worker.ground_m + 0.5 * worker.stature_m;
             for (j, p) in worker.path.iter().enumerate() {
                 let at = format!("workers[{k}].path[{j}]");
@@ -227,7 +240,7 @@ impl LineCheck<'_, '_> {
         rig: Option<&RigSettings>,
         train: usize,
     ) {
-        if let Some(rig) = rig {
+        if let Some(rig) = rig.filter(|_| self.check.is_right(rig_at)) {
             self.view(rig_at, rig, train);
         }
         let train = self.file.trains().nth(train);
@@ -303,8 +316,21 @@ impl LineCheck<'_, '_> {
     }
 
     /// A wayside device at its place.
-    fn post(&mut self, key: &str, post: &WaysidePostSettings) -> Option<WaysidePost> {
+    fn post(&mut self, at: &str, post: &WaysidePostSettings) -> Option<WaysidePost> {
+        if !self.check.is_right(at) {
+            return None;
+        }
         let tunnel = self.tunnel;
+        let key = &format!("{at}.device");
+        if post.device.trim().is_empty() {
+            let names = tunnel.wayside.iter().map(|site| site.name.as_str());
+            let remedy = format!(
+                "give the name of one that the tunnel has: {}",
+                names.collect::<Vec<_>>().join(", ")
+            );
+            self.check.problem(key, "names no device", remedy);
+            return None;
+        }
         let Some(site) = tunnel.wayside.iter().find(|site| site.name == post.device) else {
             let names: Vec<_> = tunnel
                 .wayside

@@ -4,7 +4,7 @@ mod line;
 
 pub(super) use line::in_tunnel;
 
-use super::file::ScenarioFile;
+use super::file::{LONGEST_RUN_S, ScenarioFile};
 use crate::bus::{TrainEnd, TrainId};
 use crate::settings::{Checker, name_advice};
 use crate::twin::faults::rig_cameras;
@@ -27,8 +27,9 @@ impl ScenarioFile {
         check_onboard(self, check);
         check_names(self, check);
         check_reach(self, check);
+        let mut devices = BTreeSet::new();
         for (k, post) in self.wayside.iter().enumerate() {
-            if self.wayside[..k].iter().any(|p| p.device == post.device) {
+            if !devices.insert(&post.device) {
                 check.problem(
                     &format!("wayside[{k}].device"),
                     format!("`{}` is in use already", post.device),
@@ -98,9 +99,10 @@ fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
         }
     }
     let others = file.other_trains.len();
+    let mut equipped = BTreeSet::new();
     for (k, onboard) in file.onboard.iter().enumerate() {
         let number = usize::from(onboard.train);
-        let twice = file.onboard[..k].iter().any(|o| o.train == onboard.train);
+        let twice = !equipped.insert(onboard.train);
         let what = if twice {
             format!("train {number} has its equipment already")
         } else if number == 0 || number > others {
@@ -154,8 +156,19 @@ fn check_carrier(file: &ScenarioFile, check: &mut Checker<'_>) {
         ),
         _ => {}
     }
-    if file.bench.is_none() {
+    let Some(bench) = &file.bench else {
         return;
+    };
+    let takes_s = file
+        .rig
+        .as_ref()
+        .map(|rig| bench.duration_s(rig.pairs_per_s));
+    if let Some(takes_s) = takes_s.filter(|takes_s| *takes_s > LONGEST_RUN_S) {
+        check.problem(
+            "bench.fixes_per_point",
+            format!("all pairs of images take {takes_s:.0} s"),
+            format!("give fewer points or fixes, for at most {LONGEST_RUN_S} s as other runs have"),
+        );
     }
     let mut ends = file.rig.iter().map(|rig| rig.end);
     if ends.any(|end| end == TrainEnd::Rear) {

@@ -1,5 +1,6 @@
 //! Conditions between named values: `gap_m > 2.0 * size_m && !(dark || wet)`.
 
+use crate::settings::shortened;
 use exmex::regex::{Captures, Regex};
 use exmex::{
     BinOp, Express, FlatEx, MakeOperators, MatchLiteral, Operator, literal_matcher_from_pattern,
@@ -69,6 +70,9 @@ ops_factory!(
 
 literal_matcher_from_pattern!(Numbers, r"^([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?");
 
+/// The parser's time grows with the square of the length.
+const LONGEST: usize = 2000;
+
 /// A condition, parsed.
 #[derive(Clone, Debug)]
 pub struct Condition {
@@ -95,7 +99,12 @@ impl Condition {
     /// Parses one of `+ - * / ^`, `< <= > >= == !=`, `&& || !`, `abs(x)`, `sqrt(x)`, `ln(x)`, `exp(x)`,
     /// `floor(x)`, `min(x, y)`, `max(x, y)`, numbers and names; names in braces may hold anything.
     pub fn parse(text: &str) -> Result<Self, ConditionError> {
-        let form = |e: exmex::ExError| ConditionError::Form(text.to_owned(), e.to_string());
+        let shown = || shortened(text, 200);
+        if text.len() > LONGEST {
+            let why = format!("it is longer than {LONGEST} letters");
+            return Err(ConditionError::Form(shown(), why));
+        }
+        let form = |e: exmex::ExError| ConditionError::Form(shown(), e.to_string());
         Ok(Self {
             text: text.to_owned(),
             expression: Box::new(FlatEx::parse(&in_braces(text)).map_err(form)?),
@@ -196,5 +205,11 @@ mod tests {
             Err(ConditionError::NoCondition(..))
         ));
         assert!(matches!(holds("a > "), Err(ConditionError::Form(..))));
+        let nested = |n: usize| format!("{}a{} > 1", "(".repeat(n), ")".repeat(n));
+        assert_eq!(holds(&nested(900)), Ok(Some(true)));
+        assert!(matches!(
+            holds(&nested(1_000_000)),
+            Err(ConditionError::Form(..))
+        ));
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Template;
 use crate::scenario::ScenarioFile;
+use crate::settings::{ReadLimit, read_bytes};
 use sha2::{Digest, Sha256};
 use std::collections::BTreeMap;
 use std::fs;
@@ -55,7 +56,7 @@ impl Inputs {
     /// Hash of each file, as `sha256sum` prints it, by its path below the root.
     pub fn hashes(&self) -> io::Result<BTreeMap<String, String>> {
         let hash = |file: &PathBuf| {
-            let bytes = fs::read(self.root.join(file))?;
+            let bytes = read_input(&self.root.join(file))?;
             Ok((file.to_string_lossy().into_owned(), sha256(&bytes)))
         };
         self.files.iter().map(hash).collect()
@@ -78,7 +79,7 @@ impl Inputs {
             if let Some(parent) = to.parent() {
                 fs::create_dir_all(parent)?;
             }
-            write(&to, &fs::read(self.root.join(file))?)?;
+            write(&to, &read_input(&self.root.join(file))?)?;
         }
         Ok(())
     }
@@ -100,6 +101,16 @@ impl Inputs {
         let folder = self.study.parent().unwrap_or(Path::new(""));
         Some(plain(&folder.join(name)))
     }
+}
+
+/// Reads a file that a study is made of.
+fn read_input(path: &Path) -> io::Result<Vec<u8>> {
+    let kinds = [ReadLimit::TOML, ReadLimit::CSV, ReadLimit::OBJ];
+    let ending = path.extension().unwrap_or_default();
+    let kind = kinds
+        .into_iter()
+        .find(|k| ending.eq_ignore_ascii_case(k.ending));
+    read_bytes(path, kind.unwrap_or(ReadLimit::TOML))
 }
 
 /// Hash of bytes, in hexadecimal digits.

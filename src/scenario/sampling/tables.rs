@@ -1,7 +1,7 @@
 //! Tables of measured values that variables are drawn from.
 
 use super::settings::{Distribution, StudySettings};
-use crate::settings::Problem;
+use crate::settings::{Problem, ReadLimit, read_bytes};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use toml::Value;
@@ -67,14 +67,26 @@ impl Tables {
     }
 }
 
+/// A table of measured values has fewer.
+const MOST_COLUMNS: usize = 1000;
+
 fn read(path: &Path) -> Result<Columns, String> {
     let failed = |e: csv::Error| format!("{}: {e}", path.display());
+    let text = read_bytes(path, ReadLimit::CSV)
+        .map_err(|error| format!("cannot read {}: {error}", path.display()))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(failed)?;
-    let headers = reader.headers().map_err(failed)?.iter();
+        .from_reader(text.as_slice());
+    let headers = reader.headers().map_err(failed)?;
+    if headers.len() > MOST_COLUMNS {
+        let count = headers.len();
+        return Err(format!(
+            "{} has {count} columns, more than {MOST_COLUMNS}",
+            path.display()
+        ));
+    }
+    let headers = headers.iter();
     let mut columns: Columns = headers.map(|h| (h.to_owned(), Vec::new())).collect();
     for record in reader.records() {
         for ((_, cells), cell) in columns.iter_mut().zip(&record.map_err(failed)?) {

@@ -5,9 +5,10 @@ use super::copula;
 use super::plan::{MOST_SOBOL, SamplingPlan};
 use super::settings::{Distribution, PlanSettings, StudySettings};
 use super::tables::Tables;
-use crate::scenario::build::{overridden, read};
+use crate::scenario::build::overridden;
+use crate::scenario::parts::read;
 use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
-use crate::settings::{FileError, Problem, read_toml};
+use crate::settings::{FileError, Problem, read_settings};
 use nalgebra::DMatrix;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -40,17 +41,30 @@ pub struct Template {
 impl Template {
     /// Reads and checks a file, and the scenario that it is as it stands.
     pub fn load(path: &Path) -> Result<Self, ScenarioError> {
-        let text = read(path)?;
+        Self::from_text(path, read(path)?)
+    }
+
+    /// As [`Self::load`], of a text already read; `path` is where relative paths count from.
+    pub fn from_text(path: &Path, text: String) -> Result<Self, ScenarioError> {
         let wrong = |source| ScenarioError::file(path, &text, source);
-        Scenario::from_text(path, &text, &[])?;
-        let file: ScenarioFile = read_toml(&text).map_err(wrong)?;
+        let own = Scenario::from_text(path, &text, &[]).err();
+        let file: ScenarioFile = match read_settings(&text) {
+            Ok(file) => file,
+            Err(source) => return Err(own.unwrap_or_else(|| wrong(source))),
+        };
         let settings = file.study.clone().ok_or_else(|| {
             wrong(FileError::Problems(vec![Problem::new(
                 "study",
                 "is missing: nothing is said to vary",
                 "add a table [study]; scenarios/studies has examples",
             )]))
-        })?;
+        });
+        // What else is wrong with a study is found by drawing from it.
+        let settings = match own {
+            Some(ref own) if settings.is_ok() && !own.is_at("study") => settings?,
+            Some(own) => return Err(own),
+            None => settings?,
+        };
         let mut problems = Vec::new();
         let folder = path.parent().unwrap_or(Path::new(""));
         let tables = Tables::read(&settings, folder, &mut problems);
@@ -59,8 +73,8 @@ impl Template {
         check_keys(path, &text, &settings, &tables, &mut problems);
         let coordinates = coordinates(&settings);
         check_size(&settings, coordinates.len(), &mut problems);
-        if !problems.is_empty() {
-            return Err(wrong(FileError::Problems(problems)));
+        if let Some(error) = ScenarioError::joined(own, path, &text, problems) {
+            return Err(error);
         }
         let swept = settings.variables.iter().filter(|(_, v)| v.from.is_swept());
         Ok(Self {
@@ -78,6 +92,16 @@ impl Template {
             settings,
             text,
         })
+    }
+
+    /// What is wrong with the file, found by whoever knows the figures of a run.
+    pub fn wrong(&self, problem: Problem) -> ScenarioError {
+        ScenarioError::file(&self.path, &self.text, FileError::Problems(vec![problem]))
+    }
+
+    /// Bytes of the file.
+    pub fn text_len(&self) -> usize {
+        self.text.len()
     }
 
     /// With another seed or number of runs.
@@ -206,6 +230,9 @@ fn check_size(settings: &StudySettings, coordinates: usize, problems: &mut Vec<P
     }
 }
 
+/// For each key that is set the whole file is read: so many bytes take some seconds.
+const MOST_BYTES_SET: usize = 32 << 20;
+
 /// Every key that a variable sets must be there, and take a value of its kind.
 fn check_keys(
     path: &Path,
@@ -214,6 +241,18 @@ fn check_keys(
     tables: &Tables,
     problems: &mut Vec<Problem>,
 ) {
+    let keys: usize = settings.variables.values().map(|v| v.keys.len()).sum();
+    if keys.saturating_mul(text.len()) > MOST_BYTES_SET {
+        problems.push(Problem::new(
+            "study.variables",
+            format!(
+                "they set {keys} keys, too many for a file of {} bytes",
+                text.len()
+            ),
+            "set fewer keys, or whole tables by a `choice`",
+        ));
+        return;
+    }
     for (name, variable) in &settings.variables {
         let tried: Vec<Value> = match &variable.from {
             Distribution::Table { file, column } => {

@@ -1,4 +1,5 @@
 use super::*;
+use crate::settings::{Problem, did_you_mean, locate};
 use serde::Deserialize;
 
 #[derive(Debug, Deserialize)]
@@ -130,4 +131,93 @@ fn suggestions_are_near_or_none() {
     assert_eq!(did_you_mean("power_kw", &known), Some("power_w"));
     assert_eq!(did_you_mean("hieght_m", &known), Some("height_m"));
     assert_eq!(did_you_mean("colour", &known), None);
+}
+
+/// Provokes: a search that ends at a key that is missing, or at a kind that is none; what follows from
+/// a wrong kind told as a problem of its own; a kind without the names that it may have.
+#[test]
+fn a_missing_key_hides_no_other() {
+    let text = r#"
+        colour = 3
+        [lamps]
+        chip_us = "45"
+        [[obstacles]]
+        shape = { kind = 7, radius_m = 1.0 }
+        [[obstacles]]
+        mass_kg = 1.0
+        shape = { kind = "box", size_m = [1.0, 2.0] }
+        [[obstacles]]
+        mass_kg = true
+    "#;
+    let found = problems(text);
+    let keys: Vec<_> = found.iter().map(|p| p.key.as_str()).collect();
+    for key in [
+        "name",
+        "colour",
+        "lamps.chip_us",
+        "obstacles[0].mass_kg",
+        "obstacles[0].shape.kind",
+        "obstacles[2].mass_kg",
+    ] {
+        assert!(keys.contains(&key), "{key}: {found:#?}");
+    }
+    let kind = found.iter().find(|p| p.key.ends_with("kind")).unwrap();
+    assert_eq!(kind.remedy, "give one of: sphere, box");
+    assert!(keys.iter().any(|key| key.starts_with("obstacles[1].shape")));
+    assert_eq!(found.len(), 7, "{found:#?}");
+}
+
+/// Provokes: words of the parser in place of those of a user.
+#[test]
+fn values_of_the_wrong_kind_are_told_in_plain_words() {
+    #[derive(Debug, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Kinds {
+        count: u64,
+        index: u8,
+        name: String,
+        on: bool,
+        list: Vec<f64>,
+        three: [f64; 3],
+        table: Option<Lamps>,
+        level: f64,
+    }
+    let text = "count = -1\nindex = 1.5\nname = 3\non = 'yes'\nlist = 4\nthree = [1.0]\ntable = []\n\
+                level = [1]";
+    let Err(FileError::Problems(found)) = read_toml::<Kinds>(text) else {
+        panic!("nothing is wrong");
+    };
+    let said: Vec<String> = found.iter().map(Problem::to_string).collect();
+    for sentence in [
+        "count: is the whole number -1; give a whole number, 0 or more",
+        "index: is the number 1.5; give a whole number from 0 to 255",
+        "name: is the whole number 3; give a text in quotes",
+        "on: is the text \"yes\"; give true or false",
+        "list: is the whole number 4; give a list, in [ ]",
+        "three: has 1 elements; give a list of 3 elements",
+        "level: is a list; give a number",
+    ] {
+        assert!(said.iter().any(|s| s == sentence), "{sentence}: {said:#?}");
+    }
+    assert_eq!(found.len(), 8, "{said:#?}");
+    let rust = [
+        "f64", "u64", "u8", "struct", "sequence", "invalid", "integer",
+    ];
+    let words = said.join("\n");
+    assert!(rust.iter().all(|word| !words.contains(word)), "{words}");
+}
+
+/// Provokes: work that grows with the number of problems times the size, a value of any length in a
+/// message.
+#[test]
+fn very_many_problems_take_bounded_work() {
+    let start = std::time::Instant::now();
+    let bad = |k: usize| format!("[[obstacles]]\nbad{k} = \"{}\"\n", "x".repeat(80));
+    let text = format!("name = 'x'\n{}", (0..8000).map(bad).collect::<String>());
+    let found = problems(&text);
+    assert!(found.len() <= 101, "{}", found.len());
+    assert!(found.last().unwrap().to_string().contains("may be more"));
+    assert!(start.elapsed().as_secs() < 20);
+    let long = format!("name = 'x'\nrenderer = '{}'", "y".repeat(1_000_000));
+    assert!(problems(&long)[0].to_string().len() < 3000);
 }

@@ -5,6 +5,7 @@ use crate::settings::{Checker, did_you_mean};
 use crate::track::Tunnel;
 use crate::track::furniture::WaysideSite;
 use crate::track::section::OutlinePoint;
+use std::collections::BTreeMap;
 
 /// Checks wayside devices against rock, gauge and balises.
 pub(super) fn check_wayside(tunnel: &Tunnel, check: &mut Checker<'_>) {
@@ -19,6 +20,11 @@ pub(super) fn check_wayside(tunnel: &Tunnel, check: &mut Checker<'_>) {
 }
 
 fn check_balise(key: &str, w: &WaysideSite, tunnel: &Tunnel, check: &mut Checker<'_>) {
+    if w.balise.trim().is_empty() {
+        let remedy = "name the one of `[[balises]]` that gets its messages";
+        check.problem(key, "is empty", remedy);
+        return;
+    }
     match tunnel.balise(&w.balise) {
         None => {
             let names: Vec<String> = tunnel.balises.iter().map(|b| b.name.clone()).collect();
@@ -53,11 +59,15 @@ pub(super) fn check_named(tunnel: &Tunnel, check: &mut Checker<'_>) {
         ("base_stations", base_stations.collect()),
         ("stations", stations.collect()),
     ] {
-        for (k, (name, chainage_m)) in places.iter().enumerate() {
+        let mut named: BTreeMap<&str, usize> = BTreeMap::new();
+        for (k, (name, chainage_m)) in places.into_iter().enumerate() {
             let place = format!("{table}[{k}]");
-            on_line(&format!("{place}.chainage_m"), *chainage_m, tunnel, check);
-            let first = places[..k].iter().position(|(other, _)| other == name);
-            if let Some(first) = first {
+            on_line(&format!("{place}.chainage_m"), chainage_m, tunnel, check);
+            let first = *named.entry(name).or_insert(k);
+            if name.trim().is_empty() {
+                let what = "is empty, and messages and figures go by names";
+                check.problem(&format!("{place}.name"), what, "give it a name of its own");
+            } else if first < k {
                 check.problem(
                     &format!("{place}.name"),
                     format!("\"{name}\" is the name of {table}[{first}] too"),

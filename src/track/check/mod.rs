@@ -9,7 +9,7 @@ use super::Tunnel;
 use super::file::TunnelFile;
 use super::gauge::Gauge;
 use super::section::OutlinePoint;
-use crate::settings::{Checker, FileError, Problem, Settings, read_toml};
+use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 
 /// Chainages closer than this are the same place.
 const SAME_M: f64 = 1e-6;
@@ -19,7 +19,7 @@ impl Tunnel {
     /// keys of the problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let mut problems = Vec::new();
-        let tunnel = check(&read_toml(text)?, &mut problems);
+        let tunnel = check(&read_settings(text)?, &mut problems);
         if problems.is_empty() {
             Ok(tunnel)
         } else {

@@ -19,7 +19,7 @@ settings! {
         #[serde(default)]
         from_s: f64, in 0.0..=86_400.0;
         /// Until when, s. Default: to the end.
-        to_s: Option<f64>;
+        to_s: Option<f64>, in 0.0..=1e6;
     }
     also check_stretch
 }

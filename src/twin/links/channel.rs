@@ -10,9 +10,9 @@ settings! {
     #[derive(Copy)]
     pub struct Outage {
         /// Begins, seconds after the scenario's start.
-        from_s: f64;
+        from_s: f64, in -1e6..=1e6;
         /// Ends.
-        to_s: f64;
+        to_s: f64, in -1e6..=1e6;
     }
     also check_order
 }

@@ -97,7 +97,7 @@ pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
-pub use settings::{PhysicsSettings, STEP_S, TrackSettings, TrainSettings, train_key};
+pub use settings::{HISTORY_S, PhysicsSettings, STEP_S, TrackSettings, TrainSettings, train_key};
 pub use train_truth::TrainState;
 pub use truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{

@@ -25,7 +25,7 @@ settings! {
         step_s: f64 = 0.001, in STEP_S;
         /// How far back poses can be asked for, in seconds; at least the longest frame of any
         /// camera.
-        history_s: f64 = 0.5, in 0.01..=60.0;
+        history_s: f64 = 0.5, in HISTORY_S;
         /// How even the track is.
         track: TrackSettings = TrackSettings::default(), nested;
         /// Trains, up to eight, by number.
@@ -71,6 +71,9 @@ impl PhysicsSettings {
         }
     }
 }
+
+/// How long poses may be kept, s: of a minute they take some ten megabytes a car.
+pub const HISTORY_S: RangeInclusive<f64> = 0.01..=60.0;
 
 /// Where a scenario has the train of a number.
 pub fn train_key(number: usize) -> String {

@@ -43,7 +43,7 @@ settings! {
             file: String;
             /// Metres that a unit of the file stands for.
             #[serde(default = "crate::settings::one::<f64>")]
-            scale: f64;
+            scale: f64, in 1e-6..=1e6;
             /// What the file holds, unscaled; whoever reads the scenario puts it here.
             #[serde(skip)]
             hull: Option<Arc<Hull>>;

@@ -1,6 +1,6 @@
 //! Dimensions, masses, springs and dampers of a car, as a file has them.
 
-use crate::settings::{Checker, FileError, Settings, read_toml, settings};
+use crate::settings::{Checker, FileError, Settings, read_settings, settings};
 use std::sync::LazyLock;
 
 /// Texts of the sets that come with the program.
@@ -144,7 +144,7 @@ settings! {
 impl VehicleFile {
     /// Reads and checks a vehicle file's text.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
-        let file: Self = read_toml(text)?;
+        let file: Self = read_settings(text)?;
         let mut problems = Vec::new();
         file.check("", &mut problems);
         match problems.is_empty() {

@@ -39,10 +39,10 @@ settings! {
         /// What he carries, a single thing; place, motion, hold and `appears_s` of it are ignored.
         carries: Option<ObstacleSettings> = None, nested;
         /// When he puts it down beside him, seconds, while he is there; never where absent.
-        puts_down_s: Option<f64> = None;
+        puts_down_s: Option<f64> = None, in 0.0..=1e6;
         /// When he picks it up again, seconds, while he is there and it lies within 1.5 m of him;
         /// never where absent.
-        picks_up_s: Option<f64> = None;
+        picks_up_s: Option<f64> = None, in 0.0..=1e6;
     }
     also check_path
 }

@@ -29,6 +29,25 @@ pub enum ReadOut {
 /// Columns and rows: at most the widest texture that every graphics adapter has.
 pub(super) const SIDE_PX: RangeInclusive<f64> = 16.0..=8192.0;
 
+/// Frames a second. The world remembers poses for a minute at most: twice a frame of 10 s, with all
+/// that makes images late, fits into it. More than one in a step of the physics (1 ms) show nothing new.
+pub(super) const FRAMES_PER_S: RangeInclusive<f64> = 0.1..=1000.0;
+/// Exposures, us: the shortest of electronic shutters is over 0.1 us, and for all of an exposure the
+/// pose of every millisecond is kept.
+pub(super) const EXPOSURE_US: RangeInclusive<f64> = 0.1..=1e7;
+/// Line times, us: the fewest rows, 16, then take longer than the longest frame.
+pub(super) const LINE_TIME_US: RangeInclusive<f64> = 0.0..=1e7;
+/// Jitter, us: a tenth of the longest frame; frames that would overtake each other are refused too.
+pub(super) const JITTER_US: RangeInclusive<f64> = 0.0..=1e7;
+/// Errors of the line time, us: those of what it may be.
+pub(super) const LINE_TIME_ERROR_US: RangeInclusive<f64> = -1e7..=1e7;
+/// Focal lengths, mm: from less than the smallest lens to telescopes.
+pub(super) const FOCAL_MM: RangeInclusive<f64> = 0.1..=10_000.0;
+/// Differences of focal lengths, mm.
+pub(super) const FOCAL_ERROR_MM: RangeInclusive<f64> = -1000.0..=1000.0;
+/// Pixels, um: from less than a wavelength of light to a plate for each.
+pub(super) const PIXEL_UM: RangeInclusive<f64> = 0.1..=1000.0;
+
 /// Draws of jitter farther off than this many standard deviations are held there.
 pub(super) const MOST_SIGMAS: f64 = 4.0;
 
@@ -64,11 +83,15 @@ impl CameraSettings {
     }
 
     fn check_optics(&self, rate_key: &str, check: &mut Checker<'_>) {
-        check.positive("focal_length_mm", self.focal_length_mm, 3.9);
-        check.positive("pixel_um", self.pixel_um, 3.75);
-        check.positive("exposure_us", self.exposure_us, 30.0);
-        check.positive(rate_key, self.frames_per_s, 30.0);
-        check.within("line_time_us", self.line_time_us, 0.0..=1e7);
+        for (key, value, range) in [
+            ("focal_length_mm", self.focal_length_mm, FOCAL_MM),
+            ("pixel_um", self.pixel_um, PIXEL_UM),
+            ("exposure_us", self.exposure_us, EXPOSURE_US),
+            (rate_key, self.frames_per_s, FRAMES_PER_S),
+            ("line_time_us", self.line_time_us, LINE_TIME_US),
+        ] {
+            check.within(key, value, range);
+        }
         self.check_frame_time(rate_key, check);
         self.check_lens(check);
     }
@@ -256,9 +279,9 @@ settings! {
     #[derive(Copy)]
     pub struct CameraSettings {
         /// Focal length, mm. Default 4.1 (1093 px: 83 deg across).
-        focal_length_mm: f64 = 4.1;
+        focal_length_mm: f64 = 4.1, in FOCAL_MM;
         /// Width and height of a pixel, um.
-        pixel_um: f64 = 3.75;
+        pixel_um: f64 = 3.75, in PIXEL_UM;
         /// Columns.
         width_px: u32 = 1920, in SIDE_PX;
         /// Rows.
@@ -270,16 +293,16 @@ settings! {
         /// Distortion of the lens, as OpenCV has it. Default: none.
         distortion: DistortionCoefficients = DistortionCoefficients::default();
         /// Time from the opening of a row to the opening of the next, us.
-        line_time_us: f64 = 14.8;
+        line_time_us: f64 = 14.8, in LINE_TIME_US;
         /// Whether rows are read downwards or upwards.
         read_out: ReadOut = ReadOut::Down;
         /// How long every row collects light, us.
-        exposure_us: f64 = 16_000.0;
+        exposure_us: f64 = 16_000.0, in EXPOSURE_US;
         /// Frames a second.
-        frames_per_s: f64 = 10.0;
+        frames_per_s: f64 = 10.0, in FRAMES_PER_S;
         /// Standard deviation of a frame's true start about the one that it says, us, drawn anew
         /// for each; held at four times that.
-        frame_jitter_us: f64 = 0.0;
+        frame_jitter_us: f64 = 0.0, in JITTER_US;
         /// By how much the device really differs from the calibration that the stack is given.
         /// Default: not at all.
         calibration_error: WaysideError = WaysideError::default(), nested;
@@ -326,7 +349,7 @@ settings! {
     #[derive(Copy)]
     pub struct WaysideError {
         /// Focal length, mm.
-        focal_length_mm: f64 = 0.0;
+        focal_length_mm: f64 = 0.0, in FOCAL_ERROR_MM;
         /// Principal point, px to the right.
         principal_u_px: f64 = 0.0, in -100.0..=100.0;
         /// Principal point, px down.
@@ -334,7 +357,7 @@ settings! {
         /// Distortion of r^2.
         k1: f64 = 0.0, in -1.0..=1.0;
         /// Line time, us.
-        line_time_us: f64 = 0.0;
+        line_time_us: f64 = 0.0, in LINE_TIME_ERROR_US;
         /// Yaw, deg, left positive.
         yaw_deg: f64 = 0.0, in -45.0..=45.0;
         /// Pitch, deg, up positive.

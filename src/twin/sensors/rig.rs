@@ -23,7 +23,10 @@
 //! of the lenses it misses of both alike. Both eyes share the jitter of the trigger, and one line
 //! time: it does not drift. Nothing changes with temperature or vibration.
 
-use super::camera::{CameraSettings, ReadOut, SIDE_PX, check_half, mounted};
+use super::camera::{
+    CameraSettings, EXPOSURE_US, FOCAL_ERROR_MM, FOCAL_MM, FRAMES_PER_S, JITTER_US,
+    LINE_TIME_ERROR_US, LINE_TIME_US, PIXEL_UM, ReadOut, SIDE_PX, check_half, mounted,
+};
 use super::{ClockSettings, ExposureSettings, WaysideError};
 use crate::bus::{DistortionCoefficients, RigCalibration, TrainEnd};
 use crate::settings::{Checker, settings};
@@ -31,6 +34,10 @@ use crate::twin::render::{BLUR_PX, LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
+
+/// Distances of the eyes, mm: a train is 3 m wide.
+const BASELINE_MM: RangeInclusive<f64> = 1.0..=3000.0;
 
 /// The side of a train on which a rig looks out.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -47,9 +54,9 @@ settings! {
     /// The stereo rig at an end of a train: where it is mounted, what it sees, when.
     pub struct RigSettings {
         /// Focal length of the left eye, mm. Default 3.9 (1040 px).
-        focal_length_mm: f64 = 3.9;
+        focal_length_mm: f64 = 3.9, in FOCAL_MM;
         /// Width and height of a pixel, um.
-        pixel_um: f64 = 3.75;
+        pixel_um: f64 = 3.75, in PIXEL_UM;
         /// Columns of either eye's image.
         width_px: u32 = 1280, in SIDE_PX;
         /// Rows of either eye's image.
@@ -64,22 +71,22 @@ settings! {
         right: RightEye = RightEye::default(), nested;
         /// Distance between the eyes, mm; the right eye sits that far along the left eye's right
         /// hand axis.
-        baseline_mm: f64 = 120.0;
+        baseline_mm: f64 = 120.0, in BASELINE_MM;
         /// Time from the opening of a row to the opening of the next, us; 0 for a global shutter.
-        line_time_us: f64 = 22.2;
+        line_time_us: f64 = 22.2, in LINE_TIME_US;
         /// Whether rows are read downwards or upwards, in both eyes.
         read_out: ReadOut = ReadOut::Down;
         /// How long every row collects light, us. Longer than a chip of the lamps' code (45 us in
         /// the shipped tunnels) it blurs the stripes away.
-        exposure_us: f64 = 30.0;
+        exposure_us: f64 = 30.0, in EXPOSURE_US;
         /// Pairs of images a second.
-        pairs_per_s: f64 = 30.0;
+        pairs_per_s: f64 = 30.0, in FRAMES_PER_S;
         /// By how much later than the left eye the right one is triggered, us; negative: earlier.
         /// Its frames say so.
         trigger_offset_us: f64 = 0.0, in MOST_OFFSET_US;
         /// Standard deviation of a pair's true start about the one that its frames say, us, drawn
         /// anew for each and the same for both eyes; held at four times that.
-        frame_jitter_us: f64 = 0.0;
+        frame_jitter_us: f64 = 0.0, in JITTER_US;
         /// The end of the train that it is at, with the inertial unit. At the rear end it looks back:
         /// what is ahead and left of it is behind the train and on its right.
         end: TrainEnd = TrainEnd::Front;
@@ -90,7 +97,7 @@ settings! {
         /// Left eye, m to the left of the centreline.
         lateral_m: f64 = 1.0, in -2.0..=2.0;
         /// Left eye, m above top of rail.
-        height_m: f64 = 1.7;
+        height_m: f64 = 1.7, in 0.01..=6.0;
         /// Turn of the optical axis from straight ahead, deg, left positive; psi = 90 - yaw.
         yaw_deg: f64 = 39.0, in -180.0..=180.0;
         /// Tilt of the optical axis, deg, up positive.
@@ -116,7 +123,7 @@ settings! {
     #[derive(Copy)]
     pub struct RightEye {
         /// Focal length, mm.
-        focal_length_mm: f64 = 0.0;
+        focal_length_mm: f64 = 0.0, in FOCAL_ERROR_MM;
         /// Principal point, px to the right.
         principal_u_px: f64 = 0.0;
         /// Principal point, px down.
@@ -138,7 +145,7 @@ settings! {
     #[derive(Copy)]
     pub struct RigError {
         /// Focal length, mm.
-        focal_length_mm: f64 = 0.0;
+        focal_length_mm: f64 = 0.0, in FOCAL_ERROR_MM;
         /// Principal point of both eyes, px to the right.
         principal_u_px: f64 = 0.0, in -100.0..=100.0;
         /// Principal point of both eyes, px down.
@@ -148,11 +155,11 @@ settings! {
         /// Blur of both lenses, px (`lens.blur_px`); the sum is 0 to 50.
         blur_px: f64 = 0.0;
         /// Line time, us.
-        line_time_us: f64 = 0.0;
+        line_time_us: f64 = 0.0, in LINE_TIME_ERROR_US;
         /// How much later the right eye is triggered than its frames say, us.
         trigger_offset_us: f64 = 0.0, in MOST_OFFSET_US;
         /// Baseline, mm.
-        baseline_mm: f64 = 0.0;
+        baseline_mm: f64 = 0.0, in -1000.0..=1000.0;
         /// Yaw, deg.
         yaw_deg: f64 = 0.0, in -45.0..=45.0;
         /// Pitch, deg.
@@ -256,8 +263,6 @@ impl RigSettings {
         let left = self.left_eye();
         left.check_camera("pairs_per_s", check);
         self.right.check_eye(&left, &mut check.below("right"));
-        check.positive("baseline_mm", self.baseline_mm, 120.0);
-        check.positive("height_m", self.height_m, 1.7);
         self.check_errors(&mut check.below("calibration_error"));
         self.check_built(check);
     }
@@ -324,7 +329,7 @@ impl RigSettings {
 }
 
 /// Further apart two triggers are not one pair's.
-const MOST_OFFSET_US: std::ops::RangeInclusive<f64> = -10_000.0..=10_000.0;
+const MOST_OFFSET_US: RangeInclusive<f64> = -10_000.0..=10_000.0;
 
 impl RightEye {
     /// The right eye, where the left one is `left`.
@@ -467,7 +472,7 @@ mod tests {
             (
                 "focal_length_mm = 0.0",
                 "focal_length_mm",
-                "0 mm is not greater than 0",
+                "0 mm is out of range",
             ),
             (
                 "exposure_us = 40000.0",

@@ -1,0 +1,300 @@
+//! What hostile and mistaken input comes to: bounded answers that say what to do.
+#![cfg(feature = "twin")]
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use metrotwin::cli::check_text;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::time::{Duration, Instant};
+
+const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
+const SCENARIO: &str = "name = \"x\"\ntunnel = \"tunnels/chengdu_line1.toml\"\nduration_s = 0.2\n\
+    [train]\nstart_chainage_m = 150.0\n";
+
+fn metrotwin(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_metrotwin"))
+        .args(args)
+        .current_dir(REPOSITORY)
+        .env("NO_COLOR", "1")
+        .env_remove("XDG_RUNTIME_DIR")
+        .output()
+        .expect("the program starts")
+}
+
+/// A file is refused with exit code 2 and each of `words`; what is printed.
+fn refused(args: &[&str], words: &[&str]) -> String {
+    let output = metrotwin(args);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(2), "{args:?} said: {said}");
+    for word in words {
+        assert!(said.contains(word), "{args:?}: no `{word}` in: {said}");
+    }
+    said
+}
+
+/// What `check` says of a text beside the repository's own files.
+fn said_of(text: &str) -> Result<String, String> {
+    check_text(&Path::new(REPOSITORY).join("text.toml"), text)
+}
+
+fn file(name: &str, text: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli_input");
+    fs::create_dir_all(&folder).expect("a folder can be made");
+    let path = folder.join(name);
+    fs::write(&path, text).expect("a file can be written");
+    path
+}
+
+/// Provokes: a panic of the report where a problem stands beyond column 65,535.
+#[test]
+fn a_problem_far_to_the_right_is_shown() {
+    let far = format!("{SCENARIO}{}cars = 99\n", " ".repeat(70_000));
+    let said = said_of(&far).expect_err("there are too many cars");
+    assert!(
+        said.contains("train.cars") && said.contains("70008"),
+        "{said}"
+    );
+    let long = format!("{SCENARIO}cars = [{}]\n", "1, ".repeat(100_000));
+    let said = said_of(&long).expect_err("cars are no list");
+    assert!(said.len() < 3000, "{}", said.len());
+    let broken = format!("{SCENARIO}x = [{}] ]\n", "1,".repeat(50_000));
+    assert!(said_of(&broken).expect_err("not TOML").len() < 3000);
+}
+
+/// Provokes: an answer whose length or time grows with the number of problems times the size.
+#[test]
+fn thousands_of_problems_are_told_in_a_few_lines() {
+    let start = Instant::now();
+    let unknown = (0..2000).map(|k| format!("[[obstacles]]\nbad_{k} = 3\n"));
+    let said = said_of(&format!("{SCENARIO}{}", unknown.collect::<String>()));
+    let said = said.expect_err("the keys are unknown");
+    assert!(said.len() < 20_000 && said.contains("not shown"), "{said}");
+    let heavy = (0..2000).map(|k| format!("[[obstacles]]\nname = \"o{k}\"\nmass_kg = -3.0\n"));
+    let said = said_of(&format!("{SCENARIO}{}", heavy.collect::<String>()));
+    let said = said.expect_err("the masses are negative");
+    assert!(
+        said.len() < 20_000 && said.contains("more problems are not shown"),
+        "{said}"
+    );
+    assert!(start.elapsed() < Duration::from_secs(20));
+}
+
+/// Provokes: memory taken, or time, before a number is held against its range.
+#[test]
+fn numbers_are_checked_before_they_are_used() {
+    let start = Instant::now();
+    for (key, value) in [
+        ("bench.points", "2147483647"),
+        ("rig.exposure_us", "1e12"),
+        ("rig.pairs_per_s", "1e-10"),
+        ("radio.latency_ms", "1e13"),
+    ] {
+        let shipped = match key {
+            "bench.points" => "scenarios/static_bench.toml",
+            _ => "scenarios/line_run.toml",
+        };
+        let change = format!("{key}={value}");
+        refused(
+            &["check", shipped, "--set", &change],
+            &[key, "out of range", "give"],
+        );
+    }
+    assert!(start.elapsed() < Duration::from_secs(20));
+}
+
+/// Provokes: a scenario that is right, and then cannot begin, or never ends.
+#[test]
+fn what_could_not_be_run_is_refused() {
+    let drift = [
+        "rig.clock.drift_ppm=1000.0",
+        "duration_s=86400",
+        "rig.pairs_per_s=1",
+    ];
+    let drift = drift.iter().flat_map(|change| ["--set", change]);
+    let args: Vec<&str> = ["check", "scenarios/line_run.toml"]
+        .into_iter()
+        .chain(drift)
+        .collect();
+    refused(&args, &["duration_s", "poses are kept for 60 s"]);
+    let bench = [
+        "bench.points=1000",
+        "bench.step_m=0.0",
+        "bench.fixes_per_point=100000",
+    ];
+    let bench = bench.iter().flat_map(|change| ["--set", change]);
+    let args: Vec<&str> = ["check", "scenarios/static_bench.toml"]
+        .into_iter()
+        .chain(bench)
+        .collect();
+    refused(&args, &["bench.fixes_per_point", "86400 s"]);
+}
+
+/// Provokes: a device or a pipe that is read, the first line of any file in a message.
+#[test]
+fn other_files_are_neither_read_nor_shown() {
+    let secret = file("secret", "root:$6$hash:1::\nk = 1\n");
+    let name = secret.to_str().expect("the path is UTF-8");
+    let hidden = |said: String| assert!(!said.contains("$6$") && !said.contains("hash"), "{said}");
+    hidden(refused(&["check", name], &[".toml"]));
+    let tunnel = SCENARIO.replace("tunnels/chengdu_line1.toml", name);
+    hidden(said_of(&tunnel).expect_err("it is no tunnel"));
+    let table = format!(
+        "{SCENARIO}[study.variables.speed]\nkeys = [\"train.cruise_speed_kmh\"]\n\
+         from = {{ table = {{ file = \"{name}\", column = \"v\" }} }}\n"
+    );
+    let said = said_of(&table).expect_err("it is no CSV file");
+    assert!(
+        said.contains(".csv") && said.contains("study.variables.speed"),
+        "{said}"
+    );
+    hidden(said);
+    let mesh =
+        format!("{SCENARIO}[[obstacles]]\nbody = {{ shape = \"mesh\", file = \"{name}\" }}\n");
+    hidden(said_of(&mesh).expect_err("it is no mesh"));
+    if cfg!(unix) {
+        refused(&["check", "/dev/zero"], &["no regular file"]);
+        for text in [
+            tunnel.replace(name, "/dev/zero"),
+            table.replace(name, "/dev/zero"),
+        ] {
+            let said = said_of(&text).expect_err("it is a device");
+            assert!(said.contains("no regular file"), "{said}");
+        }
+    }
+}
+
+/// Provokes: problems of the vehicle, the scenario and the tunnel told one after the other, and those
+/// of values only when all keys are right.
+#[test]
+fn all_files_and_stages_are_told_at_once() {
+    let shipped =
+        |path: &str| fs::read_to_string(Path::new(REPOSITORY).join(path)).expect("it is there");
+    let vehicle = shipped("scenarios/vehicles/metro_b1_empty.toml")
+        .replacen("slack_m = 0.0", "", 1)
+        .replacen("cg_m = 1.8", "cg_m = \"x\"", 1)
+        .replacen("length_m = 19.67", "length_m = 1967.0", 1);
+    let tunnel = shipped("tunnels/chengdu_line1.toml")
+        .replacen("kind = \"arc\"", "kind = 7", 1)
+        .replacen("radius_m = 350.0", "", 1)
+        .replacen("spacing_m = 10.0", "spacing_m = -10.0", 1);
+    let (vehicle, tunnel) = (file("v.toml", &vehicle), file("t.toml", &tunnel));
+    let scenario = "name = \"x\"\ntunnel = \"t.toml\"\n[train]\nvehicle = \"v.toml\"\ncars = 99\n";
+    let scenario = file("s.toml", scenario);
+    let name = |path: &Path| path.to_str().expect("the path is UTF-8").to_owned();
+    let of_vehicle = ["coupler.slack_m", "body.cg_m", "body.length_m"];
+    let of_tunnel = [
+        "plan[2].kind",
+        "straight, clothoid, arc",
+        "plan[10].radius_m",
+        "lamps.spacing_m",
+    ];
+    refused(&["check", &name(&vehicle)], &of_vehicle);
+    refused(&["check", &name(&tunnel)], &of_tunnel);
+    let all = [&of_vehicle[..], &of_tunnel, &["train.cars"]].concat();
+    refused(&["check", &name(&scenario)], &all);
+}
+
+/// Each mistake is named, with what to do.
+#[test]
+fn mistakes_of_the_command_line_are_named() {
+    refused(
+        &["run", "tunnels/test_bench.toml"],
+        &["is a tunnel", "a scenario that names it"],
+    );
+    let car = "scenarios/vehicles/manchester.toml";
+    refused(&["frames", car, "--out", "never"], &["is a vehicle"]);
+    refused(
+        &["study", "run", "tunnels/test_bench.toml"],
+        &["is a tunnel"],
+    );
+    let run = "scenarios/line_run.toml";
+    refused(&["run", run, "--index", "3"], &["--index", "--from-study"]);
+    refused(
+        &["run", run, "--connect", "127.0.0.1:9"],
+        &["no viewer answers", "127.0.0.1:9"],
+    );
+    let empty = ["check", run, "--set", "obstacles[0].mass_kg=1"];
+    refused(&empty, &["no entry in `obstacles`", "[[obstacles]]"]);
+    refused(
+        &["check", "tunnels/test_bench.toml", "--set", "seed=3"],
+        &["changes scenarios"],
+    );
+}
+
+/// Provokes: an event that names nothing, told without its file, its place, or what was meant.
+#[test]
+fn a_wrong_event_is_told_with_its_place() {
+    let path = Path::new(REPOSITORY).join("scenarios/studies/protection.toml");
+    let text = fs::read_to_string(&path).expect("it is there");
+    let wrong = text.replacen("hit = \"collision\"", "hit = \"collison\"", 1);
+    let said = check_text(&path, &wrong).expect_err("there is no such figure");
+    for word in [
+        "protection.toml",
+        "study.events.hit",
+        "did you mean `collision`?",
+    ] {
+        assert!(said.contains(word), "no `{word}` in: {said}");
+    }
+}
+
+/// Provokes: names of tunnels that are empty, and a device without a name in a scenario.
+#[test]
+fn empty_names_are_refused() {
+    let path = Path::new(REPOSITORY).join("tunnels/chengdu_line1.toml");
+    let text = fs::read_to_string(&path).expect("it is there");
+    let wrong = text
+        .replacen("name = \"W1530\"", "name = \"\"", 1)
+        .replacen("balise = \"B1110\"", "balise = \"\"", 1);
+    let said = check_text(&path, &wrong).expect_err("names are empty");
+    assert!(
+        said.contains("wayside[0].name") && said.contains("wayside[0].balise"),
+        "{said}"
+    );
+    let said = said_of(&format!("{SCENARIO}[[wayside]]\ndevice = \"\"\n"));
+    let said = said.expect_err("the device has no name");
+    assert!(
+        said.contains("names no device") && said.contains("W1530"),
+        "{said}"
+    );
+}
+
+/// Provokes: a train that crawls, or a rig that sees nothing, without a word about it.
+#[test]
+fn what_may_surprise_is_noted() {
+    let slow = said_of(SCENARIO).expect("it is right");
+    assert!(
+        slow.contains("25 km/h") && slow.contains("initial_chainage_m"),
+        "{slow}"
+    );
+    let known = format!("{SCENARIO}[stack.protection]\ninitial_chainage_m = 150.0\n");
+    let known = said_of(&known).expect("it is right");
+    assert!(!known.contains("note"), "{known}");
+    let blind = SCENARIO.replace("150.0", "2992.0") + "stop_at_m = 2995.0\n[rig]\n";
+    let blind = said_of(&blind).expect("it is right");
+    assert!(
+        blind.contains("no lamp stands on the way of train 0"),
+        "{blind}"
+    );
+    let args = "check scenarios/line_run.toml --set train.direction=\"down\" --set \
+        train.start_chainage_m=2875 --set train.stop_at_m=195 --set rig.side=\"right\" --set rig.yaw_deg=141";
+    let back = metrotwin(&args.split_whitespace().collect::<Vec<_>>());
+    let back = String::from_utf8_lossy(&back.stdout).into_owned();
+    assert!(
+        back.contains("behind its end of the train") && !back.contains(" -"),
+        "{back}"
+    );
+}
+
+/// Provokes: a graphics driver that complains of a desktop.
+#[test]
+fn the_driver_says_nothing_of_a_desktop() {
+    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli_input/quiet");
+    let out = out.to_str().expect("the path is UTF-8");
+    let run = "run scenarios/line_run.toml --set duration_s=0.01 --no-recording --out";
+    let args: Vec<&str> = run.split_whitespace().chain([out]).collect();
+    let output = metrotwin(&args);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(0), "{said}");
+    assert!(!said.contains("XDG_RUNTIME_DIR"), "{said}");
+}
