@@ -125,6 +125,42 @@ fn a_figure_that_most_runs_lack_is_shown() {
     assert_eq!((margin.runs, margin.lacking), (2, 18));
 }
 
+/// Quantiles of three runs: what cannot be bounded ends where the figure does, not outside.
+#[test]
+fn quantiles_stay_where_the_figure_can_be() {
+    let base = folder("quantiles");
+    let figures = |k: u64| {
+        let k = k as f64;
+        json!({"paper_availability": 0.9 + 0.04 * k, "paper_error_max_m": 0.1 * (k + 1.0), "stop_error_m": k - 1.0})
+    };
+    let rows: Vec<Row> = (0..3)
+        .map(|k| row(k, Status::Complete, figures(k)))
+        .collect();
+    let digest = Digest::of(&template(&base), &rows);
+    fs::remove_dir_all(base).ok();
+    let ends = |name: &str| {
+        let median = figure(&digest, name).quantiles[0].unwrap();
+        [median.low, median.high].map(|end| {
+            if end.is_infinite() {
+                end.signum() * 9.0
+            } else {
+                end
+            }
+        })
+    };
+    for (name, [low, high]) in [
+        ("paper_availability", [0.0, 1.0]),
+        ("paper_error_max_m", [0.0, 9.0]),
+        ("stop_error_m", [-9.0, 9.0]),
+    ] {
+        let [a, b] = ends(name);
+        assert!(
+            (a - low).abs() < 1e-12 && (b - high).abs() < 1e-12,
+            "{name}: {a} to {b}"
+        );
+    }
+}
+
 /// The mark of a study that ended by the precision of a figure, and none of one that ran to its end.
 #[test]
 fn an_early_stop_is_marked() {

@@ -213,7 +213,7 @@ impl FigureDigest {
         let is_flag = measure.kind == Kind::Flag;
         Some(Self {
             mean,
-            quantiles: QUANTILES.map(|p| quantile(&sample, p).filter(|_| !is_flag)),
+            quantiles: QUANTILES.map(|p| measure.quantile(&sample, p).filter(|_| !is_flag)),
             drivers: drivers.collect(),
             ..bare
         })
@@ -240,6 +240,29 @@ impl WorstCase {
 }
 
 impl Measure {
+    /// A quantile of sorted values. An end that the sample is too small for is that of the bounds, where
+    /// the values keep them.
+    fn quantile(&self, sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
+        let (bounds, e) = (self.range(), quantile(sorted, p)?);
+        let is_kept = [sorted.first(), sorted.last()]
+            .into_iter()
+            .flatten()
+            .all(|x| bounds.hold(*x));
+        Some(IntervalEstimate {
+            low: if is_kept {
+                e.low.max(bounds.low)
+            } else {
+                e.low
+            },
+            high: if is_kept {
+                e.high.min(bounds.high)
+            } else {
+                e.high
+            },
+            ..e
+        })
+    }
+
     /// The mean of its values in runs, of a flag the rate.
     pub fn mean(&self, values: &[f64]) -> Option<IntervalEstimate> {
         if self.kind == Kind::Flag {
