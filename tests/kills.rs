@@ -4,7 +4,12 @@
 //!
 //! `METROTWIN_KILLS` is the number of kills of all commands together, 10 without it.
 #![cfg(all(feature = "twin", unix))]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and prints what it counted"
+)]
 
 use metrotwin::study::{Row, read_rows};
 use rerun::external::re_log_encoding::DecoderApp;
