@@ -1,6 +1,10 @@
 //! What hostile and mistaken input comes to: bounded answers that say what to do.
 #![cfg(feature = "twin")]
-#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::expect_used,
+    clippy::disallowed_methods,
+    reason = "a test fails by panicking, and an answer must come in time"
+)]
 
 use metrotwin::cli::check_text;
 use std::fs;
