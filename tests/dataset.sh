@@ -15,7 +15,8 @@ METROTWIN=$(realpath "$METROTWIN")
 
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
-python3 -m venv "$dir/venv"
+. tests/common/venv.sh
+make_venv "$dir/venv"
 "$dir/venv/bin/pip" install --quiet --disable-pip-version-check \
     opencv-python-headless==5.0.0.93 pyarrow==26.0.1 pandas pycocotools
 "$METROTWIN" frames scenarios/forgotten_toolbox.toml --out "$dir/set" --renderer cpu --limit 1 --cameras left \

@@ -44,10 +44,17 @@ fn every_case_is_run_once_and_breaks_something() {
 /// with the key.
 #[test]
 fn cases_are_checked() {
-    let text = std::fs::read_to_string("tests/studies/small.toml").unwrap();
-    let text = text.replace(
-        "../../tunnels",
-        &format!("{}/tunnels", env!("CARGO_MANIFEST_DIR")),
+    let root = env!("CARGO_MANIFEST_DIR");
+    let text = format!(
+        r#"
+        name = "cases"
+        tunnel = "{root}/tunnels/test_bench.toml"
+        duration_s = 1.0
+        [train]
+        [study.variables.cars]
+        keys = ["train.cars"]
+        from = {{ integer = {{ min = 2, max = 5 }} }}
+        "#
     );
     let path = std::env::temp_dir().join(format!("metrotwin_cases_{}.toml", std::process::id()));
     let refused = |case: &str| {

@@ -361,7 +361,7 @@ fn any_file_is_answered() {
             tally.runs += 1;
             tally.guarded(seed, &text, || short_run(&file.path, &text));
         }
-        if (seed + 1 - first) % 100_000 == 0 {
+        if (seed + 1 - first).is_multiple_of(100_000) {
             println!("{} files, {:?} kB", seed + 1 - first, peak_memory_kb());
         }
     }

@@ -15,15 +15,8 @@ METROTWIN=$(realpath "$METROTWIN")
 
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
-if ! python3 -m venv "$dir/venv" >/dev/null 2>&1; then
-    if [[ $(id -u) -ne 0 ]] || ! command -v apt-get >/dev/null; then
-        echo "tests/parquet.sh: install Python 3 with its venv (on Debian: python3-venv)" >&2
-        exit 1
-    fi
-    apt-get update -qq
-    DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends python3-venv >/dev/null
-    python3 -m venv --clear "$dir/venv"
-fi
+. tests/common/venv.sh
+make_venv "$dir/venv"
 "$dir/venv/bin/pip" install --quiet --disable-pip-version-check pyarrow==26.0.1 duckdb==2.0.0
 
 "$METROTWIN" study run tests/studies/small.toml --out "$dir/small" --renderer cpu >/dev/null

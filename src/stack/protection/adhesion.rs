@@ -16,6 +16,8 @@ const SLIPPERY_FOR_M: f64 = 500.0;
 pub(super) struct Grip {
     /// The wheelset of the odometer slides or slips now.
     pub slides: bool,
+    /// Rate of the full service brake on level track.
+    pub service_mps2: f64,
     /// Guaranteed rate of the emergency brake on level track.
     pub emergency_mps2: f64,
     /// The train may be faster than the odometer says by so much.
@@ -39,10 +41,12 @@ impl Adhesion {
         let slippery = (self.slid_at_m).is_some_and(|at_m| (run_m - at_m).abs() < SLIPPERY_FOR_M);
         let mut grip = Grip {
             slides,
+            service_mps2: s.service_mps2,
             emergency_mps2: s.emergency_mps2,
             speed_error_mps: s.speed_error_kmh / 3.6,
         };
         if slippery {
+            grip.service_mps2 = s.service_mps2.min(s.low_adhesion_mps2);
             grip.emergency_mps2 = s.emergency_mps2.min(s.low_adhesion_mps2);
         }
         if slides {
@@ -50,5 +54,38 @@ impl Adhesion {
             grip.speed_error_mps += s.position_sigmas * s.slide_error * speed_mps;
         }
         grip
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::{OdometerSample, SimTime};
+
+    /// A slide must lower the guaranteed rate for the next 500 m, not only while it lasts, and widen the
+    /// speed only while it lasts; on rails that bear the brake nothing changes.
+    #[test]
+    fn rails_are_slippery_for_a_while_after_a_slide() {
+        let settings = ProtectionSettings::default();
+        let mut odometry = Odometry::default();
+        let mut adhesion = Adhesion::default();
+        let mut at = |k: u32, slides: bool| {
+            let sample = OdometerSample {
+                time: SimTime::from_secs(0.1 * f64::from(k)),
+                distance_m: f64::from(k),
+                speed_mps: 10.0,
+                slides,
+            };
+            odometry.on_sample(&sample);
+            let grip = adhesion.update(&odometry, sample.distance_m, &settings);
+            (grip.emergency_mps2, grip.speed_error_mps)
+        };
+        let (dry, error_mps) = (settings.emergency_mps2, settings.speed_error_kmh / 3.6);
+        assert_eq!(at(0, false), (dry, error_mps));
+        let (rate, wider_mps) = at(10, true);
+        assert!((rate - settings.low_adhesion_mps2).abs() < 1e-12);
+        assert!((wider_mps - error_mps - 3.0).abs() < 1e-9, "{wider_mps}");
+        assert_eq!(at(500, false), (settings.low_adhesion_mps2, error_mps));
+        assert_eq!(at(511, false), (dry, error_mps));
     }
 }

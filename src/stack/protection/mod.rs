@@ -45,23 +45,25 @@
 //!
 //! The danger point lies `danger_distance_m` before the obstacle. The emergency curve takes the
 //! train's head k sigma further ahead and its speed higher than measured, with traction on until
-//! it is cut; where wheels have slid, with the rate that slippery rails leave (see `adhesion`). What the
-//! rails ahead bear is not known: the service curve takes the rate of the poorest rails. The service curve ends `safety_distance_m` before the obstacle, or earlier where a
-//! large sigma asks for it. Up to the permitted speed nothing happens; over it the driver is
-//! warned, and has `driver_time_s` until the service brake intervenes.
+//! it is cut; where wheels have slid, with the rate that slippery rails leave (see `adhesion`). The
+//! service curve takes the rate of the poorest rails that are reckoned with, since what the rails ahead
+//! bear is not known. It ends `safety_distance_m` before the obstacle, or earlier where a large sigma
+//! asks for it. Up to the permitted speed nothing happens; over it the driver is warned, and has
+//! `driver_time_s` until the service brake intervenes.
 //!
 //! A high danger ends the authority; a low one only tells the driver. Where the permitted speed
 //! has come down to walking pace, the brake stops and holds the train until the device clears the
 //! warning. Warnings outlive silence of the radio; a "clear" does not: where a device of the map has
 //! not been heard for `radio_timeout_s`, its stretch counts as occupied; so it does after the
-//! equipment is switched on, until the device is heard. With no position the train is restricted to `restricted_kmh`, and any high danger stops
-//! it; with no odometer it stops at once.
+//! equipment is switched on, until the device is heard. With no position the train is restricted to
+//! `restricted_kmh`, and any high danger stops it; with no odometer it stops at once.
 //!
 //! # What it does not do
 //!
 //! It does not supervise running backwards, speed restrictions of single sections, or doors. A train
-//! ahead is an obstacle that stands where it last said to be ([`TrainProtection`]). It trusts the odometer's speed within its stated error, and what the slide
-//! protection of the odometer's wheelset says: a wheel that slides unnoticed puts the train too far back.
+//! ahead is an obstacle that stands where it last said to be ([`TrainProtection`]). It trusts the
+//! odometer's speed within its stated error, and what the slide protection of the odometer's wheelset
+//! says: a wheel that slides unnoticed puts the train too far back.
 
 mod adhesion;
 mod curve;
@@ -119,7 +121,7 @@ impl Protection {
             obstacles: Obstacles::new(settings, &map),
             adhesion: Adhesion::default(),
             supervisor: Supervisor::new(settings),
-            monitor: BrakeMonitor::default(),
+            monitor: BrakeMonitor::new(settings),
             brake: BrakeDemand::None,
             first_cycle: None,
             settings: settings.clone(),
@@ -193,8 +195,7 @@ impl Protection {
         let (grades, settings) = (&self.grades, &self.settings);
         let odometry = &self.position.odometry;
         let grip = (self.adhesion).update(odometry, odometry.distance_m(time), settings);
-        let failed =
-            (self.monitor).update(time, self.brake, speed_mps, head_m, grades, settings, grip);
+        let failed = (self.monitor).update(time, self.brake, speed_mps, head_m, grades, grip);
 
         // With no position every obstacle may be the next one.
         let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| self.rearmost_m(t));

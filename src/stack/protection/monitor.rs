@@ -12,8 +12,10 @@ const WINDOW_S: f64 = 1.0;
 /// Below this speed the odometer says too little.
 const SLOWEST_MPS: f64 = 1.5;
 
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct BrakeMonitor {
+    /// From a demand to the full brake.
+    answer_s: f64,
     demand: BrakeDemand,
     since: SimTime,
     /// Start of the running window: time and speed.
@@ -22,6 +24,16 @@ pub(super) struct BrakeMonitor {
 }
 
 impl BrakeMonitor {
+    pub fn new(s: &ProtectionSettings) -> Self {
+        Self {
+            answer_s: s.reaction_s + s.traction_cut_s + s.brake_buildup_s,
+            demand: BrakeDemand::None,
+            since: SimTime::default(),
+            window: None,
+            failed: false,
+        }
+    }
+
     /// Takes what was demanded in the last cycle and what speed there is now; true while the
     /// brake counts as failed, which it does until the train stands.
     pub fn update(
@@ -31,7 +43,6 @@ impl BrakeMonitor {
         speed_mps: f64,
         at_m: Option<f64>,
         grades: &Grades,
-        settings: &ProtectionSettings,
         grip: Grip,
     ) -> bool {
         if demand != self.demand {
@@ -41,7 +52,7 @@ impl BrakeMonitor {
         }
         let rate = match demand {
             BrakeDemand::None => return self.failed,
-            BrakeDemand::Service => settings.service_mps2.min(grip.emergency_mps2),
+            BrakeDemand::Service => grip.service_mps2,
             BrakeDemand::Emergency => grip.emergency_mps2,
         };
         if grip.slides || speed_mps < SLOWEST_MPS {
@@ -49,8 +60,7 @@ impl BrakeMonitor {
             self.failed &= speed_mps > 0.1;
             return self.failed;
         }
-        let answer_s = settings.reaction_s + settings.traction_cut_s + settings.brake_buildup_s;
-        if time.since(self.since) < answer_s {
+        if time.since(self.since) < self.answer_s {
             return self.failed;
         }
         match self.window {
