@@ -98,6 +98,7 @@ impl Fault {
     }
 
     /// Of several wrong files: the first, and then the others.
+    #[cfg(feature = "twin")]
     pub(super) fn several(faults: impl Iterator<Item = Self>) -> Self {
         let mut faults = faults;
         let mut first = faults

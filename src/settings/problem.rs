@@ -105,7 +105,7 @@ impl<'a> Checker<'a> {
     }
 
     /// Adds a problem, unless the key has one already: a second may only follow from the first. Of a
-    /// file with very many only the first [`MOST_PROBLEMS`] are kept.
+    /// file with very many only the first `MOST_PROBLEMS` are kept.
     pub fn problem(&mut self, key: &str, what: impl Into<String>, remedy: impl Into<String>) {
         let key = self.key(key);
         let is_full = self.problems.len() >= MOST_PROBLEMS;

@@ -10,7 +10,7 @@
 //! 20 mm of that, the larger figure along the track. The shipped line scenarios take 15 mm along
 //! and 10 mm across and up. By default there is no error: a bench measures its one lamp itself.
 //!
-//! Control points stand every [`CONTROL_M`]; where one has moved, everything that was measured from it
+//! Control points stand every 120 m; where one has moved, everything that was measured from it
 //! is off along the track, and between two of them by what lies on the line between their errors. The
 //! cant of the map is that of the last track measurement, some millimetres off; balises are placed to
 //! some decimetres.
