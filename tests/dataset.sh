@@ -7,15 +7,11 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 
-if [[ -z "${METROTWIN:-}" ]]; then
-    cargo build --release
-    METROTWIN=${CARGO_TARGET_DIR:-target}/release/metrotwin
-fi
-METROTWIN=$(realpath "$METROTWIN")
+. tests/common/scripts.sh
+find_program
 
 dir=$(mktemp -d)
 trap 'rm -rf "$dir"' EXIT
-. tests/common/venv.sh
 make_venv "$dir/venv"
 "$dir/venv/bin/pip" install --quiet --disable-pip-version-check \
     opencv-python-headless==5.0.0.93 pyarrow==26.0.1 pandas pycocotools

@@ -20,11 +20,8 @@ if ! command -v slurmctld slurmd munged sbatch >/dev/null; then
     DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends slurm-wlm munge >/dev/null
 fi
 
-if [[ -z "${METROTWIN:-}" ]]; then
-    cargo build --release
-    METROTWIN=${CARGO_TARGET_DIR:-target}/release/metrotwin
-fi
-METROTWIN=$(realpath "$METROTWIN")
+. tests/common/scripts.sh
+find_program
 
 dir=$(mktemp -d)
 pids=()

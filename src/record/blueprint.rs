@@ -5,7 +5,8 @@
 //! 3-D view follows.
 
 use super::images::WaysidePaths;
-use super::stream::{RowStream, SIM_TIME};
+use super::recording_file::SIM_TIME;
+use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{Contents, images, path_of, plots, scene, texts};
 use crate::bus::TrainId;

@@ -3,7 +3,6 @@
 //! yet. Its end makes a file of it that is quick to look at: batches of some seconds, and an index. Both
 //! would be kept in memory if they were made on the way.
 
-use super::stream::SIM_TIME;
 use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name};
 use rerun::external::re_log_encoding::{DecoderApp, EncodeError, Encoder, EncodingOptions};
 use rerun::log::{Chunk, LogMsg};
@@ -16,6 +15,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+/// Simulated time since the scenario's start.
+pub(super) const SIM_TIME: &str = "sim_time";
 /// Recorded time of a batch in the finished file.
 const BATCH_NS: i64 = 10_000_000_000;
 

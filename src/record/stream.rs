@@ -5,7 +5,7 @@
 //! time says, never by a timer. The sdk puts rows of one entity that hold different components
 //! into different batches, in no fixed order; so all rows of an entity hold the same ones.
 
-use super::recording_file::RecordingFile;
+use super::recording_file::{RecordingFile, SIM_TIME};
 use super::whole_files::{Result, failed};
 use crate::bus::SimTime;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
@@ -17,8 +17,6 @@ use rerun::{
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Simulated time since the scenario's start.
-pub(super) const SIM_TIME: &str = "sim_time";
 /// Number of the camera frame.
 pub(super) const FRAME: &str = "frame";
 

@@ -1,6 +1,6 @@
 //! What a wayside device has in view: the truth that its reports are scored against.
 
-use super::outline::Outline;
+use super::image_box::ImageBox;
 use crate::bus::{SimTime, TrainId, WaysideCalibration};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::track::{Alignment, BED_M};
@@ -27,7 +27,7 @@ pub struct Presence {
     /// Half its extent across.
     pub half_width_m: f64,
     /// Where it is in the picture; of a train, each car that is. What stands before it is not looked at.
-    pub outlines: Vec<Outline>,
+    pub image_boxes: Vec<ImageBox>,
     /// Since when it lies still, on its own, where the device has it in view.
     pub lies_in_view_since: Option<SimTime>,
     /// It is scored as an obstacle (a worker or a train is not).
@@ -65,9 +65,13 @@ impl FieldOfView {
             && self.walls.cast(self.segment, &eye, &sight, 1.0).is_none()
     }
 
-    fn outline(&self, world_from_box: &Isometry3<f64>, half_m: &Vector3<f64>) -> Option<Outline> {
+    fn image_box(
+        &self,
+        world_from_box: &Isometry3<f64>,
+        half_m: &Vector3<f64>,
+    ) -> Option<ImageBox> {
         let camera_from_box = self.device.world_from_camera.inv_mul(world_from_box);
-        Outline::of_box(&self.device.camera.intrinsics, &camera_from_box, half_m)
+        ImageBox::of_box(&self.device.camera.intrinsics, &camera_from_box, half_m)
     }
 
     /// Everything that the device may rightly report.
@@ -81,7 +85,10 @@ impl FieldOfView {
                 lateral_m: o.lateral_m,
                 half_length_m: o.half_extents_m.x,
                 half_width_m: o.half_extents_m.y,
-                outlines: self.outline(pose, &(0.5 * o.size_m)).into_iter().collect(),
+                image_boxes: self
+                    .image_box(pose, &(0.5 * o.size_m))
+                    .into_iter()
+                    .collect(),
                 lies_in_view_since: (o.resting_since)
                     .filter(|_| self.has_in_view(&pose.translation.vector.into())),
                 obstacle: true,
@@ -94,7 +101,7 @@ impl FieldOfView {
             lateral_m: w.lateral_m,
             half_length_m: STRIDE_REACH_M,
             half_width_m: STRIDE_REACH_M,
-            outlines: self.worker_outline(&w, line).into_iter().collect(),
+            image_boxes: self.worker_box(&w, line).into_iter().collect(),
             lies_in_view_since: None,
             obstacle: false,
         });
@@ -102,11 +109,11 @@ impl FieldOfView {
         obstacles.chain(workers).chain(trains).collect()
     }
 
-    fn worker_outline(&self, worker: &WorkerTruth<'_>, line: &Alignment) -> Option<Outline> {
+    fn worker_box(&self, worker: &WorkerTruth<'_>, line: &Alignment) -> Option<ImageBox> {
         let half_m = Vector3::new(STRIDE_REACH_M, STRIDE_REACH_M, 0.5 * worker.stature_m);
         let world_from_line = line.at(worker.chainage_m).world_from_line();
         let middle = Translation3::new(0.0, worker.lateral_m, BED_M + half_m.z);
-        self.outline(&(world_from_line * middle), &half_m)
+        self.image_box(&(world_from_line * middle), &half_m)
     }
 
     fn train(&self, world: &World, id: TrainId) -> Option<Presence> {
@@ -121,7 +128,9 @@ impl FieldOfView {
             lateral_m: 0.0,
             half_length_m: 0.5 * length_m,
             half_width_m: half_m.y,
-            outlines: cars.filter_map(|car| self.outline(car, &half_m)).collect(),
+            image_boxes: cars
+                .filter_map(|car| self.image_box(car, &half_m))
+                .collect(),
             lies_in_view_since: None,
             obstacle: false,
         })

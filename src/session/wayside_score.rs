@@ -6,7 +6,7 @@
 //! report. By place, a report is right where its stretch and the thing are at most [`ALONG_M`] and
 //! [`ACROSS_M`] apart; the picture does not matter. Neither depends on a setting of the detector.
 
-use super::outline::Outline;
+use super::image_box::ImageBox;
 use super::presence::Presence;
 use super::summary::{Cost, ObstacleScore, Wayside};
 use crate::bus::{DangerLevel, DetectedObstacle, SimTime, WaysideReport};
@@ -91,11 +91,11 @@ impl WaysideScore {
     }
 
     fn in_picture(&mut self, seen: &DetectedObstacle, given: SimTime, present: &[Presence]) {
-        let region = Outline::from(&seen.blob.bounds);
-        let outlines = present
+        let region = ImageBox::from(&seen.blob.bounds);
+        let image_boxes = present
             .iter()
-            .flat_map(|p| p.outlines.iter().map(move |o| (p, o)));
-        let fitting = outlines.filter(|(_, o)| region.over_smaller(o) >= LEAST_COMMON);
+            .flat_map(|p| p.image_boxes.iter().map(move |o| (p, o)));
+        let fitting = image_boxes.filter(|(_, o)| region.over_smaller(o) >= LEAST_COMMON);
         let best = fitting.max_by(|(_, a), (_, b)| {
             let [a, b] = [a, b].map(|o| region.over_union(o));
             a.total_cmp(&b)
@@ -196,7 +196,7 @@ mod tests {
             lateral_m: 0.0,
             half_length_m: 0.25,
             half_width_m: 0.15,
-            outlines: vec![Outline {
+            image_boxes: vec![ImageBox {
                 sides_px: [left_px, 0.0, left_px + 10.0, 10.0],
             }],
             lies_in_view_since: Some(SimTime::from_secs(3.0)),
@@ -208,7 +208,7 @@ mod tests {
         Presence {
             obstacle: false,
             lies_in_view_since: None,
-            outlines: vec![Outline { sides_px }],
+            image_boxes: vec![ImageBox { sides_px }],
             ..lying("worker", chainage_m, 0.0)
         }
     }
@@ -353,7 +353,7 @@ mod tests {
     fn only_what_is_in_view_counts() {
         let hidden = Presence {
             lies_in_view_since: None,
-            outlines: Vec::new(),
+            image_boxes: Vec::new(),
             ..lying("hidden", 60.0, 0.0)
         };
         let wayside = scored(&[(4.1, WaysideReport::default())], &[hidden]);

@@ -29,7 +29,7 @@ struct Reading {
 
 /// What was run since the first sample, metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Run {
+pub struct DistanceRun {
     /// As the odometer counted it.
     pub distance_m: f64,
     /// That part of it, always positive, which was counted while the wheelset slid or slipped.
@@ -59,23 +59,23 @@ impl Odometry {
     }
 
     /// The same, with what of it was counted on a sliding wheel.
-    pub fn run(&self, time: SimTime) -> Run {
+    pub fn run(&self, time: SimTime) -> DistanceRun {
         let Some((latest, last)) = self.samples.latest() else {
-            return Run::default();
+            return DistanceRun::default();
         };
         let first_m = self.first_m.unwrap_or(0.0);
         if time >= latest {
             let on_m = last.sample.speed_mps * time.since(latest).min(RUN_ON_S);
             let slid_m = if last.sample.slides { on_m.abs() } else { 0.0 };
-            return Run {
+            return DistanceRun {
                 distance_m: last.sample.distance_m + on_m - first_m,
                 slid_m: last.slid_m + slid_m,
             };
         }
         let around = self.samples.around(time);
-        around.map_or(Run::default(), |(a, b, share)| {
+        around.map_or(DistanceRun::default(), |(a, b, share)| {
             let between = |a: f64, b: f64| a + share * (b - a);
-            Run {
+            DistanceRun {
                 distance_m: between(a.sample.distance_m, b.sample.distance_m) - first_m,
                 slid_m: between(a.slid_m, b.slid_m),
             }

@@ -1,7 +1,6 @@
 //! Two studies held against each other, run by run: with the same seed and variables, run k of both
 //! met the same chances, and the differences of pairs scatter far less than the runs do.
 
-use super::digest::is_weighted;
 use super::stats::{Bounds, IntervalEstimate, bounded_mean, weighted_mean};
 use super::{MEASURES, Result, Row, Study};
 use crate::record::parquet::Kind;
@@ -55,7 +54,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
     };
     let sampled_otherwise = pairs.iter().filter(|(a, b)| !alike(a, b)).count();
 
-    let weighted = is_weighted(&a.template) || is_weighted(&b.template);
+    let weighted = a.template.is_weighted() || b.template.is_weighted();
     let mut differences = Vec::new();
     let mut add = |name: &str, unit: &str, bounds: Bounds, of: &dyn Fn(&Row) -> Option<f64>| {
         let both = pairs

@@ -104,7 +104,7 @@ pub struct Sensitivity {
 impl Digest {
     /// Of rows in order.
     pub fn of(template: &Template, rows: &[Row]) -> Self {
-        let weighted = is_weighted(template);
+        let weighted = template.is_weighted();
         let ln_weights: Vec<f64> = rows.iter().map(|r| r.ln_weight).collect();
         let events = template.events.iter();
         let shown = MEASURES.iter().filter(|m| is_shown(m));
@@ -141,7 +141,7 @@ impl EventDigest {
         let outcomes = || rows.iter().map(|r| (r.ln_weight, r.outcome(condition)));
         // Weights have mean 1 by themselves only if no condition cut draws off.
         let cut_off = !template.settings.require.is_empty();
-        let is_weighted = is_weighted(template);
+        let is_weighted = template.is_weighted();
         let weighted = || weighted_rate(&outcomes().collect::<Vec<_>>(), cut_off);
         let rate = || Tally::of(outcomes().map(|o| o.1)).rate();
         Self {
@@ -153,15 +153,6 @@ impl EventDigest {
             least_worth: LEAST_WORTH,
         }
     }
-}
-
-/// Whether runs carry weights.
-pub fn is_weighted(template: &Template) -> bool {
-    template
-        .settings
-        .variables
-        .values()
-        .any(|v| v.propose.is_some())
 }
 
 /// Whether two variables come from one table, whose rows tie them together.
@@ -201,7 +192,7 @@ impl FigureDigest {
             quantiles: [None; QUANTILES.len()],
             drivers: Vec::new(),
         };
-        if is_weighted(template) {
+        if template.is_weighted() {
             let mean = weighted_mean(&known, measure.range());
             return Some(Self { mean, ..bare });
         }

@@ -3,7 +3,6 @@
 //! An interval that was looked at again and again until it was short holds the truth somewhat less often
 //! than it says, the more so the skewer the figure is: reports mark it.
 
-use super::digest::is_weighted;
 use super::stats::{IntervalEstimate, Moments, Tally};
 use super::table::meant;
 use super::{Measure, Result, Row, StudyError, measure};
@@ -40,7 +39,7 @@ impl Precision {
         let Some(when) = &template.settings.stop.when else {
             return Ok(None);
         };
-        if is_weighted(template) {
+        if template.is_weighted() {
             return Err(StudyError::Unusable(
                 "study.stop.when does not go with `propose`: weighted figures have other intervals; leave \
                  one of them out"

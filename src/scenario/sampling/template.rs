@@ -113,6 +113,12 @@ impl Template {
         self
     }
 
+    /// Whether runs carry weights: a variable is drawn from elsewhere than its distribution.
+    pub fn is_weighted(&self) -> bool {
+        let mut variables = self.settings.variables.values();
+        variables.any(|v| v.propose.is_some())
+    }
+
     /// Combinations of swept values: 1 without any.
     pub fn cells(&self) -> u64 {
         self.swept

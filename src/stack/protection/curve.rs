@@ -96,7 +96,7 @@ pub(super) struct BrakeModel {
 
 /// State at the end of the phases before the full rate.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Run {
+struct PhaseEnd {
     way_m: f64,
     speed_mps: f64,
 }
@@ -142,10 +142,10 @@ impl BrakeModel {
     }
 
     /// Way and speed through reaction, cut and build-up under a constant pull.
-    fn run_up(&self, speed_mps: f64, pull_mps2: f64) -> Run {
+    fn run_up(&self, speed_mps: f64, pull_mps2: f64) -> PhaseEnd {
         let traction = self.traction_mps2;
         let react = phase(
-            Run {
+            PhaseEnd {
                 way_m: 0.0,
                 speed_mps,
             },
@@ -186,7 +186,7 @@ impl BrakeModel {
 
 /// Runs on for `time_s` while the acceleration goes linearly from the first to the second value;
 /// ends early at a standstill.
-fn phase(from: Run, time_s: f64, (a0, a1): (f64, f64)) -> Run {
+fn phase(from: PhaseEnd, time_s: f64, (a0, a1): (f64, f64)) -> PhaseEnd {
     if time_s <= 0.0 {
         return from;
     }
@@ -195,14 +195,14 @@ fn phase(from: Run, time_s: f64, (a0, a1): (f64, f64)) -> Run {
     let way = |t: f64| from.speed_mps * t + 0.5 * a0 * t * t + jerk * t * t * t / 6.0;
     let end = speed(time_s);
     if end > 0.0 {
-        return Run {
+        return PhaseEnd {
             way_m: from.way_m + way(time_s),
             speed_mps: end,
         };
     }
     // The speed is a parabola that ends at or under 0: the last root from above.
     let (_, stopped_s) = bisected((0.0, time_s), 40, |t| speed(t) > 0.0);
-    Run {
+    PhaseEnd {
         way_m: from.way_m + way(stopped_s).max(0.0),
         speed_mps: 0.0,
     }

@@ -10,7 +10,7 @@
 
 use super::ProtectionSettings;
 use crate::bus::{PositionFix, PositionSource, SimTime};
-use crate::stack::odometry::{Odometry, Run};
+use crate::stack::odometry::{DistanceRun, Odometry};
 use crate::track::uid::Uid;
 
 /// Refused fixes in a row that overrule the estimate, and of how many lamps after each other.
@@ -24,14 +24,14 @@ pub(super) struct HeadPosition {
     /// One sigma of it.
     pub sigma_m: f64,
     /// What was run by then.
-    pub run: Run,
+    pub run: DistanceRun,
     /// The last source besides the odometer.
     pub source: PositionSource,
 }
 
 impl HeadPosition {
     /// Carried on by the odometer.
-    fn carried(&self, run: Run, error: OdometerError) -> Self {
+    fn carried(&self, run: DistanceRun, error: OdometerError) -> Self {
         let run_m = run.distance_m - self.run.distance_m;
         let slid_m = (run.slid_m - self.run.slid_m).abs();
         let error_m = error.drift * run_m.abs() + error.slide * slid_m;
@@ -82,7 +82,7 @@ impl Position {
             anchor: settings.initial_chainage_m.map(|chainage_m| HeadPosition {
                 chainage_m,
                 sigma_m: settings.initial_sigma_m,
-                run: Run::default(),
+                run: DistanceRun::default(),
                 source: PositionSource::Setting,
             }),
             refused: Refused::default(),

@@ -63,7 +63,7 @@ impl Placer<'_> {
                 (sight.map().alignment.world_from_track(foot), None)
             }
         };
-        let outline = Outline::at(sight, &blob.bounds, foot_px, front)?;
+        let outline = RegionOutline::at(sight, &blob.bounds, foot_px, front)?;
         if outline.width_m.max(outline.height_m) < self.settings.min_size_m {
             return None;
         }
@@ -121,7 +121,7 @@ impl Placer<'_> {
     fn obstacle(
         &self,
         blob: &Blob,
-        outline: &Outline,
+        outline: &RegionOutline,
         foot: Point3<f64>,
         depth_m: f64,
     ) -> DetectedObstacle {
@@ -168,7 +168,7 @@ fn front_and_depth(ranges: &[f64]) -> Option<(f64, f64)> {
 }
 
 /// The outline, on an upright plane through the foot across the line of sight.
-struct Outline {
+struct RegionOutline {
     right: Point3<f64>,
     left: Point3<f64>,
     /// Horizontal unit vector away from the camera.
@@ -177,7 +177,7 @@ struct Outline {
     height_m: f64,
 }
 
-impl Outline {
+impl RegionOutline {
     fn at(sight: &Sight, b: &PixelBox, foot_px: f64, foot: Point3<f64>) -> Option<Self> {
         let eye = sight.eye();
         let away = Vector3::new(foot.x - eye.x, foot.y - eye.y, 0.0);

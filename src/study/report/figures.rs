@@ -4,7 +4,6 @@ use super::axis::Axis;
 use super::plot::{Plot, PlotLayers};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
-use crate::study::digest::is_weighted;
 use crate::study::stats::{Tally, quantile, rank_correlation};
 use crate::study::table::unit_of;
 use crate::study::{Digest, FigureDigest, Measure, Row};
@@ -83,7 +82,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
     let names = template.settings.variables.keys();
     let inputs: Vec<_> = names.map(|n| Input::of(template, n, &rows)).collect();
     // Weighed runs lie where they were proposed, not where nature has them: only maps show that.
-    let weighted = is_weighted(template);
+    let weighted = template.is_weighted();
     let mut plots = Vec::new();
     for (name, condition) in &template.events {
         let happened = || complete.iter().filter_map(|r| r.happened(condition));

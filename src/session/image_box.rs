@@ -10,12 +10,12 @@ const MOST_POINTS: f64 = 64.0;
 
 /// The rectangle around a thing in the picture, in pixels; cut off at the picture's border.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Outline {
+pub struct ImageBox {
     /// Left, upper, right and lower side.
     pub sides_px: [f64; 4],
 }
 
-impl From<&PixelBox> for Outline {
+impl From<&PixelBox> for ImageBox {
     fn from(b: &PixelBox) -> Self {
         let [left, top, right, bottom] = [b.u0, b.v0, b.u1, b.v1].map(f64::from);
         Self {
@@ -24,7 +24,7 @@ impl From<&PixelBox> for Outline {
     }
 }
 
-impl Outline {
+impl ImageBox {
     /// Of a box by its half extents; `None` where nothing of it is in the picture.
     pub fn of_box(
         camera: &Intrinsics,
@@ -104,9 +104,9 @@ mod tests {
         Intrinsics::centred(1000, 600, 500.0)
     }
 
-    fn seen(x: f64, z: f64, half_m: [f64; 3]) -> Option<Outline> {
+    fn seen(x: f64, z: f64, half_m: [f64; 3]) -> Option<ImageBox> {
         let place = Isometry3::from(Translation3::new(x, 0.0, z));
-        Outline::of_box(&camera(), &place, &half_m.into())
+        ImageBox::of_box(&camera(), &place, &half_m.into())
     }
 
     /// A cube of 1 m whose face is 5 m away has 100 px at 500 px focal length; one behind the camera or
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn shares_of_what_is_common() {
         let [large, small, apart] = [[0.0, 0.0, 10.0, 10.0], [2.0, 2.0, 4.0, 4.0], [20.0; 4]]
-            .map(|sides_px| Outline { sides_px });
+            .map(|sides_px| ImageBox { sides_px });
         assert!((large.over_smaller(&small) - 1.0).abs() < 1e-12);
         assert!((large.over_union(&small) - 0.04).abs() < 1e-12);
         assert!(large.over_union(&apart).abs() < 1e-12);

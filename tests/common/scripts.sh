@@ -1,3 +1,14 @@
+# What the scripts beside this folder share.
+
+# METROTWIN is the program's path; it is built where none is given.
+find_program() {
+    if [[ -z "${METROTWIN:-}" ]]; then
+        cargo build --release
+        METROTWIN=${CARGO_TARGET_DIR:-target}/release/metrotwin
+    fi
+    METROTWIN=$(realpath "$METROTWIN")
+}
+
 # make_venv FOLDER: a virtual environment of Python; on Debian and Ubuntu what it needs is installed.
 make_venv() {
     if ! python3 -m venv "$1" >/dev/null 2>&1; then
