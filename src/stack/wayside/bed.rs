@@ -5,15 +5,13 @@ use super::cells::{CELL_PX, GaugeCells};
 use super::difference::Difference;
 use super::reference::Reference;
 use super::sight::Sight;
+use super::veil::TrackContrast;
 use crate::bus::PixelBox;
-use crate::track::TrackPoint;
 
 /// Along the line, the bed is looked at so often.
 const STEP_M: f64 = 1.0;
 /// And in so many places across it, metres left of the centreline.
 const ACROSS_M: [f64; 3] = [-0.5, 0.0, 0.5];
-/// A place is seen where its line of sight meets the bed within so many metres of it along the line.
-const FOOT_ERROR_M: f64 = 1.0;
 /// Share of a place's pixels that must show the bed as the reference has it.
 const CLEAR_SHARE: f64 = 0.9;
 /// In light as that of the reference the mean grey of a place differs by less than this share of the
@@ -39,6 +37,7 @@ struct BedPlace {
 #[derive(Clone, Debug)]
 pub(super) struct BedLight {
     places: Vec<BedPlace>,
+    track: TrackContrast,
     /// Places in view, and places seen, of each step along the line.
     counts: Vec<(u32, u32)>,
 }
@@ -55,20 +54,15 @@ impl BedLight {
         });
         Self {
             places: places.collect(),
+            track: TrackContrast::new(sight, STEP_M, steps),
             counts: vec![(0, 0); steps],
         }
     }
 
     fn place(sight: &Sight, step: usize, s_m: f64, l_m: f64) -> Option<BedPlace> {
-        let on_rails = TrackPoint { s_m, l_m, h_m: 0.0 };
-        let h_m = sight.floor_m(on_rails);
-        let pixel = sight.pixel_of(TrackPoint { h_m, ..on_rails })?;
-        let lens = &sight.calibration().camera.intrinsics;
-        let foot = lens
-            .contains(&pixel)
-            .then(|| sight.foot(pixel.x, pixel.y))??;
+        let pixel = sight.floor_pixel(s_m, l_m)?;
         let cell = |px: f64| px.max(0.0) as usize / CELL_PX * CELL_PX;
-        ((foot.s_m - s_m).abs() <= FOOT_ERROR_M).then(|| BedPlace {
+        Some(BedPlace {
             step,
             cell_px: (cell(pixel.x), cell(pixel.y)),
             grey: 0.0,
@@ -89,22 +83,25 @@ impl BedLight {
     }
 
     /// Length of bed in view, metres, on which a body of the least contrast would not be found in the
-    /// light of the last frame. What a train hides does not count.
+    /// light of a frame, the one that `difference` was made of. What a train hides does not count.
     pub fn unseen_m(
         &mut self,
-        difference: &Difference,
+        frame: &[u8],
+        (reference, difference): (&Reference, &Difference),
         cells: &GaugeCells,
         settings: &WaysideSettings,
     ) -> f64 {
+        self.track.measure(frame, reference, cells);
         self.counts.fill((0, 0));
         for place in &self.places {
             if cells.is_blind(place.cell_px) {
                 continue;
             }
             let (expected, limit) = difference.expected(place.cell_px, place.grey);
+            let behind_veil = self.track.around(place.step) / settings.track_contrast;
             let (in_view, seen) = &mut self.counts[place.step];
             *in_view += 1;
-            *seen += u32::from(limit <= settings.least_contrast * expected);
+            *seen += u32::from(limit <= settings.least_contrast * expected.min(behind_veil));
         }
         let unseen = self
             .counts

@@ -12,6 +12,8 @@ const CUT_PX: u32 = 2;
 /// One span and one flag a cell.
 #[derive(Clone, Debug)]
 pub(super) struct GaugeCells {
+    /// Of the image, pixels.
+    width: usize,
     wide: usize,
     spans: Vec<Option<GaugeSpan>>,
     blind: Vec<bool>,
@@ -26,6 +28,7 @@ impl GaugeCells {
             .map(|k| sight.gauge_span(middle(k % wide), middle(k / wide)))
             .collect();
         Self {
+            width: width.max(1),
             wide,
             spans,
             blind: vec![false; wide * high],
@@ -54,6 +57,11 @@ impl GaugeCells {
     /// Whether the cell of a pixel is blind.
     pub fn is_blind(&self, (u, v): (usize, usize)) -> bool {
         self.blind.get(v / CELL_PX * self.wide + u / CELL_PX) == Some(&true)
+    }
+
+    /// Whether the cell of the pixel at an index into the image is blind.
+    pub fn hides(&self, pixel: usize) -> bool {
+        self.any_blind && self.is_blind((pixel % self.width, pixel / self.width))
     }
 
     pub fn any_blind(&self) -> bool {

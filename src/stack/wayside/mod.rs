@@ -36,7 +36,9 @@
 //!     ..Default::default()
 //! };
 //! let mut detector = WaysideDetector::new(&settings, calibration, map);
-//! let mut image = image::GrayImage::from_pixel(640, 360, image::Luma([90]));
+//! // Without anything to see on it, the bed might lie behind mist.
+//! let bed = |u, _| image::Luma([if u % 16 < 8 { 70 } else { 110 }]);
+//! let mut image = image::GrayImage::from_fn(640, 360, bed);
 //! let report = |detector: &mut WaysideDetector, number: u32, image: &image::GrayImage| {
 //!     let start = SimTime::from_secs(f64::from(number) * 0.1);
 //!     let (exposure_s, gain_db) = (8e-3, 0.0);
@@ -67,6 +69,7 @@
 //! | `rails` | rail heads, which mirror any light |
 //! | `shadows` | shadows, which are no bodies: the texture of the floor shows in them |
 //! | `bed` | whether the light lets the bed be seen, and where it is seen to be clear |
+//! | `veil` | how much of the bed's light comes through mist, by range |
 //! | `regions` | connected regions |
 //! | `sight` | where a line of sight meets gauge and bed, from calibration and map |
 //! | `place` | region to obstacle: place, width, height; fused with lidar echoes |
@@ -115,6 +118,7 @@ mod sight;
 mod test_scene;
 #[cfg(test)]
 mod tests;
+mod veil;
 mod vision;
 
 pub use equipment::WaysideDetection;
@@ -244,7 +248,8 @@ impl WaysideDetector {
         let train_near = trains.iter().any(|t| self.may_light(t));
         let places = (&self.cells, &self.rails);
         (self.difference).run(grey, &self.reference, places, train_near);
-        let unseen_m = (self.bed_light).unseen_m(&self.difference, &self.cells, &self.settings);
+        let compared = (&self.reference, &self.difference);
+        let unseen_m = (self.bed_light).unseen_m(grey, compared, &self.cells, &self.settings);
         let sees = unseen_m <= self.settings.unseen_bed_m;
         self.bed_was_seen |= sees;
         self.vision.note(sees, frame.start, &self.settings);

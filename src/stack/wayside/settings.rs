@@ -24,6 +24,9 @@ settings! {
         /// light is so little, or so different from that of the reference, that the threshold is higher,
         /// the bed counts as unseen.
         least_contrast: f64 = 0.6, in 0.05..=1.0;
+        /// Standard deviation of the grey across the track (rails, sleepers, bed) in clear air, as a share
+        /// of the bed's grey. What is missing of it, a veil before the bed has taken, of bodies too.
+        track_contrast: f64 = 0.35, in 0.01..=1.0;
         /// Length of bed that may be unseen before the device counts as blind, m.
         unseen_bed_m: f64 = 10.0, in 0.0..=500.0;
         /// Smallest region, pixels.

@@ -16,6 +16,9 @@ use std::sync::Arc;
 const STATION_M: f64 = 0.5;
 /// Height of the bed over top of rail where the map has no cross-section: a slab track's.
 const DEFAULT_BED_M: f64 = -0.2;
+/// A place on the floor is seen where its line of sight meets the floor within so many metres of it along
+/// the line.
+const FOOT_ERROR_M: f64 = 1.0;
 /// Resolution across the track of the tabulated cross-section.
 const PROFILE_STEP_M: f64 = 0.02;
 
@@ -211,6 +214,18 @@ impl Sight {
         let station = &self.stations[k.min(self.stations.len() - 1)];
         let floor = self.profiles[station.profile].at(at.l_m);
         floor.map_or(DEFAULT_BED_M, |f| f.0)
+    }
+
+    /// Where the floor is seen at a place on the line; `None` outside the picture and behind a wall.
+    pub fn floor_pixel(&self, s_m: f64, l_m: f64) -> Option<Point2<f64>> {
+        let on_rails = TrackPoint { s_m, l_m, h_m: 0.0 };
+        let h_m = self.floor_m(on_rails);
+        let pixel = self.pixel_of(TrackPoint { h_m, ..on_rails })?;
+        let lens = &self.calibration.camera.intrinsics;
+        let foot = lens
+            .contains(&pixel)
+            .then(|| self.foot(pixel.x, pixel.y))??;
+        ((foot.s_m - s_m).abs() <= FOOT_ERROR_M).then_some(pixel)
     }
 
     /// Where a pixel's line of sight meets the floor first; `None` for a wall, the ceiling, or

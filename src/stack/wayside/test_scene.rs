@@ -6,7 +6,8 @@ use crate::bus::{
     CameraModel, Frame, Intrinsics, LidarReturn, LidarScan, Shutter, SimTime, WaysideCalibration,
 };
 use crate::track::{
-    Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
+    Alignment, CrossSection, Material, OutlinePoint, PlanElement, RAIL_OFFSET_M, SectionRange,
+    Tunnel,
 };
 use image::GrayImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -28,6 +29,8 @@ pub fn words(a: u32, b: u32, c: u32) -> [u32; 3] {
     v
 }
 
+/// Of thick mist.
+const AIRLIGHT_GREY: f64 = 120.0;
 /// Numbers of the noise table: prime, so that frames do not repeat its rows.
 const NOISE: usize = 99_991;
 
@@ -161,6 +164,8 @@ pub struct TestScene {
     rays: Vec<Vector3<f64>>,
     eye: Point3<f64>,
     noise: Vec<f64>,
+    /// Of the air, metres.
+    pub visibility_m: f64,
 }
 
 impl TestScene {
@@ -174,20 +179,24 @@ impl TestScene {
         let map = tunnel(0.0);
         let mut calibration = calibration(&map, width, height);
         calibration.camera.intrinsics = lens;
-        // Stains of some 16 pixels, and rows of sleepers: light and dark all over.
+        let i = calibration.camera.intrinsics;
+        let (eye, line_from_camera) = line_from(&map, &calibration.world_from_camera);
+        let rays: Vec<_> = (0..width * height)
+            .map(|k| line_from_camera * i.ray(f64::from(k % width), f64::from(k / width)))
+            .collect();
+        // Stains of some 16 pixels, and rows of sleepers: light and dark all over. Rails, with what shines
+        // beside them.
         let background = (0..width * height)
-            .map(|k| {
+            .zip(&rays)
+            .map(|(k, ray): (u32, &Vector3<f64>)| {
                 let (u, v) = (k % width, k / width);
                 let stain = f64::from(words(u / 16, v / 16, 7)[0] % 60);
                 let sleeper = if v % 24 < 9 { 35.0 } else { 0.0 };
-                50.0 + stain + sleeper
-            })
-            .collect();
-        let i = calibration.camera.intrinsics;
-        let (eye, line_from_camera) = line_from(&map, &calibration.world_from_camera);
-        let rays = (0..width * height)
-            .map(|k| line_from_camera * i.ray(f64::from(k % width), f64::from(k / width)))
-            .collect();
+                let l_m = eye.y + ray.y * bed_distance_m(&eye, ray);
+                let on_rail = (l_m.abs() - RAIL_OFFSET_M).abs() < 0.1;
+                50.0 + stain + sleeper + if on_rail { 45.0 } else { 0.0 }
+            });
+        let background = background.collect();
         Self {
             map,
             calibration,
@@ -195,6 +204,7 @@ impl TestScene {
             rays,
             eye,
             noise: (0..NOISE as u32).map(normal).collect(),
+            visibility_m: f64::INFINITY,
         }
     }
 
@@ -217,7 +227,9 @@ impl TestScene {
         for (k, pixel) in image.iter_mut().enumerate() {
             let (u, v) = (k as u32 % i.width_px, k as u32 / i.width_px);
             let noise = 1.7 * noise.next().unwrap_or(&0.0);
-            *pixel = (grey[k] * light(u, v) + noise).round().clamp(0.0, 255.0) as u8;
+            let through = self.transmission(&self.rays[k]);
+            let behind = grey[k] * through + AIRLIGHT_GREY * (1.0 - through);
+            *pixel = (behind * light(u, v) + noise).round().clamp(0.0, 255.0) as u8;
         }
         Frame {
             number,
@@ -226,6 +238,12 @@ impl TestScene {
             gain_db: 0.0,
             image,
         }
+    }
+
+    /// Share of the bed's light that comes through the air along a ray (Koschmieder).
+    fn transmission(&self, ray: &Vector3<f64>) -> f64 {
+        let bed_m = bed_distance_m(&self.eye, ray).min(200.0);
+        (-3.912 * bed_m / self.visibility_m).exp()
     }
 
     fn paint(&self, grey: &mut [f64], item: Crate, level: f64) {
@@ -277,6 +295,11 @@ impl TestScene {
             returns,
         }
     }
+}
+
+/// How far along a ray the bed lies: beyond the horizon, very far.
+fn bed_distance_m(eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
+    (BED_M - eye.z) / ray.z.min(-1e-3)
 }
 
 /// Origin (chainage, left, height) and rotation of a pose in line axes.

@@ -583,7 +583,7 @@ fn a_blind_device_is_not_silent() {
 /// sees warns although it has learnt nothing, and a lost frame or two are no fault.
 #[test]
 fn a_device_that_never_sees_warns() {
-    let scene = TestScene::new(64, 36);
+    let scene = TestScene::new(640, 360);
     let mut d = detector(&scene, &quiet());
     let first = scene.frame(0, STEADY, &[]);
     let mut said = Vec::new();
@@ -658,5 +658,40 @@ fn a_dark_tunnel_is_not_clear() {
         // A second after the last frame that showed the bed, until five have shown it again.
         assert_eq!(report.blind, (30..54).contains(&n), "frame {n}");
         assert!(report.obstacles.is_empty());
+    }
+}
+
+/// Mist hides a body before it hides the light: the device says that it is blind, whether the mist was there
+/// when it learnt or came later. Provokes brightness taken for sight. What it would miss is missed: a body at
+/// 55 m, as much brighter than the bed as must be found, is found in thin mist and not in thick mist.
+#[test]
+fn mist_that_hides_a_body_blinds() {
+    let mut scene = TestScene::new(640, 360);
+    let settings = quiet();
+    let grey = 97.0 * (1.0 + settings.least_contrast);
+    let body = [(Crate::on_bed(145.0, 0.0, 1.2), grey)];
+    let clear = f64::INFINITY;
+    for (learnt_m, now_m, blind) in [
+        (1000.0, 1000.0, false),
+        (80.0, 80.0, true),
+        (20.0, 20.0, true),
+        (clear, 80.0, true),
+        (clear, 20.0, true),
+    ] {
+        scene.visibility_m = learnt_m;
+        let mut d = detector(&scene, &settings);
+        for n in 0..settings.reference_frames {
+            d.on_frame(&scene.frame(n, STEADY, &[]), None, &[]);
+        }
+        scene.visibility_m = now_m;
+        let mut last = |frames: std::ops::Range<u32>, bodies: &[(Crate, f64)]| {
+            let reports = frames.map(|n| d.on_frame(&scene.frame(n, STEADY, bodies), None, &[]));
+            reports.last().unwrap()
+        };
+        let report = last(10..40, &[]);
+        assert_eq!(report.blind, blind, "{learnt_m} m, {now_m} m");
+        assert_eq!(report.passage_possible, !blind);
+        let found = last(40..50, &body).obstacles.len();
+        assert_eq!(found, usize::from(!blind), "{learnt_m} m, {now_m} m");
     }
 }
