@@ -32,7 +32,7 @@ struct Reading {
 pub struct DistanceRun {
     /// As the odometer counted it.
     pub distance_m: f64,
-    /// That part of it, always positive, which was counted while the wheelset slid or slipped.
+    /// Distance counted while the wheelset slid or slipped, forward and backward added, metres.
     pub slid_m: f64,
 }
 
@@ -82,10 +82,9 @@ impl Odometry {
         })
     }
 
-    /// Whether the wheelset slid or slipped when it was heard last.
+    /// Whether the wheelset slid or slipped in a sample that [`Self::mean_speed_mps`] is taken from.
     pub fn slides(&self) -> bool {
-        let latest = self.samples.latest();
-        latest.is_some_and(|(_, last)| last.sample.slides)
+        self.of_mean_speed().any(|(_, sample)| sample.slides)
     }
 
     /// Speed at a time between samples, the first and the last one's outside; 0 without any.
@@ -101,18 +100,28 @@ impl Odometry {
     /// gives one pulse every 21 mm or so: over a single interval of 20 ms that would be steps of 1
     /// m/s, and no deceleration could be seen in them. The lag is on the safe side while braking.
     pub fn mean_speed_mps(&self) -> Option<f64> {
-        let (latest, Reading { sample: last, .. }) = self.samples.latest()?;
-        let age_s = |s: &OdometerSample| latest.since(s.time);
-        let samples = self.samples.newest_first();
-        let samples = samples.map(|(_, reading)| reading.sample);
-        let old = samples
-            .take_while(|s| age_s(s) <= SPEED_WINDOW_S)
+        let (_, last) = self.of_mean_speed().next()?;
+        let first = self
+            .of_mean_speed()
             .last()
-            .filter(|s| age_s(s) > 0.0);
-        let speed = old.map_or(last.speed_mps, |s| {
-            (last.distance_m - s.distance_m) / age_s(&s)
+            .filter(|(age_s, _)| *age_s > 0.0);
+        let speed = first.map_or(last.speed_mps, |(age_s, first)| {
+            (last.distance_m - first.distance_m) / age_s
         });
         Some(speed.max(0.0))
+    }
+
+    /// The samples that the mean speed is taken from, newest first, with how much older than the newest
+    /// they are, seconds.
+    fn of_mean_speed(&self) -> impl Iterator<Item = (f64, OdometerSample)> + '_ {
+        let newest = self
+            .samples
+            .latest()
+            .map_or(SimTime::ZERO, |(time, _)| time);
+        let samples = self.samples.newest_first();
+        samples
+            .map(move |(time, reading)| (newest.since(time), reading.sample))
+            .take_while(|(age_s, _)| *age_s <= SPEED_WINDOW_S)
     }
 
     /// Time since the last sample, seconds.
@@ -183,6 +192,22 @@ mod tests {
             assert!((run.slid_m - slid_m).abs() < 1e-9, "{run:?} at {time_s} s");
         }
         assert!(!odometry.slides());
+    }
+
+    /// The speed is a mean: as long as a sample of its time was taken on a sliding wheel, it is wrong.
+    #[test]
+    fn a_slide_lasts_as_long_as_its_samples_count() {
+        let mut odometry = Odometry::default();
+        for k in 0..=150u32 {
+            let time_s = 0.02 * f64::from(k);
+            odometry.on_sample(&OdometerSample {
+                time: SimTime::from_secs(time_s),
+                distance_m: 10.0 * time_s,
+                speed_mps: 10.0,
+                slides: (51..=100).contains(&k),
+            });
+            assert_eq!(odometry.slides(), (51..=125).contains(&k), "{time_s} s");
+        }
     }
 
     /// The last speed is believed for a second, and what is no number or no news not at all.
