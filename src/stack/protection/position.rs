@@ -3,12 +3,14 @@
 //!
 //! The odometer's error is mostly one of scale (wheel diameter), so it grows in proportion to the
 //! distance and not to its root: sigma^2 = sigma_fix^2 + (drift x distance + slide x slid)^2, where
-//! slid is the distance that was counted on a sliding wheel. A fix is taken at the time when it was true, by the odometer's reading then, and fused by inverse variance; one
-//! too far off is refused. Five refused ones in a row that agree with each other mean that the
-//! train is not where it was thought to be: the last of them is taken. They must be of two lamps: of one
-//! lamp that is taken for another, all fixes agree.
+//! slid is the distance that was counted on a sliding wheel. A fix is taken at the time when it was
+//! true, by the odometer's reading then, and fused by inverse variance; one too far off is refused.
+//! Five refused ones in a row that agree with each other mean that the train is not where it was
+//! thought to be: the last of them is taken. They must be of two lamps: of one lamp that is taken for
+//! another, all fixes agree.
 
 use super::ProtectionSettings;
+use super::settings::LEAST_SIGMA_M;
 use crate::bus::{PositionFix, PositionSource, SimTime};
 use crate::stack::odometry::{DistanceRun, Odometry};
 use crate::track::uid::Uid;
@@ -76,7 +78,7 @@ impl Position {
                 drift: settings.odometer_drift,
                 slide: settings.slide_error,
             },
-            floor_m: settings.sigma_floor_m,
+            floor_m: settings.sigma_floor_m.max(LEAST_SIGMA_M),
             gate: settings.gate_sigmas,
             odometry: Odometry::default(),
             anchor: settings.initial_chainage_m.map(|chainage_m| HeadPosition {
@@ -232,5 +234,23 @@ mod tests {
         // Not a number changes nothing.
         p.on_fix(&fix(t, f64::NAN, 1.0));
         assert!((p.at(t).unwrap().chainage_m - 160.0).abs() < 1e-9);
+    }
+
+    /// Two fixes without a sigma must not make the place no number: no obstacle would be ahead of it.
+    #[test]
+    fn exact_fixes_give_a_place() {
+        let settings = ProtectionSettings {
+            sigma_floor_m: 0.0,
+            ..ProtectionSettings::default()
+        };
+        let mut p = driven(&settings, 1.0, 0.0);
+        let t = SimTime::from_secs(1.0);
+        p.on_fix(&fix(t, 100.0, 0.0));
+        p.on_fix(&fix(t, 100.0, 0.0));
+        let e = p.at(t).unwrap();
+        assert!(
+            (e.chainage_m - 100.0).abs() < 1e-9 && e.sigma_m > 0.0,
+            "{e:?}"
+        );
     }
 }

@@ -14,7 +14,7 @@ settings! {
         /// it the first fix or balise tells.
         initial_chainage_m: Option<f64> = None, in -1e5..=1e6;
         /// One sigma of that position, m.
-        initial_sigma_m: f64 = 5.0, in 0.01..=1e3;
+        initial_sigma_m: f64 = 5.0, in LEAST_SIGMA_M..=1e3;
         /// The movement authority ends this far before an obstacle, m: room to clear it. The
         /// service brake stops the train there.
         safety_distance_m: f64 = 25.0, in 0.0..=500.0;
@@ -32,9 +32,9 @@ settings! {
         speed_error_kmh: f64 = 3.0, in 0.0..=20.0;
         /// No fix makes the position better than this, m, one sigma (survey and mounting errors do
         /// not average out).
-        sigma_floor_m: f64 = 0.3, in 0.0..=50.0;
+        sigma_floor_m: f64 = 0.3, in LEAST_SIGMA_M..=50.0;
         /// One sigma of the position given by a balise, m.
-        balise_sigma_m: f64 = 0.5, in 0.01..=50.0;
+        balise_sigma_m: f64 = 0.5, in LEAST_SIGMA_M..=50.0;
         /// A fix further off than this many sigma is refused.
         gate_sigmas: f64 = 5.0, in 1.0..=100.0;
         /// Time of the onboard equipment to react, s, with traction still on.
@@ -79,6 +79,9 @@ settings! {
     }
     also check_order
 }
+
+/// No position is known better than this, metres, one sigma.
+pub(super) const LEAST_SIGMA_M: f64 = 0.01;
 
 /// Length of six cars of class B (GB 50157), metres.
 const SIX_CARS_M: f64 = 118.0;
