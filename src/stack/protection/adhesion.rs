@@ -1,15 +1,23 @@
-//! What the wheels tell of the rails: whether they slide, and what the brake is then held to reach.
+//! Slippery rails, known by wheels that slid, and the brake rates that are then assumed.
 //!
 //! The slide and slip protection of a wheelset acts where the wheel no longer turns as the train runs.
 //! From then on the rails count as slippery until the train has run [`SLIPPERY_FOR_M`] without it: the
 //! emergency brake is held to reach `low_adhesion_mps2` only, and while the wheels slide the true
 //! speed may be above what they say by k times `slide_error`.
+//!
+//! A wheel that stands while its protection acts is locked, and the train may run. That is believed
+//! for as long as the fastest train takes to stop on the poorest rails, not for ever.
 
 use super::ProtectionSettings;
+use super::curve::FASTEST_MPS;
+use crate::bus::SimTime;
 use crate::stack::odometry::Odometry;
 
 /// Leaf film lies in stretches of some hundred metres, with gaps.
 const SLIPPERY_FOR_M: f64 = 500.0;
+
+/// A wheel slower than this stands.
+pub(super) const STANDING_MPS: f64 = 0.1;
 
 /// What may be expected of brake and odometer on the rails as they are.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,8 +28,8 @@ pub(super) struct Grip {
     pub service_mps2: f64,
     /// Guaranteed rate of the emergency brake on level track.
     pub emergency_mps2: f64,
-    /// The train may be faster than the odometer says by so much.
-    pub speed_error_mps: f64,
+    /// What the slide adds to the odometer's speed error.
+    pub slide_error_mps: f64,
 }
 
 /// Remembers where wheels slid.
@@ -29,12 +37,20 @@ pub(super) struct Grip {
 pub(super) struct Adhesion {
     /// Distance run when a wheel slid last.
     slid_at_m: Option<f64>,
+    /// Since when the wheel is locked.
+    locked_since: Option<SimTime>,
 }
 
 impl Adhesion {
     /// What holds now. Called every cycle.
-    pub fn update(&mut self, odometry: &Odometry, run_m: f64, s: &ProtectionSettings) -> Grip {
-        let slides = odometry.slides();
+    pub fn update(&mut self, time: SimTime, odometry: &Odometry, s: &ProtectionSettings) -> Grip {
+        let run_m = odometry.distance_m(time);
+        let speed_mps = odometry.mean_speed_mps().unwrap_or(0.0);
+        let locked = odometry.slides() && speed_mps <= STANDING_MPS;
+        self.locked_since = locked.then(|| self.locked_since.unwrap_or(time));
+        let longest_s = FASTEST_MPS / s.low_adhesion_mps2;
+        let stands = (self.locked_since).is_some_and(|since| time.since(since) > longest_s);
+        let slides = odometry.slides() && !stands;
         if slides {
             self.slid_at_m = Some(run_m);
         }
@@ -43,15 +59,14 @@ impl Adhesion {
             slides,
             service_mps2: s.service_mps2,
             emergency_mps2: s.emergency_mps2,
-            speed_error_mps: s.speed_error_kmh / 3.6,
+            slide_error_mps: 0.0,
         };
         if slippery {
             grip.service_mps2 = s.service_mps2.min(s.low_adhesion_mps2);
             grip.emergency_mps2 = s.emergency_mps2.min(s.low_adhesion_mps2);
         }
         if slides {
-            let speed_mps = odometry.mean_speed_mps().unwrap_or(0.0);
-            grip.speed_error_mps += s.position_sigmas * s.slide_error * speed_mps;
+            grip.slide_error_mps = s.position_sigmas * s.slide_error * speed_mps;
         }
         grip
     }
@@ -77,15 +92,15 @@ mod tests {
                 slides,
             };
             odometry.on_sample(&sample);
-            let grip = adhesion.update(&odometry, sample.distance_m, &settings);
-            (grip.emergency_mps2, grip.speed_error_mps)
+            let grip = adhesion.update(sample.time, &odometry, &settings);
+            (grip.emergency_mps2, grip.slide_error_mps)
         };
-        let (dry, error_mps) = (settings.emergency_mps2, settings.speed_error_kmh / 3.6);
-        assert_eq!(at(0, false), (dry, error_mps));
+        let dry = settings.emergency_mps2;
+        assert_eq!(at(0, false), (dry, 0.0));
         let (rate, wider_mps) = at(10, true);
         assert!((rate - settings.low_adhesion_mps2).abs() < 1e-12);
-        assert!((wider_mps - error_mps - 3.0).abs() < 1e-9, "{wider_mps}");
-        assert_eq!(at(500, false), (settings.low_adhesion_mps2, error_mps));
-        assert_eq!(at(511, false), (dry, error_mps));
+        assert!((wider_mps - 3.0).abs() < 1e-9, "{wider_mps}");
+        assert_eq!(at(500, false), (settings.low_adhesion_mps2, 0.0));
+        assert_eq!(at(511, false), (dry, 0.0));
     }
 }

@@ -25,7 +25,7 @@ const STEP_M: f64 = 5.0;
 /// How far the table goes beyond both ends of the line.
 const BEYOND_M: f64 = 1000.0;
 /// No train is faster.
-const FASTEST_MPS: f64 = 70.0;
+pub(super) const FASTEST_MPS: f64 = 70.0;
 
 /// Mean height of a train over its length, by the chainage of its head.
 #[derive(Clone, Debug)]
@@ -122,8 +122,8 @@ impl BrakeModel {
         }
     }
 
-    /// The service brake as an obstacle is approached by it, after the driver's time: what the rails
-    /// ahead bear is not known.
+    /// The service brake by which the train approaches an obstacle, at the rate of the poorest rails;
+    /// counted from the end of the driver's time.
     pub fn service(s: &ProtectionSettings) -> Self {
         Self {
             traction_mps2: 0.0,
@@ -132,11 +132,12 @@ impl BrakeModel {
         }
     }
 
-    /// The same brake, already on.
-    pub fn is_on(self) -> Self {
+    /// The same brake, demanded `on_s` ago with traction cut.
+    pub fn demanded_for(self, on_s: f64) -> Self {
+        let building_s = (on_s - self.reaction_s).max(0.0);
         Self {
-            reaction_s: 0.0,
-            buildup_s: 0.0,
+            reaction_s: (self.reaction_s - on_s).max(0.0),
+            buildup_s: (self.buildup_s - building_s).max(0.0),
             ..self.traction_is_cut()
         }
     }
@@ -214,10 +215,10 @@ fn phase(from: PhaseEnd, time_s: f64, (a0, a1): (f64, f64)) -> PhaseEnd {
 pub(super) fn overlap_m(settings: &ProtectionSettings, speed_error_mps: f64) -> f64 {
     let emergency = BrakeModel::emergency(settings).traction_is_cut();
     let service = BrakeModel::service(settings);
-    let climb = -G_MPS2 * STEEP / (1.0 + settings.rotating_mass.max(0.0));
+    let uphill_pull_mps2 = -G_MPS2 * STEEP / (1.0 + settings.rotating_mass.max(0.0));
     (0..=240)
         .map(|k| f64::from(k) * 0.25)
-        .flat_map(|v| [0.0, climb].map(|pull| (v, pull)))
+        .flat_map(|v| [0.0, uphill_pull_mps2].map(|pull| (v, pull)))
         .map(|(v, pull)| {
             let left = v * v / (2.0 * (service.rate_mps2 - pull));
             emergency.distance_m(v + speed_error_mps, pull) - left
@@ -274,6 +275,20 @@ mod tests {
                 );
             }
         }
+    }
+
+    /// A brake answers step by step after its demand: it reacts, builds up, and is on.
+    #[test]
+    fn a_demanded_brake_comes_on() {
+        let left_s = |on_s| {
+            let brake = EMERGENCY.demanded_for(on_s);
+            (brake.reaction_s, brake.buildup_s)
+        };
+        assert_eq!(left_s(0.25), (0.25, 1.5));
+        assert_eq!(left_s(1.0), (0.0, 1.0));
+        assert_eq!(left_s(5.0), (0.0, 0.0));
+        let on_m = EMERGENCY.demanded_for(5.0).distance_m(20.0, 0.0);
+        assert!((on_m - 200.0).abs() < 1e-9);
     }
 
     /// A train that stops while the brake builds up, or stands, must not get a negative way.

@@ -9,7 +9,6 @@ pub(super) struct Situation {
     pub obstacle: Option<Ahead>,
     pub brake_failed: bool,
     pub odometer_lost: bool,
-    pub wheels_slide: bool,
     pub radio_timeout_s: f64,
 }
 
@@ -55,7 +54,11 @@ fn text(report: &ProtectionReport, s: &Situation) -> String {
         Supervision::Warning => ", too fast",
         Supervision::Permitted => "",
     };
-    let slide = if s.wheels_slide { ", wheels slide" } else { "" };
+    let slide = if report.wheels_slide {
+        ", wheels slide"
+    } else {
+        ""
+    };
     match s.obstacle {
         Some(ahead) => {
             let what = match (ahead.blind, ahead.danger) {

@@ -82,20 +82,44 @@ pub use settings::ProtectionSettings;
 
 use crate::bus::{
     BrakeDemand, DangerLevel, DriverDisplay, ObstacleWarning, OdometerSample, PositionEstimate,
-    PositionFix, PositionSource, ProtectionReport, SimTime, TrainCommand,
+    PositionFix, PositionSource, ProtectionReport, SimTime, Supervision, TrainCommand,
 };
 use crate::track::{Direction, TrackId, Tunnel};
-use adhesion::Adhesion;
+use adhesion::{Adhesion, Grip};
 use curve::Grades;
 use display::{Ahead, Situation};
 use monitor::BrakeMonitor;
 use obstacles::Obstacles;
 use position::{HeadPosition, Position};
 use std::sync::Arc;
-use supervision::Supervisor;
+use supervision::{Limits, Supervisor};
 
 /// The odometer's stated speed error is so many standard deviations.
 const SPEED_ERROR_SIGMAS: f64 = 3.0;
+
+/// What is known in a cycle.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    time: SimTime,
+    train: Option<HeadPosition>,
+    /// By the odometer.
+    speed: Option<f64>,
+    grip: Grip,
+    odometer_lost: bool,
+    brake_failed: bool,
+    /// Where the nearest high danger begins.
+    obstacle_m: Option<f64>,
+}
+
+impl Known {
+    fn speed_mps(&self) -> f64 {
+        self.speed.unwrap_or(0.0)
+    }
+
+    fn head_m(&self) -> Option<f64> {
+        self.train.map(|train| train.chainage_m)
+    }
+}
 
 /// The protection of one train.
 #[derive(Clone, Debug)]
@@ -171,13 +195,18 @@ impl Protection {
     /// Position and speed on the route, as the protection takes them to be.
     pub fn estimate(&self, time: SimTime, direction: Direction) -> Option<PositionEstimate> {
         let head = self.position.at(time)?;
-        let speed_sigma_mps = self.settings.speed_error_kmh / 3.6 / SPEED_ERROR_SIGMAS;
+        let odometry = &self.position.odometry;
+        let v_mps = odometry.mean_speed_mps().unwrap_or(0.0);
+        let mut speed_sigma_mps = self.settings.speed_error_kmh / 3.6 / SPEED_ERROR_SIGMAS;
+        if odometry.slides() {
+            speed_sigma_mps = speed_sigma_mps.hypot(self.settings.slide_error * v_mps);
+        }
         Some(PositionEstimate {
             time,
             track: TrackId::default(),
             direction,
             s_m: head.chainage_m,
-            v_mps: self.position.odometry.mean_speed_mps().unwrap_or(0.0),
+            v_mps,
             covariance: [[head.sigma_m.powi(2), 0.0], [0.0, speed_sigma_mps.powi(2)]],
             protection_level_m: None,
             sources: vec![head.source, PositionSource::Odometer],
@@ -186,94 +215,122 @@ impl Protection {
 
     /// Decides; called 10 times a second.
     pub fn cycle(&mut self, time: SimTime) -> ProtectionReport {
+        self.first_cycle.get_or_insert(time);
         self.obstacles.lapse(time);
-        let train = self.position.at(time);
-        let speed = self.position.odometry.mean_speed_mps();
-        let speed_mps = speed.unwrap_or(0.0);
-        let odometer_lost = self.odometer_lost(time);
-        let head_m = train.map(|t| t.chainage_m);
-        let (grades, settings) = (&self.grades, &self.settings);
-        let odometry = &self.position.odometry;
-        let grip = (self.adhesion).update(odometry, odometry.distance_m(time), settings);
-        let failed = (self.monitor).update(time, self.brake, speed_mps, head_m, grades, grip);
-
+        let now = self.known(time);
+        let (train, obstacle_m, grip) = (now.train, now.obstacle_m, now.grip);
+        let ceiling_mps = self.ceiling_mps(train);
+        let limits = (self.supervisor).limits(&self.grades, ceiling_mps, train, obstacle_m, grip);
         // With no position every obstacle may be the next one.
-        let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| self.rearmost_m(t));
-        let end_m = self
-            .obstacles
-            .ahead(rearmost_m, DangerLevel::High)
-            .map(|(warning, _)| warning.from_chainage_m);
+        let must_stop = train.is_none() && obstacle_m.is_some();
+        let at_once = now.odometer_lost || now.brake_failed;
+        let supervision =
+            (self.supervisor).step(time, limits, now.speed, grip.slides, must_stop, at_once);
+        self.brake = supervision::demand(supervision);
+        self.report(&now, limits, supervision)
+    }
+
+    fn known(&mut self, time: SimTime) -> Known {
+        let train = self.position.at(time);
+        let odometry = &self.position.odometry;
+        let mut known = Known {
+            time,
+            train,
+            speed: odometry.mean_speed_mps(),
+            grip: self.adhesion.update(time, odometry, &self.settings),
+            odometer_lost: self.odometer_lost(time),
+            brake_failed: false,
+            obstacle_m: self
+                .ahead(train, DangerLevel::High)
+                .map(|(warning, _)| warning.from_chainage_m),
+        };
+        let (speed_mps, head_m) = (known.speed_mps(), known.head_m());
+        known.brake_failed = (self.monitor).update(
+            time,
+            self.brake,
+            speed_mps,
+            head_m,
+            &self.grades,
+            known.grip,
+        );
+        known
+    }
+
+    fn ceiling_mps(&self, train: Option<HeadPosition>) -> f64 {
+        let settings = &self.settings;
         let ceiling_kmh = match train {
             Some(_) => settings.line_speed_kmh,
             None => settings.restricted_kmh.min(settings.line_speed_kmh),
         };
-        let limits = (self.supervisor).limits(grades, ceiling_kmh / 3.6, train, end_m, grip);
-        let lost = train.is_none() && end_m.is_some();
-        let at_once = odometer_lost || failed;
-        let supervision = self.supervisor.step(limits, speed, lost, at_once);
-        self.brake = supervision::demand(supervision);
+        ceiling_kmh / 3.6
+    }
 
-        let stops = |train, obstacle_m| {
-            let fastest_mps = speed_mps + grip.speed_error_mps - settings.speed_error_kmh / 3.6;
-            (self.supervisor).stops(grades, train, fastest_mps, obstacle_m, grip)
-        };
-        let stops_in_time = train
-            .zip(end_m)
-            .is_none_or(|(train, at_m)| stops(train, at_m));
-        let situation = Situation {
-            obstacle: self.nearest(time, train, rearmost_m),
-            wheels_slide: grip.slides,
-            brake_failed: failed,
-            odometer_lost,
-            radio_timeout_s: self.settings.radio_timeout_s,
-        };
+    fn report(&self, now: &Known, limits: Limits, supervision: Supervision) -> ProtectionReport {
         let mut report = ProtectionReport {
-            time,
-            position_m: head_m,
-            sigma_m: train.map(|t| t.sigma_m),
-            speed_mps,
+            time: now.time,
+            position_m: now.head_m(),
+            sigma_m: now.train.map(|t| t.sigma_m),
+            speed_mps: now.speed_mps(),
             permitted_mps: limits.permitted_mps,
             service_mps: limits.service_mps,
             emergency_mps: limits.emergency_mps,
             supervision,
-            authority_end_m: end_m.map(|m| m - self.settings.safety_distance_m),
-            wheels_slide: grip.slides,
-            stops_in_time,
+            authority_end_m: now.obstacle_m.map(|m| m - self.settings.safety_distance_m),
+            wheels_slide: now.grip.slides,
+            stops_in_time: self.stops_in_time(now),
             command: TrainCommand {
                 brake: self.brake,
                 permitted_speed_mps: limits.permitted_mps,
             },
             display: DriverDisplay::default(),
         };
+        let situation = Situation {
+            obstacle: self.nearest(now),
+            brake_failed: now.brake_failed,
+            odometer_lost: now.odometer_lost,
+            radio_timeout_s: self.settings.radio_timeout_s,
+        };
         report.display = display::display(&report, &situation);
         report
     }
 
-    /// The head's rearmost possible place: an obstacle counts as passed only behind it.
-    fn rearmost_m(&self, train: HeadPosition) -> f64 {
-        train.chainage_m - self.settings.position_sigmas * train.sigma_m
+    /// Whether the emergency brake stops the train before the nearest high danger.
+    fn stops_in_time(&self, now: &Known) -> bool {
+        let (Some(train), Some(obstacle_m)) = (now.train, now.obstacle_m) else {
+            return true;
+        };
+        let fastest_mps = now.speed_mps() + now.grip.slide_error_mps;
+        let emergency = self.supervisor.emergency_at(now.time, now.grip);
+        emergency.stops(&self.grades, train.chainage_m, fastest_mps, obstacle_m)
+    }
+
+    /// The nearest obstacle of at least `danger`. It counts as passed only behind the head's rearmost
+    /// possible place.
+    fn ahead(
+        &self,
+        train: Option<HeadPosition>,
+        danger: DangerLevel,
+    ) -> Option<(&ObstacleWarning, SimTime)> {
+        let sigmas = self.settings.position_sigmas;
+        let rearmost_m = train.map_or(f64::NEG_INFINITY, |t| t.chainage_m - sigmas * t.sigma_m);
+        self.obstacles.ahead(rearmost_m, danger)
     }
 
     /// The obstacle that the driver is shown: a dangerous one first.
-    fn nearest(
-        &self,
-        time: SimTime,
-        train: Option<HeadPosition>,
-        rearmost_m: f64,
-    ) -> Option<Ahead> {
-        let head_m = train?.chainage_m;
-        let ahead = |danger| self.obstacles.ahead(rearmost_m, danger);
+    fn nearest(&self, now: &Known) -> Option<Ahead> {
+        let head_m = now.head_m()?;
+        let ahead = |danger| self.ahead(now.train, danger);
         let (warning, received) = ahead(DangerLevel::High).or_else(|| ahead(DangerLevel::Low))?;
         Some(Ahead {
             distance_m: warning.from_chainage_m - head_m,
             danger: warning.danger,
-            silent_s: time.since(received),
+            silent_s: now.time.since(received),
             blind: warning.blind,
         })
     }
 
-    fn odometer_lost(&mut self, time: SimTime) -> bool {
-        let since_start = time.since(*self.first_cycle.get_or_insert(time));
+    fn odometer_lost(&self, time: SimTime) -> bool {
+        let since_start = self.first_cycle.map_or(0.0, |first| time.since(first));
         let age_s = self.position.odometry.age_s(time).unwrap_or(since_start);
         // A sample from the future would hold off all that follow.
         age_s.abs() > self.settings.odometer_timeout_s

@@ -3,7 +3,7 @@
 //! deceleration says nothing of the train's.
 
 use super::ProtectionSettings;
-use super::adhesion::Grip;
+use super::adhesion::{Grip, STANDING_MPS};
 use super::curve::Grades;
 use crate::bus::{BrakeDemand, SimTime};
 
@@ -57,7 +57,7 @@ impl BrakeMonitor {
         };
         if grip.slides || speed_mps < SLOWEST_MPS {
             self.window = None;
-            self.failed &= speed_mps > 0.1;
+            self.failed &= grip.slides || speed_mps > STANDING_MPS;
             return self.failed;
         }
         if time.since(self.since) < self.answer_s {

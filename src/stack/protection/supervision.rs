@@ -1,16 +1,14 @@
 //! The decision of one cycle: limits at this place, and what the speed means against them.
 
 use super::ProtectionSettings;
-use super::adhesion::Grip;
+use super::adhesion::{Grip, STANDING_MPS};
 use super::curve::{BrakeModel, Grades, overlap_m};
 use super::position::HeadPosition;
-use crate::bus::{BrakeDemand, Supervision};
+use crate::bus::{BrakeDemand, SimTime, Supervision};
 
 /// Where the permitted speed is under this, the end of the authority is reached: the brake
 /// stops the train and holds it.
 const HOLD_UNDER_MPS: f64 = 1.0;
-/// Slower than this is standing.
-const STANDING_MPS: f64 = 0.1;
 
 /// Speed limits at the train's place.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +27,8 @@ pub(super) struct Supervisor {
     overlap_m: f64,
     settings: ProtectionSettings,
     state: Supervision,
+    /// Since when the emergency brake is demanded.
+    emergency_since: Option<SimTime>,
 }
 
 impl Supervisor {
@@ -39,6 +39,7 @@ impl Supervisor {
             overlap_m: overlap_m(settings, settings.speed_error_kmh / 3.6),
             settings: settings.clone(),
             state: Supervision::Permitted,
+            emergency_since: None,
         }
     }
 
@@ -66,14 +67,10 @@ impl Supervisor {
         let ahead_m = s.position_sigmas * train.sigma_m;
         let danger_m = obstacle_m - s.danger_distance_m;
         let stop_m = (obstacle_m - s.safety_distance_m).min(danger_m - ahead_m - self.overlap_m);
-        let emergency = self.emergency_on(grip);
-        let emergency = if self.brakes() {
-            emergency.traction_is_cut()
-        } else {
-            emergency
-        };
+        let emergency = self.emergency_now(grip);
         let fastest = emergency.speed_mps(grades, train.chainage_m + ahead_m, danger_m, 0.0);
-        let emergency_mps = (fastest - grip.speed_error_mps).max(0.0);
+        let error_mps = s.speed_error_kmh / 3.6 + grip.slide_error_mps;
+        let emergency_mps = (fastest - error_mps).max(0.0);
         let service_mps = self
             .service
             .speed_mps(grades, train.chainage_m, stop_m, 0.0)
@@ -90,47 +87,41 @@ impl Supervisor {
         }
     }
 
-    /// Whether the emergency brake stops a train of this place and speed before an obstacle.
-    pub fn stops(
-        &self,
-        grades: &Grades,
-        train: HeadPosition,
-        speed_mps: f64,
-        obstacle_m: f64,
-        grip: Grip,
-    ) -> bool {
-        let emergency = self.emergency_on(grip);
-        let emergency = if self.brakes() {
-            emergency.is_on()
-        } else {
-            emergency
-        };
-        emergency.stops(grades, train.chainage_m, speed_mps, obstacle_m)
-    }
-
-    fn brakes(&self) -> bool {
-        matches!(self.state, Supervision::Service | Supervision::Emergency)
-    }
-
-    /// The emergency brake on the rails as they are.
-    fn emergency_on(&self, grip: Grip) -> BrakeModel {
-        BrakeModel {
+    /// The emergency brake on the rails as they are, were it demanded now: an intervention has cut
+    /// traction already.
+    fn emergency_now(&self, grip: Grip) -> BrakeModel {
+        let emergency = BrakeModel {
             rate_mps2: grip.emergency_mps2,
             ..self.emergency
+        };
+        match self.state {
+            Supervision::Permitted | Supervision::Warning => emergency,
+            Supervision::Service | Supervision::Emergency => emergency.traction_is_cut(),
+        }
+    }
+
+    /// The same, demanded when it was, or now.
+    pub fn emergency_at(&self, time: SimTime, grip: Grip) -> BrakeModel {
+        let emergency = self.emergency_now(grip);
+        match self.emergency_since {
+            Some(since) => emergency.demanded_for(time.since(since)),
+            None => emergency,
         }
     }
 
     /// The state after this cycle. `must_stop` brakes whatever the speed, up to the emergency
-    /// brake when `at_once`. A train of unknown speed is taken to move.
+    /// brake when `at_once`. A train of unknown speed, or whose wheels slide, is taken to move.
     pub fn step(
         &mut self,
+        time: SimTime,
         limits: Limits,
         speed_mps: Option<f64>,
+        slides: bool,
         must_stop: bool,
         at_once: bool,
     ) -> Supervision {
         let hold = must_stop || (limits.by_obstacle && limits.permitted_mps < HOLD_UNDER_MPS);
-        let moving = speed_mps.is_none_or(|v| v > STANDING_MPS);
+        let moving = slides || speed_mps.is_none_or(|v| v > STANDING_MPS);
         let speed_mps = speed_mps.unwrap_or(0.0);
         let wanted = if moving && (at_once || speed_mps > limits.emergency_mps) {
             Supervision::Emergency
@@ -148,6 +139,8 @@ impl Supervisor {
             Supervision::Service if wanted == Supervision::Warning => Supervision::Service,
             _ => wanted,
         };
+        let emergency = self.state == Supervision::Emergency;
+        self.emergency_since = emergency.then(|| self.emergency_since.unwrap_or(time));
         self.state
     }
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
 
 use super::*;
-use crate::bus::{Identity, Indicator, Method, ObstacleWarning, Supervision};
+use crate::bus::{Identity, Indicator, Method, ObstacleWarning};
 use crate::track::uid::Uid;
 use crate::track::{Alignment, Balise, Grade, PlanElement};
 use nalgebra::{Point3, Vector3};
@@ -226,7 +226,8 @@ fn well_known(chainage_m: f64) -> ProtectionSettings {
 
 /// Every speed and gradient, a driver who ignores everything and keeps powering, brakes as the
 /// specification has them: the service brake alone stops the train between the end of the
-/// authority and 15 m before it (at 1 m/s downhill, the rate of slippery rails takes that), and the emergency brake never joins in.
+/// authority and 15 m before it (at 1 m/s downhill, the rate of slippery rails takes that), and the
+/// emergency brake never joins in.
 #[test]
 fn the_service_brake_stops_before_the_obstacle() {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
@@ -316,6 +317,7 @@ fn a_failed_brake_lights_the_emergency_lamp() {
 struct Bench {
     protection: Protection,
     time: SimTime,
+    slides: bool,
 }
 
 impl Bench {
@@ -323,6 +325,7 @@ impl Bench {
         Self {
             protection: Protection::new(settings, map(0.0)),
             time: SimTime::ZERO,
+            slides: false,
         }
     }
 
@@ -332,7 +335,7 @@ impl Bench {
             time: self.time,
             distance_m,
             speed_mps,
-            slides: false,
+            slides: self.slides,
         });
         self.protection.cycle(self.time)
     }
@@ -448,6 +451,60 @@ fn uncertainty_brings_the_end_nearer() {
     let shift =
         model.distance_m(limit(1.0) + error, 0.0) - model.distance_m(limit(11.0) + error, 0.0);
     assert!((shift - 30.0).abs() < 0.01, "{shift}");
+}
+
+/// Where the emergency brake is demanded now, it is not on yet: it needs 275 m from 80 km/h, and would
+/// need 247 m had it been on before.
+#[test]
+fn a_brake_just_demanded_is_not_on() {
+    let settings = ProtectionSettings {
+        initial_sigma_m: 0.0,
+        ..well_known(1000.0)
+    };
+    let stops = |obstacle_m: f64| {
+        let mut b = Bench::new(&settings);
+        b.hear(0, 0.0, DangerLevel::High, obstacle_m);
+        let report = b.cycle(0.0, 80.0 / 3.6);
+        assert_eq!(report.supervision, Supervision::Emergency);
+        report.stops_in_time
+    };
+    assert!(!stops(1260.0));
+    assert!(stops(1276.0));
+}
+
+/// A wheel that stands while slide protection acts is a locked wheel: neither is the emergency brake
+/// released, nor a failed brake forgotten, until any train would have stopped.
+#[test]
+fn a_locked_wheel_is_no_standing_train() {
+    let mut b = Bench::new(&at(1000.0, 0.5));
+    b.hear(0, 0.0, DangerLevel::High, 1500.0);
+    for k in 0..60 {
+        b.cycle(2.0 * f64::from(k), 20.0);
+    }
+    b.slides = true;
+    for _ in 0..100 {
+        let report = b.cycle(120.0, 0.0);
+        assert_eq!(report.supervision, Supervision::Emergency);
+        assert_eq!(report.display.lamp, Indicator::Emergency);
+    }
+    let released = (0..3000).find(|_| b.cycle(120.0, 0.0).supervision != Supervision::Emergency);
+    assert!(released.is_some());
+}
+
+/// While the wheels slide, the speed is less well known.
+#[test]
+fn a_slide_widens_the_estimated_speed() {
+    let mut b = Bench::new(&at(1000.0, 0.5));
+    let mut sigma_mps = |slides: bool| {
+        b.slides = slides;
+        b.cycle(0.0, 20.0);
+        let estimate = b.protection.estimate(b.time, Direction::Up).unwrap();
+        b = Bench::new(&at(1000.0, 0.5));
+        estimate.covariance[1][1].sqrt()
+    };
+    let rolling_mps = 3.0 / 3.6 / 3.0;
+    assert!((sigma_mps(false) - rolling_mps).abs() < 1e-9);
+    assert!((sigma_mps(true) - f64::hypot(rolling_mps, 0.1 * 20.0)).abs() < 1e-9);
 }
 
 /// The odometer falls silent: the emergency brake, after the timeout and not before.
