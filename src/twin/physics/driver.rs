@@ -111,6 +111,9 @@ impl AutomaticDriver {
         if now.time_s < s.start_s {
             target = target.min(s.start_speed_kmh / 3.6);
         }
+        if now.time_s < self.may_start_s {
+            target = 0.0;
+        }
         let error = target - now.speed_mps;
         // The root keeps the approach within the jerk limit, so that the speed does not overshoot.
         let answer = (GAIN_PER_S * error.abs()).min((1.5 * s.jerk_mps3 * error.abs()).sqrt());
@@ -126,9 +129,6 @@ impl AutomaticDriver {
             if needed > 0.9 * planned {
                 wanted = wanted.min(now.resistance_mps2 - needed);
             }
-        }
-        if now.time_s < self.may_start_s {
-            target = 0.0;
         }
         if target < STANDING_MPS && now.speed_mps < 0.1 {
             return -s.service_brake_mps2;
@@ -178,5 +178,25 @@ mod tests {
             started_s.is_some_and(|s| (28.0..32.0).contains(&s)),
             "{started_s:?}"
         );
+    }
+
+    /// A train that is pushed while its driver waits must not be given power.
+    #[test]
+    fn a_driver_who_waits_takes_no_power_when_the_train_moves() {
+        let mut driver = AutomaticDriver::new(&TrainSettings::default());
+        for k in 0..5000u32 {
+            let now = Instruments {
+                time_s: 1e-3 * f64::from(k),
+                chainage_m: 0.0,
+                speed_mps: if k == 1 { 0.0 } else { 1.0 },
+                resistance_mps2: 0.0,
+            };
+            let mut command = TrainCommand::UNSUPERVISED;
+            if k == 0 {
+                command.brake = BrakeDemand::Emergency;
+            }
+            let effort = driver.step(&now, &command, 1e-3);
+            assert!(effort.traction_mps2 <= 0.0, "{} s", now.time_s);
+        }
     }
 }

@@ -131,8 +131,8 @@ settings! {
         start_speed_kmh: f64 = 0.0, in 0.0..=160.0;
         /// The driver does not take power before this time, seconds.
         start_s: f64 = 0.0, in 0.0..=1e6;
-        /// After an emergency brake the driver starts again this long after the train stands, seconds:
-        /// he must ask for leave.
+        /// After an emergency brake the driver starts again this long after the train stands and the
+        /// emergency brake is no longer demanded, seconds: he must ask for leave.
         restart_after_s: f64 = 60.0, in 0.0..=1e6;
         /// Speed that the automatic driver aims at, km/h.
         cruise_speed_kmh: f64 = 60.0, in 0.0..=160.0;
