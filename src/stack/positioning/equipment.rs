@@ -46,6 +46,16 @@ impl CabMount {
         }
     }
 
+    /// A sample of the train's odometer, as the cab looks.
+    fn of_cab(&self, sample: &OdometerSample) -> OdometerSample {
+        let sign = self.end.sign();
+        OdometerSample {
+            distance_m: sign * sample.distance_m,
+            speed_mps: sign * sample.speed_mps,
+            ..*sample
+        }
+    }
+
     /// A fix of the cab, as one of the head.
     fn of_head(&self, fix: PositionFix, map: &Tunnel) -> PositionFix {
         let run_m = fix.chainage_m - self.head_behind_m;
@@ -121,13 +131,7 @@ impl Equipment for LampPositioning {
         match &message.content {
             Content::Imu(sample) => self.positioner.on_imu(sample),
             Content::Odometer(sample) => {
-                let sign = self.mount.end.sign();
-                self.positioner.on_odometer(&OdometerSample {
-                    time: sample.time,
-                    distance_m: sign * sample.distance_m,
-                    speed_mps: sign * sample.speed_mps,
-                    slides: false,
-                });
+                self.positioner.on_odometer(&self.mount.of_cab(sample));
             }
             Content::Pair(pair) => self.on_pair(pair, message.received_at),
             _ => {}
@@ -140,5 +144,32 @@ impl Equipment for LampPositioning {
             messages.extend(self.silent(now));
         }
         messages
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stack::led::testing::tunnel;
+    use crate::track::Direction;
+
+    /// Backwards, and with all else that the odometer says.
+    #[test]
+    fn the_rear_cab_runs_backwards() {
+        let route = Route::new(&tunnel("manchester"), Direction::Down);
+        let sample = OdometerSample {
+            time: SimTime::from_secs(1.0),
+            distance_m: 12.0,
+            speed_mps: 6.0,
+            slides: true,
+        };
+        let said = |end| CabMount::new(end, route, 118.0).of_cab(&sample);
+        assert_eq!(said(TrainEnd::Front), sample);
+        let backwards = OdometerSample {
+            distance_m: -12.0,
+            speed_mps: -6.0,
+            ..sample
+        };
+        assert_eq!(said(TrainEnd::Rear), backwards);
     }
 }

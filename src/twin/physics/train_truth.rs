@@ -105,8 +105,8 @@ impl World {
     }
 
     /// Whether slide and slip protection of an axle, counted from 0 at the head, holds effort back.
-    pub fn wheel_protected(&self, id: TrainId, axle: usize) -> Option<bool> {
-        Some(self.get(id)?.consist.wheelsets.get(axle)?.is_protected())
+    pub fn wheel_protection_acts(&self, id: TrainId, axle: usize) -> Option<bool> {
+        Some(self.get(id)?.consist.wheelsets.get(axle)?.protection_acts())
     }
 
     /// What the worst of its wheels has been through.

@@ -178,7 +178,7 @@ impl Wheelset {
     }
 
     /// Slide and slip protection holds effort back.
-    pub(super) fn is_protected(&self) -> bool {
+    pub(super) fn protection_acts(&self) -> bool {
         self.effort_share < 1.0
     }
 

@@ -90,15 +90,14 @@ impl Odometer {
     /// A sample now; `None` without the train that carries it, or without that wheelset.
     pub fn sample(&mut self, world: &World, train: TrainId) -> Option<OdometerSample> {
         let axle = (self.settings.axle as usize).saturating_sub(1);
-        let sample = self.read(world.time(), world.wheel_run_m(train, axle)?);
-        Some(OdometerSample {
-            slides: world.wheel_protected(train, axle)?,
-            ..sample
-        })
+        let run_m = world.wheel_run_m(train, axle)?;
+        let slides = world.wheel_protection_acts(train, axle)?;
+        Some(self.read(world.time(), run_m, slides))
     }
 
-    /// What the box says when its wheelset's tread has rolled `run_m` since the start.
-    fn read(&mut self, time: SimTime, run_m: f64) -> OdometerSample {
+    /// What the box says when its wheelset's tread has rolled `run_m` since the start, and `slides` or
+    /// not.
+    fn read(&mut self, time: SimTime, run_m: f64, slides: bool) -> OdometerSample {
         let per_turn = f64::from(self.settings.pulses_per_turn);
         let pulse_m = TAU * self.settings.wheel_radius_m / per_turn;
         let turned = run_m / (TAU * self.true_radius_m) * per_turn + self.phase;
@@ -118,7 +117,7 @@ impl Odometer {
             time,
             distance_m: reading.count * pulse_m,
             speed_mps: reading.speed_mps,
-            slides: false,
+            slides,
         }
     }
 
@@ -191,7 +190,7 @@ mod tests {
         assert!((scale - 1.0).abs() > 1e-6 && (scale - 1.0).abs() < 0.01);
         for k in 0..1000 {
             let run = 0.37 * f64::from(k);
-            let said = odometer.read(at(k), run);
+            let said = odometer.read(at(k), run, false);
             let behind = run / scale - said.distance_m;
             assert!(behind.abs() <= PULSE_M + 1e-9, "{behind} m");
             let steps = said.distance_m / PULSE_M;
@@ -206,7 +205,7 @@ mod tests {
         for speed in [22.0, 1.0, 0.3, -0.3, -8.0] {
             let mut odometer = Odometer::new(&exact(), 7, 0);
             for k in 0..200 {
-                let said = odometer.read(at(k), speed * 0.02 * f64::from(k));
+                let said = odometer.read(at(k), speed * 0.02 * f64::from(k), false);
                 // The first intervals have no edge before them.
                 if k > 20 {
                     let wrong = said.speed_mps - speed;
@@ -223,7 +222,7 @@ mod tests {
         let mut odometer = Odometer::new(&exact(), 7, 0);
         let mut before = f64::INFINITY;
         for k in 0..100 {
-            let said = odometer.read(at(k), 0.1 * f64::from(k.min(50)));
+            let said = odometer.read(at(k), 0.1 * f64::from(k.min(50)), false);
             if k > 50 {
                 assert!(said.speed_mps >= 0.0 && said.speed_mps <= before);
                 before = said.speed_mps;
@@ -245,10 +244,10 @@ mod tests {
                 ..exact()
             };
             let mut odometer = Odometer::new(&settings, 7, 0);
-            let mut said = odometer.read(at(0), 0.0);
+            let mut said = odometer.read(at(0), 0.0, false);
             for k in 1..=150 {
                 let run = 0.1 * f64::from(if k <= 100 { k } else { 200 - k });
-                said = odometer.read(at(k), run);
+                said = odometer.read(at(k), run, false);
             }
             assert!((said.distance_m - end_m).abs() <= 3.0 * PULSE_M);
             assert!((said.speed_mps - speed).abs() < 1e-9, "{}", said.speed_mps);
@@ -266,10 +265,10 @@ mod tests {
             };
             let mut odometer = Odometer::new(&settings, 7, 0);
             let border = (1.0 - odometer.phase) * PULSE_M;
-            let mut said = odometer.read(at(0), 0.0);
+            let mut said = odometer.read(at(0), 0.0, false);
             for k in 1..=100 {
                 let run = border + if k % 2 == 0 { 1e-3 } else { -1e-3 };
-                said = odometer.read(at(k), run);
+                said = odometer.read(at(k), run, false);
                 // The first edge of all has none before it to count from.
                 assert!(!two_channels || k < 3 || said.speed_mps.abs() < 1e-9);
             }
@@ -286,8 +285,8 @@ mod tests {
             ..exact()
         };
         let mut odometer = Odometer::new(&settings, 7, 0);
-        odometer.read(at(0), 0.0);
-        let said = odometer.read(at(1000), 400.0);
+        odometer.read(at(0), 0.0, false);
+        let said = odometer.read(at(1000), 400.0, false);
         let share = said.distance_m / 400.0;
         assert!((share - 0.43 / 0.425).abs() < 1e-4, "{share}");
     }
