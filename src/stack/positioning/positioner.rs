@@ -34,9 +34,28 @@ pub struct LedPositioner {
     lamp_presence: LampPresence,
     followed: Vec<Followed>,
     epoch: Option<SimTime>,
-    /// Those of the last pair: their memory serves again.
-    lamps: PairLamps,
     alone: ChipVotes,
+}
+
+/// What is read of an eye's frame.
+#[derive(Clone, Copy)]
+struct EyeView<'a> {
+    number: u32,
+    start: SimTime,
+    health: CameraHealth,
+    /// `None` where the eye shows a fault.
+    image: Option<&'a GrayImage>,
+}
+
+impl<'a> EyeView<'a> {
+    fn new(frame: &'a Frame, health: CameraHealth) -> Self {
+        Self {
+            number: frame.number,
+            start: frame.start,
+            health,
+            image: health.is_good().then_some(&frame.image),
+        }
+    }
 }
 
 /// No camera on a train exposes for as long as this.
@@ -66,7 +85,6 @@ impl LedPositioner {
             lamp_presence: LampPresence::default(),
             followed: Vec::new(),
             epoch: None,
-            lamps: PairLamps::default(),
         }
     }
 
@@ -84,22 +102,14 @@ impl LedPositioner {
     /// fault is left out: then the other one measures alone.
     pub fn on_pair(&mut self, pair: &StereoPair) -> LedReport {
         self.expose(pair);
-        let eyes = self.look_after(pair);
-        let mut report = match eyes.map(|eye| eye.is_good()) {
-            [true, true] => self.read_pair(pair),
-            [true, false] => self.read_pair(&StereoPair {
-                left: pair.left.clone(),
-                right: without_image(&pair.right),
-            }),
-            [false, true] => self.read_right(pair),
-            [false, false] => self.read_pair(&StereoPair {
-                left: without_image(&pair.left),
-                right: without_image(&pair.right),
-            }),
-        };
-        report.eyes = eyes;
-        report.best = self.best_method(eyes.iter().any(|eye| !eye.is_good()));
-        report
+        let [left, right] = self.look_after(pair);
+        let left = EyeView::new(&pair.left, left);
+        let right = EyeView::new(&pair.right, right);
+        if left.image.is_none() && right.image.is_some() {
+            self.read_right(left, right)
+        } else {
+            self.read_pair([left, right])
+        }
     }
 
     fn gives(&self, method: Method) -> bool {
@@ -145,17 +155,15 @@ impl LedPositioner {
     }
 
     /// The right eye stands in for the left one.
-    fn read_right(&mut self, pair: &StereoPair) -> LedReport {
+    fn read_right(&mut self, left: EyeView<'_>, right: EyeView<'_>) -> LedReport {
         let rig = self.rig;
         self.rig.left = rig.right;
         self.rig.vehicle_from_left = rig.vehicle_from_left * rig.left_from_right;
         self.finders.swap(0, 1);
-        let mut report = self.read_pair(&StereoPair {
-            left: pair.right.clone(),
-            right: without_image(&pair.right),
-        });
+        let mut report = self.read_pair([right, left]);
         self.rig = rig;
         self.finders.swap(0, 1);
+        report.eyes.reverse();
         std::mem::swap(&mut report.left, &mut report.right);
         for fix in &mut report.fixes {
             let lamp = rig.left_from_right * Point3::from(fix.lamp_in_camera);
@@ -164,17 +172,16 @@ impl LedPositioner {
         report
     }
 
-    fn read_pair(&mut self, pair: &StereoPair) -> LedReport {
-        let start = pair.left.start;
-        let seconds = start.since(*self.epoch.get_or_insert(start));
-        let mut lamps = std::mem::take(&mut self.lamps);
-        self.find(pair, &mut lamps);
+    fn read_pair(&mut self, views: [EyeView<'_>; 2]) -> LedReport {
+        let starts = views.map(|view| view.start);
+        let seconds = starts[0].since(*self.epoch.get_or_insert(starts[0]));
+        let mut lamps = self.find(views);
         self.followed
             .retain(|f| seconds - f.seen_s <= self.settings.forget_s);
         let (mut stereo, mut mono) = (None, None);
         for k in 0..lamps.left.len() {
-            let mut sighting = self.measurement().sight(pair, &lamps, k);
-            sighting.named = self.name(pair, &sighting, seconds, &lamps);
+            let mut sighting = self.measurement().sight(starts, &lamps, k);
+            sighting.named = self.name(views, &sighting, seconds, &lamps);
             lamps.left[k].spot.uid = sighting.named;
             if let Some(r) = sighting.right {
                 lamps.right[r].spot.uid = sighting.named;
@@ -188,27 +195,26 @@ impl LedPositioner {
                 keep_surer(&mut mono, fix);
             }
         }
-        let best = match self.best_method(pair.right.image.is_empty()) {
+        let best = self.best_method(views.iter().any(|view| view.image.is_none()));
+        let best_fix = match best {
             Method::Stereo => &stereo,
             Method::Mono => &mono,
         };
-        if let Some(fix) = best {
+        if let Some(fix) = best_fix {
             self.reckoning.on_fix(fix.time, fix.chainage_m);
         }
         let fixes = stereo.into_iter().chain(mono).collect();
         let spots = |lamps: &[LampImage]| lamps.iter().map(|l| l.spot.clone()).collect();
-        let report = LedReport {
-            time: start,
-            number: pair.left.number,
-            eyes: [CameraHealth::default(); 2],
-            best: Method::Stereo,
-            dark: self.dark_lamps(pair, &lamps.left),
+        LedReport {
+            time: starts[0],
+            number: views[0].number,
+            eyes: views.map(|view| view.health),
+            best,
+            dark: self.dark_lamps(views[0], &lamps.left),
             left: spots(&lamps.left),
             right: spots(&lamps.right),
             fixes,
-        };
-        self.lamps = lamps;
-        report
+        }
     }
 
     fn measurement(&self) -> Measurement<'_> {
@@ -221,14 +227,14 @@ impl LedPositioner {
     }
 
     /// Lamps that have gone out of the left eye's sight without ever having been in it.
-    fn dark_lamps(&mut self, pair: &StereoPair, left: &[LampImage]) -> Vec<Uid> {
+    fn dark_lamps(&mut self, view: EyeView<'_>, left: &[LampImage]) -> Vec<Uid> {
         let camera = self.rig.left;
         let middle = 0.5 * f64::from(camera.intrinsics.height_px);
-        let time = camera.shutter.row_mid(pair.left.start, middle);
+        let time = camera.shutter.row_mid(view.start, middle);
         let Some(chainage_m) = self
             .reckoning
             .chainage_m(time)
-            .filter(|_| !pair.left.image.is_empty())
+            .filter(|_| view.image.is_some())
         else {
             self.lamp_presence.forget();
             return Vec::new();
@@ -239,8 +245,8 @@ impl LedPositioner {
     }
 
     /// Finds the lamps of both eyes' images.
-    fn find(&mut self, pair: &StereoPair, lamps: &mut PairLamps) {
-        let start = pair.left.start;
+    fn find(&mut self, [left, right]: [EyeView<'_>; 2]) -> PairLamps {
+        let start = left.start;
         let reckoning = &self.reckoning;
         let (head_m, speed_mps) = (reckoning.chainage_m(start), reckoning.speed_mps(start));
         let vehicle_from_left = self.rig.vehicle_from_left;
@@ -252,19 +258,24 @@ impl LedPositioner {
             travel_m: speed_mps * eye.shutter.exposure_s,
         };
         let from_right = vehicle_from_left * self.rig.left_from_right;
-        let smears = [
-            smear(&self.rig.left, vehicle_from_left),
-            smear(&self.rig.right, from_right),
-        ];
-        let [of_left, of_right] = &mut self.finders;
-        lamps.left = of_left.find(&pair.left.image, |p| smears[0].along_row_px(p));
-        lamps.right = of_right.find(&pair.right.image, |p| smears[1].along_row_px(p));
+        let of_left = smear(&self.rig.left, vehicle_from_left);
+        let of_right = smear(&self.rig.right, from_right);
+        let find = |finder: &mut LampFinder, view: EyeView<'_>, smear: LampSmear<'_>| {
+            view.image.map_or_else(Vec::new, |image| {
+                finder.find(image, |p| smear.along_row_px(p))
+            })
+        };
+        let [left_finder, right_finder] = &mut self.finders;
+        PairLamps {
+            left: find(left_finder, left, of_left),
+            right: find(right_finder, right, of_right),
+        }
     }
 
     /// Follows the lamp, reads its stripes, and names it.
     fn name(
         &mut self,
-        pair: &StereoPair,
+        views: [EyeView<'_>; 2],
         sighting: &Sighting,
         seconds: f64,
         lamps: &PairLamps,
@@ -273,7 +284,7 @@ impl LedPositioner {
         let lamp_m = (self.rig.vehicle_from_left * Point3::from(lamp)).coords;
         let distance_m = self.reckoning.distance_m(sighting.time);
         let k = self.follow(lamp_m, distance_m, seconds);
-        let reading = self.read(pair, sighting, seconds, k, lamps);
+        let reading = self.read(views, sighting, seconds, k, lamps);
         let expected = self.expect(sighting.time, &lamp_m);
         let followed = &mut self.followed[k];
         match (self.naming).judge(followed, reading, expected, &self.map) {
@@ -307,7 +318,7 @@ impl LedPositioner {
     /// Reads the left eye's stripes, or the right eye's where the left lamp is cut off.
     fn read(
         &mut self,
-        pair: &StereoPair,
+        views: [EyeView<'_>; 2],
         sighting: &Sighting,
         seconds: f64,
         k: usize,
@@ -315,14 +326,16 @@ impl LedPositioner {
     ) -> PairReading {
         let lamp = &lamps.left[sighting.left];
         let right = sighting.right.map(|r| &lamps.right[r]);
-        let (eye, frame, lamp) = match right.filter(|right| !right.spot.cut) {
-            Some(right) if lamp.spot.cut => (1, &pair.right, right),
-            _ => (0, &pair.left, lamp),
+        let (eye, lamp) = match right.filter(|right| !right.spot.cut) {
+            Some(right) if lamp.spot.cut => (1, right),
+            _ => (0, lamp),
         };
-        let Some(reading) = self.finders[eye].read(&frame.image, lamp) else {
+        let view = views[eye];
+        let reading = (view.image).and_then(|image| self.finders[eye].read(image, lamp));
+        let Some(reading) = reading else {
             return PairReading::Nothing;
         };
-        let seconds = seconds + frame.start.since(pair.left.start);
+        let seconds = seconds + view.start.since(views[0].start);
         self.followed[k].votes.add(seconds, &reading);
         self.alone.clear();
         self.alone.add(seconds, &reading);
@@ -338,17 +351,6 @@ impl LedPositioner {
         Some(Expected {
             lamp_chainage_m: line.track_from_world(&lamp, chainage_m).s_m,
         })
-    }
-}
-
-/// The frame of an eye that has delivered nothing.
-fn without_image(frame: &Frame) -> Frame {
-    Frame {
-        number: frame.number,
-        start: frame.start,
-        exposure_s: frame.exposure_s,
-        gain_db: frame.gain_db,
-        image: GrayImage::default(),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::reckoning::DeadReckoning;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
-use crate::bus::{Identity, Intrinsics, RigCalibration, SimTime, StereoPair};
+use crate::bus::{Identity, Intrinsics, RigCalibration, SimTime};
 use crate::stack::led::{LampImage, LedSettings};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;
@@ -56,8 +56,9 @@ pub struct Measurement<'a> {
 }
 
 impl Measurement<'_> {
-    /// Finds the right eye's image of a lamp and where the lamp is.
-    pub fn sight(&self, pair: &StereoPair, lamps: &PairLamps, left: usize) -> Sighting {
+    /// Finds the right eye's image of a lamp and where the lamp is. `starts` are those of the frames,
+    /// left and right.
+    pub fn sight(&self, starts: [SimTime; 2], lamps: &PairLamps, left: usize) -> Sighting {
         let lamp = &lamps.left[left];
         let height_px = f64::from(lamp.spot.bounds.v1 - lamp.spot.bounds.v0 + 1);
         let row_miss_px = ROW_MISS_PX + ROW_MISS_SHARE * height_px;
@@ -65,11 +66,11 @@ impl Measurement<'_> {
         let partner = (lamps.right)
             .iter()
             .enumerate()
-            .filter_map(|(r, other)| Some((r, self.pairing(pair, lamp, other)?)))
+            .filter_map(|(r, other)| Some((r, self.pairing(starts, lamp, other)?)))
             .filter(|(_, pairing)| pairing.miss < row_miss)
             .min_by(|a, b| a.1.miss.total_cmp(&b.1.miss));
         let shutter = &self.rig.left.shutter;
-        let time = shutter.row_mid(pair.left.start, lamp.spot.centre.y);
+        let time = shutter.row_mid(starts[0], lamp.spot.centre.y);
         Sighting {
             left,
             right: partner.map(|p| p.0),
@@ -82,11 +83,16 @@ impl Measurement<'_> {
 
     /// Both eyes' images of a lamp, with what the train runs between their rows. The rows' times
     /// are taken from the images first, then, without their noise, from where the lamp is.
-    fn pairing(&self, pair: &StereoPair, left: &LampImage, right: &LampImage) -> Option<Pairing> {
+    fn pairing(
+        &self,
+        starts: [SimTime; 2],
+        left: &LampImage,
+        right: &LampImage,
+    ) -> Option<Pairing> {
         let rig = self.rig;
         let times = |left_row: f64, right_row: f64| {
-            let left = rig.left.shutter.row_mid(pair.left.start, left_row);
-            (left, rig.right.shutter.row_mid(pair.right.start, right_row))
+            let left = rig.left.shutter.row_mid(starts[0], left_row);
+            (left, rig.right.shutter.row_mid(starts[1], right_row))
         };
         let (l, r) = (
             line_of_sight(&rig.left.intrinsics, left),
