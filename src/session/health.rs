@@ -27,7 +27,7 @@ impl Health {
         let Some(figures) = self.cameras.get_mut(camera) else {
             return false;
         };
-        figures.lost_frames += health.lost;
+        figures.lost_frames = figures.lost_frames.saturating_add(health.lost);
         let now = figures.faults.last_mut().filter(|span| span.to_s.is_none());
         if now.as_ref().map(|span| span.fault) == health.fault {
             return false;
@@ -88,5 +88,18 @@ mod tests {
             span(CameraFault::Dead, 5.0, None),
         ];
         assert_eq!(figures["W1"].faults, expected);
+    }
+
+    /// More lost frames than can be counted.
+    #[test]
+    fn the_count_of_lost_frames_ends() {
+        let mut health = Health::of(["W1"]);
+        let said = CameraHealth {
+            fault: None,
+            lost: u32::MAX,
+        };
+        health.note("W1", SimTime::ZERO, said);
+        health.note("W1", SimTime::ZERO, said);
+        assert_eq!(health.cameras["W1"].lost_frames, u32::MAX);
     }
 }
