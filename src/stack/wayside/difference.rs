@@ -213,17 +213,19 @@ impl Difference {
         let (wide, high) = (self.tiles_wide, self.tiles_high);
         for j in 0..high {
             for i in 0..wide {
-                let mut near: Vec<f64> = Vec::with_capacity(25);
+                let (mut near, mut known) = ([0.0; 25], 0);
                 for y in j.saturating_sub(2)..(j + 3).min(high) {
                     for x in i.saturating_sub(2)..(i + 3).min(wide) {
                         let ratio = self.ratio[y * wide + x];
                         if ratio.is_finite() {
-                            near.push(ratio);
+                            near[known] = ratio;
+                            known += 1;
                         }
                     }
                 }
+                let near = &mut near[..known];
                 near.sort_unstable_by(f64::total_cmp);
-                let median = near.get(near.len() / 2).copied();
+                let median = near.get(known / 2).copied();
                 self.gain[j * wide + i] = median.unwrap_or(1.0);
             }
         }

@@ -39,8 +39,9 @@ settings! {
         confirm_frames: u32 = 3, in 1.0..=64.0;
         /// Length of the memory for confirmation, frames (64 at most).
         confirm_of: u32 = 5, in 1.0..=64.0;
-        /// A confirmed obstacle is gone when it was not found in this many frames in a row (64 at
-        /// most).
+        /// A confirmed obstacle is gone after this many frames in which the clear bed is seen in its
+        /// place, with none between in which it is found (64 at most, and not fewer than `confirm_of`).
+        /// Frames that show neither do not count.
         clear_frames: u32 = 10, in 1.0..=64.0;
         /// Half width of the structure gauge, clearance included, m from the centreline.
         gauge_half_width_m: f64 = 1.6, in 0.75..=3.0;
