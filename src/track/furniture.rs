@@ -40,7 +40,6 @@ pub struct LampSite {
 
 settings! {
     /// A wayside device.
-    #[schemars(rename = "WaysideEntry")]
     pub struct WaysideSite {
         /// Name.
         name: String;
