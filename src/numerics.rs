@@ -1,7 +1,7 @@
 //! What rooms calculate alike.
 
-/// The ends of what is left of an interval after so many halvings: `is_low` holds below a place in
-/// it, which stays between them, and not above.
+/// Halves an interval so many times about the place where `is_low` turns from true to false; returns
+/// the two ends that are left.
 pub(crate) fn bisected(
     (mut low, mut high): (f64, f64),
     halvings: u32,

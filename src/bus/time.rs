@@ -4,8 +4,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// Integer nanoseconds since the scenario's start: adding steps never drifts, and equal times
-/// compare equal. Times that are 292 years or more from the start are held there: what is so late
-/// never comes, and nothing late is taken for early.
+/// compare equal. Sums saturate at 292 years from the start.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
 )]

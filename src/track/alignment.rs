@@ -239,8 +239,8 @@ impl Alignment {
         }
     }
 
-    /// The same line with another cant: more by `more_m` of the chainage, which is taken at the ends of the
-    /// plan's pieces and is linear between them.
+    /// The same line with more cant: by `more_m(chainage)` at the ends of each piece of the plan, linear
+    /// between them.
     #[must_use]
     pub fn canted_more(&self, more_m: impl Fn(f64) -> f64) -> Self {
         let mut line = self.clone();

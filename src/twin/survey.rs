@@ -11,8 +11,8 @@
 //! and 10 mm across and up. By default there is no error: a bench measures its one lamp itself.
 //!
 //! Control points stand every 120 m; where one has moved, everything that was measured from it
-//! is off along the track, and between two of them by what lies on the line between their errors. The
-//! cant of the map is that of the last track measurement, some millimetres off; balises are placed to
+//! is off along the track. The error between two control points is linear between theirs. The cant of
+//! the map is that of the last track measurement, some millimetres off; balises are placed to
 //! some decimetres.
 //!
 //! **What it does not do.** Plan and profile of the map's track are right: what a survey leaves of
@@ -130,7 +130,7 @@ mod tests {
     }
 
     /// Lamps that stand together share the error of their control points and others do not, the map's cant
-    /// is off by some millimetres and its lamps go with it, and balises are off.
+    /// is off by some millimetres, and balises are off.
     #[test]
     fn control_points_cant_and_balises_have_errors() {
         let tunnel = line();

@@ -83,10 +83,14 @@ impl Measurement<'_> {
         })
     }
 
-    /// One sigma along the track: of distance and bearing (`accuracy`: what the images scatter by and,
-    /// of the rig's calibration, what enters the disparity), of the rest of the calibration (focal
-    /// length, attitude of the mount; an error of the first scales depths alone, as x = (u - cx) b /
-    /// d), of the car's attitude, and of the survey.
+    /// One sigma along the track, of
+    /// - the distance (`accuracy`: what the images scatter by and, of the rig's calibration, what enters
+    ///   the disparity),
+    /// - the bearing (`accuracy` too),
+    /// - the focal length, which scales depths alone, as x = (u - cx) b / d,
+    /// - the attitude of the mount,
+    /// - the car's attitude,
+    /// - the survey.
     fn sigma_m(
         &self,
         lamp: &Vector3<f64>,

@@ -56,8 +56,8 @@ impl Followed {
         near.then(|| miss.norm())
     }
 
-    /// Notes the name that all readings so far give, and how many pairs in a row gave it. A pair that
-    /// read nothing gives none again.
+    /// Notes the name that all readings so far give. Returns how many pairs in a row gave it; a pair
+    /// without a reading adds none.
     fn note(&mut self, uid: Uid, reading: PairReading) -> u32 {
         let more = u32::from(reading != PairReading::Nothing);
         let times = match self.read {

@@ -35,17 +35,17 @@ pub(super) const FRAMES_PER_S: RangeInclusive<f64> = 0.1..=1000.0;
 /// Exposures, us: the shortest of electronic shutters is over 0.1 us, and for all of an exposure the
 /// pose of every millisecond is kept.
 pub(super) const EXPOSURE_US: RangeInclusive<f64> = 0.1..=1e7;
-/// Line times, us: the fewest rows, 16, then take longer than the longest frame.
+/// Line times, us: at 10 s a line no frame fits any more.
 pub(super) const LINE_TIME_US: RangeInclusive<f64> = 0.0..=1e7;
 /// Jitter, us: a tenth of the longest frame; frames that would overtake each other are refused too.
 pub(super) const JITTER_US: RangeInclusive<f64> = 0.0..=1e7;
-/// Errors of the line time, us: those of what it may be.
+/// Errors of the line time, us.
 pub(super) const LINE_TIME_ERROR_US: RangeInclusive<f64> = -1e7..=1e7;
 /// Focal lengths, mm: from less than the smallest lens to telescopes.
 pub(super) const FOCAL_MM: RangeInclusive<f64> = 0.1..=10_000.0;
 /// Differences of focal lengths, mm.
 pub(super) const FOCAL_ERROR_MM: RangeInclusive<f64> = -1000.0..=1000.0;
-/// Pixels, um: from less than a wavelength of light to a plate for each.
+/// Pixels, um: wider than any sensor's.
 pub(super) const PIXEL_UM: RangeInclusive<f64> = 0.1..=1000.0;
 
 /// Draws of jitter farther off than this many standard deviations are held there.

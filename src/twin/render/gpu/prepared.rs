@@ -20,10 +20,10 @@ pub struct PreparedView {
     pub constants: wgpu::Buffer,
     /// Poses of its rows.
     pub poses: wgpu::Buffer,
-    /// Those of the list.
+    /// [`DrawList::placements`], on the adapter.
     pub placements: wgpu::Buffer,
-    /// Those of the list: a texture, since software adapters read it for many pixels at once, but a
-    /// buffer one pixel after the other.
+    /// [`DrawList::shares`], on the adapter: a texture, since software adapters read it for many pixels
+    /// at once, but a buffer one pixel after the other.
     pub shares: Texture,
     /// Tunnel and bodies.
     pub list: DrawList,

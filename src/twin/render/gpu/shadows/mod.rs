@@ -1,10 +1,10 @@
 //! Shadows that bodies throw, laid over the finished background.
 //!
 //! What is hidden of a light is defined in [`photometry`](crate::twin::render::photometry) and
-//! counted by the shader, pixel by pixel. Here is found where it has to look: the tunnel's surface is taken in
-//! cells, and where the ball around a cell meets the cone behind a body that a light shines on, the
-//! tiles of the picture that show the cell get the number of that light and body. All other tiles
-//! are left alone; a view without bodies in the light of a lamp costs nothing.
+//! counted by the shader, pixel by pixel. Here is found where it has to look: the tunnel's surface
+//! is taken in cells, and where the ball around a cell meets the cone behind a body that a light
+//! shines on, the tiles of the picture that show the cell get the number of that light and body.
+//! All other tiles are left alone; a view without bodies in the light of a lamp costs nothing.
 //!
 //! Walls that show the blinking of a lamp are shaded as in its mean light, and what moves in the
 //! exposure throws its shadow from where it is in the middle.
