@@ -22,6 +22,8 @@ pub(super) fn part_name(path: &Path) -> PathBuf {
 pub(super) struct PartFile {
     path: PathBuf,
     file: File,
+    /// What lay under the temporary name. It stays locked: another process may have opened it.
+    _earlier: Option<File>,
 }
 
 impl PartFile {
@@ -29,18 +31,22 @@ impl PartFile {
     /// living one writes there is an error.
     pub fn create(path: &Path) -> io::Result<Self> {
         let part = part_name(path);
-        if fs::symlink_metadata(&part).is_ok_and(|about| about.is_file()) {
-            let earlier = File::open(&part)?;
-            if let Err(TryLockError::WouldBlock) = earlier.try_lock() {
-                let what = format!("another process is writing {}", path.display());
-                return Err(io::Error::new(ErrorKind::ResourceBusy, what));
+        let mut earlier = None;
+        let file = match File::create_new(&part) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {
+                // What a link points to is not opened.
+                if fs::symlink_metadata(&part).is_ok_and(|about| about.is_file()) {
+                    earlier = Some(locked(File::open(&part)?, path)?);
+                }
+                create_new(&part)?
             }
-        }
-        let file = create_new(&part)?;
-        // File systems without locks lose only the check above.
-        _ = file.try_lock();
-        let path = path.to_owned();
-        Ok(Self { path, file })
+            made => made?,
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            file: locked(file, path)?,
+            _earlier: earlier,
+        })
     }
 
     /// Gives the file its name, once its content is on the disk.
@@ -64,6 +70,17 @@ impl Write for PartFile {
 
     fn flush(&mut self) -> io::Result<()> {
         self.file.flush()
+    }
+}
+
+/// Locks a file that is being written as `path`. File systems without locks lose only this check.
+fn locked(file: File, path: &Path) -> io::Result<File> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => {
+            let what = format!("another process is writing {}", path.display());
+            Err(io::Error::new(ErrorKind::ResourceBusy, what))
+        }
+        _ => Ok(file),
     }
 }
 

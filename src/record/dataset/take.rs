@@ -16,8 +16,8 @@ use image::GrayImage;
 use rayon::prelude::*;
 use serde_json::json;
 
-/// Frames of a camera are numbered within this.
-const FRAMES: i64 = 1_000_000;
+/// Frames of a camera are numbered within this: a day of a thousand a second has fewer.
+const FRAMES: i64 = 1_000_000_000;
 /// Annotations of a frame are numbered within this.
 const INSTANCES: i64 = 65_536;
 
