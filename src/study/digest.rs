@@ -19,8 +19,8 @@ pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
 pub struct Digest {
     /// Rows there are.
     pub runs: usize,
-    /// Of these, complete ones; the rest gives its reasons in the table. No denominator leaves the rest
-    /// out.
+    /// Of these, complete ones; the rest gives its reasons in the table. Rates of events are over all runs,
+    /// means and quantiles over complete ones.
     pub complete: usize,
     /// Where the study ended before all of its runs, because a figure was known well enough.
     pub early: Option<EarlyStop>,
@@ -234,22 +234,12 @@ impl Measure {
     /// A quantile of sorted values. An end that the sample is too small for is that of the bounds, where
     /// the values keep them.
     fn quantile(&self, sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
-        let (bounds, e) = (self.range(), quantile(sorted, p)?);
-        let is_kept = [sorted.first(), sorted.last()]
-            .into_iter()
-            .flatten()
-            .all(|x| bounds.hold(*x));
+        let e = quantile(sorted, p)?;
+        let ends = [sorted.first(), sorted.last()];
+        let bounds = self.range().kept_by(ends.into_iter().flatten().copied());
         Some(IntervalEstimate {
-            low: if is_kept {
-                e.low.max(bounds.low)
-            } else {
-                e.low
-            },
-            high: if is_kept {
-                e.high.min(bounds.high)
-            } else {
-                e.high
-            },
+            low: e.low.max(bounds.low),
+            high: e.high.min(bounds.high),
             ..e
         })
     }
@@ -280,7 +270,10 @@ impl Sensitivity {
             && rows.iter().all(|r| r.number(measure.name).is_some());
         let share = || {
             if pairs.is_empty() {
-                first_order_of_groups(&by_name(name, measure, rows))
+                let named = rows.iter().filter_map(|r| {
+                    Some((r.values.get(name)?.to_string(), r.number(measure.name)?))
+                });
+                first_order_of_groups(&named.collect::<Vec<_>>())
             } else {
                 first_order(&pairs)
             }
@@ -291,15 +284,4 @@ impl Sensitivity {
             first_order: independent.then(share).flatten(),
         }
     }
-}
-
-/// Runs by which of the names of a variable they have.
-fn by_name(variable: &str, measure: &Measure, rows: &[&Row]) -> Vec<(usize, f64)> {
-    let name = |row: &Row| Some(row.values.get(variable)?.to_string());
-    let names: BTreeSet<String> = rows.iter().filter_map(|r| name(r)).collect();
-    let place = |row: &Row| names.iter().position(|n| Some(n) == name(row).as_ref());
-    let pairs = rows
-        .iter()
-        .filter_map(|r| Some((place(r)?, r.number(measure.name)?)));
-    pairs.collect()
 }

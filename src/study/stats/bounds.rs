@@ -23,9 +23,11 @@ impl Bounds {
         Self { low, high }
     }
 
-    /// Whether a number lies between them.
-    pub fn hold(self, x: f64) -> bool {
-        (self.low..=self.high).contains(&x)
+    /// These, or none where a number does not lie between them.
+    pub fn kept_by(self, numbers: impl IntoIterator<Item = f64>) -> Self {
+        let mut numbers = numbers.into_iter();
+        let are_kept = numbers.all(|x| (self.low..=self.high).contains(&x));
+        if are_kept { self } else { Self::NONE }
     }
 
     /// The interval about a mean that would be `half` wide to either side if nothing bounded it: with one

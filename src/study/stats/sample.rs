@@ -59,8 +59,7 @@ impl Moments {
         let t = StudentsT::new(0.0, 1.0, (n - 1) as f64)
             .ok()?
             .inverse_cdf(1.0 - TAIL);
-        let is_kept = bounds.hold(self.least) && bounds.hold(self.most);
-        let bounds = if is_kept { bounds } else { Bounds::NONE };
+        let bounds = bounds.kept_by([self.least, self.most]);
         let (low, high) = bounds.interval(self.mean, t * sigma);
         Some(IntervalEstimate {
             value: self.mean,

@@ -66,11 +66,11 @@ pub fn first_order(pairs: &[(f64, f64)]) -> Option<f64> {
 /// variance of y that lies between the groups, less what chance alone puts there (Kelley's epsilon
 /// squared, Proc. Natl. Acad. Sci. 21 (1935)), and 0 where it is less. `None` of fewer than ten runs, of one group, where every
 /// run is a group, or where y does not vary.
-pub fn first_order_of_groups(pairs: &[(usize, f64)]) -> Option<f64> {
+pub fn first_order_of_groups<G: Ord>(pairs: &[(G, f64)]) -> Option<f64> {
     let n = pairs.len();
-    let mut groups = BTreeMap::<usize, Vec<f64>>::new();
+    let mut groups = BTreeMap::<&G, Vec<f64>>::new();
     for (group, y) in pairs {
-        groups.entry(*group).or_default().push(*y);
+        groups.entry(group).or_default().push(*y);
     }
     if n < 10 || groups.len() < 2 || groups.len() == n {
         return None;

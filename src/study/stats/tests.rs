@@ -287,6 +287,24 @@ fn weighted_rates_are_guarded_and_bounded() {
     assert!((partly.low - plain.low).abs() < 1e-5 && (partly.high - all.high).abs() < 1e-5);
 }
 
+/// Fails where the ends of an interval are of two estimators: weights of mean 2 put the rate at 0.08 as
+/// they are, and what may have happened takes it over the limit for rare events.
+#[test]
+fn both_ends_of_a_weighted_rate_are_of_one_estimator() {
+    let outcome = |k: usize| match k % 100 {
+        0..4 => Some(true),
+        4..6 => None,
+        _ => Some(false),
+    };
+    let runs: Vec<_> = (0..10_000).map(|k| (2f64.ln(), outcome(k))).collect();
+    let rate = weighted_rate(&runs, false).rate.unwrap();
+    assert!((rate.value - 0.08).abs() < 1e-9);
+    assert!(
+        rate.low < rate.value && rate.value + 0.04 < rate.high,
+        "{rate:?}"
+    );
+}
+
 /// Runs that failed: they stay in the denominator, and the interval holds the rate however they would have
 /// come out.
 #[test]

@@ -21,6 +21,8 @@ pub struct Weighted {
 /// Weighted runs that are worth fewer than this give no figure: a few of them decide it, and intervals
 /// hold the truth far less often than they say.
 pub const LEAST_WORTH: f64 = 100.0;
+/// Rates below this are known better with the weights as they are.
+const RARE: f64 = 0.1;
 
 /// The mean over the distributions that were asked for, of the natural logarithm of each run's weight
 /// and a number. Weights are brought to mean 1, so that it does not depend on where the numbers' zero is;
@@ -32,8 +34,7 @@ pub fn weighted_mean(runs: &[(f64, f64)], bounds: Bounds) -> Option<IntervalEsti
         return None;
     }
     let (value, sigma) = estimate(runs, true)?;
-    let is_kept = runs.iter().all(|r| bounds.hold(r.1));
-    let bounds = if is_kept { bounds } else { Bounds::NONE };
+    let bounds = bounds.kept_by(runs.iter().map(|r| r.1));
     let (low, high) = bounds.interval(value, z() * sigma);
     Some(IntervalEstimate {
         value,
@@ -61,13 +62,19 @@ pub fn weighted_rate(runs: &[(f64, Option<bool>)], normalise: bool) -> Weighted 
         let runs = runs
             .iter()
             .map(|(ln, h)| (*ln, f64::from(h.unwrap_or(unknown))));
-        interval_of_rate(&runs.collect::<Vec<_>>(), normalise)
+        runs.collect::<Vec<_>>()
     };
-    let rate = as_if(false).filter(|_| effective_events >= LEAST_WORTH);
+    let (least, most) = (as_if(false), as_if(true));
+    // One choice for both: each has an interval of its own.
+    let normalise = normalise || estimate(&least, false).is_none_or(|(value, _)| value >= RARE);
+    let all: Vec<f64> = runs.iter().map(|r| r.0).collect();
+    let is_worth =
+        effective_events >= LEAST_WORTH && (!normalise || effective_runs(&all) >= LEAST_WORTH);
+    let rate = interval_of_rate(&least, normalise).filter(|_| is_worth);
     let rate = rate.map(|(value, low, _)| IntervalEstimate {
         value,
         low,
-        high: as_if(true).map_or(1.0, |(_, _, high)| high),
+        high: interval_of_rate(&most, normalise).map_or(1.0, |(_, _, high)| high),
         n: runs.len(),
     });
     Weighted {
@@ -81,13 +88,7 @@ pub fn weighted_rate(runs: &[(f64, Option<bool>)], normalise: bool) -> Weighted 
 /// Value and ends of a rate: Wilson's interval of as many runs as would know it as well without weights,
 /// n = p (1 - p) / sigma^2 (Korn and Graubard, Survey Methodology 24 (1998)).
 fn interval_of_rate(runs: &[(f64, f64)], normalise: bool) -> Option<(f64, f64, f64)> {
-    const RARE: f64 = 0.1;
-    let plain = estimate(runs, false).filter(|(value, _)| !normalise && *value < RARE);
-    let ln_weights = || runs.iter().map(|r| r.0).collect::<Vec<_>>();
-    let (value, sigma) = plain.or_else(|| {
-        let is_worth = effective_runs(&ln_weights()) >= LEAST_WORTH;
-        estimate(runs, true).filter(|_| is_worth)
-    })?;
+    let (value, sigma) = estimate(runs, normalise)?;
     let n = value * (1.0 - value) / (sigma * sigma);
     if !n.is_finite() || n <= 0.0 {
         return None;
