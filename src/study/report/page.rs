@@ -79,18 +79,18 @@ pub fn page(study: &Study, digest: &Digest, plots: &[Plot], rows: &[Row]) -> Res
 
 /// By the first figure that is an error, a latency or a margin.
 fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
-    /// Large is bad, or small.
-    const JUDGED: [(&str, f64); 7] = [
-        ("impact_speed_mps", 1.0),
-        ("stop_margin_m", -1.0),
-        ("paper_error_max_m", 1.0),
-        ("missed", 1.0),
-        ("detection_latency_s", 1.0),
-        ("stop_error_m", 1.0),
-        ("most_slip_mps", 1.0),
+    const JUDGED: [&str; 7] = [
+        "impact_speed_mps",
+        "stop_margin_m",
+        "paper_error_max_m",
+        "missed",
+        "detection_latency_s",
+        "stop_error_m",
+        "most_slip_mps",
     ];
-    let varies = |name: &str| digest.figures.iter().any(|f| f.measure.name == name);
-    let (figure, sign) = JUDGED.into_iter().find(|(name, _)| varies(name))?;
+    let shown = |name| digest.figures.iter().find(|f| f.measure.name == name);
+    let measure = JUDGED.into_iter().find_map(shown)?.measure;
+    let figure = measure.name;
     let runs = rows.iter().filter_map(|row| {
         let values = row.values.iter().map(|(n, v)| format!("{n} {}", short(v)));
         Some(WorstRun {
@@ -100,7 +100,8 @@ fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
         })
     });
     let mut runs: Vec<_> = runs.collect();
-    runs.sort_by(|a, b| (sign * b.value).total_cmp(&(sign * a.value)));
+    let badness = |run: &WorstRun| measure.badness(run.value);
+    runs.sort_by(|a, b| badness(b).total_cmp(&badness(a)));
     runs.truncate(WORST);
     Some(Worst { figure, runs })
 }
@@ -109,5 +110,50 @@ fn short(value: &Value) -> String {
     match value.as_f64() {
         Some(x) if !value.is_i64() => format!("{x:.4}"),
         _ => value.to_string(),
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::scenario::sampling::ScenarioSample;
+    use crate::study::{FigureDigest, QUANTILES, Status, measure};
+    use serde_json::json;
+
+    /// Fails where a train that stops far too early is no worse than one that stops in place.
+    #[test]
+    fn the_worst_run_is_that_of_the_digest() {
+        let row = |(index, error_m): (u64, f64)| {
+            let sample = ScenarioSample {
+                index,
+                ..ScenarioSample::default()
+            };
+            let mut row = Row::without_figures(&sample, Status::Complete, String::new());
+            row.figures.insert("stop_error_m".into(), json!(error_m));
+            row
+        };
+        let rows: Vec<Row> = [(0, 0.2), (1, -9.0), (2, 3.0)].map(row).into();
+        let figure = FigureDigest {
+            measure: measure("stop_error_m").unwrap(),
+            runs: 3,
+            lacking: 0,
+            worst: None,
+            mean: None,
+            quantiles: [None; QUANTILES.len()],
+            drivers: Vec::new(),
+        };
+        let digest = Digest {
+            runs: 3,
+            complete: 3,
+            early: None,
+            rejected: 0,
+            effective_runs: None,
+            events: Vec::new(),
+            figures: vec![figure],
+        };
+        let worst = worst(&digest, &rows).unwrap();
+        let order: Vec<u64> = worst.runs.iter().map(|run| run.index).collect();
+        assert_eq!(order, [1, 2, 0]);
     }
 }
