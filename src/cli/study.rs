@@ -202,7 +202,6 @@ fn run(args: &RunArgs) -> Result<(), Failure> {
         args.shard
             .map_or(out.clone(), |shard| out.join(shard.folder()))
     });
-    prepare(&out)?;
     stop_on_signals();
     let bar = ProgressBar::new("{bar:40} {pos} of {len} runs{msg}, {elapsed} so far, {eta} to go");
     let show = |progress: &Progress| show(&bar, progress);

@@ -42,7 +42,7 @@ fn is_below(path: &Path) -> bool {
 }
 
 /// What draws the images on this machine, by a choice.
-fn renderer_of(choice: RendererChoice) -> Result<Backend> {
+pub fn renderer(choice: RendererChoice) -> Result<Backend> {
     let plain = || Backend {
         backend: "cpu".into(),
         adapter: "plain renderer".into(),
@@ -61,16 +61,20 @@ fn program_hash() -> std::io::Result<String> {
 
 impl Manifest {
     /// Of a study about to be run here.
-    pub fn of(template: &Template, choice: RendererChoice, shard: Option<Shard>) -> Result<Self> {
+    pub fn of(
+        template: &Template,
+        inputs: &Inputs,
+        renderer: &Backend,
+        shard: Option<Shard>,
+    ) -> Result<Self> {
         let unreadable = |source| StudyError::file(&template.path, source);
-        let inputs = Inputs::of(template).map_err(unreadable)?;
         Ok(Self {
             metrotwin: env!("CARGO_PKG_VERSION").into(),
             program: program_hash().map_err(StudyError::Worker)?,
             study: inputs.study.clone(),
             inputs: inputs.hashes().map_err(unreadable)?,
             runs: template.runs(),
-            renderer: renderer_of(choice)?,
+            renderer: renderer.clone(),
             shard,
         })
     }

@@ -102,6 +102,14 @@ pub enum StudyError {
         /// What is wrong with which of its keys.
         what: String,
     },
+    /// Nothing can be written into a folder.
+    #[error("cannot write into {}: {source}; give another --out, or make that one writable", path.display())]
+    Unwritable {
+        /// The folder.
+        path: PathBuf,
+        /// What the system says.
+        source: io::Error,
+    },
     /// The folder holds a study already.
     #[error("{} holds {rows} rows of this study already; give --resume to go on, or another --out", path.display())]
     Exists {

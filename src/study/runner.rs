@@ -2,14 +2,16 @@
 
 use super::collected::CollectedRows;
 use super::journal::{self, Journal};
+use super::manifest;
 use super::pool::{Next, Pool};
 use super::stop::Precision;
 use super::{INPUTS, Manifest, Result, Row, Shard, Status, StudyError, table};
 use crate::record;
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
+use crate::settings::Problem;
+use crate::twin::render::Backend;
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::available_parallelism;
@@ -62,18 +64,19 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> 
     }
     table::check_names(template)?;
     if template.runs() > MOST_RUNS {
-        let runs = template.runs();
-        return Err(StudyError::Unusable(format!(
-            "the study has {runs} runs, more than {MOST_RUNS}; ask for fewer"
-        )));
+        let what = format!("{} runs are more than {MOST_RUNS}", template.runs());
+        let problem = Problem::new("study.runs", what, "ask for fewer");
+        return Err(template.wrong(problem).into());
     }
     let precision = Precision::of(template)?;
     if precision.is_some() && in_shards {
-        return Err(StudyError::Unusable(
-            "study.stop.when looks at all runs, and a shard does not see the others': run the study \
-             whole, or without it"
-                .into(),
-        ));
+        let what = "looks at all runs, and a shard has only some of them";
+        let problem = Problem::new(
+            "study.stop.when",
+            what,
+            "run the study whole, or without it",
+        );
+        return Err(template.wrong(problem).into());
     }
     Ok(precision)
 }
@@ -82,9 +85,12 @@ pub fn check(template: &Template, in_shards: bool) -> Result<Option<Precision>> 
 /// folder gets copies of the inputs, a manifest, the journal of rows, and `rows.parquet`.
 pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<Vec<Row>> {
     let precision = check(template, options.shard.is_some())?;
-    let manifest = Manifest::of(template, options.renderer, options.shard)?;
-    fs::create_dir_all(folder).map_err(|e| StudyError::file(folder, e))?;
-    let (journal, rows) = prepare(template, folder, options, &manifest)?;
+    let renderer = manifest::renderer(options.renderer)?;
+    record::probe(folder).map_err(|source| StudyError::Unwritable {
+        path: folder.to_owned(),
+        source,
+    })?;
+    let (journal, rows) = prepare(template, folder, options, &renderer)?;
 
     let done: BTreeSet<u64> = rows.iter().map(|row| row.index).collect();
     let is_wanted = |k: &u64| options.shard.is_none_or(|s| s.holds(*k)) && !done.contains(k);
@@ -106,7 +112,7 @@ pub fn run(template: &Template, folder: &Path, options: &Options<'_>) -> Result<
     };
     if !collector.rows.are_enough() {
         let next = |row| collector.next(row);
-        pool(folder, &manifest, options)?.work(template, lacking, next)?;
+        pool(folder, &renderer, options)?.work(template, lacking, next)?;
     }
     let rows = collector.rows.into_rows();
     table::write(folder, template, &rows)?;
@@ -119,13 +125,17 @@ fn prepare(
     template: &Template,
     folder: &Path,
     options: &Options<'_>,
-    manifest: &Manifest,
+    renderer: &Backend,
 ) -> Result<(Journal, Vec<Row>)> {
+    // The folder is locked before anything else is read.
+    let (journal, mut rows) = Journal::open(folder)?;
+    let unreadable = |e| StudyError::file(&template.path, e);
+    let inputs = Inputs::of(template).map_err(unreadable)?;
+    let manifest = Manifest::of(template, &inputs, renderer, options.shard)?;
     let kept = Manifest::read(folder)?;
-    if let Some(what) = kept.as_ref().and_then(|kept| another_part(kept, manifest)) {
+    if let Some(what) = kept.as_ref().and_then(|kept| another_part(kept, &manifest)) {
         return Err(another(folder, what));
     }
-    let (journal, mut rows) = Journal::open(folder)?;
     if kept.is_none() && !rows.is_empty() {
         return Err(another(folder, "rows without a manifest".into()));
     }
@@ -136,18 +146,12 @@ fn prepare(
         });
     }
     if kept.is_none() {
-        let unreadable = |e| StudyError::file(folder, e);
-        let inputs = Inputs::of(template).map_err(unreadable)?;
         let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
-        copied.map_err(unreadable)?;
+        copied.map_err(|e| StudyError::file(folder, e))?;
     }
     // With fewer runs than it has, a study keeps those that it has.
     let runs = kept.map_or(0, |kept| kept.runs).max(manifest.runs);
-    let manifest = Manifest {
-        runs,
-        ..manifest.clone()
-    };
-    manifest.write(folder)?;
+    Manifest { runs, ..manifest }.write(folder)?;
     // What crashed may have done so for want of memory: it is tried again.
     journal::sort(&mut rows);
     rows.retain(|row| row.status != Status::Crashed);
@@ -167,10 +171,10 @@ fn another(folder: &Path, what: String) -> StudyError {
     StudyError::Other { path, what }
 }
 
-fn pool<'a>(folder: &'a Path, manifest: &Manifest, options: &Options<'_>) -> Result<Pool<'a>> {
+fn pool<'a>(folder: &'a Path, renderer: &Backend, options: &Options<'_>) -> Result<Pool<'a>> {
     let cores = available_parallelism().map_or(1, usize::from);
     // What the manifest says, and nothing else where that fails.
-    let is_plain = manifest.renderer.backend == "cpu";
+    let is_plain = renderer.backend == "cpu";
     let limit = Duration::from_secs_f64(RUN_LIMIT_S);
     Ok(Pool {
         program: std::env::current_exe().map_err(StudyError::Worker)?,

@@ -5,7 +5,7 @@
 
 use super::stats::{IntervalEstimate, Moments, Tally};
 use super::table::meant;
-use super::{Measure, Result, Row, StudyError, measure};
+use super::{Measure, Result, Row, measure};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Template};
 use crate::settings::Problem;
@@ -40,11 +40,9 @@ impl Precision {
             return Ok(None);
         };
         if template.is_weighted() {
-            return Err(StudyError::Unusable(
-                "study.stop.when does not go with `propose`: weighted figures have other intervals; leave \
-                 one of them out"
-                    .into(),
-            ));
+            let what = "does not go with `propose`: weighted figures have other intervals";
+            let problem = Problem::new("study.stop.when", what, "leave one of them out");
+            return Err(template.wrong(problem).into());
         }
         let known = || measure(&when.of).filter(|m| can_be_known(m));
         let figure = match template.events.get(&when.of) {

@@ -1,6 +1,6 @@
 //! Rows as a table in Parquet.
 
-use super::{MEASURES, Result, Row, Status, StudyError, measure};
+use super::{MEASURES, Result, Row, Status, measure};
 use crate::record::parquet::{Column, Kind, ParquetTable, column};
 use crate::scenario::sampling::{Condition, Template, VariableSettings};
 use crate::settings::{self, Problem, did_you_mean};
@@ -74,14 +74,18 @@ pub fn check_names(template: &Template) -> Result {
                 .into());
         }
     }
-    let is_taken =
-        |name: &&String| OWN.iter().any(|c| c.name == name.as_str()) || measure(name).is_some();
-    let mut names = settings.variables.keys().chain(settings.events.keys());
-    match names.find(is_taken) {
+    let is_taken = |name: &str| OWN.iter().any(|c| c.name == name) || measure(name).is_some();
+    let variables = settings.variables.keys().map(|name| ("variables", name));
+    let events = settings.events.keys().map(|name| ("events", name));
+    match variables.chain(events).find(|(_, name)| is_taken(name)) {
         None => Ok(()),
-        Some(name) => Err(StudyError::Unusable(format!(
-            "study: `{name}` is a column of every study; give the variable or event a name of its own"
-        ))),
+        Some((table, name)) => Err(template
+            .wrong(Problem::new(
+                format!("study.{table}.{name}"),
+                format!("`{name}` is a column of every study"),
+                "give it a name of its own",
+            ))
+            .into()),
     }
 }
 
