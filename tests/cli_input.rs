@@ -226,6 +226,60 @@ fn mistakes_of_the_command_line_are_named() {
     );
 }
 
+/// Provokes: seeds that no file can hold, more scenarios than a folder can.
+#[test]
+fn numbers_of_the_command_line_are_bounded() {
+    let run = "scenarios/line_run.toml";
+    let most = "9223372036854775808";
+    refused(&["run", run, "--seed", most], &["--seed"]);
+    let seed = format!("seed={}", i64::MAX);
+    refused(&["check", run, "--set", &seed], &["seed", "out of range"]);
+    let study = "scenarios/studies/led_accuracy.toml";
+    let generate = ["generate", study, "--out", "never", "-n"];
+    refused(&[&generate[..], &["100001"]].concat(), &["100000"]);
+    let seeded = [&generate[..], &["1", "--seed", most]].concat();
+    refused(&seeded, &["--seed"]);
+}
+
+/// Provokes: the whole file read for each of very many cases, keys held one by one against all others, or
+/// the scenario read for each cell of a table.
+#[test]
+fn large_studies_are_checked_in_bounded_time() {
+    let start = Instant::now();
+    let study = "[study.variables.many]\n";
+    let cases = (0..4000).map(|k| {
+        let pad = "x".repeat(200);
+        format!("{{ name = \"{k}\", set = {{ description = \"{pad}\" }} }},\n")
+    });
+    let cases: String = cases.collect();
+    let said = said_of(&format!(
+        "{SCENARIO}{study}from = {{ cases = [{cases}] }}\n"
+    ));
+    let said = said.expect_err("there are too many");
+    assert!(said.contains("4000 keys, too many"), "{said}");
+
+    let keys: String = (0..100_000).map(|k| format!("\"k{k}\",")).collect();
+    let from = "from = { uniform = { min = 1.0, max = 2.0 } }";
+    let said = said_of(&format!("{SCENARIO}{study}keys = [{keys}]\n{from}\n"));
+    let said = said.expect_err("there are too many");
+    assert!(said.contains("100000 keys, too many"), "{said}");
+
+    let cells: String = (0..100_000).map(|k| format!("{}\n", 20 + k % 60)).collect();
+    file("speeds.csv", &format!("speed_kmh\n{cells}"));
+    let text = SCENARIO.replace("tunnels/", &format!("{REPOSITORY}/tunnels/"));
+    let table = format!(
+        "{text}{study}keys = [\"train.cruise_speed_kmh\"]\n\
+         from = {{ table = {{ file = \"speeds.csv\", column = \"speed_kmh\" }} }}\n"
+    );
+    let path = file("table.toml", &table);
+    let out = path.with_file_name("drawn");
+    fs::remove_dir_all(&out).ok();
+    let args = ["generate", &path.to_string_lossy(), "-n", "1", "--out"];
+    let made = metrotwin(&[&args[..], &[&out.to_string_lossy()]].concat());
+    assert!(made.status.success(), "{made:?}");
+    assert!(start.elapsed() < Duration::from_secs(20));
+}
+
 /// Provokes: an event that names nothing, told without its file, its place, or what was meant.
 #[test]
 fn a_wrong_event_is_told_with_its_place() {

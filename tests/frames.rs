@@ -346,6 +346,8 @@ fn the_command_refuses_what_is_wrong_and_keeps_what_is_there() {
         (["--cameras", "middle"], "left, right, W1530"),
         (["--labels", "depths"], "`depths`"),
         (["--from", "99"], "lasts 0.65 s"),
+        (["--to", "nan"], "lasts 0.65 s"),
+        (["--seed", "18446744073709551615"], "--seed"),
         (["--every", "0"], "--every"),
     ] {
         let output = frames(&[&["--out", path], &args[..]].concat());
@@ -385,6 +387,19 @@ fn the_command_refuses_what_is_wrong_and_keeps_what_is_there() {
         "scenario.toml",
     ];
     assert_eq!(names, expected);
+
+    // As an interrupted set: that of another camera is not gone on with.
+    let meta = out.join("meta.json");
+    let whole = fs::read_to_string(&meta).unwrap();
+    let begun = whole.replace("\"finished\": true", "\"finished\": false");
+    assert_ne!(whole, begun);
+    fs::write(&meta, begun).unwrap();
+    let mut right = some;
+    right[7] = "right";
+    let refused = frames(&right);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
+    fs::write(&meta, whole).unwrap();
 
     fs::write(out.join("mine.txt"), "kept").unwrap();
     fs::write(out.join("images/holiday.jpg"), "kept").unwrap();

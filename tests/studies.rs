@@ -305,7 +305,7 @@ fn wrong_studies_are_refused() {
         let out = base.join("never");
         let file = changed(&base.join(name), from, to);
         refused(study_of(&file, &out, "--resume"), what);
-        assert!(!out.join(MANIFEST).exists(), "{name} was begun");
+        assert!(!out.exists(), "{name} was begun");
     }
     fs::remove_dir_all(base).ok();
 }
@@ -492,6 +492,14 @@ fn scenarios_drawn_again_leave_no_stale_ones() {
     succeeds(&generate("-n 9"));
     refuses(&generate("-n 2"), "--force");
     assert_eq!(drawn(), 9);
+    // As of an interrupted draw: only the same one goes on with it.
+    fs::remove_file(out.join("index.csv")).unwrap();
+    refuses(
+        &generate("-n 9 --seed 5"),
+        "small_000000.toml of another draw",
+    );
+    refuses(&generate("-n 2"), "small_000002.toml of another draw");
+    succeeds(&generate("-n 9"));
     succeeds(&generate("-n 2 --force"));
     assert_eq!(drawn(), 2);
     assert_eq!(fs::read_to_string(out.join("mine.toml")).unwrap(), "kept");

@@ -119,6 +119,7 @@ impl Fault {
         source: FileError,
         changed: &dyn Fn(&str) -> Option<String>,
     ) -> Self {
+        let is_first = matches!(source, FileError::FirstProblems(_));
         let others = match source {
             FileError::Read { source, .. } => {
                 let remedy = "check the path; relative ones count from here";
@@ -131,8 +132,8 @@ impl Fault {
                 let fault = Self::new(format!("this is not TOML: {message}"));
                 vec![fault.at(path, text, span, "here")]
             }
-            FileError::Problems(problems) => {
-                let (shown, rest) = shown(&problems);
+            FileError::Problems(problems) | FileError::FirstProblems(problems) => {
+                let (shown, rest) = shown(&problems, !is_first);
                 let one = |problem| Self::of_problem((path, text), problem, changed);
                 shown.iter().map(one).chain(rest.map(Self::new)).collect()
             }

@@ -2,7 +2,7 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
 use crate::record::dataset::{DataSet, FramePlan, LabelKinds, Provenance, RoomError};
 use crate::scenario::sampling::Inputs;
@@ -47,7 +47,7 @@ pub(super) struct FramesArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Everything random follows from it [default: the scenario's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed())]
     seed: Option<u64>,
     /// Change a value of the scenario, e.g. rig.width_px=640; may be given again
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -139,7 +139,9 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
     }
     let to_s = args.to.unwrap_or(f64::INFINITY);
     let begins = args.from >= 0.0 && args.from < scenario.file.duration_s;
-    if !begins || to_s < args.from {
+    // No number lies nowhere.
+    let ends = to_s >= args.from;
+    if !begins || !ends {
         return Err(Failure::input(
             format!(
                 "--from {} --to {to_s}: no frame of the scenario, which lasts {} s, is between them",

@@ -2,10 +2,12 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::prepare;
+use super::running::{prepare, seed};
 use super::scenario_fault::load_template;
 use crate::record::{self, Listing};
 use crate::scenario::sampling::{Inputs, ScenarioSample, Template};
+use std::collections::BTreeSet;
+use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -30,10 +32,10 @@ pub(super) struct GenerateArgs {
     /// Scenario file with a [study]
     scenario: PathBuf,
     /// How many
-    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SCENARIOS))]
     number: u32,
     /// All draws follow from it [default: the study's]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", value_parser = seed())]
     seed: Option<u64>,
     /// Folder for the scenarios
     #[arg(long, value_name = "DIR")]
@@ -43,6 +45,8 @@ pub(super) struct GenerateArgs {
     force: bool,
 }
 
+/// More than anyone looks at.
+const MOST_SCENARIOS: i64 = 100_000;
 /// Whose files are listed.
 const COMMAND: &str = "metrotwin generate";
 /// Folder for the copies of what the scenarios name.
@@ -56,18 +60,19 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let samples = samples.collect::<Result<Vec<_>, _>>();
     let samples =
         samples.map_err(|e| Failure::input(e, "ease the conditions under study.require"))?;
-    // Nothing is written unless all of them can be.
     let inputs = Inputs::of(&template).map_err(Failure::run)?;
-    let texts = samples.iter();
-    let texts = texts.map(|sample| template.text_of(sample, &inputs, Path::new(INPUTS)));
-    let texts = texts.collect::<Result<Vec<_>, _>>()?;
     let copies = inputs.copies(Path::new(INPUTS));
     let copies = copies.map(|path| path.to_string_lossy().into_owned());
     let names: Vec<String> = samples.iter().map(|s| file_name(&template, s)).collect();
     let all: Vec<String> = copies.chain(names).chain([INDEX.to_owned()]).collect();
     make_room(args, &all)?;
+    // Nothing is written unless all of them can be.
+    for sample in &samples {
+        let text = template.text_of(sample, &inputs, Path::new(INPUTS))?;
+        go_on(args, &file_name(&template, sample), &text)?;
+    }
     prepare(&args.out)?;
-    write(&args.out, all, &template, &inputs, &samples, &texts)
+    write(&args.out, all, &template, &inputs, &samples)
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write the scenarios")))?;
     let rejected: u64 = samples.iter().map(|d| u64::from(d.rejected)).sum();
     print(&format!(
@@ -81,8 +86,8 @@ fn file_name(template: &Template, sample: &ScenarioSample) -> String {
     format!("{}_{:06}.toml", template.file.name, sample.index)
 }
 
-/// Refuses to write over files of others, and to replace a whole set of scenarios without `--force`. One
-/// whose table is missing was interrupted: it is gone on with.
+/// Refuses to write over files of others, and to replace scenarios without `--force`. A set whose table is
+/// missing was interrupted: it is gone on with where it has no other files.
 fn make_room(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     let out = args.out.display();
     let unusable = |error: io::Error| {
@@ -90,7 +95,7 @@ fn make_room(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
         Failure::input(what, "choose another folder with --out")
     };
     let names = names.iter().map(String::as_str);
-    if let Some(name) = record::foreign(&args.out, COMMAND, names).map_err(unusable)? {
+    if let Some(name) = record::foreign(&args.out, COMMAND, names.clone()).map_err(unusable)? {
         return Err(Failure::input(
             format!("{out} holds a file {name} that `generate` has not listed there"),
             "choose another folder with --out, or move that file away",
@@ -102,7 +107,32 @@ fn make_room(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
             "choose another folder with --out, or give --force to replace them",
         ));
     }
-    Ok(())
+    let names: BTreeSet<&str> = names.collect();
+    let listed = Listing::read(&args.out, COMMAND).map_err(unusable)?;
+    let mut others = listed.iter().flatten();
+    match others.find(|name| !names.contains(name.as_str()) && args.out.join(name).exists()) {
+        Some(name) if !args.force => Err(another_draw(args, name)),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses to replace a scenario of an interrupted set by another one without `--force`.
+fn go_on(args: &GenerateArgs, name: &str, text: &str) -> Result<(), Failure> {
+    match fs::read(args.out.join(name)) {
+        Ok(kept) if !args.force && kept != text.as_bytes() => Err(another_draw(args, name)),
+        _ => Ok(()),
+    }
+}
+
+fn another_draw(args: &GenerateArgs, name: &str) -> Failure {
+    Failure::input(
+        format!(
+            "{} holds {name} of another draw, which was interrupted",
+            args.out.display()
+        ),
+        "give the study, number and seed of that draw to go on with it, choose another folder with --out, \
+         or give --force to replace it",
+    )
 }
 
 /// Writes all files, of which `names` are the names.
@@ -112,15 +142,15 @@ fn write(
     template: &Template,
     inputs: &Inputs,
     samples: &[ScenarioSample],
-    texts: &[String],
 ) -> io::Result<()> {
     let mut listing = Listing::open(out, COMMAND)?;
     listing.announce(names)?;
     record::remove(&out.join(INDEX))?;
     inputs.copy_to(&out.join(INPUTS), record::write_whole)?;
-    for (sample, text) in samples.iter().zip(texts) {
-        let path = out.join(file_name(template, sample));
-        record::write_whole(&path, text.as_bytes())?;
+    for sample in samples {
+        let text = template.text_of(sample, inputs, Path::new(INPUTS));
+        let text = text.map_err(io::Error::other)?;
+        record::write_whole(&out.join(file_name(template, sample)), text.as_bytes())?;
     }
     listing.close()?;
     let index = index(template, samples).map_err(io::Error::other)?;

@@ -1,7 +1,7 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, stop_on_signals};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
 use super::{print, report, table};
 use crate::bus::TrainId;
@@ -51,7 +51,7 @@ pub(super) struct RunArgs {
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Everything random follows from it [default: the scenario's]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = seed())]
     seed: Option<u64>,
     /// Change a value of the scenario, e.g. train.cruise_speed_kmh=80; may be given again
     #[arg(long = "set", value_name = "KEY=VALUE")]

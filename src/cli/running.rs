@@ -3,6 +3,8 @@
 use super::fault::Failure;
 use super::signals::{self, Signal};
 use crate::record;
+use crate::scenario::MOST_SEED;
+use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
 use std::path::Path;
@@ -15,13 +17,22 @@ pub(super) static STOP: AtomicBool = AtomicBool::new(false);
 /// A second Ctrl-C ends the process at once; the others are sent twice by some, so that a second one
 /// says nothing.
 pub(super) fn stop_on_signals() {
+    let is_second = AtomicBool::new(false);
     signals::handle(
-        |signal| match (STOP.swap(true, Ordering::Relaxed), signal) {
-            (false, _) => eprintln!("ending the run; Ctrl-C again ends it at once"),
+        move |signal| match (is_second.swap(true, Ordering::Relaxed), signal) {
+            (false, _) => {
+                STOP.store(true, Ordering::Relaxed);
+                eprintln!("ending the run; Ctrl-C again ends it at once");
+            }
             (true, Signal::CtrlC) => std::process::exit(1),
             (true, Signal::Ended) => {}
         },
     );
+}
+
+/// Seeds that a file can hold.
+pub(super) fn seed() -> RangedU64ValueParser {
+    RangedU64ValueParser::new().range(..=MOST_SEED as u64)
 }
 
 /// Makes the folder for results, and makes sure that files can be written there.

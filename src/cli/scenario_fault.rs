@@ -3,7 +3,8 @@
 use super::fault::{Failure, Fault};
 use super::file_kind::FileKind;
 use crate::scenario::sampling::Template;
-use crate::scenario::{self, Override, Scenario, ScenarioError, is_within};
+use crate::scenario::{self, Override, Scenario, ScenarioError};
+use crate::settings::is_within;
 use miette::Report;
 use std::path::Path;
 
@@ -16,8 +17,9 @@ pub(super) fn load_scenario(path: &Path, overrides: &[Override]) -> Result<Scena
 
 /// A study's scenario.
 pub(super) fn load_template(path: &Path) -> Result<Template, Failure> {
-    refuse_other(path, &scenario::read(path)?)?;
-    Ok(Template::load(path)?)
+    let text = scenario::read(path)?;
+    refuse_other(path, &text)?;
+    Ok(Template::from_text(path, text)?)
 }
 
 /// Every key of a tunnel or a vehicle would be unknown in a scenario: what it is says more.

@@ -96,6 +96,7 @@ macro_rules! cells {
 
 cells! {
     i64 => Int,
+    u64 => Int,
     u32 => Int,
     usize => Int,
     f64 => Real,

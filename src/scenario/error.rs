@@ -1,8 +1,7 @@
 //! Why there is no scenario.
 
-use super::overrides::is_within;
 use super::{Override, OverrideError};
-use crate::settings::{FileError, Problem};
+use crate::settings::{FileError, Problem, is_within};
 use std::path::{Path, PathBuf};
 
 /// Why there is no scenario.

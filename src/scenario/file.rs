@@ -34,7 +34,7 @@ settings! {
         tunnel: String;
         /// Everything random follows from it.
         #[serde(default = "crate::settings::one::<u64>")]
-        seed: u64;
+        seed: u64, in 0.0..=MOST_SEED;
         /// Simulated time, s. A bench run ends after its last point instead.
         #[serde(default = "default_duration_s")]
         duration_s: f64, in 1e-3..=LONGEST_RUN_S;
@@ -104,6 +104,8 @@ settings! {
     also check_together
 }
 
+/// Whole numbers of a file, and of the tables that seeds stand in, reach little further.
+pub const MOST_SEED: f64 = 9e18;
 /// A day: what a line does repeats then.
 pub(super) const LONGEST_RUN_S: f64 = 86_400.0;
 

@@ -46,10 +46,9 @@ pub mod sampling;
 pub use build::{Scenario, WaysidePost};
 pub use error::ScenarioError;
 pub use file::{
-    BenchSettings, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
+    BenchSettings, MOST_SEED, OnboardEquipment, OnboardSettings, ScenarioFile, StackSettings,
     WaysidePostSettings,
 };
-pub(crate) use overrides::is_within;
 pub use overrides::{Override, OverrideError};
 pub(crate) use parts::{parse_vehicle, read};
 pub use recording::RecordSettings;

@@ -136,12 +136,6 @@ pub(super) fn lookup<'a>(document: &'a Table, key: &str) -> Option<&'a Value> {
     })
 }
 
-/// Whether a dotted key is another one or lies below it.
-pub(crate) fn is_within(key: &str, other: &str) -> bool {
-    let rest = key.strip_prefix(other);
-    rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-}
-
 impl Override {
     /// Sets the value, with the tables that lead to it where the document does not have them yet.
     pub fn apply(&self, document: &mut Table) -> Result<(), OverrideError> {

@@ -37,10 +37,8 @@ fn read<T: DeserializeOwned>(
         message: e.message().to_owned(),
         span: e.span(),
     })?;
-    T::deserialize(toml::Deserializer::from(document.clone())).map_err(|error| {
-        let search = Search::of(document, text.len());
-        FileError::Problems(search.problems(error, check))
-    })
+    T::deserialize(toml::Deserializer::from(document.clone()))
+        .map_err(|error| Search::of(document, text.len()).problems(error, check))
 }
 
 #[cfg(test)]

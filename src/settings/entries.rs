@@ -1,6 +1,6 @@
 //! Keys of a TOML document with their places in its text.
 
-use super::problem::key_below;
+use super::problem::{key_below, rest_within};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
@@ -14,11 +14,9 @@ pub fn locate(text: &str, dotted_key: &str) -> Option<Range<usize>> {
 }
 
 fn find_in_table(table: &DeTable<'_>, dotted_key: &str) -> Option<Range<usize>> {
-    let leading = table.iter().filter_map(|(key, value)| {
-        let rest = dotted_key.strip_prefix(key.get_ref().as_ref())?;
-        let ends = rest.is_empty() || rest.starts_with(['.', '[']);
-        ends.then_some((key, value, rest))
-    });
+    let leading = table
+        .iter()
+        .filter_map(|(key, value)| Some((key, value, rest_within(dotted_key, key.get_ref())?)));
     let (key, value, rest) = leading.min_by_key(|(_, _, rest)| rest.len())?;
     // A table's own span is its header only when it has one, its key is always there.
     let shown = match value.get_ref().is_table() {

@@ -23,5 +23,7 @@ pub use files::{ReadLimit, read_bytes, read_text};
 pub use names::{did_you_mean, name_advice};
 pub(crate) use numbers::one;
 pub use numbers::{Numbers, put_range};
-pub use problem::{Checker, FileError, LONGEST_KEY, Problem, key_below, shortened, shown};
+pub use problem::{
+    Checker, FileError, LONGEST_KEY, Problem, is_within, key_below, shortened, shown,
+};
 pub use unit::unit_in;

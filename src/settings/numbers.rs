@@ -22,6 +22,12 @@ macro_rules! numbers {
 
 numbers!(u8 u16 u32 f64);
 
+impl Numbers for u64 {
+    fn first_outside(&self, range: &RangeInclusive<f64>) -> Option<f64> {
+        (*self as f64).first_outside(range)
+    }
+}
+
 impl<N: Numbers> Numbers for Option<N> {
     fn first_outside(&self, range: &RangeInclusive<f64>) -> Option<f64> {
         self.as_ref()?.first_outside(range)

@@ -74,6 +74,18 @@ pub fn key_below(at: &str, key: &str) -> String {
     }
 }
 
+/// What a dotted key has behind another one: nothing where it is that one; `None` where it does not lie
+/// below it.
+pub(super) fn rest_within<'k>(key: &'k str, other: &str) -> Option<&'k str> {
+    let rest = key.strip_prefix(other)?;
+    (rest.is_empty() || rest.starts_with(['.', '['])).then_some(rest)
+}
+
+/// Whether a dotted key is another one or lies below it.
+pub fn is_within(key: &str, other: &str) -> bool {
+    rest_within(key, other).is_some()
+}
+
 /// Checks one part of a file.
 ///
 /// ```
@@ -137,11 +149,7 @@ impl<'a> Checker<'a> {
     /// Nothing is wrong at or below one of its keys.
     pub fn is_right(&self, key: &str) -> bool {
         let at = self.key(key);
-        let is_below = |p: &Problem| {
-            let rest = p.key.strip_prefix(&at);
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-        };
-        !self.problems.iter().any(is_below)
+        !self.problems.iter().any(|p| is_within(&p.key, &at))
     }
 
     /// A checker of what stands below one of its keys.
@@ -175,8 +183,11 @@ pub enum FileError {
         span: Option<Range<usize>>,
     },
     /// Its values are wrong: all of them, in the order found.
-    #[error("{}", lines(.0))]
+    #[error("{}", lines(.0, true))]
     Problems(Vec<Problem>),
+    /// Its values are wrong: those found first, before the search for more took too long.
+    #[error("{}", lines(.0, false))]
+    FirstProblems(Vec<Problem>),
 }
 
 /// Problems that are kept of a file.
@@ -184,21 +195,24 @@ pub const MOST_PROBLEMS: usize = 1000;
 /// Problems that are shown of a file.
 const MOST_SHOWN: usize = 20;
 
-/// The problems of a file that are shown, and what is said of the others.
-pub fn shown(problems: &[Problem]) -> (&[Problem], Option<String>) {
+/// The problems of a file that are shown, and what is said of the others; `are_all` where the file has no
+/// more than these.
+pub fn shown(problems: &[Problem], are_all: bool) -> (&[Problem], Option<String>) {
     let shown = problems.get(..MOST_SHOWN).unwrap_or(problems);
-    let more = problems.len() - shown.len();
-    let least = if problems.len() < MOST_PROBLEMS {
-        ""
-    } else {
-        "at least "
+    let rest = match (
+        problems.len() - shown.len(),
+        are_all && problems.len() < MOST_PROBLEMS,
+    ) {
+        (0, true) => None,
+        (0, false) => Some("there may be more problems".to_owned()),
+        (more, true) => Some(format!("{more} more problems are not shown")),
+        (more, false) => Some(format!("at least {more} more problems are not shown")),
     };
-    let rest = format!("{least}{more} more problems are not shown");
-    (shown, (more > 0).then_some(rest))
+    (shown, rest)
 }
 
-fn lines(problems: &[Problem]) -> String {
-    let (shown, rest) = shown(problems);
+fn lines(problems: &[Problem], are_all: bool) -> String {
+    let (shown, rest) = shown(problems, are_all);
     let lines = shown.iter().map(Problem::to_string).chain(rest);
     lines.collect::<Vec<String>>().join("\n")
 }

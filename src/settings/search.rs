@@ -4,7 +4,7 @@
 //! what it misses is put in, and the rest is tried again, so that a user sees all wrong keys at once.
 
 use super::entries::Entries;
-use super::problem::{Problem, key_below};
+use super::problem::{FileError, MOST_PROBLEMS, Problem, is_within, key_below};
 use super::wrong::Wrong;
 use serde::de::DeserializeOwned;
 use std::borrow::Cow;
@@ -13,8 +13,6 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue, Error};
 
-/// More problems of one file than anyone mends at once.
-const MOST_PROBLEMS: usize = 100;
 /// Every turn reads all of the document. So many bytes together take less than a second.
 const MOST_BYTES: usize = 16 << 20;
 const MOST_TURNS: usize = 500;
@@ -64,38 +62,30 @@ impl<'t> Search<'t> {
         }
     }
 
-    /// All problems, the first of which serde told.
+    /// All problems, the first of which serde told, or those found until the search took too long.
     /// `check` finds what is wrong with the values of what could be read.
     pub(super) fn problems<T: DeserializeOwned>(
         mut self,
         first: Error,
         check: impl Fn(&T, &mut Vec<Problem>),
-    ) -> Vec<Problem> {
+    ) -> FileError {
         let turns = (MOST_BYTES / self.text_len.max(1)).clamp(1, MOST_TURNS);
         let mut error = first;
         for _ in 0..turns {
-            if self.problems.len() == MOST_PROBLEMS {
-                break;
-            }
             if !self.mend::<T>(&error) {
-                return self.problems;
+                return FileError::Problems(self.problems);
             }
             match self.read::<T>() {
                 Ok(mended) => {
                     let mut more = Vec::new();
                     check(&mended, &mut more);
                     self.add_ranges(more);
-                    return self.problems;
+                    return FileError::Problems(self.problems);
                 }
                 Err(next) => error = next,
             }
         }
-        self.problems.push(Problem::new(
-            "",
-            "there may be more wrong keys: the search ended here",
-            "correct these first",
-        ));
-        self.problems
+        FileError::FirstProblems(self.problems)
     }
 
     /// Adds numbers out of their range, unless they were put in, or taken out and have a default. What
@@ -128,11 +118,8 @@ impl<'t> Search<'t> {
     }
 
     fn note(&mut self, problem: Problem) {
-        let follows = |table: &String| {
-            let rest = problem.key.strip_prefix(table.as_str());
-            rest.is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '[']))
-        };
-        if !self.unsure.iter().any(follows) {
+        let follows = |table: &String| is_within(&problem.key, table);
+        if self.problems.len() < MOST_PROBLEMS && !self.unsure.iter().any(follows) {
             self.problems.push(problem);
         }
     }

@@ -17,7 +17,7 @@ table_rows! {
         /// name of the scenario
         scenario: String, "";
         /// seed of the run
-        seed: i64, "";
+        seed: u64, "";
         /// left, right, or the name of a wayside device
         camera: String, "";
         /// of the frame, counting all that the camera took from 0; both eyes of a pair have one
@@ -151,7 +151,7 @@ impl FrameRow {
         Self {
             frame_id,
             scenario: scenario.name.clone(),
-            seed: scenario.seed as i64,
+            seed: scenario.seed,
             camera: camera.to_owned(),
             number,
             image: String::new(),

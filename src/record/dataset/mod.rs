@@ -315,7 +315,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// The scenario as it was run, by itself: with all changes, and with the paths of its inputs' copies.
-    fn scenario_text(&self) -> String {
+    fn scenario_text(&self) -> Result<String> {
         let mut file = self.scenario.file.clone();
         if let Some(inputs) = &self.provenance.inputs {
             inputs.rename(&mut file, Path::new(INPUTS));
@@ -324,7 +324,8 @@ impl<'a> DataSet<'a> {
             "# {}, seed {}, as it was run: every key stands here, with what it means.\n\n",
             file.name, file.seed
         );
-        head + &complete(&file)
+        let text = complete(&file).map_err(failed("writing scenario.toml"))?;
+        Ok(head + &text)
     }
 
     fn meta(&self, finished: bool) -> serde_json::Value {
@@ -352,6 +353,7 @@ impl<'a> DataSet<'a> {
                 "from_s": self.plan.from_s,
                 "to_s": finite(self.plan.to_s),
                 "limit": self.plan.limit,
+                "cameras": self.plan.cameras,
                 "labels": self.plan.labels.0,
             },
         })
@@ -448,7 +450,7 @@ impl Observer for DataSet<'_> {
         let text =
             readme::of(&self.plan, &meta, self.period_s).map_err(failed("writing README.md"))?;
         self.write("README.md", &text)?;
-        self.write("scenario.toml", &self.scenario_text())?;
+        self.write("scenario.toml", &self.scenario_text()?)?;
         let listing = self.listing.take().map_or(Ok(()), Listing::close);
         listing.map_err(failed("listing the files of the data set"))?;
         // The last one: it says that all others are whole.

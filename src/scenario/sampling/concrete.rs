@@ -3,7 +3,7 @@
 
 use super::{Inputs, ScenarioSample, Template};
 use crate::scenario::{ScenarioError, ScenarioFile};
-use crate::settings::key_below;
+use crate::settings::{Problem, key_below};
 use serde_json::Value as Json;
 use std::fmt::Write;
 use std::path::Path;
@@ -25,7 +25,11 @@ impl Template {
         let name = format!("{}_{:06}", file.name, sample.index);
         let head = self.heading(sample, &name);
         file.name = name;
-        Ok(head + &complete(&file))
+        let text = complete(&file).map_err(|error| {
+            let what = format!("cannot be written as a file: {error}");
+            self.wrong(Problem::new("", what, "change what is drawn"))
+        })?;
+        Ok(head + &text)
     }
 
     fn heading(&self, sample: &ScenarioSample, name: &str) -> String {
@@ -56,14 +60,14 @@ impl Template {
 }
 
 /// The text of a file with all its keys, their values and their documentation.
-pub fn complete(file: &ScenarioFile) -> String {
-    let document = Table::try_from(file).unwrap_or_default();
+pub fn complete(file: &ScenarioFile) -> Result<String, toml::ser::Error> {
+    let document = Table::try_from(file)?;
     let writer = Writer {
         schema: schemars::schema_for!(ScenarioFile).to_value(),
     };
     let mut text = String::new();
     writer.table(&mut text, &document, &writer.schema, "");
-    text
+    Ok(text)
 }
 
 struct Writer {

@@ -34,8 +34,10 @@ impl Inputs {
     }
 
     fn of_files(path: &Path, files: impl IntoIterator<Item = PathBuf>) -> io::Result<Self> {
-        let study = plain(&std::path::absolute(path)?);
-        let folder = study.parent().unwrap_or(Path::new("/")).to_owned();
+        let path = std::path::absolute(path)?;
+        // Where the folder is a link, `..` is that of what it points to.
+        let folder = fs::canonicalize(path.parent().unwrap_or(Path::new("/")))?;
+        let study = folder.join(path.file_name().unwrap_or_default());
         let (absolute, relative): (Vec<_>, Vec<_>) =
             files.into_iter().partition(|f| f.is_absolute());
         let mut files: Vec<_> = relative.iter().map(|f| plain(&folder.join(f))).collect();
@@ -136,4 +138,33 @@ fn plain(path: &Path) -> PathBuf {
 fn common(folder: &Path, file: &Path) -> PathBuf {
     let parts = folder.components().zip(file.components());
     parts.take_while(|(a, b)| a == b).map(|(a, _)| a).collect()
+}
+
+#[cfg(all(test, unix))]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::settings::read_toml;
+    use std::os::unix::fs::symlink;
+
+    /// Fails where the tunnel beside a link to the scenario's folder is taken for that of the scenario.
+    #[test]
+    fn files_are_those_that_the_scenario_reads() {
+        let base = std::env::temp_dir().join(format!("metrotwin-inputs-{}", std::process::id()));
+        for (file, text) in [
+            ("shared/scenarios/x.toml", ""),
+            ("shared/tunnels/t.toml", "read"),
+            ("own/tunnels/t.toml", "not read"),
+        ] {
+            let path = base.join(file);
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, text).unwrap();
+        }
+        symlink(base.join("shared/scenarios"), base.join("own/scenarios")).unwrap();
+        let file = read_toml("name = 'x'\ntunnel = '../tunnels/t.toml'").unwrap();
+        let path = base.join("own/scenarios/x.toml");
+        let hashes = Inputs::of_scenario(&path, &file).unwrap().hashes().unwrap();
+        assert_eq!(hashes["tunnels/t.toml"], sha256(b"read"));
+        fs::remove_dir_all(&base).unwrap();
+    }
 }

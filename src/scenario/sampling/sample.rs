@@ -3,7 +3,7 @@
 use super::condition::ConditionError;
 use super::copula;
 use super::plan::RunNumber;
-use super::settings::{Distribution, VariableSettings};
+use super::settings::{CaseSettings, Distribution, VariableSettings};
 use super::template::{Template, table_coordinate};
 use crate::scenario::build::overridden;
 use crate::scenario::overrides::lookup;
@@ -240,12 +240,7 @@ impl VariableSettings {
     pub(super) fn overrides(&self, value: &Value) -> Vec<Override> {
         if let Distribution::Cases(cases) = &self.from {
             let case = cases.iter().find(|c| value.as_str() == Some(&c.name));
-            let set = case.into_iter().flat_map(|case| &case.set);
-            let of = |(key, value): (&String, &Value)| Override {
-                key: key.clone(),
-                value: value.clone(),
-            };
-            return set.map(of).collect();
+            return case.map(CaseSettings::overrides).unwrap_or_default();
         }
         let value = match number(value) {
             Some(x) if self.is_rescaled() => Value::Float(self.offset + self.scale * x),
@@ -256,6 +251,17 @@ impl VariableSettings {
             value: value.clone(),
         };
         self.keys.iter().map(of).collect()
+    }
+}
+
+impl CaseSettings {
+    /// What it changes in the scenario.
+    pub(super) fn overrides(&self) -> Vec<Override> {
+        let of = |(key, value): (&String, &Value)| Override {
+            key: key.clone(),
+            value: value.clone(),
+        };
+        self.set.iter().map(of).collect()
     }
 }
 

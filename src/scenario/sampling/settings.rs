@@ -1,7 +1,7 @@
 //! What varies from run to run, as written under `[study]`.
 
-use crate::scenario::overrides::is_within;
-use crate::settings::{Checker, settings};
+use crate::scenario::MOST_SEED;
+use crate::settings::{Checker, is_within, settings};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
@@ -12,7 +12,7 @@ settings! {
     pub struct StudySettings {
         /// All draws follow from it, and each run's own seed. Studies with the same seed meet the
         /// same chances, run by run, and can be compared in pairs.
-        seed: u64 = 1;
+        seed: u64 = 1, in 0.0..=MOST_SEED;
         /// Number of runs; of a study that sweeps, for each combination of the swept values.
         runs: u32 = 100, in 1.0..=1e7;
         /// Which points the draws take.
@@ -265,27 +265,28 @@ impl StudySettings {
 
     /// A key that two variables set would be what the last of them says.
     fn check_keys(&self, check: &mut Checker<'_>) {
-        let mut seen: Vec<(&str, &str)> = Vec::new();
+        let mut keys: Vec<(&str, &String)> = Vec::new();
         for (name, variable) in &self.variables {
-            for key in variable.all_keys() {
-                let clash = seen
-                    .iter()
-                    .find(|(_, other)| is_within(key, other) || is_within(other, key));
-                let why = match clash {
-                    Some((other, _)) => format!("`{key}` is set by `{other}` too"),
-                    None if is_within(key, "study") => format!("`{key}` is no key of a scenario"),
-                    None if key == "seed" => "`seed` follows from the study's".to_owned(),
-                    None => {
-                        seen.push((name, key));
-                        continue;
-                    }
-                };
-                check.problem(
-                    &format!("variables.{name}.keys"),
-                    why,
-                    "let each variable set keys of its own",
-                );
-            }
+            keys.extend(variable.all_keys().into_iter().map(|key| (key, name)));
+        }
+        // Each key is followed by those below it.
+        keys.sort_by(|(a, _), (b, _)| ranks(a).cmp(ranks(b)));
+        let mut above: Option<(&str, &String)> = None;
+        for (key, name) in keys {
+            let why = match above.filter(|(above, _)| is_within(key, above)) {
+                Some((_, other)) => format!("`{key}` is set by `{other}` too"),
+                None if is_within(key, "study") => format!("`{key}` is no key of a scenario"),
+                None if key == "seed" => "`seed` follows from the study's".to_owned(),
+                None => {
+                    above = Some((key, name));
+                    continue;
+                }
+            };
+            check.problem(
+                &format!("variables.{name}.keys"),
+                why,
+                "let each variable set keys of its own",
+            );
         }
     }
 
@@ -320,6 +321,11 @@ impl StudySettings {
             }
         }
     }
+}
+
+/// The letters of a dotted key in an order in which nothing lies between a key and those below it.
+fn ranks(key: &str) -> impl Iterator<Item = (bool, u8)> {
+    key.bytes().map(|b| (!matches!(b, b'.' | b'['), b))
 }
 
 fn is_name(name: &str) -> bool {

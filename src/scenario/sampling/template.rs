@@ -3,14 +3,14 @@
 use super::condition::{Condition, ConditionError};
 use super::copula;
 use super::plan::{MOST_SOBOL, SamplingPlan};
-use super::settings::{Distribution, PlanSettings, StudySettings};
+use super::settings::{CaseSettings, Distribution, PlanSettings, StudySettings, VariableSettings};
 use super::tables::Tables;
 use crate::scenario::build::overridden;
 use crate::scenario::parts::read;
-use crate::scenario::{Scenario, ScenarioError, ScenarioFile};
+use crate::scenario::{Override, Scenario, ScenarioError, ScenarioFile};
 use crate::settings::{FileError, Problem, read_settings};
 use nalgebra::DMatrix;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -140,15 +140,9 @@ impl Template {
         };
         add(self.file.clone());
         for variable in self.settings.variables.values() {
-            let listed = match &variable.from {
-                Distribution::Choice { values, .. } => values.clone(),
-                Distribution::Table { file, column } => self.tables.values(file, column).to_vec(),
-                // A grid's numbers name no files.
-                Distribution::Grid { .. } => Vec::new(),
-                from => from.swept(),
-            };
-            for value in listed {
-                let changes = variable.overrides(&value);
+            let mut listed = self.listed_changes(variable);
+            listed.retain(|changes| changes.iter().any(|c| may_name_file(&c.value)));
+            for changes in listed {
                 if let Ok(file) = overridden(&self.path, &self.text, &changes) {
                     add(file);
                 }
@@ -158,6 +152,27 @@ impl Template {
         files.dedup();
         files
     }
+
+    /// What each of the values that a variable lists changes in the file; of equal values once. Others have
+    /// numbers only.
+    fn listed_changes(&self, variable: &VariableSettings) -> Vec<Vec<Override>> {
+        let values = match &variable.from {
+            Distribution::Cases(cases) => {
+                return cases.iter().map(CaseSettings::overrides).collect();
+            }
+            Distribution::Choice { values, .. } | Distribution::Sweep { values } => values,
+            Distribution::Table { file, column } => self.tables.values(file, column),
+            _ => return Vec::new(),
+        };
+        let mut seen = BTreeSet::new();
+        let texts = values.iter().filter(|value| may_name_file(value));
+        let texts = texts.filter(|value| seen.insert(value.to_string()));
+        texts.map(|value| variable.overrides(value)).collect()
+    }
+}
+
+fn may_name_file(value: &Value) -> bool {
+    matches!(value, Value::String(_) | Value::Array(_) | Value::Table(_))
 }
 
 /// Variables that are drawn, one by one or by the rows of a table.
@@ -247,7 +262,13 @@ fn check_keys(
     tables: &Tables,
     problems: &mut Vec<Problem>,
 ) {
-    let keys: usize = settings.variables.values().map(|v| v.keys.len()).sum();
+    let variables = settings.variables.values();
+    let keys: usize = variables
+        .map(|variable| match &variable.from {
+            Distribution::Cases(cases) => cases.iter().map(|case| case.set.len()).sum(),
+            _ => variable.keys.len(),
+        })
+        .sum();
     if keys.saturating_mul(text.len()) > MOST_BYTES_SET {
         problems.push(Problem::new(
             "study.variables",
@@ -260,18 +281,19 @@ fn check_keys(
         return;
     }
     for (name, variable) in &settings.variables {
-        let tried: Vec<Value> = match &variable.from {
-            Distribution::Table { file, column } => {
-                tables.value(file, column, 0.5).into_iter().collect()
-            }
-            Distribution::Cases(_) => variable.from.swept(),
+        let tried = match &variable.from {
+            Distribution::Table { file, column } => tables.value(file, column, 0.5),
+            Distribution::Cases(_) => None,
             from => from
                 .quantile(0.5)
-                .or_else(|| from.swept().into_iter().next())
-                .into_iter()
-                .collect(),
+                .or_else(|| from.swept().into_iter().next()),
         };
-        for change in tried.iter().flat_map(|value| variable.overrides(value)) {
+        let tried = tried.map(|value| variable.overrides(&value)).into_iter();
+        let of_cases = match &variable.from {
+            Distribution::Cases(cases) => cases.iter().map(CaseSettings::overrides).collect(),
+            _ => Vec::new(),
+        };
+        for change in tried.chain(of_cases).flatten() {
             if let Err(error) = overridden(path, text, std::slice::from_ref(&change)) {
                 let what = match error {
                     ScenarioError::Overridden { source, .. } => source.to_string(),

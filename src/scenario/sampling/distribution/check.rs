@@ -3,6 +3,7 @@
 use super::TruncatedNormal;
 use crate::scenario::sampling::settings::{CaseSettings, Distribution};
 use crate::settings::{Problem, Settings};
+use std::collections::BTreeSet;
 
 /// A truncated distribution must leave this much of the whole.
 const LEAST_SHARE: f64 = 1e-12;
@@ -101,14 +102,15 @@ fn left(normal: TruncatedNormal) -> Option<Flaw> {
 }
 
 fn cases(cases: &[CaseSettings]) -> Option<Flaw> {
-    let twice = |k: usize| cases[..k].iter().any(|c| c.name == cases[k].name);
     if cases.is_empty() {
         return Some((
             "there are no cases".into(),
             "give one or more, each with a `name`",
         ));
     }
-    let k = (0..cases.len()).find(|k| cases[*k].name.is_empty() || twice(*k))?;
+    let mut seen = BTreeSet::new();
+    let mut names = cases.iter().map(|case| &case.name);
+    let k = names.position(|name| name.is_empty() || !seen.insert(name))?;
     let what = format!("case {} has no name of its own: `{}`", k + 1, cases[k].name);
     Some((what, "give each case a name that no other has"))
 }
