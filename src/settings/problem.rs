@@ -1,9 +1,7 @@
 //! What is wrong with a file, in terms of its own keys.
 
-use super::unit::of_key;
-use super::{Numbers, Settings};
 use std::fmt;
-use std::ops::{Range, RangeInclusive};
+use std::ops::Range;
 use std::path::PathBuf;
 
 /// One wrong value: where, what, and what would be right.
@@ -43,7 +41,7 @@ impl Problem {
     }
 }
 
-const OUT_OF_RANGE: &str = "is out of range";
+pub(super) const OUT_OF_RANGE: &str = "is out of range";
 /// Letters that are shown of what is wrong, and of what would be right.
 const LONGEST_TEXT: usize = 1000;
 /// Letters that are shown of a key.
@@ -86,80 +84,33 @@ pub fn is_within(key: &str, other: &str) -> bool {
     rest_within(key, other).is_some()
 }
 
-/// Checks one part of a file.
-///
-/// ```
-/// use metrotwin::settings::Checker;
-///
-/// let mut problems = Vec::new();
-/// let mut check = Checker::new("train", &mut problems);
-/// check.within("start_s", -1.0, 0.0..=60.0);
-/// assert_eq!(problems[0].to_string(), "train.start_s: -1 s is out of range; give 0 to 60 s");
-/// ```
-#[derive(Debug)]
-pub struct Checker<'a> {
-    at: String,
-    problems: &'a mut Vec<Problem>,
+/// The known key that a wrong one was most likely meant to be: the same stem with another unit,
+/// else the nearest by edit distance if that is near.
+pub fn did_you_mean<'k>(wrong: &str, known: &'k [String]) -> Option<&'k str> {
+    let stem = |key: &str| key.rsplit_once('_').map(|(stem, _)| stem.to_owned());
+    let same_stem = known.iter().find(|k| {
+        k.as_str() == wrong
+            || stem(k).is_some_and(|s| Some(&s) == stem(wrong).as_ref() || s == wrong)
+    });
+    same_stem
+        .or_else(|| {
+            known
+                .iter()
+                .map(|k| (strsim::levenshtein(wrong, k), k))
+                .filter(|(distance, k)| *distance <= 1 + k.len().min(wrong.len()) / 4)
+                .min_by_key(|(distance, _)| *distance)
+                .map(|(_, k)| k)
+        })
+        .map(String::as_str)
 }
 
-impl<'a> Checker<'a> {
-    /// Of what stands under the dotted key `at`; adds to `problems`.
-    pub fn new(at: &str, problems: &'a mut Vec<Problem>) -> Self {
-        Self {
-            at: at.to_owned(),
-            problems,
-        }
-    }
-
-    /// Dotted key of one of its keys.
-    pub fn key(&self, key: &str) -> String {
-        key_below(&self.at, key)
-    }
-
-    /// Adds a problem, unless the key has one already: a second may only follow from the first. Of a
-    /// file with very many only the first `MOST_PROBLEMS` are kept.
-    pub fn problem(&mut self, key: &str, what: impl Into<String>, remedy: impl Into<String>) {
-        let key = self.key(key);
-        let is_full = self.problems.len() >= MOST_PROBLEMS;
-        if !is_full && self.problems.iter().all(|p| p.key != key) {
-            self.problems.push(Problem::new(key, what, remedy));
-        }
-    }
-
-    /// Adds a problem unless all numbers under a key lie in a range (one that is no number never
-    /// does).
-    pub fn within(&mut self, key: &str, numbers: impl Numbers, range: RangeInclusive<f64>) {
-        let Some(value) = numbers.first_outside(&range) else {
-            return;
-        };
-        let (low, high) = range.into_inner();
-        let unit = of_key(key);
-        let space = if unit.is_empty() { "" } else { " " };
-        self.problem(
-            key,
-            format!("{value}{space}{unit} {OUT_OF_RANGE}"),
-            match (low.is_finite(), high.is_finite()) {
-                (true, false) => format!("give at least {low}{space}{unit}"),
-                (false, true) => format!("give at most {high}{space}{unit}"),
-                _ => format!("give {low} to {high}{space}{unit}"),
-            },
-        );
-    }
-
-    /// Nothing is wrong at or below one of its keys.
-    pub fn is_right(&self, key: &str) -> bool {
-        let at = self.key(key);
-        !self.problems.iter().any(|p| is_within(&p.key, &at))
-    }
-
-    /// A checker of what stands below one of its keys.
-    pub fn below(&mut self, key: &str) -> Checker<'_> {
-        Checker::new(&self.key(key), self.problems)
-    }
-
-    /// Adds what the settings under a key find wrong with themselves.
-    pub fn nested(&mut self, key: &str, settings: &impl Settings) {
-        settings.check(&self.key(key), self.problems);
+/// What would be right in place of a wrong name: the known one that it was most likely meant to be,
+/// else all known ones under a heading, or other advice where there is none.
+pub fn name_advice(wrong: &str, known: &[String], heading: &str, without_any: &str) -> String {
+    match did_you_mean(wrong, known) {
+        Some(similar) => format!("did you mean `{similar}`?"),
+        None if known.is_empty() => without_any.to_owned(),
+        None => format!("{heading}: {}", known.join(", ")),
     }
 }
 
@@ -185,7 +136,7 @@ pub enum FileError {
     /// Its values are wrong: all of them, in the order found.
     #[error("{}", lines(.0, true))]
     Problems(Vec<Problem>),
-    /// Its values are wrong: those found first, before the search for more took too long.
+    /// Its values are wrong: those found before the search for more took too long, or could not go on.
     #[error("{}", lines(.0, false))]
     FirstProblems(Vec<Problem>),
 }

@@ -46,7 +46,7 @@ enum Renderer {
 
 fn problems(text: &str) -> Vec<Problem> {
     match read_toml::<Root>(text) {
-        Err(FileError::Problems(problems)) => problems,
+        Err(FileError::Problems(problems) | FileError::FirstProblems(problems)) => problems,
         other => panic!("{other:?}"),
     }
 }

@@ -3,21 +3,23 @@
 //! serde stops at the first thing it dislikes. Here what it dislikes is taken out of the document,
 //! what it misses is put in, and the rest is tried again, so that a user sees all wrong keys at once.
 
+use super::edit::{insert, insert_below, remove, replace};
 use super::entries::Entries;
-use super::problem::{FileError, MOST_PROBLEMS, Problem, is_within, key_below};
-use super::wrong::Wrong;
+use super::message::SerdeMessage;
+use crate::settings::problem::{FileError, MOST_PROBLEMS, Problem, is_within, key_below};
 use serde::de::DeserializeOwned;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use std::ops::Range;
 use toml::Spanned;
-use toml::de::{DeArray, DeTable, DeValue, Error};
+use toml::de::{DeTable, DeValue, Error};
 
 /// Every turn reads all of the document. So many bytes together take less than a second.
 const MOST_BYTES: usize = 16 << 20;
 const MOST_TURNS: usize = 500;
 
-/// What may be put in for a missing key, until one is taken: a number, a text, a list, a table, a flag.
+/// What may be put in for a missing key, until one is taken: a number, a text, a list, a
+/// table, a list of three, a flag.
 const STAND_INS: [&str; 6] = ["97", "\"stand-in\"", "[]", "{}", "[97, 97, 97]", "true"];
 
 /// A value that stands in for a missing one.
@@ -31,7 +33,7 @@ struct StandIn {
 }
 
 /// A document while it is searched.
-pub(super) struct Search<'t> {
+pub(super) struct ProblemSearch<'t> {
     document: Spanned<DeTable<'t>>,
     entries: Entries,
     problems: Vec<Problem>,
@@ -47,7 +49,7 @@ pub(super) struct Search<'t> {
     stand_ins: usize,
 }
 
-impl<'t> Search<'t> {
+impl<'t> ProblemSearch<'t> {
     pub(super) fn of(document: Spanned<DeTable<'t>>, text_len: usize) -> Self {
         Self {
             entries: Entries::of(document.get_ref()),
@@ -62,7 +64,7 @@ impl<'t> Search<'t> {
         }
     }
 
-    /// All problems, the first of which serde told, or those found until the search took too long.
+    /// All problems, the first of which serde told, or those found where the search came to no end.
     /// `check` finds what is wrong with the values of what could be read.
     pub(super) fn problems<T: DeserializeOwned>(
         mut self,
@@ -73,7 +75,7 @@ impl<'t> Search<'t> {
         let mut error = first;
         for _ in 0..turns {
             if !self.mend::<T>(&error) {
-                return FileError::Problems(self.problems);
+                break;
             }
             match self.read::<T>() {
                 Ok(mended) => {
@@ -105,15 +107,17 @@ impl<'t> Search<'t> {
     /// Notes what is wrong and changes the document so that the next thing is found; false where that
     /// cannot be done.
     fn mend<T: DeserializeOwned>(&mut self, error: &Error) -> bool {
-        let wrong = Wrong::read(error.message());
+        let message = SerdeMessage::read(error.message());
         let span = error.span();
-        if self.is_about_stand_in(&wrong, span.as_ref()) {
-            return self.try_next_stand_in(&wrong);
+        if self.is_about_stand_in(&message, span.as_ref()) {
+            return self.try_next_stand_in(&message);
         }
         self.stand_in = None;
-        match &wrong {
-            Wrong::MissingKey { key } => self.put_in(key, &wrong, span.unwrap_or_default()),
-            _ => self.take_out::<T>(&wrong, span),
+        match &message {
+            SerdeMessage::MissingKey { key } => {
+                self.put_in(key, &message, span.unwrap_or_default())
+            }
+            _ => self.take_out::<T>(&message, span),
         }
     }
 
@@ -124,14 +128,14 @@ impl<'t> Search<'t> {
         }
     }
 
-    fn put_in(&mut self, key: &str, wrong: &Wrong, table: Range<usize>) -> bool {
+    fn put_in(&mut self, key: &str, message: &SerdeMessage, table: Range<usize>) -> bool {
         // The table may be a stand-in itself, of which nothing is said.
         if table.start <= self.text_len {
             let path = self.entries.path(self.entries.table_at(&table));
             let path = key_below(&path, key);
             self.put_in.insert(path.clone());
             if !self.taken.contains(&path) {
-                self.note(wrong.problem(path, Vec::new()));
+                self.note(message.problem(path, Vec::new()));
             }
         }
         self.stand_ins += 1;
@@ -142,26 +146,27 @@ impl<'t> Search<'t> {
             key: key.to_owned(),
             next: 0,
         });
-        self.try_next_stand_in(wrong)
+        self.try_next_stand_in(message)
     }
 
-    fn is_about_stand_in(&self, wrong: &Wrong, span: Option<&Range<usize>>) -> bool {
+    fn is_about_stand_in(&self, message: &SerdeMessage, span: Option<&Range<usize>>) -> bool {
         let Some(stand_in) = &self.stand_in else {
             return false;
         };
-        let of_value = span == Some(&stand_in.span) && !matches!(wrong, Wrong::MissingKey { .. });
+        let of_value =
+            span == Some(&stand_in.span) && !matches!(message, SerdeMessage::MissingKey { .. });
         // Where a table is read through a buffer, its span is all that is known.
         let quotes = |what: &str| what.contains("`97`") || what.contains("stand-in");
-        let of_table = matches!(wrong, Wrong::Value { what, .. } if quotes(what));
+        let of_table = matches!(message, SerdeMessage::Value { what, .. } if quotes(what));
         of_value || (of_table && span == Some(&stand_in.table))
     }
 
     /// Puts the next value in; false where none is left.
-    fn try_next_stand_in(&mut self, wrong: &Wrong) -> bool {
+    fn try_next_stand_in(&mut self, message: &SerdeMessage) -> bool {
         let Some(stand_in) = &mut self.stand_in else {
             return false;
         };
-        let value = match wrong.names().into_iter().next() {
+        let value = match message.names().into_iter().next() {
             Some(name) => {
                 // Which keys belong to a choice is not known where it was made for the user.
                 let table = self.entries.table_at(&stand_in.table);
@@ -191,21 +196,25 @@ impl<'t> Search<'t> {
         entry.is_none()
     }
 
-    fn take_out<T: DeserializeOwned>(&mut self, wrong: &Wrong, span: Option<Range<usize>>) -> bool {
+    fn take_out<T: DeserializeOwned>(
+        &mut self,
+        message: &SerdeMessage,
+        span: Option<Range<usize>>,
+    ) -> bool {
         let span = span.unwrap_or_default();
-        let culprit = self.culprit(wrong, &span);
+        let culprit = self.culprit(message, &span);
         let about = culprit.or_else(|| self.entries.around(&span));
         let path = self.entries.path(about);
-        let names = match (wrong.lacks_names(), culprit) {
+        let names = match (message.lacks_names(), culprit) {
             (true, Some(culprit)) => self.names_at::<T>(culprit),
             _ => Vec::new(),
         };
-        self.note(wrong.problem(path.clone(), names));
+        self.note(message.problem(path.clone(), names));
         let Some(culprit) = culprit else {
             return false;
         };
         let parent = self.entries.path(self.entries.parent(culprit));
-        if let Some(meant) = wrong.meant() {
+        if let Some(meant) = message.meant() {
             self.taken.insert(key_below(&parent, meant));
         }
         self.taken.insert(path);
@@ -221,15 +230,15 @@ impl<'t> Search<'t> {
     /// Spans are exact, unless an enum was read through a buffer: then they are those of the table
     /// around, and the outermost such key, or the first value that the message quotes, below it is the
     /// one.
-    fn culprit(&self, wrong: &Wrong, span: &Range<usize>) -> Option<usize> {
+    fn culprit(&self, message: &SerdeMessage, span: &Range<usize>) -> Option<usize> {
         let at = self.entries.at(span);
-        match wrong {
-            Wrong::MissingKey { .. } => None,
-            Wrong::UnknownKey { key, .. } => {
+        match message {
+            SerdeMessage::MissingKey { .. } => None,
+            SerdeMessage::UnknownKey { key, .. } => {
                 let named = || self.entries.named_below(at?, key);
                 self.entries.key_at(span).or_else(named)
             }
-            Wrong::Value { what, .. } => {
+            SerdeMessage::Value { what, .. } => {
                 let quoted = at.and_then(|at| self.entries.quoted_below(at, what));
                 quoted.or(at)
             }
@@ -246,85 +255,9 @@ impl<'t> Search<'t> {
         replace(document.get_mut(), key, &mut text);
         match T::deserialize(toml::Deserializer::from(document)) {
             Err(error) if error.message().contains("`stand-in`") => {
-                Wrong::read(error.message()).names()
+                SerdeMessage::read(error.message()).names()
             }
             _ => Vec::new(),
         }
-    }
-}
-
-/// Tables directly inside a value.
-fn tables_in<'a, 't>(
-    value: &'a mut Spanned<DeValue<'t>>,
-) -> Vec<(Range<usize>, &'a mut DeTable<'t>)> {
-    let span = value.span();
-    match value.get_mut() {
-        DeValue::Table(table) => vec![(span, table)],
-        DeValue::Array(array) => array.iter_mut().flat_map(tables_in).collect(),
-        _ => Vec::new(),
-    }
-}
-
-type NewEntry<'t> = Option<(Spanned<Cow<'t, str>>, Spanned<DeValue<'t>>)>;
-
-fn insert<'t>(table: &mut DeTable<'t>, entry: &mut NewEntry<'t>) {
-    if let Some((key, value)) = entry.take() {
-        table.insert(key, value);
-    }
-}
-
-/// Puts an entry into the innermost table with a span.
-fn insert_below<'t>(table: &mut DeTable<'t>, at: &Range<usize>, entry: &mut NewEntry<'t>) {
-    for (_, value) in table.iter_mut() {
-        for (span, inner) in tables_in(value) {
-            insert_below(inner, at, entry);
-            if span == *at {
-                insert(inner, entry);
-            }
-        }
-    }
-}
-
-/// Puts a value in place of that whose key has a span.
-fn replace<'t>(table: &mut DeTable<'t>, key: &Range<usize>, value: &mut Option<DeValue<'t>>) {
-    for (other, old) in table.iter_mut() {
-        if other.span() == *key
-            && let Some(value) = value.take()
-        {
-            *old.get_mut() = value;
-        }
-        for (_, inner) in tables_in(old) {
-            replace(inner, key, value);
-        }
-    }
-}
-
-/// Takes the entry out whose key has a span, or an element of a list by the span of its value.
-fn remove(table: &mut DeTable<'_>, key: Option<&Range<usize>>, value: &Range<usize>) -> bool {
-    let found = table
-        .keys()
-        .find(|other| Some(&other.span()) == key)
-        .cloned();
-    if let Some(found) = found {
-        return table.remove(&found).is_some();
-    }
-    let mut values = table.iter_mut();
-    values.any(|(_, inner)| remove_from(inner.get_mut(), key, value))
-}
-
-fn remove_from(inner: &mut DeValue<'_>, key: Option<&Range<usize>>, value: &Range<usize>) -> bool {
-    match inner {
-        DeValue::Table(table) => remove(table, key, value),
-        DeValue::Array(array) => {
-            let is_it = |element: &Spanned<DeValue<'_>>| key.is_none() && element.span() == *value;
-            if array.iter().any(is_it) {
-                let all = std::mem::replace(array, DeArray::new());
-                *array = all.into_iter().filter(|element| !is_it(element)).collect();
-                return true;
-            }
-            let mut elements = array.iter_mut();
-            elements.any(|element| remove_from(element.get_mut(), key, value))
-        }
-        _ => false,
     }
 }

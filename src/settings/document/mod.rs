@@ -1,8 +1,14 @@
 //! TOML into a typed struct, with every wrong key named.
 
-use super::declaration::Settings;
-use super::problem::{FileError, Problem};
-use super::search::Search;
+mod edit;
+mod entries;
+mod message;
+mod problems;
+
+pub use entries::locate;
+
+use crate::settings::{FileError, Problem, Settings};
+use problems::ProblemSearch;
 use serde::de::DeserializeOwned;
 use toml::de::DeTable;
 
@@ -38,7 +44,7 @@ fn read<T: DeserializeOwned>(
         span: e.span(),
     })?;
     T::deserialize(toml::Deserializer::from(document.clone()))
-        .map_err(|error| Search::of(document, text.len()).problems(error, check))
+        .map_err(|error| ProblemSearch::of(document, text.len()).problems(error, check))
 }
 
 #[cfg(test)]

@@ -1,16 +1,15 @@
 //! What serde finds wrong with a document, in the words of this program.
 
-use super::names::{did_you_mean, name_advice};
-use super::problem::Problem;
+use crate::settings::{Problem, did_you_mean, name_advice};
 
 /// What serde found wrong, read from its message (it gives no other form).
-pub(super) enum Wrong {
+pub(super) enum SerdeMessage {
     UnknownKey { key: String, known: Vec<String> },
     MissingKey { key: String },
     Value { what: String, expected: String },
 }
 
-impl Wrong {
+impl SerdeMessage {
     pub(super) fn read(message: &str) -> Self {
         let mut quoted = quoted(message);
         if message.starts_with("unknown field") {

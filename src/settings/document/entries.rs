@@ -1,6 +1,6 @@
 //! Keys of a TOML document with their places in its text.
 
-use super::problem::{key_below, rest_within};
+use crate::settings::problem::{key_below, rest_within};
 use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
