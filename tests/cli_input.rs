@@ -312,7 +312,7 @@ fn empty_names_are_refused() {
     let said = said_of(&format!("{SCENARIO}[[wayside]]\ndevice = \"\"\n"));
     let said = said.expect_err("the device has no name");
     assert!(
-        said.contains("names no device") && said.contains("W1530"),
+        said.contains("no wayside device ``") && said.contains("W1530"),
         "{said}"
     );
 }

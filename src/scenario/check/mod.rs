@@ -1,14 +1,17 @@
 //! What no part can check by itself: how the parts of a scenario go together.
 
+mod equipment;
 mod line;
+mod trains;
 
 pub(super) use line::in_tunnel;
+
+use equipment::{check_motion, check_onboard};
 
 use super::file::{LONGEST_RUN_S, ScenarioFile};
 use crate::bus::{TrainEnd, TrainId};
 use crate::settings::{Checker, name_advice};
 use crate::twin::faults::rig_cameras;
-use crate::twin::physics::TrainSettings;
 use std::collections::BTreeSet;
 
 impl ScenarioFile {
@@ -86,37 +89,6 @@ fn check_names(file: &ScenarioFile, check: &mut Checker<'_>) {
                 );
             }
         }
-    }
-}
-
-/// Sensors and equipment of other trains, each of a train that there is, and named once.
-fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
-    let kinds = file.onboard.iter().enumerate();
-    let kinds = kinds.map(|(k, o)| (format!("onboard[{k}].equipment"), &o.equipment));
-    for (key, kinds) in kinds.chain([("stack.onboard".to_owned(), &file.stack.onboard)]) {
-        if (1..kinds.len()).any(|k| kinds[..k].contains(&kinds[k])) {
-            check.problem(&key, "names an equipment twice", "name each once");
-        }
-    }
-    let others = file.other_trains.len();
-    let mut equipped = BTreeSet::new();
-    for (k, onboard) in file.onboard.iter().enumerate() {
-        let number = usize::from(onboard.train);
-        let twice = !equipped.insert(onboard.train);
-        let what = if twice {
-            format!("train {number} has its equipment already")
-        } else if number == 0 || number > others {
-            format!("there is no other train {number}")
-        } else {
-            continue;
-        };
-        let remedy = match others {
-            _ if twice => "put all of a train's equipment into one table".to_owned(),
-            0 => "add it to [[other_trains]]".to_owned(),
-            1 => "give 1: the one of [[other_trains]]".to_owned(),
-            most => format!("give 1 to {most}, each once, in the order of [[other_trains]]"),
-        };
-        check.problem(&format!("onboard[{k}].train"), what, remedy);
     }
 }
 
@@ -223,39 +195,6 @@ fn check_faulty_cameras(file: &ScenarioFile, check: &mut Checker<'_>) {
                 "take this out",
             );
         }
-    }
-}
-
-/// The sensors of motion need the part of the train that they sit on.
-fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
-    let Some(train) = &file.train else {
-        if file.doppler.is_some() {
-            check.problem(
-                "doppler",
-                "there is no train that carries it",
-                "add [train], or take this out",
-            );
-        }
-        return;
-    };
-    check_axle("odometer.axle", file.odometer.axle, train, check);
-    for (k, onboard) in file.onboard.iter().enumerate() {
-        if let Some(train) = file.trains().nth(onboard.train.into()) {
-            let key = format!("onboard[{k}].odometer.axle");
-            check_axle(&key, onboard.odometer.axle, train, check);
-        }
-    }
-}
-
-fn check_axle(key: &str, axle: u32, train: &TrainSettings, check: &mut Checker<'_>) {
-    // A train without cars is a problem of its own.
-    let axles = train.axles().max(1);
-    if axle > axles {
-        check.problem(
-            key,
-            format!("the train has {axles} wheelsets, not {axle}"),
-            format!("give 1 to {axles}"),
-        );
     }
 }
 
