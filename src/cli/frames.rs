@@ -4,7 +4,7 @@ use super::fault::Failure;
 use super::print;
 use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
-use crate::record::dataset::{DataSet, FramePlan, LabelKinds, Provenance, RoomError};
+use crate::record::dataset::{DataSet, FolderError, FramePlan, LabelKinds, Provenance};
 use crate::scenario::sampling::Inputs;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, RendererChoice, RunOptions, Summary};
@@ -96,8 +96,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let progress = ProgressBar::new(RUN_BAR);
     let to_s = plan.to_s.min(scenario.file.duration_s);
     let mut set = DataSet::new(&args.out, &scenario, plan, provenance, renderer, &STOP);
-    set.make_room(args.force)
-        .map_err(|e| no_room(&args.out, &e))?;
+    set.claim(args.force).map_err(|e| unusable(&args.out, &e))?;
     prepare(&args.out)?;
     let show = |now_s| progress.show_run(now_s, to_s);
     let options = RunOptions {
@@ -139,7 +138,7 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
     }
     let to_s = args.to.unwrap_or(f64::INFINITY);
     let begins = args.from >= 0.0 && args.from < scenario.file.duration_s;
-    // No number lies nowhere.
+    // Each comparison with NaN is false.
     let ends = to_s >= args.from;
     if !begins || !ends {
         return Err(Failure::input(
@@ -161,14 +160,14 @@ fn plan(args: &FramesArgs, scenario: &Scenario) -> Result<FramePlan, Failure> {
 }
 
 /// What is said of a folder that cannot be used.
-fn no_room(out: &Path, error: &RoomError) -> Failure {
+fn unusable(out: &Path, error: &FolderError) -> Failure {
     let remedy = match error {
-        RoomError::Occupied | RoomError::NotEmpty => {
+        FolderError::Occupied | FolderError::NotEmpty => {
             "choose another folder with --out, or give --force: of an earlier data set there, the files \
              that it lists are then removed, and nothing else"
         }
-        RoomError::Taken(_) => "choose another folder with --out, or move that file away",
-        RoomError::Io(_) => "choose another folder with --out",
+        FolderError::Taken(_) => "choose another folder with --out, or move that file away",
+        FolderError::Io(_) => "choose another folder with --out",
     };
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }

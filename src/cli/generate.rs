@@ -31,7 +31,7 @@ Examples:
 pub(super) struct GenerateArgs {
     /// Scenario file with a [study]
     scenario: PathBuf,
-    /// How many
+    /// How many, up to 100000
     #[arg(short, long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=MOST_SCENARIOS))]
     number: u32,
     /// All draws follow from it [default: the study's]
@@ -65,7 +65,7 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let copies = copies.map(|path| path.to_string_lossy().into_owned());
     let names: Vec<String> = samples.iter().map(|s| file_name(&template, s)).collect();
     let all: Vec<String> = copies.chain(names).chain([INDEX.to_owned()]).collect();
-    make_room(args, &all)?;
+    claim(args, &all)?;
     // Nothing is written unless all of them can be.
     for sample in &samples {
         let text = template.text_of(sample, &inputs, Path::new(INPUTS))?;
@@ -88,7 +88,7 @@ fn file_name(template: &Template, sample: &ScenarioSample) -> String {
 
 /// Refuses to write over files of others, and to replace scenarios without `--force`. A set whose table is
 /// missing was interrupted: it is gone on with where it has no other files.
-fn make_room(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
+fn claim(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     let out = args.out.display();
     let unusable = |error: io::Error| {
         let what = format!("cannot use {out}: {error}");

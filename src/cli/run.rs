@@ -73,6 +73,9 @@ pub(super) struct RunArgs {
     connect: Option<String>,
 }
 
+/// Name of the recording in its folder.
+const RECORDING: &str = "recording.rrd";
+
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let task = task(args)?;
     let scenario = &task.scenario;
@@ -199,7 +202,7 @@ fn observed(
     errors: &mut Fixes,
 ) -> Result<Summary, Failure> {
     let mut file = (!args.no_recording)
-        .then(|| Recording::to_file(&out.join("recording.rrd"), &scenario.file.record));
+        .then(|| Recording::to_file(&out.join(RECORDING), &scenario.file.record));
     let rigs = scenario.onboard.iter().filter(|o| o.rig.is_some());
     let mut fixes: Vec<_> = rigs.map(|o| FixTable::to_folder(out, o.id())).collect();
     let mut observers: Vec<&mut dyn Observer> = vec![errors];
@@ -266,14 +269,13 @@ const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 /// What this run did not write, but an earlier one into the same folder, would not belong to its
 /// summary.
 fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
-    // The second is what the end of a recording is written under.
-    let recording = ["recording.rrd", "recording.rrd.indexed"].map(str::to_owned);
-    let recording = args.no_recording.then_some(recording);
+    if args.no_recording {
+        record::remove_recording(&out.join(RECORDING))?;
+    }
     let has_rig = |id| (scenario.onboard.iter()).any(|o| o.id() == id && o.rig.is_some());
     let without_rig = (0..TrainId::MOST)
         .map(TrainId::from_index)
         .filter(|id| !has_rig(*id));
-    let fixes = without_rig.map(FixTable::file_name);
-    let mut stale = recording.into_iter().flatten().chain(fixes);
+    let mut stale = without_rig.map(FixTable::file_name);
     stale.try_for_each(|name| record::remove(&out.join(name)))
 }

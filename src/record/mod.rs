@@ -46,6 +46,7 @@ mod texts;
 mod whole_files;
 
 pub(crate) use listing::{Listing, foreign};
+pub(crate) use recording_file::remove_recording;
 pub use tables::FixTable;
 pub(crate) use template::render;
 pub(crate) use whole_files::{create_new, probe, remove, write_whole};

@@ -3,14 +3,14 @@
 //! yet. Its end makes a file of it that is quick to look at: batches of some seconds, and an index. Both
 //! would be kept in memory if they were made on the way.
 
-use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name};
+use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name, remove};
 use rerun::external::re_log_encoding::{DecoderApp, EncodeError, Encoder, EncodingOptions};
 use rerun::log::{Chunk, LogMsg};
 use rerun::sink::{LogSink, SinkFlushError};
 use rerun::{StoreId, StoreKind};
 use std::error::Error;
 use std::fs::{self, File};
-use std::io::BufReader;
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -78,10 +78,16 @@ fn encoder(part: PartFile) -> Result<Encoder<PartFile>, EncodeError> {
 }
 
 /// Name under which the finished file is written, while its rows are in `<path>.part`.
-pub(super) fn indexed_name(path: &Path) -> PathBuf {
+fn indexed_name(path: &Path) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".indexed");
     PathBuf::from(name)
+}
+
+/// Removes a recording of an earlier run, and what an interrupted one left of it.
+pub(crate) fn remove_recording(path: &Path) -> io::Result<()> {
+    remove(&indexed_name(path))?;
+    remove(path)
 }
 
 /// Writes the finished file from the rows in `<path>.part`.

@@ -4,7 +4,7 @@
 //! the end of a list, and those that came too early wait in a map.
 
 use super::Row;
-use super::stop::{Look, Precision};
+use super::stop::{Precision, PrecisionCheck};
 use std::collections::BTreeMap;
 
 /// Rows by index, each once.
@@ -15,14 +15,14 @@ pub struct CollectedRows {
     /// Those behind the first gap.
     ahead: BTreeMap<u64, Row>,
     incomplete: u64,
-    look: Option<Look>,
+    check: Option<PrecisionCheck>,
 }
 
 impl CollectedRows {
     /// None yet; looked at for a precision, where a study stops by one.
     pub fn new(precision: Option<Precision>) -> Self {
         Self {
-            look: precision.map(Look::new),
+            check: precision.map(PrecisionCheck::new),
             ..Self::default()
         }
     }
@@ -33,8 +33,8 @@ impl CollectedRows {
         self.ahead.insert(row.index, row);
         let next = |rows: &Self| rows.in_order.len() as u64;
         while let Some(row) = self.ahead.remove(&next(self)) {
-            if let Some(look) = &mut self.look {
-                look.at(&row);
+            if let Some(check) = &mut self.check {
+                check.add(&row);
             }
             self.in_order.push(row);
         }
@@ -52,9 +52,9 @@ impl CollectedRows {
 
     /// Whether the figure that the study stops by is known.
     pub fn are_enough(&self) -> bool {
-        self.look
+        self.check
             .as_ref()
-            .is_some_and(|look| look.enough().is_some())
+            .is_some_and(|check| check.enough().is_some())
     }
 
     /// All of them, in order.
@@ -64,7 +64,7 @@ impl CollectedRows {
 
     /// In order, up to where the study stops.
     pub fn into_rows(self) -> Vec<Row> {
-        let enough = self.look.as_ref().and_then(Look::enough);
+        let enough = self.check.as_ref().and_then(PrecisionCheck::enough);
         let rows = self.in_order.into_iter().chain(self.ahead.into_values());
         rows.take(enough.unwrap_or(usize::MAX)).collect()
     }

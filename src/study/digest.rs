@@ -4,7 +4,7 @@ use super::stats::{
     IntervalEstimate, LEAST_WORTH, Rate, Tally, Weighted, bounded_mean, effective_runs,
     first_order, first_order_of_groups, quantile, rank_correlation, weighted_mean, weighted_rate,
 };
-use super::stop::{Look, Precision};
+use super::stop::{Precision, PrecisionCheck};
 use super::{MEASURES, Measure, Row};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
@@ -127,8 +127,8 @@ impl Digest {
 impl EarlyStop {
     fn of(template: &Template, rows: &[Row]) -> Option<Self> {
         let when = template.settings.stop.when.as_ref()?;
-        let look = Look::over(Precision::of(template).ok()??, rows);
-        let is_early = look.enough().is_some() && (rows.len() as u64) < template.runs();
+        let check = PrecisionCheck::over(Precision::of(template).ok()??, rows);
+        let is_early = check.enough().is_some() && (rows.len() as u64) < template.runs();
         is_early.then(|| Self {
             of: when.of.clone(),
             half_width: when.half_width,

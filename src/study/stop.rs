@@ -63,14 +63,14 @@ impl Precision {
 
     /// Leaves out the rows, which are in order, after the one at which the figure is known.
     pub fn truncate(self, rows: &mut Vec<Row>) {
-        let enough = Look::over(self, rows).enough();
+        let enough = PrecisionCheck::over(self, rows).enough();
         rows.truncate(enough.unwrap_or(usize::MAX));
     }
 }
 
-/// Looks at the rows of a study one by one, from run 0 on without a gap.
+/// Whether the figure is known, from the rows of a study one by one, from run 0 on without a gap.
 #[derive(Debug)]
-pub struct Look {
+pub struct PrecisionCheck {
     precision: Precision,
     rows: usize,
     tally: Tally,
@@ -78,7 +78,7 @@ pub struct Look {
     enough: Option<usize>,
 }
 
-impl Look {
+impl PrecisionCheck {
     /// Before the first row.
     pub fn new(precision: Precision) -> Self {
         Self {
@@ -92,15 +92,15 @@ impl Look {
 
     /// Over rows in order, as far as none is missing.
     pub fn over(precision: Precision, rows: &[Row]) -> Self {
-        let mut look = Self::new(precision);
+        let mut check = Self::new(precision);
         let whole = rows.iter().zip(0u64..);
         let whole = whole.take_while(|(row, k)| row.index == *k);
-        whole.for_each(|(row, _)| look.at(row));
-        look
+        whole.for_each(|(row, _)| check.add(row));
+        check
     }
 
-    /// Looks at the next row.
-    pub fn at(&mut self, row: &Row) {
+    /// Takes the next row.
+    pub fn add(&mut self, row: &Row) {
         self.rows += 1;
         match &self.precision.figure {
             Figure::Mean(measure) => {

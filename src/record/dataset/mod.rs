@@ -40,16 +40,16 @@
 mod clean;
 mod coco;
 mod files;
+mod folder;
 mod frame;
 mod lamps;
 mod obstacles;
 mod plan;
 mod readme;
-mod room;
 mod take;
 
+pub use folder::FolderError;
 pub use plan::{FramePlan, LabelKind, LabelKinds, UnknownLabel};
-pub use room::RoomError;
 
 use crate::bus::TrainId;
 use crate::record::listing::Listing;
@@ -177,10 +177,10 @@ impl<'a> DataSet<'a> {
         }
     }
 
-    /// Makes room in the folder. An earlier data set there is removed by `force`, and nothing else ever
+    /// Claims the folder. An earlier data set there is removed by `force`, and nothing else ever
     /// is; without it, what is there is left alone, unless it is the beginning of this same set.
-    pub fn make_room(&self, force: bool) -> Result<(), RoomError> {
-        room::make_room(&self.out, &self.meta(false), force)
+    pub fn claim(&self, force: bool) -> Result<(), FolderError> {
+        folder::claim(&self.out, &self.meta(false), force)
     }
 
     /// All frames of the plan have been taken, before the scenario's end.
@@ -292,7 +292,7 @@ impl<'a> DataSet<'a> {
     fn begin(&mut self) -> Result {
         let doing = || failed("beginning the data set");
         fs::create_dir_all(&self.out).map_err(doing())?;
-        self.listing = Some(Listing::open(&self.out, room::COMMAND).map_err(doing())?);
+        self.listing = Some(Listing::open(&self.out, folder::COMMAND).map_err(doing())?);
         let inputs = self.provenance.inputs.clone();
         let copies = inputs.iter().flat_map(|i| i.copies(Path::new(INPUTS)));
         let copies = copies.map(|path| path.to_string_lossy().into_owned());
@@ -334,7 +334,7 @@ impl<'a> DataSet<'a> {
         let cameras = cameras.map(|c| json!({"name": c.name, "frames": c.written}));
         let finite = |s: f64| s.is_finite().then_some(s);
         json!({
-            "format": room::FORMAT,
+            "format": folder::FORMAT,
             "format_version": 2,
             // Not while it is being made, nor after a kill.
             "finished": finished,

@@ -17,7 +17,7 @@ const PROGRESS: [&str; 3] = ["finished", "frames", "cameras"];
 
 /// Why a data set cannot be written into a folder.
 #[derive(Debug, thiserror::Error)]
-pub enum RoomError {
+pub enum FolderError {
     /// The folder cannot be read, or an earlier set cannot be removed.
     #[error(transparent)]
     Io(#[from] io::Error),
@@ -32,10 +32,10 @@ pub enum RoomError {
     Taken(PathBuf),
 }
 
-/// Makes room in a folder for the set that `meta` is about. An earlier set is removed by `force`, file
+/// Claims a folder for the set that `meta` is about. An earlier set is removed by `force`, file
 /// by file as it has listed them, and nothing else ever is. The beginning of the same set, as a kill
 /// leaves it, is gone on with.
-pub(super) fn make_room(folder: &Path, meta: &Value, force: bool) -> Result<(), RoomError> {
+pub(super) fn claim(folder: &Path, meta: &Value, force: bool) -> Result<(), FolderError> {
     let listed = Listing::read(folder, COMMAND)?;
     let kept = fs::read(folder.join("meta.json")).ok();
     let kept = kept.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
@@ -43,15 +43,15 @@ pub(super) fn make_room(folder: &Path, meta: &Value, force: bool) -> Result<(), 
     match (kept, listed) {
         (Some(_), _) if force => Listing::clear(folder, COMMAND)?,
         (Some(kept), _) if goes_on(&kept, meta) => {}
-        (Some(_), _) => return Err(RoomError::Occupied),
+        (Some(_), _) => return Err(FolderError::Occupied),
         // A kill before the first file leaves a list alone.
         (None, Some(listed)) if listed.iter().all(|name| !folder.join(name).exists()) => {}
-        (None, Some(_)) => return Err(RoomError::Taken(folder.join(LIST))),
-        (None, None) if !force && !is_empty(folder)? => return Err(RoomError::NotEmpty),
+        (None, Some(_)) => return Err(FolderError::Taken(folder.join(LIST))),
+        (None, None) if !force && !is_empty(folder)? => return Err(FolderError::NotEmpty),
         (None, None) => {}
     }
     let taken = foreign(folder, COMMAND, FILES)?;
-    taken.map_or(Ok(()), |name| Err(RoomError::Taken(folder.join(name))))
+    taken.map_or(Ok(()), |name| Err(FolderError::Taken(folder.join(name))))
 }
 
 /// Whether a set that is not finished is the same as another one.
