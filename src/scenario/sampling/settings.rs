@@ -348,15 +348,13 @@ fn check_name(key: &str, name: &str, check: &mut Checker<'_>) {
 impl VariableSettings {
     /// The keys that it sets, in any of its cases.
     fn all_keys(&self) -> Vec<&str> {
-        let mut of_cases: Vec<&str> = match &self.from {
+        let of_cases: BTreeSet<&str> = match &self.from {
             Distribution::Cases(cases) => {
                 let keys = cases.iter().flat_map(|case| case.set.keys());
                 keys.map(String::as_str).collect()
             }
-            _ => Vec::new(),
+            _ => BTreeSet::new(),
         };
-        of_cases.sort_unstable();
-        of_cases.dedup();
         let own = self.keys.iter().map(String::as_str);
         own.chain(of_cases).collect()
     }
