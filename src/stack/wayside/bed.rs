@@ -29,8 +29,19 @@ struct BedPlace {
     step: usize,
     /// First pixel of the cell.
     cell_px: (usize, usize),
-    /// Mean grey level of the cell in the reference.
+    /// Mean grey level of the cell in the reference; 0 where most of it cannot be compared.
     grey: f64,
+}
+
+/// A step along the line: its places in view, how many of them the last frame showed, and in how many it
+/// would have shown a body.
+#[derive(Clone, Copy, Debug, Default)]
+struct BedStep {
+    in_view: u32,
+    shown: u32,
+    lit: u32,
+    /// Whether a body would have been found by the last frame that showed any of it.
+    seen: bool,
 }
 
 /// The bed as the camera has it in view, and how bright it is.
@@ -38,8 +49,7 @@ struct BedPlace {
 pub(super) struct BedLight {
     places: Vec<BedPlace>,
     track: TrackContrast,
-    /// Places in view, and places seen, of each step along the line.
-    counts: Vec<(u32, u32)>,
+    steps: Vec<BedStep>,
 }
 
 impl BedLight {
@@ -52,11 +62,15 @@ impl BedLight {
             let places = ACROSS_M.into_iter();
             places.filter_map(move |l_m| Self::place(sight, step, s_m, l_m))
         });
-        Self {
+        let mut light = Self {
             places: places.collect(),
             track: TrackContrast::new(sight, STEP_M, steps),
-            counts: vec![(0, 0); steps],
+            steps: vec![BedStep::default(); steps],
+        };
+        for place in &light.places {
+            light.steps[place.step].in_view += 1;
         }
+        light
     }
 
     fn place(sight: &Sight, step: usize, s_m: f64, l_m: f64) -> Option<BedPlace> {
@@ -70,20 +84,25 @@ impl BedLight {
     }
 
     /// Takes the grey levels of a reference image.
-    pub fn set_reference(&mut self, mean: &[u8], width_px: usize) {
+    pub fn set_reference(&mut self, reference: &Reference, width_px: usize) {
         for place in &mut self.places {
             let (u, v) = place.cell_px;
-            let rows = mean.chunks_exact(width_px.max(1)).skip(v).take(CELL_PX);
-            let pixels = rows.flat_map(|row| row.iter().skip(u).take(CELL_PX));
-            let (sum, count) = pixels.fold((0u32, 0u32), |(sum, count), grey| {
-                (sum + u32::from(*grey), count + 1)
+            let rows = (v..v + CELL_PX).flat_map(|v| v * width_px + u..v * width_px + u + CELL_PX);
+            let pixels = rows.filter(|&k| reference.valid.get(k) == Some(&1));
+            let (sum, count) = pixels.fold((0, 0), |(sum, count), k| {
+                (sum + u32::from(reference.mean[k]), count + 1)
             });
-            place.grey = f64::from(sum) / f64::from(count.max(1));
+            let most = 2 * count >= CELL_PX * CELL_PX;
+            place.grey = if most {
+                f64::from(sum) / count as f64
+            } else {
+                0.0
+            };
         }
     }
 
     /// Length of bed in view, metres, on which a body of the least contrast would not be found in the
-    /// light of a frame, the one that `difference` was made of. What a train hides does not count.
+    /// light of a frame, the one that `difference` was made of. What a train hides is as it was before.
     pub fn unseen_m(
         &mut self,
         frame: &[u8],
@@ -92,21 +111,23 @@ impl BedLight {
         settings: &WaysideSettings,
     ) -> f64 {
         self.track.measure(frame, reference, cells);
-        self.counts.fill((0, 0));
+        for step in &mut self.steps {
+            (step.shown, step.lit) = (0, 0);
+        }
         for place in &self.places {
             if cells.is_blind(place.cell_px) {
                 continue;
             }
             let (expected, limit) = difference.expected(place.cell_px, place.grey);
             let behind_veil = self.track.around(place.step) / settings.track_contrast;
-            let (in_view, seen) = &mut self.counts[place.step];
-            *in_view += 1;
-            *seen += u32::from(limit <= settings.least_contrast * expected.min(behind_veil));
+            let step = &mut self.steps[place.step];
+            step.shown += 1;
+            step.lit += u32::from(limit <= settings.least_contrast * expected.min(behind_veil));
         }
-        let unseen = self
-            .counts
-            .iter()
-            .filter(|(in_view, seen)| 2 * seen < *in_view);
+        for step in self.steps.iter_mut().filter(|step| step.shown > 0) {
+            step.seen = 2 * step.lit >= step.shown;
+        }
+        let unseen = self.steps.iter().filter(|s| s.in_view > 0 && !s.seen);
         unseen.count() as f64 * STEP_M
     }
 }

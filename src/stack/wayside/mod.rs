@@ -314,7 +314,7 @@ impl WaysideDetector {
             let cells = &self.cells;
             self.reference.restrict(width, |u, v| cells.in_gauge(u, v));
             self.difference.set_reference(&self.reference);
-            self.bed_light.set_reference(&self.reference.mean, width);
+            self.bed_light.set_reference(&self.reference, width);
         }
     }
 
