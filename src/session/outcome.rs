@@ -12,10 +12,12 @@ pub struct Outcome {
     slowed_by_obstacle: bool,
     brake_commanded: Option<SimTime>,
     stopped: Option<SimTime>,
-    /// Closest that the head came to what was ahead of it.
+    /// Closest that the head came to what was ahead of it; below 0 after a hit.
     closest_m: Option<f64>,
-    /// Chainage of the head when the train first hit something.
-    hit_at_m: Option<f64>,
+    /// The train has hit something: what comes after that does not count.
+    has_hit: bool,
+    /// Speed at the last look.
+    speed_mps: Option<f64>,
     standing: bool,
     has_run: bool,
     standing_since: Option<SimTime>,
@@ -35,6 +37,7 @@ impl Outcome {
     /// Follows whether the train has run, and since when it stands.
     pub fn on_motion(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
         self.approach(id, train, world, line);
+        self.speed_mps = Some(train.speed_mps);
         self.standing = train.standing;
         self.has_run |= !train.standing;
         if !train.standing {
@@ -51,16 +54,19 @@ impl Outcome {
         }
     }
 
-    /// Follows how near the train comes to what is ahead of it, and how far it runs on after a hit.
+    /// Follows how near the train comes to what is ahead of it, until it hits something.
     fn approach(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
-        let hit = world.impacts().iter().find(|hit| hit.train == id);
-        if let (None, Some(hit)) = (self.hit_at_m, hit) {
-            let head_m = world.chainage_at(id, hit.time);
-            self.hit_at_m = Some(head_m.unwrap_or(train.chainage_m));
+        if self.has_hit {
+            return;
         }
-        let now_m = match self.hit_at_m {
-            Some(hit_m) => Some(train.direction.ahead_m(train.chainage_m, hit_m).min(0.0)),
-            None => ahead_m(id, train, world, line).map(|ahead_m| ahead_m.max(0.0)),
+        self.has_hit = world.impacts().iter().any(|hit| hit.train == id);
+        let now_m = if self.has_hit {
+            // A hit slows the train: its speed before it counts.
+            let speed_mps = self.speed_mps.unwrap_or(train.speed_mps);
+            let brake_mps2 = world.emergency_brake_mps2(id);
+            brake_mps2.map(|brake_mps2| 0.0 - stopping_way_m(speed_mps, brake_mps2))
+        } else {
+            ahead_m(id, train, world, line).map(|ahead_m| ahead_m.max(0.0))
         };
         self.closest_m = [self.closest_m, now_m]
             .into_iter()
@@ -87,6 +93,11 @@ impl Outcome {
             impacts,
         })
     }
+}
+
+/// Way from a speed to standstill at a constant deceleration.
+fn stopping_way_m(speed_mps: f64, brake_mps2: f64) -> f64 {
+    speed_mps * speed_mps / (2.0 * brake_mps2)
 }
 
 /// From the head to the nearest obstacle or train that it would meet. What has fallen just behind the
@@ -167,7 +178,8 @@ mod tests {
     }
 
     /// A run that ends in a hit, one that stops short, and one that ends before it comes near must all have
-    /// a closest approach: of the hit less than 0, by as much as the train ran on.
+    /// a closest approach: of the hit less than 0, by the stopping way from the speed of the hit, however
+    /// long the run goes on after it and whatever the train does then.
     #[test]
     fn every_run_has_a_closest_approach() {
         let text = include_str!("../../tunnels/test_bench.toml");
@@ -177,7 +189,7 @@ mod tests {
             start_speed_kmh: 40.0,
             ..TrainSettings::default()
         };
-        let closest = |obstacle_m, for_s: f64| {
+        let closest = |obstacle_m, for_s: f64, brake_after_hit| {
             let obstacle = ObstacleSettings {
                 chainage_m: obstacle_m,
                 ..ObstacleSettings::default()
@@ -188,30 +200,38 @@ mod tests {
                 ..PhysicsSettings::default()
             };
             let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
-            let command = TrainCommand {
+            let mut command = TrainCommand {
                 brake: BrakeDemand::Emergency,
                 ..TrainCommand::default()
             };
             let mut outcome = Outcome::default();
             while world.time().secs() < for_s {
+                if !world.impacts().is_empty() {
+                    command.brake = brake_after_hit;
+                }
                 world.step(&[command]).unwrap();
                 let train = world.train(TrainId(0)).unwrap();
                 outcome.on_motion(TrainId(0), &train, &world, &tunnel.alignment);
             }
             let figures = outcome.protection(TrainId(0), &world).unwrap();
             let head_m = world.train(TrainId(0)).unwrap().chainage_m;
-            (figures.stop_margin_m.unwrap(), figures.collision, head_m)
+            let hit_mps = figures.impacts.first().map(|hit| hit.speed_mps);
+            (figures.stop_margin_m.unwrap(), hit_mps, head_m)
         };
-        let (hit_m, collision, head_m) = closest(175.0, 15.0);
-        // The box's near face is where the head was at the hit.
-        assert!(
-            collision && (hit_m - (175.0 - 0.15 - head_m)).abs() < 0.3,
-            "{hit_m}"
-        );
-        assert!(hit_m < -10.0);
+        for (for_s, brake_after_hit) in [
+            (3.5, BrakeDemand::Emergency),
+            (15.0, BrakeDemand::Emergency),
+            (15.0, BrakeDemand::None),
+        ] {
+            let (margin_m, hit_mps, _) = closest(175.0, for_s, brake_after_hit);
+            let needed_m = stopping_way_m(hit_mps.unwrap(), train.emergency_brake_mps2);
+            assert!(needed_m > 20.0, "{needed_m}");
+            let off = margin_m / -needed_m - 1.0;
+            assert!(off.abs() < 0.01, "{for_s} s: {margin_m} m, {needed_m} m");
+        }
         for (obstacle_m, for_s) in [(260.0, 15.0), (260.0, 1.0)] {
-            let (margin_m, collision, head_m) = closest(obstacle_m, for_s);
-            assert!(!collision && margin_m > 0.0);
+            let (margin_m, hit_mps, head_m) = closest(obstacle_m, for_s, BrakeDemand::Emergency);
+            assert!(hit_mps.is_none() && margin_m > 0.0);
             assert!(
                 (margin_m - (obstacle_m - 0.15 - head_m)).abs() < 0.3,
                 "{margin_m}"

@@ -265,8 +265,10 @@ pub struct ProtectionFigures {
     /// When the train first stood after that: slower than 0.01 m/s.
     pub stopped_s: Option<f64>,
     /// Closest approach, whether the train stopped or not: the least distance from its head to an obstacle
-    /// within the gauge, or a train, ahead of it; where it hit something, less than 0: so far its head ran
-    /// on from where it was at the first hit. `null` where nothing was ever ahead.
+    /// within the gauge, or a train, ahead of it; where it hit something, minus the way that it would still
+    /// have needed to stop: v^2 / (2 b), v its speed just before the first hit, b the deceleration of its
+    /// emergency brake on dry rails (`train.emergency_brake_mps2`), whatever it did after that. `null` where
+    /// nothing was ever ahead.
     pub stop_margin_m: Option<f64>,
     /// The train hit something.
     pub collision: bool,

@@ -93,6 +93,11 @@ impl World {
         Some(self.get(id)?.consist.length_m())
     }
 
+    /// Deceleration of its emergency brake on dry rails.
+    pub fn emergency_brake_mps2(&self, id: TrainId) -> Option<f64> {
+        Some(self.get(id)?.consist.settings.emergency_brake_mps2)
+    }
+
     /// Half extents of the box of one of its car bodies.
     pub fn car_half_extents_m(&self, id: TrainId) -> Option<Vector3<f64>> {
         Some(self.get(id)?.consist.half_extents_m())
