@@ -202,11 +202,12 @@ pub struct Wayside {
     /// wall; however small and far away), or was reported while it moved.
     pub obstacles: Vec<ObstacleScore>,
     /// Dangers reported, counted once a frame, whose region in the picture is of nothing that is there:
-    /// less than half of the smaller of region and outline is common to both. What is still reported after
-    /// it has gone or left the picture counts too.
+    /// region and outline have less than half of the smaller of them in common, or less than a tenth of what
+    /// either covers. What is still reported after it has gone or left the picture counts too.
     pub false_alarms: u32,
-    /// Dangers reported, counted once a frame, with no thing, worker or train within 2.5 m along the line
-    /// and 0.5 m across of the place reported.
+    /// Dangers reported, counted once a frame, with no thing, worker or train at the place reported: the
+    /// middle of the report is more than 2.5 m along the line or 0.5 m across from all of it, or the report is
+    /// more than 5 m longer or 1 m wider than it.
     pub misplaced_alarms: u32,
     /// Cost of the stack a frame.
     pub ms_per_frame: Option<Cost>,
@@ -228,9 +229,11 @@ pub struct ObstacleScore {
     /// a train stood before it. A report is of it by its region in the picture. `null` where it never lay,
     /// or was not reported after that.
     pub latency_s: Option<f64>,
-    /// The same to the first report of its place: within 2.5 m along the line and 0.5 m across.
+    /// The same to the first report of its place: its middle within 2.5 m of the thing along the line and
+    /// 0.5 m across, and no more than 5 m longer and 1 m wider.
     pub placed_latency_s: Option<f64>,
-    /// Reported less true distance along the line, mean over the frames that report it at rest.
+    /// How far the middle of the report is from its own along the line, without sign: mean over the frames
+    /// that report it at rest.
     pub distance_error_m: Option<f64>,
 }
 

@@ -1,10 +1,12 @@
 //! Scores of wayside detection: what is reported held against what is there, in the picture and by place.
 //!
 //! In the picture, a report is of the thing whose outline has the most in common with its region, over
-//! what either covers, if that is half of the smaller one at least; a report of none is a false alarm.
-//! Where the report puts the thing does not matter, so that the error of its place is that of every
-//! report. By place, a report is right where its stretch and the thing are at most [`ALONG_M`] and
-//! [`ACROSS_M`] apart; the picture does not matter. Neither depends on a setting of the detector.
+//! what either covers, if that is half of the smaller one and a tenth of what either covers at least; a
+//! report of none is a false alarm. Where the report puts the thing does not matter, so that the error of
+//! its place is that of every report. By place, a report is right where its middle is at most [`ALONG_M`]
+//! and [`ACROSS_M`] from the thing, and it is longer and wider than the thing by no more than twice that;
+//! the picture does not matter. Neither depends on a setting of the detector, and a report of more is not
+//! right more easily.
 
 use super::image_box::ImageBox;
 use super::presence::Presence;
@@ -15,6 +17,10 @@ use std::collections::BTreeMap;
 /// What region and outline have in common is at least so much of the smaller one: a detector may see a
 /// part of a thing, or its shadow with it.
 const LEAST_COMMON: f64 = 0.5;
+/// And so much of what either covers: a region that is much larger than a thing does not say where it is. A
+/// rectangle around a thing, a shadow as wide beside it and a reflection as high below it covers four times
+/// as much as the thing, and about twice that where the thing is so small that its blurred border counts.
+const LEAST_OVER_UNION: f64 = 0.1;
 
 /// A place is right within so much along the line: the train's authority ends 25 m before an obstacle,
 /// and a tenth of that does not matter.
@@ -39,6 +45,7 @@ struct Found {
     reported: Vec<SimTime>,
     /// When each report of its place was.
     placed: Vec<SimTime>,
+    /// Of its place along the line, without sign, by all reports of it at rest.
     error_sum_m: f64,
     errors: u32,
 }
@@ -95,7 +102,7 @@ impl WaysideScore {
         let image_boxes = present
             .iter()
             .flat_map(|p| p.image_boxes.iter().map(move |o| (p, o)));
-        let fitting = image_boxes.filter(|(_, o)| region.over_smaller(o) >= LEAST_COMMON);
+        let fitting = image_boxes.filter(|(_, o)| fits(&region, o));
         let best = fitting.max_by(|(_, a), (_, b)| {
             let [a, b] = [a, b].map(|o| region.over_union(o));
             a.total_cmp(&b)
@@ -106,7 +113,7 @@ impl WaysideScore {
                 let found = self.found(p);
                 found.reported.push(given);
                 if p.lies_in_view_since.is_some() {
-                    found.error_sum_m += middle_m(seen) - p.chainage_m;
+                    found.error_sum_m += (middle_m(seen) - p.chainage_m).abs();
                     found.errors += 1;
                 }
             }
@@ -162,6 +169,11 @@ impl WaysideScore {
     }
 }
 
+/// Whether a region can be of what has this outline.
+fn fits(region: &ImageBox, outline: &ImageBox) -> bool {
+    region.over_smaller(outline) >= LEAST_COMMON && region.over_union(outline) >= LEAST_OVER_UNION
+}
+
 /// Chainage of the middle of what was reported.
 fn middle_m(seen: &DetectedObstacle) -> f64 {
     0.5 * (seen.from_chainage_m + seen.to_chainage_m)
@@ -172,12 +184,15 @@ fn away_m(seen: &DetectedObstacle, p: &Presence) -> f64 {
     (middle_m(seen) - p.chainage_m).hypot(seen.lateral_m - p.lateral_m)
 }
 
-/// Whether what was reported is where this is.
+/// Whether what was reported is where this is: its middle within what this covers and the tolerance, and
+/// itself no larger than that. A report that is larger does not say where.
 fn is_there(seen: &DetectedObstacle, p: &Presence) -> bool {
-    let half_m = 0.5 * (seen.to_chainage_m - seen.from_chainage_m);
-    let along_m = (middle_m(seen) - p.chainage_m).abs() - half_m - p.half_length_m;
-    let across_m = (seen.lateral_m - p.lateral_m).abs() - 0.5 * seen.width_m - p.half_width_m;
-    along_m <= ALONG_M && across_m <= ACROSS_M
+    let length_m = seen.to_chainage_m - seen.from_chainage_m;
+    let (along_m, across_m) = (p.half_length_m + ALONG_M, p.half_width_m + ACROSS_M);
+    (middle_m(seen) - p.chainage_m).abs() <= along_m
+        && (seen.lateral_m - p.lateral_m).abs() <= across_m
+        && 0.5 * length_m.abs() <= along_m
+        && 0.5 * seen.width_m.abs() <= across_m
 }
 
 #[cfg(test)]
@@ -260,9 +275,10 @@ mod tests {
             (100.0, 0.0, 200, true, true),
             (109.0, 0.0, 200, true, false),
             (100.0, 1.0, 204, true, false),
-            (102.8, 0.0, 206, false, true),
-            (103.0, 0.0, 206, false, false),
-            (97.2, 0.8, 100, false, true),
+            (102.7, 0.0, 206, false, true),
+            (102.8, 0.0, 206, false, false),
+            (97.3, 0.6, 100, false, true),
+            (97.3, 0.7, 100, false, false),
         ] {
             let alarm = alarm(chainage_m, lateral_m, u0);
             let wayside = scored(&[(4.1, alarm)], &[lying("box", 100.0, 200.0)]);
@@ -273,11 +289,63 @@ mod tests {
             assert_eq!(wayside.false_alarms, u32::from(!seen), "{case}");
             assert_eq!(wayside.misplaced_alarms, u32::from(!placed), "{case}");
             if let Some(error_m) = found.distance_error_m {
-                assert!((error_m - (chainage_m - 100.0)).abs() < 1e-9, "{case}");
+                assert!(
+                    (error_m - (chainage_m - 100.0f64).abs()).abs() < 1e-9,
+                    "{case}"
+                );
             }
             // From lying visible at 3 s to the report, not to the frame.
             assert!(found.latency_s.is_none_or(|s| (s - 1.1).abs() < 1e-9));
         }
+    }
+
+    /// A report of the whole picture, of a stretch of kilometres, or of all of the tunnel's width must not
+    /// count for what lies somewhere in it: neither in the picture nor by place.
+    #[test]
+    fn reports_of_everything_are_of_nothing() {
+        let toolbox = || lying("box", 100.0, 200.0);
+        let mut picture = alarm(100.0, 0.0, 0);
+        picture.obstacles[0].blob.bounds = PixelBox {
+            u0: 0,
+            v0: 0,
+            u1: 1919,
+            v1: 1079,
+        };
+        let wayside = scored(&[(4.1, picture)], &[toolbox()]);
+        assert_eq!(wayside.false_alarms, 1);
+        assert_eq!(wayside.obstacles[0].latency_s, None);
+        // Shadow and reflection beside the thing, each as large as it.
+        let mut with_shadow = alarm(100.0, 0.0, 190);
+        with_shadow.obstacles[0].blob.bounds.u1 = 219;
+        let wayside = scored(&[(4.1, with_shadow)], &[toolbox()]);
+        assert_eq!(wayside.false_alarms, 0);
+
+        for (from_m, to_m, width_m, misplaced) in [
+            (97.5, 102.5, 0.4, 0),
+            (97.0, 103.0, 0.4, 1),
+            (0.0, 3000.0, 0.4, 1),
+            (99.8, 100.2, 1.2, 0),
+            (99.8, 100.2, 5.0, 1),
+            (99.8, 100.2, f64::NAN, 1),
+        ] {
+            let mut stretch = alarm(100.0, 0.0, 200);
+            let seen = &mut stretch.obstacles[0];
+            (seen.from_chainage_m, seen.to_chainage_m, seen.width_m) = (from_m, to_m, width_m);
+            let wayside = scored(&[(4.1, stretch)], &[toolbox()]);
+            let case = format!("{from_m} to {to_m}, {width_m}");
+            assert_eq!(wayside.misplaced_alarms, misplaced, "{case}");
+            let placed = wayside.obstacles[0].placed_latency_s.is_some();
+            assert_eq!(placed, misplaced == 0, "{case}");
+        }
+    }
+
+    /// Fails where an error to one side makes up for one to the other.
+    #[test]
+    fn errors_of_the_distance_have_no_sign() {
+        let reports = [98.0, 102.0].map(|m| (4.1, alarm(m, 0.0, 200)));
+        let wayside = scored(&reports, &[lying("box", 100.0, 200.0)]);
+        let error_m = wayside.obstacles[0].distance_error_m.unwrap();
+        assert!((error_m - 2.0).abs() < 1e-9, "{error_m}");
     }
 
     /// Beside a worker, or before him, a report must count for the one whose outline it fits: it is neither
