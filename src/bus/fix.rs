@@ -45,6 +45,13 @@ pub enum Identity {
     Predicted,
 }
 
+impl Identity {
+    /// Whether the lamp itself told its name, in this frame or together with earlier ones.
+    pub fn is_read(self) -> bool {
+        matches!(self, Self::Decoded | Self::Joined)
+    }
+}
+
 impl fmt::Display for Identity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         self.serialize(f)

@@ -7,7 +7,8 @@
 //! true, by the odometer's reading then, and fused by inverse variance; one too far off is refused.
 //! Five refused ones in a row that agree with each other mean that the train is not where it was
 //! thought to be: the last of them is taken. They must be of two lamps: of one lamp that is taken for
-//! another, all fixes agree.
+//! another, all fixes agree. And the name of each lamp must have been read for the fix: one that is
+//! predicted from a wrong place agrees with it.
 
 use super::ProtectionSettings;
 use super::settings::LEAST_SIGMA_M;
@@ -94,7 +95,7 @@ impl Position {
     /// A position that may be wrong (from the lamps).
     pub fn on_fix(&mut self, fix: &PositionFix) {
         let (time, chainage_m, sigma_m) = (fix.time, fix.chainage_m, fix.sigma_m);
-        let lamp = fix.uid;
+        let (lamp, is_read) = (fix.uid, fix.identity.is_read());
         if !(chainage_m.is_finite() && sigma_m.is_finite() && sigma_m >= 0.0) {
             return;
         }
@@ -111,7 +112,9 @@ impl Position {
         let predicted = anchor.carried(fix.run, self.error);
         let off_m = fix.chainage_m - predicted.chainage_m;
         if off_m.abs() > self.gate * predicted.sigma_m.hypot(fix.sigma_m) {
-            self.refuse(fix, lamp);
+            if is_read {
+                self.refuse(fix, lamp);
+            }
             return;
         }
         // Shares of the two in their common sigma: squares of very large ones would be infinite.
@@ -172,7 +175,7 @@ mod tests {
     #![allow(clippy::unwrap_used, reason = "a test may stop at the first surprise")]
     use super::super::tests::fix;
     use super::*;
-    use crate::bus::OdometerSample;
+    use crate::bus::{Identity, OdometerSample};
 
     fn driven(settings: &ProtectionSettings, seconds: f64, speed_mps: f64) -> Position {
         let mut p = Position::new(settings);
@@ -210,6 +213,34 @@ mod tests {
         p.on_fix(&fix(SimTime::from_secs(19.01), 700.0, 0.4));
         let e = p.at(SimTime::from_secs(20.0)).unwrap();
         assert!((e.chainage_m - 719.8).abs() < 1e-9);
+    }
+
+    /// Fails where a lamp whose name nobody read stands in for the second one.
+    #[test]
+    fn only_names_that_were_read_overrule() {
+        for (identity, overrules) in [
+            (Identity::Decoded, true),
+            (Identity::Joined, true),
+            (Identity::Followed, false),
+            (Identity::Predicted, false),
+        ] {
+            let mut p = driven(&ProtectionSettings::default(), 1.0, 0.0);
+            let t = SimTime::from_secs(1.0);
+            p.on_fix(&fix(t, 100.0, 1.0));
+            for _ in 0..5 {
+                p.on_fix(&fix(t, 160.0, 1.0));
+            }
+            for _ in 0..20 {
+                let mut of_next = PositionFix {
+                    identity,
+                    ..fix(t, 160.0, 1.0)
+                };
+                of_next.uid.lamp += 1;
+                p.on_fix(&of_next);
+            }
+            let believed_m = p.at(t).unwrap().chainage_m;
+            assert_eq!((believed_m - 160.0).abs() < 1e-9, overrules, "{identity}");
+        }
     }
 
     /// Fusion by inverse variance, one outlier refused, any number of one lamp refused, five of two
