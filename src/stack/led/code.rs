@@ -119,6 +119,11 @@ impl ChipVotes {
         }
     }
 
+    /// Fewest chips that a name is read from.
+    pub fn least_chips(&self) -> u32 {
+        self.code.chips() - MAX_UNKNOWN
+    }
+
     fn is_known(&self, chip: usize) -> bool {
         self.weight[chip] > 0.0 && self.sum[chip].abs() >= AGREEMENT * self.weight[chip]
     }

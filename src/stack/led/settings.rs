@@ -22,8 +22,8 @@ settings! {
         /// A lamp is taken for the predicted one within this share of the lamps' spacing (under
         /// 0.5).
         gate_share: f64 = 0.4, in 0.01..=0.49;
-        /// Without a prediction, as many frames must read the same name before it is believed; as
-        /// many must contradict a prediction before it is given up.
+        /// Without a prediction, a name must be read this often before it is believed; as often it must
+        /// contradict a prediction before that is given up.
         agreeing_reads: u32 = 2, in 1.0..=20.0;
         /// A lamp not seen for this many seconds is forgotten, with what was read of its code.
         forget_s: f64 = 0.5, in 0.02..=60.0;

@@ -6,7 +6,10 @@
 //! - with a position to expect: when the lamp then is where the map has it, within a gate of under
 //!   half the spacing; a name that contradicts is not used, until it has been read so often that
 //!   the expectation must be wrong;
-//! - without one: when enough pairs have read the same name.
+//! - without one: when the same name has been read often enough.
+//!
+//! A name is read from one image, or from several joined; it is read again by as many new chips as a name
+//! is read from. A few chips, of which each agrees by chance in one case of two, are no reading.
 //!
 //! A lamp keeps a name once believed for as long as it is followed, whether its stripes can be read
 //! again or not. One of which nothing is read yet takes the name of the map's lamp that is expected there.
@@ -21,6 +24,15 @@ use nalgebra::Vector3;
 const FOLLOW_ALONG_M: f64 = 3.0;
 const FOLLOW_ACROSS_M: f64 = 1.5;
 
+/// Readings of one name after each other.
+#[derive(Clone, Copy, Debug)]
+struct Agreeing {
+    uid: Uid,
+    times: u32,
+    /// Chips read since the last of them.
+    new_chips: u32,
+}
+
 /// A lamp followed from pair to pair.
 #[derive(Debug)]
 pub struct Followed {
@@ -32,7 +44,7 @@ pub struct Followed {
     pub seen_s: f64,
     /// What was read of its code.
     pub votes: ChipVotes,
-    read: Option<(Uid, u32)>,
+    read: Option<Agreeing>,
     believed: Option<Uid>,
 }
 
@@ -56,16 +68,29 @@ impl Followed {
         near.then(|| miss.norm())
     }
 
-    /// Notes the name that all readings so far give. Returns how many pairs in a row gave it; a pair
-    /// without a reading adds none.
+    /// Notes the name that all chips so far give, and how often in a row it was read: the first time by
+    /// chips of any number of pairs, again by a whole name, or by as many new chips as one takes.
     fn note(&mut self, uid: Uid, reading: PairReading) -> u32 {
-        let more = u32::from(reading != PairReading::Nothing);
-        let times = match self.read {
-            Some((last, times)) if last == uid => times + more,
-            _ => more,
+        let least_chips = self.votes.least_chips();
+        let known = self.read.filter(|read| read.uid == uid);
+        let mut read = known.unwrap_or(Agreeing {
+            uid,
+            times: 0,
+            new_chips: least_chips,
+        });
+        let is_reading = match reading {
+            PairReading::Nothing => false,
+            PairReading::Name(own) => own == uid,
+            PairReading::Chips(chips) => {
+                read.new_chips = read.new_chips.saturating_add(chips);
+                read.new_chips >= least_chips
+            }
         };
-        self.read = Some((uid, times));
-        times
+        if is_reading {
+            (read.times, read.new_chips) = (read.times.saturating_add(1), 0);
+        }
+        self.read = Some(read);
+        read.times
     }
 }
 
@@ -74,8 +99,8 @@ impl Followed {
 pub enum PairReading {
     /// They cannot be read.
     Nothing,
-    /// A part of its code.
-    Chips,
+    /// So many chips of its code.
+    Chips(u32),
     /// All of its name.
     Name(Uid),
 }
@@ -254,7 +279,8 @@ mod tests {
         }
     }
 
-    /// Fails where chips of long ago count as a reading of every later pair.
+    /// Fails where chips of long ago count as a reading of every later pair, or a few new ones as a whole
+    /// name.
     #[test]
     fn what_was_joined_once_is_one_reading() {
         let map = tunnel("manchester");
@@ -269,14 +295,19 @@ mod tests {
             edges: 20,
         };
         lamp.votes.add(0.0, &reading);
+        let least_chips = lamp.votes.least_chips();
+        assert_eq!((least_chips, least_chips % 6), (42, 0));
         assert_eq!(lamp.votes.decode(), Some(uid));
         let mut judge = |reading| NAMING.judge(&mut lamp, reading, expected, &map);
-        assert_eq!(judge(PairReading::Chips), Verdict::Unknown);
+        assert_eq!(judge(PairReading::Chips(frame.len)), Verdict::Unknown);
         for _ in 0..10 {
             assert_eq!(judge(PairReading::Nothing), Verdict::Unknown);
         }
+        for _ in 0..least_chips / 6 - 1 {
+            assert_eq!(judge(PairReading::Chips(6)), Verdict::Unknown);
+        }
         let moved = Verdict::Moved(uid, Identity::Joined);
-        assert_eq!(judge(PairReading::Chips), moved);
+        assert_eq!(judge(PairReading::Chips(6)), moved);
     }
 
     /// Within the gate the expected lamp, between two lamps none.

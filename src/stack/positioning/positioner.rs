@@ -339,7 +339,8 @@ impl LedPositioner {
         self.followed[k].votes.add(seconds, &reading);
         self.alone.clear();
         self.alone.add(seconds, &reading);
-        (self.alone.decode()).map_or(PairReading::Chips, PairReading::Name)
+        let chips = reading.chips.iter().flatten().count() as u32;
+        (self.alone.decode()).map_or(PairReading::Chips(chips), PairReading::Name)
     }
 
     /// Chainage where this lamp must stand, from where the train takes itself to be.
