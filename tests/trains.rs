@@ -51,7 +51,9 @@ fn the_second_train_stops_behind_the_first() {
     assert!(!of(first).collision && !of(second).collision);
     assert_eq!(of(first).brake_commanded_s, None);
     let margin_m = of(second).stop_margin_m.unwrap();
-    assert!((20.0..160.0).contains(&margin_m), "{margin_m} m");
+    eprintln!("stands {margin_m:.1} m behind the first");
+    // Measured: 55 m.
+    assert!((30.0..90.0).contains(&margin_m), "{margin_m} m");
     assert!(first.train.unwrap().stop_error_m.unwrap().abs() < 0.1);
 
     let hit = two_trains(false);
@@ -180,6 +182,10 @@ fn a_clock_that_is_off_shifts_the_position() {
     let [start, set] = up;
     let fast = stretch(&[start, set, "rig.clock.offset_ms=10.0"]);
     let fast = fast.positioning[&Method::Stereo].error_m.unwrap();
+    eprintln!(
+        "p95 {:.3} m, with a fast clock p50 {:.3} m",
+        exact.p95, fast.p50
+    );
     assert!(exact.p95 < 0.1, "{}", exact.p95);
     assert!((fast.p50 - 0.167).abs() < 0.06, "{}", fast.p50);
 }
@@ -201,6 +207,7 @@ fn a_train_that_runs_down_positions_itself() {
     assert_eq!(paper.wrong_uid, 0);
     assert!(paper.fixes > 60, "{}", paper.fixes);
     let error_m = paper.error_m.unwrap();
+    eprintln!("down the line: p95 {:.3} m", error_m.p95);
     assert!(error_m.p95 < 0.1, "{}", error_m.p95);
     let run_m = summary.train.unwrap().run_m;
     assert!((run_m - 50.0).abs() < 2.0, "{run_m}");
@@ -236,7 +243,9 @@ fn a_rig_in_the_rear_cab_gives_the_head() {
         assert_eq!(paper.wrong_uid, 0, "{of_direction:?}");
         assert!(paper.fixes > 60, "{}", paper.fixes);
         let error_m = paper.error_m.unwrap();
-        // Couplers give, and cars are chords: the stack takes 5 cm for one sigma of it. Measured: 0.11 m.
+        eprintln!("rear cab: p95 {:.3} m", error_m.p95);
+        // Couplers give, and cars are chords: the stack takes 5 cm for one sigma of it. Measured: 0.05
+        // and 0.11 m.
         assert!(error_m.p95 < 0.15, "{of_direction:?}: {}", error_m.p95);
     }
 }

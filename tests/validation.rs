@@ -1,9 +1,9 @@
 //! The shipped scenarios, run whole and held to the figures that they must reach. Published
 //! figures: Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
 //!
-//! A run takes long, so each is also held to its own past: the bounds in [`regress`] and after the
-//! word "measured" are some 1.5 times what was measured, and far under the published ones. Whoever
-//! makes the world harder and has to raise one says so in the change.
+//! A run takes long, so each is also held to its own past: no figure is worse than [`ROOM`] times what
+//! was measured, which is far under the published ones. Whoever makes the world harder and has to raise
+//! one says so in the change.
 
 #![cfg(feature = "twin")]
 #![allow(
@@ -32,18 +32,28 @@ fn figures(scenario: &Scenario, observer: &mut dyn Observer) -> Summary {
     summary
 }
 
+/// A figure may be worse than measured by this factor.
+const ROOM: f64 = 1.6;
+
+/// What was measured of a method.
+struct Measured {
+    mean_m: f64,
+    p95_m: f64,
+    nees_mean: f64,
+}
+
 /// Holds a method to its own past: no wrong lamp, mean and 95th percentile of the error, and a sigma
 /// that is neither too small nor too large (an honest one has a `nees_mean` of 1). That of `mono` is
 /// too small by a factor of two and more: it takes the edges of neighbouring rows for independent.
-fn regress(summary: &Summary, method: Method, mean_m: f64, p95_m: f64) {
+fn regress(summary: &Summary, method: Method, measured: &Measured) {
     let figures = &summary.positioning[&method];
     assert_eq!(figures.wrong_uid, 0, "{method:?}");
     let ErrorStatistics { mean, p95, .. } = figures.error_m.unwrap();
-    assert!(mean < mean_m, "{method:?}: mean {mean} m");
-    assert!(p95 < p95_m, "{method:?}: p95 {p95} m");
+    assert!(mean < ROOM * measured.mean_m, "{method:?}: mean {mean} m");
+    assert!(p95 < ROOM * measured.p95_m, "{method:?}: p95 {p95} m");
     let nees = figures.nees_mean.unwrap();
-    let most = if method == Method::Mono { 9.0 } else { 2.5 };
-    assert!((0.4..most).contains(&nees), "{method:?}: nees_mean {nees}");
+    let right = measured.nees_mean.min(1.0) / ROOM..measured.nees_mean * ROOM;
+    assert!(right.contains(&nees), "{method:?}: nees_mean {nees}");
 }
 
 /// Error of every fix of the paper's method, with the distance of its lamp.
@@ -80,10 +90,19 @@ fn val_static_bench() {
     }
     assert!(max_m(Method::Stereo) <= 0.2973);
     assert!(max_m(Method::Mono) <= 0.356);
-    // Measured: mean 5 and 43 mm, p95 15 and 155 mm, max 55 mm.
-    regress(&summary, Method::Stereo, 0.008, 0.025);
-    regress(&summary, Method::Mono, 0.065, 0.23);
-    assert!(max_m(Method::Stereo) < 0.085);
+    let stereo = Measured {
+        mean_m: 0.0050,
+        p95_m: 0.018,
+        nees_mean: 0.45,
+    };
+    let mono = Measured {
+        mean_m: 0.044,
+        p95_m: 0.167,
+        nees_mean: 3.2,
+    };
+    regress(&summary, Method::Stereo, &stereo);
+    regress(&summary, Method::Mono, &mono);
+    assert!(max_m(Method::Stereo) < ROOM * 0.035);
     let rms = |near_m: f64, far_m: f64| {
         let inside = errors.0.iter().filter(|e| (near_m..far_m).contains(&e.0));
         let (n, sum) = inside.fold((0, 0.0), |(n, sum), e| (n + 1, sum + e.1 * e.1));
@@ -111,10 +130,20 @@ fn val_line_run_at_60_kmh() {
     let paper = &summary.positioning[&Method::Stereo];
     assert!(paper.uid_decode_rate.unwrap() >= 0.95);
     assert!(paper.error_m.unwrap().mean < 0.1533);
-    // Measured with errors of survey and calibration: mean 30 and 48 mm, p95 76 and 156 mm, and 99.1 %
-    // of the pairs. There is room for a rig whose eyes are some 0.004 deg out of parallel.
-    regress(&summary, Method::Stereo, 0.06, 0.15);
-    regress(&summary, Method::Mono, 0.07, 0.23);
+    // With errors of survey and calibration. One fix of `mono` is 1.2 m off.
+    let stereo = Measured {
+        mean_m: 0.030,
+        p95_m: 0.077,
+        nees_mean: 0.56,
+    };
+    let mono = Measured {
+        mean_m: 0.044,
+        p95_m: 0.147,
+        nees_mean: 4.9,
+    };
+    regress(&summary, Method::Stereo, &stereo);
+    regress(&summary, Method::Mono, &mono);
+    // Measured: 0.990.
     for method in [Method::Stereo, Method::Mono] {
         assert!(summary.positioning[&method].availability.unwrap() > 0.97);
     }
@@ -133,21 +162,24 @@ fn val_forgotten_toolbox() {
         .iter()
         .find(|o| o.name == "toolbox")
         .unwrap();
-    // The worker stands and walks between camera and toolbox for some seconds.
+    // The worker stands and walks between camera and toolbox for some seconds. Measured: 5.1.
     assert!(toolbox.latency_s.unwrap() < 6.0);
-    // The camera hangs 0.05 deg off its calibration, which is 0.2 m there. Measured: 0.30 m.
-    assert!(toolbox.distance_error_m.unwrap().abs() < 0.45);
+    // The camera hangs 0.05 deg off its calibration, which is 0.2 m there.
+    assert!(toolbox.distance_error_m.unwrap() < ROOM * 0.186);
     // What of the worker's shadows cannot be told from bodies, for the 27 s that he is there, half of
-    // it a frame; and his last images, each held until ten frames have shown the bed there. Measured: 182.
+    // it a frame; and his last images, each held until ten frames have shown the bed there. Measured: 186 by
+    // the picture, 179 by place.
     assert!(wayside.false_alarms <= 210, "{}", wayside.false_alarms);
+    let misplaced = wayside.misplaced_alarms;
+    assert!(misplaced <= 210, "{misplaced}");
     assert_eq!(wayside.obstacles.len(), 1);
     let protection = summary.protection.unwrap();
     assert!(!protection.collision);
     assert!(protection.brake_commanded_s.unwrap() > toolbox.first_detected_s.unwrap());
     assert!(protection.stopped_s.is_some());
-    // Before it, and not needlessly far: the authority ends 25 m before the obstacle.
+    // Before it, and not needlessly far: the authority ends 25 m before the obstacle. Measured: 30.7.
     let margin_m = protection.stop_margin_m.unwrap();
-    assert!((10.0..50.0).contains(&margin_m), "{margin_m} m");
+    assert!((25.0..40.0).contains(&margin_m), "{margin_m} m");
 }
 
 /// How far off the position is that the train runs by (lamps, and the odometer between them), ten
