@@ -5,12 +5,7 @@ use super::stats::Bounds;
 use crate::record::parquet::Kind;
 
 /// Figures that have a sign: positions, and differences of them.
-const SIGNED: [&str; 4] = [
-    "detection_distance_error_m",
-    "stop_margin_m",
-    "stop_error_m",
-    "run_m",
-];
+const SIGNED: [&str; 3] = ["stop_margin_m", "stop_error_m", "run_m"];
 /// Ends of names of shares.
 const SHARES: [&str; 2] = ["_availability", "_uid_decode_rate"];
 /// Ends of names of figures of which less is worse.
