@@ -1,9 +1,9 @@
 //! `metrotwin frames`: images with labels, as a data set, from any scenario.
 
 use super::fault::Failure;
-use super::print;
 use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
+use super::{print, running};
 use crate::record::dataset::{DataSet, FolderError, FramePlan, LabelKinds, Provenance};
 use crate::scenario::sampling::Inputs;
 use crate::scenario::{Override, Scenario};
@@ -33,8 +33,9 @@ Examples:
   metrotwin frames scenarios/line_run.toml --out out/left --cameras left --to 30 --labels clean,depth
   metrotwin frames scenarios/forgotten_toolbox.toml --out out/day2 --seed 2 --cameras W1530
 
-Ctrl-C, SIGTERM and SIGHUP end it cleanly: what has been taken is a whole, smaller set. A second Ctrl-C
-ends it at once; the same command then begins the set anew.
+Ctrl-C, SIGTERM and SIGHUP end it cleanly: what has been taken is a whole, smaller set. A second Ctrl-C,
+or a SIGTERM or SIGHUP a second or more after the first, ends it at once; the same command then begins
+the set anew.
 Exit code 0 for a whole set, 1 where the run failed or was broken off, 2 for wrong input.";
 
 /// Images + labels of a scenario as a data set
@@ -167,7 +168,7 @@ fn unusable(out: &Path, error: &FolderError) -> Failure {
              that it lists are then removed, and nothing else"
         }
         FolderError::Taken(_) => "choose another folder with --out, or move that file away",
-        FolderError::Io(_) => "choose another folder with --out",
+        FolderError::Io(error) => return running::unusable(out, error),
     };
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }

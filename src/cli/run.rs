@@ -1,15 +1,14 @@
 //! `metrotwin run`: one scenario, from start to summary.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
+use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals, unusable};
 use super::scenario_fault::load_scenario;
 use super::{print, report, table};
-use crate::bus::TrainId;
-use crate::record::{self, FixTable, Recording};
+use crate::record::{self, FixTable, Listing, Recording};
 use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
 use crate::session::{self, End, Observer, RendererChoice, RunOptions, Summary};
-use crate::study::{self, Fixes, Row, Study, StudyError};
+use crate::study::{Fixes, Row, Study, StudyError};
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::path::{Path, PathBuf};
@@ -20,6 +19,9 @@ Into the output folder go:
   recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
   summary.json    the figures
   fixes.csv       every position, with its truth (of train k: fixes_train_k.csv)
+  files.txt       the list of these files
+The next run into the folder replaces them. Files that the list does not name are never removed or written
+over: where one has the name of a result, nothing is run.
 Each is written under a temporary name, .part, and renamed when it is complete. A run that is killed
 leaves recording.rrd.part, up to its last second: renamed, it opens in the viewer.
 
@@ -31,7 +33,8 @@ Examples:
   metrotwin run scenarios/static_bench.toml --no-recording --json | jq .positioning
   metrotwin run --from-study out/led_accuracy --index 17
 
-Ctrl-C, SIGTERM and SIGHUP end a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at once.
+Ctrl-C, SIGTERM and SIGHUP end a run cleanly: what it has recorded is kept. A second Ctrl-C ends it at
+once, and so does a SIGTERM or SIGHUP a second or more after the first.
 Exit code 0 for a whole run, 1 for one that failed or was broken off, 2 for wrong input.";
 
 /// Run a scenario: recording, summary, fixes
@@ -75,6 +78,10 @@ pub(super) struct RunArgs {
 
 /// Name of the recording in its folder.
 const RECORDING: &str = "recording.rrd";
+/// Name of the figures' file.
+const SUMMARY: &str = "summary.json";
+/// Whose files are listed.
+const COMMAND: &str = "metrotwin run";
 
 pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let task = task(args)?;
@@ -82,15 +89,18 @@ pub(super) fn run(args: &RunArgs) -> Result<(), Failure> {
     let live = live(args, scenario)?;
     let out = args.out.clone().unwrap_or_else(|| task.out.clone());
     prepare(&out)?;
+    // Open until the end: no other command writes into the folder meanwhile.
+    let listing = listing(args, scenario, &out).map_err(|error| unusable(&out, &error))?;
 
     stop_on_signals();
     let mut fixes = Fixes::default();
     let summary = observed(args, scenario, live, &out, &mut fixes)?;
-    remove_stale(args, scenario, &out).map_err(|e| {
-        Failure::run(anyhow::Error::new(e).context("cannot remove results of an earlier run"))
-    })?;
     let text = serde_json::to_string_pretty(&summary).map_err(Failure::run)?;
-    record::write_whole(&out.join("summary.json"), format!("{text}\n").as_bytes())
+    // What an earlier run has left would not belong to this summary.
+    let written = listing
+        .close()
+        .and_then(|()| record::write_whole(&out.join(SUMMARY), format!("{text}\n").as_bytes()));
+    written
         .map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write summary.json")))?;
     if args.json {
         print(&text)?;
@@ -148,17 +158,17 @@ fn task(args: &RunArgs) -> Result<Task, Failure> {
 
 /// From the copies of the inputs that the study keeps.
 fn from_study(folder: &Path, index: u64) -> Result<Task, Failure> {
-    let Study {
-        manifest, template, ..
-    } = Study::open(folder)?;
-    if let Some(file) = manifest.changed_outside() {
+    let study = Study::open(folder)?;
+    if let Some(file) = study.manifest.changed_outside() {
+        let file = file.display();
         return Err(Failure::input(
             format!("{file} has changed since the study was run, or is gone"),
             "put it back as it was; the study's folder keeps copies of inputs with relative paths only",
         ));
     }
-    let rows = study::read_rows(folder)?;
-    let row = rows
+    let template = &study.template;
+    let row = study
+        .all_rows()?
         .into_iter()
         .find(|row| row.index == index)
         .ok_or_else(|| {
@@ -266,16 +276,13 @@ fn reach(address: &str) -> io::Result<()> {
 /// A viewer on another continent answers in less.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// What this run did not write, but an earlier one into the same folder, would not belong to its
-/// summary.
-fn remove_stale(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<()> {
-    if args.no_recording {
-        record::remove_recording(&out.join(RECORDING))?;
-    }
-    let has_rig = |id| (scenario.onboard.iter()).any(|o| o.id() == id && o.rig.is_some());
-    let without_rig = (0..TrainId::MOST)
-        .map(TrainId::from_index)
-        .filter(|id| !has_rig(*id));
-    let mut stale = without_rig.map(FixTable::file_name);
-    stale.try_for_each(|name| record::remove(&out.join(name)))
+/// Lists the files of a run before they are written.
+fn listing(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<Listing> {
+    let recording = (!args.no_recording).then(|| record::names_of_recording(RECORDING));
+    let rigs = scenario.onboard.iter().filter(|o| o.rig.is_some());
+    let fixes = rigs.map(|o| FixTable::file_name(o.id()));
+    let names = recording.into_iter().flatten().chain(fixes);
+    let mut listing = Listing::open(out, COMMAND)?;
+    listing.announce(names.chain([SUMMARY.to_owned()]))?;
+    Ok(listing)
 }

@@ -7,28 +7,38 @@ use crate::scenario::MOST_SEED;
 use clap::builder::RangedU64ValueParser;
 use indicatif::ProgressStyle;
 use std::cell::Cell;
+use std::io::{self, ErrorKind};
 use std::path::Path;
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 /// Set by the first signal to end, or when there is nothing more to do.
 pub(super) static STOP: AtomicBool = AtomicBool::new(false);
 
 /// From now on Ctrl-C, SIGTERM (Slurm, containers) and SIGHUP (a terminal that is closed) set [`STOP`].
-/// A second Ctrl-C ends the process at once; the others are sent twice by some, so that a second one
-/// says nothing.
+/// A second one ends the process at once; but some send SIGTERM or SIGHUP twice and mean it once.
+#[allow(
+    clippy::disallowed_methods,
+    reason = "signals of people and of machines are told apart by the time between them"
+)]
 pub(super) fn stop_on_signals() {
-    let is_second = AtomicBool::new(false);
+    let first = OnceLock::new();
     signals::handle(
-        move |signal| match (is_second.swap(true, Ordering::Relaxed), signal) {
-            (false, _) => {
+        move |signal| match (first.get().map(Instant::elapsed), signal) {
+            (None, _) => {
+                first.get_or_init(Instant::now);
                 STOP.store(true, Ordering::Relaxed);
                 eprintln!("ending the run; Ctrl-C again ends it at once");
             }
-            (true, Signal::CtrlC) => std::process::exit(1),
-            (true, Signal::Ended) => {}
+            (Some(after), Signal::Ended) if after < SENT_TWICE => {}
+            (Some(_), _) => std::process::exit(1),
         },
     );
 }
+
+/// Signals of one request follow each other faster.
+const SENT_TWICE: Duration = Duration::from_secs(1);
 
 /// Seeds that a file can hold.
 pub(super) fn seed() -> RangedU64ValueParser {
@@ -44,6 +54,16 @@ pub(super) fn prepare(out: &Path) -> Result<(), Failure> {
             "choose another folder with --out, or make that one writable",
         )
     })
+}
+
+/// What is said of a folder in which a command cannot write its files.
+pub(super) fn unusable(out: &Path, error: &io::Error) -> Failure {
+    let remedy = match error.kind() {
+        ErrorKind::ResourceBusy => "wait for it to end, or choose another folder with --out",
+        ErrorKind::AlreadyExists => "choose another folder with --out, or move that file away",
+        _ => "choose another folder with --out",
+    };
+    Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }
 
 /// How far something is: a bar on a terminal, else a line for every tenth.

@@ -2,16 +2,16 @@
 //! file before it is begun. So it holds after a kill too, and nothing that it does not name is ever
 //! removed or written over.
 
-use super::whole_files::{PROBE, remove, write_whole};
+use super::whole_files::{PROBE, locked, open_in_place, part_name, remove, taken, write_whole};
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 /// Name of the list in its folder.
 pub(crate) const LIST: &str = "files.txt";
 
-/// The list of a folder, being written.
+/// The list of a folder, being written; as long as it is open, no other command opens it.
 #[derive(Debug)]
 pub(crate) struct Listing {
     folder: PathBuf,
@@ -28,41 +28,36 @@ impl Listing {
     pub fn read(folder: &Path, command: &str) -> io::Result<Option<BTreeSet<String>>> {
         let path = folder.join(LIST);
         match fs::symlink_metadata(&path) {
-            Ok(about) if about.is_file() => {}
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-            _ => return Ok(None),
+            Ok(about) if about.is_file() => Ok(parse(&fs::read(&path)?, command)),
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(error),
+            _ => Ok(None),
         }
-        let text = fs::read(&path)?;
-        let text = String::from_utf8_lossy(&text);
-        // A last line without an end was cut by a loss of power, before its files were begun.
-        let lines = text.strip_prefix(&heading(command));
-        let lines = lines.map(|text| text.rsplit_once('\n').map_or("", |(whole, _)| whole));
-        Ok(lines.map(|text| {
-            let names = text.lines().filter(|name| is_plain(name));
-            names.map(str::to_owned).collect()
-        }))
     }
 
     /// Goes on with the list of a folder, or begins one. `command` is the one whose files they are.
     pub fn open(folder: &Path, command: &'static str) -> io::Result<Self> {
         let path = folder.join(LIST);
-        let earlier = Self::read(folder, command)?;
-        if earlier.is_none() && path.symlink_metadata().is_ok() {
-            return Err(taken(&path));
+        let file = open_in_place(&path, OpenOptions::new().read(true).append(true))?;
+        let mut file = locked(file, &path)?;
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes)?;
+        let earlier = parse(&bytes, command).ok_or_else(|| taken(&path))?;
+        let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
+        file.set_len(whole as u64)?;
+        if whole == 0 {
+            file.write_all(heading(command).as_bytes())?;
         }
-        let earlier = earlier.unwrap_or_default();
-        write_whole(&path, text(command, &earlier).as_bytes())?;
         Ok(Self {
             folder: folder.to_owned(),
             command,
-            file: OpenOptions::new().append(true).open(&path)?,
+            file,
             earlier,
             announced: BTreeSet::new(),
         })
     }
 
     /// Lists files that are about to be written, by their paths below the folder. One that is there and
-    /// not listed is somebody else's, and an error.
+    /// not listed is somebody else's, and an error; so is one in a folder that is a link.
     pub fn announce(&mut self, names: impl IntoIterator<Item = String>) -> io::Result<()> {
         let mut lines = String::new();
         for name in names {
@@ -70,10 +65,13 @@ impl Listing {
                 let what = format!("`{}` is no name that can be listed", name.escape_debug());
                 return Err(io::Error::new(ErrorKind::InvalidInput, what));
             }
+            if let Some(link) = links(&self.folder, &name).next() {
+                return Err(taken(&link));
+            }
             if !self.earlier.contains(&name) && !self.announced.contains(&name) {
                 let path = self.folder.join(&name);
-                if path.symlink_metadata().is_ok() {
-                    return Err(taken(&path));
+                if let Some(path) = [part_name(&path), path].iter().find(|path| is_there(path)) {
+                    return Err(taken(path));
                 }
                 lines += &format!("{name}\n");
             }
@@ -116,8 +114,12 @@ pub(crate) fn foreign<'a>(
         Some(listed) => name == LIST || listed.contains(name),
         None => false,
     };
+    let is_other = |name: &str| {
+        let is_linked = links(folder, name).next().is_some();
+        is_linked || is_there(&folder.join(name)) && !is_ours(name)
+    };
     let mut names = names.into_iter().chain([LIST]);
-    Ok(names.find(|name| folder.join(name).symlink_metadata().is_ok() && !is_ours(name)))
+    Ok(names.find(|name| is_other(name)))
 }
 
 /// Whether a folder holds nothing, or is not there.
@@ -129,9 +131,31 @@ pub(crate) fn is_empty(folder: &Path) -> io::Result<bool> {
     }
 }
 
-fn taken(path: &Path) -> io::Error {
-    let what = format!("{} is there already, and is not ours", path.display());
-    io::Error::new(ErrorKind::AlreadyExists, what)
+/// Also of a link that leads nowhere.
+fn is_there(path: &Path) -> bool {
+    path.symlink_metadata().is_ok()
+}
+
+/// Folders between a folder and a file below it that are links.
+fn links(folder: &Path, name: &str) -> impl Iterator<Item = PathBuf> {
+    let above = Path::new(name).ancestors().skip(1);
+    let above = above.filter(|path| !path.as_os_str().is_empty());
+    let above = above.map(|path| folder.join(path));
+    above.filter(|path| path.is_symlink())
+}
+
+/// The names in a list; `None` of what the command has not written. What follows the last line break was
+/// cut by a loss of power, before its files were begun.
+fn parse(bytes: &[u8], command: &str) -> Option<BTreeSet<String>> {
+    let text = String::from_utf8_lossy(bytes);
+    let heading = heading(command);
+    if heading.starts_with(&*text) {
+        return Some(BTreeSet::new());
+    }
+    let lines = text.strip_prefix(&heading)?;
+    let whole = lines.rsplit_once('\n').map_or("", |(whole, _)| whole);
+    let names = whole.lines().filter(|name| is_plain(name));
+    Some(names.map(str::to_owned).collect())
 }
 
 fn heading(command: &str) -> String {
@@ -158,15 +182,13 @@ fn is_plain(name: &str) -> bool {
 fn remove_all(folder: &Path, names: &BTreeSet<String>) -> io::Result<()> {
     let mut folders = BTreeSet::new();
     for name in names {
-        let above: Vec<_> = Path::new(name).ancestors().skip(1).collect();
-        let above = above.iter().filter(|path| !path.as_os_str().is_empty());
-        let mut above = above.map(|path| folder.join(path));
-        let is_link = |path: &PathBuf| path.symlink_metadata().is_ok_and(|a| a.is_symlink());
-        if above.clone().any(|path| is_link(&path)) {
+        if links(folder, name).next().is_some() {
             continue;
         }
         remove(&folder.join(name))?;
-        folders.extend(&mut above);
+        let above = Path::new(name).ancestors().skip(1);
+        let above = above.filter(|path| !path.as_os_str().is_empty());
+        folders.extend(above.map(|path| folder.join(path)));
     }
     // The deepest first. One that is not empty stays.
     for folder in folders.iter().rev() {
@@ -198,6 +220,16 @@ mod tests {
         names.iter().for_each(|name| write(name));
         assert!(first.announce(["notes.txt".to_owned()]).is_err());
         assert!(first.announce(["../outside".to_owned()]).is_err());
+        assert!(Listing::open(&folder, "one").is_err());
+        write("theirs.part");
+        assert!(first.announce(["theirs".to_owned()]).is_err());
+        #[cfg(unix)]
+        {
+            std::os::unix::fs::symlink(&base, folder.join("link")).unwrap();
+            assert!(first.announce(["link/new".to_owned()]).is_err());
+            let found = foreign(&folder, "one", ["link/new"]).unwrap();
+            assert_eq!(found, Some("link/new"));
+        }
         drop(first);
         // As after a kill: the list goes on, and another command does not take it for its own.
         assert!(Listing::open(&folder, "two").is_err());

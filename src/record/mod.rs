@@ -45,11 +45,11 @@ mod template;
 mod texts;
 mod whole_files;
 
-pub(crate) use listing::{Listing, foreign};
-pub(crate) use recording_file::remove_recording;
+pub(crate) use listing::{LIST, Listing, foreign};
+pub(crate) use recording_file::names_of_recording;
 pub use tables::FixTable;
 pub(crate) use template::render;
-pub(crate) use whole_files::{create_new, probe, remove, write_whole};
+pub(crate) use whole_files::{create_new, open_in_place, probe, remove, write_whole};
 
 use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;

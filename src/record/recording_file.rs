@@ -3,14 +3,14 @@
 //! yet. Its end makes a file of it that is quick to look at: batches of some seconds, and an index. Both
 //! would be kept in memory if they were made on the way.
 
-use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name, remove};
+use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name};
 use rerun::external::re_log_encoding::{DecoderApp, EncodeError, Encoder, EncodingOptions};
 use rerun::log::{Chunk, LogMsg};
 use rerun::sink::{LogSink, SinkFlushError};
 use rerun::{StoreId, StoreKind};
 use std::error::Error;
 use std::fs::{self, File};
-use std::io::{self, BufReader};
+use std::io::BufReader;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -84,10 +84,10 @@ fn indexed_name(path: &Path) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Removes a recording of an earlier run, and what an interrupted one left of it.
-pub(crate) fn remove_recording(path: &Path) -> io::Result<()> {
-    remove(&indexed_name(path))?;
-    remove(path)
+/// Files that a recording of some name may leave, finished or not, apart from temporary names.
+pub(crate) fn names_of_recording(name: &str) -> [String; 2] {
+    let indexed = indexed_name(Path::new(name));
+    [name.to_owned(), indexed.to_string_lossy().into_owned()]
 }
 
 /// Writes the finished file from the rows in `<path>.part`.

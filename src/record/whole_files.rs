@@ -31,16 +31,12 @@ impl PartFile {
     /// living one writes there is an error.
     pub fn create(path: &Path) -> io::Result<Self> {
         let part = part_name(path);
-        let mut earlier = None;
-        let file = match File::create_new(&part) {
+        let (file, earlier) = match File::create_new(&part) {
             Err(error) if error.kind() == ErrorKind::AlreadyExists => {
-                // What a link points to is not opened.
-                if fs::symlink_metadata(&part).is_ok_and(|about| about.is_file()) {
-                    earlier = Some(locked(File::open(&part)?, path)?);
-                }
-                create_new(&part)?
+                let earlier = left_over(path)?;
+                (create_new(&part)?, earlier)
             }
-            made => made?,
+            made => (made?, None),
         };
         Ok(Self {
             path: path.to_owned(),
@@ -73,8 +69,18 @@ impl Write for PartFile {
     }
 }
 
+/// What a killed process has left under the temporary name of a file, locked; what a living one writes
+/// there is an error. What a link points to is not opened.
+fn left_over(path: &Path) -> io::Result<Option<File>> {
+    let part = part_name(path);
+    match fs::symlink_metadata(&part) {
+        Ok(about) if about.is_file() => locked(File::open(&part)?, path).map(Some),
+        _ => Ok(None),
+    }
+}
+
 /// Locks a file that is being written as `path`. File systems without locks lose only this check.
-fn locked(file: File, path: &Path) -> io::Result<File> {
+pub(super) fn locked(file: File, path: &Path) -> io::Result<File> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => {
             let what = format!("another process is writing {}", path.display());
@@ -89,6 +95,21 @@ pub(crate) fn create_new(path: &Path) -> io::Result<File> {
     gone(fs::remove_file(path))?;
     let mut options = OpenOptions::new();
     options.write(true).create_new(true).open(path)
+}
+
+/// Opens a file that is written in place, and makes it where there is none. Anything else of that name,
+/// such as a link, is an error.
+pub(crate) fn open_in_place(path: &Path, options: &mut OpenOptions) -> io::Result<File> {
+    if fs::symlink_metadata(path).is_ok_and(|about| !about.is_file()) {
+        return Err(taken(path));
+    }
+    options.create(true).truncate(false).open(path)
+}
+
+/// That a file is there which the program has not written.
+pub(super) fn taken(path: &Path) -> io::Error {
+    let what = format!("{} is there already, and is not ours", path.display());
+    io::Error::new(ErrorKind::AlreadyExists, what)
 }
 
 /// Makes sure that the names in a file's folder outlast a loss of power.
@@ -140,8 +161,9 @@ pub(crate) fn gone(removed: io::Result<()>) -> io::Result<()> {
     }
 }
 
-/// Removes a file, and what an interrupted process left of it.
+/// Removes a file, and what an interrupted process left of it; one that is being written is an error.
 pub(crate) fn remove(path: &Path) -> io::Result<()> {
+    let _left = left_over(path)?;
     gone(fs::remove_file(part_name(path)))?;
     gone(fs::remove_file(path))
 }
@@ -176,8 +198,8 @@ mod tests {
     use super::*;
     use std::os::unix::fs::symlink;
 
-    /// Fails where a link that lies under a temporary name leads to another file being written over,
-    /// or two processes write one file.
+    /// Fails where a link that lies under a temporary name leads to another file being written over, two
+    /// processes write one file, or one removes what the other writes.
     #[test]
     fn a_temporary_name_that_is_a_link_is_not_followed() {
         let folder = std::env::temp_dir().join(format!("metrotwin-part-{}", std::process::id()));
@@ -195,6 +217,8 @@ mod tests {
         let first = PartFile::create(&ours).unwrap();
         let second = PartFile::create(&ours).unwrap_err();
         assert_eq!(second.kind(), ErrorKind::ResourceBusy);
+        assert_eq!(remove(&ours).unwrap_err().kind(), ErrorKind::ResourceBusy);
+        assert!(ours.exists() && part_name(&ours).exists());
         drop(first);
         PartFile::create(&ours).unwrap().finish().unwrap();
         fs::remove_dir_all(&folder).unwrap();

@@ -34,28 +34,45 @@ impl ReadLimit {
         ending: "obj",
         most_bytes: 32 << 20,
     };
+    /// What the program itself has written about a study or a data set: a line for each input.
+    pub const JSON: Self = Self {
+        ending: "json",
+        most_bytes: 8 << 20,
+    };
+}
+
+/// Opens a file to be read; fails where it is a device, a pipe or a folder.
+pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+    // To open a pipe would wait for its writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(refused("it is no regular file"));
+    }
+    File::open(path)
+}
+
+fn refused(why: impl Into<String>) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidInput, why.into())
 }
 
 /// Reads all of a file; fails where it is of another kind, no regular file, or too large.
 pub fn read_bytes(path: &Path, kind: ReadLimit) -> io::Result<Vec<u8>> {
-    let refused = |why: String| Err(io::Error::new(io::ErrorKind::InvalidInput, why));
     // Links are followed: a link may have any name.
     let real = fs::canonicalize(path)?;
-    // To open a pipe would wait for its writer.
-    if !fs::metadata(&real)?.is_file() {
-        return refused("it is no regular file".to_owned());
-    }
+    let file = open_regular(&real)?;
     let ending = real.extension().unwrap_or_default();
     if !ending.eq_ignore_ascii_case(kind.ending) {
-        return refused(format!("its name does not end with .{}", kind.ending));
+        return Err(refused(format!(
+            "its name does not end with .{}",
+            kind.ending
+        )));
     }
     let mut bytes = Vec::new();
     // The size that a file system tells is no bound: some tell 0, and a file may grow.
-    let mut bounded = File::open(real)?.take(kind.most_bytes + 1);
+    let mut bounded = file.take(kind.most_bytes + 1);
     bounded.read_to_end(&mut bytes)?;
     if bytes.len() as u64 > kind.most_bytes {
         let most = kind.most_bytes >> 20;
-        return refused(format!("it is larger than {most} MiB"));
+        return Err(refused(format!("it is larger than {most} MiB")));
     }
     Ok(bytes)
 }

@@ -1,10 +1,11 @@
 //! Whether a folder may take a data set: what lies there is told apart by the `meta.json` and the list
 //! of files that every set has from its beginning.
 
-use super::files::FILES;
+use super::INPUTS;
+use super::files::{FILES, FOLDERS};
 use crate::record::listing::{LIST, Listing, foreign, is_empty};
+use crate::settings::{ReadLimit, read_bytes};
 use serde_json::Value;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -37,7 +38,7 @@ pub enum FolderError {
 /// leaves it, is gone on with.
 pub(super) fn claim(folder: &Path, meta: &Value, force: bool) -> Result<(), FolderError> {
     let listed = Listing::read(folder, COMMAND)?;
-    let kept = fs::read(folder.join("meta.json")).ok();
+    let kept = read_bytes(&folder.join("meta.json"), ReadLimit::JSON).ok();
     let kept = kept.and_then(|text| serde_json::from_slice::<Value>(&text).ok());
     let kept = kept.filter(|kept| kept["format"] == FORMAT && listed.is_some());
     match (kept, listed) {
@@ -50,7 +51,9 @@ pub(super) fn claim(folder: &Path, meta: &Value, force: bool) -> Result<(), Fold
         (None, None) if !force && !is_empty(folder)? => return Err(FolderError::NotEmpty),
         (None, None) => {}
     }
-    let taken = foreign(folder, COMMAND, FILES)?;
+    let is_link = |name: &&str| folder.join(name).is_symlink();
+    let link = FOLDERS.into_iter().chain([INPUTS]).find(is_link);
+    let taken = link.or(foreign(folder, COMMAND, FILES)?);
     taken.map_or(Ok(()), |name| Err(FolderError::Taken(folder.join(name))))
 }
 
