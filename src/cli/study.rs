@@ -62,8 +62,10 @@ Into the output folder go:
   study.json     hashes of all inputs, version, renderer; a study goes on only while they are the same
   inputs/        copies of all inputs, from which any run can be made again
   study.lock     locked while a command writes there
+  files.txt      the list of these files; others are never written over
 
-Ctrl-C, SIGTERM and SIGHUP begin no more runs and wait for those in flight; --resume goes on later.";
+Ctrl-C, SIGTERM and SIGHUP begin no more runs and wait for those in flight. A second Ctrl-C, or a SIGTERM or
+SIGHUP a second or more after the first, ends at once. --resume goes on later.";
 
 /// Run what a folder lacks of a study
 #[derive(clap::Args)]

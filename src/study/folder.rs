@@ -21,6 +21,7 @@ impl Study {
     pub fn open(folder: &Path) -> Result<Self> {
         let manifest =
             Manifest::read(folder)?.ok_or_else(|| StudyError::NoStudy(folder.to_owned()))?;
+        manifest.check_copies(folder)?;
         let mut template = Template::load(&folder.join(INPUTS).join(&manifest.study))?;
         template.settings.runs = runs_of_cell(folder, &manifest, &template)?;
         Ok(Self {
@@ -30,9 +31,14 @@ impl Study {
         })
     }
 
+    /// All rows, in order.
+    pub fn all_rows(&self) -> Result<Vec<Row>> {
+        journal::read_of(&self.folder, &self.manifest)
+    }
+
     /// The rows that count, in order.
     pub fn rows(&self) -> Result<Vec<Row>> {
-        let mut rows = journal::read(&self.folder)?;
+        let mut rows = self.all_rows()?;
         if let Some(precision) = Precision::of(&self.template)? {
             precision.truncate(&mut rows);
         }

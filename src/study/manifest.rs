@@ -1,9 +1,10 @@
 //! The manifest `study.json`: SHA-256 of every input and of the program, and the renderer, that the rows of a
 //! folder were made with.
 
-use super::{Result, Shard, StudyError, write_whole};
-use crate::scenario::sampling::{Inputs, MOST_RUNS, Template, sha256};
+use super::{Result, Row, Shard, StudyError, not_read, write_whole};
+use crate::scenario::sampling::{Inputs, MOST_RUNS, Template, read_input, sha256};
 use crate::session::RendererChoice;
+use crate::settings::{ReadLimit, read_bytes};
 use crate::twin::render::{Backend, gpu};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -82,9 +83,9 @@ impl Manifest {
     /// Reads that of a folder; `None` where there is none.
     pub fn read(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(MANIFEST);
-        let text = match fs::read(&path) {
+        let text = match read_bytes(&path, ReadLimit::JSON) {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            other => other.map_err(|source| StudyError::file(&path, source))?,
+            other => other.map_err(|source| not_read(&path, source))?,
         };
         let manifest: Result<Self, String> =
             serde_json::from_slice(&text).map_err(|e| e.to_string());
@@ -127,19 +128,39 @@ impl Manifest {
     }
 
     /// An input that is named by an absolute path, so that the folder has no copy, and that has changed.
-    pub fn changed_outside(&self) -> Option<&str> {
-        let mut outside = self
-            .inputs
-            .iter()
-            .filter(|(file, _)| Path::new(file).is_absolute());
-        let is_other = |file: &str, hash: &str| {
-            // A device may have no end.
-            let is_file = fs::metadata(file).is_ok_and(|m| m.is_file());
-            let read = || fs::read(file).map(|b| sha256(&b)).ok();
-            is_file.then(read).flatten().as_deref() != Some(hash)
-        };
-        let changed = outside.find(|(file, hash)| is_other(file, hash));
-        changed.map(|(file, _)| file.as_str())
+    pub fn changed_outside(&self) -> Option<PathBuf> {
+        self.changed(None)
+    }
+
+    /// Whether the copies of the inputs in a folder are what its rows were made with.
+    pub fn check_copies(&self, folder: &Path) -> Result {
+        let copy = self.changed(Some(&folder.join(INPUTS)));
+        copy.map_or(Ok(()), |copy| Err(StudyError::Changed(copy)))
+    }
+
+    /// The first whose content is another, or that is gone: of the inputs that are named by absolute
+    /// paths, or of the copies below a folder.
+    fn changed(&self, copies: Option<&Path>) -> Option<PathBuf> {
+        let is_same =
+            |path: &Path, hash: &str| read_input(path).is_ok_and(|bytes| sha256(&bytes) == hash);
+        let is_wanted = |file: &str| Path::new(file).is_relative() == copies.is_some();
+        let inputs = self.inputs.iter().filter(|(file, _)| is_wanted(file));
+        let folder = copies.unwrap_or(Path::new(""));
+        let mut inputs = inputs.map(|(file, hash)| (folder.join(file), hash));
+        let changed = inputs.find(|(path, hash)| !is_same(path, hash));
+        changed.map(|(path, _)| path)
+    }
+
+    /// Whether a row can be of this study, or of this part of it.
+    pub fn check_row(&self, row: &Row) -> Result<(), String> {
+        let (index, runs) = (row.index, self.runs);
+        if index >= runs {
+            return Err(format!("run {index} is none of the study's {runs}"));
+        }
+        match self.shard.filter(|shard| !shard.holds(index)) {
+            Some(shard) => Err(format!("run {index} is not of shard {shard}")),
+            None => Ok(()),
+        }
     }
 
     /// What differs between two of them, in words; shard and number of runs aside: a study may go on

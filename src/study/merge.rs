@@ -1,8 +1,9 @@
 //! Shards put together.
 
 use super::journal::{self, JOURNAL, Journal};
-use super::{INPUTS, Manifest, Result, Row, Shard, Status, Study, StudyError, table, write_whole};
-use crate::record;
+use super::{
+    Manifest, Result, Row, Shard, Status, Study, StudyError, copy_inputs, table, write_whole,
+};
 use crate::scenario::sampling::Inputs;
 use std::collections::BTreeMap;
 use std::fs;
@@ -26,8 +27,7 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>> {
         let Some(shard) = manifest.shard else {
             return wrong(format!("{} is a whole study, not a shard", path.display()));
         };
-        let mut of_shard = journal::read(path)?;
-        of_shard.retain(|row| row.index < manifest.runs);
+        let of_shard = journal::read_of(path, manifest)?;
         check_whole(path, shard, manifest.runs, &of_shard)?;
         found.insert(shard.number, shard.of);
         rows.extend(of_shard);
@@ -49,9 +49,11 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>> {
         ));
     }
     // The folder is locked, so that no study runs there meanwhile.
-    let (_journal, there) = Journal::open(folder)?;
-    let kept = Manifest::read(folder)?;
-    check_free(folder, kept.as_ref(), first, &there)?;
+    let (_journal, kept, there) = Journal::open(folder)?;
+    if let Some(what) = kept.as_ref().and_then(|kept| kept.difference(first)) {
+        let path = folder.to_owned();
+        return Err(StudyError::Other { path, what });
+    }
     // Rows that the folder itself holds count too, such as those of runs that crashed in a shard and were
     // tried again after an earlier merge; and it may have gone on to more runs.
     rows.extend(there);
@@ -66,16 +68,6 @@ pub fn merge(folder: &Path) -> Result<Vec<Row>> {
 
 fn wrong<T>(what: String) -> Result<T> {
     Err(StudyError::Unusable(what))
-}
-
-/// A folder that holds another study is left alone.
-fn check_free(folder: &Path, kept: Option<&Manifest>, merged: &Manifest, rows: &[Row]) -> Result {
-    let what = match kept {
-        None => (!rows.is_empty()).then(|| "rows without a manifest".to_owned()),
-        Some(kept) => kept.difference(merged),
-    };
-    let path = folder.to_owned();
-    what.map_or(Ok(()), |what| Err(StudyError::Other { path, what }))
 }
 
 /// Folders of shards, with their manifests.
@@ -101,10 +93,6 @@ fn shards(folder: &Path) -> Result<Vec<(PathBuf, Manifest)>> {
 
 fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result {
     let wanted = (0..runs).filter(|k| shard.holds(*k)).count();
-    if let Some(row) = rows.iter().find(|row| !shard.holds(row.index)) {
-        let (path, index) = (path.display(), row.index);
-        return wrong(format!("{path}: run {index} is not of shard {shard}"));
-    }
     if rows.len() < wanted {
         return wrong(format!(
             "{} has {} of {wanted} rows; finish it with --shard {shard} --resume",
@@ -116,14 +104,14 @@ fn check_whole(path: &Path, shard: Shard, runs: u64, rows: &[Row]) -> Result {
 }
 
 fn write(folder: &Path, shard: &Path, manifest: &Manifest, mut rows: Vec<Row>) -> Result<Vec<Row>> {
-    // Sorting keeps the last of a run's rows: one that crashed gives way to any other.
-    rows.sort_by_key(|row| row.status != Status::Crashed);
-    journal::sort(&mut rows);
+    // The first of a run's rows is kept: the last that was made, and one that crashed gives way to any other.
+    rows.reverse();
+    rows.sort_by_key(|row| (row.index, row.status == Status::Crashed));
+    rows.dedup_by_key(|row| row.index);
     let template = Study::open(shard)?.template;
     let failed = |e| StudyError::file(folder, e);
     let inputs = Inputs::of(&template).map_err(failed)?;
-    let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
-    copied.map_err(failed)?;
+    copy_inputs(folder, &inputs)?;
     // Before the rows: a folder that holds rows belongs to a study.
     manifest.write(folder)?;
     let mut text = Vec::new();

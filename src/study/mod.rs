@@ -58,9 +58,9 @@ pub use shard::{MOST_SHARDS, Shard};
 pub use slurm::{Submission, Submitted};
 pub use worker::{ScenarioRunner, serve};
 
-use crate::record;
+use crate::record::{self, LIST, Listing};
 use crate::scenario::ScenarioError;
-use crate::scenario::sampling::SampleError;
+use crate::scenario::sampling::{Inputs, SampleError};
 use crate::session::ObserverError;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -80,7 +80,7 @@ pub enum StudyError {
     },
     /// A line that is no row.
     #[error(
-        "{}, line {line}: {why}; it was written by another program or version: choose another folder",
+        "{}, line {line}: {why}; put the file back as `study run` wrote it, or choose another folder",
         path.display()
     )]
     Journal {
@@ -91,17 +91,27 @@ pub enum StudyError {
         /// What the parser says.
         why: String,
     },
-    /// A manifest that no study has written.
+    /// A manifest or a journal that no study has written.
     #[error(
         "{}: {what}; put the file back as `study run` wrote it, or run the study into another folder",
         path.display()
     )]
     Manifest {
-        /// The manifest.
+        /// The file.
         path: PathBuf,
-        /// What is wrong with which of its keys.
+        /// What is wrong with it, or with which of its keys.
         what: String,
     },
+    /// A copy of an input in the study's folder.
+    #[error(
+        "{} is not what the study was run with, or is gone; put it back as it was, or run the study \
+         into another folder",
+        .0.display()
+    )]
+    Changed(PathBuf),
+    /// A file that no study has written has the name of one of the study's.
+    #[error("{0}; move it away, or choose another folder")]
+    Taken(io::Error),
     /// Nothing can be written into a folder.
     #[error("cannot write into {}: {source}; give another --out, or make that one writable", path.display())]
     Unwritable {
@@ -159,6 +169,45 @@ impl StudyError {
             source,
         }
     }
+}
+
+/// Whose files are listed.
+const COMMAND: &str = "metrotwin study";
+
+/// Lists files of a study's folder before they are written, by their paths below it.
+fn announce(folder: &Path, names: impl IntoIterator<Item = String>) -> Result {
+    let listed = Listing::open(folder, COMMAND).and_then(|mut list| list.announce(names));
+    listed.map_err(|source| not_written(&folder.join(LIST), source))
+}
+
+/// Why a file of a study's folder is not written.
+fn not_written(path: &Path, source: io::Error) -> StudyError {
+    match source.kind() {
+        io::ErrorKind::AlreadyExists => StudyError::Taken(source),
+        _ => StudyError::file(path, source),
+    }
+}
+
+/// Why a file of a study's folder is not read.
+fn not_read(path: &Path, source: io::Error) -> StudyError {
+    match source.kind() {
+        io::ErrorKind::InvalidInput => StudyError::Manifest {
+            path: path.to_owned(),
+            what: source.to_string(),
+        },
+        _ => StudyError::file(path, source),
+    }
+}
+
+/// Copies the inputs into a study's folder.
+fn copy_inputs(folder: &Path, inputs: &Inputs) -> Result {
+    let names = inputs.copies(Path::new(INPUTS));
+    announce(
+        folder,
+        names.map(|name| name.to_string_lossy().into_owned()),
+    )?;
+    let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
+    copied.map_err(|source| StudyError::file(folder, source))
 }
 
 fn write_whole(path: &Path, content: &[u8]) -> Result {

@@ -24,6 +24,11 @@ pub const READY: &str = "ready";
 /// Lines at the end of a dead worker's log that are kept as the reason.
 const LOG_LINES: usize = 3;
 
+/// Name of the file, in the study's folder, with what a worker says on standard error.
+pub fn worker_log(number: usize) -> String {
+    format!("worker-{number}.log")
+}
+
 /// How workers are started.
 #[derive(Clone, Debug)]
 pub struct Pool<'a> {
@@ -151,7 +156,7 @@ struct Worker {
 
 impl Worker {
     fn start(pool: &Pool<'_>, number: usize) -> io::Result<Self> {
-        let log = pool.folder.join(format!("worker-{number}.log"));
+        let log = pool.folder.join(worker_log(number));
         let mut command = Command::new(&pool.program);
         command
             .args(["study", "worker", "--renderer", pool.renderer])

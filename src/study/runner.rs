@@ -1,11 +1,11 @@
 //! Runs what a study still lacks.
 
 use super::collected::CollectedRows;
-use super::journal::{self, Journal};
+use super::journal::Journal;
 use super::manifest;
-use super::pool::{Next, Pool};
+use super::pool::{Next, Pool, worker_log};
 use super::stop::Precision;
-use super::{INPUTS, Manifest, Result, Row, Shard, Status, StudyError, table};
+use super::{Manifest, Result, Row, Shard, Status, StudyError, announce, copy_inputs, table};
 use crate::record;
 use crate::scenario::sampling::{Inputs, MOST_RUNS, Template};
 use crate::session::RendererChoice;
@@ -127,17 +127,13 @@ fn prepare(
     options: &Options<'_>,
     renderer: &Backend,
 ) -> Result<(Journal, Vec<Row>)> {
-    // The folder is locked before anything else is read.
-    let (journal, mut rows) = Journal::open(folder)?;
+    let (journal, kept, mut rows) = Journal::open(folder)?;
     let unreadable = |e| StudyError::file(&template.path, e);
     let inputs = Inputs::of(template).map_err(unreadable)?;
     let manifest = Manifest::of(template, &inputs, renderer, options.shard)?;
-    let kept = Manifest::read(folder)?;
     if let Some(what) = kept.as_ref().and_then(|kept| another_part(kept, &manifest)) {
-        return Err(another(folder, what));
-    }
-    if kept.is_none() && !rows.is_empty() {
-        return Err(another(folder, "rows without a manifest".into()));
+        let path = folder.to_owned();
+        return Err(StudyError::Other { path, what });
     }
     if !options.resume && !rows.is_empty() {
         return Err(StudyError::Exists {
@@ -146,14 +142,12 @@ fn prepare(
         });
     }
     if kept.is_none() {
-        let copied = inputs.copy_to(&folder.join(INPUTS), record::write_whole);
-        copied.map_err(|e| StudyError::file(folder, e))?;
+        copy_inputs(folder, &inputs)?;
     }
     // With fewer runs than it has, a study keeps those that it has.
     let runs = kept.map_or(0, |kept| kept.runs).max(manifest.runs);
     Manifest { runs, ..manifest }.write(folder)?;
     // What crashed may have done so for want of memory: it is tried again.
-    journal::sort(&mut rows);
     rows.retain(|row| row.status != Status::Crashed);
     Ok((journal, rows))
 }
@@ -166,21 +160,18 @@ fn another_part(kept: &Manifest, now: &Manifest) -> Option<String> {
     })
 }
 
-fn another(folder: &Path, what: String) -> StudyError {
-    let path = folder.to_owned();
-    StudyError::Other { path, what }
-}
-
 fn pool<'a>(folder: &'a Path, renderer: &Backend, options: &Options<'_>) -> Result<Pool<'a>> {
     let cores = available_parallelism().map_or(1, usize::from);
     // What the manifest says, and nothing else where that fails.
     let is_plain = renderer.backend == "cpu";
     let limit = Duration::from_secs_f64(RUN_LIMIT_S);
+    let jobs = options.jobs.unwrap_or(cores);
+    announce(folder, (1..=jobs).map(worker_log))?;
     Ok(Pool {
         program: std::env::current_exe().map_err(StudyError::Worker)?,
         folder,
         renderer: if is_plain { "cpu" } else { "gpu" },
-        jobs: options.jobs.unwrap_or(cores),
+        jobs,
         run_limit: options.run_limit.unwrap_or(limit),
     })
 }

@@ -1,12 +1,16 @@
 //! A study as a Slurm job array: a task a shard, and a job that merges them when all have ended well.
 //! Slurm does the scheduling; here are only two scripts, which can be read before they are handed in.
 
-use super::{Result, StudyError, write_whole};
+use super::{Result, StudyError, announce, write_whole};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+/// Folder of the scripts, below the study's.
+const FOLDER: &str = "slurm";
+/// Of one task of the array, and of the job that merges.
+const SCRIPTS: [&str; 2] = ["array.sh", "merge.sh"];
 const NO_SBATCH: &str = "sbatch is not there: install Slurm's client (on Debian: slurm-client), or run \
                          the shards yourself with --shard and merge them";
 
@@ -99,7 +103,7 @@ impl Submission {
 
     /// Where scripts and logs go.
     pub fn scripts(&self) -> PathBuf {
-        self.folder.join("slurm")
+        self.folder.join(FOLDER)
     }
 
     /// Writes both scripts, and gives their paths.
@@ -107,13 +111,14 @@ impl Submission {
         self.check()?;
         let folder = self.scripts();
         fs::create_dir_all(&folder).map_err(|e| StudyError::file(&folder, e))?;
+        announce(&self.folder, SCRIPTS.map(|name| format!("{FOLDER}/{name}")))?;
         let write = |name: &str, text: String| {
             let path = folder.join(name);
             write_whole(&path, text.as_bytes()).map(|()| path)
         };
         Ok([
-            write("array.sh", self.array_script())?,
-            write("merge.sh", self.merge_script())?,
+            write(SCRIPTS[0], self.array_script())?,
+            write(SCRIPTS[1], self.merge_script())?,
         ])
     }
 

@@ -76,14 +76,20 @@ impl Inputs {
         folder: &Path,
         write: impl Fn(&Path, &[u8]) -> io::Result<()>,
     ) -> io::Result<()> {
-        for file in self.files.iter().filter(|f| f.is_relative()) {
-            let to = folder.join(file);
+        for copy in self.contents(folder) {
+            let (to, bytes) = copy?;
             if let Some(parent) = to.parent() {
                 fs::create_dir_all(parent)?;
             }
-            write(&to, &read_input(&self.root.join(file))?)?;
+            write(&to, &bytes)?;
         }
         Ok(())
+    }
+
+    /// The paths of [`Self::copies`], each with what the copy holds.
+    pub fn contents(&self, folder: &Path) -> impl Iterator<Item = io::Result<(PathBuf, Vec<u8>)>> {
+        let relative = self.files.iter().filter(|file| file.is_relative());
+        relative.map(move |file| Ok((folder.join(file), read_input(&self.root.join(file))?)))
     }
 
     /// Lets a scenario name the copies below a folder; absolute paths stay.
@@ -106,7 +112,7 @@ impl Inputs {
 }
 
 /// Reads a file that a study is made of.
-fn read_input(path: &Path) -> io::Result<Vec<u8>> {
+pub(crate) fn read_input(path: &Path) -> io::Result<Vec<u8>> {
     let kinds = [ReadLimit::TOML, ReadLimit::CSV, ReadLimit::OBJ];
     let ending = path.extension().unwrap_or_default();
     let kind = kinds

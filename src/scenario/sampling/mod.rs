@@ -64,6 +64,7 @@ mod template;
 
 pub use concrete::complete;
 pub use condition::{Condition, ConditionError};
+pub(crate) use inputs::read_input;
 pub use inputs::{Inputs, sha256};
 pub use sample::{SampleError, ScenarioSample};
 pub use settings::{
