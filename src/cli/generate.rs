@@ -2,12 +2,11 @@
 
 use super::fault::Failure;
 use super::print;
-use super::running::{prepare, seed};
+use super::running::{prepare, seed, unusable};
 use super::scenario_fault::load_template;
 use crate::record::{self, Listing};
-use crate::scenario::sampling::{Inputs, ScenarioSample, Template};
+use crate::scenario::sampling::{Inputs, ScenarioSample, Template, read_input};
 use std::collections::BTreeSet;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -66,10 +65,15 @@ pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
     let names: Vec<String> = samples.iter().map(|s| file_name(&template, s)).collect();
     let all: Vec<String> = copies.chain(names).chain([INDEX.to_owned()]).collect();
     claim(args, &all)?;
+    for copy in inputs.contents(Path::new(INPUTS)) {
+        let (path, bytes) = copy.map_err(Failure::run)?;
+        go_on(args, &path, &bytes)?;
+    }
     // Nothing is written unless all of them can be.
     for sample in &samples {
         let text = template.text_of(sample, &inputs, Path::new(INPUTS))?;
-        go_on(args, &file_name(&template, sample), &text)?;
+        let name = file_name(&template, sample);
+        go_on(args, Path::new(&name), text.as_bytes())?;
     }
     prepare(&args.out)?;
     write(&args.out, all, &template, &inputs, &samples)
@@ -90,10 +94,7 @@ fn file_name(template: &Template, sample: &ScenarioSample) -> String {
 /// missing was interrupted: it is gone on with where it has no other files.
 fn claim(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     let out = args.out.display();
-    let unusable = |error: io::Error| {
-        let what = format!("cannot use {out}: {error}");
-        Failure::input(what, "choose another folder with --out")
-    };
+    let unusable = |error: io::Error| unusable(&args.out, &error);
     let names = names.iter().map(String::as_str);
     if let Some(name) = record::foreign(&args.out, COMMAND, names.clone()).map_err(unusable)? {
         return Err(Failure::input(
@@ -116,18 +117,20 @@ fn claim(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     }
 }
 
-/// Refuses to replace a scenario of an interrupted set by another one without `--force`.
-fn go_on(args: &GenerateArgs, name: &str, text: &str) -> Result<(), Failure> {
-    match fs::read(args.out.join(name)) {
-        Ok(kept) if !args.force && kept != text.as_bytes() => Err(another_draw(args, name)),
-        _ => Ok(()),
+/// Refuses to replace a file of an interrupted set by another one without `--force`.
+fn go_on(args: &GenerateArgs, name: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    match read_input(&args.out.join(name)) {
+        Ok(kept) if kept == bytes => Ok(()),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        _ if args.force => Ok(()),
+        _ => Err(another_draw(args, &name.to_string_lossy())),
     }
 }
 
 fn another_draw(args: &GenerateArgs, name: &str) -> Failure {
     Failure::input(
         format!(
-            "{} holds {name} of another draw, which was interrupted",
+            "{} holds {name} of another draw, which was interrupted, or changed since",
             args.out.display()
         ),
         "give the study, number and seed of that draw to go on with it, choose another folder with --out, \
