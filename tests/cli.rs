@@ -3,31 +3,16 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
+#[path = "common/program.rs"]
+mod common;
+
+use common::{REPOSITORY, folder, program};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
-
-const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
-
-/// A folder of its own for each test, empty at the start.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("cli")
-        .join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).expect("old results can be removed");
-    }
-    fs::create_dir_all(&folder).expect("a folder can be made");
-    folder
-}
+use std::process::Output;
 
 fn metrotwin(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_metrotwin"))
-        .args(args)
-        .current_dir(REPOSITORY)
-        .env("NO_COLOR", "1")
-        .output()
-        .expect("the program starts")
+    program(args).output().expect("the program starts")
 }
 
 /// A right scenario on the test bench, in which `from` is replaced by `to`.
@@ -351,10 +336,13 @@ fn a_run_writes_whole_files() {
     assert_eq!(printed["seed"], 7);
     assert!(printed["stereo_frames"].as_u64() >= Some(2));
     assert_eq!(printed["renderer"]["backend"], "cpu");
-    assert_eq!(files, ["fixes.csv", "recording.rrd", "summary.json"]);
+    assert_eq!(
+        files,
+        ["files.txt", "fixes.csv", "recording.rrd", "summary.json"]
+    );
     // The recording of the run before does not belong to this one's summary.
     let (_, files) = run(&["--no-recording"]);
-    assert_eq!(files, ["fixes.csv", "summary.json"]);
+    assert_eq!(files, ["files.txt", "fixes.csv", "summary.json"]);
 }
 
 /// Every shipped file is right, and the report has the figures that a user plans with.

@@ -6,24 +6,23 @@
     reason = "a test fails by panicking, and an answer must come in time"
 )]
 
+#[path = "common/program.rs"]
+mod common;
+
+use common::{REPOSITORY, folder, program};
 use metrotwin::cli::check_text;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::{Duration, Instant};
 
-const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
 const SCENARIO: &str = "name = \"x\"\ntunnel = \"tunnels/chengdu_line1.toml\"\nduration_s = 0.2\n\
     [train]\nstart_chainage_m = 150.0\n";
 
 fn metrotwin(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_metrotwin"))
-        .args(args)
-        .current_dir(REPOSITORY)
-        .env("NO_COLOR", "1")
-        .env_remove("XDG_RUNTIME_DIR")
-        .output()
-        .expect("the program starts")
+    let mut command = program(args);
+    let output = command.env_remove("XDG_RUNTIME_DIR").output();
+    output.expect("the program starts")
 }
 
 /// A file is refused with exit code 2 and each of `words`; what is printed.
@@ -347,7 +346,7 @@ fn what_may_surprise_is_noted() {
 /// Provokes: a graphics driver that complains of a desktop.
 #[test]
 fn the_driver_says_nothing_of_a_desktop() {
-    let out = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli_input/quiet");
+    let out = folder("quiet");
     let out = out.to_str().expect("the path is UTF-8");
     let run = "run scenarios/line_run.toml --set duration_s=0.01 --no-recording --out";
     let args: Vec<&str> = run.split_whitespace().chain([out]).collect();

@@ -3,6 +3,9 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/program.rs"]
+mod common;
+
 use metrotwin::scenario::sampling::{PrecisionSettings, ScenarioSample, Template};
 use metrotwin::study::{
     Digest, FigureDigest, INPUTS, MANIFEST, Row, Status, Study, compare, report,
@@ -15,8 +18,7 @@ const SMALL: &str = "tests/studies/small.toml";
 
 /// A folder of a test with the inputs of the small study.
 fn folder(name: &str) -> PathBuf {
-    let folder = std::env::temp_dir().join(format!("metrotwin-{}-{name}", std::process::id()));
-    fs::remove_dir_all(&folder).ok();
+    let folder = common::folder(name);
     for file in [
         SMALL,
         "tests/studies/steps.csv",

@@ -2,9 +2,13 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/program.rs"]
+mod common;
+
 use arrow::array::AsArray;
 use arrow::datatypes::{Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
+use common::{REPOSITORY, content, folder, printed, program, refuses, succeeds};
 use image::GrayImage;
 use metrotwin::record::dataset::{DataSet, FramePlan, Provenance};
 use metrotwin::scenario::Scenario;
@@ -14,11 +18,9 @@ use metrotwin::session::{
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::path::Path;
+use std::process::Output;
 use std::sync::atomic::{AtomicBool, Ordering};
-
-const REPOSITORY: &str = env!("CARGO_MANIFEST_DIR");
 
 /// The toolbox's place in small pictures, with a box that falls instead of the worker.
 const SMALL: [&str; 14] = [
@@ -45,18 +47,6 @@ fn scenario(seed: u64) -> Scenario {
     let mut scenario = Scenario::load(&path, &overrides).unwrap();
     scenario.file.seed = seed;
     scenario
-}
-
-/// A folder of its own for each test, empty at the start.
-fn folder(test: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("frames")
-        .join(test);
-    if folder.exists() {
-        fs::remove_dir_all(&folder).unwrap();
-    }
-    fs::create_dir_all(&folder).unwrap();
-    folder
 }
 
 /// Keeps the images that reach the stack, by the names that their files have.
@@ -141,21 +131,6 @@ fn npy(path: &Path) -> (String, Vec<f32>) {
     (String::from_utf8(text.to_vec()).unwrap(), numbers.collect())
 }
 
-/// Every file below a folder with its content.
-fn content(folder: &Path, root: &Path, all: &mut BTreeMap<PathBuf, Vec<u8>>) {
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            content(&path, root, all);
-        } else {
-            all.insert(
-                path.strip_prefix(root).unwrap().to_owned(),
-                fs::read(path).unwrap(),
-            );
-        }
-    }
-}
-
 /// Fails where a file is missing, left under its temporary name, or differs from what the stack
 /// got; where tables, masks and annotations count other pixels; where rows have another time.
 #[test]
@@ -166,12 +141,8 @@ fn files_tables_and_annotations_agree() {
     let rows = table_of("frames.parquet");
     assert_eq!(rows.num_rows(), frames);
     assert_eq!(frames, delivered.0.len());
-    let mut all = BTreeMap::new();
-    content(&out, &out, &mut all);
-    assert!(
-        all.keys()
-            .all(|path| path.extension() != Some("part".as_ref()))
-    );
+    let all = content(&out);
+    assert!(all.keys().all(|name| !name.ends_with(".part")));
 
     let (ids, images, raws) = (
         ints(&rows, "frame_id"),
@@ -285,9 +256,7 @@ fn same_seed_same_bytes() {
         );
         // Ended by the first frames after the last wanted time, not by the scenario.
         assert!((0.5..0.6).contains(&simulated_s), "{simulated_s}");
-        let mut all = BTreeMap::new();
-        content(&out, &out, &mut all);
-        all
+        content(&out)
     });
     assert!(one.len() > 40, "{} files", one.len());
     assert_eq!(
@@ -295,11 +264,11 @@ fn same_seed_same_bytes() {
         two.keys().collect::<Vec<_>>()
     );
     for (path, bytes) in &one {
-        assert_eq!(bytes, &two[path], "{}", path.display());
+        assert_eq!(bytes, &two[path], "{path}");
     }
     assert_ne!(
-        one[Path::new("images/left/000002.png")],
-        other[Path::new("images/left/000002.png")]
+        one["images/left/000002.png"],
+        other["images/left/000002.png"]
     );
 }
 
@@ -319,21 +288,12 @@ fn a_run_broken_off_leaves_a_whole_set() {
 }
 
 fn frames(args: &[&str]) -> Output {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
-    command.args([
-        "frames",
-        "scenarios/forgotten_toolbox.toml",
-        "--renderer",
-        "cpu",
-    ]);
+    let line = "frames scenarios/forgotten_toolbox.toml --renderer cpu";
+    let mut command = program(line.split(' '));
     for change in SMALL {
         command.args(["--set", change]);
     }
-    command
-        .args(args)
-        .current_dir(REPOSITORY)
-        .env("NO_COLOR", "1");
-    command.output().unwrap()
+    command.args(args).output().unwrap()
 }
 
 /// Fails where a wrong argument is found too late, or somebody's files are written over.
@@ -370,12 +330,8 @@ fn the_command_refuses_what_is_wrong_and_keeps_what_is_there() {
         "left",
     ];
     assert_eq!(frames(&some).status.code(), Some(0));
-    let mut files = BTreeMap::new();
-    content(&out, &out, &mut files);
-    let names: Vec<_> = files
-        .keys()
-        .map(|p| p.to_string_lossy().into_owned())
-        .collect();
+    let files = content(&out);
+    let names: Vec<_> = files.keys().map(String::as_str).collect();
     let expected = [
         "README.md",
         "files.txt",
@@ -396,16 +352,12 @@ fn the_command_refuses_what_is_wrong_and_keeps_what_is_there() {
     fs::write(&meta, begun).unwrap();
     let mut right = some;
     right[7] = "right";
-    let refused = frames(&right);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
+    refuses(&frames(&right), "--force");
     fs::write(&meta, whole).unwrap();
 
     fs::write(out.join("mine.txt"), "kept").unwrap();
     fs::write(out.join("images/holiday.jpg"), "kept").unwrap();
-    let refused = frames(&some);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&refused.stderr).contains("--force"));
+    refuses(&frames(&some), "--force");
     let forced = [&some[..], &["--force", "--from", "0.1"]].concat();
     assert_eq!(frames(&forced).status.code(), Some(0));
     assert!(!out.join("images/left/000000.png").exists());
@@ -486,42 +438,22 @@ fn the_scenario_of_a_set_makes_the_set_again() {
         "left,W1530",
     ];
     let made = frames(&[&["--out", first.to_str().unwrap()], &some[..], &change].concat());
-    assert_eq!(
-        made.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
-    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
-    command.args([
-        "frames",
-        "first/scenario.toml",
-        "--renderer",
-        "cpu",
-        "--out",
-        "again",
-    ]);
+    succeeds(&made);
+    let line = "frames first/scenario.toml --renderer cpu --out again";
+    let mut command = program(line.split(' '));
     let made = command.args(some).current_dir(&base).output().unwrap();
-    assert_eq!(
-        made.status.code(),
-        Some(0),
-        "{}",
-        String::from_utf8_lossy(&made.stderr)
-    );
+    succeeds(&made);
     let [a, b] = [&first, &again].map(|out| {
-        let mut all = BTreeMap::new();
-        content(out, out, &mut all);
-        all.retain(|path, _| !path.starts_with("inputs"));
+        let mut all = content(out);
         // These two tell of changes and list the inputs.
-        all.retain(|path, _| path != Path::new("meta.json") && path != Path::new("files.txt"));
+        all.retain(|name, _| {
+            !name.starts_with("inputs/") && name != "meta.json" && name != "files.txt"
+        });
         all
     });
     assert!(a.len() > 8);
     assert!(a.keys().eq(b.keys()));
-    for (path, bytes) in a
-        .iter()
-        .filter(|(path, _)| *path != Path::new("scenario.toml"))
-    {
-        assert!(*bytes == b[path], "{}", path.display());
+    for (name, bytes) in a.iter().filter(|(name, _)| *name != "scenario.toml") {
+        assert!(*bytes == b[name], "{name}");
     }
 }

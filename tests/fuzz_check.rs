@@ -1,16 +1,18 @@
 //! `metrotwin check` on files that nobody wrote: shipped ones with changes by structure and by text.
 //!
 //! No panic, no answer over 2 s, no memory over 500 MB. `METROTWIN_FUZZ` is the number of files, for
-//! instance 1000000; `METROTWIN_FUZZ_SEED` draws others.
+//! instance 1000000; `METROTWIN_FUZZ_CASE` is one of them again.
 #![cfg(feature = "twin")]
 #![allow(
     clippy::unwrap_used,
-    clippy::panic,
     clippy::print_stdout,
-    clippy::disallowed_methods,
     reason = "a test fails by panicking, and says how far it came"
 )]
 
+#[path = "common/fuzz.rs"]
+mod fuzz;
+
+use fuzz::{Draw, cases, check_memory, execute};
 use metrotwin::cli::check_text;
 use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{self, RendererChoice, RunOptions};
@@ -18,19 +20,15 @@ use metrotwin::settings::{FileError, Problem, Settings, read_settings};
 use metrotwin::track::Tunnel;
 use metrotwin::twin::physics::VehicleFile;
 use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
 use toml::{Table, Value};
 
 /// Files where the number is not given: some seconds.
 const FEW: u64 = 3000;
 /// One of so many is checked with all files that it names, and its answer printed.
 const WHOLE_EVERY: u64 = 25;
-/// One of so many that are right is run.
+/// One of so many is run, if it is right.
 const RUN_EVERY: u64 = 50;
-const LONGEST_ANSWER: Duration = Duration::from_secs(2);
-const MOST_MEMORY_KB: u64 = 500_000;
 
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
@@ -75,27 +73,6 @@ fn shipped() -> Vec<Shipped> {
     files
 }
 
-/// Draws of SplitMix64.
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    }
-
-    fn below(&mut self, count: usize) -> usize {
-        (self.next() % count.max(1) as u64) as usize
-    }
-
-    fn of<'a, T>(&mut self, list: &'a [T]) -> &'a T {
-        &list[self.below(list.len())]
-    }
-}
-
 const NUMBERS: [&str; 22] = [
     "0",
     "-0.0",
@@ -132,7 +109,7 @@ fn odd_value(draw: &mut Draw) -> Value {
         5 => Value::Table(Table::new()),
         6 => (0..1 + draw.below(100)).fold(Value::Integer(1), |value, _| Value::Array(vec![value])),
         _ => {
-            let text = format!("v = {}", draw.of(&NUMBERS));
+            let text = format!("v = {}", draw.pick(&NUMBERS));
             text.parse::<Table>().unwrap().remove("v").unwrap()
         }
     }
@@ -145,7 +122,7 @@ fn change_table(table: &mut Table, donor: &Table, draw: &mut Draw) {
         table.insert("odd".to_owned(), odd_value(draw));
         return;
     }
-    let key = draw.of(&keys).clone();
+    let key = draw.pick(&keys).clone();
     let is_deep = matches!(table[&key], Value::Table(_) | Value::Array(_));
     if is_deep && draw.below(4) > 0 {
         change_value(&mut table[&key], donor, draw);
@@ -159,12 +136,12 @@ fn change_table(table: &mut Table, donor: &Table, draw: &mut Draw) {
         }
         2 => {
             let value = table.remove(&key).unwrap();
-            let other = draw.of(&keys).clone();
+            let other = draw.pick(&keys).clone();
             table.insert(other, value);
         }
         3 => {
             let donors: Vec<_> = donor.iter().collect();
-            let (key, value) = *draw.of(&donors);
+            let (key, value) = *draw.pick(&donors);
             table.insert(key.clone(), value.clone());
         }
         _ => _ = table.insert(key, odd_value(draw)),
@@ -199,14 +176,14 @@ fn change_text(text: &str, donor: &str, draw: &mut Draw) -> String {
         let end = (at + draw.below(40)).min(bytes.len());
         match draw.below(7) {
             0 => _ = bytes.drain(at..end),
-            1 => bytes.insert(at, draw.next() as u8),
+            1 => bytes.insert(at, draw.word() as u8),
             2 => {
                 let from = draw.below(donor.len());
                 let to = (from + draw.below(200)).min(donor.len());
                 _ = bytes.splice(at..end, donor.as_bytes()[from..to].iter().copied());
             }
             3 => {
-                let byte = *draw.of(b"[({\"'= \n-9.");
+                let byte = *draw.pick(b"[({\"'= \n-9.");
                 _ = bytes.splice(at..at, std::iter::repeat_n(byte, 1 << draw.below(17)));
             }
             4 => {
@@ -229,13 +206,13 @@ fn change_number(bytes: &mut Vec<u8>, at: usize, draw: &mut Draw) {
     let is_part = |byte: &u8| byte.is_ascii_digit() || b"._eE".contains(byte);
     let length = rest[start..].iter().position(|b| !is_part(b));
     let (start, length) = (at + start, length.unwrap_or(rest.len() - start));
-    _ = bytes.splice(start..start + length, draw.of(&NUMBERS).bytes());
+    _ = bytes.splice(start..start + length, draw.pick(&NUMBERS).bytes());
 }
 
 /// A file with some changes.
-fn mutant(files: &[Shipped], seed: u64) -> (&Shipped, String) {
-    let mut draw = Draw(seed);
-    let (file, donor) = (draw.of(files), draw.of(files));
+fn mutant(files: &[Shipped], case: u64) -> (&Shipped, String) {
+    let mut draw = Draw::of(case);
+    let (file, donor) = (draw.pick(files), draw.pick(files));
     if draw.below(2) == 0 {
         return (file, change_text(&file.text, &donor.text, &mut draw));
     }
@@ -290,94 +267,33 @@ fn short_run(path: &Path, text: &str) {
     _ = session::run(&scenario, &options, &mut []);
 }
 
-/// Time that this thread has had of a processor: on a busy machine an answer waits for its turn.
-fn processor_time() -> Option<Duration> {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    let nanos = text.split_whitespace().next()?.parse().ok()?;
-    Some(Duration::from_nanos(nanos))
-}
-
-/// The most memory that this process has had, kB.
-fn peak_memory_kb() -> Option<u64> {
-    let text = fs::read_to_string("/proc/self/status").ok()?;
-    let line = text.lines().find(|line| line.starts_with("VmHWM"))?;
-    line.split_whitespace().nth(1)?.parse().ok()
-}
-
-#[derive(Default)]
-struct Tally {
-    right: u64,
-    whole: u64,
-    runs: u64,
-    longest: Duration,
-}
-
-impl Tally {
-    /// Does something with a mutant in bounded time, and without a panic.
-    fn guarded<T>(&mut self, seed: u64, text: &str, what: impl FnOnce() -> T) -> T {
-        let (start, before) = (Instant::now(), processor_time());
-        let answer = catch_unwind(AssertUnwindSafe(what));
-        let taken = match (processor_time(), before) {
-            (Some(now), Some(before)) => now.saturating_sub(before),
-            _ => start.elapsed(),
-        };
-        self.longest = self.longest.max(taken);
-        let keep = || {
-            let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("mutant_{seed}.toml"));
-            fs::write(&path, text).unwrap();
-            path.display().to_string()
-        };
-        if taken > LONGEST_ANSWER {
-            panic!("seed {seed} took {taken:?}: {}", keep());
-        }
-        if peak_memory_kb().is_some_and(|kb| kb > MOST_MEMORY_KB) {
-            panic!("seed {seed} took {:?} kB: {}", peak_memory_kb(), keep());
-        }
-        answer.unwrap_or_else(|_| panic!("seed {seed} panics: {}", keep()))
-    }
-}
-
 /// Provokes: a panic, an answer that takes for ever, a message or memory without bounds, by any file.
 #[test]
 fn any_file_is_answered() {
-    let number = |name: &str| std::env::var(name).ok().and_then(|text| text.parse().ok());
-    let count: u64 = number("METROTWIN_FUZZ").unwrap_or(FEW);
-    let first: u64 = number("METROTWIN_FUZZ_SEED").unwrap_or(0);
     let files = shipped();
-    let mut tally = Tally::default();
-    for seed in first..first + count {
-        let (file, text) = mutant(&files, seed);
-        let right = tally.guarded(seed, &text, || parsed(file.kind, &text));
-        tally.right += u64::from(right);
-        if seed % WHOLE_EVERY == 0 {
-            tally.whole += 1;
-            let said = tally.guarded(seed, &text, || check_text(&file.path, &text));
-            assert!(
-                said.unwrap_or_else(|error| error).len() < 200_000,
-                "seed {seed}"
-            );
+    let all = cases(FEW);
+    let count = all.end - all.start;
+    let (mut right, mut whole, mut runs) = (0, 0, 0);
+    for case in all {
+        let (file, text) = mutant(&files, case);
+        let name = file.path.display().to_string();
+        let is_right = execute(case, &name, || parsed(file.kind, &text));
+        right += u64::from(is_right);
+        if case % WHOLE_EVERY == 0 {
+            whole += 1;
+            let said = execute(case, &name, || check_text(&file.path, &text));
+            let length = said.unwrap_or_else(|error| error).len();
+            assert!(length < 200_000, "case {case}");
         }
-        if right && file.kind == Kind::Scenario && tally.right % RUN_EVERY == 0 {
-            tally.runs += 1;
-            tally.guarded(seed, &text, || short_run(&file.path, &text));
+        if is_right && file.kind == Kind::Scenario && case % RUN_EVERY == 0 {
+            runs += 1;
+            execute(case, &name, || short_run(&file.path, &text));
         }
-        if (seed + 1 - first).is_multiple_of(100_000) {
-            println!("{} files, {:?} kB", seed + 1 - first, peak_memory_kb());
+        if case % 1000 == 0 {
+            check_memory();
         }
     }
-    let Tally {
-        right,
-        whole,
-        runs,
-        longest,
-    } = tally;
-    println!(
-        "{count} files: {right} right, {whole} checked whole, {runs} run; longest answer {longest:?}, peak \
-         {:?} kB",
-        peak_memory_kb()
-    );
-    assert!(
-        right > count / 100 && whole > 0,
-        "{right} right, {whole} whole"
-    );
+    check_memory();
+    println!("{count} files: {right} right, {whole} checked whole, {runs} run");
+    assert!(count < FEW || right > count / 100, "{right} right");
 }

@@ -11,13 +11,21 @@
     reason = "a test fails by panicking, and prints what it counted"
 )]
 
+#[path = "common/program.rs"]
+mod common;
+#[path = "common/fuzz.rs"]
+mod fuzz;
+
+use common::{PROGRAM, REPOSITORY, content, folder, metrotwin, printed, refuses, run, succeeds};
+use fuzz::Draw;
 use metrotwin::study::{Row, read_rows};
 use rerun::external::re_log_encoding::DecoderApp;
+use rerun::log::{Chunk, LogMsg};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::BufReader;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -33,77 +41,12 @@ const SMALL: &str = "--set workers=[] --set duration_s=0.65 --set rig.pairs_per_
     --set wayside[0].camera.pixel_um=15 --set wayside[0].camera.line_time_us=59.2 \
     --set train.start_chainage_m=700 --renderer cpu";
 
-/// Numbers from 0 to 1, the same ones in every run (SplitMix64).
-struct Draws(u64);
-
-impl Draws {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        (z ^ (z >> 31)) as f64 / u64::MAX as f64
-    }
-}
-
-/// A folder of a test, empty.
-fn folder(name: &str) -> PathBuf {
-    let path = Path::new(env!("CARGO_TARGET_TMPDIR"))
-        .join("kills")
-        .join(name);
-    fs::remove_dir_all(&path).ok();
-    fs::create_dir_all(&path).unwrap();
-    path
-}
-
-/// The program with arguments that have no spaces.
-fn metrotwin(line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
-    command.args(line.split_whitespace());
-    command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    command
-}
-
-fn printed(output: &Output) -> String {
-    let streams = [&output.stdout, &output.stderr];
-    streams
-        .map(|s| String::from_utf8_lossy(s).into_owned())
-        .concat()
-}
-
-fn succeeds(line: &str) {
-    let output = metrotwin(line).output().unwrap();
-    assert!(output.status.success(), "{line}: {}", printed(&output));
-}
-
 #[allow(
     clippy::disallowed_methods,
     reason = "how long a command takes, so that kills fall into it"
 )]
 fn now() -> Instant {
     Instant::now()
-}
-
-/// Every file below a folder with its content.
-fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    fn add(folder: &Path, root: &Path, all: &mut BTreeMap<String, Vec<u8>>) {
-        for entry in fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                add(&path, root, all);
-            } else {
-                let name = path
-                    .strip_prefix(root)
-                    .unwrap()
-                    .to_string_lossy()
-                    .into_owned();
-                all.insert(name, fs::read(path).unwrap());
-            }
-        }
-    }
-    let mut all = BTreeMap::new();
-    add(folder, folder, &mut all);
-    all
 }
 
 /// A command whose results lie in one folder.
@@ -123,32 +66,36 @@ struct Killed {
     same: fn(&Path, &Path),
 }
 
-/// Kills the command at drawn moments, each time in a folder of its own and sometimes twice, until the
-/// command has had its share of all kills. Gives the number of kills that hit it before its end.
+/// Kills the command at drawn moments, each time in a folder of its own and sometimes twice, until it has
+/// been hit before its end as often as is its share of all kills. Most kills must hit.
 fn kill_at_drawn_moments(case: &Killed) {
     let all = std::env::var("METROTWIN_KILLS").map_or(10, |n| n.parse::<usize>().unwrap());
-    let base = folder(case.name);
+    let base = folder(&format!("of_{}", case.name));
     let whole = base.join("whole");
     fs::create_dir_all(&whole).unwrap();
     (case.prepare)(&whole);
     let begin = now();
-    succeeds(&(case.line)(&whole));
+    succeeds(&run(&(case.line)(&whole)));
     let lasts_s = begin.elapsed().as_secs_f64();
     let whole_files = content(&whole);
 
-    let mut draws = Draws(case.name.len() as u64);
+    let seed = (case.name.bytes()).fold(0, |seed: u64, byte| seed * 31 + u64::from(byte));
+    let mut draw = Draw::of(seed);
+    let wanted = all.div_ceil(COMMANDS);
     let (mut kills, mut hits) = (0, 0);
-    while kills < all.div_ceil(COMMANDS) {
+    while hits < wanted {
         let out = base.join("killed");
         fs::remove_dir_all(&out).ok();
         fs::create_dir_all(&out).unwrap();
         (case.prepare)(&out);
         let mut kept = 0;
         loop {
-            let moment = Duration::from_secs_f64(1.05 * lasts_s * draws.next());
-            let mut child = metrotwin(&(case.line)(&out)).spawn().unwrap();
+            let moment = Duration::from_secs_f64(lasts_s * draw.share());
+            let mut command = metrotwin(&(case.line)(&out));
+            let mut child = (command.stdout(Stdio::null()).stderr(Stdio::null()).spawn()).unwrap();
             sleep(moment);
-            hits += usize::from(child.try_wait().unwrap().is_none());
+            let is_hit = child.try_wait().unwrap().is_none();
+            hits += usize::from(is_hit);
             child.kill().unwrap();
             child.wait().unwrap();
             kills += 1;
@@ -160,7 +107,7 @@ fn kill_at_drawn_moments(case: &Killed) {
             );
             kept = now;
             what_is_there_is_whole(case, &out, &whole_files);
-            if (case.is_done)(&out) || draws.next() < 0.6 {
+            if !is_hit || (case.is_done)(&out) || draw.share() < 0.6 {
                 break;
             }
         }
@@ -172,7 +119,7 @@ fn kill_at_drawn_moments(case: &Killed) {
             fs::write(path, name).unwrap();
         }
         if !(case.is_done)(&out) {
-            succeeds(&(case.line)(&out));
+            succeeds(&run(&(case.line)(&out)));
         }
         let mut files = content(&out);
         for name in FOREIGN.iter().filter(|_| has_begun) {
@@ -183,10 +130,12 @@ fn kill_at_drawn_moments(case: &Killed) {
         what_is_there_is_whole(case, &out, &whole_files);
         (case.same)(&out, &whole);
     }
-    println!(
+    let what = format!(
         "{}: {kills} kills, {hits} of them before its end ({lasts_s:.2} s)",
         case.name
     );
+    println!("{what}");
+    assert!(kills <= 2 * wanted + 4, "{what}");
     fs::remove_dir_all(base).ok();
 }
 
@@ -206,11 +155,8 @@ fn what_is_there_is_whole(case: &Killed, out: &Path, whole: &BTreeMap<String, Ve
 }
 
 fn same_study(a: &Path, b: &Path) {
-    succeeds(&format!(
-        "study compare {} {} --same",
-        a.display(),
-        b.display()
-    ));
+    let [a, b] = [a, b].map(Path::display);
+    succeeds(&run(&format!("study compare {a} {b} --same")));
 }
 
 /// A study that loses rows, or whose folder blocks the next `--resume`.
@@ -237,9 +183,9 @@ fn study_merge() {
     for k in 1..=2 {
         let out = shards.join(format!("shard-{k}-of-2"));
         let out = out.display();
-        succeeds(&format!(
+        succeeds(&run(&format!(
             "study run {STUDY} --renderer cpu --shard {k}/2 --out {out}"
-        ));
+        )));
     }
     let files = content(&shards);
     kill_at_drawn_moments(&Killed {
@@ -258,7 +204,7 @@ fn study_merge() {
             })
         },
         is_done: |_| false,
-        varies: |name| name == "rows.jsonl" || name == "report.html",
+        varies: |name| ["rows.jsonl", "report.html", "files.txt"].contains(&name),
         same: same_study,
     });
     fs::remove_dir_all(shards).ok();
@@ -310,17 +256,38 @@ fn generate() {
     });
 }
 
-/// Messages that a recording, or what is left of it, holds.
+/// Messages that a recording, or what is left of it, holds: all that is whole stands before the first
+/// that is not.
+fn read_recording(path: &Path) -> Vec<LogMsg> {
+    let Ok(file) = File::open(path) else {
+        return Vec::new();
+    };
+    let mut all = DecoderApp::decode_lazy(BufReader::new(file));
+    let whole: Vec<_> = all.by_ref().map_while(Result::ok).collect();
+    assert!(all.next().is_none(), "{} is torn", path.display());
+    whole
+}
+
 fn messages(path: &Path) -> usize {
-    let file = File::open(path).map(BufReader::new);
-    file.map_or(0, |file| {
-        DecoderApp::decode_lazy(file).filter(Result::is_ok).count()
-    })
+    read_recording(path).len()
+}
+
+/// The last simulated time in a recording, s.
+fn recorded_s(path: &Path) -> f64 {
+    let times = read_recording(path).into_iter().filter_map(|message| {
+        let LogMsg::ArrowMsg(_, rows) = &message else {
+            return None;
+        };
+        let batch = Chunk::from_arrow_msg(rows).unwrap();
+        let times = batch.timelines().get(&"sim_time".into())?;
+        Some(times.time_range().max().as_i64())
+    });
+    times.max().unwrap_or(0) as f64 * 1e-9
 }
 
 /// A run whose recording cannot be read after a kill, or whose next one is hindered by it.
 #[test]
-fn run() {
+fn single_run() {
     kill_at_drawn_moments(&Killed {
         name: "run",
         line: |out| {
@@ -328,9 +295,13 @@ fn run() {
             format!("run scenarios/forgotten_toolbox.toml {SMALL} --out {out}")
         },
         prepare: Box::new(|_| ()),
-        kept: |_| 0,
+        // The next run begins a recording of its own.
+        kept: |out| {
+            messages(&out.join("recording.rrd.part"));
+            0
+        },
         is_done: |_| false,
-        varies: |name| name == "recording.rrd" || name == "summary.json",
+        varies: |name| ["recording.rrd", "summary.json", "files.txt"].contains(&name),
         same: |a, b| {
             let count = |folder: &Path| messages(&folder.join("recording.rrd"));
             assert_eq!(count(a), count(b));
@@ -374,12 +345,92 @@ fn send(signal: &str, child: &Child) {
     assert!(sent.unwrap().success());
 }
 
-/// A run of hours, without pictures.
-fn long_run(out: &Path) -> String {
+/// A run without pictures.
+fn run_of(duration_s: u32, out: &Path) -> String {
     let out = out.display();
-    let long =
-        "--set duration_s=80000 --set stop_after_standstill_s=80000 --set train.stop_at_m=300";
-    format!("run scenarios/low_adhesion.toml {long} --out {out}")
+    format!(
+        "run scenarios/low_adhesion.toml --set duration_s={duration_s} \
+         --set stop_after_standstill_s={duration_s} --set train.stop_at_m=300 --out {out}"
+    )
+}
+
+fn long_run(out: &Path) -> String {
+    run_of(80_000, out)
+}
+
+/// In the background of a script signals are ignored, and would stay so.
+fn spawn_with_signals(line: &str) -> Child {
+    let mut command = Command::new("env");
+    command.args(["--default-signal", PROGRAM]);
+    command.args(line.split_whitespace());
+    let piped = command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    piped.current_dir(REPOSITORY).spawn().unwrap()
+}
+
+/// Fails where a kill takes more of a recording than its last second.
+#[test]
+fn a_killed_run_leaves_its_recording() {
+    let out = folder("recording");
+    let mut command = metrotwin(&run_of(100, &out));
+    let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
+    let lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    let mut lines = lines.map_while(Result::ok);
+    assert!(lines.any(|line| line.contains("30 % of the run")));
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let kept_s = recorded_s(&out.join("recording.rrd.part"));
+    assert!((29.0..100.0).contains(&kept_s), "{kept_s} s");
+}
+
+/// Fails where a second run into a folder removes what the first one writes.
+#[cfg(target_os = "linux")]
+#[test]
+fn two_runs_do_not_share_a_folder() {
+    let out = folder("two");
+    let child = spawn_with_signals(&long_run(&out));
+    let part = out.join("recording.rrd.part");
+    wait_for(&part);
+    for more in ["", "--no-recording"] {
+        let second = run(&format!("{} {more}", run_of(1, &out)));
+        refuses(&second, "another process is writing");
+        assert!(part.exists());
+    }
+    send("-TERM", &child);
+    let output = child.wait_with_output().unwrap();
+    assert!(printed(&output).contains("the run was broken off"));
+    assert!(messages(&out.join("recording.rrd")) > 10);
+}
+
+/// Fails where a study that waits for a run in flight cannot be ended but by a kill.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_second_term_ends_a_command_at_once() {
+    let base = folder("second_term");
+    let text = fs::read_to_string(STUDY).unwrap();
+    let text = text
+        .replace("duration_s = 1.5", "duration_s = 80000.0")
+        .replace("../..", REPOSITORY)
+        .replace(
+            "steps.csv",
+            &format!("{REPOSITORY}/tests/studies/steps.csv"),
+        );
+    let (study, out) = (base.join("long.toml"), base.join("out"));
+    fs::write(&study, text).unwrap();
+    let [study, folder] = [&study, &out].map(|path| path.display());
+    let line = format!("study run {study} --renderer cpu --jobs 1 --out {folder}");
+    let mut child = spawn_with_signals(&line);
+    wait_for(&out.join("worker-1.log"));
+    send("-TERM", &child);
+    send("-TERM", &child);
+    sleep(Duration::from_millis(1500));
+    assert!(child.try_wait().unwrap().is_none(), "it waits for no run");
+    send("-TERM", &child);
+    let ended = (0..100).any(|_| {
+        sleep(Duration::from_millis(50));
+        child.try_wait().unwrap().is_some()
+    });
+    child.kill().ok();
+    assert!(ended);
 }
 
 /// Fails where Slurm, a container or a closed terminal ends a run as a kill does; where a signal that is
@@ -389,14 +440,7 @@ fn long_run(out: &Path) -> String {
 fn term_and_hup_end_a_run_as_ctrl_c_does() {
     for signal in ["-INT", "-TERM", "-HUP"] {
         let out = folder(&format!("signal{signal}"));
-        // In the background of a script signals are ignored, and would stay so.
-        let mut command = Command::new("env");
-        command
-            .args(["--default-signal", env!("CARGO_BIN_EXE_metrotwin")])
-            .args(long_run(&out).split_whitespace())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped());
-        let child = command.spawn().unwrap();
+        let child = spawn_with_signals(&long_run(&out));
         wait_for(&out.join("recording.rrd.part"));
         send(signal, &child);
         if signal != "-INT" {
@@ -427,8 +471,7 @@ fn term_and_hup_end_a_run_as_ctrl_c_does() {
 fn a_signal_that_is_ignored_from_outside_stays_ignored() {
     let out = folder("nohup");
     let line = long_run(&out);
-    let program = env!("CARGO_BIN_EXE_metrotwin");
-    let script = format!("trap '' HUP; exec '{program}' {line}");
+    let script = format!("trap '' HUP; exec '{PROGRAM}' {line}");
     let mut command = Command::new("sh");
     command
         .args(["-c", &script])

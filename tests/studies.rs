@@ -3,6 +3,10 @@
 #![cfg(feature = "twin")]
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+#[path = "common/program.rs"]
+mod common;
+
+use common::{PROGRAM, folder, metrotwin, printed, refuses, run, says, succeeds};
 use metrotwin::study::{MANIFEST, Row, Study, read_rows};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,25 +15,6 @@ use std::thread::sleep;
 use std::time::Duration;
 
 const SMALL: &str = "tests/studies/small.toml";
-
-/// A folder of a test, empty.
-fn folder(name: &str) -> PathBuf {
-    let path = std::env::temp_dir().join(format!("metrotwin-{}-{name}", std::process::id()));
-    fs::remove_dir_all(&path).ok();
-    fs::create_dir_all(&path).unwrap();
-    path
-}
-
-/// The program with arguments that have no spaces.
-fn metrotwin(line: &str) -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_metrotwin"));
-    command.args(line.split_whitespace());
-    command
-}
-
-fn run(line: &str) -> Output {
-    metrotwin(line).output().unwrap()
-}
 
 fn study(out: &Path, more: &str) -> Output {
     study_of(Path::new(SMALL), out, more)
@@ -57,27 +42,6 @@ fn changed(base: &Path, from: &str, to: &str) -> PathBuf {
     let path = folder.join("small.toml");
     fs::write(&path, text.replace(from, to)).unwrap();
     path
-}
-
-fn printed(output: &Output) -> String {
-    let streams = [&output.stdout, &output.stderr];
-    streams
-        .map(|s| String::from_utf8_lossy(s).into_owned())
-        .join("\n")
-}
-
-fn succeeds(output: &Output) {
-    assert!(output.status.success(), "{}", printed(output));
-}
-
-fn says(output: &Output, what: &str) {
-    let printed = printed(output);
-    assert!(printed.contains(what), "no `{what}` in: {printed}");
-}
-
-fn refuses(output: &Output, what: &str) {
-    assert_eq!(output.status.code(), Some(2), "{}", printed(output));
-    says(output, what);
 }
 
 fn same(a: &Path, b: &Path) {
@@ -429,10 +393,9 @@ fn no_worker_outlives_its_study() {
 fn a_full_disk_loses_nothing() {
     let base = folder("full");
     let out = base.join("out");
-    let program = env!("CARGO_BIN_EXE_metrotwin");
     // No file over 4 KiB: so full is the disk for the journal.
     let line = study_line(Path::new(SMALL), &out, "--jobs 1 --resume");
-    let line = format!("trap '' XFSZ; ulimit -f 4; exec '{program}' {line}");
+    let line = format!("trap '' XFSZ; ulimit -f 4; exec '{PROGRAM}' {line}");
     // The copies of the inputs are larger: they are there already.
     succeeds(&study(&out, "--runs 1"));
     let output = Command::new("bash").args(["-c", &line]).output().unwrap();
@@ -535,6 +498,10 @@ fn submit_refuses_what_a_script_would_read_otherwise() {
 #[test]
 fn val_a_rare_event_is_estimated() {
     use metrotwin::scenario::sampling::Template;
+    #[path = "common/program.rs"]
+    mod common;
+
+    use common::{PROGRAM, folder, metrotwin, printed, refuses, run, says, succeeds};
     use metrotwin::study::Digest;
     let base = folder("rare");
     let file = Path::new("tests/studies/rare.toml");

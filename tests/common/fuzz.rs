@@ -49,6 +49,11 @@ impl Draw {
         z ^ (z >> 31)
     }
 
+    /// From 0 to 1.
+    pub fn share(&mut self) -> f64 {
+        self.word() as f64 / u64::MAX as f64
+    }
+
     /// Under `n`; 0 of 0.
     pub fn below(&mut self, n: usize) -> usize {
         (self.word() % n.max(1) as u64) as usize
