@@ -8,7 +8,7 @@ mod common;
 use arrow::array::AsArray;
 use arrow::datatypes::{Float64Type, Int64Type};
 use arrow::record_batch::RecordBatch;
-use common::{REPOSITORY, content, folder, printed, program, refuses, succeeds};
+use common::{REPOSITORY, content, folder, program, refuses, succeeds};
 use image::GrayImage;
 use metrotwin::record::dataset::{DataSet, FramePlan, Provenance};
 use metrotwin::scenario::Scenario;

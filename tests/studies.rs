@@ -343,6 +343,11 @@ fn a_merge_that_was_cut_off_does_not_block_the_next() {
         succeeds(&study(&out, &format!("--runs 1 --shard {k}/2")));
     }
     let merge = || run(&format!("study merge {}", base.display()));
+    succeeds(&merge());
+    // As before the first one, but for the list of files.
+    for name in [MANIFEST, "rows.jsonl", "rows.parquet"] {
+        fs::remove_file(base.join(name)).unwrap();
+    }
     let in_the_way = base.join("rows.parquet.part");
     fs::create_dir(&in_the_way).unwrap();
     assert!(!merge().status.success());
@@ -498,10 +503,6 @@ fn submit_refuses_what_a_script_would_read_otherwise() {
 #[test]
 fn val_a_rare_event_is_estimated() {
     use metrotwin::scenario::sampling::Template;
-    #[path = "common/program.rs"]
-    mod common;
-
-    use common::{PROGRAM, folder, metrotwin, printed, refuses, run, says, succeeds};
     use metrotwin::study::Digest;
     let base = folder("rare");
     let file = Path::new("tests/studies/rare.toml");

@@ -42,7 +42,7 @@ impl ReadLimit {
 }
 
 /// Opens a file to be read; fails where it is a device, a pipe or a folder.
-pub(crate) fn open_regular(path: &Path) -> io::Result<File> {
+pub fn open_regular(path: &Path) -> io::Result<File> {
     // To open a pipe would wait for its writer.
     if !fs::metadata(path)?.is_file() {
         return Err(refused("it is no regular file"));

@@ -16,8 +16,7 @@ pub use checker::Checker;
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
 pub use document::{locate, read_settings, read_toml};
-pub(crate) use files::open_regular;
-pub use files::{ReadLimit, read_bytes, read_text};
+pub use files::{ReadLimit, open_regular, read_bytes, read_text};
 pub(crate) use numbers::one;
 pub use numbers::{Numbers, put_range};
 pub use problem::{
