@@ -64,6 +64,11 @@ fn files_of_others_are_not_written_over() {
         refuses(&output, name);
         says(&output, "is there already, and is not ours");
         assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
+        // Inputs are held against the folder when it is locked.
+        assert!(
+            content(&out).len() == 1 || name.starts_with("inputs/"),
+            "{name}"
+        );
     }
 }
 

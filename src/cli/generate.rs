@@ -146,8 +146,7 @@ fn write(
     inputs: &Inputs,
     samples: &[ScenarioSample],
 ) -> io::Result<()> {
-    let mut listing = Listing::open(out, COMMAND)?;
-    listing.announce(names)?;
+    let listing = Listing::claim(out, COMMAND, names)?;
     record::remove(&out.join(INDEX))?;
     inputs.copy_to(&out.join(INPUTS), record::write_whole)?;
     for sample in samples {

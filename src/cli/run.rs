@@ -282,7 +282,5 @@ fn listing(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<Listin
     let rigs = scenario.onboard.iter().filter(|o| o.rig.is_some());
     let fixes = rigs.map(|o| FixTable::file_name(o.id()));
     let names = recording.into_iter().flatten().chain(fixes);
-    let mut listing = Listing::open(out, COMMAND)?;
-    listing.announce(names.chain([SUMMARY.to_owned()]))?;
-    Ok(listing)
+    Listing::claim(out, COMMAND, names.chain([SUMMARY.to_owned()]).collect())
 }

@@ -56,6 +56,18 @@ impl Listing {
         })
     }
 
+    /// Goes on with the list of a folder, or begins one, with names of files that are about to be written.
+    /// In a folder where one of them is somebody else's nothing is made.
+    pub fn claim(folder: &Path, command: &'static str, names: Vec<String>) -> io::Result<Self> {
+        if let Some(name) = foreign(folder, command, names.iter().map(String::as_str))? {
+            let path = in_the_way(folder, name, false);
+            return Err(taken(&path.unwrap_or_else(|| folder.join(name))));
+        }
+        let mut listing = Self::open(folder, command)?;
+        listing.announce(names)?;
+        Ok(listing)
+    }
+
     /// Lists files that are about to be written, by their paths below the folder. One that is there and
     /// not listed is somebody else's, and an error; so is one in a folder that is a link.
     pub fn announce(&mut self, names: impl IntoIterator<Item = String>) -> io::Result<()> {
@@ -65,14 +77,11 @@ impl Listing {
                 let what = format!("`{}` is no name that can be listed", name.escape_debug());
                 return Err(io::Error::new(ErrorKind::InvalidInput, what));
             }
-            if let Some(link) = links(&self.folder, &name).next() {
-                return Err(taken(&link));
+            let is_listed = self.earlier.contains(&name) || self.announced.contains(&name);
+            if let Some(path) = in_the_way(&self.folder, &name, is_listed) {
+                return Err(taken(&path));
             }
-            if !self.earlier.contains(&name) && !self.announced.contains(&name) {
-                let path = self.folder.join(&name);
-                if let Some(path) = [part_name(&path), path].iter().find(|path| is_there(path)) {
-                    return Err(taken(path));
-                }
+            if !is_listed {
                 lines += &format!("{name}\n");
             }
             self.announced.insert(name);
@@ -114,12 +123,8 @@ pub(crate) fn foreign<'a>(
         Some(listed) => name == LIST || listed.contains(name),
         None => false,
     };
-    let is_other = |name: &str| {
-        let is_linked = links(folder, name).next().is_some();
-        is_linked || is_there(&folder.join(name)) && !is_ours(name)
-    };
     let mut names = names.into_iter().chain([LIST]);
-    Ok(names.find(|name| is_other(name)))
+    Ok(names.find(|name| in_the_way(folder, name, is_ours(name)).is_some()))
 }
 
 /// Whether a folder holds nothing, or is not there.
@@ -134,6 +139,15 @@ pub(crate) fn is_empty(folder: &Path) -> io::Result<bool> {
 /// Also of a link that leads nowhere.
 fn is_there(path: &Path) -> bool {
     path.symlink_metadata().is_ok()
+}
+
+/// What keeps a file from being written: a folder above it that is a link, and where it is not listed,
+/// what has its name.
+fn in_the_way(folder: &Path, name: &str, is_listed: bool) -> Option<PathBuf> {
+    let path = folder.join(name);
+    let own = [part_name(&path), path];
+    let own = own.into_iter().filter(|path| !is_listed && is_there(path));
+    links(folder, name).chain(own).next()
 }
 
 /// Folders between a folder and a file below it that are links.

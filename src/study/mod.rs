@@ -176,8 +176,10 @@ const COMMAND: &str = "metrotwin study";
 
 /// Lists files of a study's folder before they are written, by their paths below it.
 fn announce(folder: &Path, names: impl IntoIterator<Item = String>) -> Result {
-    let listed = Listing::open(folder, COMMAND).and_then(|mut list| list.announce(names));
-    listed.map_err(|source| not_written(&folder.join(LIST), source))
+    let listed = Listing::claim(folder, COMMAND, names.into_iter().collect());
+    listed
+        .map(drop)
+        .map_err(|source| not_written(&folder.join(LIST), source))
 }
 
 /// Why a file of a study's folder is not written.
