@@ -63,13 +63,13 @@ pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
     }
 }
 
-/// A train on its way past a wayside device, all cameras of few pixels.
+/// A train on its way past a wayside device, all cameras of few pixels: the track shows for 10 m in them.
 const SMALL: &str = r#"
     name = "small"
     tunnel = "given"
     duration_s = 4.0
     train = { cars = 1, start_chainage_m = 1300.0, start_speed_kmh = 60.0, cruise_speed_kmh = 60.0 }
-    stack = { protection = { initial_chainage_m = 1300.0 } }
+    stack = { protection = { initial_chainage_m = 1300.0 }, wayside = { reach_m = 10.0 } }
     [rig]
     pairs_per_s = 10.0
     width_px = 64
