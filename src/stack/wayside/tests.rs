@@ -691,7 +691,7 @@ fn mist_that_hides_a_body_blinds() {
         let report = last(10..40, &[]);
         assert_eq!(report.blind, blind, "{learnt_m} m, {now_m} m");
         assert_eq!(report.passage_possible, !blind);
-        if learnt_m == now_m {
+        if (learnt_m - now_m).abs() < 1.0 {
             let found = last(40..50, &body).obstacles.len();
             assert_eq!(found, usize::from(!blind), "{now_m} m");
         }
