@@ -18,6 +18,7 @@
 //! What it does not do: many runs, and files (observers write them).
 
 mod bench;
+mod cost_tally;
 mod costs;
 mod event;
 mod fitting;

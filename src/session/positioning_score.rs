@@ -1,6 +1,7 @@
 //! Scores of lamp positioning: fixes and names held against the truth.
 
-use super::summary::{Cost, ErrorStatistics, Positioning};
+use super::cost_tally::CostTally;
+use super::summary::{ErrorStatistics, Positioning};
 use crate::bus::{Identity, Intrinsics, LedReport, Method, PositionFix, SimTime};
 use crate::track::uid::Uid;
 use crate::track::{Direction, Tunnel};
@@ -39,7 +40,7 @@ pub struct PositioningScore {
     methods: BTreeMap<Method, Errors>,
     named: BTreeSet<Uid>,
     pairs: u32,
-    costs_ms: Vec<f64>,
+    costs: CostTally,
     /// Where the rig was first, and how far it has run from there.
     run: Option<(RigPlace, f64)>,
 }
@@ -52,7 +53,7 @@ impl PositioningScore {
             methods: methods.iter().map(|m| (*m, Errors::default())).collect(),
             named: BTreeSet::new(),
             pairs: 0,
-            costs_ms: Vec::new(),
+            costs: CostTally::default(),
             run: None,
         }
     }
@@ -76,7 +77,7 @@ impl PositioningScore {
         left_at: impl Fn(SimTime) -> Option<Isometry3<f64>>,
     ) {
         self.pairs += 1;
-        self.costs_ms.push(cost_ms);
+        self.costs.add(cost_ms);
         let Some(left) = left_at(report.time) else {
             return;
         };
@@ -140,9 +141,9 @@ impl PositioningScore {
     }
 
     /// The figures, by method.
-    pub fn finish(mut self) -> BTreeMap<Method, Positioning> {
+    pub fn finish(self) -> BTreeMap<Method, Positioning> {
         let uid_decode_rate = self.decode_rate();
-        let ms_per_frame = Cost::of(&mut self.costs_ms);
+        let ms_per_frame = self.costs.cost();
         let pairs = f64::from(self.pairs);
         self.methods
             .into_iter()

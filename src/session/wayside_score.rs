@@ -8,9 +8,10 @@
 //! the picture does not matter. Neither depends on a setting of the detector, and a report of more is not
 //! right more easily.
 
+use super::cost_tally::CostTally;
 use super::image_box::ImageBox;
 use super::presence::Presence;
-use super::summary::{Cost, ObstacleScore, Wayside};
+use super::summary::{ObstacleScore, Wayside};
 use crate::bus::{DangerLevel, DetectedObstacle, SimTime, WaysideReport};
 use std::collections::BTreeMap;
 
@@ -34,7 +35,7 @@ pub struct WaysideScore {
     found: BTreeMap<String, Found>,
     false_alarms: u32,
     misplaced: u32,
-    costs_ms: Vec<f64>,
+    costs: CostTally,
 }
 
 #[derive(Clone, Debug)]
@@ -79,7 +80,7 @@ impl WaysideScore {
         cost_ms: f64,
         present: &[Presence],
     ) {
-        self.costs_ms.push(cost_ms);
+        self.costs.add(cost_ms);
         for p in present.iter().filter(|p| p.obstacle) {
             if let Some(since) = p.lies_in_view_since {
                 self.found(p).lay_visible.get_or_insert(since);
@@ -147,11 +148,11 @@ impl WaysideScore {
         }
         self.false_alarms += other.false_alarms;
         self.misplaced += other.misplaced;
-        self.costs_ms.extend(other.costs_ms);
+        self.costs.add_all(&other.costs);
     }
 
     /// The figures.
-    pub fn finish(mut self) -> Wayside {
+    pub fn finish(self) -> Wayside {
         let score = |(name, f): (String, Found)| ObstacleScore {
             name,
             size_m: f.size_m,
@@ -164,7 +165,7 @@ impl WaysideScore {
             obstacles: self.found.into_iter().map(score).collect(),
             false_alarms: self.false_alarms,
             misplaced_alarms: self.misplaced,
-            ms_per_frame: Cost::of(&mut self.costs_ms),
+            ms_per_frame: self.costs.cost(),
         }
     }
 }
