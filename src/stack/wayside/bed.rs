@@ -33,14 +33,14 @@ struct BedPlace {
     grey: f64,
 }
 
-/// A step along the line: its places in view, how many of them the last frame showed, and in how many it
-/// would have shown a body.
-#[derive(Clone, Copy, Debug, Default)]
+/// A step along the line: how many of its places the last frame showed, and in how many it would have shown
+/// a body.
+#[derive(Clone, Copy, Debug)]
 struct BedStep {
-    in_view: u32,
     shown: u32,
     lit: u32,
-    /// Whether a body would have been found by the last frame that showed any of it.
+    /// Whether a body would have been found in the last frame that showed any of it; true where the camera
+    /// has none of it in view.
     seen: bool,
 }
 
@@ -65,10 +65,17 @@ impl BedLight {
         let mut light = Self {
             places: places.collect(),
             track: TrackContrast::new(sight, STEP_M, steps),
-            steps: vec![BedStep::default(); steps],
+            steps: vec![
+                BedStep {
+                    shown: 0,
+                    lit: 0,
+                    seen: true,
+                };
+                steps
+            ],
         };
         for place in &light.places {
-            light.steps[place.step].in_view += 1;
+            light.steps[place.step].seen = false;
         }
         light
     }
@@ -87,7 +94,9 @@ impl BedLight {
     pub fn set_reference(&mut self, reference: &Reference, width_px: usize) {
         for place in &mut self.places {
             let (u, v) = place.cell_px;
-            let rows = (v..v + CELL_PX).flat_map(|v| v * width_px + u..v * width_px + u + CELL_PX);
+            let columns = u..(u + CELL_PX).min(width_px);
+            let row = |v: usize| columns.clone().map(move |u| v * width_px + u);
+            let rows = (v..v + CELL_PX).flat_map(row);
             let pixels = rows.filter(|&k| reference.valid.get(k) == Some(&1));
             let (sum, count) = pixels.fold((0, 0), |(sum, count), k| {
                 (sum + u32::from(reference.mean[k]), count + 1)
@@ -127,7 +136,7 @@ impl BedLight {
         for step in self.steps.iter_mut().filter(|step| step.shown > 0) {
             step.seen = 2 * step.lit >= step.shown;
         }
-        let unseen = self.steps.iter().filter(|s| s.in_view > 0 && !s.seen);
+        let unseen = self.steps.iter().filter(|step| !step.seen);
         unseen.count() as f64 * STEP_M
     }
 }

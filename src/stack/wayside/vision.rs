@@ -1,8 +1,9 @@
 //! Whether the device sees at all: its camera's faults, too little light, and when they count.
 //!
 //! A device that cannot see must say so. When no frame that shows the bed has come for `blind_after_s`,
-//! all of the stretch that it watches counts as occupied, as a track circuit's does when it fails. It counts as clear again when as many good frames have
-//! come as a confirmation takes, so that what fell on the track meanwhile is found first.
+//! all of the stretch that it watches counts as occupied, as a track circuit's does when it fails. It counts
+//! as clear again when as many good frames have come as a confirmation takes, so that what fell on the track
+//! meanwhile is found first.
 
 use super::WaysideSettings;
 use crate::bus::{CameraHealth, Frame, SimTime};
