@@ -10,6 +10,7 @@ use super::groups::{self, train_group};
 use super::history::VehicleMotion;
 use super::placement::{BODIES, body_name, is_wheelset, place_train, wheelset_of};
 use super::settings::TrainSettings;
+use super::slide_protection::ReferenceSpeed;
 use super::suspension::{Axes, BodyState, Wrench, coupler, primary, secondary};
 use super::vehicle::{AXLES, GRAVITY_MPS2, Mass, Vehicle};
 use super::wheelset::{Drive, WheelExtremes, Wheelset};
@@ -35,6 +36,7 @@ pub(super) struct Consist {
     pub vehicle: Vehicle,
     pub settings: TrainSettings,
     pub wheelsets: Vec<Wheelset>,
+    reference: ReferenceSpeed,
     /// Of every car in turn: itself, its bogies, its wheelsets, at the start of the step.
     pub states: Vec<BodyState>,
     /// Mean compression of the leading axle's primary springs.
@@ -76,6 +78,7 @@ impl Consist {
             states: cars.concat(),
             couplers_n: vec![0.0; cars.len() - 1],
             wrenches: vec![Wrench::default(); BODIES * cars.len()],
+            reference: ReferenceSpeed::new(speed_mps),
             previous,
             ..Self::default()
         };
@@ -86,7 +89,8 @@ impl Consist {
                     .track_from_world(&state.position.into(), head_m)
                     .s_m;
                 let roll_rad = alignment.at(s_m).roll_rad;
-                consist.wheelsets.push(Wheelset::new(s_m, roll_rad));
+                let wheelset = Wheelset::new(s_m, roll_rad, speed_mps);
+                consist.wheelsets.push(wheelset);
             }
         }
         consist
@@ -218,8 +222,9 @@ impl Consist {
         self.wrenches.fill(Wrench::default());
         self.ledger = Ledger::default();
         let davis_mps2 = self.davis_mps2(track);
+        let drive = self.drive(effort, dt_s);
         for k in 0..self.settings.cars as usize {
-            self.car_forces(k, track, effort, dt_s);
+            self.car_forces(k, track, drive, dt_s);
             self.resist(k, davis_mps2);
         }
         self.coupler_forces();
@@ -234,14 +239,26 @@ impl Consist {
         }
     }
 
-    /// Suspension, rails, traction and brakes of car `k`.
-    fn car_forces(&mut self, k: usize, track: &DirectedTrack, effort: Effort, dt_s: f64) {
+    /// What is demanded of every wheelset.
+    fn drive(&mut self, effort: Effort, dt_s: f64) -> Drive {
         let v = &self.vehicle;
+        let brakes = effort.brake_mps2 > 0.0;
+        let demanded_mps2 = effort.brake_mps2.max(effort.traction_mps2);
+        let shares = self.wheelsets.iter().map(Wheelset::effort_share);
+        let hardest_mps2 = demanded_mps2 * shares.sum::<f64>() / self.wheelsets.len() as f64;
+        let treads_mps = self.wheelsets.iter().map(|w| w.tread_mps);
+        (self.reference).update(treads_mps, brakes, hardest_mps2, dt_s);
         let share_kg = 0.25 * v.effective_kg();
-        let drive = Drive {
+        Drive {
             traction_n: effort.traction_mps2 * share_kg,
             brake_n: effort.brake_mps2 * share_kg,
-        };
+            reference: self.reference,
+        }
+    }
+
+    /// Suspension, rails, traction and brakes of car `k`.
+    fn car_forces(&mut self, k: usize, track: &DirectedTrack, drive: Drive, dt_s: f64) {
+        let v = &self.vehicle;
         let ledger = &mut self.ledger;
         let bodies = BODIES * k..BODIES * (k + 1);
         let states = &self.states[bodies.clone()];

@@ -67,6 +67,7 @@ mod placement;
 mod saved;
 mod settings;
 mod shape;
+mod slide_protection;
 mod stability;
 mod surroundings;
 mod suspension;

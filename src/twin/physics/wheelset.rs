@@ -29,6 +29,7 @@ use super::adhesion::{KALKER_ACROSS_N, KALKER_ALONG_N};
 use super::deviation::Deviation;
 use super::directed_track::{DirectedTrack, rail_axes};
 use super::energy::Ledger;
+use super::slide_protection::{EffortShare, ReferenceSpeed};
 use super::suspension::{Axes, BodyState, Wrench};
 use super::vehicle::{FLANGE_STIFFNESS_N_M, GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
 use rapier3d_f64::math::Vector;
@@ -45,12 +46,6 @@ const LEAST_SPEED_MPS: f64 = 0.01;
 /// Discs and pads of one wheelset give by this before they slip, at the wheel's tread.
 const BRAKE_STIFFNESS_N_M: f64 = 2.5e6;
 const BRAKE_DAMPING_N_S_M: f64 = 5e4;
-/// Slide and slip protection lets go where the wheel's speed is off by this share and speed, and
-/// takes and gives back the effort in so many seconds.
-const PROTECTED_SHARE: f64 = 0.15;
-const PROTECTED_MPS: f64 = 0.3;
-const LET_GO_S: f64 = 0.1;
-const GIVE_BACK_S: f64 = 1.0;
 
 /// What a wheelset and its rails do to each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -78,8 +73,10 @@ pub(super) struct Wheelset {
     roll_rad_per_m: f64,
     /// Elastic slip of its brake.
     brake_slip_m: f64,
-    /// Share of the effort that slide and slip protection lets through.
-    effort_share: f64,
+    /// Speed of its treads, by how fast the axle turns.
+    pub tread_mps: f64,
+    /// What slide and slip protection lets through.
+    effort_share: EffortShare,
     /// How far its middle is left of the rails' middle, and its lower wheel over its rail.
     off_m: f64,
     over_m: f64,
@@ -130,14 +127,17 @@ struct Rails {
 pub(super) struct Drive {
     pub traction_n: f64,
     pub brake_n: f64,
+    /// What slide and slip protection takes for the train's speed.
+    pub reference: ReferenceSpeed,
 }
 
 impl Wheelset {
-    pub(super) fn new(s_m: f64, roll_rad: f64) -> Self {
+    pub(super) fn new(s_m: f64, roll_rad: f64, speed_mps: f64) -> Self {
         Self {
-            effort_share: 1.0,
             s_m,
             roll_rad,
+            tread_mps: speed_mps,
+            effort_share: EffortShare::new(speed_mps),
             ..Self::default()
         }
     }
@@ -158,8 +158,9 @@ impl Wheelset {
         let axle = state.rotation * Vector::Y;
         let spin = state.angular.dot(axle);
         let tread_mps = spin * vehicle.wheel_radius_m;
+        self.tread_mps = tread_mps;
         self.rolled_m += tread_mps * dt_s;
-        let (traction, brake) = self.effort(drive, tread_mps, rails.speed_mps, dt_s);
+        let (traction, brake) = self.effort(drive, dt_s);
         ledger.traction_w += traction * tread_mps;
         ledger.brake_w -= brake * tread_mps;
         let torque = axle * ((traction + brake) * vehicle.wheel_radius_m);
@@ -177,9 +178,14 @@ impl Wheelset {
         self.off_m.abs() > RAIL_HEAD_M || self.over_m > FLANGE_HEIGHT_M
     }
 
+    /// Share of brake and traction that slide and slip protection lets through.
+    pub(super) fn effort_share(&self) -> f64 {
+        self.effort_share.share()
+    }
+
     /// Slide and slip protection holds effort back.
     pub(super) fn protection_acts(&self) -> bool {
-        self.effort_share < 1.0
+        self.effort_share.acts()
     }
 
     /// The rails under the axle, a step on.
@@ -267,23 +273,16 @@ impl Wheelset {
     }
 
     /// Forces of traction and brake at the tread, through slide and slip protection.
-    fn effort(&mut self, drive: Drive, tread_mps: f64, speed_mps: f64, dt_s: f64) -> (f64, f64) {
-        let slip = (speed_mps - tread_mps).abs();
-        let slips = slip > PROTECTED_SHARE * speed_mps.abs() + PROTECTED_MPS;
-        let share = &mut self.effort_share;
-        let change = if slips {
-            -dt_s / LET_GO_S
-        } else {
-            dt_s / GIVE_BACK_S
-        };
-        *share = (*share + change).clamp(0.0, 1.0);
-        let most_n = *share * drive.brake_n;
+    fn effort(&mut self, drive: Drive, dt_s: f64) -> (f64, f64) {
+        let tread_mps = self.tread_mps;
+        let share = (self.effort_share).update(tread_mps, &drive.reference, dt_s);
+        let most_n = share * drive.brake_n;
         // Friction with elastic slip (Dahl): the same law brakes a running wheel and holds a
         // standing one.
         let most_slip = most_n / BRAKE_STIFFNESS_N_M;
         self.brake_slip_m = (self.brake_slip_m + tread_mps * dt_s).clamp(-most_slip, most_slip);
         let brake = BRAKE_STIFFNESS_N_M * self.brake_slip_m + BRAKE_DAMPING_N_S_M * tread_mps;
-        (*share * drive.traction_n, -brake.clamp(-most_n, most_n))
+        (share * drive.traction_n, -brake.clamp(-most_n, most_n))
     }
 
     /// Creep along, across and in yaw; all that acts else is in the wrench already.

@@ -4,7 +4,8 @@
 //! is worth on the radius set in the box; the true radius differs by a tolerance and by the
 //! wear since, and that is a scale error. Whatever the wheelset does it takes for travel: slip and
 //! slide of the axle that it sits on are errors of its distance and speed. While the slide and slip
-//! protection of that axle holds effort back, its samples say so.
+//! protection of the train holds effort back from that axle, its samples say so: the protection knows the
+//! axles' speeds only, sees a slide late, and a slow one of all axles never.
 //!
 //! Speed comes from the pulses' edges: so many pulses from the last edge of one interval to the
 //! last edge of the next, over the time between these (the M/T method: Ohmae et al., IEEE Trans.
@@ -45,6 +46,8 @@ settings! {
         worn_m: f64 = 0.0, in 0.0..=0.05;
         /// One sigma of how well it was measured, as a share; the wear comes on top.
         radius_error_share: f64 = 0.003, in 0.0..=0.05;
+        /// Its samples say where slide and slip protection of its wheelset acts.
+        reports_slides: bool = true;
         /// Its clock.
         clock: ClockSettings = ClockSettings::default(), nested;
     }
@@ -91,7 +94,8 @@ impl Odometer {
     pub fn sample(&mut self, world: &World, train: TrainId) -> Option<OdometerSample> {
         let axle = (self.settings.axle as usize).saturating_sub(1);
         let run_m = world.wheel_run_m(train, axle)?;
-        let slides = world.wheel_protection_acts(train, axle)?;
+        let acts = world.wheel_protection_acts(train, axle)?;
+        let slides = acts && self.settings.reports_slides;
         Some(self.read(world.time(), run_m, slides))
     }
 
