@@ -45,6 +45,6 @@ pub use time::{SimTime, Ticker};
 pub use train_id::{TrainEnd, TrainId};
 pub use warning::ObstacleWarning;
 pub use wayside::{
-    Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,
+    BedSight, Blob, DangerLevel, DetectedObstacle, LidarReturn, LidarScan, Plan, TrainReport,
     WaysideCalibration, WaysideReport,
 };

@@ -131,6 +131,16 @@ pub struct TrainReport {
     pub time: SimTime,
 }
 
+/// What a wayside device sees of the bed of the stretch that it watches.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct BedSight {
+    /// Length of bed in view on which a body of the least contrast would not be found, m.
+    pub unseen_m: f64,
+    /// Standard deviation of the grey across the track (rails, sleepers, bed) as a share of the bed's grey:
+    /// the median over the bed in view. A veil takes of it what it takes of bodies.
+    pub track_contrast: Option<f64>,
+}
+
 /// The report of one frame. As text it is the list that the paper prints.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct WaysideReport {
@@ -146,6 +156,8 @@ pub struct WaysideReport {
     pub learning: bool,
     /// A train stands or runs where the camera looks, so that part of its view is blind.
     pub train_in_view: bool,
+    /// What of the bed it sees; `None` while it learns, and of a frame that shows a fault.
+    pub bed: Option<BedSight>,
     /// Everything found, confirmed obstacles only.
     pub obstacles: Vec<DetectedObstacle>,
     /// All regions of the binary image over the size limit, confirmed or not.

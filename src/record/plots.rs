@@ -123,6 +123,8 @@ groups! {
         "display", "driver's display", WHITE, 2.0, Protection |r| r.display.distance_to_obstacle_m;
     }
     ERROR: "Position error and ±2σ, m", "plots/position_error", RightTop {}
+    UNSEEN: "Bed not seen, m", "plots/bed_unseen", RightTop {}
+    CONTRAST: "Contrast across the track", "plots/track_contrast", RightTop {}
     EXPOSURE: "Exposure, µs", "plots/exposure", RightTop {}
     GAIN: "Gain, dB", "plots/gain", RightTop {}
 }
@@ -149,7 +151,7 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<PlotGroup>> {
         panes.push(vec![ERROR]);
     }
     if !contents.devices.is_empty() {
-        panes.push(vec![DISTANCE]);
+        panes.push(vec![DISTANCE, UNSEEN, CONTRAST]);
     }
     if let Some(last) = panes.last_mut().filter(|_| contents.cameras().count() > 0) {
         last.extend([EXPOSURE, GAIN]);
@@ -213,6 +215,9 @@ impl Plots {
             style(&stream, &line, name, *colour, 1.5)?;
             let formula_name = format!("{name}, formula");
             style(&stream, &formula, &formula_name, faint(*colour), 1.5)?;
+            for path in bed_paths(name) {
+                style(&stream, &path, name, *colour, 1.5)?;
+            }
         }
         for (camera, colour) in contents.cameras().zip(DEVICE_COLOURS.iter().cycle()) {
             for path in exposure_paths(id, camera) {
@@ -282,11 +287,14 @@ impl Plots {
         }
     }
 
-    /// How far a wayside device takes the train to be from the obstacle.
+    /// How far a wayside device takes the train to be from the obstacle, and what it sees of the bed.
     pub(super) fn wayside(&mut self, device: usize, report: &WaysideReport) {
         if let Some(name) = self.devices.get(device) {
             let values_m = [report.train_distance_exact_m, report.train_distance_m];
             self.push(distance_paths(name), report.time, values_m);
+            let contrast = report.bed.and_then(|bed| bed.track_contrast);
+            let values = [report.bed.map(|bed| bed.unseen_m), contrast];
+            self.push(bed_paths(name), report.time, values);
         }
     }
 
@@ -350,6 +358,11 @@ fn error_paths(id: TrainId, method: Method) -> [String; 3] {
 /// Of the distance along the line, and by the paper's formula.
 fn distance_paths(device: &str) -> [String; 2] {
     ["line", "formula"].map(|what| format!("plots/distance/{}/{what}", slug(device)))
+}
+
+/// Of the bed that is not seen, and of the contrast across the track.
+fn bed_paths(device: &str) -> [String; 2] {
+    ["bed_unseen", "track_contrast"].map(|what| format!("plots/{what}/{}", slug(device)))
 }
 
 /// Of exposure and gain.

@@ -6,7 +6,7 @@ use super::difference::Difference;
 use super::reference::Reference;
 use super::sight::Sight;
 use super::veil::TrackContrast;
-use crate::bus::PixelBox;
+use crate::bus::{BedSight, PixelBox};
 
 /// Along the line, the bed is looked at so often.
 const STEP_M: f64 = 1.0;
@@ -50,6 +50,8 @@ pub(super) struct BedLight {
     places: Vec<BedPlace>,
     track: TrackContrast,
     steps: Vec<BedStep>,
+    /// Contrast of the track at each place that the last frame showed.
+    contrasts: Vec<f64>,
 }
 
 impl BedLight {
@@ -73,6 +75,7 @@ impl BedLight {
                 };
                 steps
             ],
+            contrasts: Vec::new(),
         };
         for place in &light.places {
             light.steps[place.step].seen = false;
@@ -110,16 +113,17 @@ impl BedLight {
         }
     }
 
-    /// Length of bed in view, metres, on which a body of the least contrast would not be found in the
-    /// light of a frame, the one that `difference` was made of. What a train hides is as it was before.
-    pub fn unseen_m(
+    /// What is seen of the bed in the light of a frame, the one that `difference` was made of. What a train
+    /// hides is as it was before.
+    pub fn look(
         &mut self,
         frame: &[u8],
         (reference, difference): (&Reference, &Difference),
         cells: &GaugeCells,
         settings: &WaysideSettings,
-    ) -> f64 {
+    ) -> BedSight {
         self.track.measure(frame, reference, cells);
+        self.contrasts.clear();
         for step in &mut self.steps {
             (step.shown, step.lit) = (0, 0);
         }
@@ -128,7 +132,11 @@ impl BedLight {
                 continue;
             }
             let (expected, limit) = difference.expected(place.cell_px, place.grey);
-            let behind_veil = self.track.around(place.step) / settings.track_contrast;
+            let across = self.track.around(place.step);
+            if expected > 0.0 {
+                self.contrasts.push(across / expected);
+            }
+            let behind_veil = across / settings.track_contrast;
             let step = &mut self.steps[place.step];
             step.shown += 1;
             step.lit += u32::from(limit <= settings.least_contrast * expected.min(behind_veil));
@@ -137,8 +145,17 @@ impl BedLight {
             step.seen = 2 * step.lit >= step.shown;
         }
         let unseen = self.steps.iter().filter(|step| !step.seen);
-        unseen.count() as f64 * STEP_M
+        BedSight {
+            unseen_m: unseen.count() as f64 * STEP_M,
+            track_contrast: median(&mut self.contrasts),
+        }
     }
+}
+
+/// The upper one of the two in the middle; `None` of nothing.
+fn median(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// A frame held against the reference, in the search for the clear bed.

@@ -249,8 +249,8 @@ impl WaysideDetector {
         let places = (&self.cells, &self.rails);
         (self.difference).run(grey, &self.reference, places, train_near);
         let compared = (&self.reference, &self.difference);
-        let unseen_m = (self.bed_light).unseen_m(grey, compared, &self.cells, &self.settings);
-        let sees = unseen_m <= self.settings.unseen_bed_m;
+        let bed_sight = (self.bed_light).look(grey, compared, &self.cells, &self.settings);
+        let sees = bed_sight.unseen_m <= self.settings.unseen_bed_m;
         self.bed_was_seen |= sees;
         self.vision.note(sees, frame.start, &self.settings);
         let binary = &mut self.difference.binary;
@@ -273,7 +273,12 @@ impl WaysideDetector {
             threshold: self.settings.threshold_grey,
         };
         (self.confirmation).update(&found, &self.cells, &self.settings, |b| bed.shows_in(b));
-        let mut report = self.report(WaysideReport { blobs, ..seen }, &trains);
+        let seen = WaysideReport {
+            bed: Some(bed_sight),
+            blobs,
+            ..seen
+        };
+        let mut report = self.report(seen, &trains);
         if self.settings.keep_images {
             let (w, h) = frame.image.dimensions();
             report.difference = GrayImage::from_raw(w, h, self.difference.absolute.clone());

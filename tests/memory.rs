@@ -1,0 +1,75 @@
+//! A run keeps nothing of what is behind it.
+#![cfg(all(feature = "twin", target_os = "linux"))]
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+#[path = "common/program.rs"]
+mod common;
+
+use common::{PROGRAM, REPOSITORY, folder};
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// Six minutes of a train that creeps towards a wayside device; all sensors at work, small pictures.
+const SCENARIO: &str = r#"
+    name = "memory"
+    tunnel = "TUNNELS/chengdu_line1.toml"
+    duration_s = 360.0
+    train = { start_chainage_m = 800.0, cruise_speed_kmh = 2.4 }
+    stack = { protection = { initial_chainage_m = 800.0 }, wayside = { blind_danger = "low" } }
+    imu = {}
+    doppler = {}
+    [rig]
+    pairs_per_s = 20.0
+    width_px = 64
+    height_px = 36
+    pixel_um = 75.0
+    [[wayside]]
+    device = "W1530"
+    camera = { width_px = 64, height_px = 36, pixel_um = 45.0, frames_per_s = 10.0 }
+"#;
+
+/// What the process holds by itself, kB.
+fn own_kb(process: u32) -> f64 {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).unwrap();
+    let line = status.lines().find(|l| l.starts_with("RssAnon:")).unwrap();
+    line.split_whitespace().nth(1).unwrap().parse().unwrap()
+}
+
+/// Memory at each tenth of a run but the last, kB.
+fn run_of(scenario: &Path, more: &[&str]) -> Vec<f64> {
+    let mut command = Command::new(PROGRAM);
+    command.args(["run", "--renderer", "cpu", "--out"]);
+    command.arg(scenario.with_extension("out"));
+    command.arg(scenario).args(more).current_dir(REPOSITORY);
+    let mut child = (command.stdout(Stdio::null()).stderr(Stdio::piped()))
+        .spawn()
+        .unwrap();
+    let said = BufReader::new(child.stderr.take().unwrap()).lines();
+    let tenths = said
+        .map(Result::unwrap)
+        .filter(|line| line.ends_with("% of the run"));
+    let kept = tenths.map(|_| own_kb(child.id())).collect();
+    assert!(child.wait().unwrap().success());
+    kept
+}
+
+/// Flat within 5 MB over an hour: after its first minutes a run must not take 0.4 MB more in the next four,
+/// with a recording or without. Provokes figures that are kept one by one, and recordings that are.
+#[test]
+fn memory_is_flat() {
+    let folder = folder("memory");
+    fs::create_dir_all(&folder).unwrap();
+    for (name, more) in [("recorded", &[][..]), ("bare", &["--no-recording"][..])] {
+        let scenario = folder.join(format!("{name}.toml"));
+        let tunnels = format!("{REPOSITORY}/tunnels");
+        fs::write(&scenario, SCENARIO.replace("TUNNELS", &tunnels)).unwrap();
+        let kept_kb = run_of(&scenario, more);
+        eprintln!("{name}: {kept_kb:?} kB");
+        assert!(kept_kb.len() > 7, "{kept_kb:?}");
+        let (early, late) = (&kept_kb[2..4], &kept_kb[kept_kb.len() - 2..]);
+        let most = |kb: &[f64]| kb.iter().fold(0.0, |a: f64, b| a.max(*b));
+        assert!(most(late) - most(early) < 400.0, "{kept_kb:?}");
+    }
+}
