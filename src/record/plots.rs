@@ -289,13 +289,15 @@ impl Plots {
 
     /// How far a wayside device takes the train to be from the obstacle, and what it sees of the bed.
     pub(super) fn wayside(&mut self, device: usize, report: &WaysideReport) {
-        if let Some(name) = self.devices.get(device) {
-            let values_m = [report.train_distance_exact_m, report.train_distance_m];
-            self.push(distance_paths(name), report.time, values_m);
-            let contrast = report.bed.and_then(|bed| bed.track_contrast);
-            let values = [report.bed.map(|bed| bed.unseen_m), contrast];
-            self.push(bed_paths(name), report.time, values);
-        }
+        let Some(name) = self.devices.get(device) else {
+            return;
+        };
+        let (distances, bed) = (distance_paths(name), bed_paths(name));
+        let values_m = [report.train_distance_exact_m, report.train_distance_m];
+        self.push(distances, report.time, values_m);
+        let contrast = report.bed.and_then(|bed| bed.track_contrast);
+        let values = [report.bed.map(|bed| bed.unseen_m), contrast];
+        self.push(bed, report.time, values);
     }
 
     /// What a camera says it took a frame with.
