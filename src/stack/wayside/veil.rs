@@ -131,7 +131,52 @@ fn variance_about_slope(values: impl Iterator<Item = f64>) -> Option<(f64, f64)>
 
 #[cfg(test)]
 mod tests {
+    use super::super::WaysideSettings;
+    use super::super::test_scene::{BED_M, DEVICE_M, TestScene};
     use super::*;
+
+    const STEPS: usize = 60;
+
+    /// What is measured of the tests' track at each metre of the watched stretch.
+    fn measured(scene: &TestScene) -> Vec<f64> {
+        let settings = WaysideSettings::default();
+        let (calibration, map) = (scene.calibration.clone(), scene.map.clone());
+        let i = calibration.camera.intrinsics;
+        let (width, height) = (i.width_px as usize, i.height_px as usize);
+        let sight = Sight::new(&settings, calibration, map);
+        let cells = GaugeCells::new(&sight, width, height);
+        let mut reference = Reference::new(&settings, width * height);
+        let frame = |n| scene.frame(n, |_, _| 1.0, &[]).image;
+        for n in 0..settings.reference_frames {
+            reference.learn(&frame(n), &settings);
+        }
+        let mut track = TrackContrast::new(&sight, 1.0, STEPS);
+        track.measure(&frame(20), &reference, &cells);
+        (0..STEPS).map(|step| track.around(step)).collect()
+    }
+
+    /// Of the contrast in clear air Koschmieder's share must be left, e^(-3.912 d / V) at a distance d, for
+    /// the middle of the steps that count; and the noise must not count. Provokes a veil's own light taken
+    /// for contrast, and steps counted from the wrong end.
+    #[test]
+    fn what_is_left_follows_koschmieder() {
+        let mut scene = TestScene::new(1280, 720);
+        let clear = measured(&scene);
+        for visibility_m in [300.0, 100.0] {
+            scene.visibility_m = visibility_m;
+            let veiled = measured(&scene);
+            // The watched stretch begins 80 m before the device.
+            for step in [35, 45, 55] {
+                let along_m = 80.0 - (step as f64 + 0.5);
+                let eye = scene.calibration.world_from_camera.translation.vector;
+                let bed = scene.map.alignment.at(DEVICE_M - along_m);
+                let below = bed.world_from_line() * nalgebra::Point3::new(0.0, 0.0, BED_M);
+                let law = (-3.912 * (below.coords - eye).norm() / visibility_m).exp();
+                let left = veiled[step] / clear[step];
+                assert!((left / law - 1.0).abs() < 0.1, "{along_m} m: {left}, {law}");
+            }
+        }
+    }
 
     /// A slope alone has no variance; a wave on it has its own, half its height squared. Provokes a slope
     /// left in, and a wrong number of degrees of freedom.
