@@ -8,13 +8,29 @@
     reason = "a test fails by panicking, and says what it measured"
 )]
 
+use metrotwin::bus::Content;
 use metrotwin::scenario::sampling::{Distribution, Template};
 use metrotwin::scenario::{Scenario, ScenarioFile};
-use metrotwin::session::{RunOptions, run};
+use metrotwin::session::{Event, Observer, ObserverError, RunOptions, run};
 use std::collections::BTreeSet;
 use std::path::Path;
 
 const STUDY: &str = "scenarios/studies/faults.toml";
+
+/// Whether the equipment of the train says that it may not stop in time.
+#[derive(Default)]
+struct MayNotStop(bool);
+
+impl Observer for MayNotStop {
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        if let Event::Message { message, .. } = event
+            && let Content::Protection(report) = &message.content
+        {
+            self.0 |= !report.stops_in_time;
+        }
+        Ok(())
+    }
+}
 
 /// Each case once, each with a name of its own and, but for the first, something that is not as it was; none
 /// is refused.
@@ -42,9 +58,10 @@ fn every_case_is_run_once_and_breaks_something() {
     }
 }
 
-/// The cases in which the box cannot be seen or the rails bear little, and that without a fault, end without
-/// a collision; so does the run in which headlights once took the alarm back. Without the rig, and with a
-/// camera of a quarter of the pixels, to be quick. Provokes an "all clear" from a camera that sees nothing.
+/// The cases in which the box cannot be seen, and that without a fault, end without a collision, with the
+/// camera of the run in which headlights once took the alarm back. On a film of leaves the brakes need as much
+/// as there is: where the train hits it must be slow, and have said that it may not stop. Without the rig, and
+/// with a quarter of the pixels, to be quick. Provokes an "all clear" from a camera that sees nothing.
 #[test]
 fn the_worst_cases_end_before_the_box() {
     let text = std::fs::read_to_string(STUDY).unwrap();
@@ -83,10 +100,20 @@ fn the_worst_cases_end_before_the_box() {
             .map(|(key, value)| format!("{key}={value}").parse().unwrap())
             .collect();
         let scenario = Scenario::load(&path, &sets).unwrap();
-        let summary = run(&scenario, &RunOptions::default(), &mut []).unwrap();
+        let mut may_not_stop = MayNotStop::default();
+        let summary = run(&scenario, &RunOptions::default(), &mut [&mut may_not_stop]).unwrap();
         let protection = summary.protection.unwrap();
-        println!("{}: {:?}", name(case), protection.stop_margin_m);
-        assert!(!protection.collision, "{}", name(case));
+        println!(
+            "{}: {:?} m, may not stop: {}",
+            name(case),
+            protection.stop_margin_m,
+            may_not_stop.0
+        );
+        let on_leaves = name(case).starts_with("film of leaves");
+        assert!(on_leaves || !protection.collision, "{}", name(case));
+        assert!(!protection.collision || may_not_stop.0, "{}", name(case));
+        let hits_mps = protection.impacts.iter().map(|i| i.speed_mps);
+        assert!(hits_mps.fold(0.0, f64::max) < 4.0, "{}", name(case));
         assert!(protection.stopped_s.is_some(), "{}", name(case));
     }
     std::fs::remove_file(&path).unwrap();
