@@ -8,7 +8,7 @@
     reason = "a test fails by panicking, and says what it measured"
 )]
 
-use metrotwin::bus::Content;
+use metrotwin::bus::{Content, SimTime};
 use metrotwin::scenario::sampling::{Distribution, Template};
 use metrotwin::scenario::{Scenario, ScenarioFile};
 use metrotwin::session::{Event, Observer, ObserverError, RunOptions, run};
@@ -17,16 +17,17 @@ use std::path::Path;
 
 const STUDY: &str = "scenarios/studies/faults.toml";
 
-/// Whether the equipment of the train says that it may not stop in time.
+/// When the equipment of the train said first that it may not stop in time.
 #[derive(Default)]
-struct MayNotStop(bool);
+struct MayNotStop(Option<SimTime>);
 
 impl Observer for MayNotStop {
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         if let Event::Message { message, .. } = event
             && let Content::Protection(report) = &message.content
+            && !report.stops_in_time
         {
-            self.0 |= !report.stops_in_time;
+            self.0.get_or_insert(report.time);
         }
         Ok(())
     }
@@ -59,11 +60,12 @@ fn every_case_is_run_once_and_breaks_something() {
 }
 
 /// The cases in which the box cannot be seen, and that without a fault, end without a collision, with the
-/// camera of the run in which headlights once took the alarm back. On a film of leaves the brakes need as much
-/// as there is: where the train hits it must be slow, and have said that it may not stop. Without the rig, and
-/// with a quarter of the pixels, to be quick. Provokes an "all clear" from a camera that sees nothing.
+/// camera of the run in which headlights once took the alarm back. On a film of leaves the brakes need all of
+/// the way that there is, or some metres more: a train that still hits is slower than 4 m/s, and its equipment
+/// has said before that it may not stop. Without the rig, and with a quarter of the pixels, to be quick.
+/// Provokes an "all clear" from a camera that sees nothing.
 #[test]
-fn the_worst_cases_end_before_the_box() {
+fn the_worst_cases_end_before_the_box_or_slowly() {
     let text = std::fs::read_to_string(STUDY).unwrap();
     let mut table: toml::Table = text.parse().unwrap();
     let study = table.remove("study").unwrap();
@@ -83,6 +85,7 @@ fn the_worst_cases_end_before_the_box() {
         "mist, 40 m of sight",
         "no radio",
         "film of leaves everywhere",
+        "film of leaves everywhere, slides not reported",
     ];
     let cases = study["variables"]["fault"]["from"]["cases"]
         .as_array()
@@ -104,16 +107,17 @@ fn the_worst_cases_end_before_the_box() {
         let summary = run(&scenario, &RunOptions::default(), &mut [&mut may_not_stop]).unwrap();
         let protection = summary.protection.unwrap();
         println!(
-            "{}: {:?} m, may not stop: {}",
+            "{}: {:?} m, may not stop: {:?}",
             name(case),
             protection.stop_margin_m,
             may_not_stop.0
         );
         let on_leaves = name(case).starts_with("film of leaves");
         assert!(on_leaves || !protection.collision, "{}", name(case));
-        assert!(!protection.collision || may_not_stop.0, "{}", name(case));
-        let hits_mps = protection.impacts.iter().map(|i| i.speed_mps);
-        assert!(hits_mps.fold(0.0, f64::max) < 4.0, "{}", name(case));
+        if let Some(hit) = protection.impacts.first() {
+            let warned = may_not_stop.0.is_some_and(|t| t.secs() < hit.time_s);
+            assert!(warned && hit.speed_mps < 4.0, "{}: {hit:?}", name(case));
+        }
         assert!(protection.stopped_s.is_some(), "{}", name(case));
     }
     std::fs::remove_file(&path).unwrap();

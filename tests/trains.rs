@@ -102,7 +102,7 @@ impl Observer for Placed {
 }
 
 /// A train comes at 60 km/h towards the tail of one that stands, `gap_m` ahead of it.
-fn on_slippery_rails(rails: &str, gap_m: f64) -> (Summary, Placed) {
+fn on_slippery_rails(rails: &str, gap_m: f64, more: &str) -> (Summary, Placed) {
     let text = format!(
         r#"
         name = "slippery"
@@ -119,6 +119,7 @@ fn on_slippery_rails(rails: &str, gap_m: f64) -> (Summary, Placed) {
         [[onboard]]
         train = 1
         protection = {{ initial_chainage_m = {start_m}, initial_sigma_m = 1.0 }}
+        {more}
         "#,
         start_m = 1532.0 - gap_m
     );
@@ -138,7 +139,7 @@ fn a_train_stops_on_leaves_or_says_that_it_cannot() {
     let film = r#"{ rail = "leaf_film" }"#;
     let stretch = r#"{ rail_zones = [{ from_m = 1200.0, to_m = 1560.0, rail = "leaf_film" }] }"#;
     for (rails, slides) in [(film, true), (stretch, false)] {
-        let (summary, placed) = on_slippery_rails(rails, 410.0);
+        let (summary, placed) = on_slippery_rails(rails, 410.0, "");
         let protection = summary.trains[1].protection.clone().unwrap();
         eprintln!(
             "{rails}: stands {:?} m before, position off by at most {:.1} sigma",
@@ -153,10 +154,14 @@ fn a_train_stops_on_leaves_or_says_that_it_cannot() {
             placed.worst_sigmas
         );
     }
-    let (summary, placed) = on_slippery_rails(film, 250.0);
+    // Nothing else tells the equipment of the slide.
+    let silent = "odometer = { reports_slides = false }";
+    let (_, placed) = on_slippery_rails(film, 410.0, silent);
+    assert!(!placed.slid);
+    let (summary, placed) = on_slippery_rails(film, 250.0, "");
     assert!(summary.trains[1].protection.clone().unwrap().collision);
     assert!(placed.may_not_stop);
-    let (summary, placed) = on_slippery_rails(r#"{ rail = "dry" }"#, 250.0);
+    let (summary, placed) = on_slippery_rails(r#"{ rail = "dry" }"#, 250.0, "");
     assert!(!summary.trains[1].protection.clone().unwrap().collision);
     assert!(!placed.slid && !placed.may_not_stop);
 }

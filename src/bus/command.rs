@@ -143,7 +143,7 @@ pub struct ProtectionReport {
     pub supervision: Supervision,
     /// Where the movement authority ends, while something limits it.
     pub authority_end_m: Option<f64>,
-    /// The wheelset of the odometer slides or slips.
+    /// Slide and slip protection acts on the wheelset of the odometer.
     pub wheels_slide: bool,
     /// The emergency brake is held to stop the train before the nearest high danger, by the rate that is
     /// guaranteed on rails as the wheels found them; true without one.

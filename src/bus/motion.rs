@@ -24,7 +24,9 @@ pub struct OdometerSample {
     pub distance_m: f64,
     /// Speed between the last edges of pulses.
     pub speed_mps: f64,
-    /// The slide and slip protection of the wheelset is at work: what it counts is not what the train runs.
+    /// Slide and slip protection holds effort back from the wheelset: what it counts may not be what the
+    /// train runs. It sees a slide late, and a slow one of all axles never; after a slide it gives the effort
+    /// back within a second or two.
     pub slides: bool,
 }
 

@@ -137,7 +137,7 @@ pub struct BedSight {
     /// Length of bed in view on which a body of the least contrast would not be found, m.
     pub unseen_m: f64,
     /// Standard deviation of the grey across the track (rails, sleepers, bed) as a share of the bed's grey:
-    /// the median over the bed in view. A veil takes of it by what it swallows and by the light it adds.
+    /// the median over the bed in view. A veil lowers it: it absorbs light and adds its own.
     pub track_contrast: Option<f64>,
 }
 

@@ -1,9 +1,9 @@
 //! Slippery rails, known by wheels that slid, and the brake rates that are then assumed.
 //!
-//! The slide and slip protection of a wheelset acts where the wheel no longer turns as the train runs.
-//! From then on the rails count as slippery until the train has run [`SLIPPERY_FOR_M`] without it: the
-//! emergency brake is held to reach `low_adhesion_mps2` only, and while the wheels slide the true
-//! speed may be above what they say by k times `slide_error`.
+//! Slide and slip protection acts where it sees that a wheel no longer turns as the train runs. From then
+//! on the rails count as slippery until the train has run [`SLIPPERY_FOR_M`] without it: the emergency
+//! brake is held to reach `low_adhesion_mps2` only, and while it acts the true speed may be above what the
+//! wheel says by k times `slide_error`. A slide that it does not see is not reckoned with.
 //!
 //! A wheel that stands while its protection acts is locked, and the train may run. That is believed
 //! for as long as the fastest train takes to stop on the poorest rails, not for ever.
@@ -22,7 +22,7 @@ pub(super) const STANDING_MPS: f64 = 0.1;
 /// What may be expected of brake and odometer on the rails as they are.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Grip {
-    /// The wheelset of the odometer slides or slips now.
+    /// Slide and slip protection acts on the wheelset of the odometer now.
     pub slides: bool,
     /// Rate of the full service brake on level track.
     pub service_mps2: f64,

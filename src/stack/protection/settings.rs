@@ -25,8 +25,8 @@ settings! {
         position_sigmas: f64 = 3.0, in 0.0..=10.0;
         /// Odometer error, share of the distance run (wheel wear, slip).
         odometer_drift: f64 = 0.02, in 0.0..=0.5;
-        /// One sigma of the odometer's distance and speed while the wheelset slides or slips, share of
-        /// what it says. Slide protection acts at some 15 %, and wheels slide deeper until it does.
+        /// One sigma of the odometer's distance and speed while slide and slip protection acts on its
+        /// wheelset, share of what it says. It acts at some 10 %, and wheels slide deeper until it does.
         slide_error: f64 = 0.1, in 0.0..=1.0;
         /// Odometer speed error, km/h.
         speed_error_kmh: f64 = 3.0, in 0.0..=20.0;

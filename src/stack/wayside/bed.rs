@@ -133,10 +133,10 @@ impl BedLight {
             }
             let (expected, limit) = difference.expected(place.cell_px, place.grey);
             let across = self.track.around(place.step);
-            if expected > 0.0 {
+            if let Some(across) = across.filter(|_| expected > 0.0) {
                 self.contrasts.push(across / expected);
             }
-            let behind_veil = across / settings.track_contrast;
+            let behind_veil = across.unwrap_or(0.0) / settings.track_contrast;
             let step = &mut self.steps[place.step];
             step.shown += 1;
             step.lit += u32::from(limit <= settings.least_contrast * expected.min(behind_veil));

@@ -222,7 +222,8 @@ impl Consist {
         self.wrenches.fill(Wrench::default());
         self.ledger = Ledger::default();
         let davis_mps2 = self.davis_mps2(track);
-        let drive = self.drive(effort, dt_s);
+        self.update_reference(effort, dt_s);
+        let drive = self.drive(effort);
         for k in 0..self.settings.cars as usize {
             self.car_forces(k, track, drive, dt_s);
             self.resist(k, davis_mps2);
@@ -239,16 +240,17 @@ impl Consist {
         }
     }
 
-    /// What is demanded of every wheelset.
-    fn drive(&mut self, effort: Effort, dt_s: f64) -> Drive {
-        let v = &self.vehicle;
-        let brakes = effort.brake_mps2 > 0.0;
-        let demanded_mps2 = effort.brake_mps2.max(effort.traction_mps2);
+    /// What slide and slip protection takes for the train's speed, a step on.
+    fn update_reference(&mut self, effort: Effort, dt_s: f64) {
         let shares = self.wheelsets.iter().map(Wheelset::effort_share);
-        let hardest_mps2 = demanded_mps2 * shares.sum::<f64>() / self.wheelsets.len() as f64;
+        let mean_share = shares.sum::<f64>() / self.wheelsets.len() as f64;
         let treads_mps = self.wheelsets.iter().map(|w| w.tread_mps);
-        (self.reference).update(treads_mps, brakes, hardest_mps2, dt_s);
-        let share_kg = 0.25 * v.effective_kg();
+        (self.reference).update(treads_mps, effort, mean_share, dt_s);
+    }
+
+    /// What is demanded of every wheelset.
+    fn drive(&self, effort: Effort) -> Drive {
+        let share_kg = 0.25 * self.vehicle.effective_kg();
         Drive {
             traction_n: effort.traction_mps2 * share_kg,
             brake_n: effort.brake_mps2 * share_kg,

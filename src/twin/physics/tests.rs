@@ -118,6 +118,43 @@ fn driver_keeps_limits_and_stops_at_the_mark() {
     assert!(state.standing && (state.chainage_m - 900.0).abs() < 0.3);
 }
 
+/// On rough, jointed dry rails no wheel slides, and the protection must take none for sliding, from the start to
+/// the emergency stop: it would be taken for a film of leaves over the next 500 m.
+#[test]
+fn no_false_slide_on_rough_rails() {
+    let train = TrainSettings {
+        cruise_speed_kmh: 65.0,
+        ..TrainSettings::default()
+    };
+    let mut settings = settings(train);
+    settings.track.irregularity.class = IrregularityClass::GermanHigh;
+    settings.track.defects = vec![DefectSettings {
+        shape: DefectShape::Joint {
+            depth_m: 0.001,
+            half_length_m: 0.5,
+        },
+        chainage_m: 160.0,
+        side: RailSide::Both,
+        every_m: Some(25.0),
+        count: 50,
+    }];
+    let mut world = World::new(straight(), &settings, 1, 0).unwrap();
+    let mut fastest_mps = 0.0f64;
+    for (brake, steps) in [
+        (BrakeDemand::None, 40_000),
+        (BrakeDemand::Emergency, 25_000),
+    ] {
+        for _ in 0..steps {
+            world.step(&[command(brake, GO)]).unwrap();
+            fastest_mps = fastest_mps.max(world.trains[0].consist.speed_mps());
+            let acts = |axle| world.wheel_protection_acts(TRAIN, axle).unwrap();
+            assert!(!(0..24).any(acts), "{}", world.time());
+        }
+    }
+    let train = world.train(TRAIN).unwrap();
+    assert!(train.standing && 3.6 * fastest_mps > 60.0);
+}
+
 /// Same seed, same bytes; another seed or run, another shake.
 #[test]
 fn determinism() {
