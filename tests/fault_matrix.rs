@@ -115,7 +115,7 @@ fn the_worst_cases_end_before_the_box_or_slowly() {
         let on_leaves = name(case).starts_with("film of leaves");
         assert!(on_leaves || !protection.collision, "{}", name(case));
         if let Some(hit) = protection.impacts.first() {
-            let warned = may_not_stop.0.is_some_and(|t| t.secs() < hit.time_s);
+            let warned = may_not_stop.0.is_some_and(|t| t < hit.time);
             assert!(warned && hit.speed_mps < 4.0, "{}: {hit:?}", name(case));
         }
         assert!(protection.stopped_s.is_some(), "{}", name(case));
