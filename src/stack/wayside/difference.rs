@@ -6,12 +6,14 @@
 //! Headlights change the light everywhere. When a train is near, or much of the picture got
 //! brighter or darker together, f is compared with g b instead, g the local gain: the ratio of
 //! the mean grey of tiles, median over 5 x 5 tiles, so that an obstacle does not move it. The
-//! gain is only known roughly, so T rises by a share of |g b - b|.
+//! gain is only known roughly, so T rises by a share of |g b - b|. Where a train's headlights are in the
+//! picture, saturated pixels do not count: they are those lamps, and no body. Anywhere else they do.
 
 use super::WaysideSettings;
 use super::cells::{CELL_PX, GaugeCells};
 use super::rails::Rails;
 use super::reference::Reference;
+use crate::bus::PixelBox;
 
 /// Side of a gain tile.
 const TILE_PX: usize = 48;
@@ -83,23 +85,26 @@ impl Difference {
             .collect();
     }
 
-    /// Fills `absolute` and `binary`. `train_near` asks for the compensation at once.
+    /// Fills `absolute` and `binary`. `train_near` asks for the compensation at once; `headlights` is where
+    /// those of trains are in the picture.
     pub fn run(
         &mut self,
         frame: &[u8],
         reference: &Reference,
         (cells, rails): (&GaugeCells, &Rails),
         train_near: bool,
+        headlights: &[PixelBox],
     ) {
         let changed = self.measure_gain(frame, &reference.valid);
         self.compensated = train_near || changed;
         if self.compensated {
             self.smooth_gain();
-            // What blinds the camera while a train is near is its lamps.
-            let dazzle = if train_near { self.saturated } else { u8::MAX };
-            self.compare_compensated(frame, reference, dazzle);
+            self.compare_compensated(frame, reference);
         } else {
             self.compare(frame, reference);
+        }
+        for lamps in headlights {
+            self.forgive_saturated(frame, lamps);
         }
         cells.clear_blind(&mut self.raw, self.width);
         rails.forgive(frame, &reference.mean, &mut self.raw);
@@ -117,7 +122,20 @@ impl Difference {
         }
     }
 
-    fn compare_compensated(&mut self, frame: &[u8], reference: &Reference, dazzle: u8) {
+    /// Sets to 0 what is saturated in a box.
+    fn forgive_saturated(&mut self, frame: &[u8], lamps: &PixelBox) {
+        let columns = lamps.u0 as usize..(lamps.u1 as usize + 1).min(self.width);
+        let rows = lamps.v0 as usize..(lamps.v1 as usize + 1).min(self.height);
+        for v in rows {
+            for k in columns.clone().map(|u| v * self.width + u) {
+                if frame[k] > self.saturated {
+                    self.raw[k] = 0;
+                }
+            }
+        }
+    }
+
+    fn compare_compensated(&mut self, frame: &[u8], reference: &Reference) {
         let (threshold, distrust) = (u16::from(self.threshold), self.distrust);
         for v in 0..self.height {
             if v % CELL_PX == 0 {
@@ -140,7 +158,7 @@ impl Difference {
                 let limit = threshold + ((expected.abs_diff(b16) * distrust) >> 8);
                 let d = f16.abs_diff(expected);
                 *absolute = d as u8;
-                *raw = u8::from(d >= limit) & u8::from(f <= dazzle) & ok;
+                *raw = u8::from(d >= limit) & ok;
             }
         }
     }
@@ -320,11 +338,19 @@ mod tests {
                 .zip(random(w * h, 3, 30))
                 .map(|(&b, d)| b.saturating_add(d))
                 .collect();
+            let lamps = PixelBox {
+                u0: 3,
+                v0: 2,
+                u1: w as u32 / 2,
+                v1: h as u32 + 5,
+            };
             for train_near in [false, true] {
                 let mut fast = Difference::new(&settings, w, h);
                 fast.set_reference(&learnt);
                 let compensated = train_near || fast.measure_gain(&frame, &valid);
-                fast.run(&frame, &learnt, (&cells, &Rails::default()), train_near);
+                let headlights = if train_near { &[lamps][..] } else { &[] };
+                let places = (&cells, &Rails::default());
+                fast.run(&frame, &learnt, places, train_near, headlights);
                 let mut raw = vec![0u8; w * h];
                 for k in 0..w * h {
                     let (u, v) = (k % w / CELL_PX * CELL_PX, k / w / CELL_PX * CELL_PX);
@@ -337,7 +363,8 @@ mod tests {
                     let expected = (b * gain).floor().min(255.0);
                     let distrust = f64::from(fast.distrust) / 256.0;
                     let limit = 15.0 + ((expected - b).abs() * distrust).floor();
-                    let dazzled = train_near && f >= settings.saturated_grey;
+                    let in_lamps = (3..=w / 2).contains(&(k % w)) && k / w >= 2;
+                    let dazzled = train_near && in_lamps && f >= settings.saturated_grey;
                     assert_eq!(fast.absolute[k], (f - expected).abs() as u8);
                     raw[k] = u8::from((f - expected).abs() >= limit && !dazzled) * valid[k];
                 }

@@ -125,8 +125,8 @@ pub use equipment::WaysideDetection;
 pub use settings::WaysideSettings;
 
 use crate::bus::{
-    DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, Plan, SimTime, TrainReport,
-    WaysideCalibration, WaysideReport,
+    DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, PixelBox, Plan, SimTime,
+    TrainReport, WaysideCalibration, WaysideReport,
 };
 use crate::track::Tunnel;
 use announce::Announcer;
@@ -247,7 +247,8 @@ impl WaysideDetector {
         self.cells.occupy(&occupied_m);
         let train_near = trains.iter().any(|t| self.may_light(t));
         let places = (&self.cells, &self.rails);
-        (self.difference).run(grey, &self.reference, places, train_near);
+        let headlights: Vec<_> = trains.iter().filter_map(|t| self.headlights(t)).collect();
+        (self.difference).run(grey, &self.reference, places, train_near, &headlights);
         let compared = (&self.reference, &self.difference);
         let bed_sight = (self.bed_light).look(grey, compared, &self.cells, &self.settings);
         let sees = bed_sight.unseen_m <= self.settings.unseen_bed_m;
@@ -329,6 +330,22 @@ impl WaysideDetector {
         let tail_m = train.chainage_m - sign * (train.length_m + TRAIN_MARGIN_M);
         let glare_m = train.chainage_m + sign * GLARE_M;
         (tail_m.min(glare_m), tail_m.max(glare_m))
+    }
+
+    /// Where a train's headlights may be in the picture, mirrored in a wet bed too, with their halos; `None`
+    /// of a train whose head is not before the camera, or too far away to dazzle.
+    fn headlights(&self, train: &TrainReport) -> Option<PixelBox> {
+        if !self.may_light(train) {
+            return None;
+        }
+        let nearest_m = train.chainage_m + train.direction.sign() * TRAIN_MARGIN_M;
+        let far = self.sight.front_box(train.chainage_m, &self.settings)?;
+        let near = self
+            .sight
+            .front_box(nearest_m, &self.settings)
+            .unwrap_or(far);
+        let both = far.joined(&near);
+        Some(both.widened(both.u1 - both.u0, both.v1 - both.v0))
     }
 
     fn may_light(&self, train: &TrainReport) -> bool {

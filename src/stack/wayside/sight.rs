@@ -6,11 +6,14 @@
 //! lines between them, is off by less than 0.2 mm in a curve of 150 m radius.
 
 use super::WaysideSettings;
-use crate::bus::WaysideCalibration;
+use crate::bus::{PixelBox, WaysideCalibration};
 use crate::numerics::bisected;
 use crate::track::{CrossSection, Edge, TrackPoint, Tunnel};
 use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
+
+/// Boxes in the picture end here, on the right and below.
+const FARTHEST_PX: f64 = 65_535.0;
 
 /// Distance between stations.
 const STATION_M: f64 = 0.5;
@@ -198,6 +201,30 @@ impl Sight {
         let world = self.map.alignment.world_from_track(place);
         let seen = (calibration.world_from_camera).inverse_transform_point(&world);
         (seen.z > 0.1).then(|| calibration.camera.intrinsics.project(&seen))?
+    }
+
+    /// The structure gauge at a chainage in the picture, with its mirror image below the rails; `None` behind
+    /// the camera.
+    pub fn front_box(&self, s_m: f64, settings: &WaysideSettings) -> Option<PixelBox> {
+        let (half_m, top_m) = (settings.gauge_half_width_m, settings.gauge_height_m);
+        let corners = [
+            (-half_m, -top_m),
+            (half_m, -top_m),
+            (-half_m, top_m),
+            (half_m, top_m),
+        ];
+        let mut boxes = corners.into_iter().map(|(l_m, h_m)| {
+            let pixel = self.pixel_of(TrackPoint { s_m, l_m, h_m })?;
+            let [u, v] = [pixel.x, pixel.y].map(|x| x.clamp(0.0, FARTHEST_PX) as u32);
+            Some(PixelBox {
+                u0: u,
+                v0: v,
+                u1: u,
+                v1: v,
+            })
+        });
+        let first = boxes.next()??;
+        boxes.try_fold(first, |all, corner| Some(all.joined(&corner?)))
     }
 
     /// A world point on the line, where it is within the device's surroundings.

@@ -661,6 +661,39 @@ fn a_dark_tunnel_is_not_clear() {
     }
 }
 
+/// A train comes near, its headlights saturate their pixels, and a bright body is put down that saturates its own:
+/// found, and nothing else. Provokes a body that is taken for headlights, wherever it lies, as long as a train is
+/// within 200 m of it.
+#[test]
+fn a_bright_body_is_no_headlight() {
+    let scene = TestScene::new(640, 360);
+    let settings = quiet();
+    let mut d = taught(&scene, &settings);
+    let body = Crate::on_bed(182.0, 0.0, 0.6);
+    for n in 10..40u32 {
+        let head_m = 40.0 + f64::from(n);
+        let lamps = Crate {
+            s: (head_m - 0.1, head_m),
+            l: (-1.2, 1.2),
+            h: (0.6, 1.2),
+        };
+        let frame = scene.frame(n, STEADY, &[(lamps, 255.0), (body, 255.0)]);
+        let train = TrainReport {
+            chainage_m: head_m,
+            direction: Direction::Up,
+            speed_mps: 10.0,
+            time: frame.start,
+            length_m: 118.0,
+            ..TrainReport::default()
+        };
+        let report = d.on_frame(&frame, None, &[train]);
+        let found: Vec<_> = report.obstacles.iter().map(|o| o.from_chainage_m).collect();
+        let expected = usize::from(n >= 12);
+        assert_eq!(found.len(), expected, "frame {n}: {found:?}");
+        assert!(found.iter().all(|m| (m - 182.0).abs() < 1.0), "{found:?}");
+    }
+}
+
 /// Mist hides a body before it hides the light: the device says that it is blind, whether the mist was there
 /// when it learnt or came later. Provokes brightness taken for sight. What it would miss is missed: a body at
 /// 55 m, as much brighter than the bed as must be found, is found in thin mist and not in thick mist.
