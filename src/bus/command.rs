@@ -86,7 +86,7 @@ pub enum Indicator {
     /// Nothing on the way.
     #[default]
     NormalGreen,
-    /// An obstacle ahead: brake; red, with buzzer.
+    /// A dangerous obstacle ahead, or too fast: brake; red, with buzzer.
     BrakeWarningRed,
     /// The automatic brake failed: brake by hand; emergency lamp and buzzer.
     Emergency,

@@ -5,7 +5,7 @@ use crate::bus::{CameraModel, RigCalibration};
 use crate::scenario::sampling::Template;
 use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::{Direction, Tunnel};
-use crate::twin::physics::VehicleFile;
+use crate::twin::physics::{ObstacleSettings, VehicleFile};
 use crate::twin::sensors::visible_interval;
 
 /// Dimensions and masses.
@@ -59,7 +59,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
                 Direction::Up => "",
                 Direction::Down => " down the line",
             },
-            train.cruise_speed_kmh
+            (10.0 * train.cruise_speed_kmh).round() / 10.0
         ));
     }
     if let Some(bench) = &scenario.file.bench {
@@ -95,7 +95,28 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
 pub(super) fn notes(scenario: &Scenario) -> Vec<String> {
     let onboard = scenario.onboard.iter();
     let of_each = onboard.map(|o| [without_position(o, scenario), without_lamps(o, scenario)]);
-    of_each.flatten().flatten().collect()
+    let mut notes: Vec<String> = of_each.flatten().flatten().collect();
+    notes.extend(in_the_reference(scenario));
+    notes
+}
+
+/// What lies before a wayside camera while it learns what the clear track looks like.
+fn in_the_reference(scenario: &Scenario) -> Option<String> {
+    let detection = &scenario.file.stack.wayside;
+    let early = |o: &&ObstacleSettings| {
+        let mut devices = scenario.wayside.iter();
+        devices.any(|post| {
+            let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
+            let away_m = (o.chainage_m - post.calibration.chainage_m).abs();
+            o.appears_s < learns_s && o.held_until_s.is_none() && away_m < detection.reach_m
+        })
+    };
+    let first = scenario.physics.obstacles.iter().find(early)?;
+    Some(format!(
+        "`{}` appears at {} s, while a wayside camera near it learns its reference image from its first {} \
+         frames: what lies there then belongs to the track, and is not found; let it appear later (appears_s)",
+        first.name, first.appears_s, detection.reference_frames
+    ))
 }
 
 /// A train that does not know where it is, and by what it may find out.
@@ -111,8 +132,14 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
         0 => "stack.protection",
         _ => "the protection of its [[onboard]]",
     };
+    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
+    let too_fast = if train.start_speed_kmh > protection.restricted_kmh {
+        ", so that it brakes at once"
+    } else {
+        ""
+    };
     Some(format!(
-        "{} starts without a position, and its equipment permits {} km/h {}; \
+        "{} starts without a position, and its equipment permits {} km/h {}{too_fast}; \
          initial_chainage_m in {key} gives it one",
         onboard.id(),
         protection.restricted_kmh,

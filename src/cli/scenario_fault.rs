@@ -12,6 +12,12 @@ use std::path::Path;
 pub(super) fn load_scenario(path: &Path, overrides: &[Override]) -> Result<Scenario, Failure> {
     let text = scenario::read(path)?;
     refuse_other(path, &text)?;
+    if FileKind::of(&text) == FileKind::Study {
+        let path = path.display();
+        eprintln!(
+            "note: [study] of {path} is left out; `metrotwin study run {path}` makes its runs"
+        );
+    }
     Ok(Scenario::from_text(path, &text, overrides)?)
 }
 

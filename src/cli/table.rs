@@ -159,6 +159,7 @@ mod tests {
             dark_lamps: (1..=9).map(|k| format!("1-{k}")).collect(),
             protection: Some(ProtectionFigures {
                 brake_commanded_s: Some(20.0),
+                emergency_brake_s: Some(20.5),
                 stopped_s: Some(30.006),
                 stop_margin_m: Some(-1.25),
                 collision: true,
@@ -195,7 +196,8 @@ mod tests {
             "camera W1530: 3 frames lost, no image from 1.00 to 2.50 s, too late from 1.00 s to the end, \
              no image from 1.00 to 2.50 s, too late from 1.00 s to the end, 5 faults in all",
             "9 dark lamps: 1-1, 1-2, 1-3, 1-4, 1-5, 1-6, 1-7, 1-8, ...",
-            "protection braked at 20.00 s, the train stood at 30.01 s, it lacked 1.2 m to stop in; COLLISION",
+            "braked for what was ahead from 20.00 s, emergency brake at 20.50 s, stood at 30.01 s, it lacked \
+             1.2 m to stop in; COLLISION",
             "  hit toolbox at 31.50 s with 36.0 km/h: 1234 N s, 1.50 kJ of 5.00 kJ lost, beyond design damage",
             "  and 1 more hits: see summary.json",
             "train ran 512.3 m; floor 0.346 m/s^2 vertical, 0.200 lateral (RMS); wheel load down to 88 %; \

@@ -58,8 +58,8 @@ pub(super) fn danger(danger: DangerLevel) -> Color {
 /// Of the driver's lamp, with its name.
 pub(super) fn driver_lamp(lamp: Indicator) -> (&'static str, &'static str) {
     match lamp {
-        Indicator::NormalGreen => ("green", "line clear"),
-        Indicator::BrakeWarningRed => ("RED + buzzer", "obstacle ahead"),
+        Indicator::NormalGreen => ("green", "run"),
+        Indicator::BrakeWarningRed => ("RED + buzzer", "brake"),
         Indicator::Emergency => ("EMERGENCY + buzzer", "brake by hand"),
     }
 }

@@ -136,9 +136,8 @@ const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
 pub(super) const RIG_CAMERA: &str = "rig";
 
 fn most_slip_mps(train: &TrainState) -> Option<f64> {
-    let slips = train.wheels.iter().map(|w| w.slip_mps);
-    let most = slips.fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-    train.wheels.first().map(|_| most)
+    let slips = train.wheels.iter().map(|w| w.slip_mps.abs());
+    slips.reduce(f64::max)
 }
 
 /// The plots of a run by panes; plots of one pane are its tabs.

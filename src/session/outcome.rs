@@ -11,6 +11,7 @@ pub struct Outcome {
     /// An obstacle ahead permits less than the driver aims at.
     slowed_by_obstacle: bool,
     brake_commanded: Option<SimTime>,
+    emergency_brake: Option<SimTime>,
     stopped: Option<SimTime>,
     /// Closest that the head came to what was ahead of it; below 0 after a hit.
     closest_m: Option<f64>,
@@ -31,6 +32,9 @@ impl Outcome {
         self.slowed_by_obstacle = obstacle && report.permitted_mps < aim_mps;
         if obstacle && !self.standing && report.command.brake != BrakeDemand::None {
             self.brake_commanded.get_or_insert(now);
+        }
+        if !self.standing && report.command.brake == BrakeDemand::Emergency {
+            self.emergency_brake.get_or_insert(now);
         }
     }
 
@@ -87,6 +91,7 @@ impl Outcome {
         let impacts: Vec<_> = impacts.cloned().collect();
         Some(ProtectionFigures {
             brake_commanded_s: self.brake_commanded.map(SimTime::secs),
+            emergency_brake_s: self.emergency_brake.map(SimTime::secs),
             stopped_s: self.stopped.map(SimTime::secs),
             stop_margin_m: self.closest_m,
             collision: !impacts.is_empty(),

@@ -265,7 +265,10 @@ pub struct ProtectionFigures {
     /// When the train first braked for an obstacle, by the equipment or by a driver who keeps to the
     /// permitted speed.
     pub brake_commanded_s: Option<f64>,
-    /// When the train first stood after that: slower than 0.01 m/s.
+    /// When the equipment first demanded the emergency brake of a running train, for whatever reason: speed,
+    /// an unknown place, what is ahead, a fault.
+    pub emergency_brake_s: Option<f64>,
+    /// When the train first stood after it braked for an obstacle: slower than 0.01 m/s.
     pub stopped_s: Option<f64>,
     /// Closest approach, whether the train stopped or not: the least distance from its head to an obstacle
     /// within the gauge, or a train, ahead of it; where it hit something, minus the way that it would still

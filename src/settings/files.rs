@@ -62,7 +62,7 @@ pub fn read_bytes(path: &Path, kind: ReadLimit) -> io::Result<Vec<u8>> {
     let ending = real.extension().unwrap_or_default();
     if !ending.eq_ignore_ascii_case(kind.ending) {
         return Err(refused(format!(
-            "its name does not end with .{}",
+            "its name does not end with .{}, as that of such a file must",
             kind.ending
         )));
     }
