@@ -339,13 +339,11 @@ impl WaysideDetector {
             return None;
         }
         let nearest_m = train.chainage_m + train.direction.sign() * TRAIN_MARGIN_M;
-        let far = self.sight.front_box(train.chainage_m, &self.settings)?;
-        let near = self
-            .sight
-            .front_box(nearest_m, &self.settings)
-            .unwrap_or(far);
+        let far = self.sight.lamps_box(train.chainage_m)?;
+        let near = self.sight.lamps_box(nearest_m).unwrap_or(far);
         let both = far.joined(&near);
-        Some(both.widened(both.u1 - both.u0, both.v1 - both.v0))
+        let halo_px = (both.u1 - both.u0) / 2;
+        Some(both.widened(halo_px, halo_px))
     }
 
     fn may_light(&self, train: &TrainReport) -> bool {

@@ -12,6 +12,8 @@ use crate::track::{CrossSection, Edge, TrackPoint, Tunnel};
 use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
 
+/// A train's headlights are within this of the middle between the rails, across and in height.
+const LAMPS_WITHIN_M: f64 = 1.8;
 /// Boxes in the picture end here, on the right and below.
 const FARTHEST_PX: f64 = 65_535.0;
 
@@ -203,17 +205,12 @@ impl Sight {
         (seen.z > 0.1).then(|| calibration.camera.intrinsics.project(&seen))?
     }
 
-    /// The structure gauge at a chainage in the picture, with its mirror image below the rails; `None` behind
-    /// the camera.
-    pub fn front_box(&self, s_m: f64, settings: &WaysideSettings) -> Option<PixelBox> {
-        let (half_m, top_m) = (settings.gauge_half_width_m, settings.gauge_height_m);
-        let corners = [
-            (-half_m, -top_m),
-            (half_m, -top_m),
-            (-half_m, top_m),
-            (half_m, top_m),
-        ];
-        let mut boxes = corners.into_iter().map(|(l_m, h_m)| {
+    /// Where the headlights of a train whose head is at a chainage are in the picture, and their mirror image
+    /// in a wet bed; `None` behind the camera.
+    pub fn lamps_box(&self, s_m: f64) -> Option<PixelBox> {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
+        let mut boxes = corners.into_iter().map(|(left, up)| {
+            let (l_m, h_m) = (left * LAMPS_WITHIN_M, up * LAMPS_WITHIN_M);
             let pixel = self.pixel_of(TrackPoint { s_m, l_m, h_m })?;
             let [u, v] = [pixel.x, pixel.y].map(|x| x.clamp(0.0, FARTHEST_PX) as u32);
             Some(PixelBox {
