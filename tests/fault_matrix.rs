@@ -62,8 +62,8 @@ fn every_case_is_run_once_and_breaks_something() {
 /// The cases in which the box cannot be seen, and that without a fault, end without a collision, with the
 /// camera of the run in which headlights once took the alarm back. On a film of leaves the brakes need all of
 /// the way that there is, or some metres more: a train that still hits is slower than 6 m/s (4 when measured),
-/// and its equipment has said before that it may not stop. Without the rig, and with a quarter of the pixels, to be quick.
-/// Provokes an "all clear" from a camera that sees nothing.
+/// and its equipment has said before that it may not stop. Without the rig, and with a quarter of the pixels,
+/// to be quick. Provokes an "all clear" from a camera that sees nothing.
 #[test]
 fn the_worst_cases_end_before_the_box_or_slowly() {
     let text = std::fs::read_to_string(STUDY).unwrap();

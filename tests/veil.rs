@@ -50,8 +50,8 @@ fn seen_by_w1530(more: &str) -> (f64, f64, bool) {
 
 /// In clear air the camera of the shipped line must have the contrast of the shipped
 /// `stack.wayside.track_contrast` (0.35), or nearly: with less, bodies would count as less visible than they
-/// are, with much more, mist would be noticed too late. Mist lowers it, as it absorbs light and adds its own, and where too little is left the device must
-/// be blind. Provokes a bright veil taken for a bright bed.
+/// are, with much more, mist would be noticed too late. Mist lowers it, as it absorbs light and adds its own,
+/// and where too little is left the device must be blind. Provokes a bright veil taken for a bright bed.
 #[test]
 fn mist_takes_the_contrast_of_the_track() {
     let (clear, unseen_m, blind) = seen_by_w1530("");

@@ -178,6 +178,10 @@ mod tests {
             }
             let protection = outcome.protection(TrainId(0), &world).unwrap();
             assert_eq!(protection.brake_commanded_s.is_some(), braked);
+            assert_eq!(
+                protection.emergency_brake_s.is_some(),
+                start_speed_kmh > 0.0
+            );
             assert_eq!(protection.stopped_s, None);
         }
     }

@@ -213,12 +213,7 @@ impl Sight {
             let (l_m, h_m) = (left * LAMPS_WITHIN_M, up * LAMPS_WITHIN_M);
             let pixel = self.pixel_of(TrackPoint { s_m, l_m, h_m })?;
             let [u, v] = [pixel.x, pixel.y].map(|x| x.clamp(0.0, FARTHEST_PX) as u32);
-            Some(PixelBox {
-                u0: u,
-                v0: v,
-                u1: u,
-                v1: v,
-            })
+            Some(PixelBox::of_row(v, (u, u)))
         });
         let first = boxes.next()??;
         boxes.try_fold(first, |all, corner| Some(all.joined(&corner?)))

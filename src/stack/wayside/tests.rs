@@ -20,6 +20,18 @@ fn quiet() -> WaysideSettings {
     }
 }
 
+/// A train of six cars that runs up the line, as it reports itself.
+fn train_report(head_m: f64, speed_mps: f64, time: SimTime) -> TrainReport {
+    TrainReport {
+        chainage_m: head_m,
+        direction: Direction::Up,
+        speed_mps,
+        time,
+        length_m: 118.0,
+        ..TrainReport::default()
+    }
+}
+
 /// Runs the frames of the reference.
 fn taught(scene: &TestScene, settings: &WaysideSettings) -> WaysideDetector {
     let mut d = detector(scene, settings);
@@ -331,14 +343,7 @@ fn the_train_is_no_obstacle() {
             let near = 0.3 * (f64::from(n - 10) / 50.0);
             let light = |_, _| 1.0 + near;
             let frame = scene.frame(n, light, &[(train, 210.0), (item, 20.0)]);
-            let report = TrainReport {
-                chainage_m: head - 1.0,
-                direction: Direction::Up,
-                speed_mps: 20.0,
-                time: frame.start.plus(-0.05),
-                length_m: 118.0,
-                ..TrainReport::default()
-            };
+            let report = train_report(head - 1.0, 20.0, frame.start.plus(-0.05));
             let report = d.on_frame(&frame, None, reported.then_some(report).as_slice());
             let behind = |o: &DetectedObstacle| o.to_chainage_m < 183.0;
             if reported {
@@ -369,14 +374,7 @@ fn the_glare_of_a_train_hides_what_falls_before_it() {
         let mut d = taught(&scene, &quiet());
         let mut look = |n: u32, things: &[(Crate, f64)], head_m: Option<f64>| {
             let frame = scene.frame(n, STEADY, things);
-            let train = head_m.map(|chainage_m| TrainReport {
-                chainage_m,
-                direction: Direction::Up,
-                speed_mps: 0.0,
-                time: frame.start,
-                length_m: 118.0,
-                ..TrainReport::default()
-            });
+            let train = head_m.map(|head_m| train_report(head_m, 0.0, frame.start));
             d.on_frame(&frame, None, train.as_slice()).obstacles.len()
         };
         assert_eq!(look(10, &[], head_m), 0);
@@ -401,14 +399,7 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
     let mut whole = None;
     for n in 10..110u32 {
         let frame = scene.frame(n, STEADY, &item);
-        let train = TrainReport {
-            chainage_m: 40.0 + 0.5 * f64::from(n),
-            direction: Direction::Up,
-            speed_mps: 0.0,
-            time: frame.start,
-            length_m: 118.0,
-            ..TrainReport::default()
-        };
+        let train = train_report(40.0 + 0.5 * f64::from(n), 0.0, frame.start);
         let report = d.on_frame(&frame, None, &[train]);
         if n < 14 {
             continue;
@@ -678,14 +669,7 @@ fn a_bright_body_is_no_headlight() {
             h: (0.6, 1.2),
         };
         let frame = scene.frame(n, STEADY, &[(lamps, 255.0), (body, 255.0)]);
-        let train = TrainReport {
-            chainage_m: head_m,
-            direction: Direction::Up,
-            speed_mps: 10.0,
-            time: frame.start,
-            length_m: 118.0,
-            ..TrainReport::default()
-        };
+        let train = train_report(head_m, 10.0, frame.start);
         let report = d.on_frame(&frame, None, &[train]);
         let found: Vec<_> = report.obstacles.iter().map(|o| o.from_chainage_m).collect();
         let expected = usize::from(n >= 12);
@@ -741,14 +725,7 @@ fn a_train_before_it_gives_no_sight_to_a_blind_device() {
     let mut d = detector(&scene, &settings);
     for n in 0..100u32 {
         let frame = scene.frame(n, STEADY, &[]);
-        let train = TrainReport {
-            chainage_m: 40.0 + f64::from(n),
-            direction: Direction::Up,
-            speed_mps: 10.0,
-            time: frame.start,
-            length_m: 118.0,
-            ..TrainReport::default()
-        };
+        let train = train_report(40.0 + f64::from(n), 10.0, frame.start);
         let report = d.on_frame(&frame, None, &[train]);
         assert!(!report.passage_possible, "frame {n}");
         assert!(report.blind || n < 20, "frame {n}");
