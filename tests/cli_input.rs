@@ -333,6 +333,26 @@ fn what_may_surprise_is_noted() {
         blind.contains("no lamp stands on the way of train 0"),
         "{blind}"
     );
+    let wrong = format!("{SCENARIO}[stack.protection]\ninitial_chainage_m = 550.0\n");
+    let wrong = said_of(&wrong).expect("it is right");
+    assert!(
+        wrong.contains("at 550 m; it is at 150 m, 400.0 m from there"),
+        "{wrong}"
+    );
+    let box_at = |chainage_m: f64, more: &str| {
+        let things = format!("[[obstacles]]\nchainage_m = {chainage_m}\n{more}\n");
+        let devices = "[[wayside]]\ndevice = \"W1530\"\n";
+        said_of(&format!("{SCENARIO}{things}{devices}")).expect("it is right")
+    };
+    let inside = box_at(145.0, "");
+    assert!(
+        inside.contains("in or under train 0, which stands from "),
+        "{inside}"
+    );
+    let of_device = |said: String| said.contains("in the picture of no wayside camera (W1530)");
+    // It looks down the line.
+    assert!(of_device(box_at(1600.0, "appears_s = 0.1")));
+    assert!(!of_device(box_at(1505.0, "appears_s = 0.1")));
     let args = "check scenarios/line_run.toml --set train.direction=\"down\" --set \
         train.start_chainage_m=2875 --set train.stop_at_m=195 --set rig.side=\"right\" --set rig.yaw_deg=141";
     let back = metrotwin(&args.split_whitespace().collect::<Vec<_>>());

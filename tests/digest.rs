@@ -153,13 +153,41 @@ fn quantiles_stay_where_the_figure_can_be() {
     for (name, [low, high]) in [
         ("paper_availability", [0.0, 1.0]),
         ("paper_error_max_m", [0.0, 9.0]),
-        ("stop_error_m", [-9.0, 9.0]),
+        ("stop_error_m", [0.0, 9.0]),
     ] {
         let [a, b] = ends(name);
         assert!(
             (a - low).abs() < 1e-12 && (b - high).abs() < 1e-12,
             "{name}: {a} to {b}"
         );
+    }
+}
+
+/// Quantiles are those of the harmful side: a margin, a speed, an error with a sign, and a distance that
+/// has none.
+#[test]
+fn quantiles_are_of_the_worse_side() {
+    let base = folder("worse");
+    let figures = |k: u64| {
+        let k = k as f64;
+        json!({"stop_margin_m": k, "most_slip_mps": k, "stop_error_m": -k, "run_m": k})
+    };
+    let rows: Vec<Row> = (0..=100)
+        .map(|k| row(k, Status::Complete, figures(k)))
+        .collect();
+    let digest = Digest::of(&template(&base), &rows);
+    fs::remove_dir_all(base).ok();
+    for (name, expected, worst) in [
+        ("stop_margin_m", 5.0, Some(0)),
+        ("most_slip_mps", 95.0, Some(100)),
+        ("stop_error_m", 95.0, Some(100)),
+        ("run_m", 95.0, None),
+    ] {
+        let figure = figure(&digest, name);
+        let [.., q95] = figure.quantiles.map(Option::unwrap);
+        assert!((q95.value - expected).abs() < 1e-12, "{name}: {q95:?}");
+        assert!(q95.low < expected && expected < q95.high, "{name}: {q95:?}");
+        assert_eq!(figure.worst.map(|w| w.index), worst, "{name}");
     }
 }
 

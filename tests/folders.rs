@@ -62,7 +62,10 @@ fn files_of_others_are_not_written_over() {
             _ => short_run(&out),
         };
         refuses(&output, name);
-        says(&output, "is there already, and is not ours");
+        says(
+            &output,
+            "is there already, and this command has not written it",
+        );
         assert_eq!(fs::read_to_string(&path).unwrap(), "mine");
         // Inputs are held against the folder when it is locked.
         assert!(

@@ -3,16 +3,19 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use metrotwin::scenario::ScenarioFile;
+use metrotwin::session::Summary;
 use metrotwin::settings::{self, Problem, Settings};
 use metrotwin::track::TunnelFile;
 use metrotwin::twin::physics::VehicleFile;
+use schemars::generate::SchemaSettings;
 use schemars::{JsonSchema, schema_for};
 use serde::{Serialize, de::DeserializeOwned};
 use serde_json::Value as Json;
 use std::marker::PhantomData;
 use std::path::Path;
 
-/// Fails when a settings struct changed (a key, a default, a doc comment) and its schema did not.
+/// Fails when a settings struct or the summary changed (a key, a default, a doc comment) and its schema did
+/// not.
 /// `METROTWIN_WRITE_SCHEMAS=1 cargo test --release --test schema` writes them anew.
 #[test]
 fn schemas_are_up_to_date() {
@@ -24,6 +27,13 @@ fn schemas_are_up_to_date() {
             schema_for!(VehicleFile),
         ),
         ("tunnels/tunnel.schema.json", schema_for!(TunnelFile)),
+        (
+            "docs/summary.schema.json",
+            SchemaSettings::default()
+                .for_serialize()
+                .into_generator()
+                .into_root_schema_for::<Summary>(),
+        ),
     ] {
         let text = serde_json::to_string_pretty(&schema).expect("the types have schemas") + "\n";
         let file = root.join(path);

@@ -8,7 +8,18 @@ use std::fmt;
 /// Number of a train in a scenario, from 0. Train 0 is the one of the scenario's `[train]` table,
 /// train `k` the `k`-th of `[[other_trains]]`.
 #[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize,
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    JsonSchema,
 )]
 pub struct TrainId(pub u8);
 

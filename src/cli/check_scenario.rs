@@ -2,7 +2,7 @@
 
 use super::fault::Failure;
 use super::file_kind::FileKind;
-use super::report;
+use super::{notes, report};
 use crate::scenario::sampling::Template;
 use crate::scenario::{self, Override, Scenario};
 use crate::study;
@@ -25,7 +25,7 @@ pub(super) fn report_on(
     };
     let scenario = Scenario::from_text(path, text, overrides)?;
     let mut said = report::scenario(&scenario);
-    for note in report::notes(&scenario) {
+    for note in notes::of(&scenario) {
         said += &format!("  note: {note}\n");
     }
     if let Some(template) = template {

@@ -30,6 +30,8 @@ mod frames;
 #[cfg(feature = "twin")]
 mod generate;
 #[cfg(feature = "twin")]
+mod notes;
+#[cfg(feature = "twin")]
 mod report;
 #[cfg(feature = "twin")]
 mod run;

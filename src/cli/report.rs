@@ -1,11 +1,11 @@
 //! What a vehicle, scenario or study says, in a few lines.
 
 use super::tunnel::indented;
-use crate::bus::{CameraModel, RigCalibration};
+use crate::bus::{CameraModel, RigCalibration, TrainId};
 use crate::scenario::sampling::Template;
 use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::{Direction, Tunnel};
-use crate::twin::physics::{ObstacleSettings, VehicleFile};
+use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
 
 /// Dimensions and masses.
@@ -44,7 +44,10 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         ),
     ];
     for (k, train) in scenario.physics.trains.iter().enumerate() {
-        let what = if k == 0 { "train" } else { "other train" };
+        let what = match scenario.physics.trains.len() {
+            1 => "train".to_owned(),
+            _ => TrainId::from_index(k).to_string(),
+        };
         let stop = train
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));
@@ -89,101 +92,6 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         ));
     }
     indented(&lines)
-}
-
-/// What a user may not expect of a scenario that is right.
-pub(super) fn notes(scenario: &Scenario) -> Vec<String> {
-    let onboard = scenario.onboard.iter();
-    let of_each = onboard.map(|o| [without_position(o, scenario), without_lamps(o, scenario)]);
-    let mut notes: Vec<String> = of_each.flatten().flatten().collect();
-    notes.extend(in_the_reference(scenario));
-    notes
-}
-
-/// What lies before a wayside camera while it learns what the clear track looks like.
-fn in_the_reference(scenario: &Scenario) -> Option<String> {
-    let detection = &scenario.file.stack.wayside;
-    let early = |o: &&ObstacleSettings| {
-        let mut devices = scenario.wayside.iter();
-        devices.any(|post| {
-            let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
-            let away_m = (o.chainage_m - post.calibration.chainage_m).abs();
-            o.appears_s < learns_s && o.held_until_s.is_none() && away_m < detection.reach_m
-        })
-    };
-    let first = scenario.physics.obstacles.iter().find(early)?;
-    Some(format!(
-        "`{}` appears at {} s, while a wayside camera near it learns its reference image from its first {} \
-         frames: what lies there then belongs to the track, and is not found; let it appear later (appears_s)",
-        first.name, first.appears_s, detection.reference_frames
-    ))
-}
-
-/// A train that does not know where it is, and by what it may find out.
-fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
-    let protection = &onboard.protection;
-    if !onboard.protects() || protection.initial_chainage_m.is_some() {
-        return None;
-    }
-    let [from_m, to_m] = way_m(onboard, scenario)?;
-    let balises = &scenario.tunnel.balises;
-    let meets_balise = (balises.iter()).any(|b| (from_m..=to_m).contains(&b.chainage_m));
-    let key = match onboard.train {
-        0 => "stack.protection",
-        _ => "the protection of its [[onboard]]",
-    };
-    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
-    let too_fast = if train.start_speed_kmh > protection.restricted_kmh {
-        ", so that it brakes at once"
-    } else {
-        ""
-    };
-    Some(format!(
-        "{} starts without a position, and its equipment permits {} km/h {}{too_fast}; \
-         initial_chainage_m in {key} gives it one",
-        onboard.id(),
-        protection.restricted_kmh,
-        match (meets_balise, onboard.positions()) {
-            (false, false) => "all the way: it meets no balise and has no positioning by lamps",
-            (true, false) => "until it has read a balise",
-            (false, true) => "until it has found itself by lamps",
-            (true, true) => "until it has read a balise or found itself by lamps",
-        }
-    ))
-}
-
-/// A rig on a train that has all lamps behind it.
-fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
-    onboard.rig.as_ref()?;
-    let [from_m, to_m] = way_m(onboard, scenario)?;
-    let lamps = &scenario.tunnel.lamps;
-    let (first, last) = (lamps.first()?, lamps.last()?);
-    let passes = lamps
-        .iter()
-        .any(|l| (from_m..=to_m).contains(&l.chainage_m));
-    (!passes).then(|| {
-        format!(
-            "no lamp stands on the way of {}, from {from_m:.0} to {to_m:.0} m: those of the line are \
-             from {} to {} m",
-            onboard.id(),
-            first.chainage_m,
-            last.chainage_m
-        )
-    })
-}
-
-/// The stretch from where a train starts to the end of the line, or its stop.
-fn way_m(onboard: &OnboardSettings, scenario: &Scenario) -> Option<[f64; 2]> {
-    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
-    let start_m = train.start_chainage_m;
-    let stop_m = train.stop_at_m;
-    Some(match train.direction {
-        Direction::Up => [
-            start_m,
-            stop_m.unwrap_or(scenario.tunnel.alignment.length_m()),
-        ],
-        Direction::Down => [stop_m.unwrap_or(0.0), start_m],
-    })
 }
 
 /// The rig of a train, if it has one.

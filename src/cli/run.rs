@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals, unusable};
 use super::scenario_fault::load_scenario;
-use super::{print, report, table};
+use super::{notes, print, table};
 use crate::record::{self, FixTable, Listing, Recording};
 use crate::scenario::sampling::ScenarioSample;
 use crate::scenario::{Override, Scenario};
@@ -17,13 +17,21 @@ use std::time::Duration;
 const AFTER: &str = "\
 Into the output folder go:
   recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
-  summary.json    the figures
+  summary.json    the figures; docs/summary.schema.json says what each key is
   fixes.csv       every position, with its truth (of train k: fixes_train_k.csv)
   files.txt       the list of these files
 The next run into the folder replaces them. Files that the list does not name are never removed or written
 over: where one has the name of a result, nothing is run.
 Each is written under a temporary name, .part, and renamed when it is complete. A run that is killed
 leaves recording.rrd.part, up to its last second: renamed, it opens in the viewer.
+
+Columns of fixes.csv:
+  time_s                       when the train was there: mid-exposure of the lamp's row
+  method                       paper (stereo) or mono (one camera)
+  uid, identity                the lamp, and how it was named: decoded, joined, followed, predicted
+  chainage_m, sigma_m          the estimate for the train's head, with one sigma
+  true_chainage_m, error_m     the truth, and estimate less truth
+  lamp_x_m, lamp_y_m, lamp_z_m the lamp in the left camera's frame: right, down, forward
 
 Examples:
   metrotwin run scenarios/line_run.toml
@@ -145,7 +153,7 @@ fn task(args: &RunArgs) -> Result<Task, Failure> {
     }
     let path = args.scenario.as_deref().unwrap_or(Path::new(""));
     let mut scenario = load_scenario(path, &args.overrides)?;
-    for note in report::notes(&scenario) {
+    for note in notes::of(&scenario) {
         eprintln!("note: {note}");
     }
     scenario.file.seed = args.seed.unwrap_or(scenario.file.seed);
@@ -283,4 +291,22 @@ fn listing(args: &RunArgs, scenario: &Scenario, out: &Path) -> io::Result<Listin
     let fixes = rigs.map(|o| FixTable::file_name(o.id()));
     let names = recording.into_iter().flatten().chain(fixes);
     Listing::claim(out, COMMAND, names.chain([SUMMARY.to_owned()]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::FIX_COLUMNS;
+
+    /// Fails where a column has no line in the help.
+    #[test]
+    fn help_tells_all_columns() {
+        let told = AFTER
+            .split_once("Columns of fixes.csv:")
+            .map_or("", |t| t.1);
+        let words: Vec<&str> = told.split([' ', ',', '\n']).collect();
+        for column in FIX_COLUMNS.split(',') {
+            assert!(words.contains(&column), "{column}");
+        }
+    }
 }

@@ -66,10 +66,10 @@ pub(super) fn unusable(out: &Path, error: &io::Error) -> Failure {
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }
 
-/// How far something is: a bar on a terminal, else a line for every tenth.
+/// How far something is: a bar on a terminal, else a line at the start and for every tenth.
 pub(super) struct ProgressBar {
     bar: indicatif::ProgressBar,
-    tenths: Cell<u64>,
+    tenths: Cell<Option<u64>>,
 }
 
 impl ProgressBar {
@@ -80,7 +80,7 @@ impl ProgressBar {
                 Ok(style) => bar.with_style(style),
                 Err(_) => bar,
             },
-            tenths: Cell::new(0),
+            tenths: Cell::new(None),
         }
     }
 
@@ -96,7 +96,7 @@ impl ProgressBar {
         self.bar.set_length(all);
         self.bar.set_position(done);
         self.bar.set_message(message.to_owned());
-        let reached = 10 * done / all.max(1);
+        let reached = Some(10 * done / all.max(1));
         if self.bar.is_hidden() && reached > self.tenths.replace(reached) {
             eprintln!("{}", line());
         }

@@ -41,7 +41,7 @@ impl Listing {
         let mut file = locked(file, &path)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let earlier = parse(&bytes, command).ok_or_else(|| taken(&path))?;
+        let earlier = parse(&bytes, command).ok_or_else(|| owned(&path, &bytes))?;
         let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
         file.set_len(whole as u64)?;
         if whole == 0 {
@@ -60,8 +60,11 @@ impl Listing {
     /// In a folder where one of them is somebody else's nothing is made.
     pub fn claim(folder: &Path, command: &'static str, names: Vec<String>) -> io::Result<Self> {
         if let Some(name) = foreign(folder, command, names.iter().map(String::as_str))? {
-            let path = in_the_way(folder, name, false);
-            return Err(taken(&path.unwrap_or_else(|| folder.join(name))));
+            let path = in_the_way(folder, name, false).unwrap_or_else(|| folder.join(name));
+            return Err(match name {
+                LIST => fs::read(&path).map_or_else(|_| taken(&path), |list| owned(&path, &list)),
+                _ => taken(&path),
+            });
         }
         let mut listing = Self::open(folder, command)?;
         listing.announce(names)?;
@@ -173,7 +176,23 @@ fn parse(bytes: &[u8], command: &str) -> Option<BTreeSet<String>> {
 }
 
 fn heading(command: &str) -> String {
-    format!("# Written here by {command}, which may remove it again:\n")
+    format!("{WRITTEN_BY}{command}{MAY_REMOVE}\n")
+}
+
+const WRITTEN_BY: &str = "# Written here by ";
+const MAY_REMOVE: &str = ", which may remove it again:";
+
+/// That a list is another command's, and which one's if it says.
+fn owned(path: &Path, list: &[u8]) -> io::Error {
+    let list = String::from_utf8_lossy(list);
+    let heading = list.lines().next().unwrap_or_default();
+    let command = heading.strip_prefix(WRITTEN_BY);
+    let Some(command) = command.and_then(|rest| rest.strip_suffix(MAY_REMOVE)) else {
+        return taken(path);
+    };
+    let folder = path.parent().unwrap_or(path).display();
+    let what = format!("{folder} holds the files of `{}`", command.escape_debug());
+    io::Error::new(ErrorKind::AlreadyExists, what)
 }
 
 fn text(command: &str, names: impl IntoIterator<Item = impl AsRef<str>>) -> String {
@@ -246,7 +265,10 @@ mod tests {
         }
         drop(first);
         // As after a kill: the list goes on, and another command does not take it for its own.
-        assert!(Listing::open(&folder, "two").is_err());
+        let error = Listing::open(&folder, "two").unwrap_err().to_string();
+        assert!(error.ends_with("holds the files of `one`"), "{error}");
+        let claimed = Listing::claim(&folder, "two", vec!["new".to_owned()]);
+        assert_eq!(claimed.unwrap_err().to_string(), error);
         let list = fs::read_to_string(folder.join(LIST)).unwrap();
         fs::write(folder.join(LIST), list.clone() + "../outside\nimages/ho").unwrap();
         let mut second = Listing::open(&folder, "one").unwrap();

@@ -47,6 +47,8 @@ mod whole_files;
 
 pub(crate) use listing::{LIST, Listing, foreign};
 pub(crate) use recording_file::names_of_recording;
+#[cfg(test)]
+pub(crate) use tables::FIX_COLUMNS;
 pub use tables::FixTable;
 pub(crate) use template::render;
 pub(crate) use whole_files::{create_new, open_in_place, probe, remove, write_whole};

@@ -6,7 +6,8 @@ use crate::session::{Event, Observer, Opening};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-const HEADER: &str = "time_s,method,uid,identity,chainage_m,true_chainage_m,error_m,sigma_m,\
+/// Columns of `fixes.csv`; `metrotwin run --help` says what they are.
+pub(crate) const FIX_COLUMNS: &str = "time_s,method,uid,identity,chainage_m,true_chainage_m,error_m,sigma_m,\
                       lamp_x_m,lamp_y_m,lamp_z_m";
 
 /// One row a position fix of one train, as comma-separated values: when, by which method, on which lamp, the
@@ -42,7 +43,7 @@ impl Observer for FixTable {
         make_folder_of(&self.path)?;
         let file = PartFile::create(&self.path).map_err(broken(&self.path))?;
         let mut rows = BufWriter::new(file);
-        writeln!(rows, "{HEADER}").map_err(broken(&self.path))?;
+        writeln!(rows, "{FIX_COLUMNS}").map_err(broken(&self.path))?;
         self.rows = Some(rows);
         Ok(())
     }

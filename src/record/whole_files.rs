@@ -108,7 +108,10 @@ pub(crate) fn open_in_place(path: &Path, options: &mut OpenOptions) -> io::Resul
 
 /// That a file is there which the program has not written.
 pub(super) fn taken(path: &Path) -> io::Error {
-    let what = format!("{} is there already, and is not ours", path.display());
+    let what = format!(
+        "{} is there already, and this command has not written it",
+        path.display()
+    );
     io::Error::new(ErrorKind::AlreadyExists, what)
 }
 

@@ -41,6 +41,7 @@ pub use event::{
     Event, Exposure, Observer, ObserverError, Opening, Source, TrainOpening, TrainPoint,
 };
 pub use fitting::{Fitted, Fitting, Mounted};
+pub(crate) use presence::FieldOfView;
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{

@@ -55,7 +55,7 @@ impl FieldOfView {
 
     /// Whether a place is in the picture and not behind a wall. How far the detector looks, how small the
     /// thing is there, and what moves in between, does not matter.
-    fn has_in_view(&self, place: &Point3<f64>) -> bool {
+    pub fn has_in_view(&self, place: &Point3<f64>) -> bool {
         let camera = &self.device.camera.intrinsics;
         let pose = &self.device.world_from_camera;
         let pixel = camera.project(&pose.inverse_transform_point(place));

@@ -3,11 +3,12 @@
 use crate::bus::{CameraFault, Method, TrainId};
 use crate::twin::physics::{EnergyBook, Impact};
 use crate::twin::render::Backend;
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// The figures of one run. Lengths in metres, times in seconds; `null` where a scenario has none.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Summary {
     /// Name of the scenario.
     pub scenario: String,
@@ -49,7 +50,7 @@ pub struct Summary {
 }
 
 /// The figures of one train, as in [`Summary`].
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct TrainSummary {
     /// Its number.
     pub id: TrainId,
@@ -68,7 +69,7 @@ pub struct TrainSummary {
 }
 
 /// How a run ended.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum End {
     /// As the scenario has it.
@@ -80,14 +81,14 @@ pub enum End {
 }
 
 /// Cost of the physics.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct Physics {
     /// Microseconds of wall time a step of the world.
     pub us_per_step: f64,
 }
 
 /// Where the wall time went.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, JsonSchema)]
 pub struct WallShares {
     /// Stepping the world.
     pub physics_s: f64,
@@ -102,7 +103,7 @@ pub struct WallShares {
 }
 
 /// One method's figures. Errors are along the track, without sign.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Positioning {
     /// Positions given.
     pub fixes: u32,
@@ -121,7 +122,7 @@ pub struct Positioning {
 }
 
 /// Order statistics.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[allow(missing_docs, reason = "the names say it")]
 pub struct ErrorStatistics {
     pub mean: f64,
@@ -149,7 +150,7 @@ impl ErrorStatistics {
 }
 
 /// Median and 99th percentile of a cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[allow(missing_docs, reason = "the names say it")]
 pub struct Cost {
     pub p50: f64,
@@ -176,7 +177,7 @@ pub(crate) fn quantile(sorted: &[f64], p: f64) -> f64 {
 }
 
 /// What the stack says of one camera.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct CameraFigures {
     /// Frames that never came, by the gaps in their numbers.
     pub lost_frames: u32,
@@ -185,7 +186,7 @@ pub struct CameraFigures {
 }
 
 /// One fault of a camera, as the stack saw it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 pub struct FaultSpan {
     /// Which.
     pub fault: CameraFault,
@@ -196,7 +197,7 @@ pub struct FaultSpan {
 }
 
 /// Wayside detection.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct Wayside {
     /// Every obstacle that came to lie in view of a device (in its picture, not behind a
     /// wall; however small and far away), or was reported while it moved.
@@ -214,7 +215,7 @@ pub struct Wayside {
 }
 
 /// How one obstacle was found.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct ObstacleScore {
     /// Its name in the scenario.
     pub name: String,
@@ -238,7 +239,7 @@ pub struct ObstacleScore {
 }
 
 /// How the train ran: figures of the truth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct TrainFigures {
     /// Distance of its head, along the line.
     pub run_m: f64,
@@ -260,7 +261,7 @@ pub struct TrainFigures {
 }
 
 /// Train protection.
-#[derive(Clone, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct ProtectionFigures {
     /// When the train first braked for an obstacle, by the equipment or by a driver who keeps to the
     /// permitted speed.

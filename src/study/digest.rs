@@ -2,16 +2,16 @@
 
 use super::stats::{
     IntervalEstimate, LEAST_WORTH, Rate, Tally, Weighted, bounded_mean, effective_runs,
-    first_order, first_order_of_groups, quantile, rank_correlation, weighted_mean, weighted_rate,
+    first_order, first_order_of_groups, rank_correlation, weighted_mean, weighted_rate,
 };
 use super::stop::{Precision, PrecisionCheck};
-use super::{MEASURES, Measure, Row};
+use super::{MEASURES, Measure, Row, WorseSide};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Quantiles that are shown.
+/// Shares of the runs for which is shown what they are no worse than.
 pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
 
 /// All figures of a study.
@@ -70,11 +70,13 @@ pub struct FigureDigest {
     pub runs: usize,
     /// How many runs have it not, or only of a part of the run.
     pub lacking: usize,
-    /// The worst of all runs, those included that are not complete.
+    /// Which of its values are worse.
+    pub worse_side: WorseSide,
+    /// The worst of all runs, those included that are not complete; `None` where no value is worse.
     pub worst: Option<WorstCase>,
     /// Its mean, of flags the rate.
     pub mean: Option<IntervalEstimate>,
-    /// Its [`QUANTILES`].
+    /// What shares of the runs, those of [`QUANTILES`], are no worse than.
     pub quantiles: [Option<IntervalEstimate>; QUANTILES.len()],
     /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
     /// no quantiles and drivers: theirs are not those of the distributions that were asked for.
@@ -177,17 +179,19 @@ impl FigureDigest {
             .iter()
             .filter_map(|r| Some((r.ln_weight, r.number(measure.name)?)));
         let known: Vec<(f64, f64)> = known.collect();
-        let worst = WorstCase::of(measure, rows)?;
-        let is_same = |x: f64| x.to_bits() == worst.value.to_bits();
+        let first = rows.iter().find_map(|r| r.number(measure.name))?;
+        let is_same = |x: f64| x.to_bits() == first.to_bits();
         let lacking = rows.len() - known.len();
         if lacking == 0 && known.iter().all(|(_, x)| is_same(*x)) {
             return None;
         }
+        let worse_side = measure.worse_side();
         let bare = Self {
             measure,
             runs: known.len(),
             lacking,
-            worst: Some(worst),
+            worse_side,
+            worst: WorstCase::of(measure, rows).filter(|_| worse_side != WorseSide::Neither),
             mean: None,
             quantiles: [None; QUANTILES.len()],
             drivers: Vec::new(),
@@ -196,9 +200,8 @@ impl FigureDigest {
             let mean = weighted_mean(&known, measure.range());
             return Some(Self { mean, ..bare });
         }
-        let mut sample: Vec<f64> = known.into_iter().map(|(_, x)| x).collect();
+        let sample: Vec<f64> = known.into_iter().map(|(_, x)| x).collect();
         let mean = measure.mean(&sample);
-        sample.sort_by(f64::total_cmp);
         let variables = template.settings.variables.keys();
         let drivers = variables.map(|name| Sensitivity::of(template, name, measure, &complete));
         let is_flag = measure.kind == Kind::Flag;
@@ -231,19 +234,6 @@ impl WorstCase {
 }
 
 impl Measure {
-    /// A quantile of sorted values. An end that the sample is too small for is that of the bounds, where
-    /// the values keep them.
-    fn quantile(&self, sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
-        let e = quantile(sorted, p)?;
-        let ends = [sorted.first(), sorted.last()];
-        let bounds = self.range().kept_by(ends.into_iter().flatten().copied());
-        Some(IntervalEstimate {
-            low: e.low.max(bounds.low),
-            high: e.high.min(bounds.high),
-            ..e
-        })
-    }
-
     /// The mean of its values in runs, of a flag the rate.
     pub fn mean(&self, values: &[f64]) -> Option<IntervalEstimate> {
         if self.kind == Kind::Flag {

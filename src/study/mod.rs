@@ -54,6 +54,7 @@ pub use merge::merge;
 pub use report::{REPORT, report};
 pub use row::{Row, Status};
 pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
+pub use scale::WorseSide;
 pub use shard::{MOST_SHARDS, Shard};
 pub use slurm::{Submission, Submitted};
 pub use worker::{ScenarioRunner, serve};

@@ -1,24 +1,46 @@
 //! Where the values of a figure can lie, and which of them are worse.
 
 use super::Measure;
-use super::stats::Bounds;
+use super::stats::{Bounds, IntervalEstimate, quantile};
 use crate::record::parquet::Kind;
+use serde::Serialize;
 
 /// Figures that have a sign: positions, and differences of them.
 const SIGNED: [&str; 3] = ["stop_margin_m", "stop_error_m", "run_m"];
 /// Ends of names of shares.
 const SHARES: [&str; 2] = ["_availability", "_uid_decode_rate"];
 /// Ends of names of figures of which less is worse.
-const LESS_IS_WORSE: [&str; 8] = [
+const LESS_IS_WORSE: [&str; 5] = [
     "_availability",
     "_uid_decode_rate",
     "_fixes",
-    "_frames",
     "stop_margin_m",
     "least_wheel_load",
+];
+/// Ends of names of figures of which neither less nor more is worse: they say what a run was like.
+const NEUTRAL: [&str; 7] = [
+    "obstacles",
+    "dark_lamps",
+    "brake_commanded_s",
+    "stopped_s",
     "run_m",
     "simulated_s",
+    "_frames",
 ];
+
+/// Which values of a figure are worse than others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum WorseSide {
+    /// The larger ones.
+    More,
+    /// The smaller ones.
+    Less,
+    /// Those farther from 0.
+    Farther,
+    /// None.
+    Neither,
+}
 
 impl Measure {
     /// What its values lie between.
@@ -33,15 +55,51 @@ impl Measure {
         }
     }
 
+    /// Which of its values are worse.
+    pub fn worse_side(&self) -> WorseSide {
+        let is_of = |ends: &[&str]| ends.iter().any(|end| self.name.ends_with(end));
+        if is_of(&LESS_IS_WORSE) {
+            WorseSide::Less
+        } else if is_of(&NEUTRAL) {
+            WorseSide::Neither
+        } else if SIGNED.contains(&self.name) {
+            WorseSide::Farther
+        } else {
+            WorseSide::More
+        }
+    }
+
     /// The larger, the worse: of a value with a sign its size, of others it or its negative.
     pub fn badness(&self, value: f64) -> f64 {
-        if LESS_IS_WORSE.iter().any(|end| self.name.ends_with(end)) {
-            -value
-        } else if SIGNED.contains(&self.name) {
-            value.abs()
-        } else {
-            value
+        match self.worse_side() {
+            WorseSide::Less => -value,
+            WorseSide::Farther => value.abs(),
+            WorseSide::More | WorseSide::Neither => value,
         }
+    }
+
+    /// The value that all but a share `1 - p` of sorted values are no worse than; of figures without a worse
+    /// side, that they are not above. Of a figure with a sign it is a size. An end that the sample is too
+    /// small for is that of the range, where the values keep it.
+    pub fn quantile(&self, values: &[f64], p: f64) -> Option<IntervalEstimate> {
+        let mut ranks: Vec<f64> = values.iter().map(|x| self.badness(*x)).collect();
+        ranks.sort_by(f64::total_cmp);
+        let e = quantile(&ranks, p)?;
+        let side = self.worse_side();
+        let (value, low, high) = match side {
+            WorseSide::Less => (-e.value, -e.high, -e.low),
+            _ => (e.value, e.low, e.high),
+        };
+        let bounds = match side {
+            WorseSide::Farther => Bounds::NOT_NEGATIVE,
+            _ => self.range().kept_by(values.iter().copied()),
+        };
+        Some(IntervalEstimate {
+            value,
+            low: low.max(bounds.low),
+            high: high.min(bounds.high),
+            ..e
+        })
     }
 }
 
@@ -53,8 +111,8 @@ mod tests {
     /// A figure that was renamed, and whose bounds or worse side are then those of another.
     #[test]
     fn every_name_is_that_of_a_figure() {
-        let ends = SHARES.iter().chain(&LESS_IS_WORSE).chain(&SIGNED);
-        for end in ends {
+        let ends = SHARES.iter().chain(&LESS_IS_WORSE).chain(&NEUTRAL);
+        for end in ends.chain(&SIGNED) {
             assert!(MEASURES.iter().any(|m| m.name.ends_with(end)), "{end}");
         }
     }

@@ -19,9 +19,9 @@ impl LineCheck<'_, '_> {
                 continue;
             }
             self.train(&at, train);
-            let [from_m, to_m] = stands_m(train);
+            let [from_m, to_m] = train.stands_m();
             let before = file.trains().take(k).position(|other| {
-                let [other_from_m, other_to_m] = stands_m(other);
+                let [other_from_m, other_to_m] = other.stands_m();
                 from_m < other_to_m && other_from_m < to_m
             });
             if let Some(other) = before.map(|other| file.train_key(other)) {
@@ -70,15 +70,6 @@ impl LineCheck<'_, '_> {
                 format!("give a stop_at_m {way} to {last_m:.0} m, or shorten duration_s"),
             );
         }
-    }
-}
-
-/// Where a train stands at the start.
-fn stands_m(train: &TrainSettings) -> [f64; 2] {
-    let head_m = train.start_chainage_m;
-    match train.direction {
-        Direction::Up => [head_m - train.length_m(), head_m],
-        Direction::Down => [head_m, head_m + train.length_m()],
     }
 }
 

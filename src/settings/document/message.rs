@@ -65,6 +65,9 @@ impl SerdeMessage {
                 name_advice(name, known, "keys that may stand here", "take it out"),
             ),
             Self::MissingKey { .. } => Problem::new(key, "is missing", "give it a value"),
+            Self::Value { what, expected } if is_large(what) && expected.starts_with('u') => {
+                Problem::new(key, what_is_there(what), "give a smaller whole number")
+            }
             Self::Value { what, expected } => {
                 let mut allowed = self.names();
                 allowed.extend(names);
@@ -73,6 +76,12 @@ impl SerdeMessage {
             }
         }
     }
+}
+
+/// Whether a whole number is wrong, and not for its sign.
+fn is_large(what: &str) -> bool {
+    let number = what.strip_prefix("invalid value: integer `");
+    number.is_some_and(|number| !number.starts_with('-'))
 }
 
 /// What stands between backquotes.
@@ -118,18 +127,10 @@ fn what_is_there(what: &str) -> String {
 
 /// What Rust's name of a type means to a user.
 fn what_is_expected(expected: &str) -> String {
-    let counts = [
-        ("u8", u64::from(u8::MAX)),
-        ("u16", u64::from(u16::MAX)),
-        ("u32", u64::from(u32::MAX)),
-    ];
-    if let Some((_, most)) = counts.iter().find(|(name, _)| *name == expected) {
-        return format!("a whole number from 0 to {most}");
-    }
     let array = expected.strip_prefix("an array of length ");
     let words = match expected {
         "f64" | "f32" => "a number",
-        "u64" | "usize" => "a whole number, 0 or more",
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or more",
         "i64" | "i32" => "a whole number",
         "a string" | "a borrowed string" | "a character" => "a text in quotes",
         "a boolean" => "true or false",

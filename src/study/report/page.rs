@@ -118,7 +118,7 @@ fn short(value: &Value) -> String {
 mod tests {
     use super::*;
     use crate::scenario::sampling::ScenarioSample;
-    use crate::study::{FigureDigest, QUANTILES, Status, measure};
+    use crate::study::{FigureDigest, QUANTILES, Status, WorseSide, measure};
     use serde_json::json;
 
     /// Fails where a train that stops far too early is no worse than one that stops in place.
@@ -138,6 +138,7 @@ mod tests {
             measure: measure("stop_error_m").unwrap(),
             runs: 3,
             lacking: 0,
+            worse_side: WorseSide::Farther,
             worst: None,
             mean: None,
             quantiles: [None; QUANTILES.len()],

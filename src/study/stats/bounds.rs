@@ -9,6 +9,10 @@ pub struct Bounds {
     pub high: f64,
 }
 
+/// Half an interval over the mean's distance from the bound, from which on it has no upper end: as of two
+/// runs, whose t is 12.7. The end would be twenty times the mean.
+const MOST_RELATIVE: f64 = 3.0;
+
 impl Bounds {
     /// Any number.
     pub const NONE: Self = Self::new(f64::NEG_INFINITY, f64::INFINITY);
@@ -32,7 +36,8 @@ impl Bounds {
 
     /// The interval about a mean that would be `half` wide to either side if nothing bounded it: with one
     /// bound even in the logarithm of the distance from it, with two even in the logit between them
-    /// (delta method), so that it never leaves them.
+    /// (delta method), so that it never leaves them. Where `half` is so many times the distance from one
+    /// bound that the method no longer holds, nothing bounds the mean on the other side.
     pub fn interval(self, mean: f64, half: f64) -> (f64, f64) {
         let is_inside = self.low < mean && mean < self.high;
         if !is_inside || !self.low.is_finite() || half <= 0.0 {
@@ -48,6 +53,11 @@ impl Bounds {
             return (end(odds / factor), end(odds * factor));
         }
         let factor = (half / above).exp();
-        (self.low + above / factor, self.low + above * factor)
+        let high = if half / above > MOST_RELATIVE {
+            f64::INFINITY
+        } else {
+            self.low + above * factor
+        };
+        (self.low + above / factor, high)
     }
 }

@@ -348,6 +348,11 @@ fn val_means_of_what_is_bounded_are_scipys() {
         let e = bounded_mean(few, Bounds::NOT_NEGATIVE).unwrap();
         assert!(0.0 <= e.low && e.low < e.value, "{e:?}");
     }
+    // Two runs that are far apart say nothing of how large the mean may be, and ten say it.
+    let two = bounded_mean(&[0.1, 1.1], Bounds::NOT_NEGATIVE).unwrap();
+    assert!(two.high.is_infinite() && two.low > 0.0, "{two:?}");
+    let ten: Vec<f64> = [0.1, 1.1].repeat(5);
+    assert!(bounded_mean(&ten, Bounds::NOT_NEGATIVE).unwrap().high < 1.3);
     let outside = [0.5, 1.5, -3.0];
     assert_eq!(bounded_mean(&outside, Bounds::SHARE), mean(&outside));
     let same = bounded_mean(&[1.0; 9], Bounds::SHARE).unwrap();

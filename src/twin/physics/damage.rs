@@ -12,11 +12,12 @@
 //! The bounds hold for hits where these parts are. A thing that hits equipment below the floor does
 //! harm at less.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 use std::fmt;
 
 /// What a hit does to the train, by the energy that it uses up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Damage {
     /// Scratches: no more than the front glazing must withstand.

@@ -1,5 +1,6 @@
 //! The energy book of a train: what traction and gravity put in, where it went, what is left.
 
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Energy and power of one moment.
@@ -21,7 +22,7 @@ pub(super) struct Ledger {
 
 /// Energy of the train since the start, J. What was there at the start and came in by traction is
 /// still there, or was lost: [`Self::gap_j`] says by how much this fails. Hits are not in it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct EnergyBook {
     /// Put in by traction, at the wheels' treads.
     pub traction_j: f64,

@@ -15,16 +15,18 @@ use crate::bus::{SimTime, TrainId};
 use rapier3d_f64::geometry::ContactPair;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::{ColliderHandle, PhysicsWorld, RigidBodyHandle};
+use schemars::JsonSchema;
 use serde::{Serialize, Serializer};
 
 /// One hit of a train on something.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct Impact {
     /// The train. Files list hits by train.
     #[serde(skip)]
     pub train: TrainId,
     /// When it began; seconds in files.
     #[serde(rename = "time_s", serialize_with = "seconds")]
+    #[schemars(with = "f64")]
     pub time: SimTime,
     /// Name of what was hit.
     pub with: String,

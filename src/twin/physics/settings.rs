@@ -194,6 +194,15 @@ impl TrainSettings {
         f64::from(self.cars) * self.vehicle().length_m
     }
 
+    /// From the lower to the upper chainage of its ends at the start.
+    pub fn stands_m(&self) -> [f64; 2] {
+        let head_m = self.start_chainage_m;
+        match self.direction {
+            Direction::Up => [head_m - self.length_m(), head_m],
+            Direction::Down => [head_m, head_m + self.length_m()],
+        }
+    }
+
     fn check_together(&self, check: &mut Checker<'_>) {
         if self.car().is_none() {
             check.problem(
@@ -205,10 +214,20 @@ impl TrainSettings {
                 ),
             );
         }
-        let ahead_m = match self.direction {
-            Direction::Up => self.start_chainage_m..=1e6,
-            Direction::Down => -1e6..=self.start_chainage_m,
-        };
-        check.within("stop_at_m", self.stop_at_m, ahead_m);
+        let start_m = self.start_chainage_m;
+        let is_behind = |stop_m: &f64| self.direction.sign() * (stop_m - start_m) < 0.0;
+        if let Some(stop_m) = self.stop_at_m.filter(is_behind) {
+            let way = match self.direction {
+                Direction::Up => "up",
+                Direction::Down => "down",
+            };
+            check.problem(
+                "stop_at_m",
+                format!(
+                    "{stop_m} m lies behind the train, which runs {way} the line from {start_m} m"
+                ),
+                format!("give {start_m} m, or a place further {way} the line"),
+            );
+        }
     }
 }

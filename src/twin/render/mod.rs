@@ -27,13 +27,14 @@ pub use scene::{CameraMotion, Job, NoiseKey, Scene, View};
 pub use sensor::{BLUR_PX, LensSettings, Pattern, SensorSettings, upper_bits};
 
 use image::{GrayImage, ImageBuffer, Luma};
+use schemars::JsonSchema;
 
 /// Digital numbers as the converter gives them, black level included: linear, at the full depth of
 /// [`SensorSettings::bits`], in the low bits. A colour sensor's is the mosaic.
 pub type RawImage = ImageBuffer<Luma<u16>, Vec<u16>>;
 
 /// Which renderer drew, for the summary.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, JsonSchema)]
 pub struct Backend {
     /// `vulkan`, `metal`, `dx12` or `cpu`.
     pub backend: String,
