@@ -9,11 +9,11 @@
 #[path = "common/program.rs"]
 mod common;
 
-use common::{REPOSITORY, folder, program};
+use common::{PROGRAM, REPOSITORY, folder, program};
 use metrotwin::cli::check_text;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Output;
+use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 const SCENARIO: &str = "name = \"x\"\ntunnel = \"tunnels/chengdu_line1.toml\"\nduration_s = 0.2\n\
@@ -25,9 +25,21 @@ fn metrotwin(args: &[&str]) -> Output {
     output.expect("the program starts")
 }
 
+/// With no more than 1.5 GB of address space.
+fn with_little_memory(args: &[&str]) -> Output {
+    let mut command = Command::new("sh");
+    let script = "ulimit -v 1500000; exec \"$0\" \"$@\"";
+    command.args(["-c", script, PROGRAM]).args(args);
+    let output = command.current_dir(REPOSITORY).output();
+    output.expect("the program starts")
+}
+
 /// A file is refused with exit code 2 and each of `words`; what is printed.
 fn refused(args: &[&str], words: &[&str]) -> String {
-    let output = metrotwin(args);
+    refused_by(&metrotwin(args), args, words)
+}
+
+fn refused_by(output: &Output, args: &[&str], words: &[&str]) -> String {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(2), "{args:?} said: {said}");
     for word in words {
@@ -98,10 +110,9 @@ fn numbers_are_checked_before_they_are_used() {
             _ => "scenarios/line_run.toml",
         };
         let change = format!("{key}={value}");
-        refused(
-            &["check", shipped, "--set", &change],
-            &[key, "out of range", "give"],
-        );
+        let args = ["check", shipped, "--set", &change];
+        let output = with_little_memory(&args);
+        refused_by(&output, &args, &[key, "out of range", "give"]);
     }
     assert!(start.elapsed() < Duration::from_secs(20));
 }
@@ -160,9 +171,10 @@ fn other_files_are_neither_read_nor_shown() {
         for text in [
             tunnel.replace(name, "/dev/zero"),
             table.replace(name, "/dev/zero"),
+            mesh.replace(name, "/dev/zero"),
         ] {
             let said = said_of(&text).expect_err("it is a device");
-            assert!(said.contains("no regular file"), "{said}");
+            assert!(said.contains("no regular"), "{said}");
         }
     }
 }
@@ -330,29 +342,55 @@ fn what_may_surprise_is_noted() {
     let blind = SCENARIO.replace("150.0", "2992.0") + "stop_at_m = 2995.0\n[rig]\n";
     let blind = said_of(&blind).expect("it is right");
     assert!(
-        blind.contains("no lamp stands on the way of train 0"),
+        blind.contains("no lamp stands on the way of the train"),
         "{blind}"
     );
     let wrong = format!("{SCENARIO}[stack.protection]\ninitial_chainage_m = 550.0\n");
     let wrong = said_of(&wrong).expect("it is right");
     assert!(
-        wrong.contains("at 550 m; it is at 150 m, 400.0 m from there"),
+        wrong.contains("of the train is 550 m, and its head starts at 150 m: 400.00 m off"),
         "{wrong}"
     );
+    let near = SCENARIO.replace(
+        "[train]",
+        "[stack.protection]\ninitial_chainage_m = 160.0\n[train]",
+    );
+    let near = said_of(&near).expect("it is right");
+    assert!(!near.contains("note"), "{near}");
     let box_at = |chainage_m: f64, more: &str| {
         let things = format!("[[obstacles]]\nchainage_m = {chainage_m}\n{more}\n");
         let devices = "[[wayside]]\ndevice = \"W1530\"\n";
         said_of(&format!("{SCENARIO}{things}{devices}")).expect("it is right")
     };
-    let inside = box_at(145.0, "");
-    assert!(
-        inside.contains("in or under train 0, which stands from "),
-        "{inside}"
-    );
-    let of_device = |said: String| said.contains("in the picture of no wayside camera (W1530)");
-    // It looks down the line.
-    assert!(of_device(box_at(1600.0, "appears_s = 0.1")));
-    assert!(!of_device(box_at(1505.0, "appears_s = 0.1")));
+    let inside = |said: &str| said.contains("in or under the train, which stands from ");
+    assert!(inside(&box_at(145.0, "")));
+    assert!(!inside(&box_at(160.0, "")));
+    assert!(!inside(&box_at(145.0, "lateral_m = 1.7")));
+    assert!(!inside(&box_at(
+        145.0,
+        "height_m = 4.0\nheld_until_s = 0.1"
+    )));
+    let moving = SCENARIO.to_owned() + "start_speed_kmh = 20.0\n";
+    let moving = moving + "[[obstacles]]\nchainage_m = 145.0\nappears_s = 0.1\n";
+    assert!(!inside(&said_of(&moving).expect("it is right")));
+    // The device looks down the line.
+    let unseen = |said: &str| said.contains("no wayside camera (W1530) has `box` at ");
+    let learnt = |said: &str| said.contains("learns its reference image");
+    for (chainage_m, is_seen) in [(1505.0, true), (1600.0, false)] {
+        let said = box_at(chainage_m, "appears_s = 0.1");
+        assert_eq!(
+            (learnt(&said), unseen(&said)),
+            (is_seen, !is_seen),
+            "{said}"
+        );
+    }
+    let rolls = box_at(1600.0, "appears_s = 0.1\nvelocity_mps = [-5.0, 0.0, 0.0]");
+    assert!(!unseen(&rolls), "{rolls}");
+    let out = folder("noted").display().to_string();
+    let run = format!("run scenarios/low_adhesion.toml --set duration_s=0.05 --out {out}");
+    let run = metrotwin(&run.split_whitespace().collect::<Vec<_>>());
+    let run = String::from_utf8_lossy(&run.stderr).into_owned();
+    assert!(run.contains("note: ") && run.contains("25 km/h"), "{run}");
     let args = "check scenarios/line_run.toml --set train.direction=\"down\" --set \
         train.start_chainage_m=2875 --set train.stop_at_m=195 --set rig.side=\"right\" --set rig.yaw_deg=141";
     let back = metrotwin(&args.split_whitespace().collect::<Vec<_>>());
@@ -374,4 +412,23 @@ fn the_driver_says_nothing_of_a_desktop() {
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(0), "{said}");
     assert!(!said.contains("XDG_RUNTIME_DIR"), "{said}");
+    #[cfg(target_os = "linux")]
+    {
+        // Not every driver complains: the variable is there for those that would.
+        let line = format!("run scenarios/low_adhesion.toml --no-recording --out {out}");
+        let mut command = program(line.split_whitespace());
+        let mut child = (command.env_remove("XDG_RUNTIME_DIR").stderr(Stdio::null()))
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("the program starts");
+        let environment = format!("/proc/{}/environ", child.id());
+        let is_set = (0..200).any(|_| {
+            std::thread::sleep(Duration::from_millis(50));
+            let bytes = fs::read(&environment).unwrap_or_default();
+            String::from_utf8_lossy(&bytes).contains("XDG_RUNTIME_DIR=")
+        });
+        child.kill().expect("it runs for minutes");
+        child.wait().expect("it has been killed");
+        assert!(is_set);
+    }
 }

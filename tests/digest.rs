@@ -1,14 +1,20 @@
 //! What the rows of a study come to: no run is left out of a denominator, the worst is shown, what was
 //! stopped by is marked.
 #![cfg(feature = "twin")]
-#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
 
 #[path = "common/program.rs"]
 mod common;
 
-use metrotwin::scenario::sampling::{PrecisionSettings, ScenarioSample, Template};
+use metrotwin::scenario::sampling::{Distribution, PrecisionSettings, ScenarioSample, Template};
+use metrotwin::session::RendererChoice;
 use metrotwin::study::{
-    Digest, FigureDigest, INPUTS, MANIFEST, Row, Status, Study, compare, report,
+    Digest, EarlyStop, FigureDigest, INPUTS, MANIFEST, Row, ScenarioRunner, Status, Study, compare,
+    report,
 };
 use serde_json::{Value, json};
 use std::fs;
@@ -127,6 +133,101 @@ fn a_figure_that_most_runs_lack_is_shown() {
     assert_eq!((margin.runs, margin.lacking), (2, 18));
 }
 
+/// A train that leaves the rails at a slab has been run to its end: it counts among the complete runs, as
+/// derailed, with its reason.
+#[test]
+fn a_derailed_run_counts() {
+    let base = common::folder("derailed");
+    fs::create_dir_all(&base).unwrap();
+    let path = base.join("derailed.toml");
+    let text = format!(
+        r#"
+        name = "derailed"
+        tunnel = "{}/tunnels/chengdu_line1.toml"
+        duration_s = 2.0
+        train = {{ cars = 1, start_chainage_m = 350.0, start_speed_kmh = 160.0, cruise_speed_kmh = 160.0 }}
+        [[track.defects]]
+        chainage_m = 380.0
+        side = "left"
+        shape = {{ kind = "slab", depth_m = 0.05, length_m = 10.0, ramp_m = 0.5 }}
+        [study.variables.depth_m]
+        keys = ["track.defects[0].shape.depth_m"]
+        from = {{ sweep = {{ values = [0.0, 0.05] }} }}
+        [study.events]
+        off_the_rails = "derailed"
+        "#,
+        env!("CARGO_MANIFEST_DIR")
+    );
+    fs::write(&path, text).unwrap();
+    let template = Template::load(&path).unwrap();
+    let mut runner = ScenarioRunner::new(RendererChoice::Cpu);
+    let rows = [0, 1].map(|index| runner.run(&template, index));
+    fs::remove_dir_all(base).ok();
+    let [whole, derailed] = &rows;
+    assert_eq!((whole.status, &whole.reason), (Status::Complete, &None));
+    assert_eq!(derailed.status, Status::Complete, "{:?}", derailed.reason);
+    assert!(derailed.reason.as_ref().unwrap().contains("left the rails"));
+    assert_eq!(derailed.figures["derailed"], json!(true));
+    let digest = Digest::of(&template, &rows);
+    let rate = digest.events[0].rate.unwrap();
+    assert_eq!((digest.complete, rate.events, rate.unknown), (2, 1, 0));
+}
+
+/// Every error of the rig, the sensors' clocks and the survey is drawn in each run, half as wide again as the
+/// stack believes or wider. Provokes a study of accuracy with one rig, or with the errors that sigma is made of.
+#[test]
+fn the_study_of_accuracy_draws_more_than_is_believed() {
+    let template = Template::load(Path::new("scenarios/studies/led_accuracy.toml")).unwrap();
+    let variables = &template.settings.variables;
+    let sigma_of = |key: &str| {
+        let drawn = variables.values().find(|v| v.keys.iter().any(|k| k == key));
+        match drawn.map(|v| &v.from) {
+            Some(Distribution::Normal { sigma, .. }) => *sigma,
+            other => panic!("{key}: {other:?}"),
+        }
+    };
+    let error = |name: &str| sigma_of(&format!("rig.calibration_error.{name}"));
+    let file = &template.file;
+    let believed = &file.stack.led;
+    let rig = file.rig.as_ref().unwrap();
+    for (drawn, believed) in [
+        (error("vergence_deg"), believed.vergence_sigma_deg),
+        (error("yaw_deg"), believed.mount_sigma_deg),
+        (error("pitch_deg"), believed.mount_sigma_deg),
+        (error("baseline_mm"), believed.baseline_sigma_mm),
+        (
+            error("focal_length_mm"),
+            believed.focal_sigma_share * rig.focal_length_mm,
+        ),
+        (file.survey.along_sigma_m, believed.survey_sigma_m),
+    ] {
+        assert!(drawn >= 1.4999 * believed, "{drawn} of {believed}");
+    }
+    for name in [
+        "right_pitch_deg",
+        "right_roll_deg",
+        "principal_u_px",
+        "blur_px",
+        "line_time_us",
+        "trigger_offset_us",
+    ] {
+        assert!(error(name) > 0.0);
+    }
+    for clock in ["rig", "imu", "odometer"] {
+        assert!(sigma_of(&format!("{clock}.clock.offset_ms")) >= 1.0);
+    }
+    let survey = &file.survey;
+    for sigma in [
+        survey.across_sigma_m,
+        survey.height_sigma_m,
+        survey.control_sigma_m,
+        survey.cant_sigma_mm,
+        survey.balise_sigma_m,
+    ] {
+        assert!(sigma > 0.0);
+    }
+}
+
 /// Quantiles of three runs: what cannot be bounded ends where the figure does, not outside.
 #[test]
 fn quantiles_stay_where_the_figure_can_be() {
@@ -163,14 +264,15 @@ fn quantiles_stay_where_the_figure_can_be() {
     }
 }
 
-/// Quantiles are those of the harmful side: a margin, a speed, an error with a sign, and a distance that
-/// has none.
+/// Fails where a quantile is of the harmless side: of a margin, a speed, an error with a sign; and of a
+/// distance, which has no worse side. A quantile of 0 has no sign.
 #[test]
 fn quantiles_are_of_the_worse_side() {
     let base = folder("worse");
     let figures = |k: u64| {
         let k = k as f64;
-        json!({"stop_margin_m": k, "most_slip_mps": k, "stop_error_m": -k, "run_m": k})
+        json!({"stop_margin_m": k, "most_slip_mps": k, "stop_error_m": -k, "run_m": k,
+            "paper_availability": (0.01 * k - 0.5).max(0.0)})
     };
     let rows: Vec<Row> = (0..=100)
         .map(|k| row(k, Status::Complete, figures(k)))
@@ -182,11 +284,16 @@ fn quantiles_are_of_the_worse_side() {
         ("most_slip_mps", 95.0, Some(100)),
         ("stop_error_m", 95.0, Some(100)),
         ("run_m", 95.0, None),
+        ("paper_availability", 0.0, Some(0)),
     ] {
         let figure = figure(&digest, name);
         let [.., q95] = figure.quantiles.map(Option::unwrap);
+        assert!(!q95.to_string().contains("-0"), "{name}: {q95}");
         assert!((q95.value - expected).abs() < 1e-12, "{name}: {q95:?}");
-        assert!(q95.low < expected && expected < q95.high, "{name}: {q95:?}");
+        assert!(
+            q95.low <= expected && expected <= q95.high,
+            "{name}: {q95:?}"
+        );
         assert_eq!(figure.worst.map(|w| w.index), worst, "{name}");
     }
 }
@@ -240,10 +347,16 @@ fn the_page_says_how_many_runs_lack_a_figure() {
         leave(folder, rows);
     }
     let study = Study::open(&folders[0]).unwrap();
-    let digest = Digest::of(&study.template, &all);
+    let mut digest = Digest::of(&study.template, &all);
+    digest.early = Some(EarlyStop {
+        of: "hit".to_owned(),
+        half_width: 0.2,
+    });
     let page = fs::read_to_string(report(&study, &digest, &all).unwrap()).unwrap();
     for said in [
         "3 of 20, 5 unknown",
+        "ended early",
+        ") *</td>",
         ">15</td><td class=\"n\">5</td>",
         "-0.5000 (run 0)",
     ] {

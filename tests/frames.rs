@@ -439,6 +439,8 @@ fn the_scenario_of_a_set_makes_the_set_again() {
     ];
     let made = frames(&[&["--out", first.to_str().unwrap()], &some[..], &change].concat());
     succeeds(&made);
+    let scenario = fs::read_to_string(first.join("scenario.toml")).unwrap();
+    assert!(!scenario.contains(REPOSITORY), "a file of its own is named");
     let line = "frames first/scenario.toml --renderer cpu --out again";
     let mut command = program(line.split(' '));
     let made = command.args(some).current_dir(&base).output().unwrap();

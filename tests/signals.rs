@@ -16,13 +16,18 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// Until a file is there.
-fn wait_for(path: &Path) {
+/// For a minute at most.
+fn wait_until(came: impl Fn() -> bool) {
     let came = (0..1200).any(|_| {
         sleep(Duration::from_millis(50));
-        path.exists()
+        came()
     });
-    assert!(came, "no {}", path.display());
+    assert!(came);
+}
+
+/// Until a file is there.
+fn wait_for(path: &Path) {
+    wait_until(|| path.exists());
 }
 
 fn send(signal: &str, child: &Child) {
@@ -147,6 +152,43 @@ fn term_and_hup_end_a_run_as_ctrl_c_does() {
         assert!(!out.join("recording.rrd.part").exists(), "{signal}");
         fs::remove_dir_all(out).ok();
     }
+}
+
+/// Fails where a signal cuts a data set or a study off in a file: what was taken is whole, and the rows of a
+/// study are kept.
+#[test]
+fn term_and_hup_end_sets_and_studies_in_order() {
+    let base = folder("sets");
+    for signal in ["-TERM", "-HUP"] {
+        let out = base.join(format!("set{signal}"));
+        let line = format!(
+            "frames scenarios/line_run.toml --renderer cpu --cameras left --set rig.width_px=160 \
+             --set rig.height_px=90 --set rig.pixel_um=30 --out {}",
+            out.display()
+        );
+        let child = spawn_with_signals(&line);
+        wait_for(&out.join("images/left/000003.png"));
+        send(signal, &child);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
+        let meta = fs::read(out.join("meta.json")).unwrap();
+        let meta: serde_json::Value = serde_json::from_slice(&meta).unwrap();
+        assert_eq!(meta["finished"], true);
+        let study = base.join(format!("study{signal}"));
+        let line = format!(
+            "study run tests/studies/small.toml --renderer cpu --jobs 1 --runs 400 --out {}",
+            study.display()
+        );
+        let child = spawn_with_signals(&line);
+        let journal = study.join("rows.jsonl");
+        wait_until(|| fs::metadata(&journal).is_ok_and(|about| about.len() > 0));
+        send(signal, &child);
+        let output = child.wait_with_output().unwrap();
+        assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
+        assert!(printed(&output).contains("--resume goes on"));
+        assert!(!metrotwin::study::read_rows(&study).unwrap().is_empty());
+    }
+    fs::remove_dir_all(base).ok();
 }
 
 /// Fails where a run under `nohup` ends with the terminal.

@@ -60,6 +60,11 @@ fn the_second_train_stops_behind_the_first() {
     for train in &hit.trains {
         let protection = of(train);
         assert!(protection.collision, "train {}", train.id);
+        assert!(
+            protection.stop_margin_m.unwrap() < 0.0,
+            "train {}",
+            train.id
+        );
         let speed_kmh = 3.6 * protection.impacts[0].speed_mps;
         assert!((40.0..50.0).contains(&speed_kmh), "{speed_kmh} km/h");
     }

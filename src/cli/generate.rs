@@ -97,10 +97,7 @@ fn claim(args: &GenerateArgs, names: &[String]) -> Result<(), Failure> {
     let unusable = |error: io::Error| unusable(&args.out, &error);
     let names = names.iter().map(String::as_str);
     if let Some(name) = record::foreign(&args.out, COMMAND, names.clone()).map_err(unusable)? {
-        return Err(Failure::input(
-            format!("{out} holds a file {name} that `generate` has not listed there"),
-            "choose another folder with --out, or move that file away",
-        ));
+        return Err(unusable(record::why_foreign(&args.out, COMMAND, name)));
     }
     if args.out.join(INDEX).exists() && !args.force {
         return Err(Failure::input(

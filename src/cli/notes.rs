@@ -1,11 +1,10 @@
 //! What a user may not expect of a scenario that is right.
 
-use crate::bus::TrainId;
-use crate::scenario::{OnboardSettings, Scenario};
+use super::report::train_name;
+use crate::scenario::{OnboardSettings, Scenario, WaysidePost};
 use crate::session::FieldOfView;
-use crate::track::Direction;
-use crate::twin::physics::ObstacleSettings;
-use nalgebra::Point3;
+use crate::track::{Alignment, BED_M, Direction, TrackPoint};
+use crate::twin::physics::{ObstacleSettings, TrainSettings};
 
 /// Everything that `check` and `run` say of it.
 pub(super) fn of(scenario: &Scenario) -> Vec<String> {
@@ -16,103 +15,143 @@ pub(super) fn of(scenario: &Scenario) -> Vec<String> {
             without_lamps(onboard, scenario),
         ]
     });
+    let devices = Devices::of(scenario);
     let of_obstacles = [
         inside_a_train(scenario),
-        out_of_view(scenario),
-        in_the_reference(scenario),
+        devices.out_of_view(),
+        devices.in_the_reference(),
     ];
     let notes = of_each.flatten().chain(of_obstacles);
     notes.flatten().collect()
 }
 
-/// What is there from the start, at a place where a train stands.
+/// An obstacle that appears where a train stands.
 fn inside_a_train(scenario: &Scenario) -> Option<String> {
-    let stands_on = |o: &ObstacleSettings| {
-        let mut trains = scenario.physics.trains.iter().zip(0..);
-        trains.find(|(train, _)| {
-            let [from_m, to_m] = train.stands_m();
-            (from_m..=to_m).contains(&o.chainage_m) && o.lateral_m.abs() < CAR_HALF_WIDTH_M
-        })
-    };
-    let mut there = scenario.physics.obstacles.iter();
-    there.find_map(|o| {
-        let (train, k) = stands_on(o).filter(|_| o.appears_s <= 0.0)?;
+    let holds = |train: &TrainSettings, o: &ObstacleSettings| {
+        let stands_until_s = match train.start_speed_kmh > 0.0 {
+            true => 0.0,
+            false => train.start_s,
+        };
         let [from_m, to_m] = train.stands_m();
+        let [width_m, height_m] = train.profile_m();
+        o.appears_s <= stands_until_s
+            && (from_m..=to_m).contains(&o.chainage_m)
+            && o.lateral_m.abs() < 0.5 * width_m
+            && o.height_m < height_m
+    };
+    let mut single = scenario.physics.obstacles.iter().filter(|o| is_single(o));
+    single.find_map(|o| {
+        let mut trains = scenario.physics.trains.iter();
+        let k = trains.position(|train| holds(train, o))?;
+        let [from_m, to_m] = scenario.physics.trains.get(k)?.stands_m();
         Some(format!(
-            "`{}` lies at {} m from the start, in or under {}, which stands from {from_m:.1} to {to_m:.1} m: \
-             place it clear of the train, or let it appear later (appears_s)",
+            "`{}` appears at {} m, in or under {}, which stands from {from_m:.1} to {to_m:.1} m: place it \
+             clear of the train",
             o.name,
             o.chainage_m,
-            TrainId::from_index(k)
+            train_name(scenario, k)
         ))
     })
 }
 
-/// Half the width of a metro car, metres.
-const CAR_HALF_WIDTH_M: f64 = 1.4;
-
-/// An obstacle that no wayside camera has in its picture, neither where it appears nor below that.
-fn out_of_view(scenario: &Scenario) -> Option<String> {
-    let views: Vec<FieldOfView> = (scenario.wayside.iter())
-        .map(|post| FieldOfView::new(scenario, post))
-        .collect();
-    let line = &scenario.tunnel.alignment;
-    let is_unseen = |o: &&ObstacleSettings| {
-        let frame = line.at(o.chainage_m).world_from_line();
-        let places = [o.height_m, 0.0].map(|up_m| frame * Point3::new(0.0, o.lateral_m, up_m));
-        let is_seen = |view: &FieldOfView| places.iter().any(|place| view.has_in_view(place));
-        o.spread_m[0] <= 0.0 && !views.iter().any(is_seen)
-    };
-    let mut obstacles = scenario.physics.obstacles.iter();
-    let unseen = obstacles.find(is_unseen).filter(|_| !views.is_empty())?;
-    let names: Vec<&str> = (scenario.wayside.iter())
-        .map(|post| post.calibration.name.as_str())
-        .collect();
-    Some(format!(
-        "`{}` at {} m is in the picture of no wayside camera ({}), and is not found there",
-        unseen.name,
-        unseen.chainage_m,
-        names.join(", ")
-    ))
+/// It appears where its entry says; several, and those of a spread, are somewhere about that.
+fn is_single(o: &ObstacleSettings) -> bool {
+    o.count == 1 && o.spread_m.iter().all(|m| *m <= 0.0)
 }
 
-/// A train that is told another position than it has.
+/// Wayside cameras, and what they have in their pictures.
+struct Devices<'a> {
+    scenario: &'a Scenario,
+    views: Vec<(&'a WaysidePost, FieldOfView)>,
+}
+
+impl<'a> Devices<'a> {
+    /// None where there is nothing to be seen.
+    fn of(scenario: &'a Scenario) -> Self {
+        let posts = scenario.wayside.iter();
+        let posts = posts.filter(|_| !scenario.physics.obstacles.is_empty());
+        let views = posts.map(|post| (post, FieldOfView::new(scenario, post)));
+        Self {
+            scenario,
+            views: views.collect(),
+        }
+    }
+
+    /// An obstacle that is in no picture, neither where it appears nor on the bed below. What has a
+    /// velocity may get into one.
+    fn out_of_view(&self) -> Option<String> {
+        if self.views.is_empty() {
+            return None;
+        }
+        let line = &self.scenario.tunnel.alignment;
+        let is_unseen = |o: &&ObstacleSettings| {
+            let stays = o.velocity_mps.iter().all(|v| v.abs() <= 0.0);
+            let mut views = self.views.iter();
+            is_single(o) && stays && !views.any(|(_, view)| shows(view, o, line))
+        };
+        let unseen = self.scenario.physics.obstacles.iter().find(is_unseen)?;
+        let views = self.views.iter();
+        let names: Vec<&str> = views.map(|(p, _)| &*p.calibration.name).collect();
+        Some(format!(
+            "no wayside camera ({}) has `{}` at {} m in its picture: it is not found there",
+            names.join(", "),
+            unseen.name,
+            unseen.chainage_m
+        ))
+    }
+
+    /// What lies before a wayside camera while it learns what the clear track looks like.
+    fn in_the_reference(&self) -> Option<String> {
+        let detection = &self.scenario.file.stack.wayside;
+        let line = &self.scenario.tunnel.alignment;
+        let early = |o: &&ObstacleSettings| {
+            self.views.iter().any(|(post, view)| {
+                let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
+                let away_m = (o.chainage_m - post.calibration.chainage_m).abs();
+                o.appears_s < learns_s
+                    && o.held_until_s.is_none()
+                    && away_m < detection.reach_m
+                    && shows(view, o, line)
+            })
+        };
+        let first = self.scenario.physics.obstacles.iter().find(early)?;
+        Some(format!(
+            "`{}` appears at {} s, while a wayside camera learns its reference image from its first {} frames: \
+             what lies there then belongs to the track, and is not found; let it appear later (appears_s)",
+            first.name, first.appears_s, detection.reference_frames
+        ))
+    }
+}
+
+/// Whether the middle of an obstacle is in a picture, where it appears or on the bed below that.
+fn shows(view: &FieldOfView, o: &ObstacleSettings, line: &Alignment) -> bool {
+    let over_lowest_m = o.middle_m().unwrap_or(o.height_m) - o.height_m;
+    [o.height_m, BED_M].iter().any(|lowest_m| {
+        view.has_in_view(&line.world_from_track(TrackPoint {
+            s_m: o.chainage_m,
+            l_m: o.lateral_m,
+            h_m: lowest_m + over_lowest_m,
+        }))
+    })
+}
+
+/// A train whose equipment is told another position than it has.
 fn told_wrong_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
     let protection = &onboard.protection;
     let told_m = protection
         .initial_chainage_m
         .filter(|_| onboard.protects())?;
-    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
-    let off_m = told_m - train.start_chainage_m;
-    let allowed_m = protection.position_sigmas * protection.initial_sigma_m;
-    (off_m.abs() > allowed_m).then(|| {
+    let k = usize::from(onboard.train);
+    let start_m = scenario.physics.trains.get(k)?.start_chainage_m;
+    let off_m = (told_m - start_m).abs();
+    let margin_m = protection.position_sigmas * protection.initial_sigma_m;
+    (off_m > margin_m).then(|| {
         format!(
-            "the equipment of {} is told (initial_chainage_m) that its head is at {told_m} m; it is at {} m, \
-             {:.1} m from there, and the equipment reckons with {allowed_m:.1} m at most",
-            onboard.id(),
-            train.start_chainage_m,
-            off_m.abs()
+            "initial_chainage_m of {} is {told_m} m, and its head starts at {start_m} m: {off_m:.2} m off, \
+             where the margin of its equipment is {margin_m:.2} m (position_sigmas times initial_sigma_m)",
+            train_name(scenario, k)
         )
     })
-}
-
-/// What lies before a wayside camera while it learns what the clear track looks like.
-fn in_the_reference(scenario: &Scenario) -> Option<String> {
-    let detection = &scenario.file.stack.wayside;
-    let early = |o: &&ObstacleSettings| {
-        let mut devices = scenario.wayside.iter();
-        devices.any(|post| {
-            let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
-            let away_m = (o.chainage_m - post.calibration.chainage_m).abs();
-            o.appears_s < learns_s && o.held_until_s.is_none() && away_m < detection.reach_m
-        })
-    };
-    let first = scenario.physics.obstacles.iter().find(early)?;
-    Some(format!(
-        "`{}` appears at {} s, while a wayside camera near it learns its reference image from its first {} \
-         frames: what lies there then belongs to the track, and is not found; let it appear later (appears_s)",
-        first.name, first.appears_s, detection.reference_frames
-    ))
 }
 
 /// A train that does not know where it is, and by what it may find out.
@@ -137,7 +176,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
     Some(format!(
         "{} starts without a position, and its equipment permits {} km/h {}{too_fast}; \
          initial_chainage_m in {key} gives it one",
-        onboard.id(),
+        train_name(scenario, usize::from(onboard.train)),
         protection.restricted_kmh,
         match (meets_balise, onboard.positions()) {
             (false, false) => "all the way: it meets no balise and has no positioning by lamps",
@@ -161,7 +200,7 @@ fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<Strin
         format!(
             "no lamp stands on the way of {}, from {from_m:.0} to {to_m:.0} m: those of the line are \
              from {} to {} m",
-            onboard.id(),
+            train_name(scenario, usize::from(onboard.train)),
             first.chainage_m,
             last.chainage_m
         )

@@ -44,10 +44,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         ),
     ];
     for (k, train) in scenario.physics.trains.iter().enumerate() {
-        let what = match scenario.physics.trains.len() {
-            1 => "train".to_owned(),
-            _ => TrainId::from_index(k).to_string(),
-        };
+        let what = train_name(scenario, k);
         let stop = train
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));
@@ -94,15 +91,20 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
     indented(&lines)
 }
 
+/// A train in a sentence.
+pub(super) fn train_name(scenario: &Scenario, k: usize) -> String {
+    match scenario.physics.trains.len() {
+        1 => "the train".to_owned(),
+        _ => TrainId::from_index(k).to_string(),
+    }
+}
+
 /// The rig of a train, if it has one.
 fn rig(onboard: &OnboardSettings, scenario: &Scenario) -> Vec<String> {
     let Some(rig) = &onboard.rig else {
         return Vec::new();
     };
-    let name = match onboard.id().index() {
-        0 => "rig".to_owned(),
-        _ => format!("rig of {}", onboard.id()),
-    };
+    let name = format!("rig of {}", train_name(scenario, onboard.id().index()));
     let calibration = rig.calibration();
     let pairs = images(scenario.file.duration_s, rig.pairs_per_s);
     vec![

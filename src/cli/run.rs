@@ -17,7 +17,7 @@ use std::time::Duration;
 const AFTER: &str = "\
 Into the output folder go:
   recording.rrd   everything, for the rerun viewer: rerun out/line_run/recording.rrd
-  summary.json    the figures; docs/summary.schema.json says what each key is
+  summary.json    the figures; keys: docs/summary.schema.json of the source tree
   fixes.csv       every position, with its truth (of train k: fixes_train_k.csv)
   files.txt       the list of these files
 The next run into the folder replaces them. Files that the list does not name are never removed or written

@@ -60,7 +60,7 @@ pub(super) fn prepare(out: &Path) -> Result<(), Failure> {
 pub(super) fn unusable(out: &Path, error: &io::Error) -> Failure {
     let remedy = match error.kind() {
         ErrorKind::ResourceBusy => "wait for it to end, or choose another folder with --out",
-        ErrorKind::AlreadyExists => "choose another folder with --out, or move that file away",
+        ErrorKind::AlreadyExists => "choose another folder with --out, or move what is there away",
         _ => "choose another folder with --out",
     };
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)

@@ -41,7 +41,7 @@ impl Listing {
         let mut file = locked(file, &path)?;
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes)?;
-        let earlier = parse(&bytes, command).ok_or_else(|| owned(&path, &bytes))?;
+        let earlier = parse(&bytes, command).ok_or_else(|| of_another(&path, &bytes, command))?;
         let whole = bytes.iter().rposition(|b| *b == b'\n').map_or(0, |k| k + 1);
         file.set_len(whole as u64)?;
         if whole == 0 {
@@ -60,11 +60,7 @@ impl Listing {
     /// In a folder where one of them is somebody else's nothing is made.
     pub fn claim(folder: &Path, command: &'static str, names: Vec<String>) -> io::Result<Self> {
         if let Some(name) = foreign(folder, command, names.iter().map(String::as_str))? {
-            let path = in_the_way(folder, name, false).unwrap_or_else(|| folder.join(name));
-            return Err(match name {
-                LIST => fs::read(&path).map_or_else(|_| taken(&path), |list| owned(&path, &list)),
-                _ => taken(&path),
-            });
+            return Err(why_foreign(folder, command, name));
         }
         let mut listing = Self::open(folder, command)?;
         listing.announce(names)?;
@@ -175,23 +171,36 @@ fn parse(bytes: &[u8], command: &str) -> Option<BTreeSet<String>> {
     Some(names.map(str::to_owned).collect())
 }
 
+const WRITTEN_BY: &str = "# Written here by ";
+const MAY_REMOVE: &str = ", which may remove it again:";
+
 fn heading(command: &str) -> String {
     format!("{WRITTEN_BY}{command}{MAY_REMOVE}\n")
 }
 
-const WRITTEN_BY: &str = "# Written here by ";
-const MAY_REMOVE: &str = ", which may remove it again:";
+/// Why the command may not write a file which [`foreign`] has found.
+pub(crate) fn why_foreign(folder: &Path, command: &str, name: &str) -> io::Error {
+    let path = in_the_way(folder, name, false).unwrap_or_else(|| folder.join(name));
+    let is_list = path.file_name().is_some_and(|name| name == LIST);
+    let is_file = fs::symlink_metadata(&path).is_ok_and(|about| about.is_file());
+    let list = (is_list && is_file).then(|| fs::read(&path));
+    match list {
+        Some(Ok(list)) => of_another(&path, &list, command),
+        _ => taken(&path),
+    }
+}
 
 /// That a list is another command's, and which one's if it says.
-fn owned(path: &Path, list: &[u8]) -> io::Error {
+fn of_another(path: &Path, list: &[u8], command: &str) -> io::Error {
     let list = String::from_utf8_lossy(list);
     let heading = list.lines().next().unwrap_or_default();
-    let command = heading.strip_prefix(WRITTEN_BY);
-    let Some(command) = command.and_then(|rest| rest.strip_suffix(MAY_REMOVE)) else {
+    let other = heading.strip_prefix(WRITTEN_BY);
+    let other = other.and_then(|rest| rest.strip_suffix(MAY_REMOVE));
+    let Some(other) = other.filter(|other| *other != command) else {
         return taken(path);
     };
     let folder = path.parent().unwrap_or(path).display();
-    let what = format!("{folder} holds the files of `{}`", command.escape_debug());
+    let what = format!("{folder} holds the files of `{}`", other.escape_debug());
     io::Error::new(ErrorKind::AlreadyExists, what)
 }
 

@@ -45,7 +45,7 @@ mod template;
 mod texts;
 mod whole_files;
 
-pub(crate) use listing::{LIST, Listing, foreign};
+pub(crate) use listing::{LIST, Listing, foreign, why_foreign};
 pub(crate) use recording_file::names_of_recording;
 #[cfg(test)]
 pub(crate) use tables::FIX_COLUMNS;

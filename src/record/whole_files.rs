@@ -224,6 +224,13 @@ mod tests {
         assert!(ours.exists() && part_name(&ours).exists());
         drop(first);
         PartFile::create(&ours).unwrap().finish().unwrap();
+
+        // Between making a file and locking it, another process takes it for a left-over.
+        let unlocked = File::create_new(part_name(&ours)).unwrap();
+        let other = PartFile::create(&ours).unwrap();
+        let late = locked(unlocked, &ours).unwrap_err();
+        assert_eq!(late.kind(), ErrorKind::ResourceBusy);
+        other.finish().unwrap();
         fs::remove_dir_all(&folder).unwrap();
     }
 }

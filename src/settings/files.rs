@@ -66,12 +66,15 @@ pub fn read_bytes(path: &Path, kind: ReadLimit) -> io::Result<Vec<u8>> {
             kind.ending
         )));
     }
+    read_bounded(file, kind.most_bytes)
+}
+
+/// The size that a file system tells is no bound: some tell 0, and a file may grow.
+fn read_bounded(source: impl Read, most_bytes: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    // The size that a file system tells is no bound: some tell 0, and a file may grow.
-    let mut bounded = file.take(kind.most_bytes + 1);
-    bounded.read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > kind.most_bytes {
-        let most = kind.most_bytes >> 20;
+    source.take(most_bytes + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > most_bytes {
+        let most = most_bytes >> 20;
         return Err(refused(format!("it is larger than {most} MiB")));
     }
     Ok(bytes)
@@ -106,6 +109,16 @@ mod tests {
         let large = folder.join("large.toml");
         fs::write(&large, vec![b'#'; (1 << 20) + 1]).unwrap();
         assert!(refused(&large).contains("larger than 1 MiB"));
+        for kind in [
+            ReadLimit::TOML,
+            ReadLimit::CSV,
+            ReadLimit::OBJ,
+            ReadLimit::JSON,
+        ] {
+            let endless = read_bounded(io::repeat(b'#'), kind.most_bytes).unwrap_err();
+            let most = format!("larger than {} MiB", kind.most_bytes >> 20);
+            assert!(endless.to_string().contains(&most), "{endless}");
+        }
         #[cfg(unix)]
         {
             assert!(refused(Path::new("/dev/zero")).contains("no regular file"));

@@ -11,7 +11,7 @@ use crate::scenario::sampling::{Condition, Distribution, Template};
 use serde::Serialize;
 use std::collections::BTreeSet;
 
-/// Shares of the runs for which is shown what they are no worse than.
+/// Shares of the runs; of each, the value that it is no worse than is shown.
 pub const QUANTILES: [f64; 3] = [0.5, 0.9, 0.95];
 
 /// All figures of a study.
@@ -76,7 +76,7 @@ pub struct FigureDigest {
     pub worst: Option<WorstCase>,
     /// Its mean, of flags the rate.
     pub mean: Option<IntervalEstimate>,
-    /// What shares of the runs, those of [`QUANTILES`], are no worse than.
+    /// Values that the shares [`QUANTILES`] of the runs are no worse than.
     pub quantiles: [Option<IntervalEstimate>; QUANTILES.len()],
     /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
     /// no quantiles and drivers: theirs are not those of the distributions that were asked for.

@@ -110,8 +110,9 @@ pub enum StudyError {
         .0.display()
     )]
     Changed(PathBuf),
-    /// A file that no study has written has the name of one of the study's.
-    #[error("{0}; move it away, or choose another folder")]
+    /// A file that no study has written has the name of one of the study's, or the folder is another
+    /// command's.
+    #[error("{0}; choose another folder, or move what is there away")]
     Taken(io::Error),
     /// Nothing can be written into a folder.
     #[error("cannot write into {}: {source}; give another --out, or make that one writable", path.display())]

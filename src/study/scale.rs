@@ -78,26 +78,25 @@ impl Measure {
         }
     }
 
-    /// The value that all but a share `1 - p` of sorted values are no worse than; of figures without a worse
-    /// side, that they are not above. Of a figure with a sign it is a size. An end that the sample is too
-    /// small for is that of the range, where the values keep it.
+    /// The value that a share `p` of the runs is no worse than; of a figure with a sign its size. Where no
+    /// side is worse, the value that this share is not above. An end that the sample is too small for is that
+    /// of the range, where the values keep it.
     pub fn quantile(&self, values: &[f64], p: f64) -> Option<IntervalEstimate> {
-        let mut ranks: Vec<f64> = values.iter().map(|x| self.badness(*x)).collect();
-        ranks.sort_by(f64::total_cmp);
-        let e = quantile(&ranks, p)?;
         let side = self.worse_side();
-        let (value, low, high) = match side {
-            WorseSide::Less => (-e.value, -e.high, -e.low),
-            _ => (e.value, e.low, e.high),
-        };
-        let bounds = match side {
-            WorseSide::Farther => Bounds::NOT_NEGATIVE,
-            _ => self.range().kept_by(values.iter().copied()),
+        let share = if side == WorseSide::Less { 1.0 - p } else { p };
+        let is_size = side == WorseSide::Farther;
+        let number = |x: &f64| if is_size { x.abs() } else { *x };
+        let mut sorted: Vec<f64> = values.iter().map(number).collect();
+        sorted.sort_by(f64::total_cmp);
+        let e = quantile(&sorted, share)?;
+        let bounds = if is_size {
+            Bounds::NOT_NEGATIVE
+        } else {
+            self.range().kept_by(sorted)
         };
         Some(IntervalEstimate {
-            value,
-            low: low.max(bounds.low),
-            high: high.min(bounds.high),
+            low: e.low.max(bounds.low),
+            high: e.high.min(bounds.high),
             ..e
         })
     }

@@ -93,11 +93,11 @@ impl ScenarioRunner {
     fn run_sample(&mut self, template: &Template, sample: &ScenarioSample) -> Row {
         let without = |status, reason| Row::without_figures(sample, status, reason);
         let scenario = match template.scenario(sample) {
-            Ok(scenario) => without_images(scenario),
+            Ok(scenario) => scenario,
             Err(error) => return without(Status::Invalid, error.to_string()),
         };
         let mut fixes = Fixes::default();
-        match self.session(&scenario, &mut fixes) {
+        match self.session(scenario, &mut fixes) {
             Ok(summary) => Row::of(sample, &summary, &fixes),
             Err(error) => {
                 self.renderer = None;
@@ -106,31 +106,27 @@ impl ScenarioRunner {
         }
     }
 
+    /// Without the images that wayside reports carry for a recording: no figure is made of them.
     fn session(
         &mut self,
-        scenario: &Scenario,
+        mut scenario: Scenario,
         observer: &mut dyn Observer,
     ) -> Result<Summary, SessionError> {
+        scenario.file.stack.wayside.keep_images = false;
         let renderer = match &mut self.renderer {
             Some(renderer) => {
-                renderer.set_scene(session::scene(scenario));
+                renderer.set_scene(session::scene(&scenario));
                 renderer
             }
-            none => none.insert(session::renderer(scenario, self.choice)?),
+            none => none.insert(session::renderer(&scenario, self.choice)?),
         };
         session::run_on(
-            scenario,
+            &scenario,
             renderer.as_mut(),
             &RunOptions::default(),
             &mut [observer],
         )
     }
-}
-
-/// No figure is made of the images that wayside reports carry for a recording, and a study has none.
-fn without_images(mut scenario: Scenario) -> Scenario {
-    scenario.file.stack.wayside.keep_images = false;
-    scenario
 }
 
 #[cfg(test)]
@@ -166,9 +162,8 @@ mod tests {
         scenario.file.duration_s = 1.0;
         let mut images = Images(0, 0);
         let mut runner = ScenarioRunner::new(RendererChoice::Cpu);
-        runner
-            .session(&without_images(scenario), &mut images)
-            .unwrap();
+        assert!(scenario.file.stack.wayside.keep_images);
+        runner.session(scenario, &mut images).unwrap();
         assert!(
             images.0 > 3 && images.1 == 0,
             "{} frames, {} images",

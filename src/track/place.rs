@@ -10,6 +10,7 @@
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// Number of a track. A tunnel file has one track, number 0.
 #[derive(
@@ -48,6 +49,16 @@ pub enum Direction {
     Up,
     /// Towards falling chainage.
     Down,
+}
+
+/// `up` or `down`.
+impl fmt::Display for Direction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Up => "up",
+            Self::Down => "down",
+        })
+    }
 }
 
 impl Direction {

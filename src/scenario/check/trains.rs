@@ -41,9 +41,10 @@ impl LineCheck<'_, '_> {
         let (head_m, length_m) = (train.start_chainage_m, train.length_m());
         let start_key = format!("{at}.start_chainage_m");
         self.is_on_line(&start_key, "the train head", head_m);
-        let (way, begins_outside, first_m) = match train.direction {
-            Direction::Up => ("up", head_m < length_m, length_m),
-            Direction::Down => ("down", head_m > end_m - length_m, end_m - length_m),
+        let way = train.direction;
+        let (begins_outside, first_m) = match way {
+            Direction::Up => (head_m < length_m, length_m),
+            Direction::Down => (head_m > end_m - length_m, end_m - length_m),
         };
         if begins_outside {
             self.check.problem(

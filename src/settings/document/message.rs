@@ -65,8 +65,8 @@ impl SerdeMessage {
                 name_advice(name, known, "keys that may stand here", "take it out"),
             ),
             Self::MissingKey { .. } => Problem::new(key, "is missing", "give it a value"),
-            Self::Value { what, expected } if is_large(what) && expected.starts_with('u') => {
-                Problem::new(key, what_is_there(what), "give a smaller whole number")
+            Self::Value { what, expected } if is_too_large(what) => {
+                Problem::new(key, what_is_there(what), at_most(expected))
             }
             Self::Value { what, expected } => {
                 let mut allowed = self.names();
@@ -78,10 +78,22 @@ impl SerdeMessage {
     }
 }
 
-/// Whether a whole number is wrong, and not for its sign.
-fn is_large(what: &str) -> bool {
+/// Whether a whole number is larger than its type holds.
+fn is_too_large(what: &str) -> bool {
     let number = what.strip_prefix("invalid value: integer `");
     number.is_some_and(|number| !number.starts_with('-'))
+}
+
+/// Remedy for a number that is too large for a type.
+fn at_most(kind: &str) -> String {
+    let most = match kind {
+        "u8" => u64::from(u8::MAX),
+        "u16" => u64::from(u16::MAX),
+        "u32" => u64::from(u32::MAX),
+        "i32" => u64::from(i32::MAX.unsigned_abs()),
+        _ => return format!("give {}", what_is_expected(kind)),
+    };
+    format!("give a whole number, {most} at most")
 }
 
 /// What stands between backquotes.

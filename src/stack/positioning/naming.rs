@@ -147,7 +147,11 @@ impl Naming {
             _ => None,
         };
         let joined = || followed.votes.decode().filter(on_map);
-        let read = own.or_else(|| joined().map(|uid| (uid, Identity::Joined)));
+        let by_votes = match reading {
+            PairReading::Nothing => Identity::Followed,
+            _ => Identity::Joined,
+        };
+        let read = own.or_else(|| joined().map(|uid| (uid, by_votes)));
         let Some((uid, identity)) = read else {
             return self.without_reading(followed, expected, map);
         };
@@ -308,6 +312,9 @@ mod tests {
         }
         let moved = Verdict::Moved(uid, Identity::Joined);
         assert_eq!(judge(PairReading::Chips(6)), moved);
+        // The chips of before are not read again.
+        let followed = Verdict::Moved(uid, Identity::Followed);
+        assert_eq!(judge(PairReading::Nothing), followed);
     }
 
     /// Within the gate the expected lamp, between two lamps none.

@@ -491,6 +491,63 @@ fn a_locked_wheel_is_no_standing_train() {
     assert!(released.is_some());
 }
 
+/// At 60 km/h, 300 m before an obstacle, the brakes are on and stop the train on dry rails. Where wheels have
+/// slid they reach `low_adhesion_mps2`, and while these slide the train may run faster than they say. Provokes a
+/// guaranteed rate, or a warning that the train may not stop, that ignores what the wheels have felt.
+#[test]
+fn a_slide_lowers_the_rate_that_is_guaranteed() {
+    let speed_mps = 60.0 / 3.6;
+    let mut b = Bench::new(&well_known(1000.0));
+    b.hear(0, 0.0, DangerLevel::High, 1300.0);
+    let mut run_m = 0.0;
+    let mut after = |slides: bool, cycles: u32| {
+        b.slides = slides;
+        let reports = (0..cycles).map(|_| {
+            run_m += 0.1 * speed_mps;
+            b.cycle(run_m, speed_mps)
+        });
+        reports.last().unwrap()
+    };
+    let dry = after(false, 1);
+    assert!(dry.stops_in_time && !dry.display.text.contains("MAY NOT STOP"));
+    let sliding = after(true, 1);
+    assert!(sliding.wheels_slide && !sliding.stops_in_time);
+    assert!(sliding.display.text.contains("MAY NOT STOP BEFORE IT"));
+    // The mean speed holds samples of the slide for half a second.
+    let slid = after(false, 10);
+    assert!(!slid.wheels_slide && !slid.stops_in_time);
+    let (wider, lower) = (
+        slid.emergency_mps - sliding.emergency_mps,
+        dry.emergency_mps - slid.emergency_mps,
+    );
+    // Three sigma of a tenth of the speed, less what the 17 m between take.
+    assert!((4.0..5.0).contains(&wider), "{wider}");
+    assert!(lower > 4.0, "{lower}");
+}
+
+/// A brake that reaches 0.35 m/s^2 has failed on dry rails, and does what it can where wheels have slid.
+#[test]
+fn a_brake_on_slippery_rails_has_not_failed() {
+    for (slides, lamp) in [
+        (false, Indicator::Emergency),
+        (true, Indicator::BrakeWarningRed),
+    ] {
+        let mut b = Bench::new(&well_known(1000.0));
+        b.hear(0, 0.0, DangerLevel::High, 1300.0);
+        let (mut run_m, mut speed_mps) = (0.0, 16.0);
+        let mut last = None;
+        for k in 0..80 {
+            b.slides = slides && k < 5;
+            speed_mps -= 0.035;
+            run_m += 0.1 * speed_mps;
+            last = Some(b.cycle(run_m, speed_mps));
+        }
+        let report = last.unwrap();
+        assert_ne!(report.command.brake, BrakeDemand::None);
+        assert_eq!(report.display.lamp, lamp, "{report:?}");
+    }
+}
+
 /// While the wheels slide, the speed is less well known.
 #[test]
 fn a_slide_widens_the_estimated_speed() {

@@ -137,3 +137,47 @@ impl Equipment for WaysideDetection {
         std::mem::take(&mut self.messages)
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::super::test_scene::TestScene;
+    use super::*;
+    use crate::bus::Frame;
+
+    /// Heartbeats that a device sends in ten seconds of frames, after its first ten; `stuck` repeats one
+    /// image.
+    fn heartbeats(stuck: bool) -> usize {
+        let scene = TestScene::new(320, 180);
+        let settings = WaysideSettings::default();
+        let mut device =
+            WaysideDetection::new(&settings, scene.calibration.clone(), scene.map.clone());
+        let first = scene.frame(10, |_, _| 1.0, &[]);
+        let frames = (0..110).map(|n| {
+            let frame = scene.frame(n, |_, _| 1.0, &[]);
+            match stuck && n > 10 {
+                true => Frame {
+                    image: first.image.clone(),
+                    ..frame
+                },
+                false => frame,
+            }
+        });
+        let sent = frames.flat_map(|frame| {
+            let (number, now) = (frame.number, frame.start);
+            let node = Node::Post("W1".into());
+            device.on(&Message::own(node, now, Content::Frame(frame)));
+            let messages = device.cycle(now);
+            messages.into_iter().filter(move |_| number > 10)
+        });
+        sent.filter(|m| matches!(m.content, Content::Heartbeat(_)))
+            .count()
+    }
+
+    /// Fails where a device whose camera repeats itself says that it is alive.
+    #[test]
+    fn a_frozen_camera_has_no_heartbeat() {
+        assert_eq!(heartbeats(false), 10);
+        assert_eq!(heartbeats(true), 0);
+    }
+}

@@ -208,6 +208,12 @@ impl TestScene {
         }
     }
 
+    /// Where a pixel's ray meets the bed.
+    pub fn bed_chainage_m(&self, u: u32, v: u32) -> f64 {
+        let ray = &self.rays[(v * self.calibration.camera.intrinsics.width_px + u) as usize];
+        self.eye.x + ray.x * bed_distance_m(&self.eye, ray)
+    }
+
     /// A frame: background times `light` (a function of the pixel), crates of a grey level,
     /// noise of 1.7 grey levels.
     pub fn frame(

@@ -627,28 +627,47 @@ fn a_change_of_light_clears_nothing() {
     }
 }
 
-/// Fails where a camera that sees nothing for want of light says that the track is clear, from the
-/// start or when the lamps go out; when they are lit again the device sees again.
+/// Fails where a camera that sees nothing for want of light, or for too much of it, says that the track is
+/// clear, from the start or when the lamps change; when they are as before the device sees again.
 #[test]
-fn a_dark_tunnel_is_not_clear() {
+fn a_tunnel_without_light_or_with_too_much_is_not_clear() {
     let scene = TestScene::new(640, 360);
-    let dark = |_: u32, _: u32| 0.12;
-    let mut d = detector(&scene, &quiet());
-    for n in 0..40u32 {
-        let report = d.on_frame(&scene.frame(n, dark, &[]), None, &[]);
-        assert!(!report.passage_possible, "frame {n}");
-        assert_eq!(report.blind, n >= 19, "frame {n}");
+    for level in [0.12, 3.0] {
+        let light = |_: u32, _: u32| level;
+        let mut d = detector(&scene, &quiet());
+        for n in 0..40u32 {
+            let report = d.on_frame(&scene.frame(n, light, &[]), None, &[]);
+            assert!(!report.passage_possible, "{level}: frame {n}");
+            assert_eq!(report.blind, n >= 19, "{level}: frame {n}");
+        }
+        let mut d = taught(&scene, &quiet());
+        for n in 10..80u32 {
+            let frame = match n {
+                20..50 => scene.frame(n, light, &[]),
+                _ => scene.frame(n, STEADY, &[]),
+            };
+            let report = d.on_frame(&frame, None, &[]);
+            // A second after the last frame that showed the bed, until five have shown it again.
+            assert_eq!(report.blind, (30..54).contains(&n), "{level}: frame {n}");
+            // What shines may be taken for a body, darkness not.
+            assert!(level > 1.0 || report.obstacles.is_empty());
+        }
     }
-    let mut d = taught(&scene, &quiet());
-    for n in 10..80u32 {
-        let frame = match n {
-            20..50 => scene.frame(n, dark, &[]),
-            _ => scene.frame(n, STEADY, &[]),
+}
+
+/// Without light on 20 m of the bed the device is blind, without it on 5 m it is not (`unseen_bed_m`).
+#[test]
+fn a_dark_stretch_is_not_clear() {
+    let scene = TestScene::new(640, 360);
+    for (dark_m, blind) in [(20.0, true), (5.0, false)] {
+        let mut d = taught(&scene, &quiet());
+        let light = |u: u32, v: u32| match DEVICE_M - scene.bed_chainage_m(u, v) {
+            away_m if (20.0..20.0 + dark_m).contains(&away_m) => 0.05,
+            _ => 1.0,
         };
-        let report = d.on_frame(&frame, None, &[]);
-        // A second after the last frame that showed the bed, until five have shown it again.
-        assert_eq!(report.blind, (30..54).contains(&n), "frame {n}");
-        assert!(report.obstacles.is_empty());
+        let reports = (10..40).map(|n| d.on_frame(&scene.frame(n, light, &[]), None, &[]));
+        let report = reports.last().unwrap();
+        assert_eq!(report.blind, blind, "{dark_m} m: {:?}", report.bed);
     }
 }
 

@@ -9,8 +9,8 @@ pub struct Bounds {
     pub high: f64,
 }
 
-/// Half an interval over the mean's distance from the bound, from which on it has no upper end: as of two
-/// runs, whose t is 12.7. The end would be twenty times the mean.
+/// Half an interval over the mean's distance from its bound, above which the interval has no upper end: it
+/// would be more than e^3 = 20 times that distance. Only means of two to four numbers exceed it.
 const MOST_RELATIVE: f64 = 3.0;
 
 impl Bounds {
@@ -36,8 +36,8 @@ impl Bounds {
 
     /// The interval about a mean that would be `half` wide to either side if nothing bounded it: with one
     /// bound even in the logarithm of the distance from it, with two even in the logit between them
-    /// (delta method), so that it never leaves them. Where `half` is so many times the distance from one
-    /// bound that the method no longer holds, nothing bounds the mean on the other side.
+    /// (delta method), so that it never leaves them. With one bound, and `half` more than [`MOST_RELATIVE`]
+    /// times the distance from it, the upper end is infinite.
     pub fn interval(self, mean: f64, half: f64) -> (f64, f64) {
         let is_inside = self.low < mean && mean < self.high;
         if !is_inside || !self.low.is_finite() || half <= 0.0 {

@@ -3,7 +3,7 @@
 //! | figure | interval | source |
 //! |---|---|---|
 //! | [`mean`] | Student's t | needs some 30 runs where errors are skew; two studies are held against each other by the mean of the differences between runs of the same index, which met the same chances |
-//! | [`bounded_mean`] | the same in a scale that has no end at the bounds (logarithm, logit) | delta method: it never leaves the bounds |
+//! | [`bounded_mean`] | the same in a scale that has no end at the bounds (logarithm, logit) | delta method: it never leaves the bounds; of two to four numbers that differ much it has no upper end |
 //! | [`quantile`] | two order statistics, by the binomial distribution | exact for any distribution: David and Nagaraja, Order Statistics, 7.1 |
 //! | [`rate`] | Wilson's score, and Clopper and Pearson's exact one | Brown, Cai, DasGupta, Stat. Sci. 16 (2001) |
 //! | [`weighted_mean`] | normal, within the bounds of the figure | importance sampling; none of runs worth fewer than 100 (Kish) |

@@ -224,6 +224,11 @@ fn weighted_means_are_those_of_the_distributions() {
     assert_eq!(given(3.0).count(), 0);
     let plain: Vec<(f64, f64)> = (0..400).map(|k| (0.0, f64::from(k))).collect();
     assert!((weighted_mean(&plain, Bounds::NONE).unwrap().value - 199.5).abs() < 1e-9);
+    let mut shares = [(0.0, 1.0); 200];
+    shares[0].1 = 0.2;
+    let share = weighted_mean(&shares, Bounds::SHARE).unwrap();
+    assert!(share.low > 0.0 && share.high <= 1.0, "{share:?}");
+    assert!(weighted_mean(&shares, Bounds::NONE).unwrap().high > 1.0);
     let nothing = [(f64::MIN, 1.0); 200];
     assert!(weighted_mean(&nothing, Bounds::NONE).is_none());
     let always = nothing.map(|(ln, _)| (ln, Some(true)));
@@ -348,9 +353,11 @@ fn val_means_of_what_is_bounded_are_scipys() {
         let e = bounded_mean(few, Bounds::NOT_NEGATIVE).unwrap();
         assert!(0.0 <= e.low && e.low < e.value, "{e:?}");
     }
-    // Two runs that are far apart say nothing of how large the mean may be, and ten say it.
+    // The mean of two numbers that are far apart has no upper end; of two that are close, or ten, it has one.
     let two = bounded_mean(&[0.1, 1.1], Bounds::NOT_NEGATIVE).unwrap();
     assert!(two.high.is_infinite() && two.low > 0.0, "{two:?}");
+    let close = bounded_mean(&[1.0, 1.1], Bounds::NOT_NEGATIVE).unwrap();
+    assert!(close.high.is_finite(), "{close:?}");
     let ten: Vec<f64> = [0.1, 1.1].repeat(5);
     assert!(bounded_mean(&ten, Bounds::NOT_NEGATIVE).unwrap().high < 1.3);
     let outside = [0.5, 1.5, -3.0];

@@ -194,7 +194,13 @@ impl TrainSettings {
         f64::from(self.cars) * self.vehicle().length_m
     }
 
-    /// From the lower to the upper chainage of its ends at the start.
+    /// Width and height of its cars over top of rail.
+    pub fn profile_m(&self) -> [f64; 2] {
+        let vehicle = self.vehicle();
+        [vehicle.width_m, vehicle.height_m]
+    }
+
+    /// Chainages of its ends at the start, the lower one first.
     pub fn stands_m(&self) -> [f64; 2] {
         let head_m = self.start_chainage_m;
         match self.direction {
@@ -214,17 +220,13 @@ impl TrainSettings {
                 ),
             );
         }
-        let start_m = self.start_chainage_m;
-        let is_behind = |stop_m: &f64| self.direction.sign() * (stop_m - start_m) < 0.0;
+        let (start_m, way) = (self.start_chainage_m, self.direction);
+        let is_behind = |stop_m: &f64| way.ahead_m(start_m, *stop_m) < 0.0;
         if let Some(stop_m) = self.stop_at_m.filter(is_behind) {
-            let way = match self.direction {
-                Direction::Up => "up",
-                Direction::Down => "down",
-            };
             check.problem(
                 "stop_at_m",
                 format!(
-                    "{stop_m} m lies behind the train, which runs {way} the line from {start_m} m"
+                    "{stop_m} m lies behind the head of the train, which runs {way} the line from {start_m} m"
                 ),
                 format!("give {start_m} m, or a place further {way} the line"),
             );

@@ -138,7 +138,7 @@ fn val_steady_curve() {
             let (v, yaw) = (kmh / 3.6, consist(&world).states[0].angular.z);
             assert!((yaw * radius_m / v - 1.0).abs() < 0.005, "{yaw} rad/s");
             let close =
-                |got: f64, want: f64, least: f64| (got - want).abs() < 0.02 * want.abs() + least;
+                |got: f64, want: f64, least: f64| (got - want).abs() < 0.006 * want.abs() + least;
             assert!(close(floor, want.floor_mps2, 1e-3));
             assert!(close(roll, want.roll_rad, 2e-5));
         }

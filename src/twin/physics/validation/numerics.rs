@@ -102,7 +102,7 @@ fn val_half_the_step() {
         );
         worst = worst.max(off.abs());
     }
-    assert!(worst < 0.01);
+    assert!(worst < 0.006);
 }
 
 /// Fails where the wheels' bounce on the rails is wrong. P2 of a dipped joint, Jenkins et al. 1974,
@@ -153,6 +153,6 @@ fn val_p2_of_a_joint() {
             100.0 * (got / want - 1.0),
             1e-3 * p0
         );
-        assert!((got / want - 1.0).abs() < 0.05);
+        assert!((got / want - 1.0).abs() < 0.048);
     }
 }
