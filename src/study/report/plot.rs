@@ -164,12 +164,17 @@ fn draw(
     chart
         .draw_series(LineSeries::new(line, BLUE.stroke_width(2)))
         .map_err(fail)?;
+    // Without a cap at either end: the interval may go on outside of the plot.
     let bars = layers.bars.iter().map(|(at, e)| {
-        let style = BLUE.stroke_width(2).filled();
-        let [low, high] = [cut(e.low), cut(e.high)];
-        ErrorBar::new_vertical(x.place(*at), low, y.place(e.value), high, style, 9)
+        let ends = [e.low, e.high].map(|end| (x.place(*at), cut(end)));
+        PathElement::new(ends, BLUE.stroke_width(2))
     });
     chart.draw_series(bars).map_err(fail)?;
+    let values = layers.bars.iter().map(|(at, e)| {
+        let place = (x.place(*at), y.place(e.value));
+        Circle::new(place, 4, BLUE.filled())
+    });
+    chart.draw_series(values).map_err(fail)?;
     root.present().map_err(fail)?;
     Ok(())
 }
