@@ -22,9 +22,9 @@ const STUDY: &str = "scenarios/studies/faults.toml";
 struct Said {
     /// When the equipment of the train said first that it may not stop in time.
     may_not_stop: Option<SimTime>,
-    /// When the device said first that something lies there that it sees.
+    /// When the device first reported the box.
     found: Option<SimTime>,
-    /// When it said first after that that nothing does.
+    /// When it first took that back.
     cleared: Option<SimTime>,
 }
 

@@ -16,18 +16,18 @@ use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// For a minute at most.
-fn wait_until(came: impl Fn() -> bool) {
-    let came = (0..1200).any(|_| {
-        sleep(Duration::from_millis(50));
-        came()
-    });
-    assert!(came);
+/// Until a file is there, for a minute at most.
+fn wait_for(path: &Path) {
+    wait_for_bytes(path, 0);
 }
 
-/// Until a file is there.
-fn wait_for(path: &Path) {
-    wait_until(|| path.exists());
+/// Until a file holds so much.
+fn wait_for_bytes(path: &Path, least: u64) {
+    let came = (0..1200).any(|_| {
+        sleep(Duration::from_millis(50));
+        fs::metadata(path).is_ok_and(|about| about.len() >= least)
+    });
+    assert!(came, "no {} of {least} bytes", path.display());
 }
 
 fn send(signal: &str, child: &Child) {
@@ -173,6 +173,10 @@ fn term_and_hup_end_sets_and_studies_in_order() {
         assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
         let meta = fs::read(out.join("meta.json")).unwrap();
         let meta: serde_json::Value = serde_json::from_slice(&meta).unwrap();
+        let pictures = fs::read_dir(out.join("images/left")).unwrap();
+        let pictures: Vec<_> = pictures.map(|entry| entry.unwrap().path()).collect();
+        assert!(pictures.iter().all(|path| image::open(path).is_ok()));
+        assert_eq!(meta["cameras"][0]["frames"], pictures.len());
         assert_eq!(meta["finished"], true);
         let study = base.join(format!("study{signal}"));
         let line = format!(
@@ -181,12 +185,15 @@ fn term_and_hup_end_sets_and_studies_in_order() {
         );
         let child = spawn_with_signals(&line);
         let journal = study.join("rows.jsonl");
-        wait_until(|| fs::metadata(&journal).is_ok_and(|about| about.len() > 0));
+        wait_for_bytes(&journal, 1);
         send(signal, &child);
         let output = child.wait_with_output().unwrap();
         assert_eq!(output.status.code(), Some(1), "{}", printed(&output));
         assert!(printed(&output).contains("--resume goes on"));
-        assert!(!metrotwin::study::read_rows(&study).unwrap().is_empty());
+        let lines = fs::read_to_string(&journal).unwrap();
+        assert!(lines.ends_with('\n'));
+        let rows = metrotwin::study::read_rows(&study).unwrap();
+        assert_eq!(rows.len(), lines.lines().count());
     }
     fs::remove_dir_all(base).ok();
 }

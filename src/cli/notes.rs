@@ -66,26 +66,28 @@ struct Devices<'a> {
 }
 
 impl<'a> Devices<'a> {
-    /// None where there is nothing to be seen.
+    /// Without views where the scenario has no obstacles.
     fn of(scenario: &'a Scenario) -> Self {
-        let posts = scenario.wayside.iter();
-        let posts = posts.filter(|_| !scenario.physics.obstacles.is_empty());
-        let views = posts.map(|post| (post, FieldOfView::new(scenario, post)));
+        let views = match scenario.physics.obstacles.is_empty() {
+            true => Vec::new(),
+            false => FieldOfView::of_all(scenario),
+        };
         Self {
             scenario,
-            views: views.collect(),
+            views: scenario.wayside.iter().zip(views).collect(),
         }
     }
 
-    /// An obstacle that is in no picture, neither where it appears nor on the bed below. What has a
-    /// velocity may get into one.
+    /// An obstacle whose middle is in no picture, neither where it appears nor on the bed below. What moves at
+    /// the start may get into one.
     fn out_of_view(&self) -> Option<String> {
         if self.views.is_empty() {
             return None;
         }
         let line = &self.scenario.tunnel.alignment;
         let is_unseen = |o: &&ObstacleSettings| {
-            let stays = o.velocity_mps.iter().all(|v| v.abs() <= 0.0);
+            let mut moves = o.velocity_mps.iter().chain(&o.spin_rad_s);
+            let stays = moves.all(|v| v.abs() <= 0.0);
             let mut views = self.views.iter();
             is_single(o) && stays && !views.any(|(_, view)| shows(view, o, line))
         };
@@ -93,7 +95,7 @@ impl<'a> Devices<'a> {
         let views = self.views.iter();
         let names: Vec<&str> = views.map(|(p, _)| &*p.calibration.name).collect();
         Some(format!(
-            "no wayside camera ({}) has `{}` at {} m in its picture: it is not found there",
+            "no wayside camera ({}) has the middle of `{}` at {} m in its picture: it may not be found there",
             names.join(", "),
             unseen.name,
             unseen.chainage_m

@@ -33,7 +33,9 @@ impl Posts {
         let posts = scenario.wayside.iter();
         let names = posts.clone().map(|post| post.calibration.name.as_str());
         Self {
-            posts: posts.map(|post| Post::new(scenario, post)).collect(),
+            posts: (posts.zip(FieldOfView::of_all(scenario)))
+                .map(|(post, view)| Post::new(post, view))
+                .collect(),
             health: Health::of(names),
             frames: 0,
         }
@@ -79,10 +81,10 @@ impl Posts {
 }
 
 impl Post {
-    fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
+    fn new(post: &WaysidePost, view: FieldOfView) -> Self {
         Self {
             node: Node::Post(post.calibration.name.clone()),
-            view: FieldOfView::new(scenario, post),
+            view,
             score: WaysideScore::default(),
             exposed: VecDeque::new(),
         }

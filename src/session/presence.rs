@@ -7,6 +7,7 @@ use crate::track::{Alignment, BED_M};
 use crate::twin::geometry::TunnelCaster;
 use crate::twin::physics::{WorkerTruth, World};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
+use std::sync::Arc;
 
 /// How far a walking man's limbs reach from his middle.
 const STRIDE_REACH_M: f64 = 0.4;
@@ -37,20 +38,29 @@ pub struct Presence {
 /// What a device can have in view: where it really hangs and looks, and the walls around it.
 pub struct FieldOfView {
     device: WaysideCalibration,
-    walls: TunnelCaster,
+    walls: Arc<TunnelCaster>,
     segment: usize,
 }
 
 impl FieldOfView {
-    /// Of a device of a scenario.
-    pub fn new(scenario: &Scenario, post: &WaysidePost) -> Self {
+    /// Of a device between walls.
+    pub fn new(walls: Arc<TunnelCaster>, post: &WaysidePost) -> Self {
         let device = &post.actual;
-        let walls = TunnelCaster::new(&scenario.tunnel);
         Self {
             segment: walls.segment_of(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
             walls,
         }
+    }
+
+    /// Of all devices of a scenario, in its order.
+    pub fn of_all(scenario: &Scenario) -> Vec<Self> {
+        if scenario.wayside.is_empty() {
+            return Vec::new();
+        }
+        let walls = Arc::new(TunnelCaster::new(&scenario.tunnel));
+        let posts = scenario.wayside.iter();
+        posts.map(|post| Self::new(walls.clone(), post)).collect()
     }
 
     /// Whether a place is in the picture and not behind a wall. How far the detector looks, how small the

@@ -55,11 +55,12 @@ impl<S: Settings> Settings for BTreeMap<String, S> {
 /// themselves. `also` names a method for what several keys say together; it takes a
 /// [`Checker`](super::Checker).
 ///
-/// Every time, delay and rate has a range, for these reasons. A run takes a day at most: 86 million steps of
-/// 1 ms, some hours of work. Moments end at 1e6 s, after any run. A message is under way for ten minutes at
-/// most, with a minute of jitter: until it arrives it is kept. No sensor samples more often than the world is
-/// stepped, 1000 times a second, and no camera takes less than a picture in ten seconds; so long a row or an
-/// exposure may last. What brakes and equipment need to act ends where no train would be run with them.
+/// Every time, delay and rate has a range. A run takes a day at most (86 million steps of 1 ms, some hours of
+/// work), and a fault begins within it; most other moments end at 1e6 s, after any run. A message takes ten
+/// minutes at most, and up to a minute of jitter: it is kept until it arrives. Sensors sample 1000 times a
+/// second at most, once in a default step. A camera takes at least one picture in ten seconds, and no row or
+/// exposure lasts longer than that. Times that brakes and equipment take end where nobody would run a train
+/// with them.
 ///
 /// Either all keys have a default or none has. Without one a key must be written, unless it is an
 /// `Option` or has a serde attribute. Keys of an `enum`'s variants have no default.

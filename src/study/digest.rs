@@ -76,7 +76,8 @@ pub struct FigureDigest {
     pub worst: Option<WorstCase>,
     /// Its mean, of flags the rate.
     pub mean: Option<IntervalEstimate>,
-    /// Values that the shares [`QUANTILES`] of the runs are no worse than.
+    /// Values that the shares [`QUANTILES`] of the runs are no worse than: sizes, where the figure has a sign;
+    /// not above, where no side is worse.
     pub quantiles: [Option<IntervalEstimate>; QUANTILES.len()],
     /// What drives it: each variable with its rank correlation and first-order share. Weighed runs have
     /// no quantiles and drivers: theirs are not those of the distributions that were asked for.
@@ -185,13 +186,12 @@ impl FigureDigest {
         if lacking == 0 && known.iter().all(|(_, x)| is_same(*x)) {
             return None;
         }
-        let worse_side = measure.worse_side();
         let bare = Self {
             measure,
             runs: known.len(),
             lacking,
-            worse_side,
-            worst: WorstCase::of(measure, rows).filter(|_| worse_side != WorseSide::Neither),
+            worse_side: measure.worse_side(),
+            worst: WorstCase::of(measure, rows),
             mean: None,
             quantiles: [None; QUANTILES.len()],
             drivers: Vec::new(),
@@ -219,17 +219,11 @@ impl WorstCase {
         let known = rows.iter().filter_map(|row| {
             let value = row.number(measure.name)?;
             let index = row.index;
-            Some(Self { value, index })
+            Some((measure.badness(value)?, Self { value, index }))
         });
-        let badness = |case: &Self| measure.badness(case.value);
         // The first of several that are equal.
-        known.reduce(|worst, case| {
-            if badness(&case) > badness(&worst) {
-                case
-            } else {
-                worst
-            }
-        })
+        let worst = known.reduce(|worst, case| if case.0 > worst.0 { case } else { worst });
+        worst.map(|(_, case)| case)
     }
 }
 

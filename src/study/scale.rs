@@ -69,12 +69,14 @@ impl Measure {
         }
     }
 
-    /// The larger, the worse: of a value with a sign its size, of others it or its negative.
-    pub fn badness(&self, value: f64) -> f64 {
+    /// The larger, the worse: of a value with a sign its size, of others it or its negative. `None` where no
+    /// value is worse.
+    pub fn badness(&self, value: f64) -> Option<f64> {
         match self.worse_side() {
-            WorseSide::Less => -value,
-            WorseSide::Farther => value.abs(),
-            WorseSide::More | WorseSide::Neither => value,
+            WorseSide::More => Some(value),
+            WorseSide::Less => Some(-value),
+            WorseSide::Farther => Some(value.abs()),
+            WorseSide::Neither => None,
         }
     }
 

@@ -39,7 +39,7 @@ fn a_device_answers_for_what_it_has_in_view() {
         world.step(&[]).unwrap();
     }
     let post = &scenario.wayside[0];
-    let view = FieldOfView::new(&scenario, post);
+    let [view] = FieldOfView::of_all(&scenario).try_into().ok().unwrap();
     let lying: Vec<_> = (view.present(&world, &scenario.tunnel.alignment).into_iter())
         .filter(|p| p.lies_in_view_since.is_some())
         .collect();

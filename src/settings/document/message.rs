@@ -66,7 +66,7 @@ impl SerdeMessage {
             ),
             Self::MissingKey { .. } => Problem::new(key, "is missing", "give it a value"),
             Self::Value { what, expected } if is_too_large(what) => {
-                Problem::new(key, what_is_there(what), at_most(expected))
+                Problem::new(key, what_is_there(what), "give a smaller whole number")
             }
             Self::Value { what, expected } => {
                 let mut allowed = self.names();
@@ -82,18 +82,6 @@ impl SerdeMessage {
 fn is_too_large(what: &str) -> bool {
     let number = what.strip_prefix("invalid value: integer `");
     number.is_some_and(|number| !number.starts_with('-'))
-}
-
-/// Remedy for a number that is too large for a type.
-fn at_most(kind: &str) -> String {
-    let most = match kind {
-        "u8" => u64::from(u8::MAX),
-        "u16" => u64::from(u16::MAX),
-        "u32" => u64::from(u32::MAX),
-        "i32" => u64::from(i32::MAX.unsigned_abs()),
-        _ => return format!("give {}", what_is_expected(kind)),
-    };
-    format!("give a whole number, {most} at most")
 }
 
 /// What stands between backquotes.

@@ -192,7 +192,7 @@ fn values_of_the_wrong_kind_are_told_in_plain_words() {
     for sentence in [
         "count: is the whole number -1; give a whole number, 0 or more",
         "index: is the number 1.5; give a whole number, 0 or more",
-        "large: is the whole number 256; give a whole number, 255 at most",
+        "large: is the whole number 256; give a smaller whole number",
         "name: is the whole number 3; give a text in quotes",
         "on: is the text \"yes\"; give true or false",
         "list: is the whole number 4; give a list, in [ ]",

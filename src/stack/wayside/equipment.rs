@@ -145,8 +145,7 @@ mod tests {
     use super::*;
     use crate::bus::Frame;
 
-    /// Heartbeats that a device sends in ten seconds of frames, after its first ten; `stuck` repeats one
-    /// image.
+    /// Heartbeats that a device sends in frames 11 to 109, ten a second; `stuck` repeats one image.
     fn heartbeats(stuck: bool) -> usize {
         let scene = TestScene::new(320, 180);
         let settings = WaysideSettings::default();

@@ -93,16 +93,18 @@ fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
     let figure = measure.name;
     let runs = rows.iter().filter_map(|row| {
         let values = row.values.iter().map(|(n, v)| format!("{n} {}", short(v)));
-        Some(WorstRun {
+        let value = row.number(figure)?;
+        let run = WorstRun {
             index: row.index,
-            value: row.number(figure)?,
+            value,
             drawn: values.collect::<Vec<_>>().join(", "),
-        })
+        };
+        Some((measure.badness(value)?, run))
     });
     let mut runs: Vec<_> = runs.collect();
-    let badness = |run: &WorstRun| measure.badness(run.value);
-    runs.sort_by(|a, b| badness(b).total_cmp(&badness(a)));
+    runs.sort_by(|(a, _), (b, _)| b.total_cmp(a));
     runs.truncate(WORST);
+    let runs = runs.into_iter().map(|(_, run)| run).collect();
     Some(Worst { figure, runs })
 }
 
