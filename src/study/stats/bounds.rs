@@ -36,7 +36,7 @@ impl Bounds {
 
     /// The interval about a mean that would be `half` wide to either side if nothing bounded it: with one
     /// bound even in the logarithm of the distance from it, with two even in the logit between them
-    /// (delta method), so that it never leaves them. With one bound, and `half` more than [`MOST_RELATIVE`]
+    /// (delta method), so that it never leaves them. With one bound, and `half` more than three
     /// times the distance from it, the upper end is infinite.
     pub fn interval(self, mean: f64, half: f64) -> (f64, f64) {
         let is_inside = self.low < mean && mean < self.high;
