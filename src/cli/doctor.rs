@@ -3,13 +3,16 @@
 use super::fault::Failure;
 use super::print;
 use crate::record::render;
-use crate::session::measure;
+use crate::session::{Profile, measure, profile};
+use serde::Serialize;
 
 const AFTER: &str = "\
-A figure is the best median of rounds of 20 frames.
+A figure is the best median of rounds of 20 frames. With --profile, times are medians of frames that are
+drawn one by one: preparing a job, waiting for its pictures, and the adapter's own time in each pass.
 
 Examples:
   metrotwin doctor
+  metrotwin doctor --profile
   metrotwin doctor --json | jq .stereo_pairs_per_s";
 
 /// List graphics adapters and measure how fast this machine is
@@ -19,16 +22,48 @@ pub(super) struct DoctorArgs {
     /// Print the figures as JSON
     #[arg(long)]
     json: bool,
+    /// Measure where the time of a picture goes instead, pass by pass
+    #[arg(long)]
+    profile: bool,
 }
 
 pub(super) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
-    let speeds = measure().map_err(|e| Failure::run(anyhow::Error::from_boxed(e)))?;
-    if args.json {
-        let text = serde_json::to_string_pretty(&speeds).map_err(Failure::run)?;
-        print(&text)
-    } else {
-        let template = include_str!("texts/doctor.txt");
-        let text = render("doctor.txt", template, &speeds).map_err(Failure::run)?;
-        print(&text)
+    let failed = |error| Failure::run(anyhow::Error::from_boxed(error));
+    if args.profile {
+        let cases = Cases {
+            cases: profile().map_err(failed)?,
+        };
+        return say(
+            args,
+            "profile.txt",
+            include_str!("texts/profile.txt"),
+            &cases,
+        );
     }
+    let speeds = measure().map_err(failed)?;
+    say(
+        args,
+        "doctor.txt",
+        include_str!("texts/doctor.txt"),
+        &speeds,
+    )
+}
+
+#[derive(Serialize)]
+struct Cases {
+    cases: Vec<Profile>,
+}
+
+/// As a text by a template, or as JSON.
+fn say(
+    args: &DoctorArgs,
+    name: &str,
+    template: &str,
+    figures: &impl Serialize,
+) -> Result<(), Failure> {
+    let text = match args.json {
+        true => serde_json::to_string_pretty(figures).map_err(Failure::run)?,
+        false => render(name, template, figures).map_err(Failure::run)?,
+    };
+    print(&text)
 }

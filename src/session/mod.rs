@@ -29,6 +29,7 @@ mod outcome;
 mod positioning_score;
 mod posts;
 mod presence;
+mod profile;
 mod ride;
 mod scheduler;
 mod scoring;
@@ -42,6 +43,7 @@ pub use event::{
 };
 pub use fitting::{Fitted, Fitting, Mounted};
 pub(crate) use presence::FieldOfView;
+pub use profile::{PassCost, Profile, profile};
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{

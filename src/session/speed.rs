@@ -8,7 +8,7 @@ use super::costs::Stopwatch;
 use super::summary::Cost;
 use super::{Event, Observer, ObserverError, RendererChoice, RunOptions, Source, renderer, run_on};
 use crate::bus::{Node, TrainCommand};
-use crate::scenario::{Scenario, ScenarioFile};
+use crate::scenario::{Override, Scenario, ScenarioFile};
 use crate::settings::read_toml;
 use crate::track::Tunnel;
 use crate::twin::physics::World;
@@ -16,12 +16,12 @@ use crate::twin::render::{Backend, Job, RenderError, Renderer, gpu};
 use serde::Serialize;
 
 /// Whatever goes wrong.
-type Error = Box<dyn std::error::Error + Send + Sync>;
+pub(super) type Error = Box<dyn std::error::Error + Send + Sync>;
 
 const TUNNEL: &str = include_str!("../../tunnels/chengdu_line1.toml");
 
 /// A train with a rig.
-const TRAIN: &str = r#"
+pub(super) const TRAIN: &str = r#"
 name = "doctor"
 tunnel = "chengdu_line1"
 rig = { pairs_per_s = 30.0 }
@@ -29,7 +29,7 @@ train = { start_chainage_m = 1330.0, start_speed_kmh = 60.0, cruise_speed_kmh = 
 "#;
 
 /// A wayside camera before a tunnel in which nothing moves, as it mostly is.
-const POST: &str = r#"
+pub(super) const POST: &str = r#"
 name = "doctor"
 tunnel = "chengdu_line1"
 wayside = [{ device = "W1530", camera = { frames_per_s = 30.0 } }]
@@ -70,12 +70,12 @@ pub struct Speeds {
 
 /// Measures this machine: the best medians of rounds of 20 frames.
 pub fn measure() -> Result<Speeds, Error> {
-    let mut renderer = renderer(&scene(TRAIN, 1)?, RendererChoice::Auto)?;
+    let mut renderer = renderer(&scene(TRAIN, 1, &[])?, RendererChoice::Auto)?;
     let drawn_by = renderer.backend();
     let rounds = if drawn_by.backend == "cpu" { 1 } else { ROUNDS };
     let (mut watched, options) = (Watched::default(), RunOptions::default());
-    let train = scene(TRAIN, rounds)?;
-    for scenario in [&train, &scene(POST, rounds)?] {
+    let train = scene(TRAIN, rounds, &[])?;
+    for scenario in [&train, &scene(POST, rounds, &[])?] {
         run_on(scenario, renderer.as_mut(), &options, &mut [&mut watched])?;
     }
     let renderer = renderer.as_mut();
@@ -91,20 +91,24 @@ pub fn measure() -> Result<Speeds, Error> {
     })
 }
 
-/// A scene, for as long as so many rounds of frames take, after the first one, which also builds what
-/// later ones use, and those of which the detector learns its reference.
-fn scene(text: &str, rounds: usize) -> Result<Scenario, Error> {
+/// A scene with some changes, for as long as so many rounds of frames take, after the first one, which also
+/// builds what later ones use, and those of which the detector learns its reference.
+pub(super) fn scene(text: &str, rounds: usize, changes: &[&str]) -> Result<Scenario, Error> {
     let tunnel = Tunnel::from_toml(TUNNEL)?;
-    let mut file: ScenarioFile = read_toml(text)?;
+    let mut document = text.parse::<toml::Table>()?;
+    for change in changes {
+        change.parse::<Override>()?.apply(&mut document)?;
+    }
+    let mut file: ScenarioFile = read_toml(&document.to_string())?;
     file.duration_s = (LEARNING + 2 + rounds * ROUND) as f64 / FRAMES_PER_S;
     Ok(Scenario::new(file, tunnel)?)
 }
 
 /// What a session drew, and what reading it cost.
 #[derive(Default)]
-struct Watched {
-    pairs: Vec<Job>,
-    frames: Vec<Job>,
+pub(super) struct Watched {
+    pub pairs: Vec<Job>,
+    pub frames: Vec<Job>,
     led_ms: Vec<f64>,
     wayside_ms: Vec<f64>,
     learnt: usize,
@@ -186,8 +190,8 @@ mod tests {
     /// A change of the shipped tunnel or of a default that the scene cannot live with.
     #[test]
     fn the_scenes_are_right() {
-        assert!(scene(TRAIN, 1).unwrap().rig().is_some());
-        let post = scene(POST, 1).unwrap();
+        assert!(scene(TRAIN, 1, &[]).unwrap().rig().is_some());
+        let post = scene(POST, 1, &[]).unwrap();
         assert_eq!(post.wayside.len(), 1);
         assert_eq!(post.file.stack.wayside.reference_frames as usize, LEARNING);
     }

@@ -19,7 +19,15 @@ pub fn adapters() -> Vec<Backend> {
     found().iter().map(|a| describe(&a.get_info())).collect()
 }
 
+/// Passes can be timed.
+const CLOCK: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
+
 impl Gpu {
+    /// Whether passes can be timed.
+    pub fn has_clock(&self) -> bool {
+        self.device.features().contains(CLOCK)
+    }
+
     /// Opens the preferred adapter.
     pub fn open() -> Result<Self, RenderError> {
         let adapter = found().into_iter().next().ok_or_else(|| {
@@ -31,6 +39,7 @@ impl Gpu {
         })?;
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("metrotwin"),
+            required_features: adapter.features() & CLOCK,
             ..Default::default()
         }))
         .map_err(|e| RenderError::Device(e.to_string()))?;

@@ -5,7 +5,7 @@ use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
 use super::pipeline::Background;
 use super::prepared::PreparedView;
-use super::recorder::{KEEP, Recorder, begin, grey};
+use super::recorder::{KEEP, Recorder, grey};
 use super::target::SurfaceLayers;
 use super::texture::Texture;
 use super::textures::Textures;
@@ -95,17 +95,17 @@ impl<'a> Recorder<'a> {
                 let draw_tunnel = |_: &_| {
                     let kept = SurfaceLayers::new(device, target.size_px);
                     let depth = Some((&kept.depth, far));
-                    let mut pass = begin(self.encoder, &kept.signal, empty, depth);
+                    let mut pass = self.passes.begin("background", &kept.signal, empty, depth);
                     view.draw_instant(&mut pass, &bound, tunnel, surfaces, k);
                     drop(pass);
                     kept
                 };
                 let kept = backdrops.get(key.clone(), draw_tunnel);
-                kept.copy_to(layers, self.encoder);
+                kept.copy_to(layers, self.passes.encoder);
                 (calls, load, depth_load) = (bodies, KEEP, wgpu::LoadOp::Load);
             }
             let depth = Some((&layers.depth, depth_load));
-            let mut pass = begin(self.encoder, &layers.signal, load, depth);
+            let mut pass = self.passes.begin("background", &layers.signal, load, depth);
             list.moving.clip(&mut pass, k > 0);
             view.draw_instant(&mut pass, &bound, calls, surfaces, k);
             drop(pass);
@@ -120,7 +120,9 @@ impl<'a> Recorder<'a> {
     fn mix_in(&mut self, instant: &Texture, k: u32) {
         let blend = &self.pipelines.blend;
         let group = self.bind(blend, &[instant.binding()]);
-        let mut pass = begin(self.encoder, &self.target.layers.signal, KEEP, None);
+        let mut pass = self
+            .passes
+            .begin("instants", &self.target.layers.signal, KEEP, None);
         self.view.list.moving.clip(&mut pass, true);
         pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
         pass.set_pipeline(blend);
@@ -144,7 +146,7 @@ impl<'a> Recorder<'a> {
         ];
         let group = self.bind(&background.gloss, &resources);
         let depth = Some((&layers.depth, wgpu::LoadOp::Load));
-        let mut pass = begin(self.encoder, &layers.signal, KEEP, depth);
+        let mut pass = self.passes.begin("gloss", &layers.signal, KEEP, depth);
         pass.set_pipeline(&background.gloss);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));

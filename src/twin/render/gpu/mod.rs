@@ -54,6 +54,7 @@ mod facets;
 mod lamps;
 pub mod layout;
 mod mesh;
+mod pass_clock;
 mod passes;
 mod pipeline;
 mod prepared;
@@ -70,6 +71,7 @@ mod upload;
 mod view;
 
 pub use adapter::adapters;
+pub use pass_clock::PassTime;
 pub use shaders::shader_source;
 
 use super::cache::Cache;
@@ -83,9 +85,10 @@ use background::Surfaces;
 use bodies::BodyMeshes;
 use chunks::Chunks;
 use image::GrayImage;
+use pass_clock::PassClock;
 use pipeline::Pipelines;
 use prepared::PreparedView;
-use recorder::Recorder;
+use recorder::{Passes, Recorder};
 use std::collections::VecDeque;
 use target::{ReadBack, ViewTarget};
 use texture::Texture;
@@ -107,6 +110,7 @@ pub struct GpuRenderer {
     backdrops: Backdrops,
     spare: Vec<ReadBack>,
     in_flight: VecDeque<InFlight>,
+    clock: Option<PassClock>,
 }
 
 struct InFlight {
@@ -133,8 +137,20 @@ impl GpuRenderer {
             backdrops: Cache::new(KEPT_BACKDROPS),
             spare: Vec::new(),
             in_flight: VecDeque::new(),
+            clock: None,
             gpu,
         })
+    }
+
+    /// From now on one job at a time is drawn, and its passes are timed; false where the adapter has no clock.
+    pub fn time_passes(&mut self) -> bool {
+        self.clock = self.gpu.has_clock().then(|| PassClock::new(&self.gpu));
+        self.clock.is_some()
+    }
+
+    /// The times of the passes of the job that was collected last.
+    pub fn pass_times(&mut self) -> Vec<PassTime> {
+        self.clock.as_mut().map_or(Vec::new(), PassClock::take)
     }
 
     /// Records all passes of a view and the way back of its image.
@@ -160,7 +176,10 @@ impl GpuRenderer {
         let mut recorder = Recorder {
             gpu,
             pipelines: &self.pipelines,
-            encoder,
+            passes: Passes {
+                encoder,
+                clock: self.clock.as_mut(),
+            },
             view: &prepared,
             target,
         };
@@ -216,9 +235,15 @@ impl Renderer for GpuRenderer {
         let images: Vec<_> = (job.views.iter())
             .map(|view| self.record(&mut encoder, (job, view), &bodies))
             .collect();
+        if let Some(clock) = &self.clock {
+            clock.send_back(&mut encoder);
+        }
         let submission = self.gpu.queue.submit([encoder.finish()]);
         for image in &images {
             image.request();
+        }
+        if let Some(clock) = &self.clock {
+            clock.request();
         }
         let spare_bits = job.views.iter().map(|v| v.sensor.spare_bits());
         self.in_flight.push_back(InFlight {

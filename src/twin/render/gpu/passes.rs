@@ -28,7 +28,13 @@ impl Recorder<'_> {
         let (border, end) = (shadows.capsule_tiles as u32, shadows.tiles.len() as u32);
         for (pipeline, tiles) in pipelines.iter().zip([0..border, border..end]) {
             if !tiles.is_empty() {
-                self.draw_rectangles((&target.layers.signal, KEEP), pipeline, &resources, tiles);
+                self.draw_rectangles(
+                    "shadows",
+                    (&target.layers.signal, KEEP),
+                    pipeline,
+                    &resources,
+                    tiles,
+                );
             }
         }
     }
@@ -42,7 +48,7 @@ impl Recorder<'_> {
         ];
         for (pipeline, (from, to)) in self.pipelines.focus.iter().zip(ways) {
             let resources = [from.binding(), sharp.depth.binding()];
-            self.draw_rectangles((to, BLACK), pipeline, &resources, 0..1);
+            self.draw_rectangles("focus", (to, BLACK), pipeline, &resources, 0..1);
         }
     }
 
@@ -60,7 +66,13 @@ impl Recorder<'_> {
         let [lamps, rows, instants] = tables.each_ref().map(Buffer::as_entire_binding);
         let resources = [lamps, rows, instants, target.layers.depth.binding()];
         let (discs, all) = (&self.pipelines.discs, 0..table.lamps.len() as u32);
-        self.draw_rectangles((&target.layers.signal, KEEP), discs, &resources, all);
+        self.draw_rectangles(
+            "lamps",
+            (&target.layers.signal, KEEP),
+            discs,
+            &resources,
+            all,
+        );
     }
 
     /// Glare, in its own texture.
@@ -69,13 +81,13 @@ impl Recorder<'_> {
         let tables = [gpu.storage(&table.glares), gpu.storage(&table.glare_rows)];
         let resources = tables.each_ref().map(Buffer::as_entire_binding);
         let (glare, all) = (&self.pipelines.glare, 0..table.glares.len() as u32);
-        self.draw_rectangles((&self.target.glare, BLACK), glare, &resources, all);
+        self.draw_rectangles("glare", (&self.target.glare, BLACK), glare, &resources, all);
     }
 
     /// Fixed pattern, noise and bits.
     pub fn draw_sensor(&mut self, map: &Texture, blooming: bool) {
         let target = self.target;
-        target.copy_signal(self.encoder);
+        target.copy_signal(self.passes.encoder);
         let resources = [
             target.glare.binding(),
             target.signal_words.as_entire_binding(),
@@ -83,6 +95,12 @@ impl Recorder<'_> {
         ];
         let pipeline = self.pipelines.sensor(&self.gpu.device, blooming);
         // Every pixel is written, so nothing needs clearing.
-        self.draw_rectangles((&target.finished, KEEP), pipeline, &resources, 0..1);
+        self.draw_rectangles(
+            "sensor",
+            (&target.finished, KEEP),
+            pipeline,
+            &resources,
+            0..1,
+        );
     }
 }

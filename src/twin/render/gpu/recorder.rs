@@ -1,6 +1,7 @@
 //! The passes of one view as they are recorded.
 
 use super::adapter::Gpu;
+use super::pass_clock::PassClock;
 use super::pipeline::Pipelines;
 use super::prepared::PreparedView;
 use super::target::ViewTarget;
@@ -16,7 +17,7 @@ pub const KEEP: wgpu::LoadOp<wgpu::Color> = wgpu::LoadOp::Load;
 pub struct Recorder<'a> {
     pub gpu: &'a Gpu,
     pub pipelines: &'a Pipelines,
-    pub encoder: &'a mut wgpu::CommandEncoder,
+    pub passes: Passes<'a>,
     pub view: &'a PreparedView,
     pub target: &'a ViewTarget,
 }
@@ -44,13 +45,14 @@ impl Recorder<'_> {
     /// A pass that draws rectangles of a pipeline whose vertices need no buffers.
     pub fn draw_rectangles(
         &mut self,
+        name: &'static str,
         (onto, load): (&Texture, wgpu::LoadOp<wgpu::Color>),
         pipeline: &wgpu::RenderPipeline,
         resources: &[wgpu::BindingResource<'_>],
         instances: Range<u32>,
     ) {
         let group = self.bind(pipeline, resources);
-        let mut pass = begin(self.encoder, onto, load, None);
+        let mut pass = self.passes.begin(name, onto, load, None);
         if !instances.is_empty() {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
@@ -59,35 +61,47 @@ impl Recorder<'_> {
     }
 }
 
-/// A pass over one colour target, with depths that are there or are cleared.
-pub fn begin<'a>(
-    encoder: &'a mut wgpu::CommandEncoder,
-    colour: &Texture,
-    load: wgpu::LoadOp<wgpu::Color>,
-    depth: Option<(&Texture, wgpu::LoadOp<f32>)>,
-) -> wgpu::RenderPass<'a> {
-    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: &colour.view,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                load,
-                store: wgpu::StoreOp::Store,
-            },
-        })],
-        depth_stencil_attachment: depth.map(|(texture, load)| {
-            wgpu::RenderPassDepthStencilAttachment {
-                view: &texture.view,
-                depth_ops: Some(wgpu::Operations {
+/// Where the passes of a job are recorded.
+pub struct Passes<'a> {
+    pub encoder: &'a mut wgpu::CommandEncoder,
+    /// Where they are timed.
+    pub clock: Option<&'a mut PassClock>,
+}
+
+impl Passes<'_> {
+    /// A pass over one colour target, with depths that are there or are cleared.
+    pub fn begin(
+        &mut self,
+        name: &'static str,
+        colour: &Texture,
+        load: wgpu::LoadOp<wgpu::Color>,
+        depth: Option<(&Texture, wgpu::LoadOp<f32>)>,
+    ) -> wgpu::RenderPass<'_> {
+        let clock = self.clock.as_deref_mut();
+        self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &colour.view,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
                     load,
                     store: wgpu::StoreOp::Store,
-                }),
-                stencil_ops: None,
-            }
-        }),
-        ..Default::default()
-    })
+                },
+            })],
+            depth_stencil_attachment: depth.map(|(texture, load)| {
+                wgpu::RenderPassDepthStencilAttachment {
+                    view: &texture.view,
+                    depth_ops: Some(wgpu::Operations {
+                        load,
+                        store: wgpu::StoreOp::Store,
+                    }),
+                    stencil_ops: None,
+                }
+            }),
+            timestamp_writes: clock.and_then(|clock| clock.stamps(name)),
+            ..Default::default()
+        })
+    }
 }
 
 /// The same in all channels, for blending.

@@ -1,0 +1,223 @@
+//! Where the time of a picture goes: by pass, on the shipped scenes of [`speed`](super::speed) and what they
+//! lack: other light, other exposure, other motion.
+//!
+//! The adapter times its passes by its own clock. What it copies between them, and what it waits for the
+//! processor, is the rest of the time from the first pass's begin to the last one's end. One job at a time is
+//! drawn, so that nothing else is drawn meanwhile: in a run the next one is prepared while one is drawn.
+
+use super::costs::Stopwatch;
+use super::speed::{Error, POST, TRAIN, Watched, scene};
+use super::summary::Cost;
+use super::{RunOptions, run_on};
+use crate::scenario::Scenario;
+use crate::twin::render::Job;
+use crate::twin::render::Renderer;
+use crate::twin::render::gpu::{GpuRenderer, PassTime};
+use serde::Serialize;
+
+/// What is drawn: its name, the scene, and its changes.
+const CASES: [(&str, &str, &[&str]); 8] = [
+    ("rig, no headlights", TRAIN, &["train.headlight_cd=0.0"]),
+    ("rig", TRAIN, &[]),
+    ("rig, exposed for 2 ms", TRAIN, &["rig.exposure_us=2000.0"]),
+    (
+        "rig, standing",
+        TRAIN,
+        &["train.start_speed_kmh=0.0", "train.cruise_speed_kmh=0.0"],
+    ),
+    ("wayside, nothing moves", POST, &[]),
+    ("wayside, a worker walks", POST, &[WORKER]),
+    (
+        "wayside, a train stands",
+        POST,
+        &[
+            "train.start_chainage_m=1500.0",
+            "train.cruise_speed_kmh=0.0",
+        ],
+    ),
+    (
+        "wayside, a train passes",
+        POST,
+        &[
+            "train.start_chainage_m=1490.0",
+            "train.start_speed_kmh=60.0",
+        ],
+    ),
+];
+
+/// Down the line, 20 to 30 m before the device.
+const WORKER: &str = "workers=[{path=[{time_s=0.0, chainage_m=1510.0, lateral_m=0.3}, \
+                      {time_s=7.0, chainage_m=1500.0, lateral_m=0.3}]}]";
+
+/// One case.
+#[derive(Clone, Debug, Serialize)]
+pub struct Profile {
+    /// What is drawn.
+    pub case: &'static str,
+    /// Pixels of a job: a pair, or a frame.
+    pub pixels: u64,
+    /// Preparing a job and handing it over, milliseconds; medians, as all times here.
+    pub submit_ms: f64,
+    /// From then until its images are there.
+    pub wait_ms: f64,
+    /// The adapter's time in each pass, in the order drawn; none where it has no clock.
+    pub passes: Vec<PassCost>,
+    /// Between the passes.
+    pub between_ms: f64,
+}
+
+/// The time of all passes of a name in a job.
+#[derive(Clone, Debug, Serialize)]
+pub struct PassCost {
+    /// Which.
+    pub name: &'static str,
+    /// Milliseconds.
+    pub ms: f64,
+    /// For each pixel of the job, nanoseconds.
+    pub ns_per_pixel: f64,
+}
+
+/// Draws every case on the preferred adapter.
+pub fn profile() -> Result<Vec<Profile>, Error> {
+    CASES.iter().map(profile_of).collect()
+}
+
+fn profile_of((case, text, changes): &(&'static str, &str, &[&str])) -> Result<Profile, Error> {
+    let scenario = scene(text, 1, changes)?;
+    let mut renderer = GpuRenderer::new(super::scene(&scenario))?;
+    let jobs = jobs(&scenario, &mut renderer)?;
+    // A run ends with pictures on their way.
+    renderer.set_scene(super::scene(&scenario));
+    renderer.time_passes();
+    let drawn = jobs.iter().map(|job| draw(&mut renderer, job));
+    let drawn: Vec<Drawn> = drawn.collect::<Result<_, Error>>()?;
+    // The first ones build what later ones use.
+    let drawn = &drawn[drawn.len() / 2..];
+    let median = |of: &dyn Fn(&Drawn) -> f64| {
+        let mut values: Vec<f64> = drawn.iter().map(of).collect();
+        Cost::of(&mut values).map_or(0.0, |cost| cost.p50)
+    };
+    let lenses = jobs.first().map_or(&[][..], |job| &job.views[..]).iter();
+    let lenses = lenses.map(|view| &view.camera.intrinsics);
+    let pixels = lenses
+        .map(|lens| u64::from(lens.width_px) * u64::from(lens.height_px))
+        .sum();
+    let names = drawn.first().map_or(Vec::new(), Drawn::names);
+    let passes = names.into_iter().map(|name| {
+        let ms = median(&|drawn| drawn.pass_ms(name));
+        let ns_per_pixel = 1e6 * ms / pixels as f64;
+        PassCost {
+            name,
+            ms,
+            ns_per_pixel,
+        }
+    });
+    Ok(Profile {
+        case,
+        pixels,
+        submit_ms: median(&|drawn| drawn.submit_ms),
+        wait_ms: median(&|drawn| drawn.wait_ms),
+        passes: passes.collect(),
+        between_ms: median(&Drawn::between_ms),
+    })
+}
+
+/// Those of the scenario's camera.
+fn jobs(scenario: &Scenario, renderer: &mut GpuRenderer) -> Result<Vec<Job>, Error> {
+    let mut watched = Watched::default();
+    run_on(
+        scenario,
+        renderer,
+        &RunOptions::default(),
+        &mut [&mut watched],
+    )?;
+    let Watched {
+        mut pairs, frames, ..
+    } = watched;
+    pairs.extend(frames);
+    Ok(pairs)
+}
+
+/// One job as it was drawn.
+struct Drawn {
+    submit_ms: f64,
+    wait_ms: f64,
+    passes: Vec<PassTime>,
+}
+
+fn draw(renderer: &mut GpuRenderer, job: &Job) -> Result<Drawn, Error> {
+    let mut watch = Stopwatch::default();
+    let (submitted, submit_s) = watch.time(|| renderer.submit(job));
+    submitted?;
+    let (collected, wait_s) = watch.time(|| renderer.collect());
+    collected?;
+    Ok(Drawn {
+        submit_ms: 1e3 * submit_s,
+        wait_ms: 1e3 * wait_s,
+        passes: renderer.pass_times(),
+    })
+}
+
+impl Drawn {
+    /// Of its passes, each once, in the order drawn.
+    fn names(&self) -> Vec<&'static str> {
+        let mut names = Vec::new();
+        for pass in &self.passes {
+            if !names.contains(&pass.name) {
+                names.push(pass.name);
+            }
+        }
+        names
+    }
+
+    fn pass_ms(&self, name: &str) -> f64 {
+        let passes = self.passes.iter().filter(|pass| pass.name == name);
+        passes.map(|pass| pass.end_ms - pass.begin_ms).sum()
+    }
+
+    fn between_ms(&self) -> f64 {
+        let ends_ms = self.passes.iter().map(|pass| pass.end_ms);
+        let within_ms = self.passes.iter().map(|pass| pass.end_ms - pass.begin_ms);
+        ends_ms.fold(0.0, f64::max) - within_ms.sum::<f64>()
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+mod tests {
+    use super::*;
+
+    /// A change of a shipped default, or of a key, that a case cannot live with; a case without its camera.
+    #[test]
+    fn the_cases_are_right() {
+        for (case, text, changes) in CASES {
+            let scenario = scene(text, 1, changes).unwrap();
+            let cameras = scenario.wayside.len() + usize::from(scenario.rig().is_some());
+            assert_eq!(cameras, 1, "{case}");
+        }
+    }
+
+    /// A pass counted twice, or a gap that is none.
+    #[test]
+    fn passes_and_gaps_are_the_whole_time() {
+        let pass = |name, begin_ms, end_ms| PassTime {
+            name,
+            begin_ms,
+            end_ms,
+        };
+        let drawn = Drawn {
+            submit_ms: 0.0,
+            wait_ms: 0.0,
+            passes: vec![
+                pass("a", 0.0, 2.0),
+                pass("b", 2.5, 3.0),
+                pass("a", 4.0, 5.0),
+            ],
+        };
+        assert_eq!(drawn.names(), ["a", "b"]);
+        let parts = [drawn.pass_ms("a"), drawn.pass_ms("b"), drawn.between_ms()];
+        for (part, expected) in parts.into_iter().zip([3.0, 0.5, 1.5]) {
+            assert!((part - expected).abs() < 1e-12, "{part}");
+        }
+    }
+}
