@@ -3,7 +3,8 @@
 #![allow(
     clippy::unwrap_used,
     clippy::panic,
-    reason = "a test fails by panicking"
+    clippy::disallowed_methods,
+    reason = "a test fails by panicking, and one holds times against the clock"
 )]
 #![cfg(feature = "twin")]
 
@@ -17,6 +18,7 @@ use metrotwin::twin::air::Air;
 use metrotwin::twin::geometry::{Body, Shape};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::cpu::CpuRenderer;
+use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{Job, Pattern, SensorSettings, View};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -299,4 +301,37 @@ fn another_scene_is_as_good_as_new() {
             assert!(equal, "{name} draws something of the first scene");
         }
     }
+}
+
+/// Passes that are left out, in another order than drawn, or longer than the whole job; pictures that change
+/// by being timed. Where an adapter has no clock there are no times, and nothing else changes.
+#[test]
+fn timed_passes_are_parts_of_the_job() {
+    let scene = sample::scene();
+    let job = sample::stereo_job(&scene.tunnel, 101.0, 60.0 / 3.6);
+    let mut renderer = GpuRenderer::new(scene).unwrap();
+    let untimed = draw(&mut renderer, &job);
+    let has_clock = renderer.time_passes();
+    let begin = std::time::Instant::now();
+    let timed = draw(&mut renderer, &job);
+    let whole_ms = 1e3 * begin.elapsed().as_secs_f64();
+    assert!(untimed == timed);
+    let passes = renderer.pass_times();
+    assert_eq!(passes.is_empty(), !has_clock);
+    let names: Vec<_> = passes.iter().map(|pass| pass.name).collect();
+    let of_eye = ["background", "lamps", "glare", "sensor"];
+    assert!(
+        !has_clock || names == [of_eye, of_eye].concat(),
+        "{names:?}"
+    );
+    for (pass, next) in passes.iter().zip(&passes[1.min(passes.len())..]) {
+        assert!(
+            pass.begin_ms <= pass.end_ms && pass.end_ms <= next.end_ms,
+            "{pass:?}"
+        );
+    }
+    assert!(passes.iter().all(|pass| pass.end_ms <= whole_ms));
+    // Each job has times of its own.
+    draw(&mut renderer, &job);
+    assert_eq!(renderer.pass_times().len(), passes.len());
 }
