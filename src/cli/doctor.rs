@@ -3,7 +3,7 @@
 use super::fault::Failure;
 use super::print;
 use crate::record::render;
-use crate::session::{Profile, measure, profile};
+use crate::session::{DrawingProfile, measure, profile};
 use serde::Serialize;
 
 const AFTER: &str = "\
@@ -51,7 +51,7 @@ pub(super) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
 
 #[derive(Serialize)]
 struct Cases {
-    cases: Vec<Profile>,
+    cases: Vec<DrawingProfile>,
 }
 
 /// As a text by a template, or as JSON.

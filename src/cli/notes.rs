@@ -1,6 +1,7 @@
 //! What a user may not expect of a scenario that is right.
 
 use super::report::train_name;
+use crate::bus::TrainId;
 use crate::scenario::{OnboardSettings, Scenario, WaysidePost};
 use crate::session::FieldOfView;
 use crate::track::{Alignment, BED_M, Direction, TrackPoint};
@@ -41,15 +42,15 @@ fn inside_a_train(scenario: &Scenario) -> Option<String> {
     };
     let mut single = scenario.physics.obstacles.iter().filter(|o| is_single(o));
     single.find_map(|o| {
-        let mut trains = scenario.physics.trains.iter();
-        let k = trains.position(|train| holds(train, o))?;
-        let [from_m, to_m] = scenario.physics.trains.get(k)?.stands_m();
+        let mut trains = scenario.physics.trains.iter().enumerate();
+        let (k, train) = trains.find(|(_, train)| holds(train, o))?;
+        let [from_m, to_m] = train.stands_m();
         Some(format!(
             "`{}` appears at {} m, in or under {}, which stands from {from_m:.1} to {to_m:.1} m: place it \
              clear of the train",
             o.name,
             o.chainage_m,
-            train_name(scenario, k)
+            train_name(scenario, TrainId::from_index(k))
         ))
     })
 }
@@ -143,15 +144,15 @@ fn told_wrong_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option
     let told_m = protection
         .initial_chainage_m
         .filter(|_| onboard.protects())?;
-    let k = usize::from(onboard.train);
-    let start_m = scenario.physics.trains.get(k)?.start_chainage_m;
+    let train = scenario.physics.trains.get(onboard.id().index())?;
+    let start_m = train.start_chainage_m;
     let off_m = (told_m - start_m).abs();
     let margin_m = protection.position_sigmas * protection.initial_sigma_m;
     (off_m > margin_m).then(|| {
         format!(
             "initial_chainage_m of {} is {told_m} m, and its head starts at {start_m} m: {off_m:.2} m off, \
              where the margin of its equipment is {margin_m:.2} m (position_sigmas times initial_sigma_m)",
-            train_name(scenario, k)
+            train_name(scenario, onboard.id())
         )
     })
 }
@@ -178,7 +179,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
     Some(format!(
         "{} starts without a position, and its equipment permits {} km/h {}{too_fast}; \
          initial_chainage_m in {key} gives it one",
-        train_name(scenario, usize::from(onboard.train)),
+        train_name(scenario, onboard.id()),
         protection.restricted_kmh,
         match (meets_balise, onboard.positions()) {
             (false, false) => "all the way: it meets no balise and has no positioning by lamps",
@@ -202,7 +203,7 @@ fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<Strin
         format!(
             "no lamp stands on the way of {}, from {from_m:.0} to {to_m:.0} m: those of the line are \
              from {} to {} m",
-            train_name(scenario, usize::from(onboard.train)),
+            train_name(scenario, onboard.id()),
             first.chainage_m,
             last.chainage_m
         )

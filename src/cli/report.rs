@@ -44,7 +44,7 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
         ),
     ];
     for (k, train) in scenario.physics.trains.iter().enumerate() {
-        let what = train_name(scenario, k);
+        let what = train_name(scenario, TrainId::from_index(k));
         let stop = train
             .stop_at_m
             .map_or(String::new(), |m| format!(", stops at {m} m"));
@@ -92,10 +92,10 @@ pub(super) fn scenario(scenario: &Scenario) -> String {
 }
 
 /// A train in a sentence.
-pub(super) fn train_name(scenario: &Scenario, k: usize) -> String {
+pub(super) fn train_name(scenario: &Scenario, id: TrainId) -> String {
     match scenario.physics.trains.len() {
         1 => "the train".to_owned(),
-        _ => TrainId::from_index(k).to_string(),
+        _ => id.to_string(),
     }
 }
 
@@ -104,7 +104,7 @@ fn rig(onboard: &OnboardSettings, scenario: &Scenario) -> Vec<String> {
     let Some(rig) = &onboard.rig else {
         return Vec::new();
     };
-    let name = format!("rig of {}", train_name(scenario, onboard.id().index()));
+    let name = format!("rig of {}", train_name(scenario, onboard.id()));
     let calibration = rig.calibration();
     let pairs = images(scenario.file.duration_s, rig.pairs_per_s);
     vec![

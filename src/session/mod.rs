@@ -43,7 +43,7 @@ pub use event::{
 };
 pub use fitting::{Fitted, Fitting, Mounted};
 pub(crate) use presence::FieldOfView;
-pub use profile::{PassCost, Profile, profile};
+pub use profile::{DrawingProfile, PassCost, profile};
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{

@@ -44,7 +44,7 @@ pub struct FieldOfView {
 
 impl FieldOfView {
     /// Of a device between walls.
-    pub fn new(walls: Arc<TunnelCaster>, post: &WaysidePost) -> Self {
+    fn new(walls: Arc<TunnelCaster>, post: &WaysidePost) -> Self {
         let device = &post.actual;
         Self {
             segment: walls.segment_of(&device.world_from_camera.translation.vector.into(), None),

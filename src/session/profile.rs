@@ -10,9 +10,8 @@ use super::speed::{Error, POST, TRAIN, Watched, scene};
 use super::summary::Cost;
 use super::{RunOptions, run_on};
 use crate::scenario::Scenario;
-use crate::twin::render::Job;
-use crate::twin::render::Renderer;
 use crate::twin::render::gpu::{GpuRenderer, PassTime};
+use crate::twin::render::{Job, Renderer};
 use serde::Serialize;
 
 /// What is drawn: its name, the scene, and its changes.
@@ -51,7 +50,7 @@ const WORKER: &str = "workers=[{path=[{time_s=0.0, chainage_m=1510.0, lateral_m=
 
 /// One case.
 #[derive(Clone, Debug, Serialize)]
-pub struct Profile {
+pub struct DrawingProfile {
     /// What is drawn.
     pub case: &'static str,
     /// Pixels of a job: a pair, or a frame.
@@ -78,11 +77,13 @@ pub struct PassCost {
 }
 
 /// Draws every case on the preferred adapter.
-pub fn profile() -> Result<Vec<Profile>, Error> {
+pub fn profile() -> Result<Vec<DrawingProfile>, Error> {
     CASES.iter().map(profile_of).collect()
 }
 
-fn profile_of((case, text, changes): &(&'static str, &str, &[&str])) -> Result<Profile, Error> {
+fn profile_of(
+    (case, text, changes): &(&'static str, &str, &[&str]),
+) -> Result<DrawingProfile, Error> {
     let scenario = scene(text, 1, changes)?;
     let mut renderer = GpuRenderer::new(super::scene(&scenario))?;
     let jobs = jobs(&scenario, &mut renderer)?;
@@ -102,8 +103,7 @@ fn profile_of((case, text, changes): &(&'static str, &str, &[&str])) -> Result<P
     let pixels = lenses
         .map(|lens| u64::from(lens.width_px) * u64::from(lens.height_px))
         .sum();
-    let names = drawn.first().map_or(Vec::new(), Drawn::names);
-    let passes = names.into_iter().map(|name| {
+    let passes = names(drawn).into_iter().map(|name| {
         let ms = median(&|drawn| drawn.pass_ms(name));
         let ns_per_pixel = 1e6 * ms / pixels as f64;
         PassCost {
@@ -112,7 +112,7 @@ fn profile_of((case, text, changes): &(&'static str, &str, &[&str])) -> Result<P
             ns_per_pixel,
         }
     });
-    Ok(Profile {
+    Ok(DrawingProfile {
         case,
         pixels,
         submit_ms: median(&|drawn| drawn.submit_ms),
@@ -159,27 +159,26 @@ fn draw(renderer: &mut GpuRenderer, job: &Job) -> Result<Drawn, Error> {
 }
 
 impl Drawn {
-    /// Of its passes, each once, in the order drawn.
-    fn names(&self) -> Vec<&'static str> {
-        let mut names = Vec::new();
-        for pass in &self.passes {
-            if !names.contains(&pass.name) {
-                names.push(pass.name);
-            }
-        }
-        names
-    }
-
     fn pass_ms(&self, name: &str) -> f64 {
         let passes = self.passes.iter().filter(|pass| pass.name == name);
-        passes.map(|pass| pass.end_ms - pass.begin_ms).sum()
+        passes.map(PassTime::ms).sum()
     }
 
     fn between_ms(&self) -> f64 {
         let ends_ms = self.passes.iter().map(|pass| pass.end_ms);
-        let within_ms = self.passes.iter().map(|pass| pass.end_ms - pass.begin_ms);
-        ends_ms.fold(0.0, f64::max) - within_ms.sum::<f64>()
+        ends_ms.fold(0.0, f64::max) - self.passes.iter().map(PassTime::ms).sum::<f64>()
     }
+}
+
+/// Names of passes, each once, in the order drawn.
+fn names(drawn: &[Drawn]) -> Vec<&'static str> {
+    let mut names = Vec::new();
+    for pass in drawn.iter().flat_map(|drawn| &drawn.passes) {
+        if !names.contains(&pass.name) {
+            names.push(pass.name);
+        }
+    }
+    names
 }
 
 #[cfg(test)]
@@ -214,7 +213,7 @@ mod tests {
                 pass("a", 4.0, 5.0),
             ],
         };
-        assert_eq!(drawn.names(), ["a", "b"]);
+        assert_eq!(names(std::slice::from_ref(&drawn)), ["a", "b"]);
         let parts = [drawn.pass_ms("a"), drawn.pass_ms("b"), drawn.between_ms()];
         for (part, expected) in parts.into_iter().zip([3.0, 0.5, 1.5]) {
             assert!((part - expected).abs() < 1e-12, "{part}");

@@ -8,7 +8,7 @@ use super::median::median3;
 use super::otsu::otsu;
 use super::outline::{ClosedSpot, Outline};
 use super::patch::Patch;
-use super::profile::{Profile, REACH_ROWS};
+use super::profile::{REACH_ROWS, RowProfile};
 use super::search::Search;
 use super::spill::SpillTable;
 use super::stripes::{StripeReader, StripeReading};
@@ -263,7 +263,7 @@ impl LampFinder {
         let around = lamp.spot.bounds.widened(MARGIN_PX, REACH_ROWS as u32 + 4);
         let raw = Patch::cut(image, &around);
         let tilt_over_rows = self.settings.tilt_over_rows;
-        let profile = Profile::of(
+        let profile = RowProfile::of(
             &raw,
             lamp.black,
             &lamp.shape,

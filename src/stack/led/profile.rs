@@ -22,7 +22,7 @@ use std::ops::RangeInclusive;
 
 /// Light by rows.
 #[derive(Debug)]
-pub struct Profile {
+pub struct RowProfile {
     /// Image row of the first entry (may be negative: rows above the image are dark).
     pub first_row: f64,
     /// Mean grey over black.
@@ -34,7 +34,7 @@ pub struct Profile {
 /// Rows of glare that are looked at above and below the spot.
 pub const REACH_ROWS: i64 = 40;
 
-impl Profile {
+impl RowProfile {
     /// The profile of the spot with this outline ellipse.
     pub fn of(
         raw: &Patch,

@@ -17,7 +17,7 @@
 //! Knowing phi, every edge has an integer chip number, and a stripe's width in chips is the
 //! difference of two: an error of one width does not shift the chips after it.
 
-use super::profile::Profile;
+use super::profile::RowProfile;
 use crate::bus::Shutter;
 use nalgebra::Complex;
 use std::f64::consts::TAU;
@@ -84,7 +84,7 @@ impl StripeReader {
     }
 
     /// The chips of a profile; `None` where there is no code in it.
-    pub fn read(&self, profile: &Profile, black: f64) -> Option<StripeReading> {
+    pub fn read(&self, profile: &RowProfile, black: f64) -> Option<StripeReading> {
         if self.shutter.is_global() {
             return None;
         }
@@ -127,7 +127,7 @@ impl StripeReader {
         self.shutter.delay_s(row) + 0.5 * self.shutter.exposure_s
     }
 
-    fn edges(&self, profile: &Profile, black: f64, rows: &[usize]) -> Vec<Edge> {
+    fn edges(&self, profile: &RowProfile, black: f64, rows: &[usize]) -> Vec<Edge> {
         let share = |k: usize| profile.light[k] / profile.envelope[k];
         let edge = |pair: &[usize]| {
             let (k, next) = (pair[0], pair[1]);
@@ -228,12 +228,12 @@ mod tests {
     };
 
     /// 100 rows of a lamp whose light would be `grey` if the sensor did not saturate at 251.
-    fn profile(wave: &Waveform, grey: f64, shutter: &Shutter) -> Profile {
+    fn profile(wave: &Waveform, grey: f64, shutter: &Shutter) -> RowProfile {
         let row = |v: i32| {
             let open = shutter.delay_s(f64::from(v));
             (grey * wave.on_share(open, open + shutter.exposure_s)).min(251.0)
         };
-        Profile {
+        RowProfile {
             first_row: 200.0,
             light: (200..300).map(row).collect(),
             envelope: vec![grey.min(251.0); 100],

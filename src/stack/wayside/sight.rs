@@ -29,13 +29,13 @@ const PROFILE_STEP_M: f64 = 0.02;
 
 /// Lowest and highest points of an outline over l.
 #[derive(Clone, Debug, Default)]
-struct Profile {
+struct SectionProfile {
     first_l_m: f64,
     /// Floor and ceiling at each step.
     heights_m: Vec<(f64, f64)>,
 }
 
-impl Profile {
+impl SectionProfile {
     fn new(section: &CrossSection) -> Self {
         let across = section.points.iter().map(|p| p.l_m);
         let (low, high) = ends(across);
@@ -118,7 +118,7 @@ pub(super) struct Sight {
     /// In order of chainage; the device's own station is `here`.
     stations: Vec<Station>,
     here: usize,
-    profiles: Vec<Profile>,
+    profiles: Vec<SectionProfile>,
     half_width_m: f64,
     top_m: f64,
 }
@@ -129,12 +129,12 @@ impl Sight {
         calibration: WaysideCalibration,
         map: Arc<Tunnel>,
     ) -> Self {
-        let mut profiles: Vec<Profile> = map
+        let mut profiles: Vec<SectionProfile> = map
             .sections
             .iter()
-            .map(|r| Profile::new(&r.section))
+            .map(|r| SectionProfile::new(&r.section))
             .collect();
-        profiles.push(Profile::default());
+        profiles.push(SectionProfile::default());
         let camera = Point3::from(calibration.world_from_camera.translation.vector);
         let own = map
             .alignment
@@ -250,7 +250,7 @@ impl Sight {
     /// Where a pixel's line of sight meets the floor first; `None` for a wall, the ceiling, or
     /// beyond reach.
     pub fn foot(&self, u: f64, v: f64) -> Option<TrackPoint> {
-        let mut last: Option<(TrackPoint, &Profile)> = None;
+        let mut last: Option<(TrackPoint, &SectionProfile)> = None;
         for (p, profile) in self.march(self.direction(u, v)) {
             if profile.contains(p) {
                 last = Some((p, profile));
@@ -297,7 +297,10 @@ impl Sight {
 
     /// The points of a ray, station by station away from the device, as far as it goes on along the
     /// line.
-    fn march(&self, direction: Vector3<f64>) -> impl Iterator<Item = (TrackPoint, &Profile)> {
+    fn march(
+        &self,
+        direction: Vector3<f64>,
+    ) -> impl Iterator<Item = (TrackPoint, &SectionProfile)> {
         let eye = self.eye();
         let up_the_line = self.sign(&direction) > 0.0;
         let mut far = 0.0;
@@ -331,7 +334,7 @@ impl Sight {
 
 /// Where the straight way from `a` (inside) to `b` (outside) leaves the tunnel, if it does so
 /// through the floor.
-fn crossing(a: TrackPoint, b: TrackPoint, profile: &Profile) -> Option<TrackPoint> {
+fn crossing(a: TrackPoint, b: TrackPoint, profile: &SectionProfile) -> Option<TrackPoint> {
     let at = |x: f64| TrackPoint {
         s_m: a.s_m + (b.s_m - a.s_m) * x,
         l_m: a.l_m + (b.l_m - a.l_m) * x,

@@ -19,6 +19,13 @@ pub struct PassTime {
     pub end_ms: f64,
 }
 
+impl PassTime {
+    /// How long it took.
+    pub fn ms(&self) -> f64 {
+        self.end_ms - self.begin_ms
+    }
+}
+
 /// Stamps the passes of one job after the other.
 pub struct PassClock {
     stamps: wgpu::QuerySet,
