@@ -20,28 +20,6 @@ fn headlights_lx(p: vec3f, n: vec3f) -> f32 {
     return sum;
 }
 
-// Where it is too dark to tell a joint from the wall beside it: one colour a material.
-
-struct Dim {
-    @invariant @builtin(position) clip: vec4f,
-    @location(0) signal_e: f32,
-}
-
-@vertex
-fn project_dim(in: Vertex) -> Dim {
-    let light = in.light_lx.x + in.light_lx.y + headlights_lx(in.position_m + in.offset_m, in.normal);
-    let luminance = in.albedo * light * (1.0 / PI) + in.luminance_cd_m2;
-    let c = seen_vertex(in);
-    let clear = exp(-view.extinction_per_m * length(c));
-    let signal_e = mix(view.airlight_e, luminance * view.electrons_per_cd_m2, clear);
-    return Dim(clip_of(c), signal_e);
-}
-
-@fragment
-fn shade_dim(in: Dim) -> @location(0) vec4f {
-    return vec4f(min(in.signal_e, BRIGHTEST_E), 0.0, 0.0, 1.0);
-}
-
 struct Lit {
     @invariant @builtin(position) clip: vec4f,
     // What white paint sends in steady light, and in that of the blinking lamp.
@@ -52,8 +30,7 @@ struct Lit {
     @location(3) @interpolate(flat, either) shares: u32,
 }
 
-@vertex
-fn project_lit(in: Vertex) -> Lit {
+fn lit(in: Vertex) -> Lit {
     var out: Lit;
     let c = seen_vertex(in);
     let clear = exp(-view.extinction_per_m * length(c));
@@ -67,6 +44,11 @@ fn project_lit(in: Vertex) -> Lit {
     return out;
 }
 
+@vertex
+fn project_lit(in: Vertex) -> Lit {
+    return lit(in);
+}
+
 @fragment
 fn shade_lit(in: Lit) -> @location(0) vec4f {
     let albedo = textureSample(painting, texels, in.place).r;
@@ -76,4 +58,38 @@ fn shade_lit(in: Lit) -> @location(0) vec4f {
     }
     let signal = albedo * white_e + in.own_e;
     return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, 1.0);
+}
+
+// For a picture that is kept: light of a lamp times its share in a row comes when it is used.
+struct Split {
+    // Steady, and blinking in the mean.
+    @location(0) light_e: vec4f,
+    // The lamp's row in `shares`.
+    @location(1) lamp: vec4u,
+}
+
+@vertex
+fn project_split(in: Vertex) -> Lit {
+    return lit(in);
+}
+
+@fragment
+fn shade_split(in: Lit) -> Split {
+    let albedo = textureSample(painting, texels, in.place).r;
+    let light = albedo * in.white_e + vec2f(in.own_e, 0.0);
+    return Split(vec4f(min(light, vec2f(BRIGHTEST_E)), 0.0, 0.0), vec4u(in.shares, 0u, 0u, 0u));
+}
+
+// Light of headlights alone, over a picture without it.
+@vertex
+fn project_headlit(in: Vertex) -> Lit {
+    var dark = in;
+    dark.light_lx = vec2f(0.0);
+    return lit(dark);
+}
+
+@fragment
+fn shade_headlit(in: Lit) -> @location(0) vec4f {
+    let albedo = textureSample(painting, texels, in.place).r;
+    return vec4f(min(albedo * in.white_e.x, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }

@@ -25,7 +25,6 @@ struct Vertex {
     @location(3) place_m: vec2f,
     // Albedo is the painting's times this.
     @location(4) paint: f32,
-    @location(5) albedo: f32,
     @location(6) luminance_cd_m2: f32,
     // Of the mesh: its origin from the reference point, its velocity, where the painting starts,
     // the instant drawn after the middle of a row's exposure, its lamp's row in `shares`, and

@@ -417,7 +417,7 @@ fn noise_is_white_and_independent() {
 /// all that may differ, at most 2^-11 of 10,000 e, a fifth of a grey level here.
 #[test]
 fn noise_is_equal_for_gpu_and_cpu_streams() {
-    let [mut cpu, mut gpu] = RENDERERS.map(|(_, make)| make(dark_scene(Vec::new())));
+    let [mut cpu, mut gpu, mut whole] = RENDERERS.map(|(_, make)| make(dark_scene(Vec::new())));
     let mut view = camera();
     view.sensor = SensorSettings {
         bits: 8,
@@ -432,21 +432,21 @@ fn noise_is_equal_for_gpu_and_cpu_streams() {
     for pattern in [Pattern::Grey, Pattern::Rggb] {
         view.sensor.pattern = pattern;
         for electrons in [0.0, 5.0, 100.0, 3000.0, 7000.0, 12_000.0] {
-            let one = flats(&mut *gpu, &view, electrons, 1).remove(0);
             let other = flats(&mut *cpu, &view, electrons, 1).remove(0);
-            let apart = one.iter().zip(other.iter()).map(|(a, b)| a.abs_diff(*b));
-            let (worst, off) = apart.fold((0, 0), |(worst, off), d| {
-                (worst.max(d), off + u32::from(d > 0))
-            });
-            let share = f64::from(off) / one.len() as f64;
-            println!(
-                "{pattern:?} {electrons} e: {:.3} % off, by {worst} at most",
-                100.0 * share
-            );
-            assert!(worst <= 1, "{pattern:?} {electrons} e: off by {worst}");
-            // Rounding splits two numbers this far apart.
-            let bound = 2e-3 + 2f64.powi(-11) * electrons * view.sensor.grey_per_e() * 2.05;
-            assert!(share < bound, "{pattern:?} {electrons} e: {share} differ");
+            for (who, renderer) in [("processor", &mut gpu), ("adapter", &mut whole)] {
+                let one = flats(&mut **renderer, &view, electrons, 1).remove(0);
+                let apart = one.iter().zip(other.iter()).map(|(a, b)| a.abs_diff(*b));
+                let (worst, off) = apart.fold((0, 0), |(worst, off), d| {
+                    (worst.max(d), off + u32::from(d > 0))
+                });
+                let share = f64::from(off) / one.len() as f64;
+                let case = format!("{who}, {pattern:?}, {electrons} e");
+                println!("{case}: {:.3} % off, by {worst} at most", 100.0 * share);
+                assert!(worst <= 1, "{case}: off by {worst}");
+                // Rounding splits two numbers this far apart.
+                let bound = 2e-3 + 2f64.powi(-11) * electrons * view.sensor.grey_per_e() * 2.05;
+                assert!(share < bound, "{case}: {share} differ");
+            }
         }
     }
 }

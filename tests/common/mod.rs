@@ -23,8 +23,8 @@ use metrotwin::twin::render::{Job, Renderer, Scene};
 /// Makes a renderer.
 pub type Make = fn(Scene) -> Box<dyn Renderer>;
 
-/// For tests that both renderers must pass.
-pub const RENDERERS: [(&str, Make); 2] = [("cpu", cpu), ("gpu", gpu)];
+/// For tests that all renderers must pass.
+pub const RENDERERS: [(&str, Make); 3] = [("cpu", cpu), ("gpu", gpu), ("gpu, whole", whole)];
 
 /// The plain renderer with a ray through every pixel.
 pub fn cpu(scene: Scene) -> Box<dyn Renderer> {
@@ -38,8 +38,19 @@ pub fn quick(scene: Scene) -> Box<dyn Renderer> {
 
 /// The renderer on the graphics adapter, which must be there.
 pub fn gpu(scene: Scene) -> Box<dyn Renderer> {
+    Box::new(on_adapter(scene))
+}
+
+/// The same as it draws on hardware.
+pub fn whole(scene: Scene) -> Box<dyn Renderer> {
+    let mut renderer = on_adapter(scene);
+    renderer.draw_whole();
+    Box::new(renderer)
+}
+
+fn on_adapter(scene: Scene) -> GpuRenderer {
     match GpuRenderer::new(scene) {
-        Ok(renderer) => Box::new(renderer),
+        Ok(renderer) => renderer,
         Err(error) => panic!("{error}; install a driver: apt-get install mesa-vulkan-drivers"),
     }
 }

@@ -4,6 +4,7 @@
 mod cache;
 pub mod constants;
 pub mod cpu;
+pub mod develop;
 pub mod disc;
 pub mod glare;
 mod glass;

@@ -11,6 +11,7 @@ pub struct Gpu {
     pub queue: wgpu::Queue,
     /// What it is.
     pub backend: Backend,
+    software: bool,
     failure: Arc<Mutex<Option<String>>>,
 }
 
@@ -26,6 +27,11 @@ impl Gpu {
     /// Whether passes can be timed.
     pub fn has_clock(&self) -> bool {
         self.device.features().contains(CLOCK)
+    }
+
+    /// Whether the processor does its work.
+    pub fn is_software(&self) -> bool {
+        self.software
     }
 
     /// Opens the preferred adapter.
@@ -53,6 +59,7 @@ impl Gpu {
             device,
             queue,
             backend: describe(&adapter.get_info()),
+            software: adapter.get_info().device_type == wgpu::DeviceType::Cpu,
             failure,
         })
     }

@@ -1,13 +1,13 @@
 //! The passes that draw tunnel and bodies, and what they mirror.
 
-use super::backdrop::{BackdropKey, Backdrops};
 use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
-use super::pipeline::Background;
-use super::prepared::PreparedView;
-use super::recorder::{KEEP, Recorder, grey};
+use super::kept::KeptTunnel;
+use super::layout::Part;
+use super::prepared::{Level, PreparedView};
+use super::recorder::{BLACK, KEEP, Recorder, grey};
+use super::rectangle::Rectangle;
 use super::target::SurfaceLayers;
-use super::texture::Texture;
 use super::textures::Textures;
 
 /// Tunnel and bodies on the adapter.
@@ -30,104 +30,232 @@ impl Surfaces<'_> {
     }
 }
 
-/// The background's pipelines, each with its bind groups for a view.
+/// A pipeline with a bind group a texture.
 struct Bound<'a> {
-    lit: &'a wgpu::RenderPipeline,
-    /// One a texture.
+    pipeline: &'a wgpu::RenderPipeline,
     paintings: Vec<wgpu::BindGroup>,
-    dim: &'a wgpu::RenderPipeline,
-    constants: wgpu::BindGroup,
 }
 
 impl<'a> Recorder<'a> {
-    fn bound(&self, background: &'a Background, textures: &Textures) -> Bound<'a> {
-        let (view, poses) = (self.view, self.view.poses.as_entire_binding());
-        let lit = if view.list.banded {
-            &background.banded
-        } else {
-            &background.lit
-        };
+    fn bound(
+        &self,
+        level: &Level,
+        (pipeline, blinks): (&'a wgpu::RenderPipeline, bool),
+        textures: &Textures,
+    ) -> Bound<'a> {
         let painted = (textures.all.iter()).map(|painting| {
+            let shares = blinks.then(|| (2, level.shares.binding()));
             let resources = [
-                poses.clone(),
-                view.shares.binding(),
-                painting.binding(),
-                wgpu::BindingResource::Sampler(&textures.sampler),
+                (1, self.view.poses.as_entire_binding()),
+                (3, painting.binding()),
+                (4, wgpu::BindingResource::Sampler(&textures.sampler)),
             ];
-            self.bind(lit, &resources)
+            self.bind_some(level, pipeline, resources.into_iter().chain(shares))
         });
         Bound {
-            lit,
+            pipeline,
             paintings: painted.collect(),
-            dim: &background.dim,
-            constants: self.bind(&background.dim, &[poses]),
         }
     }
 
-    /// Tunnel and bodies in the mean over the exposure, under so many headlights; a tunnel with a key
-    /// is kept for the next frame.
-    pub fn draw_background(
-        &mut self,
-        headlights: usize,
-        surfaces: &Surfaces<'_>,
-        (backdrops, key): (&mut Backdrops, Option<&BackdropKey>),
-    ) {
-        let (device, pipelines) = (&self.gpu.device, self.pipelines);
-        let (view, target, list) = (self.view, self.target, &self.view.list);
+    /// What draws surfaces without headlights, and with so many if any surface is in their light.
+    fn surfaces(&self, level: &Level, headlights: usize, textures: &Textures) -> Vec<Bound<'a>> {
+        let (pipelines, list) = (self.pipelines, &self.view.list);
         let headlit = list.calls.iter().any(|call| call.headlit);
-        let headlights = [0, headlights];
-        let bound: Vec<_> = (headlights[..=usize::from(headlit)].iter())
-            .map(|n| self.bound(pipelines.background(device, *n), surfaces.textures))
-            .collect();
-        let (tunnel, bodies) = list.calls.split_at(list.tunnel().count());
-        let empty = wgpu::LoadOp::Clear(wgpu::Color {
-            r: view.beyond_e,
-            ..wgpu::Color::BLACK
-        });
-        let far = wgpu::LoadOp::Clear(0.0);
-        for k in 0..list.instants {
-            let layers = match k {
-                0 => &target.layers,
-                _ => &target.instant,
-            };
-            let (mut calls, mut load, mut depth_load) = (&list.calls[..], empty, far);
-            if let Some(key) = key {
-                let draw_tunnel = |_: &_| {
-                    let kept = SurfaceLayers::new(device, target.size_px);
-                    let depth = Some((&kept.depth, far));
-                    let mut pass = self.passes.begin("background", &kept.signal, empty, depth);
-                    view.draw_instant(&mut pass, &bound, tunnel, surfaces, k);
-                    drop(pass);
-                    kept
+        ([0, headlights][..=usize::from(headlit)].iter())
+            .map(|n| {
+                let background = pipelines.background(&self.gpu.device, *n);
+                let pipeline = if list.banded {
+                    &background.banded
+                } else {
+                    &background.lit
                 };
-                let kept = backdrops.get(key.clone(), draw_tunnel);
-                kept.copy_to(layers, self.passes.encoder);
-                (calls, load, depth_load) = (bodies, KEEP, wgpu::LoadOp::Load);
-            }
-            let depth = Some((&layers.depth, depth_load));
-            let mut pass = self.passes.begin("background", &layers.signal, load, depth);
-            list.moving.clip(&mut pass, k > 0);
-            view.draw_instant(&mut pass, &bound, calls, surfaces, k);
+                self.bound(level, (pipeline, true), textures)
+            })
+            .collect()
+    }
+
+    /// What nothing has been drawn over.
+    fn empty(&self) -> wgpu::LoadOp<wgpu::Color> {
+        wgpu::LoadOp::Clear(wgpu::Color {
+            r: self.view.beyond_e,
+            ..wgpu::Color::BLACK
+        })
+    }
+
+    /// The tunnel in a small picture, under so many headlights.
+    fn draw_coarse(&mut self, level: &Level, headlights: usize, surfaces: &Surfaces<'_>) {
+        let layers = self.target.coarse.each_ref();
+        let all = [layers[0].signal.whole()];
+        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let (view, empty) = (self.view, self.empty());
+        for k in 0..view.list.instants {
+            let (onto, depth) = (layers[usize::from(k > 0)], wgpu::LoadOp::Clear(0.0));
+            let depth = Some((&onto.depth, depth));
+            let mut pass = (self.passes).begin("coarse", &[(&onto.signal, empty)], depth);
+            view.draw_instant(&mut pass, k, &bound, view.list.tunnel(), surfaces);
             drop(pass);
             if k > 0 {
-                self.mix_in(&layers.signal, k);
+                self.mix_in(level, layers, k, &all);
             }
         }
     }
 
-    /// Mixes instant `k` into the mean of those before it. A running mean: rounding to half precision
-    /// does not add up.
-    fn mix_in(&mut self, instant: &Texture, k: u32) {
+    /// Tunnel and bodies in the mean over the exposure, under so many headlights; over a tunnel that is kept,
+    /// or else over a small picture.
+    pub fn draw_background(
+        &mut self,
+        kept: Option<&KeptTunnel>,
+        headlights: usize,
+        surfaces: &Surfaces<'_>,
+    ) {
+        match (kept, &self.view.coarse) {
+            (Some(kept), _) => self.draw_changed(kept, headlights, surfaces),
+            (None, coarse) => {
+                if let Some(coarse) = coarse {
+                    self.draw_coarse(coarse, headlights, surfaces);
+                }
+                self.draw_afresh(headlights, surfaces);
+            }
+        }
+    }
+
+    /// What is drawn in full of a picture of which nothing is kept.
+    fn draw_afresh(&mut self, headlights: usize, surfaces: &Surfaces<'_>) {
+        let (view, target) = (self.view, self.target);
+        if view.areas.is_empty() {
+            return;
+        }
+        let level = &view.full;
+        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
+        let layers = [&target.layers, &target.instant];
+        for k in 0..view.list.instants {
+            let onto = layers[usize::from(k > 0)];
+            self.clear(onto, &parts);
+            let depth = Some((&onto.depth, wgpu::LoadOp::Load));
+            let mut pass = (self.passes).begin("background", &[(&onto.signal, KEEP)], depth);
+            for area in &view.areas {
+                area.part.clip(&mut pass);
+                let calls = area.calls.iter().map(|call| &view.list.calls[*call]);
+                view.draw_instant(&mut pass, k, &bound, calls, surfaces);
+            }
+            drop(pass);
+            if k > 0 {
+                self.mix_in(level, layers, k, &parts);
+            }
+        }
+    }
+
+    /// Leaves nothing in parts of the picture.
+    fn clear(&mut self, layers: &SurfaceLayers, parts: &[Rectangle]) {
+        self.fill(layers, parts, &self.pipelines.clear, &[]);
+    }
+
+    /// Draws parts of the picture over all that was there, depths too.
+    fn fill(
+        &mut self,
+        layers: &SurfaceLayers,
+        parts: &[Rectangle],
+        pipeline: &wgpu::RenderPipeline,
+        resources: &[wgpu::BindingResource<'_>],
+    ) {
+        if parts.is_empty() {
+            return;
+        }
+        let part = |part: &Rectangle| Part {
+            low: part.at.map(|x| x as f32 - 0.5),
+            high: part.ends().map(|x| x as f32 - 0.5),
+            empty_e: self.view.beyond_e as f32,
+            ..Part::default()
+        };
+        let parts: Vec<_> = parts.iter().map(part).collect();
+        let table = self.gpu.storage(&parts);
+        let resources: Vec<_> = std::iter::once(table.as_entire_binding())
+            .chain(resources.iter().cloned())
+            .collect();
+        let group = self.bind(&self.view.full, pipeline, &resources);
+        let depth = Some((&layers.depth, wgpu::LoadOp::Load));
+        let mut pass = self.passes.begin("fill", &[(&layers.signal, KEEP)], depth);
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &group, &[]);
+        pass.draw(0..6, 0..parts.len() as u32);
+    }
+
+    /// Draws what a camera at rest sees of the tunnel, to be kept.
+    pub fn draw_kept(&mut self, kept: &KeptTunnel, surfaces: &Surfaces<'_>) {
+        let (view, empty) = (self.view, self.empty());
+        let background = self.pipelines.background(&self.gpu.device, 0);
+        let bound = [self.bound(&view.full, (&background.split, false), surfaces.textures)];
+        let depth = Some((&kept.depth, wgpu::LoadOp::Clear(0.0)));
+        let targets = [(&kept.light, empty), (&kept.lamp, BLACK)];
+        let mut pass = self.passes.begin("kept", &targets, depth);
+        let calls = view.list.tunnel();
+        view.draw_instant(&mut pass, 0, &bound, calls, surfaces);
+    }
+
+    /// The parts of a picture that differ from a tunnel that is kept, in the mean over the exposure.
+    fn draw_changed(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
+        let (view, target) = (self.view, self.target);
+        let level = &view.full;
+        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let background = self.pipelines.background(&self.gpu.device, headlights);
+        let added = [self.bound(level, (&background.headlit, false), surfaces.textures)];
+        let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
+        let moving = [view.list.moving];
+        let bodies = view.list.calls.iter().skip(view.list.tunnel().count());
+        for k in 0..view.list.instants {
+            let (layers, parts) = match k {
+                0 => (&target.layers, &parts[..]),
+                _ => (&target.instant, &moving[..]),
+            };
+            self.restore(kept, layers, parts);
+            let depth = Some((&layers.depth, wgpu::LoadOp::Load));
+            let mut pass = (self.passes).begin("background", &[(&layers.signal, KEEP)], depth);
+            if k > 0 {
+                view.list.moving.clip(&mut pass);
+            }
+            pass.set_blend_constant(grey(1.0));
+            let headlit = view.list.tunnel().filter(|call| call.headlit);
+            view.draw_instant(&mut pass, k, &added, headlit, surfaces);
+            view.draw_instant(&mut pass, k, &bound, bodies.clone(), surfaces);
+            drop(pass);
+            if k > 0 {
+                self.mix_in(level, [&target.layers, &target.instant], k, &moving);
+            }
+        }
+    }
+
+    /// Brings parts of the picture back as they were kept.
+    fn restore(&mut self, kept: &KeptTunnel, layers: &SurfaceLayers, parts: &[Rectangle]) {
+        let resources = [
+            kept.light.binding(),
+            kept.lamp.binding(),
+            kept.depth.binding(),
+            self.view.full.shares.binding(),
+        ];
+        self.fill(layers, parts, &self.pipelines.restore, &resources);
+    }
+
+    /// Mixes instant `k` into the mean of those before it, in parts of the picture. A running mean:
+    /// rounding to half precision does not add up.
+    fn mix_in(
+        &mut self,
+        level: &Level,
+        [mean, instant]: [&SurfaceLayers; 2],
+        k: u32,
+        parts: &[Rectangle],
+    ) {
         let blend = &self.pipelines.blend;
-        let group = self.bind(blend, &[instant.binding()]);
-        let mut pass = self
-            .passes
-            .begin("instants", &self.target.layers.signal, KEEP, None);
-        self.view.list.moving.clip(&mut pass, true);
+        let group = self.bind(level, blend, &[instant.signal.binding()]);
+        let mut pass = (self.passes).begin("instants", &[(&mean.signal, KEEP)], None);
         pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
         pass.set_pipeline(blend);
         pass.set_bind_group(0, &group, &[]);
-        pass.draw(0..6, 0..1);
+        for part in parts {
+            part.clip(&mut pass);
+            pass.draw(0..6, 0..1);
+        }
     }
 
     /// What rail heads and a wet bed mirror, at every instant of the exposure.
@@ -141,12 +269,12 @@ impl<'a> Recorder<'a> {
         let mirrored = self.gpu.storage(&list.mirrored);
         let resources = [
             view.poses.as_entire_binding(),
-            view.shares.binding(),
+            view.full.shares.binding(),
             mirrored.as_entire_binding(),
         ];
-        let group = self.bind(&background.gloss, &resources);
+        let group = self.bind(&view.full, &background.gloss, &resources);
         let depth = Some((&layers.depth, wgpu::LoadOp::Load));
-        let mut pass = self.passes.begin("gloss", &layers.signal, KEEP, depth);
+        let mut pass = self.passes.begin("gloss", &[(&layers.signal, KEEP)], depth);
         pass.set_pipeline(&background.gloss);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));
@@ -162,29 +290,23 @@ impl<'a> Recorder<'a> {
 }
 
 impl PreparedView {
-    fn draw_instant(
+    fn draw_instant<'c>(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
-        bound: &[Bound<'_>],
-        calls: &[DrawCall],
-        surfaces: &Surfaces<'_>,
         instant: u32,
+        bound: &[Bound<'_>],
+        calls: impl Iterator<Item = &'c DrawCall>,
+        surfaces: &Surfaces<'_>,
     ) {
         pass.set_vertex_buffer(1, self.placements.slice(..));
         for call in calls {
             surfaces.set_buffers(pass, call);
             let at = instant * self.list.meshes + call.mesh;
-            let bound = &bound[usize::from(call.headlit)];
-            if !call.lit.is_empty() {
-                pass.set_pipeline(bound.lit);
-                pass.set_bind_group(0, &bound.paintings[call.texture], &[]);
-                pass.draw_indexed(call.lit.clone(), 0, at..at + 1);
-            }
-            if !call.dim.is_empty() {
-                pass.set_pipeline(bound.dim);
-                pass.set_bind_group(0, &bound.constants, &[]);
-                pass.draw_indexed(call.dim.clone(), 0, at..at + 1);
-            }
+            // Where headlights are left out, there may be nothing but what draws without them.
+            let bound = &bound[usize::from(call.headlit).min(bound.len() - 1)];
+            pass.set_pipeline(bound.pipeline);
+            pass.set_bind_group(0, &bound.paintings[call.texture], &[]);
+            pass.draw_indexed(call.indices.clone(), 0, at..at + 1);
         }
     }
 }

@@ -1,10 +1,10 @@
-//! What a view draws: which triangles in full and which cheaply, at which instants of the exposure,
-//! under which lamps' blinking.
+//! What a view draws: which triangles, at which instants of the exposure, under which lamps' blinking.
 
 use super::bodies::BodyMeshes;
 use super::chunks::Chunk;
 use super::layout::{Mirrored, Placement};
-use super::smear::{Rectangle, Smear};
+use super::rectangle::Rectangle;
+use super::smear::Smear;
 use super::textures;
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::lit_scene::LitScene;
@@ -15,14 +15,12 @@ use nalgebra::{Point3, Vector3};
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Grey levels below which paint and blinking do not show: less than the read noise, since paint
-/// changes them by half at most.
-const DIM_GREY: f64 = 0.4;
-/// Grey levels by headlights alone below which paint does not show: they do not blink, and by half of
-/// it is less than the sensor's own step.
-const FLOODLIT_GREY: f64 = 1.0;
 /// Grey levels by headlights below which they are left out.
 const UNLIT_GREY: f64 = 0.1;
+/// Grey levels, on the brightest paint, below which lamps are drawn without their blinking.
+const BLINKS_GREY: f64 = 0.1;
+/// Grey levels below which motion does not show.
+const MOVES_GREY: f64 = 0.1;
 /// Chunks nearer than this may mirror in any row.
 const MIRRORS_ALL_OVER_M: f64 = 15.0;
 /// Lamps farther than this from a camera are not mirrored in what it sees.
@@ -36,16 +34,16 @@ const BAND: f32 = 0.01;
 pub struct DrawCall {
     /// The chunk that they are of; none for bodies.
     pub chunk: Option<Arc<Chunk>>,
+    /// Which of its parts.
+    pub part: usize,
     /// Number of their texture.
     pub texture: usize,
     /// Number of their placement.
     pub mesh: u32,
     /// Whether headlights light them.
     pub headlit: bool,
-    /// Indices of those that are drawn in full.
-    pub lit: Range<u32>,
-    /// Indices of those that are too dark for that.
-    pub dim: Range<u32>,
+    /// Their indices.
+    pub indices: Range<u32>,
     /// Indices of those that mirror.
     pub glossy: Range<u32>,
 }
@@ -73,12 +71,31 @@ pub struct DrawList {
     /// Rows in which they may be.
     mirror_rows: Range<u32>,
     lamps: Vec<usize>,
+    /// Whether anything is so bright that motion shows.
+    lit: bool,
 }
 
 impl DrawList {
     /// What it draws of the tunnel: the first of all that it draws.
     pub fn tunnel(&self) -> impl Iterator<Item = &DrawCall> {
         self.calls.iter().take_while(|call| call.chunk.is_some())
+    }
+
+    /// Numbers of the draw calls that may show in a part of the picture.
+    pub fn seen_in(&self, framed: &Framed<'_>, part: &Rectangle) -> Vec<usize> {
+        let window = framed.window(part);
+        let shows = |call: &DrawCall| match &call.chunk {
+            Some(chunk) => {
+                let around = chunk.parts[call.part].around;
+                framed.may_see_in(&window, around.map(|p| chunk.origin + p.cast()))
+            }
+            None => true,
+        };
+        let calls = self.calls.iter().enumerate();
+        calls
+            .filter(|(_, call)| shows(call))
+            .map(|(k, _)| k)
+            .collect()
     }
 
     /// Of the chunks in sight and of the bodies.
@@ -93,21 +110,21 @@ impl DrawList {
             shares: vec![1.0; rows as usize],
             ..Self::default()
         };
-        let dim_cd_m2 = DIM_GREY / framed.view.grey_per_cd_m2();
         let reference = framed.reference();
         for chunk in chunks {
-            list.add_chunk(framed, job, scene, chunk, dim_cd_m2);
+            list.add_chunk(framed, job, scene, chunk);
         }
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
             list.calls.push(DrawCall {
                 chunk: None,
+                part: 0,
                 texture: textures::BLANK,
                 mesh: list.placements.len() as u32,
                 headlit: !job.headlights.is_empty(),
-                lit: range.clone(),
-                dim: 0..0,
+                indices: range.clone(),
                 glossy: 0..0,
             });
+            list.lit = true;
             let place = Point3::from(body.world_from_body.translation.vector);
             list.placements.push(Placement {
                 offset_m: single(&(place - reference)),
@@ -122,48 +139,37 @@ impl DrawList {
         list
     }
 
-    fn add_chunk(
-        &mut self,
-        framed: &Framed<'_>,
-        job: &Job,
-        scene: &LitScene,
-        chunk: &Arc<Chunk>,
-        dim_cd_m2: f64,
-    ) {
+    fn add_chunk(&mut self, framed: &Framed<'_>, job: &Job, scene: &LitScene, chunk: &Arc<Chunk>) {
+        let grey_per_cd_m2 = framed.view.grey_per_cd_m2();
         let headlit_cd_m2 = (chunk.probes.iter())
             .map(|probe| {
                 let lux = headlights_lx(&job.headlights, &scene.air, &probe.at, &probe.normal);
                 lux * f64::from(probe.reflected_per_lx)
             })
             .fold(0.0, f64::max);
-        let headlit_grey = headlit_cd_m2 * framed.view.grey_per_cd_m2();
-        let floodlit = headlit_grey > FLOODLIT_GREY;
+        let headlit_grey = headlit_cd_m2 * grey_per_cd_m2;
         let mirrors = self.find_mirrors(framed, chunk);
         let period = chunk.key.start_m() / paint::PERIOD_M;
         let away_m = (chunk.origin - framed.reference()).norm();
-        for part in &chunk.parts {
+        for (number, part) in chunk.parts.iter().enumerate() {
             let around = part.around.map(|p| chunk.origin + p.cast());
             if !framed.may_see_between(around) {
                 continue;
             }
-            let bright = if floodlit {
-                part.peaks.len()
-            } else {
-                (part.peaks).partition_point(|peak| f64::from(*peak) > dim_cd_m2)
-            };
-            let border = part.indices.start + 3 * bright as u32;
+            let lamps_grey = f64::from(part.peak_cd_m2) * grey_per_cd_m2;
+            self.lit |= headlit_grey + lamps_grey > MOVES_GREY;
             let painting = scene.paintings.of_range[part.section];
             self.calls.push(DrawCall {
                 chunk: Some(Arc::clone(chunk)),
+                part: number,
                 texture: textures::slanted(painting, away_m),
                 mesh: self.placements.len() as u32,
                 headlit: headlit_grey > UNLIT_GREY,
-                lit: part.indices.start..border,
-                dim: border..part.indices.end,
+                indices: part.indices.clone(),
                 glossy: if mirrors { part.glossy.clone() } else { 0..0 },
             });
             let rows = framed.view.camera.intrinsics.height_px;
-            let shares = match chunk.lamp.filter(|_| bright > 0) {
+            let shares = match chunk.lamp.filter(|_| lamps_grey > BLINKS_GREY) {
                 Some(lamp) => self.shares_of(framed, scene.lamps.lamps(), lamp, 0..rows),
                 None => 0,
             };
@@ -259,16 +265,12 @@ impl DrawList {
     fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &[Arc<Chunk>]) {
         self.meshes = self.placements.len() as u32;
         let smear = Smear::of(framed, job.time);
-        let anything = self.calls.iter().any(|d| !d.lit.is_empty());
-        self.instants = if anything {
+        self.moving = smear.moving(&job.bodies);
+        self.instants = if self.lit && !self.moving.is_empty() {
             smear.instants(&job.bodies, chunks)
         } else {
             1
         };
-        self.moving = smear.moving(&job.bodies);
-        if self.moving.is_empty() {
-            self.instants = 1;
-        }
         let exposure_s = framed.view.camera.shutter.exposure_s;
         let count = f64::from(self.instants);
         for k in 0..self.instants {

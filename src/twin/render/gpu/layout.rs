@@ -43,12 +43,12 @@ shared_with_shaders! {
         pub place_m: [f32; 2],
         /// Albedo is the painting's times this.
         pub paint: f32,
-        /// Share of light reflected in the mean.
-        pub albedo: f32,
         /// Own luminance.
         pub luminance_cd_m2: f32,
         /// Reflectance head on, roughness along the track and across; 0 where it is dull.
         pub gloss: [f32; 3],
+        /// Share of light reflected in the mean. No shader reads it.
+        pub albedo: f32,
     }
 
     /// Where one mesh is drawn.
@@ -160,6 +160,18 @@ shared_with_shaders! {
         pub unused: [u32; 2],
         /// Headlights.
         pub headlights: [ViewHeadlight; MAX_HEADLIGHTS],
+    }
+
+    /// A part of the picture, from the outer corners of its pixels.
+    pub struct Part {
+        /// Upper left.
+        pub low: [f32; 2],
+        /// Lower right.
+        pub high: [f32; 2],
+        /// Signal where nothing is drawn.
+        pub empty_e: f32,
+        /// Fills the stride.
+        pub unused: f32,
     }
 
     /// A lamp's disc in a view.

@@ -87,17 +87,18 @@ impl Recorder<'_> {
     /// Fixed pattern, noise and bits.
     pub fn draw_sensor(&mut self, map: &Texture, blooming: bool) {
         let target = self.target;
-        target.copy_signal(self.passes.encoder);
+        let finishing = target.finishing(&self.gpu.device);
+        target.copy_signal(finishing, self.passes.encoder);
         let resources = [
             target.glare.binding(),
-            target.signal_words.as_entire_binding(),
+            finishing.signal_words.as_entire_binding(),
             map.binding(),
         ];
         let pipeline = self.pipelines.sensor(&self.gpu.device, blooming);
         // Every pixel is written, so nothing needs clearing.
         self.draw_rectangles(
             "sensor",
-            (&target.finished, KEEP),
+            (&finishing.finished, KEEP),
             pipeline,
             &resources,
             0..1,

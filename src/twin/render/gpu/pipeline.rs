@@ -13,14 +13,21 @@ pub const DEPTH: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 /// Four pixels of the finished image a texel.
 pub const RAW: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Uint;
 
+/// Steady and blinking light of a tunnel that is kept.
+pub const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
+/// Whose blinking it is: a row of the table of shares.
+pub const LAMP: wgpu::TextureFormat = wgpu::TextureFormat::R16Uint;
+
 /// Tunnel and bodies.
 pub struct Background {
-    /// With their paint and the blinking of lamps.
+    /// Under the blinking of lamps.
     pub banded: wgpu::RenderPipeline,
-    /// With their paint.
+    /// Where that does not show.
     pub lit: wgpu::RenderPipeline,
-    /// Where it is too dark for either.
-    pub dim: wgpu::RenderPipeline,
+    /// Steady and blinking light apart, without headlights.
+    pub split: wgpu::RenderPipeline,
+    /// That of headlights alone, times the blend constant and added.
+    pub headlit: wgpu::RenderPipeline,
     /// What glossy surfaces mirror, times the blend constant and added.
     pub gloss: wgpu::RenderPipeline,
 }
@@ -31,6 +38,10 @@ pub struct Pipelines {
     backgrounds: [OnceCell<Background>; MAX_HEADLIGHTS + 1],
     background: wgpu::ShaderModule,
     gloss: wgpu::ShaderModule,
+    /// Light and depth of a tunnel that is kept, in parts of the picture.
+    pub restore: wgpu::RenderPipeline,
+    /// Nothing, in parts of the picture.
+    pub clear: wgpu::RenderPipeline,
     /// Mixes a share of one picture into another.
     pub blend: wgpu::RenderPipeline,
     /// Blurs along rows, and along columns.
@@ -51,7 +62,7 @@ struct Stage<'a> {
     entries: [&'a str; 2],
     buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     depth: Option<wgpu::DepthStencilState>,
-    target: wgpu::ColorTargetState,
+    targets: &'a [Option<wgpu::ColorTargetState>],
     constants: &'a [(&'a str, f64)],
 }
 
@@ -65,7 +76,7 @@ impl Pipelines {
             })
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
-        let (focus, shadows) = (shader("focus"), shader("shadows"));
+        let (focus, shadows, restore) = (shader("focus"), shader("shadows"), shader("restore"));
         let flat = |shader: &_, entries: [&str; 2], target, constants: &[(&str, f64)]| {
             flat_pipeline(device, shader, entries, target, constants)
         };
@@ -75,6 +86,8 @@ impl Pipelines {
             backgrounds: [const { OnceCell::new() }; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             gloss: shader("gloss"),
+            restore: filling(device, &restore, "restore"),
+            clear: filling(device, &restore, "clear"),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
             focus: flags.map(|down| {
                 let target = target(SIGNAL, None);
@@ -103,13 +116,18 @@ impl Pipelines {
             let headlights = ("HEADLIGHTS", headlights as f64);
             let make = |kind, banded| {
                 let constants = [headlights, ("BANDED", f64::from(u8::from(banded)))];
-                surface(device, &self.background, kind, &constants, false)
+                let light = [Some(target(SIGNAL, None))];
+                surface(device, &self.background, kind, &constants, &light)
             };
+            let split = [target(LIGHT, None), target(LAMP, None)].map(Some);
+            let added = [Some(target(SIGNAL, Some(ADD)))];
+            let add = |shader, kind| surface(device, shader, kind, &[headlights], &added);
             Background {
                 banded: make("lit", true),
                 lit: make("lit", false),
-                dim: make("dim", false),
-                gloss: surface(device, &self.gloss, "gloss", &[headlights], true),
+                split: surface(device, &self.background, "split", &[], &split),
+                headlit: add(&self.background, "headlit"),
+                gloss: add(&self.gloss, "gloss"),
             }
         })
     }
@@ -138,20 +156,48 @@ fn flat_pipeline(
         entries,
         buffers: &[],
         depth: None,
-        target,
+        targets: &[Some(target)],
         constants,
     };
     pipeline(device, stage)
 }
 
-/// Draws surfaces into the depth buffer, or adds to those that are there.
+/// Draws rectangles over whatever is there, depths too.
+fn filling(
+    device: &wgpu::Device,
+    shader: &wgpu::ShaderModule,
+    entry: &str,
+) -> wgpu::RenderPipeline {
+    let stage = Stage {
+        shader,
+        entries: ["part_corner", entry],
+        buffers: &[],
+        depth: Some(depths(true, wgpu::CompareFunction::Always)),
+        targets: &[Some(target(SIGNAL, None))],
+        constants: &[],
+    };
+    pipeline(device, stage)
+}
+
+fn depths(written: bool, compare: wgpu::CompareFunction) -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(written),
+        depth_compare: Some(compare),
+        stencil: wgpu::StencilState::default(),
+        bias: wgpu::DepthBiasState::default(),
+    }
+}
+
+/// Draws surfaces into the depth buffer, or adds to those that are there if a target blends.
 fn surface(
     device: &wgpu::Device,
     shader: &wgpu::ShaderModule,
     kind: &str,
     constants: &[(&str, f64)],
-    adds: bool,
+    targets: &[Option<wgpu::ColorTargetState>],
 ) -> wgpu::RenderPipeline {
+    let adds = targets.iter().flatten().any(|t| t.blend.is_some());
     let entries = [format!("project_{kind}"), format!("shade_{kind}")];
     let layout = |stride, step_mode, attributes| {
         Some(wgpu::VertexBufferLayout {
@@ -172,18 +218,15 @@ fn surface(
             ),
         ],
         depth: Some(wgpu::DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(!adds),
-            depth_compare: Some(wgpu::CompareFunction::Greater),
-            stencil: wgpu::StencilState::default(),
             // The same surface again must not be behind itself by a rounding.
             bias: wgpu::DepthBiasState {
                 constant: if adds { 16 } else { 0 },
                 slope_scale: if adds { 0.01 } else { 0.0 },
                 clamp: 0.0,
             },
+            ..depths(!adds, wgpu::CompareFunction::Greater)
         }),
-        target: target(SIGNAL, adds.then_some(ADD)),
+        targets,
         constants,
     };
     pipeline(device, stage)
@@ -211,10 +254,10 @@ const fn sum_of(src_factor: wgpu::BlendFactor, dst_factor: wgpu::BlendFactor) ->
     }
 }
 
-/// The members of [`Vertex`], one after the other.
-const VERTEX: [wgpu::VertexAttribute; 8] = wgpu::vertex_attr_array![
-    0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float32x2, 4 => Float32, 5 => Float32,
-    6 => Float32, 13 => Float32x3
+/// The members of [`Vertex`] that shaders read, one after the other.
+const VERTEX: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
+    0 => Float32x3, 1 => Float32x3, 2 => Float32x2, 3 => Float32x2, 4 => Float32, 6 => Float32,
+    13 => Float32x3
 ];
 
 /// Those of [`Placement`].
@@ -252,7 +295,7 @@ fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
             module: stage.shader,
             entry_point: Some(stage.entries[1]),
             compilation_options: options,
-            targets: &[Some(stage.target)],
+            targets: stage.targets,
         }),
         multiview_mask: None,
         cache: None,

@@ -3,7 +3,7 @@
 use super::adapter::Gpu;
 use super::pass_clock::PassClock;
 use super::pipeline::Pipelines;
-use super::prepared::PreparedView;
+use super::prepared::{Level, PreparedView};
 use super::target::ViewTarget;
 use super::texture::Texture;
 use std::ops::Range;
@@ -23,16 +23,27 @@ pub struct Recorder<'a> {
 }
 
 impl Recorder<'_> {
-    /// The resources of group 0, in the order of their bindings; the first is the view's constants.
+    /// The resources of group 0, in the order of their bindings; the first is the constants.
     pub fn bind(
         &self,
+        level: &Level,
         pipeline: &wgpu::RenderPipeline,
         resources: &[wgpu::BindingResource<'_>],
     ) -> wgpu::BindGroup {
-        let all = std::iter::once(self.view.constants.as_entire_binding())
-            .chain(resources.iter().cloned());
+        self.bind_some(level, pipeline, (1..).zip(resources.iter().cloned()))
+    }
+
+    /// The same with the bindings' numbers, where a pipeline does not use all that its shader names.
+    pub fn bind_some<'r>(
+        &self,
+        level: &'r Level,
+        pipeline: &wgpu::RenderPipeline,
+        resources: impl Iterator<Item = (u32, wgpu::BindingResource<'r>)>,
+    ) -> wgpu::BindGroup {
+        let constants = (0, level.constants.as_entire_binding());
+        let all = std::iter::once(constants).chain(resources);
         let entry = |(binding, resource)| wgpu::BindGroupEntry { binding, resource };
-        let entries: Vec<_> = (0..).zip(all).map(entry).collect();
+        let entries: Vec<_> = all.map(entry).collect();
         self.gpu
             .device
             .create_bind_group(&wgpu::BindGroupDescriptor {
@@ -51,8 +62,8 @@ impl Recorder<'_> {
         resources: &[wgpu::BindingResource<'_>],
         instances: Range<u32>,
     ) {
-        let group = self.bind(pipeline, resources);
-        let mut pass = self.passes.begin(name, onto, load, None);
+        let group = self.bind(&self.view.full, pipeline, resources);
+        let mut pass = self.passes.begin(name, &[(onto, load)], None);
         if !instances.is_empty() {
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[]);
@@ -69,25 +80,29 @@ pub struct Passes<'a> {
 }
 
 impl Passes<'_> {
-    /// A pass over one colour target, with depths that are there or are cleared.
+    /// A pass over colour targets, with depths that are there or are cleared.
     pub fn begin(
         &mut self,
         name: &'static str,
-        colour: &Texture,
-        load: wgpu::LoadOp<wgpu::Color>,
+        colours: &[(&Texture, wgpu::LoadOp<wgpu::Color>)],
         depth: Option<(&Texture, wgpu::LoadOp<f32>)>,
     ) -> wgpu::RenderPass<'_> {
         let clock = self.clock.as_deref_mut();
+        let colours: Vec<_> = (colours.iter())
+            .map(|(texture, load)| {
+                Some(wgpu::RenderPassColorAttachment {
+                    view: &texture.view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: *load,
+                        store: wgpu::StoreOp::Store,
+                    },
+                })
+            })
+            .collect();
         self.encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &colour.view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load,
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &colours,
             depth_stencil_attachment: depth.map(|(texture, load)| {
                 wgpu::RenderPassDepthStencilAttachment {
                     view: &texture.view,

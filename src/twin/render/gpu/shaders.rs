@@ -15,11 +15,12 @@ macro_rules! files {
 }
 
 /// Name and text of every file in `shaders/`.
-const FILES: [(&str, &str); 10] = files![
+const FILES: [(&str, &str); 11] = files![
     "common",
     "rows",
     "background",
     "gloss",
+    "restore",
     "blend",
     "focus",
     "lamps",

@@ -6,6 +6,7 @@
 //! sharp that moves by [`SHARP_PX`].
 
 use super::chunks::Chunk;
+use super::rectangle::Rectangle;
 use super::view::Framed;
 use crate::bus::SimTime;
 use crate::twin::geometry::{Body, Solid};
@@ -24,44 +25,6 @@ const BETWEEN_PROBES: f64 = 1.25;
 const PROBED_M: f64 = 15.0;
 /// What moves by less than this in a whole exposure stands still.
 const STILL_PX: f64 = 0.05;
-/// Added to the bounds of what moves.
-const MARGIN_PX: f64 = 2.0;
-
-/// Part of a picture: upper left corner, width and height, pixels.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Rectangle {
-    pub at: [u32; 2],
-    pub size: [u32; 2],
-}
-
-impl Rectangle {
-    /// Whether nothing is in it.
-    pub fn is_empty(&self) -> bool {
-        self.size.contains(&0)
-    }
-
-    /// Lets a pass draw nothing else, if that is wanted.
-    pub fn clip(&self, pass: &mut wgpu::RenderPass<'_>, wanted: bool) {
-        if wanted {
-            let ([x, y], [width, height]) = (self.at, self.size);
-            pass.set_scissor_rect(x, y, width, height);
-        }
-    }
-
-    /// The pixels of a picture between two corners.
-    fn between(low: Point2<f64>, high: Point2<f64>, size_px: [u32; 2]) -> Self {
-        let ends = [0, 1].map(|k| {
-            let size = f64::from(size_px[k]);
-            let low = (low[k] - MARGIN_PX).floor().clamp(0.0, size);
-            let high = (high[k] + MARGIN_PX).ceil().clamp(0.0, size);
-            (low as u32, (high.max(low) - low) as u32)
-        });
-        Self {
-            at: ends.map(|(at, _)| at),
-            size: ends.map(|(_, size)| size),
-        }
-    }
-}
 
 /// Motion in a picture while its middle row is exposed.
 pub struct Smear<'a> {
@@ -110,10 +73,7 @@ impl<'a> Smear<'a> {
     pub fn moving(&self, bodies: &[Body]) -> Rectangle {
         let lens = &self.framed.view.camera.intrinsics;
         let size_px = [lens.width_px, lens.height_px];
-        let whole = Rectangle {
-            at: [0, 0],
-            size: size_px,
-        };
+        let whole = Rectangle::whole(size_px);
         // A lens that bends lines lets edges bulge beyond their ends.
         if self.most_px() > STILL_PX || !lens.distortion.is_none() {
             return whole;

@@ -1,12 +1,18 @@
 //! What the passes draw into, and the way back to memory.
 
 use super::adapter::Gpu;
+use super::back::Image;
 use super::pipeline::{DEPTH, RAW, SIGNAL};
 use super::texture::Texture;
 use super::upload::empty_buffer;
+use crate::twin::render::RenderError;
 use crate::twin::render::constants::GLARE_STEP_PX;
 use crate::twin::render::pixel_map::PixelMap;
-use crate::twin::render::{RawImage, RenderError};
+use image::{ImageBuffer, Primitive};
+use std::cell::OnceCell;
+
+/// Side of a texel of the small picture, pixels.
+pub const COARSE_PX: u32 = 4;
 
 /// Textures of one image size, used again for every view of that size.
 pub struct ViewTarget {
@@ -17,11 +23,19 @@ pub struct ViewTarget {
     /// Where the glare is summed up, electrons: a texel for every fourth pixel of a row, and one more,
     /// so that every pixel lies between two.
     pub glare: Texture,
-    /// The signal as the sensor's pass reads it, two pixels a word: four fetches from a texture
-    /// cost a software adapter more than the copy.
-    pub signal_words: wgpu::Buffer,
     /// One instant of an exposure that shows motion, and what is blurred on the way.
     pub instant: SurfaceLayers,
+    /// The same of a small picture: its signal, and one instant.
+    pub coarse: [SurfaceLayers; 2],
+    /// Where the adapter develops the picture, if it does.
+    finishing: OnceCell<Finishing>,
+}
+
+/// What the sensor's pass needs.
+pub struct Finishing {
+    /// The signal as it is read, two pixels a word: four fetches from a texture cost a software adapter
+    /// more than the copy.
+    pub signal_words: wgpu::Buffer,
     /// The finished image, four pixels a texel.
     pub finished: Texture,
 }
@@ -46,46 +60,70 @@ impl SurfaceLayers {
             depth: Texture::new(device, size_px, DEPTH, usage),
         }
     }
-
-    /// Copies both to others of the same size.
-    pub fn copy_to(&self, other: &Self, encoder: &mut wgpu::CommandEncoder) {
-        self.signal.copy_to(&other.signal, encoder);
-        self.depth.copy_to(&other.depth, encoder);
-    }
 }
 
 impl ViewTarget {
     /// For images of one size.
     pub fn new(device: &wgpu::Device, size_px: (u32, u32)) -> Self {
-        let texture = |width, format, extra| {
-            let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | extra;
-            Texture::new(device, (width, size_px.1), format, usage)
-        };
         let glare_columns = size_px.0.div_ceil(GLARE_STEP_PX as u32) + 1;
+        let glare_usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC;
+        let coarse_px = (size_px.0.div_ceil(COARSE_PX), size_px.1.div_ceil(COARSE_PX));
         Self {
             size_px,
             layers: SurfaceLayers::new(device, size_px),
-            glare: texture(glare_columns, SIGNAL, wgpu::TextureUsages::TEXTURE_BINDING),
-            signal_words: empty_buffer(
-                device,
-                u64::from(signal_stride(size_px)) * u64::from(size_px.1),
-                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
-            ),
+            glare: Texture::new(device, (glare_columns, size_px.1), SIGNAL, glare_usage),
             instant: SurfaceLayers::new(device, size_px),
-            finished: texture(packed_width(size_px), RAW, wgpu::TextureUsages::COPY_SRC),
+            coarse: [(); 2].map(|()| SurfaceLayers::new(device, coarse_px)),
+            finishing: OnceCell::new(),
         }
     }
 
+    /// Where the adapter develops the picture.
+    pub fn finishing(&self, device: &wgpu::Device) -> &Finishing {
+        self.finishing.get_or_init(|| Finishing {
+            signal_words: empty_buffer(
+                device,
+                u64::from(signal_stride(self.size_px)) * u64::from(self.size_px.1),
+                wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+            ),
+            finished: Texture::new(
+                device,
+                (packed_width(self.size_px), self.size_px.1),
+                RAW,
+                wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            ),
+        })
+    }
+
     /// Copies the signal to where the sensor's pass reads it.
-    pub fn copy_signal(&self, encoder: &mut wgpu::CommandEncoder) {
+    pub fn copy_signal(&self, finishing: &Finishing, encoder: &mut wgpu::CommandEncoder) {
         let stride = signal_stride(self.size_px);
-        (self.layers.signal).copy_to_buffer(&self.signal_words, stride, encoder);
+        (self.layers.signal).copy_to_buffer(&finishing.signal_words, stride, encoder);
     }
 
     /// Copies the finished image to a buffer.
-    pub fn copy_back(&self, back: &ReadBack, encoder: &mut wgpu::CommandEncoder) {
-        (self.finished).copy_to_buffer(&back.buffer, stride(self.size_px), encoder);
+    pub fn copy_back(
+        &self,
+        finishing: &Finishing,
+        back: &ReadBack,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        (finishing.finished).copy_to_buffer(&back.buffer, stride(self.size_px), encoder);
     }
+}
+
+/// A texture that is drawn once, then read.
+pub fn kept_texture(
+    device: &wgpu::Device,
+    size_px: (u32, u32),
+    format: wgpu::TextureFormat,
+) -> Texture {
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC;
+    Texture::new(device, size_px, format, usage)
 }
 
 /// An image on its way back.
@@ -111,8 +149,9 @@ impl ReadBack {
         self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
-    /// The image, once the adapter is done; gives the buffer free.
-    pub fn image(&self) -> Result<RawImage, RenderError> {
+    /// The image, of which `keep` says what is kept of each digital number, once the adapter is done; gives
+    /// the buffer free.
+    pub fn image<T: Primitive>(&self, keep: impl Fn(u32) -> T) -> Result<Image<T>, RenderError> {
         let (width, height) = self.size_px;
         let mut pixels = Vec::with_capacity(width as usize * height as usize);
         {
@@ -120,11 +159,14 @@ impl ReadBack {
                 .map_err(|e| RenderError::Device(e.to_string()))?;
             for row in bytes.chunks_exact(stride(self.size_px) as usize) {
                 let (words, _) = row[..2 * width as usize].as_chunks();
-                pixels.extend(words.iter().map(|word| u16::from_le_bytes(*word)));
+                let numbers = words
+                    .iter()
+                    .map(|word| u32::from(u16::from_le_bytes(*word)));
+                pixels.extend(numbers.map(&keep));
             }
         }
         self.buffer.unmap();
-        RawImage::from_raw(width, height, pixels)
+        ImageBuffer::from_raw(width, height, pixels)
             .ok_or_else(|| RenderError::Device("an image came back too short".into()))
     }
 }

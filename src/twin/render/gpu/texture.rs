@@ -1,6 +1,7 @@
 //! Textures, each with a view of all of it.
 
 use super::adapter::Gpu;
+use super::rectangle::Rectangle;
 use wgpu::util::{DeviceExt, TextureDataOrder};
 
 /// Numbers or pictures.
@@ -45,15 +46,41 @@ impl Texture {
         }
     }
 
+    /// All of it.
+    pub fn whole(&self) -> Rectangle {
+        let size = self.texture.size();
+        Rectangle::whole([size.width, size.height])
+    }
+
     /// For a shader to read.
     pub fn binding(&self) -> wgpu::BindingResource<'_> {
         wgpu::BindingResource::TextureView(&self.view)
     }
 
-    /// Copies it to another of the same size.
-    pub fn copy_to(&self, other: &Self, encoder: &mut wgpu::CommandEncoder) {
-        let [from, to] = [self, other].map(|t| t.texture.as_image_copy());
-        encoder.copy_texture_to_texture(from, to, self.texture.size());
+    /// Copies a part of it to a buffer, from an offset on with so many bytes a row.
+    pub fn copy_part_to_buffer(
+        &self,
+        part: Rectangle,
+        buffer: &wgpu::Buffer,
+        (offset, stride): (u64, u32),
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset,
+            bytes_per_row: Some(stride),
+            rows_per_image: None,
+        };
+        let [x, y] = part.at;
+        let from = wgpu::TexelCopyTextureInfo {
+            origin: wgpu::Origin3d { x, y, z: 0 },
+            ..self.texture.as_image_copy()
+        };
+        let size = wgpu::Extent3d {
+            width: part.size[0],
+            height: part.size[1],
+            depth_or_array_layers: 1,
+        };
+        encoder.copy_texture_to_buffer(from, wgpu::TexelCopyBufferInfo { buffer, layout }, size);
     }
 
     /// Copies it to a buffer that has so many bytes a row.
@@ -63,16 +90,7 @@ impl Texture {
         stride: u32,
         encoder: &mut wgpu::CommandEncoder,
     ) {
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(stride),
-            rows_per_image: None,
-        };
-        encoder.copy_texture_to_buffer(
-            self.texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer, layout },
-            self.texture.size(),
-        );
+        self.copy_part_to_buffer(self.whole(), buffer, (0, stride), encoder);
     }
 }
 

@@ -1,9 +1,11 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
+use super::areas::Patch;
 use super::detail::{CHUNK_M, ChunkKey, Cutting, Detail, finer_stations, stations};
 use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
+use super::tiles::SurfaceCell;
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
 use crate::twin::geometry::STATION_STEP_M;
 use crate::twin::reflectance::mean_albedo;
@@ -19,15 +21,17 @@ use std::ops::Range;
 /// A painted surface is at most this many times as bright as its material in the mean.
 const BRIGHTEST_PAINT: f64 = 2.0;
 
-/// Of brightness, in the order of a chunk's triangles.
-const STEPS_PER_OCTAVE: f32 = 2.0;
+/// Length of a patch, where its ends are stations.
+const PATCH_M: f64 = 0.5;
+/// What is so near to a station is on it.
+const NEAR_STATION_M: f64 = 1e-3;
 
 /// A chunk as meshed.
 #[derive(Clone, Debug)]
 pub struct ChunkMesh {
     /// Its place in the world.
     pub origin: Point3<f64>,
-    /// Its triangles; in every part the brightest first.
+    /// Its triangles.
     pub mesh: Mesh,
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
@@ -44,8 +48,10 @@ pub struct ChunkSide {
     pub section: usize,
     /// Its indices in the mesh.
     pub indices: Range<u32>,
-    /// Of each triangle, more luminance than any of it may have, cd/m^2; falling.
-    pub peaks: Vec<f32>,
+    /// More luminance by lamps than any of it has, cd/m^2.
+    pub peak_cd_m2: f32,
+    /// All of it in pieces.
+    pub patches: Vec<Patch>,
     /// Indices of the triangles among them that mirror, once more.
     pub glossy: Range<u32>,
 }
@@ -87,12 +93,15 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         let facets = facets_of(range, rail_q_m, site.cutting);
         for side in FacetSide::ALL {
             let first = mesh.indices.len();
+            let mut patches = Vec::new();
             for facet in facets.iter().filter(|f| FacetSide::of(f, range) == side) {
+                let vertices = mesh.vertices.len();
                 site.add_strip(&mut mesh, facet, &stations);
+                site.add_patches(&mut patches, facet, &stations, &mesh.vertices[vertices..]);
             }
             if mesh.indices.len() > first {
                 let around = box_around(&mesh, first, tunnel.alignment.at(middle_m).heading_rad);
-                parts.push(brightest_first(&mut mesh, first, section, around));
+                parts.push(side_of(&mut mesh, first, section, around, patches));
             }
         }
     }
@@ -116,33 +125,28 @@ fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
         .map(|(k, _)| k)
 }
 
-/// Sorts the triangles of a mesh from index `first` on by their brightest corner, step by step.
-fn brightest_first(
+/// The triangles of a mesh from index `first` on, those that mirror once more behind them.
+fn side_of(
     mesh: &mut Mesh,
     first: usize,
     section: usize,
     around: [Vector3<f32>; 8],
+    patches: Vec<Patch>,
 ) -> ChunkSide {
-    let peak = |triangle: &[u32; 3]| {
-        let peaks = triangle.map(|k| mesh.vertices[k as usize].peak_cd_m2());
-        peaks.into_iter().fold(0.0, f32::max)
-    };
     let (triangles, _) = mesh.indices[first..].as_chunks::<3>();
     let mirrors = |k: u32| mesh.vertices[k as usize].gloss[0] > 0.0;
     let glossy = triangles.iter().filter(|t| t.iter().all(|k| mirrors(*k)));
     let glossy: Vec<u32> = glossy.flatten().copied().collect();
-    let mut sorted: Vec<_> = triangles.iter().map(|t| (step_over(peak(t)), *t)).collect();
-    // A stable sort: within a step neighbours stay together, and their corners are worked out once.
-    sorted.sort_by(|a, b| f32::total_cmp(&b.0, &a.0));
-    mesh.indices.truncate(first);
-    mesh.indices.extend(sorted.iter().flat_map(|(_, t)| *t));
     let border = mesh.indices.len() as u32;
     mesh.indices.extend(glossy);
     ChunkSide {
         around,
         section,
         indices: first as u32..border,
-        peaks: sorted.iter().map(|(peak, _)| *peak).collect(),
+        peak_cd_m2: patches
+            .iter()
+            .fold(0.0, |peak, patch| patch.peak_cd_m2.max(peak)),
+        patches,
         glossy: border..mesh.indices.len() as u32,
     }
 }
@@ -160,13 +164,6 @@ fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] 
         let side = |axis: usize| if k >> axis & 1 == 0 { low } else { high }[axis];
         to_line.inverse() * Vector3::new(side(0), side(1), side(2))
     })
-}
-
-/// The next of the steps of brightness that triangles are sorted by, [`STEPS_PER_OCTAVE`] to twice the
-/// luminance.
-fn step_over(cd_m2: f32) -> f32 {
-    let step = (STEPS_PER_OCTAVE * cd_m2.max(1e-6).log2()).ceil();
-    (step / STEPS_PER_OCTAVE).exp2()
 }
 
 impl Vertex {
@@ -195,6 +192,41 @@ impl Site<'_> {
             }
         }
         mesh.add_ribbon(first, [&sides[0], &sides[1]]);
+    }
+
+    /// The patches of a strip with these vertices, from station to station.
+    fn add_patches(
+        &self,
+        patches: &mut Vec<Patch>,
+        facet: &Facet,
+        stations: &[f64],
+        vertices: &[Vertex],
+    ) {
+        let detail = self.cutting.key.detail;
+        let start_m = self.cutting.key.start_m();
+        let mut from_m = stations[0];
+        let last_m = stations[stations.len() - 1];
+        for to_m in &stations[1..] {
+            if to_m - from_m < PATCH_M - NEAR_STATION_M && *to_m < last_m {
+                continue;
+            }
+            let at = |s_m, end| ruled(&self.scene.tunnel, s_m, facet.ends[end], detail).coords;
+            let [a, b] = [0, 1].map(|end| at(from_m, end));
+            let [c, d] = [0, 1].map(|end| at(*to_m, end));
+            let half = [0.25 * (c + d - a - b), 0.25 * (b + d - a - c)];
+            let normal = facet_normal(&self.scene.tunnel, facet, 0.5 * (from_m + to_m));
+            let stretch_m = from_m - NEAR_STATION_M..=to_m + NEAR_STATION_M;
+            let inside = |v: &&Vertex| stretch_m.contains(&(start_m + f64::from(v.place_m[0])));
+            let corners = vertices.iter().filter(inside);
+            let most = |of: &dyn Fn(&Vertex) -> f32| corners.clone().map(of).fold(0.0, f32::max);
+            patches.push(Patch {
+                cell: SurfaceCell::still((0.25 * (a + b + c + d)).into(), half, Some(normal)),
+                peak_cd_m2: most(&Vertex::peak_cd_m2),
+                reflected_per_lx: most(&Vertex::brightest_per_lx),
+                glossy: most(&|v| v.gloss[0]) > 0.0,
+            });
+            from_m = *to_m;
+        }
     }
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {

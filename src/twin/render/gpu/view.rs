@@ -2,6 +2,7 @@
 //! the camera's place in mid-frame so that f32 suffices.
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
+use super::rectangle::Rectangle;
 use crate::bus::Intrinsics;
 use crate::twin::lights::Headlight;
 use crate::twin::render::pixel_map::Dark;
@@ -24,15 +25,18 @@ const SHARP_PX: f64 = 1.0;
 /// Nothing is blurred by what is farther away.
 const MOST_REACH_PX: f64 = 24.0;
 
+/// Inside unit normals, in the camera's frame, of four planes through its centre that hold a part of the
+/// picture between them.
+pub type Window = [Vector3<f64>; 4];
+
 /// A view with its reference point.
 pub struct Framed<'a> {
     /// What was asked for.
     pub view: &'a View,
     /// `world_from_camera` in mid-frame.
     pub middle: Isometry3<f64>,
-    /// Inside unit normals, in the camera's frame, of four planes through its centre that hold all of the
-    /// picture between them.
-    borders: [Vector3<f64>; 4],
+    /// Around the picture.
+    borders: Window,
     /// How far the camera gets in half a frame, and how far it turns.
     way_m: f64,
     turned_rad: f64,
@@ -48,10 +52,11 @@ impl<'a> Framed<'a> {
             .map(|s| view.motion.pose_at(view.start.plus(s)));
         let ways = ends.map(|end| (end.translation.vector - middle.translation.vector).norm());
         let turns = ends.map(|end| end.rotation.angle_to(&middle.rotation));
+        let lens = &view.camera.intrinsics;
         Self {
             view,
             middle,
-            borders: borders(&view.camera.intrinsics),
+            borders: borders(lens, &Rectangle::whole([lens.width_px, lens.height_px])),
             way_m: ways.into_iter().fold(LEAST_WAY_M, f64::max),
             turned_rad: turns.into_iter().fold(0.0, f64::max),
         }
@@ -159,9 +164,19 @@ impl<'a> Framed<'a> {
 
     /// Whether any row may see what lies between some places.
     pub fn may_see_between(&self, places: [Point3<f64>; 8]) -> bool {
+        self.may_see_in(&self.borders, places)
+    }
+
+    /// The window of a part of the picture.
+    pub fn window(&self, part: &Rectangle) -> Window {
+        borders(&self.view.camera.intrinsics, part)
+    }
+
+    /// Whether any row may see in a window what lies between some places.
+    pub fn may_see_in(&self, window: &Window, places: [Point3<f64>; 8]) -> bool {
         let places = places.map(|p| self.middle.inverse_transform_point(&p).coords);
         let inside = |n: &Vector3<f64>| places.iter().any(|c| n.dot(c) > -self.slack_m(c));
-        inside(&Vector3::z()) && self.borders.iter().all(inside)
+        inside(&Vector3::z()) && window.iter().all(inside)
     }
 
     /// How far a place in the camera's frame in mid-frame may be from where another row has it.
@@ -193,12 +208,13 @@ impl<'a> Framed<'a> {
     }
 }
 
-/// See [`Framed`]. A lens that bends lines bows the borders.
-fn borders(lens: &Intrinsics) -> [Vector3<f64>; 4] {
-    let far = [lens.width_px, lens.height_px].map(|n| f64::from(n) - 0.5);
+/// A lens that bends lines bows the borders.
+fn borders(lens: &Intrinsics, part: &Rectangle) -> Window {
+    let near = part.at.map(|n| f64::from(n) - 0.5);
+    let far = part.ends().map(|n| f64::from(n) - 0.5);
     let along = |k: usize| {
         let share = |i: usize| i as f64 / (BORDER_PLACES - 1) as f64;
-        std::array::from_fn(|i| -0.5 + (far[k] + 0.5) * share(i))
+        std::array::from_fn(|i| near[k] + (far[k] - near[k]) * share(i))
     };
     let (us, vs): ([f64; BORDER_PLACES], [f64; BORDER_PLACES]) = (along(0), along(1));
     let column = |u: f64| vs.map(|v| lens.ray(u, v).x);
@@ -206,9 +222,9 @@ fn borders(lens: &Intrinsics) -> [Vector3<f64>; 4] {
     let least = |x: [f64; BORDER_PLACES]| x.into_iter().fold(f64::INFINITY, f64::min);
     let most = |x: [f64; BORDER_PLACES]| x.into_iter().fold(f64::NEG_INFINITY, f64::max);
     [
-        Vector3::new(1.0, 0.0, -least(column(-0.5))),
+        Vector3::new(1.0, 0.0, -least(column(near[0]))),
         Vector3::new(-1.0, 0.0, most(column(far[0]))),
-        Vector3::new(0.0, 1.0, -least(row(-0.5))),
+        Vector3::new(0.0, 1.0, -least(row(near[1]))),
         Vector3::new(0.0, -1.0, most(row(far[1]))),
     ]
     .map(|n| n.normalize())

@@ -4,8 +4,8 @@
 
 use super::casts::{self, Bodies, Cast};
 use super::occluder::LinesCut;
-use super::region::Region;
-use super::tiles::Eyes;
+use crate::twin::render::gpu::region::Region;
+use crate::twin::render::gpu::tiles::Eyes;
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::light_source::LightSource;

@@ -1,9 +1,9 @@
 //! Which lights may throw the shadow of which body where: by balls and cones, generously.
 
 use super::occluder::Occluder;
-use super::region::Region;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::render::gpu::layout::{MAX_BLOCKERS, MAX_HEADLIGHTS, MAX_SOURCES};
+use crate::twin::render::gpu::region::Region;
 use crate::twin::render::gpu::view::Framed;
 use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::light_source::LightSource;

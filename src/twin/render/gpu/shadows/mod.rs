@@ -12,24 +12,22 @@
 mod candidates;
 mod casts;
 mod occluder;
-mod region;
 mod shader_data;
-mod tiles;
 
 use super::chunks::Chunk;
 use super::detail::CHUNK_M;
 use super::layout::{Blocker, MAX_SLABS, MAX_WORDS, ShadowSource, Slab, Tile};
+use super::region::Region;
+use super::tiles::{Marks, SurfaceCell, TILE_PX, TileBounds};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::geometry::Shape;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use candidates::{Candidates, TileLists, has};
-use region::Region;
 use shader_data::{blocker, source, tile};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-use tiles::{Marks, SurfaceCell, TILE_PX, TileBounds};
 
 /// Cells are no finer than they would be at this distance.
 const NEAREST_M: f64 = 1.0;

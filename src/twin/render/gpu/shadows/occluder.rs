@@ -1,7 +1,7 @@
 //! What convex bodies hide from a light, or from the eye, exactly where balls would be generous.
 
-use super::region::Region;
 use crate::twin::geometry::{Body, Shape};
+use crate::twin::render::gpu::region::Region;
 use nalgebra::{Point3, Vector3};
 
 /// Wider than any scene.

@@ -1,10 +1,10 @@
 //! Tiles, lights and bodies as the shader takes them.
 
 use super::occluder::{Occluder, WIDE_M};
-use super::tiles::TILE_PX;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::render::disc::{DISC_PLACES, disc_points};
 use crate::twin::render::gpu::layout::{Blocker, Corner, ShadowSource, Slab, Tile};
+use crate::twin::render::gpu::tiles::TILE_PX;
 use crate::twin::render::gpu::view::{Framed, single};
 use crate::twin::render::light_source::LightSource;
 use crate::twin::render::scene::Job;

@@ -1,5 +1,6 @@
-//! Tiles of a picture, and what may matter in each: lights, and shadows of bodies.
+//! Pieces of surfaces, and tiles of a picture with what may matter in each: light, lights, shadows.
 
+use super::rectangle::Rectangle;
 use super::region::Region;
 use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
 use crate::twin::geometry::{Body, Solid};
@@ -16,7 +17,8 @@ const BORDER_PX: f64 = 2.0;
 /// Cells that reach behind the camera are looked at in so many points each way.
 const POINTS: i32 = 8;
 
-/// A parallelogram of a surface that may be shaded.
+/// A parallelogram of a surface.
+#[derive(Clone, Debug)]
 pub struct SurfaceCell {
     pub centre: Point3<f64>,
     /// Half of its sides.
@@ -48,7 +50,11 @@ pub struct Marks {
 
 impl SurfaceCell {
     /// That does not move.
-    fn still(centre: Point3<f64>, half: [Vector3<f64>; 2], normal: Option<Vector3<f64>>) -> Self {
+    pub fn still(
+        centre: Point3<f64>,
+        half: [Vector3<f64>; 2],
+        normal: Option<Vector3<f64>>,
+    ) -> Self {
         Self {
             centre,
             half,
@@ -152,6 +158,11 @@ impl SurfaceCell {
             }
         }
         cells
+    }
+
+    /// Its corners.
+    pub fn corners(&self) -> [Point3<f64>; 4] {
+        [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)].map(|(x, y)| self.point(x, y))
     }
 
     fn point(&self, x: f64, y: f64) -> Point3<f64> {
@@ -259,6 +270,19 @@ impl Marks {
         let sets = self.sets.chunks_exact(self.words.max(1));
         sets.zip(0u32..)
             .map(|(set, k)| (k % self.columns, k / self.columns, set))
+    }
+
+    /// Adds numbers to all tiles that have pixels of a part of the picture.
+    pub fn add_part(&mut self, part: &Rectangle, numbers: &[u64]) {
+        if part.is_empty() {
+            return;
+        }
+        let (low, end) = (part.at.map(f64::from), part.ends().map(f64::from));
+        let bounds = TileBounds {
+            low_px: Point2::from(low.map(|x| x + BORDER_PX)),
+            high_px: Point2::from(end.map(|x| x - 1.0 - BORDER_PX)),
+        };
+        self.add(&bounds, numbers);
     }
 
     /// Adds numbers to all tiles that show anything within bounds.

@@ -1,0 +1,262 @@
+//! The parts of a picture that a software adapter draws in full.
+//!
+//! Most of a dark tunnel is less than a grey level bright. What a moving camera sees of it is drawn in
+//! quarter size, and in full only where there is more light ([`LIT_GREY`]), or where something is seen
+//! that the small picture does not have: bodies, shadows, lamps, mirrored light. What a camera at rest sees
+//! is kept from frame to frame, but for just these.
+
+use super::draw_list::DrawList;
+use super::lamps::LampTable;
+use super::rectangle::Rectangle;
+use super::shadows::ViewShadows;
+use super::tiles::{Eyes, Marks, SurfaceCell, TILE_PX, TileBounds};
+use super::view::Framed;
+use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::photometry::headlights_lx;
+use crate::twin::render::scene::Job;
+use nalgebra::{Isometry3, Point2, Point3};
+
+/// Grey levels, on the brightest paint, from which on a moving camera's picture is drawn in full.
+const LIT_GREY: f64 = 1.5;
+/// Grey levels by headlights, on the brightest paint, from which on a picture differs from one that is kept.
+const HEADLIT_GREY: f64 = 0.03;
+/// Where more of the picture than this has to be drawn, all of it is.
+const MOST_SHARE: f64 = 0.6;
+/// Parts that a moving camera's picture is drawn in: each costs a look at everything that may be in it.
+const MOST_PARTS: usize = 2;
+/// So many tell where a camera is through a frame.
+const EYES: usize = 33;
+/// What reaches behind the camera is looked at in quarters, and these in quarters, so many times.
+const QUARTERED: u32 = 4;
+/// What is nearer to the camera's plane is behind it.
+const NEAR_M: f64 = 0.05;
+/// A mark.
+const MARKED: [u64; 1] = [1];
+
+/// A piece of a tunnel's surface.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    pub cell: SurfaceCell,
+    /// More luminance than any of it has by the lamps.
+    pub peak_cd_m2: f32,
+    /// The most luminance that a lux makes there, cd/m^2.
+    pub reflected_per_lx: f32,
+    /// Whether it mirrors.
+    pub glossy: bool,
+}
+
+/// What is known of a view when its parts are chosen.
+pub struct Seen<'a> {
+    pub framed: &'a Framed<'a>,
+    pub job: &'a Job,
+    pub scene: &'a LitScene,
+    pub list: &'a DrawList,
+    pub lamps: &'a LampTable,
+    pub shadows: &'a ViewShadows,
+}
+
+impl Seen<'_> {
+    fn size_px(&self) -> [u32; 2] {
+        let lens = &self.framed.view.camera.intrinsics;
+        [lens.width_px, lens.height_px]
+    }
+
+    /// All of the picture.
+    pub fn whole(&self) -> Vec<Rectangle> {
+        vec![Rectangle::whole(self.size_px())]
+    }
+
+    /// The parts in which a picture differs from one that is kept.
+    pub fn changed(&self) -> Vec<Rectangle> {
+        self.parts(HEADLIT_GREY, false)
+    }
+
+    /// The parts in which a picture differs from a small one.
+    pub fn lit(&self) -> Vec<Rectangle> {
+        self.parts(LIT_GREY, true)
+    }
+
+    /// The parts with more light than so much, by headlights or by lamps too.
+    fn parts(&self, grey: f64, by_lamps: bool) -> Vec<Rectangle> {
+        let [width_px, height_px] = self.size_px();
+        let mut marks = Marks::new((width_px, height_px), 1);
+        let luminance_cd_m2 = grey / self.framed.view.grey_per_cd_m2();
+        self.mark_tunnel(&mut marks, luminance_cd_m2, by_lamps);
+        self.mark_bodies(&mut marks);
+        for tile in &self.shadows.tiles {
+            marks.add_part(&self.between(tile.low_px, tile.high_px), &MARKED);
+        }
+        for lamp in &self.lamps.lamps {
+            marks.add_part(&self.between(lamp.low, lamp.high), &MARKED);
+        }
+        let mut parts = rectangles(&marks, self.size_px());
+        if by_lamps {
+            join(&mut parts);
+        }
+        let drawn: u32 = parts.iter().map(Rectangle::area).sum();
+        if f64::from(drawn) > MOST_SHARE * f64::from(width_px * height_px) {
+            return self.whole();
+        }
+        parts
+    }
+
+    fn between(&self, low: [f32; 2], high: [f32; 2]) -> Rectangle {
+        let [low, high] = [low, high].map(|p| Point2::from(p.map(f64::from)));
+        Rectangle::between(low, high, self.size_px())
+    }
+
+    fn mark_tunnel(&self, marks: &mut Marks, luminance_cd_m2: f64, by_lamps: bool) {
+        let eyes = ShutterEyes::of(self.framed);
+        let eye = (self.framed.reference(), eyes.travel_m());
+        let air = &self.scene.air;
+        for call in self.list.tunnel() {
+            let patches = call.chunk.iter().flat_map(|c| &c.parts[call.part].patches);
+            for patch in patches {
+                let bright = |p: &Point3<f64>| {
+                    let normal = patch.cell.normal.unwrap_or_default();
+                    let lux = headlights_lx(&self.job.headlights, air, p, &normal);
+                    lux * f64::from(patch.reflected_per_lx) > luminance_cd_m2
+                };
+                let lit = by_lamps && f64::from(patch.peak_cd_m2) > luminance_cd_m2;
+                let mirrors = patch.glossy && !call.glossy.is_empty();
+                let drawn = lit
+                    || mirrors
+                    || call.headlit
+                        && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
+                if drawn && !patch.cell.turns_away(eye) {
+                    eyes.mark(marks, &patch.cell, self.size_px(), QUARTERED);
+                }
+            }
+        }
+    }
+
+    fn mark_bodies(&self, marks: &mut Marks) {
+        let eyes = Eyes::of(self.framed, self.job.time);
+        for body in &self.job.bodies {
+            marks.add(&TileBounds::of_body(self.framed, &eyes, body), &MARKED);
+        }
+        let moving = self.list.moving;
+        if moving != Rectangle::whole(self.size_px()) {
+            marks.add_part(&moving, &MARKED);
+        }
+    }
+}
+
+/// Where a camera is while it exposes its rows: `camera_from_world` at equal steps through the frame.
+struct ShutterEyes<'a> {
+    framed: &'a Framed<'a>,
+    poses: Vec<Isometry3<f64>>,
+    step_s: f64,
+}
+
+impl<'a> ShutterEyes<'a> {
+    fn of(framed: &'a Framed<'a>) -> Self {
+        let view = framed.view;
+        let span_s = (view.camera.shutter).frame_span_s(view.camera.intrinsics.height_px);
+        let count = if view.motion.poses.len() > 1 { EYES } else { 1 };
+        let step_s = span_s / (count.max(2) - 1) as f64;
+        let at = |k: usize| view.motion.pose_at(view.start.plus(k as f64 * step_s));
+        Self {
+            framed,
+            poses: (0..count).map(|k| at(k).inverse()).collect(),
+            step_s,
+        }
+    }
+
+    fn travel_m(&self) -> f64 {
+        let from = self.framed.reference();
+        let away = |eye: &Isometry3<f64>| (eye * from).coords.norm();
+        self.poses.iter().map(away).fold(0.0, f64::max)
+    }
+
+    fn at(&self, s: f64) -> &Isometry3<f64> {
+        let last = self.poses.len() - 1;
+        &self.poses[((s / self.step_s).round().max(0.0) as usize).min(last)]
+    }
+
+    /// Where a place is seen, by the row that sees it, when its exposure begins and ends.
+    fn seen(&self, place: &Point3<f64>) -> Option<[Point2<f64>; 2]> {
+        let camera = &self.framed.view.camera;
+        let project = |s: f64| {
+            let place = self.at(s) * place;
+            (place.z > NEAR_M).then(|| camera.intrinsics.project(&place))?
+        };
+        let rows = f64::from(camera.intrinsics.height_px);
+        let half_s = 0.5 * camera.shutter.exposure_s;
+        let mut row = 0.5 * rows;
+        for _ in 0..2 {
+            row = project(camera.shutter.delay_s(row) + half_s)?
+                .y
+                .clamp(0.0, rows);
+        }
+        let open_s = camera.shutter.delay_s(row);
+        Some([project(open_s)?, project(open_s + 2.0 * half_s)?])
+    }
+
+    /// Marks the tiles in which a cell is seen.
+    fn mark(&self, marks: &mut Marks, cell: &SurfaceCell, size_px: [u32; 2], quartered: u32) {
+        let seen = cell.corners().map(|corner| self.seen(&corner));
+        if seen.iter().all(Option::is_none) {
+            return;
+        }
+        if seen.iter().any(Option::is_none) && quartered > 0 {
+            for quarter in cell.quarters() {
+                self.mark(marks, &quarter, size_px, quartered - 1);
+            }
+            return;
+        }
+        let none = (Point2::from([f64::MAX; 2]), Point2::from([f64::MIN; 2]));
+        let (low, high) = (seen.iter().flatten().flatten())
+            .fold(none, |(low, high), p| (low.inf(p), high.sup(p)));
+        marks.add_part(&Rectangle::between(low, high, size_px), &MARKED);
+    }
+}
+
+/// The tiles with a mark, as rectangles: runs along a row, and runs of the same columns below each other.
+fn rectangles(marks: &Marks, size_px: [u32; 2]) -> Vec<Rectangle> {
+    let mut runs: Vec<Rectangle> = Vec::new();
+    for (column, row, set) in marks.tiles() {
+        if set.first().is_none_or(|word| *word == 0) {
+            continue;
+        }
+        let at = [column, row].map(|k| k * TILE_PX);
+        match runs.last_mut() {
+            Some(run) if run.at[1] == at[1] && run.ends()[0] == at[0] => run.size[0] += TILE_PX,
+            _ => runs.push(Rectangle {
+                at,
+                size: [TILE_PX; 2],
+            }),
+        }
+    }
+    let mut parts: Vec<Rectangle> = Vec::new();
+    for run in runs {
+        let above = |part: &&mut Rectangle| {
+            part.ends()[1] == run.at[1] && part.at[0] == run.at[0] && part.size[0] == run.size[0]
+        };
+        match parts.iter_mut().rev().find(above) {
+            Some(part) => part.size[1] += TILE_PX,
+            None => parts.push(run),
+        }
+    }
+    let whole = Rectangle::whole(size_px);
+    parts.iter().map(|part| part.overlap(&whole)).collect()
+}
+
+/// Joins parts that it costs least to join while there are too many.
+fn join(parts: &mut Vec<Rectangle>) {
+    while parts.len() > MOST_PARTS {
+        let mut least = (i64::MAX, 0, 0);
+        for i in 1..parts.len() {
+            for j in 0..i {
+                let area = |r: &Rectangle| i64::from(r.area());
+                let (a, b) = (&parts[i], &parts[j]);
+                let more = area(&a.around(b)) - area(a) - area(b);
+                least = least.min((more, i, j));
+            }
+        }
+        let (_, i, j) = least;
+        let joined = parts[i].around(&parts[j]);
+        parts[j] = joined;
+        parts.swap_remove(i);
+    }
+}

@@ -1,0 +1,39 @@
+//! What is on its way back of a view.
+
+use super::signal_back::SignalBack;
+use super::target::ReadBack;
+use crate::twin::render::RenderError;
+use image::{ImageBuffer, Luma, Primitive};
+
+/// Digital numbers, or what is kept of them.
+pub type Image<T> = ImageBuffer<Luma<T>, Vec<T>>;
+
+/// Where a view's picture comes back.
+pub enum Back {
+    /// As the adapter has developed it.
+    Image(ReadBack),
+    /// As a signal, to be developed here.
+    Signal(Box<SignalBack>),
+}
+
+impl Back {
+    /// Asks for access as soon as the adapter is done. Whether that went well shows in `image`.
+    pub fn request(&self) {
+        match self {
+            Self::Image(back) => back.request(),
+            Self::Signal(back) => back.request(),
+        }
+    }
+
+    /// The image, of which `keep` says what is kept of each digital number, once the adapter is done; gives
+    /// the buffer free.
+    pub fn image<T: Primitive + Send>(
+        &self,
+        keep: impl Fn(u32) -> T + Copy + Sync,
+    ) -> Result<Image<T>, RenderError> {
+        match self {
+            Self::Image(back) => back.image(keep),
+            Self::Signal(back) => back.image(keep),
+        }
+    }
+}

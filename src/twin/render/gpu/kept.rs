@@ -1,0 +1,133 @@
+//! What cameras at rest see of the tunnel, kept from frame to frame.
+//!
+//! Each pixel keeps its steady light and that of the lamp whose blinking shows there, apart, so the picture
+//! of any exposure is steady + share * blinking, with the share of the row. Headlights, bodies, shadows and
+//! mirrored light come on top.
+
+use super::signal_back::{Piece, widen};
+use super::target::kept_texture;
+use super::texture::Texture;
+use super::view::Framed;
+use super::{adapter::Gpu, pipeline};
+use crate::bus::Intrinsics;
+use crate::twin::render::cache::Cache;
+use nalgebra::Isometry3;
+use std::ops::Range;
+use std::sync::{Arc, OnceLock};
+
+/// Cameras whose tunnel is kept.
+pub const MOST_KEPT: usize = 4;
+
+/// Tunnels as seen.
+pub type KeptTunnels = Cache<KeptKey, KeptTunnel>;
+
+/// What the picture of a tunnel depends on, but for blinking and headlights.
+#[derive(Clone, Debug, PartialEq)]
+pub struct KeptKey {
+    lens: Intrinsics,
+    pose: Isometry3<f64>,
+    electrons_per_cd_m2: f64,
+    grey_per_cd_m2: f64,
+}
+
+impl KeptKey {
+    /// Of a view; none where the camera moves.
+    pub fn of(framed: &Framed<'_>) -> Option<Self> {
+        let view = framed.view;
+        (view.motion.poses.len() == 1).then(|| Self {
+            lens: view.camera.intrinsics,
+            pose: framed.middle,
+            electrons_per_cd_m2: view.electrons_per_cd_m2(),
+            grey_per_cd_m2: view.grey_per_cd_m2(),
+        })
+    }
+}
+
+/// A tunnel on the adapter, and in memory as soon as it has come back.
+pub struct KeptTunnel {
+    /// Steady and blinking light, electrons.
+    pub light: Texture,
+    /// The lamp's row in the table of shares.
+    pub lamp: Texture,
+    pub depth: Texture,
+    /// The same in memory.
+    pub planes: Arc<OnceLock<Planes>>,
+}
+
+impl KeptTunnel {
+    /// Nothing yet.
+    pub fn new(gpu: &Gpu, size_px: (u32, u32)) -> Self {
+        let texture = |format| kept_texture(&gpu.device, size_px, format);
+        Self {
+            light: texture(pipeline::LIGHT),
+            lamp: texture(pipeline::LAMP),
+            depth: texture(pipeline::DEPTH),
+            planes: Arc::default(),
+        }
+    }
+}
+
+/// A kept tunnel in memory.
+pub struct Planes {
+    width: usize,
+    /// In half precision, row by row.
+    steady: Vec<u16>,
+    blinking: Vec<u16>,
+    /// Pixels in a row with the same lamp, each as its end and the lamp's row in the table of shares.
+    runs: Vec<(usize, usize)>,
+    /// Those of each row.
+    rows: Vec<Range<usize>>,
+}
+
+impl Planes {
+    /// From textures that have come back.
+    pub fn of(bytes: &[u8], [light, lamp]: [&Piece; 2]) -> Self {
+        let [width, height] = light.part.size.map(|n| n as usize);
+        let mut planes = Self {
+            width,
+            steady: Vec::with_capacity(width * height),
+            blinking: Vec::with_capacity(width * height),
+            runs: Vec::new(),
+            rows: Vec::with_capacity(height),
+        };
+        for v in 0..height as u32 {
+            let (pairs, _) = light.row(bytes, v).as_chunks::<2>();
+            planes
+                .steady
+                .extend(pairs.iter().map(|p| u16::from_le_bytes(p[0])));
+            (planes.blinking).extend(pairs.iter().map(|p| u16::from_le_bytes(p[1])));
+            let first = planes.runs.len();
+            let mut lamps = lamp
+                .row(bytes, v)
+                .iter()
+                .map(|word| u16::from_le_bytes(*word));
+            let mut of_run = lamps.next().unwrap_or(0);
+            for (u, lamp) in (1..).zip(lamps) {
+                if lamp != of_run {
+                    planes.runs.push((u, usize::from(of_run)));
+                    of_run = lamp;
+                }
+            }
+            planes.runs.push((width, usize::from(of_run)));
+            planes.rows.push(first..planes.runs.len());
+        }
+        planes
+    }
+
+    /// The signal of row `v` under these shares, of which each lamp has one for each of `rows` rows.
+    #[inline(always)]
+    pub fn row(&self, v: usize, shares: &[f32], out: &mut [f32]) {
+        let height = self.rows.len();
+        let row = v * self.width..(v + 1) * self.width;
+        let (steady, blinking) = (&self.steady[row.clone()], &self.blinking[row]);
+        let mut from = 0;
+        for (end, lamp) in &self.runs[self.rows[v].clone()] {
+            let share = shares.get(lamp * height + v).copied().unwrap_or(1.0);
+            let pixels = steady[from..*end].iter().zip(&blinking[from..*end]);
+            for (to, (steady, blinking)) in out[from..*end].iter_mut().zip(pixels) {
+                *to = widen(*steady) + share * widen(*blinking);
+            }
+            from = *end;
+        }
+    }
+}

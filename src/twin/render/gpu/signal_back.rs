@@ -1,0 +1,323 @@
+//! A view's signal on its way back to memory, in layers, and what becomes of it there: where a part of the
+//! picture was drawn in full, that; elsewhere what lies under it, a small picture or a tunnel that is kept;
+//! glare on top.
+
+use super::adapter::Gpu;
+use super::back::Image;
+use super::kept::{KeptTunnel, Planes};
+use super::prepared::PreparedView;
+use super::rectangle::Rectangle;
+use super::target::{COARSE_PX, ViewTarget};
+use super::texture::Texture;
+use super::upload::empty_buffer;
+use crate::twin::render::RenderError;
+use crate::twin::render::develop::Developer;
+use crate::twin::render::pixel_map::PixelMap;
+use image::{ImageBuffer, Primitive};
+use pulp::{Arch, Simd, WithSimd};
+use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
+
+/// Pieces begin at multiples of this.
+const ALIGNMENT: u64 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as u64;
+
+/// A part of a texture in a buffer.
+pub struct Piece {
+    pub part: Rectangle,
+    offset: u64,
+    stride: u32,
+    words_a_texel: u32,
+}
+
+impl Piece {
+    /// The 16-bit words of row `v` of the texture.
+    #[inline(always)]
+    pub fn row<'b>(&self, bytes: &'b [u8], v: u32) -> &'b [[u8; 2]] {
+        let row = u64::from(v - self.part.at[1]) * u64::from(self.stride);
+        let length = 2 * (self.words_a_texel * self.part.size[0]) as usize;
+        let bytes = &bytes[(self.offset + row) as usize..][..length];
+        bytes.as_chunks().0
+    }
+
+    fn has_row(&self, v: u32) -> bool {
+        (self.part.at[1]..self.part.ends()[1]).contains(&v)
+    }
+}
+
+/// Where pieces are to lie in a buffer.
+#[derive(Default)]
+pub struct Pieces<'t> {
+    copies: Vec<(&'t Texture, Rectangle, u64, u32)>,
+    size: u64,
+}
+
+impl<'t> Pieces<'t> {
+    /// Room for one of a texture with so many 16-bit words a texel.
+    pub fn add(&mut self, texture: &'t Texture, part: Rectangle, words_a_texel: u32) -> Piece {
+        let stride = (2 * words_a_texel * part.size[0]).next_multiple_of(ALIGNMENT as u32);
+        let offset = self.size;
+        self.copies.push((texture, part, offset, stride));
+        self.size += u64::from(stride) * u64::from(part.size[1]);
+        Piece {
+            part,
+            offset,
+            stride,
+            words_a_texel,
+        }
+    }
+
+    /// Copies all of them, into one of the buffers that are free if it is large enough.
+    pub fn copy(
+        self,
+        device: &wgpu::Device,
+        encoder: &mut wgpu::CommandEncoder,
+        free: &mut Vec<wgpu::Buffer>,
+    ) -> wgpu::Buffer {
+        let enough = free.iter().position(|buffer| buffer.size() >= self.size);
+        let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
+        let buffer = enough.map_or_else(
+            || empty_buffer(device, self.size.max(ALIGNMENT), usage),
+            |at| free.swap_remove(at),
+        );
+        for (texture, part, offset, stride) in self.copies {
+            texture.copy_part_to_buffer(part, &buffer, (offset, stride), encoder);
+        }
+        buffer
+    }
+}
+
+/// What lies under the parts that were drawn.
+pub enum Under {
+    /// Nothing: all of the picture was drawn.
+    Nothing,
+    /// A picture in texels of [`COARSE_PX`].
+    Coarse(Piece),
+    /// A tunnel that is kept, under shares of its lamps; with steady light and lamps if they come back now.
+    Kept(Arc<OnceLock<Planes>>, Vec<f32>, Option<[Piece; 2]>),
+}
+
+/// See the module's page.
+pub struct SignalBack {
+    pub buffer: wgpu::Buffer,
+    pub size_px: (u32, u32),
+    pub parts: Vec<Piece>,
+    pub under: Under,
+    pub glare: Piece,
+    pub map: Arc<PixelMap>,
+    pub developer: Developer,
+}
+
+impl SignalBack {
+    /// Records the copies of what was drawn of a view; of a tunnel that is kept too, if that is new.
+    pub fn of(
+        gpu: &Gpu,
+        (encoder, free): (&mut wgpu::CommandEncoder, &mut Vec<wgpu::Buffer>),
+        target: &ViewTarget,
+        view: PreparedView,
+        kept: Option<(&KeptTunnel, bool)>,
+        (map, developer): (&Arc<PixelMap>, Developer),
+    ) -> Self {
+        let mut pieces = Pieces::default();
+        let under = match (kept, &view.coarse) {
+            (Some((kept, new)), _) => {
+                let textures = [(&kept.light, 2), (&kept.lamp, 1)];
+                let made = new.then(|| textures.map(|(t, words)| pieces.add(t, t.whole(), words)));
+                Under::Kept(Arc::clone(&kept.planes), view.list.shares, made)
+            }
+            (None, Some(_)) => {
+                let coarse = &target.coarse[0].signal;
+                Under::Coarse(pieces.add(coarse, coarse.whole(), 1))
+            }
+            (None, None) => Under::Nothing,
+        };
+        let parts = view.areas.iter().map(|area| area.part);
+        let parts = parts.map(|part| pieces.add(&target.layers.signal, part, 1));
+        Self {
+            size_px: target.size_px,
+            parts: parts.collect(),
+            under,
+            glare: pieces.add(&target.glare, target.glare.whole(), 1),
+            map: Arc::clone(map),
+            developer,
+            buffer: pieces.copy(&gpu.device, encoder, free),
+        }
+    }
+
+    /// Asks for access as soon as the copies are done.
+    pub fn request(&self) {
+        self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+    }
+
+    /// The finished image, of which `keep` says what is kept of each digital number. Gives the buffer free.
+    pub fn image<T: Primitive + Send>(
+        &self,
+        keep: impl Fn(u32) -> T + Copy + Sync,
+    ) -> Result<Image<T>, RenderError> {
+        let broken = || RenderError::Device("an image came back too short".into());
+        let (width, height) = self.size_px;
+        let mut image = vec![T::DEFAULT_MIN_VALUE; width as usize * height as usize];
+        {
+            let bytes = (self.buffer.get_mapped_range(..))
+                .map_err(|e| RenderError::Device(e.to_string()))?;
+            let bytes: &[u8] = &bytes;
+            let kept = match &self.under {
+                Under::Kept(planes, shares, made) => {
+                    if let Some([light, lamp]) = made {
+                        planes.get_or_init(|| Planes::of(bytes, [light, lamp]));
+                    }
+                    Some((planes.get().ok_or_else(broken)?, &shares[..]))
+                }
+                _ => None,
+            };
+            let arch = Arch::new();
+            let rows = image.par_chunks_mut((width as usize).max(1)).enumerate();
+            rows.for_each_init(
+                || RowBuffers::new(width as usize),
+                |buffers, (v, out)| {
+                    arch.dispatch(Row {
+                        back: self,
+                        bytes,
+                        kept,
+                        v,
+                        buffers,
+                        out,
+                        keep,
+                    });
+                },
+            );
+        }
+        self.buffer.unmap();
+        ImageBuffer::from_raw(width, height, image).ok_or_else(broken)
+    }
+}
+
+/// What a thread works in.
+struct RowBuffers {
+    signals_e: Vec<f32>,
+    /// A row of a small picture, with its ends once more.
+    coarse_e: Vec<f32>,
+}
+
+impl RowBuffers {
+    fn new(width: usize) -> Self {
+        let texels = width.div_ceil(COARSE_PX as usize);
+        Self {
+            signals_e: vec![0.0; texels * COARSE_PX as usize],
+            coarse_e: vec![0.0; texels + 2],
+        }
+    }
+}
+
+/// A row of the image.
+struct Row<'a, T, F> {
+    back: &'a SignalBack,
+    bytes: &'a [u8],
+    /// A tunnel that lies under the parts, and the shares of its lamps.
+    kept: Option<(&'a Planes, &'a [f32])>,
+    v: usize,
+    buffers: &'a mut RowBuffers,
+    out: &'a mut [T],
+    keep: F,
+}
+
+impl<T, F: Fn(u32) -> T> WithSimd for Row<'_, T, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _: S) {
+        let (back, v) = (self.back, self.v);
+        let RowBuffers {
+            signals_e,
+            coarse_e,
+        } = self.buffers;
+        if let Some((planes, shares)) = self.kept {
+            planes.row(v, shares, signals_e);
+        }
+        if let Under::Coarse(piece) = &back.under {
+            enlarge(piece, self.bytes, v, coarse_e, signals_e);
+        }
+        for piece in back.parts.iter().filter(|piece| piece.has_row(v as u32)) {
+            let [from, end] = [piece.part.at[0], piece.part.ends()[0]].map(|u| u as usize);
+            let words = piece.row(self.bytes, v as u32);
+            for (to, word) in signals_e[from..end].iter_mut().zip(words) {
+                *to = widen(u16::from_le_bytes(*word));
+            }
+        }
+        add_glare(back.glare.row(self.bytes, v as u32), signals_e);
+        let words = back.map.row(v);
+        let signals_e = &signals_e[..self.out.len()];
+        back.developer.row(v, signals_e, words, self.out, self.keep);
+    }
+}
+
+/// A non-negative number in half precision. What is infinite there is 65536.
+#[inline(always)]
+pub fn widen(half: u16) -> f32 {
+    // The exponent counts from 15 there, from 127 here: times 2^112.
+    f32::from_bits(u32::from(half & 0x7fff) << 13) * f32::from_bits((112 + 127) << 23)
+}
+
+/// Row `v` of a picture from one in texels of [`COARSE_PX`], straight between their middles.
+#[inline(always)]
+fn enlarge(piece: &Piece, bytes: &[u8], v: usize, coarse_e: &mut [f32], out: &mut [f32]) {
+    let down = (v as f32 + 0.5) / COARSE_PX as f32 - 0.5;
+    let last = piece.part.size[1] as i32 - 1;
+    let above = down.floor();
+    let [a, b] = [0, 1].map(|k| piece.row(bytes, (above as i32 + k).clamp(0, last) as u32));
+    let share = down - above;
+    let texels = a.len();
+    let inner = &mut coarse_e[1..=texels];
+    for (to, (a, b)) in inner.iter_mut().zip(a.iter().zip(b)) {
+        let [a, b] = [a, b].map(|word| widen(u16::from_le_bytes(*word)));
+        *to = a + (b - a) * share;
+    }
+    coarse_e[0] = coarse_e[1];
+    coarse_e[texels + 1] = coarse_e[texels];
+    let (fours, _) = out.as_chunks_mut::<{ COARSE_PX as usize }>();
+    let (before, after) = (&coarse_e[..texels], &coarse_e[2..]);
+    let near = before.iter().zip(&coarse_e[1..]).zip(after);
+    for (four, ((before, here), after)) in fours.iter_mut().zip(near) {
+        let (left, right) = (before - here, after - here);
+        four[0] = here + 0.375 * left;
+        four[1] = here + 0.125 * left;
+        four[2] = here + 0.125 * right;
+        four[3] = here + 0.375 * right;
+    }
+}
+
+/// Adds glare, which has a texel for every fourth pixel and one more.
+#[inline(always)]
+fn add_glare(words: &[[u8; 2]], out: &mut [f32]) {
+    let (fours, _) = out.as_chunks_mut::<4>();
+    let pairs = words.iter().zip(&words[1..]);
+    for (four, (here, next)) in fours.iter_mut().zip(pairs) {
+        let [here, next] = [here, next].map(|word| widen(u16::from_le_bytes(*word)));
+        let step = 0.25 * (next - here);
+        four[0] += here;
+        four[1] += here + step;
+        four[2] += here + 2.0 * step;
+        four[3] += here + 3.0 * step;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wrong exponent, or small numbers lost.
+    #[test]
+    fn halves_keep_their_value() {
+        for (half, value) in [
+            (0, 0.0),
+            (1, 5.960_464_5e-8),
+            (0x03ff, 6.097_555e-5),
+            (0x3c00, 1.0),
+            (0x3555, 0.333_251_95),
+            (0x7bff, 65_504.0),
+            (0x7c00, 65_536.0),
+        ] {
+            assert!((widen(half) / f32::max(value, 1e-30) - 1.0).abs() < 1e-6 || value <= 0.0);
+        }
+        assert!(widen(0).abs() < 1e-30);
+    }
+}
