@@ -34,6 +34,9 @@ use schemars::JsonSchema;
 /// [`SensorSettings::bits`], in the low bits. A colour sensor's is the mosaic.
 pub type RawImage = ImageBuffer<Luma<u16>, Vec<u16>>;
 
+/// Digital numbers, or what is kept of them.
+type Image<T> = ImageBuffer<Luma<T>, Vec<T>>;
+
 /// Which renderer drew, for the summary.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize, JsonSchema)]
 pub struct Backend {

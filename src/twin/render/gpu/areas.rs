@@ -33,18 +33,6 @@ const NEAR_M: f64 = 0.05;
 /// A mark.
 const MARKED: [u64; 1] = [1];
 
-/// A piece of a tunnel's surface.
-#[derive(Clone, Debug)]
-pub struct Patch {
-    pub cell: SurfaceCell,
-    /// More luminance than any of it has by the lamps.
-    pub peak_cd_m2: f32,
-    /// The most luminance that a lux makes there, cd/m^2.
-    pub reflected_per_lx: f32,
-    /// Whether it mirrors.
-    pub glossy: bool,
-}
-
 /// What is known of a view when its parts are chosen.
 pub struct Seen<'a> {
     pub framed: &'a Framed<'a>,

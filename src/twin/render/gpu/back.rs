@@ -2,11 +2,8 @@
 
 use super::signal_back::SignalBack;
 use super::target::ReadBack;
-use crate::twin::render::RenderError;
-use image::{ImageBuffer, Luma, Primitive};
-
-/// Digital numbers, or what is kept of them.
-pub type Image<T> = ImageBuffer<Luma<T>, Vec<T>>;
+use crate::twin::render::{Image, RenderError};
+use image::Primitive;
 
 /// Where a view's picture comes back.
 pub enum Back {

@@ -4,7 +4,7 @@
 //! of any exposure is steady + share * blinking, with the share of the row. Headlights, bodies, shadows and
 //! mirrored light come on top.
 
-use super::signal_back::{Piece, widen};
+use super::pieces::{Piece, widen};
 use super::target::kept_texture;
 use super::texture::Texture;
 use super::view::Framed;

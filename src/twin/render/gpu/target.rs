@@ -1,13 +1,12 @@
 //! What the passes draw into, and the way back to memory.
 
 use super::adapter::Gpu;
-use super::back::Image;
 use super::pipeline::{DEPTH, RAW, SIGNAL};
 use super::texture::Texture;
 use super::upload::empty_buffer;
-use crate::twin::render::RenderError;
 use crate::twin::render::constants::GLARE_STEP_PX;
 use crate::twin::render::pixel_map::PixelMap;
+use crate::twin::render::{Image, RenderError};
 use image::{ImageBuffer, Primitive};
 use std::cell::OnceCell;
 

@@ -1,10 +1,10 @@
 //! Tunnel and rails cut into chunks along the line, lit by the lamps, each meshed once.
 
-use super::areas::Patch;
 use super::detail::{CHUNK_M, ChunkKey, Cutting, Detail, finer_stations, stations};
 use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
+use super::patch::Patch;
 use super::tiles::SurfaceCell;
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
 use crate::twin::geometry::STATION_STEP_M;
