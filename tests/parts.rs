@@ -25,9 +25,17 @@ const ENOUGH: &str = "seen enough";
 const DN_PER_GREY: f64 = 16.0;
 
 /// Shipped scenarios whose first seconds do not show what comes later, and what else is to be seen: a train
-/// in the light of whose headlights a wayside camera is, exposures in which the train moves far.
-const CHANGED: [(&str, &[&str]); 3] = [
+/// in the light of whose headlights a wayside camera is, also behind a lens that bends lines; exposures in which
+/// the train moves far.
+const CHANGED: [(&str, &[&str]); 4] = [
     ("forgotten_toolbox", &["train.start_chainage_m=1455.0"]),
+    (
+        "forgotten_toolbox",
+        &[
+            "train.start_chainage_m=1455.0",
+            "wayside=[{device=\"W1530\", camera={frames_per_s=10.0, distortion={k1=-0.1}}}]",
+        ],
+    ),
     ("line_run", &["rig.exposure_us=2000.0"]),
     ("line_run", &["rig.yaw_deg=0.0", "rig.exposure_us=100.0"]),
 ];

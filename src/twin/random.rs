@@ -57,6 +57,7 @@ fn unit(low: u32, high: u32) -> f64 {
 }
 
 /// The hash of four words, a bijection; the same in `shaders/`.
+#[inline(always)]
 pub fn pcg4d(v: [u32; 4]) -> [u32; 4] {
     let mut v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
     for round in 0..2 {

@@ -1,5 +1,5 @@
 //! From photo-electrons to digital numbers on the processor, many pixels at a time: for software adapters,
-//! whose shaders take five times as long for it.
+//! whose shaders take longer for it.
 //!
 //! The model is that of [`sensor`](super::sensor), the noise that of `shaders/sensor.wgsl`, number by number
 //! but for the last bits of logarithm and sine. All of it is single precision in loops over slices that
@@ -10,11 +10,11 @@ mod normals;
 
 use super::View;
 use super::gpu::layout::BRIGHTEST_E;
-use super::pixel_map::{Dark, GAIN_STEP, LEVEL_SHIFT};
+use super::pixel_map::{Dark, GAIN_STEP, HOT, LEVEL_SHIFT};
 use normals::{TEXELS, normals};
 
 /// Pixels that are worked at together: four a texel.
-pub const BLOCK_PX: usize = 4 * TEXELS;
+const BLOCK_PX: usize = 4 * TEXELS;
 /// Added to a number below it, it leaves no bits behind the point: 2^23.
 const WHOLE: f32 = 8_388_608.0;
 /// The bits of the number that was added.
@@ -95,7 +95,7 @@ impl Developer {
         let gain = (GAIN_STEP as f32) * (word & 0xffff) as i32 as f32;
         let level = (word as i32 >> LEVEL_SHIFT) as f32;
         // The flag as a number: a choice between two values becomes a slow look-up.
-        let hot = (word >> 16 & 1) as i32 as f32;
+        let hot = ((word / HOT) & 1) as i32 as f32;
         let step_e = self.level_step_e + hot * self.hot_more_e;
         // What half precision ends at may be any amount more.
         let held_e = if signal_e >= BRIGHTEST_E as f32 {

@@ -1,5 +1,6 @@
 //! Normal numbers for many texels at a time: those of `normals` in `shaders/sensor.wgsl`.
 
+use crate::twin::random::pcg4d;
 use std::f32::consts::TAU;
 
 /// Texels that are worked at together. A whole loop over so many becomes vector code; over fewer it would
@@ -35,29 +36,16 @@ pub fn normals(key: [u32; 3], counter: u32, out: &mut [f32; 4 * TEXELS]) {
     }
 }
 
-/// pcg4d of the key and each counter, see twin/random.rs.
+/// The words of each counter.
 #[inline(always)]
 fn words([x, y, z]: [u32; 3], counter: u32) -> [[u32; TEXELS]; 4] {
-    let step = |v: u32| v.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-    let (x, y, z) = (step(x), step(y), step(z));
     let mut all = [[0; TEXELS]; 4];
     let [to_a, to_b, to_c, to_d] = &mut all;
     for k in 0..TEXELS {
-        let w = step(counter.wrapping_add(k as u32));
-        let [a, b, c, d] = mixed([x, y, z, w]).map(|v| v ^ (v >> 16));
-        let [a, b, c, d] = mixed([a, b, c, d]);
+        let [a, b, c, d] = pcg4d([x, y, z, counter.wrapping_add(k as u32)]);
         (to_a[k], to_b[k], to_c[k], to_d[k]) = (a, b, c, d);
     }
     all
-}
-
-#[inline(always)]
-fn mixed([mut a, mut b, mut c, mut d]: [u32; 4]) -> [u32; 4] {
-    a = a.wrapping_add(b.wrapping_mul(d));
-    b = b.wrapping_add(c.wrapping_mul(a));
-    c = c.wrapping_add(a.wrapping_mul(b));
-    d = d.wrapping_add(b.wrapping_mul(c));
-    [a, b, c, d]
 }
 
 /// The square root of minus twice the logarithm of a number in (0, 1) with the word's upper 24 bits.
@@ -119,7 +107,6 @@ fn sin_cos(word: u32) -> [f32; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::twin::random::pcg4d;
 
     /// A word in another order, a wrong quarter of a turn, a polynomial that is off: each number of many
     /// blocks against double precision.

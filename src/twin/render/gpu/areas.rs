@@ -28,13 +28,16 @@ const MOST_PARTS: usize = 2;
 const EYES: usize = 33;
 /// What reaches behind the camera is looked at in quarters, and these in quarters, so many times.
 const QUARTERED: u32 = 4;
+/// A lens bends the edges of a body out of the rectangle around its corners by less than this share of the
+/// rectangle's longer side.
+const BULGE: f64 = 0.1;
 /// What is nearer to the camera's plane is behind it.
 const NEAR_M: f64 = 0.05;
 /// A mark.
 const MARKED: [u64; 1] = [1];
 
 /// What is known of a view when its parts are chosen.
-pub struct Seen<'a> {
+pub struct PartSearch<'a> {
     pub framed: &'a Framed<'a>,
     pub job: &'a Job,
     pub scene: &'a LitScene,
@@ -43,7 +46,7 @@ pub struct Seen<'a> {
     pub shadows: &'a ViewShadows,
 }
 
-impl Seen<'_> {
+impl PartSearch<'_> {
     fn size_px(&self) -> [u32; 2] {
         let lens = &self.framed.view.camera.intrinsics;
         [lens.width_px, lens.height_px]
@@ -119,13 +122,13 @@ impl Seen<'_> {
     }
 
     fn mark_bodies(&self, marks: &mut Marks) {
-        let eyes = Eyes::of(self.framed, self.job.time);
+        let eyes = Eyes::exposed(self.framed, self.job.time);
+        let bends = !self.framed.view.camera.intrinsics.distortion.is_none();
         for body in &self.job.bodies {
-            marks.add(&TileBounds::of_body(self.framed, &eyes, body), &MARKED);
-        }
-        let moving = self.list.moving;
-        if moving != Rectangle::whole(self.size_px()) {
-            marks.add_part(&moving, &MARKED);
+            let bounds = TileBounds::of_body(self.framed, &eyes, body);
+            // A lens that bends lines lets edges bulge beyond their ends.
+            let bulge = if bends { BULGE } else { 0.0 };
+            marks.add(&bounds.widened(bulge), &MARKED);
         }
     }
 }

@@ -198,12 +198,18 @@ impl<'a> Recorder<'a> {
     fn draw_changed(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
         let (view, target) = (self.view, self.target);
         let level = &view.full;
-        let bound = self.surfaces(level, headlights, surfaces.textures);
-        let background = self.pipelines.background(&self.gpu.device, headlights);
-        let added = [self.bound(level, (&background.headlit, false), surfaces.textures)];
+        let headlit: Vec<_> = view.list.tunnel().filter(|call| call.headlit).collect();
+        let bodies = &view.list.calls[view.list.tunnel().count()..];
+        let (mut added, mut bound) = (Vec::new(), Vec::new());
+        if !headlit.is_empty() {
+            let background = self.pipelines.background(&self.gpu.device, headlights);
+            added.push(self.bound(level, (&background.headlit, false), surfaces.textures));
+        }
+        if !bodies.is_empty() {
+            bound = self.surfaces(level, headlights, surfaces.textures);
+        }
         let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
         let moving = [view.list.moving];
-        let bodies = view.list.calls.iter().skip(view.list.tunnel().count());
         for k in 0..view.list.instants {
             let (layers, parts) = match k {
                 0 => (&target.layers, &parts[..]),
@@ -216,9 +222,8 @@ impl<'a> Recorder<'a> {
                 view.list.moving.clip(&mut pass);
             }
             pass.set_blend_constant(grey(1.0));
-            let headlit = view.list.tunnel().filter(|call| call.headlit);
-            view.draw_instant(&mut pass, k, &added, headlit, surfaces);
-            view.draw_instant(&mut pass, k, &bound, bodies.clone(), surfaces);
+            view.draw_instant(&mut pass, k, &added, headlit.iter().copied(), surfaces);
+            view.draw_instant(&mut pass, k, &bound, bodies.iter(), surfaces);
             drop(pass);
             if k > 0 {
                 self.mix_in(level, [&target.layers, &target.instant], k, &moving);

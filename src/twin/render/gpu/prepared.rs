@@ -1,7 +1,7 @@
 //! All that one view needs on the adapter.
 
 use super::adapter::Gpu;
-use super::areas::Seen;
+use super::areas::PartSearch;
 use super::bodies::BodyMeshes;
 use super::chunks::{AHEAD_M, Chunks};
 use super::draw_list::DrawList;
@@ -90,7 +90,7 @@ impl PreparedView {
         let beyond_m = SQRT_2 * AHEAD_M;
         let lamps = LampTable::new(framed, scene, airlight_cd_m2);
         let shadows = ViewShadows::new(framed, job, scene, &chunks);
-        let seen = Seen {
+        let search = PartSearch {
             framed,
             job,
             scene,
@@ -99,11 +99,11 @@ impl PreparedView {
             shadows: &shadows,
         };
         let parts = match extent {
-            Extent::Whole => seen.whole(),
-            Extent::Lit => seen.lit(),
-            Extent::Changed => seen.changed(),
+            Extent::Whole => search.whole(),
+            Extent::Lit => search.lit(),
+            Extent::Changed => search.changed(),
         };
-        let small = extent == Extent::Lit && parts != seen.whole();
+        let small = extent == Extent::Lit && parts != search.whole();
         let rows = framed.view.camera.intrinsics.height_px;
         Self {
             full: Level {

@@ -103,7 +103,7 @@ impl SignalBack {
             rows.for_each_init(
                 || RowBuffers::new(width as usize),
                 |buffers, (v, out)| {
-                    arch.dispatch(Row {
+                    arch.dispatch(ComposedRow {
                         back: self,
                         bytes,
                         kept,
@@ -138,7 +138,7 @@ impl RowBuffers {
 }
 
 /// A row of the image.
-struct Row<'a, T, F> {
+struct ComposedRow<'a, T, F> {
     back: &'a SignalBack,
     bytes: &'a [u8],
     /// A tunnel that lies under the parts, and the shares of its lamps.
@@ -149,7 +149,7 @@ struct Row<'a, T, F> {
     keep: F,
 }
 
-impl<T, F: Fn(u32) -> T> WithSimd for Row<'_, T, F> {
+impl<T, F: Fn(u32) -> T> WithSimd for ComposedRow<'_, T, F> {
     type Output = ();
 
     #[inline(always)]

@@ -6,7 +6,8 @@ use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
 use crate::twin::geometry::{Body, Solid};
 use crate::twin::render::gpu::layout::NEAR_M;
 use crate::twin::render::gpu::view::Framed;
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
+use std::ops::Range;
 
 /// Side of a tile: over so few pixels a lens's distortion is even.
 pub const TILE_PX: u32 = 32;
@@ -182,6 +183,17 @@ impl Eyes {
         }))
     }
 
+    /// From the opening of the first row to the closing of the last.
+    pub fn exposed(framed: &Framed<'_>, job_time: crate::bus::SimTime) -> Self {
+        let view = framed.view;
+        let rows = view.camera.intrinsics.height_px;
+        let span_s = view.camera.shutter.frame_span_s(rows);
+        Self([0.0, 0.5, 1.0].map(|share| {
+            let at = view.start.plus(share * span_s);
+            (view.motion.pose_at(at).inverse(), at.since(job_time))
+        }))
+    }
+
     /// How far the camera goes from a place, between these rows as it does at them.
     pub fn travel_m(&self, from: &Point3<f64>) -> f64 {
         let away = |(eye, _): &(Isometry3<f64>, f64)| (eye * from).coords.norm();
@@ -250,6 +262,18 @@ impl TileBounds {
         }
         bounds
     }
+
+    /// The same, with a share of the longer side more on every side.
+    pub fn widened(&self, share: f64) -> Self {
+        let size_px = self.high_px - self.low_px;
+        // Nothing, and everything, stay what they are.
+        let longer_px = Some(size_px.max()).filter(|px| px.is_finite());
+        let more = Vector2::repeat(share * longer_px.unwrap_or(0.0));
+        Self {
+            low_px: self.low_px - more,
+            high_px: self.high_px + more,
+        }
+    }
 }
 
 impl Marks {
@@ -277,25 +301,30 @@ impl Marks {
         if part.is_empty() {
             return;
         }
-        let (low, end) = (part.at.map(f64::from), part.ends().map(f64::from));
-        let bounds = TileBounds {
-            low_px: Point2::from(low.map(|x| x + BORDER_PX)),
-            high_px: Point2::from(end.map(|x| x - 1.0 - BORDER_PX)),
-        };
-        self.add(&bounds, numbers);
+        let counts = [self.columns, self.rows];
+        let ends = part.ends();
+        let tiles = [0, 1].map(|k| {
+            let end = ends[k].div_ceil(TILE_PX);
+            part.at[k] / TILE_PX..end.min(counts[k])
+        });
+        self.add_tiles(tiles, numbers);
     }
 
     /// Adds numbers to all tiles that show anything within bounds.
     pub fn add(&mut self, bounds: &TileBounds, numbers: &[u64]) {
-        let range = |k: usize, count: u32| {
+        let counts = [self.columns, self.rows];
+        let tiles = [0, 1].map(|k| {
             let tile = |px: f64| (px / f64::from(TILE_PX)).floor();
             let first = tile(bounds.low_px[k] + 0.5 - BORDER_PX).max(0.0);
-            let end = (tile(bounds.high_px[k] + 0.5 + BORDER_PX) + 1.0).min(f64::from(count));
+            let end = tile(bounds.high_px[k] + 0.5 + BORDER_PX) + 1.0;
             // Nothing where the end comes first.
-            first as u32..end.max(0.0) as u32
-        };
-        let columns = range(0, self.columns);
-        for row in range(1, self.rows) {
+            first as u32..end.min(f64::from(counts[k])).max(0.0) as u32
+        });
+        self.add_tiles(tiles, numbers);
+    }
+
+    fn add_tiles(&mut self, [columns, rows]: [Range<u32>; 2], numbers: &[u64]) {
+        for row in rows {
             for column in columns.clone() {
                 let at = (row * self.columns + column) as usize * self.words;
                 for (word, new) in self.sets[at..].iter_mut().zip(numbers) {
