@@ -1,6 +1,7 @@
 //! The latest few of what is costly to make.
 
 use std::collections::VecDeque;
+use std::convert::Infallible;
 
 /// Values by key; the oldest goes when there are too many.
 pub struct Cache<K, T> {
@@ -24,15 +25,26 @@ impl<K: PartialEq, T> Cache<K, T> {
 
     /// The value of a key, made now if it is new.
     pub fn get(&mut self, key: K, make: impl FnOnce(&K) -> T) -> &T {
+        match self.try_get(key, |key| Ok::<T, Infallible>(make(key))) {
+            Ok(value) => value,
+            Err(never) => match never {},
+        }
+    }
+
+    /// The same of what may fail to be made.
+    pub fn try_get<E>(&mut self, key: K, make: impl FnOnce(&K) -> Result<T, E>) -> Result<&T, E> {
         let known = self.kept.iter().position(|(k, _)| *k == key);
-        let at = known.unwrap_or_else(|| {
-            if self.kept.len() >= self.most {
-                self.kept.pop_front();
+        let at = match known {
+            Some(at) => at,
+            None => {
+                let made = make(&key)?;
+                if self.kept.len() >= self.most {
+                    self.kept.pop_front();
+                }
+                self.kept.push_back((key, made));
+                self.kept.len() - 1
             }
-            let made = make(&key);
-            self.kept.push_back((key, made));
-            self.kept.len() - 1
-        });
-        &self.kept[at].1
+        };
+        Ok(&self.kept[at].1)
     }
 }

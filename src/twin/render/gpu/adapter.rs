@@ -64,6 +64,16 @@ impl Gpu {
         })
     }
 
+    /// Returns when work is done.
+    pub fn wait_for(&self, submission: wgpu::SubmissionIndex) -> Result<(), RenderError> {
+        let wait = wgpu::PollType::Wait {
+            submission_index: Some(submission),
+            timeout: None,
+        };
+        (self.device.poll(wait)).map_err(|e| RenderError::Device(e.to_string()))?;
+        self.check()
+    }
+
     /// The first error that the adapter has reported, if any.
     pub fn check(&self) -> Result<(), RenderError> {
         let failure = self.failure.lock().unwrap_or_else(|e| e.into_inner());

@@ -2,13 +2,14 @@
 
 use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
-use super::kept::KeptTunnel;
+use super::kept::{KeptLayers, KeptTunnel};
 use super::layout::Part;
 use super::prepared::{Level, PreparedView};
-use super::recorder::{BLACK, KEEP, Recorder, grey};
+use super::recorder::{BLACK, KEEP, Passes, Recorder, grey};
 use super::rectangle::Rectangle;
 use super::target::SurfaceLayers;
 use super::textures::Textures;
+use crate::twin::render::RenderError;
 
 /// Tunnel and bodies on the adapter.
 pub struct Surfaces<'a> {
@@ -103,21 +104,15 @@ impl<'a> Recorder<'a> {
 
     /// Tunnel and bodies in the mean over the exposure, under so many headlights; over a tunnel that is kept,
     /// or else over a small picture.
-    pub fn draw_background(
-        &mut self,
-        kept: Option<&KeptTunnel>,
-        headlights: usize,
-        surfaces: &Surfaces<'_>,
-    ) {
-        match (kept, &self.view.coarse) {
-            (Some(kept), _) => self.draw_changed(kept, headlights, surfaces),
-            (None, coarse) => {
-                if let Some(coarse) = coarse {
-                    self.draw_coarse(coarse, headlights, surfaces);
-                }
-                self.draw_afresh(headlights, surfaces);
-            }
+    pub fn draw_background(&mut self, headlights: usize, surfaces: &Surfaces<'_>) {
+        if let Some(kept) = self.kept {
+            self.draw_changed(kept, headlights, surfaces);
+            return;
         }
+        if let Some(coarse) = &self.view.coarse {
+            self.draw_coarse(coarse, headlights, surfaces);
+        }
+        self.draw_afresh(headlights, surfaces);
     }
 
     /// What is drawn in full of a picture of which nothing is kept.
@@ -149,20 +144,6 @@ impl<'a> Recorder<'a> {
 
     /// Leaves nothing in parts of the picture.
     fn clear(&mut self, layers: &SurfaceLayers, parts: &[Rectangle]) {
-        self.fill(layers, parts, &self.pipelines.clear, &[]);
-    }
-
-    /// Draws parts of the picture over all that was there, depths too.
-    fn fill(
-        &mut self,
-        layers: &SurfaceLayers,
-        parts: &[Rectangle],
-        pipeline: &wgpu::RenderPipeline,
-        resources: &[wgpu::BindingResource<'_>],
-    ) {
-        if parts.is_empty() {
-            return;
-        }
         let part = |part: &Rectangle| Part {
             low: part.at.map(|x| x as f32 - 0.5),
             high: part.ends().map(|x| x as f32 - 0.5),
@@ -170,28 +151,36 @@ impl<'a> Recorder<'a> {
             ..Part::default()
         };
         let parts: Vec<_> = parts.iter().map(part).collect();
-        let table = self.gpu.storage(&parts);
-        let resources: Vec<_> = std::iter::once(table.as_entire_binding())
-            .chain(resources.iter().cloned())
-            .collect();
-        let group = self.bind(&self.view.full, pipeline, &resources);
+        let (clear, table) = (&self.pipelines.clear, self.gpu.storage(&parts));
+        let group = self.bind(&self.view.full, clear, &[table.as_entire_binding()]);
         let depth = Some((&layers.depth, wgpu::LoadOp::Load));
-        let mut pass = self.passes.begin("fill", &[(&layers.signal, KEEP)], depth);
-        pass.set_pipeline(pipeline);
+        let mut pass = self.passes.begin("clear", &[(&layers.signal, KEEP)], depth);
+        pass.set_pipeline(clear);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..parts.len() as u32);
     }
 
     /// Draws what a camera at rest sees of the tunnel, to be kept.
-    pub fn draw_kept(&mut self, kept: &KeptTunnel, surfaces: &Surfaces<'_>) {
+    pub fn draw_kept(
+        &self,
+        size_px: (u32, u32),
+        surfaces: &Surfaces<'_>,
+    ) -> Result<KeptTunnel, RenderError> {
         let (view, empty) = (self.view, self.empty());
         let background = self.pipelines.background(&self.gpu.device, 0);
         let bound = [self.bound(&view.full, (&background.split, false), surfaces.textures)];
-        let depth = Some((&kept.depth, wgpu::LoadOp::Clear(0.0)));
-        let targets = [(&kept.light, empty), (&kept.lamp, BLACK)];
-        let mut pass = self.passes.begin("kept", &targets, depth);
-        let calls = view.list.tunnel();
-        view.draw_instant(&mut pass, 0, &bound, calls, surfaces);
+        let layers = KeptLayers::new(self.gpu, size_px);
+        let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
+        let depth = Some((&layers.depth, wgpu::LoadOp::Clear(0.0)));
+        let targets = [(&layers.light, empty), (&layers.lamp, BLACK)];
+        let mut passes = Passes {
+            encoder: &mut encoder,
+            clock: None,
+        };
+        let mut pass = passes.begin("kept", &targets, depth);
+        view.draw_instant(&mut pass, 0, &bound, view.list.tunnel(), surfaces);
+        drop(pass);
+        layers.keep(self.gpu, encoder)
     }
 
     /// The parts of a picture that differ from a tunnel that is kept, in the mean over the exposure.
@@ -199,7 +188,7 @@ impl<'a> Recorder<'a> {
         let (view, target) = (self.view, self.target);
         let level = &view.full;
         let headlit: Vec<_> = view.list.tunnel().filter(|call| call.headlit).collect();
-        let bodies = &view.list.calls[view.list.tunnel().count()..];
+        let bodies = view.list.bodies();
         let (mut added, mut bound) = (Vec::new(), Vec::new());
         if !headlit.is_empty() {
             let background = self.pipelines.background(&self.gpu.device, headlights);
@@ -210,13 +199,21 @@ impl<'a> Recorder<'a> {
         }
         let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
         let moving = [view.list.moving];
+        let restored = |parts: &[Rectangle]| kept.planes.upload(self.gpu, parts, &view.list.shares);
+        let mut under = restored(&parts);
         for k in 0..view.list.instants {
-            let (layers, parts) = match k {
-                0 => (&target.layers, &parts[..]),
-                _ => (&target.instant, &moving[..]),
+            if k == 1 {
+                under = restored(&moving);
+            }
+            let layers = [&target.layers, &target.instant][usize::from(k > 0)];
+            under.copy_to(&layers.signal, self.passes.encoder);
+            let onto = if bodies.is_empty() {
+                &kept.depth
+            } else {
+                layers.depth.copy_from(&kept.depth, self.passes.encoder);
+                &layers.depth
             };
-            self.restore(kept, layers, parts);
-            let depth = Some((&layers.depth, wgpu::LoadOp::Load));
+            let depth = Some((onto, wgpu::LoadOp::Load));
             let mut pass = (self.passes).begin("background", &[(&layers.signal, KEEP)], depth);
             if k > 0 {
                 view.list.moving.clip(&mut pass);
@@ -229,17 +226,6 @@ impl<'a> Recorder<'a> {
                 self.mix_in(level, [&target.layers, &target.instant], k, &moving);
             }
         }
-    }
-
-    /// Brings parts of the picture back as they were kept.
-    fn restore(&mut self, kept: &KeptTunnel, layers: &SurfaceLayers, parts: &[Rectangle]) {
-        let resources = [
-            kept.light.binding(),
-            kept.lamp.binding(),
-            kept.depth.binding(),
-            self.view.full.shares.binding(),
-        ];
-        self.fill(layers, parts, &self.pipelines.restore, &resources);
     }
 
     /// Mixes instant `k` into the mean of those before it, in parts of the picture. A running mean:
@@ -265,7 +251,7 @@ impl<'a> Recorder<'a> {
 
     /// What rail heads and a wet bed mirror, at every instant of the exposure.
     pub fn draw_gloss(&mut self, headlights: usize, surfaces: &Surfaces<'_>) {
-        let (view, list, layers) = (self.view, &self.view.list, &self.target.layers);
+        let (view, list, signal) = (self.view, &self.view.list, &self.target.layers.signal);
         let glossy = list.calls.iter().filter(|call| !call.glossy.is_empty());
         if glossy.clone().next().is_none() {
             return;
@@ -278,8 +264,8 @@ impl<'a> Recorder<'a> {
             mirrored.as_entire_binding(),
         ];
         let group = self.bind(&view.full, &background.gloss, &resources);
-        let depth = Some((&layers.depth, wgpu::LoadOp::Load));
-        let mut pass = self.passes.begin("gloss", &[(&layers.signal, KEEP)], depth);
+        let depth = Some((self.depth(), wgpu::LoadOp::Load));
+        let mut pass = self.passes.begin("gloss", &[(signal, KEEP)], depth);
         pass.set_pipeline(&background.gloss);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));

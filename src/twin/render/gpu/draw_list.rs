@@ -81,6 +81,11 @@ impl DrawList {
         self.calls.iter().take_while(|call| call.chunk.is_some())
     }
 
+    /// What it draws of the bodies.
+    pub fn bodies(&self) -> &[DrawCall] {
+        &self.calls[self.tunnel().count()..]
+    }
+
     /// Numbers of the draw calls that may show in a part of the picture.
     pub fn seen_in(&self, framed: &Framed<'_>, part: &Rectangle) -> Vec<usize> {
         let window = framed.window(part);

@@ -4,16 +4,20 @@
 //! of any exposure is steady + share * blinking, with the share of the row. Headlights, bodies, shadows and
 //! mirrored light come on top.
 
-use super::pieces::{Piece, widen};
+use super::layout::BRIGHTEST_E;
+use super::pieces::{Piece, Pieces, Uploaded, narrow, widen};
+use super::rectangle::Rectangle;
 use super::target::kept_texture;
 use super::texture::Texture;
 use super::view::Framed;
 use super::{adapter::Gpu, pipeline};
 use crate::bus::Intrinsics;
+use crate::twin::render::RenderError;
 use crate::twin::render::cache::Cache;
 use nalgebra::Isometry3;
+use pulp::Arch;
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Cameras whose tunnel is kept.
 pub const MOST_KEPT: usize = 4;
@@ -43,27 +47,51 @@ impl KeptKey {
     }
 }
 
-/// A tunnel on the adapter, and in memory as soon as it has come back.
+/// A tunnel: its light in memory, its depth on the adapter.
 pub struct KeptTunnel {
+    pub planes: Arc<Planes>,
+    pub depth: Texture,
+}
+
+/// A tunnel as it is drawn, to be kept.
+pub struct KeptLayers {
     /// Steady and blinking light, electrons.
     pub light: Texture,
     /// The lamp's row in the table of shares.
     pub lamp: Texture,
     pub depth: Texture,
-    /// The same in memory.
-    pub planes: Arc<OnceLock<Planes>>,
 }
 
-impl KeptTunnel {
-    /// Nothing yet.
+impl KeptLayers {
+    /// Empty.
     pub fn new(gpu: &Gpu, size_px: (u32, u32)) -> Self {
         let texture = |format| kept_texture(&gpu.device, size_px, format);
         Self {
             light: texture(pipeline::LIGHT),
             lamp: texture(pipeline::LAMP),
             depth: texture(pipeline::DEPTH),
-            planes: Arc::default(),
         }
+    }
+
+    /// Draws what the encoder holds, waits for it, and brings the light to memory.
+    pub fn keep(
+        self,
+        gpu: &Gpu,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<KeptTunnel, RenderError> {
+        let mut pieces = Pieces::default();
+        let back = [(&self.light, 2), (&self.lamp, 1)]
+            .map(|(texture, words)| pieces.add(texture, texture.whole(), words));
+        let buffer = pieces.copy(&gpu.device, &mut encoder, &mut Vec::new());
+        let submission = gpu.queue.submit([encoder.finish()]);
+        buffer.map_async(wgpu::MapMode::Read, .., |_| {});
+        gpu.wait_for(submission)?;
+        let bytes =
+            (buffer.get_mapped_range(..)).map_err(|e| RenderError::Device(e.to_string()))?;
+        Ok(KeptTunnel {
+            planes: Arc::new(Planes::of(&bytes, back.each_ref())),
+            depth: self.depth,
+        })
     }
 }
 
@@ -117,17 +145,46 @@ impl Planes {
     /// The signal of row `v` under these shares, of which each lamp has one for each of `rows` rows.
     #[inline(always)]
     pub fn row(&self, v: usize, shares: &[f32], out: &mut [f32]) {
-        let height = self.rows.len();
+        self.part_of_row((v, 0), shares, out, |signal_e| signal_e);
+    }
+
+    /// That of a part of the picture, for the adapter to draw over.
+    pub fn upload(&self, gpu: &Gpu, parts: &[Rectangle], shares: &[f32]) -> Uploaded {
+        let arch = Arch::new();
+        Uploaded::new(gpu, parts, |u, v, out| {
+            arch.dispatch(|| {
+                let at = (v as usize, u as usize);
+                self.part_of_row(at, shares, out, |signal_e| {
+                    narrow(signal_e.min(BRIGHTEST_E as f32))
+                });
+            });
+        })
+    }
+
+    /// From column `u` of row `v` on, as `make` makes it of the signal.
+    #[inline(always)]
+    fn part_of_row<T>(
+        &self,
+        (v, u): (usize, usize),
+        shares: &[f32],
+        out: &mut [T],
+        make: impl Fn(f32) -> T,
+    ) {
+        let (height, end) = (self.rows.len(), self.width.min(u + out.len()));
         let row = v * self.width..(v + 1) * self.width;
         let (steady, blinking) = (&self.steady[row.clone()], &self.blinking[row]);
-        let mut from = 0;
-        for (end, lamp) in &self.runs[self.rows[v].clone()] {
-            let share = shares.get(lamp * height + v).copied().unwrap_or(1.0);
-            let pixels = steady[from..*end].iter().zip(&blinking[from..*end]);
-            for (to, (steady, blinking)) in out[from..*end].iter_mut().zip(pixels) {
-                *to = widen(*steady) + share * widen(*blinking);
+        let mut from = u;
+        for (run_end, lamp) in &self.runs[self.rows[v].clone()] {
+            let to = end.min(*run_end);
+            if to <= from {
+                continue;
             }
-            from = *end;
+            let share = shares.get(lamp * height + v).copied().unwrap_or(1.0);
+            let pixels = steady[from..to].iter().zip(&blinking[from..to]);
+            for (to, (steady, blinking)) in out[from - u..to - u].iter_mut().zip(pixels) {
+                *to = make(widen(*steady) + share * widen(*blinking));
+            }
+            from = to;
         }
     }
 }

@@ -108,7 +108,7 @@ use background::Surfaces;
 use bodies::BodyMeshes;
 use chunks::Chunks;
 use image::{GrayImage, Primitive};
-use kept::{KeptKey, KeptTunnel, KeptTunnels, MOST_KEPT};
+use kept::{KeptKey, KeptTunnels, MOST_KEPT};
 use pass_clock::PassClock;
 use pipeline::Pipelines;
 use prepared::{Extent, PreparedView};
@@ -199,7 +199,7 @@ impl GpuRenderer {
         encoder: &mut wgpu::CommandEncoder,
         (job, view): (&Job, &View),
         bodies: &BodyMeshes,
-    ) -> Back {
+    ) -> Result<Back, RenderError> {
         let (gpu, headlights, size_px) = (&self.gpu, job.headlights.len(), size_px(view));
         let framed = Framed::new(view);
         let developer = Developer::of(view).filter(|_| !self.whole);
@@ -227,18 +227,13 @@ impl GpuRenderer {
             },
             view: &prepared,
             target,
+            kept: None,
         };
-        let mut new = false;
-        let kept: Option<&KeptTunnel> = kept_key.map(|key| {
-            self.kept.get(key, |_| {
-                new = true;
-                KeptTunnel::new(gpu, size_px)
-            })
-        });
-        if let (Some(kept), true) = (kept, new) {
-            recorder.draw_kept(kept, &surfaces);
-        }
-        recorder.draw_background(kept, headlights, &surfaces);
+        let draw_kept = |_: &KeptKey| recorder.draw_kept(size_px, &surfaces);
+        let kept = kept_key.map(|key| self.kept.try_get(key, draw_kept));
+        let kept = kept.transpose()?;
+        recorder.kept = kept;
+        recorder.draw_background(headlights, &surfaces);
         recorder.draw_shadows();
         recorder.draw_gloss(headlights, &surfaces);
         if blurred {
@@ -246,11 +241,10 @@ impl GpuRenderer {
         }
         recorder.draw_lamps();
         recorder.draw_glare();
-        match developer {
+        Ok(match developer {
             Some(developer) => {
                 let map = self.maps_in_memory.get(MapKey::new(view), make_map);
                 let to = (&mut *encoder, &mut self.free);
-                let kept = kept.map(|kept| (kept, new));
                 let signal = SignalBack::of(gpu, to, target, prepared, kept, (map, developer));
                 Back::Signal(Box::new(signal))
             }
@@ -267,7 +261,7 @@ impl GpuRenderer {
                 target.copy_back(target.finishing(&gpu.device), &back, encoder);
                 Back::Image(back)
             }
-        }
+        })
     }
 }
 
@@ -306,7 +300,7 @@ impl Renderer for GpuRenderer {
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         let views: Vec<_> = (job.views.iter())
             .map(|view| self.record(&mut encoder, (job, view), &bodies))
-            .collect();
+            .collect::<Result<_, _>>()?;
         if let Some(clock) = &self.clock {
             clock.send_back(&mut encoder);
         }
@@ -341,12 +335,7 @@ impl GpuRenderer {
         keep: impl Fn(u32, u32) -> T + Copy + Sync,
     ) -> Result<Vec<Image<T>>, RenderError> {
         let job = (self.in_flight.pop_front()).ok_or(RenderError::NothingSubmitted)?;
-        let wait = wgpu::PollType::Wait {
-            submission_index: Some(job.submission),
-            timeout: None,
-        };
-        (self.gpu.device.poll(wait)).map_err(|e| RenderError::Device(e.to_string()))?;
-        self.gpu.check()?;
+        self.gpu.wait_for(job.submission)?;
         let mut images = Vec::with_capacity(job.views.len());
         for (view, spare_bits) in job.views.into_iter().zip(job.spare_bits) {
             let keep = move |dn: u32| keep(dn, spare_bits);

@@ -22,7 +22,7 @@ impl Recorder<'_> {
         ];
         let [tiles, lists, sources, blockers, slabs] =
             tables.each_ref().map(Buffer::as_entire_binding);
-        let depth = target.layers.depth.binding();
+        let depth = self.depth().binding();
         let resources = [depth, tiles, lists, sources, blockers, slabs];
         let pipelines = &self.pipelines.shadows;
         let (border, end) = (shadows.capsule_tiles as u32, shadows.tiles.len() as u32);
@@ -64,7 +64,7 @@ impl Recorder<'_> {
             gpu.storage(&table.instants),
         ];
         let [lamps, rows, instants] = tables.each_ref().map(Buffer::as_entire_binding);
-        let resources = [lamps, rows, instants, target.layers.depth.binding()];
+        let resources = [lamps, rows, instants, self.depth().binding()];
         let (discs, all) = (&self.pipelines.discs, 0..table.lamps.len() as u32);
         self.draw_rectangles(
             "lamps",

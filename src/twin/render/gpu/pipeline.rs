@@ -38,8 +38,6 @@ pub struct Pipelines {
     backgrounds: [OnceCell<Background>; MAX_HEADLIGHTS + 1],
     background: wgpu::ShaderModule,
     gloss: wgpu::ShaderModule,
-    /// Light and depth of a tunnel that is kept, in parts of the picture.
-    pub restore: wgpu::RenderPipeline,
     /// Nothing, in parts of the picture.
     pub clear: wgpu::RenderPipeline,
     /// Mixes a share of one picture into another.
@@ -76,7 +74,7 @@ impl Pipelines {
             })
         };
         let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
-        let (focus, shadows, restore) = (shader("focus"), shader("shadows"), shader("restore"));
+        let (focus, shadows, clear) = (shader("focus"), shader("shadows"), shader("clear"));
         let flat = |shader: &_, entries: [&str; 2], target, constants: &[(&str, f64)]| {
             flat_pipeline(device, shader, entries, target, constants)
         };
@@ -86,8 +84,7 @@ impl Pipelines {
             backgrounds: [const { OnceCell::new() }; MAX_HEADLIGHTS + 1],
             background: shader("background"),
             gloss: shader("gloss"),
-            restore: filling(device, &restore, "restore"),
-            clear: filling(device, &restore, "clear"),
+            clear: clearing(device, &clear),
             blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
             focus: flags.map(|down| {
                 let target = target(SIGNAL, None);
@@ -163,14 +160,10 @@ fn flat_pipeline(
 }
 
 /// Draws rectangles over whatever is there, depths too.
-fn filling(
-    device: &wgpu::Device,
-    shader: &wgpu::ShaderModule,
-    entry: &str,
-) -> wgpu::RenderPipeline {
+fn clearing(device: &wgpu::Device, shader: &wgpu::ShaderModule) -> wgpu::RenderPipeline {
     let stage = Stage {
         shader,
-        entries: ["part_corner", entry],
+        entries: ["part_corner", "clear"],
         buffers: &[],
         depth: Some(depths(true, wgpu::CompareFunction::Always)),
         targets: &[Some(target(SIGNAL, None))],

@@ -1,6 +1,7 @@
 //! The passes of one view as they are recorded.
 
 use super::adapter::Gpu;
+use super::kept::KeptTunnel;
 use super::pass_clock::PassClock;
 use super::pipeline::Pipelines;
 use super::prepared::{Level, PreparedView};
@@ -20,9 +21,11 @@ pub struct Recorder<'a> {
     pub passes: Passes<'a>,
     pub view: &'a PreparedView,
     pub target: &'a ViewTarget,
+    /// What the picture is drawn over.
+    pub kept: Option<&'a KeptTunnel>,
 }
 
-impl Recorder<'_> {
+impl<'a> Recorder<'a> {
     /// The resources of group 0, in the order of their bindings; the first is the constants.
     pub fn bind(
         &self,
@@ -51,6 +54,14 @@ impl Recorder<'_> {
                 layout: &pipeline.get_bind_group_layout(0),
                 entries: &entries,
             })
+    }
+
+    /// How far away what the picture shows is.
+    pub fn depth(&self) -> &'a Texture {
+        match self.kept {
+            Some(kept) if self.view.list.bodies().is_empty() => &kept.depth,
+            _ => &self.target.layers.depth,
+        }
     }
 
     /// A pass that draws rectangles of a pipeline whose vertices need no buffers.

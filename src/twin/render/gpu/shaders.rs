@@ -20,7 +20,7 @@ const FILES: [(&str, &str); 11] = files![
     "rows",
     "background",
     "gloss",
-    "restore",
+    "clear",
     "blend",
     "focus",
     "lamps",

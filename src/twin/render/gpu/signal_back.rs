@@ -13,7 +13,7 @@ use crate::twin::render::{Image, RenderError};
 use image::{ImageBuffer, Primitive};
 use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// What lies under the parts that were drawn.
 pub enum Under {
@@ -21,8 +21,8 @@ pub enum Under {
     Nothing,
     /// A picture in texels of [`COARSE_PX`].
     Coarse(Piece),
-    /// A tunnel that is kept, under shares of its lamps; with steady light and lamps if they come back now.
-    Kept(Arc<OnceLock<Planes>>, Vec<f32>, Option<[Piece; 2]>),
+    /// A tunnel that is kept, under shares of its lamps.
+    Kept(Arc<Planes>, Vec<f32>),
 }
 
 /// See the module's page.
@@ -37,22 +37,18 @@ pub struct SignalBack {
 }
 
 impl SignalBack {
-    /// Records the copies of what was drawn of a view; of a tunnel that is kept too, if that is new.
+    /// Records the copies of what was drawn of a view.
     pub fn of(
         gpu: &Gpu,
         (encoder, free): (&mut wgpu::CommandEncoder, &mut Vec<wgpu::Buffer>),
         target: &ViewTarget,
         view: PreparedView,
-        kept: Option<(&KeptTunnel, bool)>,
+        kept: Option<&KeptTunnel>,
         (map, developer): (&Arc<PixelMap>, Developer),
     ) -> Self {
         let mut pieces = Pieces::default();
         let under = match (kept, &view.coarse) {
-            (Some((kept, new)), _) => {
-                let textures = [(&kept.light, 2), (&kept.lamp, 1)];
-                let made = new.then(|| textures.map(|(t, words)| pieces.add(t, t.whole(), words)));
-                Under::Kept(Arc::clone(&kept.planes), view.list.shares, made)
-            }
+            (Some(kept), _) => Under::Kept(Arc::clone(&kept.planes), view.list.shares),
             (None, Some(_)) => {
                 let coarse = &target.coarse[0].signal;
                 Under::Coarse(pieces.add(coarse, coarse.whole(), 1))
@@ -82,22 +78,12 @@ impl SignalBack {
         &self,
         keep: impl Fn(u32) -> T + Copy + Sync,
     ) -> Result<Image<T>, RenderError> {
-        let broken = || RenderError::Device("an image came back too short".into());
         let (width, height) = self.size_px;
         let mut image = vec![T::DEFAULT_MIN_VALUE; width as usize * height as usize];
         {
             let bytes = (self.buffer.get_mapped_range(..))
                 .map_err(|e| RenderError::Device(e.to_string()))?;
             let bytes: &[u8] = &bytes;
-            let kept = match &self.under {
-                Under::Kept(planes, shares, made) => {
-                    if let Some([light, lamp]) = made {
-                        planes.get_or_init(|| Planes::of(bytes, [light, lamp]));
-                    }
-                    Some((planes.get().ok_or_else(broken)?, &shares[..]))
-                }
-                _ => None,
-            };
             let arch = Arch::new();
             let rows = image.par_chunks_mut((width as usize).max(1)).enumerate();
             rows.for_each_init(
@@ -106,7 +92,6 @@ impl SignalBack {
                     arch.dispatch(ComposedRow {
                         back: self,
                         bytes,
-                        kept,
                         v,
                         buffers,
                         out,
@@ -116,7 +101,8 @@ impl SignalBack {
             );
         }
         self.buffer.unmap();
-        ImageBuffer::from_raw(width, height, image).ok_or_else(broken)
+        ImageBuffer::from_raw(width, height, image)
+            .ok_or_else(|| RenderError::Device("an image came back too short".into()))
     }
 }
 
@@ -141,8 +127,6 @@ impl RowBuffers {
 struct ComposedRow<'a, T, F> {
     back: &'a SignalBack,
     bytes: &'a [u8],
-    /// A tunnel that lies under the parts, and the shares of its lamps.
-    kept: Option<(&'a Planes, &'a [f32])>,
     v: usize,
     buffers: &'a mut RowBuffers,
     out: &'a mut [T],
@@ -159,11 +143,10 @@ impl<T, F: Fn(u32) -> T> WithSimd for ComposedRow<'_, T, F> {
             signals_e,
             coarse_e,
         } = self.buffers;
-        if let Some((planes, shares)) = self.kept {
-            planes.row(v, shares, signals_e);
-        }
-        if let Under::Coarse(piece) = &back.under {
-            enlarge(piece, self.bytes, v, coarse_e, signals_e);
+        match &back.under {
+            Under::Nothing => {}
+            Under::Coarse(piece) => enlarge(piece, self.bytes, v, coarse_e, signals_e),
+            Under::Kept(planes, shares) => planes.row(v, shares, signals_e),
         }
         for piece in back.parts.iter().filter(|piece| piece.has_row(v as u32)) {
             let [from, end] = [piece.part.at[0], piece.part.ends()[0]].map(|u| u as usize);

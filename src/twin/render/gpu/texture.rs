@@ -62,16 +62,43 @@ impl Texture {
         &self,
         part: Rectangle,
         buffer: &wgpu::Buffer,
-        (offset, stride): (u64, u32),
+        to: (u64, u32),
         encoder: &mut wgpu::CommandEncoder,
     ) {
-        let layout = wgpu::TexelCopyBufferLayout {
-            offset,
-            bytes_per_row: Some(stride),
-            rows_per_image: None,
-        };
+        let (from, size, layout) = self.part(part, to);
+        encoder.copy_texture_to_buffer(from, wgpu::TexelCopyBufferInfo { buffer, layout }, size);
+    }
+
+    /// Copies a part of it from a buffer, from an offset on with so many bytes a row.
+    pub fn copy_part_from_buffer(
+        &self,
+        part: Rectangle,
+        buffer: &wgpu::Buffer,
+        from: (u64, u32),
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let (to, size, layout) = self.part(part, from);
+        encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, to, size);
+    }
+
+    /// Copies all of another of its size and format.
+    pub fn copy_from(&self, other: &Self, encoder: &mut wgpu::CommandEncoder) {
+        let (from, to) = (other.texture.as_image_copy(), self.texture.as_image_copy());
+        encoder.copy_texture_to_texture(from, to, self.texture.size());
+    }
+
+    /// A part of it, and where it lies in a buffer.
+    fn part(
+        &self,
+        part: Rectangle,
+        (offset, stride): (u64, u32),
+    ) -> (
+        wgpu::TexelCopyTextureInfo<'_>,
+        wgpu::Extent3d,
+        wgpu::TexelCopyBufferLayout,
+    ) {
         let [x, y] = part.at;
-        let from = wgpu::TexelCopyTextureInfo {
+        let at = wgpu::TexelCopyTextureInfo {
             origin: wgpu::Origin3d { x, y, z: 0 },
             ..self.texture.as_image_copy()
         };
@@ -80,7 +107,12 @@ impl Texture {
             height: part.size[1],
             depth_or_array_layers: 1,
         };
-        encoder.copy_texture_to_buffer(from, wgpu::TexelCopyBufferInfo { buffer, layout }, size);
+        let layout = wgpu::TexelCopyBufferLayout {
+            offset,
+            bytes_per_row: Some(stride),
+            rows_per_image: None,
+        };
+        (at, size, layout)
     }
 
     /// Copies it to a buffer that has so many bytes a row.
