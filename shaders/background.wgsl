@@ -2,6 +2,8 @@
 
 // Whether the blinking of lamps shows on walls.
 override BANDED: bool = true;
+// Whether more than a texel passes in the exposure.
+override SMEARED: bool = false;
 
 @group(0) @binding(3) var painting: texture_2d<f32>;
 @group(0) @binding(4) var texels: sampler;
@@ -28,6 +30,8 @@ struct Lit {
     // Its own light, and that of the air before it.
     @location(2) own_e: f32,
     @location(3) @interpolate(flat, either) shares: u32,
+    // Way on the painting that passes in the exposure.
+    @location(4) @interpolate(flat, either) smear: f32,
 }
 
 fn lit(in: Vertex) -> Lit {
@@ -41,7 +45,28 @@ fn lit(in: Vertex) -> Lit {
     out.place = in.place_m * in.paint_per_m + vec2f(in.period_share, 0.0);
     out.own_e = mix(view.airlight_e, in.luminance_cd_m2 * view.electrons_per_cd_m2, clear);
     out.shares = in.shares;
+    out.smear = in.smear_m * in.paint_per_m.x;
     return out;
+}
+
+// In the mean over what passes in the exposure, a sample a texel: between these the painting is straight.
+fn albedo(in: Lit) -> f32 {
+    if !SMEARED {
+        return textureSample(painting, texels, in.place).r;
+    }
+    let size = vec2f(textureDimensions(painting));
+    let right = dpdx(in.place) * size;
+    let down = dpdy(in.place) * size;
+    let level = 0.5 * log2(max(max(dot(right, right), dot(down, down)), 1.0));
+    let count = max(ceil(abs(in.smear) * size.x), 1.0);
+    let step = vec2f(in.smear / count, 0.0);
+    var place = in.place + 0.5 * (1.0 - count) * step;
+    var sum = 0.0;
+    for (var k = 0.0; k < count; k += 1.0) {
+        sum += textureSampleLevel(painting, texels, place, level).r;
+        place += step;
+    }
+    return sum / count;
 }
 
 @vertex
@@ -51,12 +76,11 @@ fn project_lit(in: Vertex) -> Lit {
 
 @fragment
 fn shade_lit(in: Lit) -> @location(0) vec4f {
-    let albedo = textureSample(painting, texels, in.place).r;
     var white_e = in.white_e.x + in.white_e.y;
     if BANDED {
         white_e = in.white_e.x + in.white_e.y * share_of(in.shares, u32(in.clip.y));
     }
-    let signal = albedo * white_e + in.own_e;
+    let signal = albedo(in) * white_e + in.own_e;
     return vec4f(min(signal, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }
 
@@ -75,8 +99,7 @@ fn project_split(in: Vertex) -> Lit {
 
 @fragment
 fn shade_split(in: Lit) -> Split {
-    let albedo = textureSample(painting, texels, in.place).r;
-    let light = albedo * in.white_e + vec2f(in.own_e, 0.0);
+    let light = albedo(in) * in.white_e + vec2f(in.own_e, 0.0);
     return Split(vec4f(min(light, vec2f(BRIGHTEST_E)), 0.0, 0.0), vec4u(in.shares, 0u, 0u, 0u));
 }
 
@@ -90,6 +113,5 @@ fn project_headlit(in: Vertex) -> Lit {
 
 @fragment
 fn shade_headlit(in: Lit) -> @location(0) vec4f {
-    let albedo = textureSample(painting, texels, in.place).r;
-    return vec4f(min(albedo * in.white_e.x, BRIGHTEST_E), 0.0, 0.0, 1.0);
+    return vec4f(min(albedo(in) * in.white_e.x, BRIGHTEST_E), 0.0, 0.0, 1.0);
 }

@@ -38,6 +38,8 @@ struct Vertex {
     // What the surface mirrors: twin/render/gloss.rs; and up the track from the mesh's origin.
     @location(13) gloss: vec3f,
     @location(14) along: vec3f,
+    // The paint is the mean over this way along the track.
+    @location(15) smear_m: f32,
 }
 
 // The point in the camera's frame `late_s` after the middle of the exposure of row `v`.

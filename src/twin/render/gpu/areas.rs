@@ -28,9 +28,6 @@ const MOST_PARTS: usize = 2;
 const EYES: usize = 33;
 /// What reaches behind the camera is looked at in quarters, and these in quarters, so many times.
 const QUARTERED: u32 = 4;
-/// A lens bends the edges of a body out of the rectangle around its corners by less than this share of the
-/// rectangle's longer side.
-const BULGE: f64 = 0.1;
 /// What is nearer to the camera's plane is behind it.
 const NEAR_M: f64 = 0.05;
 /// A mark.
@@ -47,14 +44,9 @@ pub struct PartSearch<'a> {
 }
 
 impl PartSearch<'_> {
-    fn size_px(&self) -> [u32; 2] {
-        let lens = &self.framed.view.camera.intrinsics;
-        [lens.width_px, lens.height_px]
-    }
-
     /// All of the picture.
     pub fn whole(&self) -> Vec<Rectangle> {
-        vec![Rectangle::whole(self.size_px())]
+        vec![self.framed.whole()]
     }
 
     /// The parts in which a picture differs from one that is kept.
@@ -69,7 +61,7 @@ impl PartSearch<'_> {
 
     /// The parts with more light than so much, by headlights or by lamps too.
     fn parts(&self, grey: f64, by_lamps: bool) -> Vec<Rectangle> {
-        let [width_px, height_px] = self.size_px();
+        let [width_px, height_px] = self.framed.size_px();
         let mut marks = Marks::new((width_px, height_px), 1);
         let luminance_cd_m2 = grey / self.framed.view.grey_per_cd_m2();
         self.mark_tunnel(&mut marks, luminance_cd_m2, by_lamps);
@@ -80,7 +72,7 @@ impl PartSearch<'_> {
         for lamp in &self.lamps.lamps {
             marks.add_part(&self.between(lamp.low, lamp.high), &MARKED);
         }
-        let mut parts = rectangles(&marks, self.size_px());
+        let mut parts = rectangles(&marks, self.framed.size_px());
         if by_lamps {
             join(&mut parts);
         }
@@ -93,7 +85,7 @@ impl PartSearch<'_> {
 
     fn between(&self, low: [f32; 2], high: [f32; 2]) -> Rectangle {
         let [low, high] = [low, high].map(|p| Point2::from(p.map(f64::from)));
-        Rectangle::between(low, high, self.size_px())
+        Rectangle::between(low, high, self.framed.size_px())
     }
 
     fn mark_tunnel(&self, marks: &mut Marks, luminance_cd_m2: f64, by_lamps: bool) {
@@ -115,7 +107,7 @@ impl PartSearch<'_> {
                     || call.headlit
                         && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
                 if drawn && !patch.cell.turns_away(eye) {
-                    eyes.mark(marks, &patch.cell, self.size_px(), QUARTERED);
+                    eyes.mark(marks, &patch.cell, self.framed.size_px(), QUARTERED);
                 }
             }
         }
@@ -123,12 +115,8 @@ impl PartSearch<'_> {
 
     fn mark_bodies(&self, marks: &mut Marks) {
         let eyes = Eyes::exposed(self.framed, self.job.time);
-        let bends = !self.framed.view.camera.intrinsics.distortion.is_none();
         for body in &self.job.bodies {
-            let bounds = TileBounds::of_body(self.framed, &eyes, body);
-            // A lens that bends lines lets edges bulge beyond their ends.
-            let bulge = if bends { BULGE } else { 0.0 };
-            marks.add(&bounds.widened(bulge), &MARKED);
+            marks.add(&TileBounds::of_outline(self.framed, &eyes, body), &MARKED);
         }
     }
 }

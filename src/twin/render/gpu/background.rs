@@ -10,6 +10,7 @@ use super::rectangle::Rectangle;
 use super::target::SurfaceLayers;
 use super::textures::Textures;
 use crate::twin::render::RenderError;
+use std::ops::Range;
 
 /// Tunnel and bodies on the adapter.
 pub struct Surfaces<'a> {
@@ -66,11 +67,7 @@ impl<'a> Recorder<'a> {
         ([0, headlights][..=usize::from(headlit)].iter())
             .map(|n| {
                 let background = pipelines.background(&self.gpu.device, *n);
-                let pipeline = if list.banded {
-                    &background.banded
-                } else {
-                    &background.lit
-                };
+                let pipeline = &background.lit[usize::from(list.banded)][usize::from(list.smeared)];
                 self.bound(level, (pipeline, true), textures)
             })
             .collect()
@@ -90,11 +87,11 @@ impl<'a> Recorder<'a> {
         let all = [layers[0].signal.whole()];
         let bound = self.surfaces(level, headlights, surfaces.textures);
         let (view, empty) = (self.view, self.empty());
-        for k in 0..view.list.instants {
+        for (k, instant) in view.tunnel_instants().enumerate() {
             let (onto, depth) = (layers[usize::from(k > 0)], wgpu::LoadOp::Clear(0.0));
             let depth = Some((&onto.depth, depth));
             let mut pass = (self.passes).begin("coarse", &[(&onto.signal, empty)], depth);
-            view.draw_instant(&mut pass, k, &bound, view.list.tunnel(), surfaces);
+            view.draw_instant(&mut pass, instant, &bound, view.list.tunnel(), surfaces);
             drop(pass);
             if k > 0 {
                 self.mix_in(level, layers, k, &all);
@@ -123,22 +120,51 @@ impl<'a> Recorder<'a> {
         }
         let level = &view.full;
         let bound = self.surfaces(level, headlights, surfaces.textures);
-        let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
+        let all: Vec<_> = view.areas.iter().map(|a| (a.part, &a.calls[..])).collect();
+        let moving = all
+            .iter()
+            .map(|(part, calls)| (part.overlap(&view.list.moving), *calls));
+        let moving: Vec<_> = moving.filter(|(part, _)| !part.is_empty()).collect();
         let layers = [&target.layers, &target.instant];
-        for k in 0..view.list.instants {
-            let onto = layers[usize::from(k > 0)];
-            self.clear(onto, &parts);
-            let depth = Some((&onto.depth, wgpu::LoadOp::Load));
-            let mut pass = (self.passes).begin("background", &[(&onto.signal, KEEP)], depth);
-            for area in &view.areas {
-                area.part.clip(&mut pass);
-                let calls = area.calls.iter().map(|call| &view.list.calls[*call]);
-                view.draw_instant(&mut pass, k, &bound, calls, surfaces);
-            }
-            drop(pass);
+        if moving != all {
+            self.draw_areas(layers[0], &all, 0, &bound, surfaces);
+        }
+        if moving.is_empty() {
+            return;
+        }
+        let parts: Vec<_> = moving.iter().map(|(part, _)| *part).collect();
+        for (k, instant) in view.list.instants.clone().enumerate() {
+            self.draw_areas(
+                layers[usize::from(k > 0)],
+                &moving,
+                instant,
+                &bound,
+                surfaces,
+            );
             if k > 0 {
                 self.mix_in(level, layers, k, &parts);
             }
+        }
+    }
+
+    /// Draws parts of the picture at an instant, each with those draw calls that may show there.
+    fn draw_areas(
+        &mut self,
+        onto: &SurfaceLayers,
+        areas: &[(Rectangle, &[usize])],
+        instant: u32,
+        bound: &[Bound<'_>],
+        surfaces: &Surfaces<'_>,
+    ) {
+        let view = self.view;
+        let parts: Vec<_> = areas.iter().map(|(part, _)| *part).collect();
+        self.clear(onto, &parts);
+        let depth = Some((&onto.depth, wgpu::LoadOp::Load));
+        let mut pass = (self.passes).begin("background", &[(&onto.signal, KEEP)], depth);
+        for (part, calls) in areas {
+            part.clip(&mut pass);
+            let calls = calls.iter().map(|call| &view.list.calls[*call]);
+            view.draw_instant(&mut pass, instant, bound, calls, surfaces);
         }
     }
 
@@ -201,7 +227,7 @@ impl<'a> Recorder<'a> {
         let moving = [view.list.moving];
         let restored = |parts: &[Rectangle]| kept.planes.upload(self.gpu, parts, &view.list.shares);
         let mut under = restored(&parts);
-        for k in 0..view.list.instants {
+        for (k, instant) in view.list.instants.clone().enumerate() {
             if k == 1 {
                 under = restored(&moving);
             }
@@ -219,8 +245,14 @@ impl<'a> Recorder<'a> {
                 view.list.moving.clip(&mut pass);
             }
             pass.set_blend_constant(grey(1.0));
-            view.draw_instant(&mut pass, k, &added, headlit.iter().copied(), surfaces);
-            view.draw_instant(&mut pass, k, &bound, bodies.iter(), surfaces);
+            view.draw_instant(
+                &mut pass,
+                instant,
+                &added,
+                headlit.iter().copied(),
+                surfaces,
+            );
+            view.draw_instant(&mut pass, instant, &bound, bodies.iter(), surfaces);
             drop(pass);
             if k > 0 {
                 self.mix_in(level, [&target.layers, &target.instant], k, &moving);
@@ -234,13 +266,13 @@ impl<'a> Recorder<'a> {
         &mut self,
         level: &Level,
         [mean, instant]: [&SurfaceLayers; 2],
-        k: u32,
+        k: usize,
         parts: &[Rectangle],
     ) {
         let blend = &self.pipelines.blend;
         let group = self.bind(level, blend, &[instant.signal.binding()]);
         let mut pass = (self.passes).begin("instants", &[(&mean.signal, KEEP)], None);
-        pass.set_blend_constant(grey(1.0 / f64::from(k + 1)));
+        pass.set_blend_constant(grey(1.0 / (k + 1) as f64));
         pass.set_pipeline(blend);
         pass.set_bind_group(0, &group, &[]);
         for part in parts {
@@ -268,12 +300,12 @@ impl<'a> Recorder<'a> {
         let mut pass = self.passes.begin("gloss", &[(signal, KEEP)], depth);
         pass.set_pipeline(&background.gloss);
         pass.set_bind_group(0, &group, &[]);
-        pass.set_blend_constant(grey(1.0 / f64::from(list.instants)));
+        pass.set_blend_constant(grey(1.0 / list.mirrored_instants.len() as f64));
         pass.set_vertex_buffer(1, view.placements.slice(..));
         for call in glossy {
             surfaces.set_buffers(&mut pass, call);
-            for instant in 0..list.instants {
-                let at = instant * list.meshes + call.mesh;
+            for instant in list.mirrored_instants.clone() {
+                let at = list.placed(call, instant);
                 pass.draw_indexed(call.glossy.clone(), 0, at..at + 1);
             }
         }
@@ -281,6 +313,15 @@ impl<'a> Recorder<'a> {
 }
 
 impl PreparedView {
+    /// The instants that show the tunnel's motion.
+    fn tunnel_instants(&self) -> Range<u32> {
+        if self.list.all_moves {
+            self.list.instants.clone()
+        } else {
+            0..1
+        }
+    }
+
     fn draw_instant<'c>(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
@@ -292,7 +333,7 @@ impl PreparedView {
         pass.set_vertex_buffer(1, self.placements.slice(..));
         for call in calls {
             surfaces.set_buffers(pass, call);
-            let at = instant * self.list.meshes + call.mesh;
+            let at = self.list.placed(call, instant);
             // Where headlights are left out, there may be nothing but what draws without them.
             let bound = &bound[usize::from(call.headlit).min(bound.len() - 1)];
             pass.set_pipeline(bound.pipeline);

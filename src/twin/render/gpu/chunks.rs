@@ -22,6 +22,9 @@ const SEARCH_STEP_M: f64 = 20.0;
 /// Farther from the line than this the chainage found is not believed.
 const NEAR_LINE_M: f64 = 30.0;
 
+/// On one side of a border of two chunks, this far from it.
+const BESIDE_M: f64 = 1e-3;
+
 /// A mesh on the adapter.
 pub struct Chunk {
     /// Which it is.
@@ -44,6 +47,8 @@ pub struct Chunk {
     pub glossy: Vec<Point3<f64>>,
     /// Up the track at its origin.
     pub along: Vector3<f64>,
+    /// Whether there are edges across the line in it: where one cross-section ends, or wet ground.
+    pub crossed: bool,
 }
 
 /// A place of a chunk's surface, in the world.
@@ -181,5 +186,18 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
             .map(place)
             .collect(),
         along: Vector3::new(cos, sin, 0.0),
+        crossed: is_crossed(scene, key.start_m()),
     }
+}
+
+/// See [`Chunk::crossed`].
+fn is_crossed(scene: &LitScene, from_m: f64) -> bool {
+    let to_m = from_m + CHUNK_M;
+    let borders = scene
+        .tunnel
+        .sections
+        .iter()
+        .flat_map(|r| [r.from_m, r.to_m]);
+    let ends = |m: f64| scene.wet.at(m - BESIDE_M) != scene.wet.at(m + BESIDE_M);
+    borders.into_iter().any(|m| (from_m..=to_m).contains(&m)) || ends(from_m) || ends(to_m)
 }

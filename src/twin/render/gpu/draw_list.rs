@@ -8,7 +8,7 @@ use super::smear::Smear;
 use super::textures;
 use super::view::{BESIDE, Framed, single};
 use crate::twin::render::lit_scene::LitScene;
-use crate::twin::render::paint;
+use crate::twin::render::paint::{self, TEXEL_M};
 use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::scene::Job;
 use nalgebra::{Point3, Vector3};
@@ -53,19 +53,25 @@ pub struct DrawCall {
 pub struct DrawList {
     /// Of the tunnel, near ones first; then of the bodies.
     pub calls: Vec<DrawCall>,
-    /// Of every mesh at the first instant, then of every mesh at the second, and so on.
+    /// Of every mesh in the middle of the exposure; then, one after the other, at instants that show motion
+    /// and at those that show what is mirrored.
     pub placements: Vec<Placement>,
     /// Number of meshes.
-    pub meshes: u32,
-    /// Number of instants; the first is the middle of the exposure.
-    pub instants: u32,
-    /// Part of the picture in which they differ.
+    meshes: u32,
+    /// Instants that show motion; the middle alone where nothing moves.
+    pub instants: Range<u32>,
+    /// Those that show what is mirrored.
+    pub mirrored_instants: Range<u32>,
+    /// Part of the picture in which instants differ, and whether that is all of it.
     pub moving: Rectangle,
+    pub all_moves: bool,
     /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
     /// number; the first row is 1.
     pub shares: Vec<f32>,
     /// Whether any of it differs from 1 so that one can see it.
     pub banded: bool,
+    /// Whether more than a texel of any paint passes a pixel in the exposure.
+    pub smeared: bool,
     /// Lamps that glossy surfaces mirror.
     pub mirrored: Vec<Mirrored>,
     /// Rows in which they may be.
@@ -140,7 +146,7 @@ impl DrawList {
         // Before those are added that are mirrored alone.
         list.banded = (list.shares.iter()).any(|share| (share - 1.0).abs() > BAND);
         list.mirror(framed, scene.lamps.lamps());
-        list.repeat(framed, job, chunks);
+        list.expose(framed, job, chunks);
         list
     }
 
@@ -266,29 +272,56 @@ impl DrawList {
         at + 1
     }
 
-    /// Copies the placements for every instant of the exposure.
-    fn repeat(&mut self, framed: &Framed<'_>, job: &Job, chunks: &[Arc<Chunk>]) {
+    /// Finds the instants to be drawn, and copies the placements for each.
+    fn expose(&mut self, framed: &Framed<'_>, job: &Job, chunks: &[Arc<Chunk>]) {
         self.meshes = self.placements.len() as u32;
         let smear = Smear::of(framed, job.time);
-        self.moving = smear.moving(&job.bodies);
-        self.instants = if self.lit && !self.moving.is_empty() {
-            smear.instants(&job.bodies, chunks)
-        } else {
-            1
-        };
+        for call in &self.calls {
+            let along_m = call
+                .chunk
+                .as_ref()
+                .map_or(0.0, |chunk| smear.along_m(chunk));
+            self.placements[call.mesh as usize].smear_m = along_m as f32;
+        }
+        let way_m = |placed: &Placement| f64::from(placed.smear_m.abs());
+        self.smeared = self.lit && self.placements.iter().any(|p| way_m(p) > TEXEL_M);
+        let (mut count, mut mirrored) = (1, 1);
+        if self.lit {
+            (count, self.moving) = smear.instants(&job.bodies, chunks);
+        }
+        if !self.mirrored.is_empty() {
+            mirrored = smear.mirrored_instants(chunks);
+        }
         let exposure_s = framed.view.camera.shutter.exposure_s;
-        let count = f64::from(self.instants);
-        for k in 0..self.instants {
+        self.instants = self.add_instants(count, exposure_s);
+        self.mirrored_instants = self.add_instants(mirrored, exposure_s);
+        self.all_moves = count > 1 && self.moving == framed.whole();
+    }
+
+    /// Copies the placements for so many instants; one is the middle that is there already.
+    fn add_instants(&mut self, count: u32, exposure_s: f64) -> Range<u32> {
+        if count <= 1 {
+            return 0..1;
+        }
+        let first = self.placements.len() as u32 / self.meshes.max(1);
+        for k in 0..count {
             // The middle comes first: its depths decide what hides the lamps.
-            let k = (k + self.instants / 2) % self.instants;
-            let late_s = ((f64::from(k) + 0.5) / count - 0.5) * exposure_s;
+            let k = (k + count / 2) % count;
+            let late_s = ((f64::from(k) + 0.5) / f64::from(count) - 0.5) * exposure_s;
             for mesh in 0..self.meshes as usize {
+                let middle = self.placements[mesh];
                 self.placements.push(Placement {
                     late_s: late_s as f32,
-                    ..self.placements[mesh]
+                    smear_m: middle.smear_m / count as f32,
+                    ..middle
                 });
             }
         }
-        self.placements.drain(..self.meshes as usize);
+        first..first + count
+    }
+
+    /// Number of a mesh's placement at an instant.
+    pub fn placed(&self, call: &DrawCall, instant: u32) -> u32 {
+        instant * self.meshes + call.mesh
     }
 }

@@ -67,6 +67,8 @@ shared_with_shaders! {
         pub paint_per_m: [f32; 2],
         /// Up the track at the mesh's origin, world axes.
         pub along: [f32; 3],
+        /// Its paint is the mean over this way along the track.
+        pub smear_m: f32,
     }
 
     /// `camera_from_world` at one time, relative to the view's reference point: rows of the matrix,

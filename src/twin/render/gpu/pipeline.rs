@@ -20,10 +20,9 @@ pub const LAMP: wgpu::TextureFormat = wgpu::TextureFormat::R16Uint;
 
 /// Tunnel and bodies.
 pub struct Background {
-    /// Under the blinking of lamps.
-    pub banded: wgpu::RenderPipeline,
-    /// Where that does not show.
-    pub lit: wgpu::RenderPipeline,
+    /// Where the blinking of lamps does not show, and where it does; each with paint that is sharp and
+    /// with paint that is smeared.
+    pub lit: [[wgpu::RenderPipeline; 2]; 2],
     /// Steady and blinking light apart, without headlights.
     pub split: wgpu::RenderPipeline,
     /// That of headlights alone, times the blend constant and added.
@@ -111,17 +110,17 @@ impl Pipelines {
         let headlights = headlights.min(MAX_HEADLIGHTS);
         self.backgrounds[headlights].get_or_init(|| {
             let headlights = ("HEADLIGHTS", headlights as f64);
-            let make = |kind, banded| {
-                let constants = [headlights, ("BANDED", f64::from(u8::from(banded)))];
-                let light = [Some(target(SIGNAL, None))];
-                surface(device, &self.background, kind, &constants, &light)
+            let light = [Some(target(SIGNAL, None))];
+            let lit = |banded, smeared| {
+                let constants = [headlights, ("BANDED", banded), ("SMEARED", smeared)];
+                surface(device, &self.background, "lit", &constants, &light)
             };
+            let flags = [0.0, 1.0];
             let split = [target(LIGHT, None), target(LAMP, None)].map(Some);
             let added = [Some(target(SIGNAL, Some(ADD)))];
             let add = |shader, kind| surface(device, shader, kind, &[headlights], &added);
             Background {
-                banded: make("lit", true),
-                lit: make("lit", false),
+                lit: flags.map(|banded| flags.map(|smeared| lit(banded, smeared))),
                 split: surface(device, &self.background, "split", &[], &split),
                 headlit: add(&self.background, "headlit"),
                 gloss: add(&self.gloss, "gloss"),
@@ -254,9 +253,9 @@ const VERTEX: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
 ];
 
 /// Those of [`Placement`].
-const PLACEMENT: [wgpu::VertexAttribute; 7] = wgpu::vertex_attr_array![
+const PLACEMENT: [wgpu::VertexAttribute; 8] = wgpu::vertex_attr_array![
     7 => Float32x3, 8 => Float32, 9 => Float32x3, 10 => Float32, 11 => Uint32, 12 => Float32x2,
-    14 => Float32x3
+    14 => Float32x3, 15 => Float32
 ];
 
 fn target(format: wgpu::TextureFormat, blend: Option<wgpu::BlendState>) -> wgpu::ColorTargetState {

@@ -1,22 +1,31 @@
-//! At how many instants of a row's exposure a view is drawn, and where they differ.
+//! How motion within a row's exposure is drawn.
 //!
-//! An edge of contrast c that moves by s pixels within the exposure is a ramp of that width; n instants
-//! make n steps of it, c / n high. They are off from it by up to c / 2n over s pixels: a sum of squares
-//! of s c^2 / 12 n^2 an edge. So n grows with the root of s for the same error, that of an edge drawn
-//! sharp that moves by [`SHARP_PX`].
+//! *Along the line.* A camera on a train moves along tunnel and rails, which are the same all along but for
+//! their paint. So the paint of a pixel is the mean over the way that passes it, by a sample a texel.
+//!
+//! *Any other way*, as of bodies, of a camera that shakes, and of edges across the line, pictures are drawn
+//! at several instants. An edge of contrast c that moves by s pixels within the exposure is a ramp of that
+//! width; n instants make n steps of it, c / n high. They are off from it by up to c / 2n over s pixels: a
+//! sum of squares of s c^2 / 12 n^2 an edge. So n grows with the root of s for the same error, that of an
+//! edge drawn sharp that moves by [`SHARP_PX`].
 
 use super::chunks::Chunk;
 use super::rectangle::Rectangle;
+use super::tiles::{Eyes, TileBounds};
 use super::view::Framed;
 use crate::bus::SimTime;
-use crate::twin::geometry::{Body, Solid};
-use nalgebra::{Isometry3, Point2, Point3, Vector3};
+use crate::twin::geometry::Body;
+use nalgebra::{Isometry3, Point3, Vector3};
 use std::sync::Arc;
 
 /// What moves by less than this within the exposure may be drawn sharp.
 const SHARP_PX: f64 = 0.5;
+/// Of the square of contrast an edge of a body has so many times as much as what is painted.
+const FULL_CONTRAST: f64 = 2.0;
 /// Most instants.
 const MAX_INSTANTS: f64 = 64.0;
+/// Light of the tunnel's lamps is even over this way.
+const EVEN_M: f64 = 0.25;
 /// No surface is taken to be nearer to a camera than this.
 const NEAREST_M: f64 = 0.3;
 /// So much farther than the probes of near chunks something between them may move.
@@ -29,10 +38,9 @@ const STILL_PX: f64 = 0.05;
 /// Motion in a picture while its middle row is exposed.
 pub struct Smear<'a> {
     framed: &'a Framed<'a>,
+    time: SimTime,
     open: Isometry3<f64>,
     close: Isometry3<f64>,
-    /// From the bodies' time to the frame's start and to its end.
-    bodies_s: [f64; 2],
 }
 
 impl<'a> Smear<'a> {
@@ -41,58 +49,68 @@ impl<'a> Smear<'a> {
         let (view, shutter) = (framed.view, &framed.view.camera.shutter);
         let rows = view.camera.intrinsics.height_px;
         let middle = shutter.row_open(view.start, 0.5 * f64::from(rows));
-        let start_s = view.start.since(time);
         Self {
             framed,
+            time,
             open: view.motion.pose_at(middle),
             close: view.motion.pose_at(middle.plus(shutter.exposure_s)),
-            bodies_s: [start_s, start_s + shutter.frame_span_s(rows)],
         }
     }
 
-    /// How many instants of a row's exposure show all motion in it.
-    pub fn instants(&self, bodies: &[Body], chunks: &[Arc<Chunk>]) -> u32 {
-        let most_px = if self.most_px() < SHARP_PX {
-            0.0
-        } else {
-            let reference = self.framed.reference();
-            let near = chunks
-                .iter()
-                .filter(|c| (c.origin - reference).norm() < PROBED_M);
-            let probes = near.flat_map(|chunk| &chunk.probes);
-            let flow_px = probes.filter_map(|probe| self.flow_px(&probe.at));
-            BETWEEN_PROBES * flow_px.fold(0.0, f64::max)
+    /// How far the camera goes along a chunk.
+    pub fn along_m(&self, chunk: &Chunk) -> f64 {
+        self.travel().dot(&chunk.along)
+    }
+
+    /// How many instants of a row's exposure show all motion in it but that along the line, and the part of
+    /// the picture that they are needed in.
+    pub fn instants(&self, bodies: &[Body], chunks: &[Arc<Chunk>]) -> (u32, Rectangle) {
+        let other_ways = |chunk: &Chunk| match chunk.crossed {
+            true => Vector3::zeros(),
+            false => chunk.along * self.along_m(chunk),
         };
+        let tunnel = count(self.tunnel_px(chunks, other_ways));
+        let tunnel = tunnel.max(count_of(self.travel().norm() / EVEN_M));
         let bodies_px = bodies.iter().map(|body| self.body_px(body));
-        let most_px = bodies_px.fold(most_px, f64::max);
-        (most_px / SHARP_PX).sqrt().ceil().clamp(1.0, MAX_INSTANTS) as u32
+        let all = tunnel.max(count(FULL_CONTRAST * bodies_px.fold(0.0, f64::max)));
+        let part = match (all, tunnel) {
+            (1, _) => Rectangle::default(),
+            (_, 1) => self.around(bodies),
+            _ => self.framed.whole(),
+        };
+        (all, part)
     }
 
-    /// Where anything moves within the exposure: all over the picture of a camera that does, else
-    /// where bodies do.
-    pub fn moving(&self, bodies: &[Body]) -> Rectangle {
-        let lens = &self.framed.view.camera.intrinsics;
-        let size_px = [lens.width_px, lens.height_px];
-        let whole = Rectangle::whole(size_px);
-        // A lens that bends lines lets edges bulge beyond their ends.
-        if self.most_px() > STILL_PX || !lens.distortion.is_none() {
-            return whole;
+    /// How many instants show what the tunnel mirrors, which does not move along with it.
+    pub fn mirrored_instants(&self, chunks: &[Arc<Chunk>]) -> u32 {
+        count(self.tunnel_px(chunks, |_| Vector3::zeros()))
+    }
+
+    /// By how much the tunnel moves in the picture but for a way in which it is the same.
+    fn tunnel_px(&self, chunks: &[Arc<Chunk>], same: impl Fn(&Chunk) -> Vector3<f64>) -> f64 {
+        if self.most_px() < SHARP_PX {
+            return 0.0;
         }
-        let (mut low, mut high) = (Point2::from([f64::MAX; 2]), Point2::from([f64::MIN; 2]));
-        for body in bodies.iter().filter(|body| self.body_px(body) > STILL_PX) {
-            for after_s in self.bodies_s {
-                for corner in Solid::at(body, after_s).corners() {
-                    let corner = self.open.inverse_transform_point(&corner);
-                    if corner.z < NEAREST_M {
-                        return whole;
-                    }
-                    if let Some(pixel) = lens.project(&corner) {
-                        (low, high) = (low.inf(&pixel), high.sup(&pixel));
-                    }
-                }
-            }
-        }
-        Rectangle::between(low, high, size_px)
+        let reference = self.framed.reference();
+        let near = chunks
+            .iter()
+            .filter(|c| (c.origin - reference).norm() < PROBED_M);
+        let flow_px = near.flat_map(|chunk| {
+            let way = same(chunk);
+            let probes = chunk.probes.iter();
+            probes.filter_map(move |probe| self.flow_px(&probe.at, way))
+        });
+        BETWEEN_PROBES * flow_px.fold(0.0, f64::max)
+    }
+
+    /// The part of the picture that shows bodies which move in it.
+    fn around(&self, bodies: &[Body]) -> Rectangle {
+        let eyes = Eyes::exposed(self.framed, self.time);
+        let moving = bodies.iter().filter(|body| self.body_px(body) > STILL_PX);
+        let parts = moving.map(|body| TileBounds::of_outline(self.framed, &eyes, body));
+        let parts = parts.map(|bounds| bounds.rectangle(self.framed.size_px()));
+        let seen = parts.filter(|part| !part.is_empty());
+        seen.reduce(|a, b| a.around(&b)).unwrap_or_default()
     }
 
     fn exposure_s(&self) -> f64 {
@@ -114,14 +132,14 @@ impl<'a> Smear<'a> {
         self.turned_px() + f_px * self.travel().norm() / NEAREST_M
     }
 
-    /// By how much a place that stands still moves, if it is in the picture.
-    fn flow_px(&self, place: &Point3<f64>) -> Option<f64> {
+    /// By how much a place that goes some way moves in the picture, if it is there.
+    fn flow_px(&self, place: &Point3<f64>, way: Vector3<f64>) -> Option<f64> {
         let lens = &self.framed.view.camera.intrinsics;
-        let seen = |pose: &Isometry3<f64>| {
+        let seen = |pose: &Isometry3<f64>, place: &Point3<f64>| {
             let place = pose.inverse_transform_point(place);
             (place.z > NEAREST_M).then(|| lens.project(&place))?
         };
-        let (from, to) = (seen(&self.open)?, seen(&self.close)?);
+        let (from, to) = (seen(&self.open, place)?, seen(&self.close, &(place + way))?);
         (lens.contains(&from) || lens.contains(&to)).then(|| (to - from).norm())
     }
 
@@ -140,4 +158,13 @@ impl<'a> Smear<'a> {
         let f_px = self.framed.view.camera.intrinsics.fx_px;
         self.turned_px() + f_px * moved.norm() / outside.norm().max(NEAREST_M)
     }
+}
+
+/// Instants that show a motion by so many pixels.
+fn count(most_px: f64) -> u32 {
+    count_of((most_px / SHARP_PX).sqrt())
+}
+
+fn count_of(parts: f64) -> u32 {
+    parts.ceil().clamp(1.0, MAX_INSTANTS) as u32
 }

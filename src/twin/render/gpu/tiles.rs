@@ -15,6 +15,9 @@ pub const TILE_PX: u32 = 32;
 const CELL_M: f64 = 1.0;
 /// A border for what bends between the corners of a cell.
 const BORDER_PX: f64 = 2.0;
+/// A lens bends the edges of a body out of the rectangle around its corners by less than this share of the
+/// rectangle's longer side.
+const BULGE: f64 = 0.1;
 /// Cells that reach behind the camera are looked at in so many points each way.
 const POINTS: i32 = 8;
 
@@ -249,7 +252,7 @@ impl TileBounds {
         bounds
     }
 
-    /// Where a body may be seen.
+    /// Where the corners of a body may be seen.
     pub fn of_body(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
         let mut bounds = Self::none();
         for (eye, after_s) in &eyes.0 {
@@ -263,8 +266,19 @@ impl TileBounds {
         bounds
     }
 
-    /// The same, with a share of the longer side more on every side.
-    pub fn widened(&self, share: f64) -> Self {
+    /// The same of all of it: a lens that bends lines lets edges bulge beyond their ends.
+    pub fn of_outline(framed: &Framed<'_>, eyes: &Eyes, body: &Body) -> Self {
+        let bends = !framed.view.camera.intrinsics.distortion.is_none();
+        Self::of_body(framed, eyes, body).widened(if bends { BULGE } else { 0.0 })
+    }
+
+    /// The pixels of a picture in it.
+    pub fn rectangle(&self, size_px: [u32; 2]) -> Rectangle {
+        Rectangle::between(self.low_px, self.high_px, size_px)
+    }
+
+    /// With a share of the longer side more on every side.
+    fn widened(&self, share: f64) -> Self {
         let size_px = self.high_px - self.low_px;
         // Nothing, and everything, stay what they are.
         let longer_px = Some(size_px.max()).filter(|px| px.is_finite());

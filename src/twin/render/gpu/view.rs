@@ -62,6 +62,17 @@ impl<'a> Framed<'a> {
         }
     }
 
+    /// Width and height of the picture.
+    pub fn size_px(&self) -> [u32; 2] {
+        let lens = &self.view.camera.intrinsics;
+        [lens.width_px, lens.height_px]
+    }
+
+    /// All of the picture.
+    pub fn whole(&self) -> Rectangle {
+        Rectangle::whole(self.size_px())
+    }
+
     /// The point that offsets count from.
     pub fn reference(&self) -> Point3<f64> {
         Point3::from(self.middle.translation.vector)
