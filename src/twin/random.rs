@@ -26,6 +26,7 @@ impl Stream {
     }
 
     /// Four independent 32-bit words for a pair of counters.
+    #[inline(always)]
     pub fn words(self, a: u32, b: u32) -> [u32; 4] {
         pcg4d([self.key[0], self.key[1], a, b])
     }

@@ -71,13 +71,21 @@ impl Shade {
         Self { columns, passed }
     }
 
-    /// In a pixel of the picture.
-    pub fn at(&self, u: u32, v: u32) -> f64 {
-        let share = |k: u32| f64::from(k % CELL_PX) / f64::from(CELL_PX);
-        let first = (v / CELL_PX) as usize * self.columns + (u / CELL_PX) as usize;
+    /// In the pixels of row `v` of the picture.
+    pub fn row(&self, v: u32, out: &mut [f32]) {
         let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
-        let row = |at: usize| mix(self.passed[at], self.passed[at + 1], share(u));
-        mix(row(first), row(first + self.columns), share(v))
+        let first = (v / CELL_PX) as usize * self.columns;
+        let down = f64::from(v % CELL_PX) / f64::from(CELL_PX);
+        let at = |column: usize| {
+            let [above, below] = [0, self.columns].map(|k| self.passed[first + k + column]);
+            mix(above, below, down)
+        };
+        for (column, cell) in out.chunks_mut(CELL_PX as usize).enumerate() {
+            let (left, right) = (at(column), at(column + 1));
+            for (k, to) in (0..).zip(cell) {
+                *to = mix(left, right, f64::from(k) / f64::from(CELL_PX)) as f32;
+            }
+        }
     }
 }
 
@@ -162,8 +170,12 @@ mod tests {
     fn shade(lens: &LensSettings) -> Vec<f64> {
         let camera = camera();
         let shade = Shade::new(lens, &camera, Stream::new(4, 0, "glass"));
-        let pixels = (0..camera.height_px).flat_map(|v| (0..camera.width_px).map(move |u| (u, v)));
-        pixels.map(|(u, v)| shade.at(u, v)).collect()
+        let width = camera.width_px as usize;
+        let mut passed = vec![0.0; width * camera.height_px as usize];
+        for (v, row) in (0..).zip(passed.chunks_mut(width)) {
+            shade.row(v, row);
+        }
+        passed.into_iter().map(f64::from).collect()
     }
 
     /// Fails where clean glass takes light, or a lattice too coarse bends the cosine's curve: a

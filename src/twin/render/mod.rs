@@ -15,6 +15,7 @@ pub mod labels;
 pub mod lamp_field;
 mod light_source;
 mod lit_scene;
+mod normals;
 pub mod paint;
 pub mod photometry;
 pub mod pixel_map;

@@ -17,11 +17,12 @@
 //! the exposure changes.
 
 use super::glass::Shade;
+use super::normals::pair;
 use super::{Pattern, View};
 use crate::bus::Intrinsics;
 use crate::twin::random::{Stream, pcg4d};
+use pulp::Arch;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
 
 /// Step of the gain: 16 bits reach from 0 to 2.
 pub const GAIN_STEP: f64 = 1.0 / 32_768.0;
@@ -31,7 +32,12 @@ pub const LEVEL_STEP: f64 = 1.0 / 1024.0;
 pub const HOT: u32 = 1 << 16;
 /// The level lies above this many bits.
 pub const LEVEL_SHIFT: u32 = 17;
-const LEVEL_MAX: f64 = 16_383.0;
+const LEVEL_MAX: f32 = 16_383.0;
+const GAIN_MASK: u32 = 0xffff;
+/// So many words there are.
+const WORDS: f64 = 4_294_967_296.0;
+/// Pixels that are worked at together: loops over so many become vector code.
+const BLOCK_PX: usize = 64;
 /// Cameras whose maps a renderer keeps.
 pub const KEPT_MAPS: usize = 8;
 
@@ -69,26 +75,75 @@ impl MapKey {
         let pixels = branch(self.stream, 2);
         let row_len = 4 * camera.width_px.div_ceil(4) as usize;
         let mut words = vec![0; row_len * camera.height_px as usize];
-        let rows = words.par_chunks_mut(row_len.max(1));
-        rows.zip(0..camera.height_px).for_each(|(row, v)| {
-            for (word, u) in row.iter_mut().zip(0..camera.width_px) {
-                *word = self.word(pixels.words(u, v), (u, v), shade.at(u, v));
-            }
-        });
+        let rows = words
+            .par_chunks_mut(row_len.max(1))
+            .zip(0..camera.height_px);
+        let arch = Arch::new();
+        rows.for_each_init(
+            || vec![0.0; camera.width_px as usize],
+            |passed, (row, v)| {
+                shade.row(v, passed);
+                arch.dispatch(|| self.fill_row(pixels, v, passed, row));
+            },
+        );
         PixelMap { row_len, words }
     }
 
-    fn word(&self, draw: [u32; 4], (u, v): (u32, u32), passed: f64) -> u32 {
-        let [a, b] = normals(draw[0], draw[1]);
-        let response = self.pattern.of(u, v, self.response);
-        let gain = passed * response * (1.0 + self.prnu * a);
-        let gain = (gain / GAIN_STEP).round().clamp(0.0, 65_535.0) as u32;
-        let hot = unit(draw[2]) < self.hot_pixel_share;
-        // Leaks of hot pixels spread as an exponential does.
-        let level = if hot { -unit(draw[3]).ln() } else { b };
-        let level = (level / LEVEL_STEP).round().clamp(-LEVEL_MAX, LEVEL_MAX) as i32;
-        gain | if hot { HOT } else { 0 } | (level << LEVEL_SHIFT) as u32
+    /// Words of the pixels of row `v`, to each of which so much light passes.
+    #[inline(always)]
+    fn fill_row(&self, pixels: Stream, v: u32, passed: &[f32], row: &mut [u32]) {
+        let response = [0, 1].map(|u| self.pattern.of(u, v, self.response));
+        let response: [f32; BLOCK_PX] = std::array::from_fn(|u| response[u % 2] as f32);
+        let hot_below = (self.hot_pixel_share * WORDS) as u32;
+        let blocks = row.chunks_mut(BLOCK_PX).zip(passed.chunks(BLOCK_PX));
+        for (first, (words, passed)) in (0..).step_by(BLOCK_PX).zip(blocks) {
+            let [mut a, mut b, mut c, mut d] = [[0; BLOCK_PX]; 4];
+            for k in 0..BLOCK_PX {
+                [a[k], b[k], c[k], d[k]] = pixels.words(first + k as u32, v);
+            }
+            let draws = a.iter().zip(&b).zip(passed.iter().zip(&response));
+            for (word, ((a, b), (passed, response))) in words.iter_mut().zip(draws) {
+                let [x, level] = pair(*a, *b);
+                let gain = passed * response * (1.0 + self.prnu as f32 * x);
+                *word = gain_bits(gain) | level_bits(level);
+            }
+            if c.iter().all(|c| *c >= hot_below) {
+                continue;
+            }
+            for ((word, c), d) in words.iter_mut().zip(c).zip(d).take(passed.len()) {
+                if c < hot_below {
+                    // Leaks of hot pixels spread as an exponential does.
+                    let leak = -((f64::from(d) + 0.5) / WORDS).ln();
+                    *word = *word & GAIN_MASK | HOT | level_bits(leak as f32);
+                }
+            }
+        }
     }
+}
+
+#[inline(always)]
+fn gain_bits(gain: f32) -> u32 {
+    rounded(gain * (1.0 / GAIN_STEP) as f32, GAIN_MASK as f32)
+}
+
+#[inline(always)]
+fn level_bits(level: f32) -> u32 {
+    // Whole numbers below 2 LEVEL_MAX, less LEVEL_MAX.
+    let from_least = rounded(
+        level * (1.0 / LEVEL_STEP) as f32 + LEVEL_MAX,
+        2.0 * LEVEL_MAX,
+    );
+    from_least.wrapping_sub(LEVEL_MAX as u32) << LEVEL_SHIFT
+}
+
+/// A number from 0 to `most`, as a whole one.
+#[inline(always)]
+fn rounded(number: f32, most: f32) -> u32 {
+    // Added to a number below it, 2^23 leaves no bits behind the point.
+    const WHOLE: f32 = 8_388_608.0;
+    let number = if number > 0.0 { number } else { 0.0 };
+    let number = if number < most { number } else { most };
+    (number + WHOLE).to_bits() & ((1 << 23) - 1)
 }
 
 /// The words of a camera's pixels.
@@ -134,7 +189,7 @@ impl Dark {
 
     /// Electrons of a pixel with that word under a signal.
     pub fn charge_e(&self, word: u32, signal_e: f64) -> f64 {
-        let gain = GAIN_STEP * f64::from(word & 0xffff);
+        let gain = GAIN_STEP * f64::from(word & GAIN_MASK);
         let level = f64::from(word as i32 >> LEVEL_SHIFT);
         let step_e = if word & HOT == 0 {
             self.step_e
@@ -149,15 +204,4 @@ impl Dark {
 fn branch(stream: Stream, number: u32) -> Stream {
     let [low, high, ..] = pcg4d([stream.key[0], stream.key[1], u32::MAX, number]);
     Stream { key: [low, high] }
-}
-
-fn unit(word: u32) -> f64 {
-    (f64::from(word) + 0.5) / 4_294_967_296.0
-}
-
-/// Two standard normal numbers of two words (Box and Muller).
-fn normals(a: u32, b: u32) -> [f64; 2] {
-    let radius = (-2.0 * unit(a).ln()).sqrt();
-    let (sin, cos) = (TAU * unit(b)).sin_cos();
-    [radius * cos, radius * sin]
 }

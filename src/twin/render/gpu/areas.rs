@@ -95,22 +95,32 @@ impl PartSearch<'_> {
         for call in self.list.tunnel() {
             let patches = call.chunk.iter().flat_map(|c| &c.parts[call.part].patches);
             for patch in patches {
+                let dark_lx = luminance_cd_m2 / f64::from(patch.reflected_per_lx);
                 let bright = |p: &Point3<f64>| {
                     let normal = patch.cell.normal.unwrap_or_default();
-                    let lux = headlights_lx(&self.job.headlights, air, p, &normal);
-                    lux * f64::from(patch.reflected_per_lx) > luminance_cd_m2
+                    headlights_lx(&self.job.headlights, air, p, &normal) > dark_lx
                 };
                 let lit = by_lamps && f64::from(patch.peak_cd_m2) > luminance_cd_m2;
                 let mirrors = patch.glossy && !call.glossy.is_empty();
                 let drawn = lit
                     || mirrors
                     || call.headlit
+                        && self.most_lx(&patch.cell) > dark_lx
                         && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
                 if drawn && !patch.cell.turns_away(eye) {
                     eyes.mark(marks, &patch.cell, self.framed.size_px(), QUARTERED);
                 }
             }
         }
+    }
+
+    /// More than headlights give anywhere on a cell, whichever way it and they face.
+    fn most_lx(&self, cell: &SurfaceCell) -> f64 {
+        let beams = self.job.headlights.iter().map(|light| {
+            let away_m = (cell.centre - light.place()).norm() - cell.half_diagonal_m();
+            light.intensity_cd / away_m.max(NEAR_M).powi(2)
+        });
+        beams.sum()
     }
 
     fn mark_bodies(&self, marks: &mut Marks) {

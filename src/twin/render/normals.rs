@@ -36,6 +36,13 @@ pub fn normals(key: [u32; 3], counter: u32, out: &mut [f32; 4 * TEXELS]) {
     }
 }
 
+/// Two of two words.
+#[inline(always)]
+pub fn pair(a: u32, b: u32) -> [f32; 2] {
+    let (radius, [sin, cos]) = (radius_of(a), sin_cos(b));
+    [radius * cos, radius * sin]
+}
+
 /// The words of each counter.
 #[inline(always)]
 fn words([x, y, z]: [u32; 3], counter: u32) -> [[u32; TEXELS]; 4] {

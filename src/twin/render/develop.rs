@@ -6,12 +6,10 @@
 //! compilers turn into vector code; [`pulp`] picks the widest that the processor has. Nothing is fused or
 //! reordered, so every processor gives the same bytes.
 
-mod normals;
-
 use super::View;
 use super::gpu::layout::BRIGHTEST_E;
+use super::normals::{TEXELS, normals};
 use super::pixel_map::{Dark, GAIN_STEP, HOT, LEVEL_SHIFT};
-use normals::{TEXELS, normals};
 
 /// Pixels that are worked at together: four a texel.
 const BLOCK_PX: usize = 4 * TEXELS;
