@@ -53,7 +53,7 @@ impl LitScene {
         let paintings = if anew {
             Paintings::of(&scene.tunnel)
         } else {
-            self.paintings.clone()
+            std::mem::take(&mut self.paintings)
         };
         *self = Self::painted(scene, paintings);
         anew

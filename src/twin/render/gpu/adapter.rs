@@ -1,6 +1,7 @@
 //! Finding and opening a graphics adapter.
 
 use crate::twin::render::{Backend, RenderError};
+use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
 /// The opened adapter.
@@ -19,6 +20,10 @@ pub struct Gpu {
 pub fn adapters() -> Vec<Backend> {
     found().iter().map(|a| describe(&a.get_info())).collect()
 }
+
+/// Sizes of the driver's blocks of memory: what is larger, such as a painting on its way, has one of its own
+/// and gives it back.
+const BLOCK_BYTES: Range<u64> = 1 << 20..4 << 20;
 
 /// Passes can be timed.
 const CLOCK: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
@@ -46,6 +51,9 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("metrotwin"),
             required_features: adapter.features() & CLOCK,
+            memory_hints: wgpu::MemoryHints::Manual {
+                suballocated_device_memory_block_size: BLOCK_BYTES,
+            },
             ..Default::default()
         }))
         .map_err(|e| RenderError::Device(e.to_string()))?;

@@ -7,7 +7,7 @@ use super::layout::Part;
 use super::prepared::{Level, PreparedView};
 use super::recorder::{BLACK, KEEP, Passes, Recorder, grey};
 use super::rectangle::Rectangle;
-use super::target::SurfaceLayers;
+use super::texture::Texture;
 use super::textures::Textures;
 use crate::twin::render::RenderError;
 use std::ops::Range;
@@ -83,18 +83,19 @@ impl<'a> Recorder<'a> {
 
     /// The tunnel in a small picture, under so many headlights.
     fn draw_coarse(&mut self, level: &Level, headlights: usize, surfaces: &Surfaces<'_>) {
-        let layers = self.target.coarse.each_ref();
-        let all = [layers[0].signal.whole()];
+        let layers = &self.target.coarse;
+        let signals = [&layers.signal, &self.target.coarse_instant];
+        let all = [layers.signal.whole()];
         let bound = self.surfaces(level, headlights, surfaces.textures);
         let (view, empty) = (self.view, self.empty());
         for (k, instant) in view.tunnel_instants().enumerate() {
-            let (onto, depth) = (layers[usize::from(k > 0)], wgpu::LoadOp::Clear(0.0));
-            let depth = Some((&onto.depth, depth));
-            let mut pass = (self.passes).begin("coarse", &[(&onto.signal, empty)], depth);
+            let onto = signals[usize::from(k > 0)];
+            let depth = Some((&layers.depth, wgpu::LoadOp::Clear(0.0)));
+            let mut pass = (self.passes).begin("coarse", &[(onto, empty)], depth);
             view.draw_instant(&mut pass, instant, &bound, view.list.tunnel(), surfaces);
             drop(pass);
             if k > 0 {
-                self.mix_in(level, layers, k, &all);
+                self.mix_in(level, signals, k, &all);
             }
         }
     }
@@ -125,9 +126,9 @@ impl<'a> Recorder<'a> {
             .iter()
             .map(|(part, calls)| (part.overlap(&view.list.moving), *calls));
         let moving: Vec<_> = moving.filter(|(part, _)| !part.is_empty()).collect();
-        let layers = [&target.layers, &target.instant];
+        let signals = [&target.layers.signal, &target.instant];
         if moving != all {
-            self.draw_areas(layers[0], &all, 0, &bound, surfaces);
+            self.draw_areas(signals[0], &all, 0, &bound, surfaces);
         }
         if moving.is_empty() {
             return;
@@ -135,14 +136,14 @@ impl<'a> Recorder<'a> {
         let parts: Vec<_> = moving.iter().map(|(part, _)| *part).collect();
         for (k, instant) in view.list.instants.clone().enumerate() {
             self.draw_areas(
-                layers[usize::from(k > 0)],
+                signals[usize::from(k > 0)],
                 &moving,
                 instant,
                 &bound,
                 surfaces,
             );
             if k > 0 {
-                self.mix_in(level, layers, k, &parts);
+                self.mix_in(level, signals, k, &parts);
             }
         }
     }
@@ -150,7 +151,7 @@ impl<'a> Recorder<'a> {
     /// Draws parts of the picture at an instant, each with those draw calls that may show there.
     fn draw_areas(
         &mut self,
-        onto: &SurfaceLayers,
+        onto: &Texture,
         areas: &[(Rectangle, &[usize])],
         instant: u32,
         bound: &[Bound<'_>],
@@ -159,8 +160,8 @@ impl<'a> Recorder<'a> {
         let view = self.view;
         let parts: Vec<_> = areas.iter().map(|(part, _)| *part).collect();
         self.clear(onto, &parts);
-        let depth = Some((&onto.depth, wgpu::LoadOp::Load));
-        let mut pass = (self.passes).begin("background", &[(&onto.signal, KEEP)], depth);
+        let depth = Some((&self.target.layers.depth, wgpu::LoadOp::Load));
+        let mut pass = (self.passes).begin("background", &[(onto, KEEP)], depth);
         for (part, calls) in areas {
             part.clip(&mut pass);
             let calls = calls.iter().map(|call| &view.list.calls[*call]);
@@ -169,7 +170,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Leaves nothing in parts of the picture.
-    fn clear(&mut self, layers: &SurfaceLayers, parts: &[Rectangle]) {
+    fn clear(&mut self, onto: &Texture, parts: &[Rectangle]) {
         let part = |part: &Rectangle| Part {
             low: part.at.map(|x| x as f32 - 0.5),
             high: part.ends().map(|x| x as f32 - 0.5),
@@ -179,8 +180,8 @@ impl<'a> Recorder<'a> {
         let parts: Vec<_> = parts.iter().map(part).collect();
         let (clear, table) = (&self.pipelines.clear, self.gpu.storage(&parts));
         let group = self.bind(&self.view.full, clear, &[table.as_entire_binding()]);
-        let depth = Some((&layers.depth, wgpu::LoadOp::Load));
-        let mut pass = self.passes.begin("clear", &[(&layers.signal, KEEP)], depth);
+        let depth = Some((&self.target.layers.depth, wgpu::LoadOp::Load));
+        let mut pass = self.passes.begin("clear", &[(onto, KEEP)], depth);
         pass.set_pipeline(clear);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..parts.len() as u32);
@@ -225,22 +226,20 @@ impl<'a> Recorder<'a> {
         }
         let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
         let moving = [view.list.moving];
+        let signals = [&target.layers.signal, &target.instant];
         let restored = |parts: &[Rectangle]| kept.planes.upload(self.gpu, parts, &view.list.shares);
         let mut under = restored(&parts);
         for (k, instant) in view.list.instants.clone().enumerate() {
             if k == 1 {
                 under = restored(&moving);
             }
-            let layers = [&target.layers, &target.instant][usize::from(k > 0)];
-            under.copy_to(&layers.signal, self.passes.encoder);
-            let onto = if bodies.is_empty() {
-                &kept.depth
-            } else {
-                layers.depth.copy_from(&kept.depth, self.passes.encoder);
-                &layers.depth
-            };
-            let depth = Some((onto, wgpu::LoadOp::Load));
-            let mut pass = (self.passes).begin("background", &[(&layers.signal, KEEP)], depth);
+            let onto = signals[usize::from(k > 0)];
+            under.copy_to(onto, self.passes.encoder);
+            if !bodies.is_empty() {
+                (target.layers.depth).copy_from(&kept.depth, self.passes.encoder);
+            }
+            let depth = Some((self.depth(), wgpu::LoadOp::Load));
+            let mut pass = (self.passes).begin("background", &[(onto, KEEP)], depth);
             if k > 0 {
                 view.list.moving.clip(&mut pass);
             }
@@ -252,10 +251,12 @@ impl<'a> Recorder<'a> {
                 headlit.iter().copied(),
                 surfaces,
             );
+            // Those that stand still elsewhere too, for their depth.
+            self.target.layers.signal.whole().clip(&mut pass);
             view.draw_instant(&mut pass, instant, &bound, bodies.iter(), surfaces);
             drop(pass);
             if k > 0 {
-                self.mix_in(level, [&target.layers, &target.instant], k, &moving);
+                self.mix_in(level, signals, k, &moving);
             }
         }
     }
@@ -265,13 +266,13 @@ impl<'a> Recorder<'a> {
     fn mix_in(
         &mut self,
         level: &Level,
-        [mean, instant]: [&SurfaceLayers; 2],
+        [mean, instant]: [&Texture; 2],
         k: usize,
         parts: &[Rectangle],
     ) {
         let blend = &self.pipelines.blend;
-        let group = self.bind(level, blend, &[instant.signal.binding()]);
-        let mut pass = (self.passes).begin("instants", &[(&mean.signal, KEEP)], None);
+        let group = self.bind(level, blend, &[instant.binding()]);
+        let mut pass = (self.passes).begin("instants", &[(mean, KEEP)], None);
         pass.set_blend_constant(grey(1.0 / (k + 1) as f64));
         pass.set_pipeline(blend);
         pass.set_bind_group(0, &group, &[]);

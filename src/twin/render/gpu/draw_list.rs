@@ -305,8 +305,8 @@ impl DrawList {
         }
         let first = self.placements.len() as u32 / self.meshes.max(1);
         for k in 0..count {
-            // The middle comes first: its depths decide what hides the lamps.
-            let k = (k + count / 2) % count;
+            // The middle comes last: its depths decide what hides the lamps.
+            let k = (k + count / 2 + 1) % count;
             let late_s = ((f64::from(k) + 0.5) / f64::from(count) - 0.5) * exposure_s;
             for mesh in 0..self.meshes as usize {
                 let middle = self.placements[mesh];

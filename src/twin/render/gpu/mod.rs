@@ -157,11 +157,13 @@ impl GpuRenderer {
         let gpu = Gpu::open()?;
         let pipelines = Pipelines::new(&gpu.device);
         gpu.check()?;
-        let scene = LitScene::new(scene);
+        let mut scene = LitScene::new(scene);
+        let textures = Textures::new(&gpu, &scene.paintings);
+        scene.paintings.forget_texels();
         Ok(Self {
             pipelines,
             chunks: Chunks::default(),
-            textures: Textures::new(&gpu, &scene.paintings),
+            textures,
             scene,
             maps: Cache::new(KEPT_MAPS),
             maps_in_memory: Cache::new(KEPT_MAPS),
@@ -282,6 +284,7 @@ impl Renderer for GpuRenderer {
     fn set_scene(&mut self, scene: Scene) {
         if self.scene.replace(scene) {
             self.textures = Textures::new(&self.gpu, &self.scene.paintings);
+            self.scene.paintings.forget_texels();
         }
         self.chunks = Chunks::default();
         self.kept.clear();

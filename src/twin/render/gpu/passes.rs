@@ -42,10 +42,7 @@ impl Recorder<'_> {
     /// Blurs what is out of focus, along rows and then along columns.
     pub fn blur(&mut self) {
         let (sharp, blurred) = (&self.target.layers, &self.target.instant);
-        let ways = [
-            (&sharp.signal, &blurred.signal),
-            (&blurred.signal, &sharp.signal),
-        ];
+        let ways = [(&sharp.signal, blurred), (blurred, &sharp.signal)];
         for (pipeline, (from, to)) in self.pipelines.focus.iter().zip(ways) {
             let resources = [from.binding(), sharp.depth.binding()];
             self.draw_rectangles("focus", (to, BLACK), pipeline, &resources, 0..1);

@@ -4,10 +4,13 @@ use super::adapter::Gpu;
 use super::rectangle::Rectangle;
 use super::texture::Texture;
 use super::upload::empty_buffer;
-use rayon::prelude::*;
+use std::ops::Range;
 
 /// Pieces begin at multiples of this.
 const ALIGNMENT: u64 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as u64;
+
+/// Sizes of buffers are multiples of this, so that a picture with more parts than the last one finds room.
+const ROOM: u64 = 1 << 20;
 
 /// A part of a texture in a buffer.
 pub struct Piece {
@@ -36,10 +39,15 @@ impl Piece {
     /// The 16-bit words of row `v` of the texture.
     #[inline(always)]
     pub fn row<'b>(&self, bytes: &'b [u8], v: u32) -> &'b [[u8; 2]] {
+        bytes[self.bytes(v)].as_chunks().0
+    }
+
+    /// Where they lie in the buffer.
+    #[inline(always)]
+    fn bytes(&self, v: u32) -> Range<usize> {
         let row = u64::from(v - self.part.at[1]) * u64::from(self.stride);
-        let length = 2 * (self.words_a_texel * self.part.size[0]) as usize;
-        let bytes = &bytes[(self.offset + row) as usize..][..length];
-        bytes.as_chunks().0
+        let first = (self.offset + row) as usize;
+        first..first + 2 * (self.words_a_texel * self.part.size[0]) as usize
     }
 
     /// Whether row `v` of the texture is in it.
@@ -65,19 +73,25 @@ impl<'t> Pieces<'t> {
         piece
     }
 
-    /// Copies all of them, into one of the buffers that are free if it is large enough.
+    /// Copies all of them, into the smallest of the buffers that are free and large enough; if there is none,
+    /// one goes for a larger.
     pub fn copy(
         self,
         device: &wgpu::Device,
         encoder: &mut wgpu::CommandEncoder,
         free: &mut Vec<wgpu::Buffer>,
     ) -> wgpu::Buffer {
-        let enough = free.iter().position(|buffer| buffer.size() >= self.size);
+        let enough = (free.iter().enumerate())
+            .filter(|(_, buffer)| buffer.size() >= self.size)
+            .min_by_key(|(_, buffer)| buffer.size());
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
-        let buffer = enough.map_or_else(
-            || empty_buffer(device, self.size.max(ALIGNMENT), usage),
-            |at| free.swap_remove(at),
-        );
+        let buffer = match enough {
+            Some((at, _)) => free.swap_remove(at),
+            None => {
+                free.pop();
+                empty_buffer(device, self.size.max(1).next_multiple_of(ROOM), usage)
+            }
+        };
         for (texture, part, offset, stride) in self.copies {
             texture.copy_part_to_buffer(part, &buffer, (offset, stride), encoder);
         }
@@ -93,7 +107,7 @@ pub struct Uploaded {
 
 impl Uploaded {
     /// With `fill` to write a row's numbers, from a column on.
-    pub fn new(gpu: &Gpu, parts: &[Rectangle], fill: impl Fn(u32, u32, &mut [u16]) + Sync) -> Self {
+    pub fn new(gpu: &Gpu, parts: &[Rectangle], fill: impl Fn(u32, u32, &mut [u16])) -> Self {
         let mut end = 0;
         let pieces = parts.iter().map(|part| {
             let piece = Piece::after(end, *part, 1);
@@ -101,20 +115,27 @@ impl Uploaded {
             piece
         });
         let pieces: Vec<Piece> = pieces.collect();
-        let mut words = vec![0; end as usize / 2];
-        let (mut rows, mut rest) = (Vec::new(), &mut words[..]);
-        for piece in &pieces {
-            for v in piece.part.at[1]..piece.part.ends()[1] {
-                let row;
-                (row, rest) = rest.split_at_mut(piece.stride as usize / 2);
-                rows.push((piece.part.at[0], v, &mut row[..piece.part.size[0] as usize]));
+        let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: None,
+            size: end.max(ALIGNMENT),
+            usage: wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: true,
+        });
+        // A device that cannot map it has failed, which is found out when the job is submitted.
+        if let Ok(mut bytes) = buffer.get_mapped_range_mut(..) {
+            let widest = parts.iter().map(|part| part.size[0]).max().unwrap_or(0);
+            let mut row = vec![0; widest as usize];
+            for piece in &pieces {
+                let row = &mut row[..piece.part.size[0] as usize];
+                for v in piece.part.at[1]..piece.part.ends()[1] {
+                    fill(piece.part.at[0], v, row);
+                    let words: &[u8] = bytemuck::cast_slice(row);
+                    bytes.slice(piece.bytes(v)).copy_from_slice(words);
+                }
             }
         }
-        rows.into_par_iter().for_each(|(u, v, row)| fill(u, v, row));
-        Self {
-            buffer: gpu.upload(wgpu::BufferUsages::COPY_SRC, &words, ALIGNMENT as usize),
-            pieces,
-        }
+        buffer.unmap();
+        Self { buffer, pieces }
     }
 
     /// Copies them into a texture.

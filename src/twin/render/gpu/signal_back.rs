@@ -50,7 +50,7 @@ impl SignalBack {
         let under = match (kept, &view.coarse) {
             (Some(kept), _) => Under::Kept(Arc::clone(&kept.planes), view.list.shares),
             (None, Some(_)) => {
-                let coarse = &target.coarse[0].signal;
+                let coarse = &target.coarse.signal;
                 Under::Coarse(pieces.add(coarse, coarse.whole(), 1))
             }
             (None, None) => Under::Nothing,

@@ -22,10 +22,11 @@ pub struct ViewTarget {
     /// Where the glare is summed up, electrons: a texel for every fourth pixel of a row, and one more,
     /// so that every pixel lies between two.
     pub glare: Texture,
-    /// One instant of an exposure that shows motion, and what is blurred on the way.
-    pub instant: SurfaceLayers,
-    /// The same of a small picture: its signal, and one instant.
-    pub coarse: [SurfaceLayers; 2],
+    /// Signal at one instant of an exposure that shows motion, and what is blurred on the way.
+    pub instant: Texture,
+    /// The same of a small picture.
+    pub coarse: SurfaceLayers,
+    pub coarse_instant: Texture,
     /// Where the adapter develops the picture, if it does.
     finishing: OnceCell<Finishing>,
 }
@@ -52,13 +53,20 @@ impl SurfaceLayers {
     pub fn new(device: &wgpu::Device, size_px: (u32, u32)) -> Self {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
             | wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_SRC
             | wgpu::TextureUsages::COPY_DST;
         Self {
-            signal: Texture::new(device, size_px, SIGNAL, usage),
+            signal: signal_texture(device, size_px),
             depth: Texture::new(device, size_px, DEPTH, usage),
         }
     }
+}
+
+fn signal_texture(device: &wgpu::Device, size_px: (u32, u32)) -> Texture {
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+        | wgpu::TextureUsages::TEXTURE_BINDING
+        | wgpu::TextureUsages::COPY_SRC
+        | wgpu::TextureUsages::COPY_DST;
+    Texture::new(device, size_px, SIGNAL, usage)
 }
 
 impl ViewTarget {
@@ -73,8 +81,9 @@ impl ViewTarget {
             size_px,
             layers: SurfaceLayers::new(device, size_px),
             glare: Texture::new(device, (glare_columns, size_px.1), SIGNAL, glare_usage),
-            instant: SurfaceLayers::new(device, size_px),
-            coarse: [(); 2].map(|()| SurfaceLayers::new(device, coarse_px)),
+            instant: signal_texture(device, size_px),
+            coarse: SurfaceLayers::new(device, coarse_px),
+            coarse_instant: signal_texture(device, coarse_px),
             finishing: OnceCell::new(),
         }
     }

@@ -86,7 +86,7 @@ pub struct Painting {
 }
 
 /// The paintings of a tunnel; equal cross-sections share one.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Paintings {
     /// Each once.
     pub all: Vec<Painting>,
@@ -109,6 +109,13 @@ impl Paintings {
         Self {
             all: sections.into_iter().map(Painting::of).collect(),
             of_range,
+        }
+    }
+
+    /// Leaves the texels to an adapter that has them.
+    pub fn forget_texels(&mut self) {
+        for painting in &mut self.all {
+            painting.levels = Vec::new();
         }
     }
 }
@@ -263,23 +270,29 @@ fn prime(strip: &mut Strip, ring: i32, outline: &Unrolled, places: &[Option<Outl
 
 /// All levels above an image, from the exact sums of its texels.
 fn pyramid(sharp: Vec<u8>, width: usize) -> Vec<Vec<u8>> {
-    let mut sums: Vec<u32> = sharp.iter().map(|a| u32::from(*a)).collect();
-    let mut columns = width;
+    let mut sums = sums_of_four(&sharp, width);
     let mut levels = vec![sharp];
     for level in 1..LEVELS {
-        let pairs = sums.par_chunks(2 * columns).flat_map_iter(|rows| {
-            let (above, below) = rows.split_at(columns);
-            let pairs = above.chunks(2).zip(below.chunks(2));
-            pairs.map(|(a, b)| a.iter().sum::<u32>() + b.iter().sum::<u32>())
-        });
-        sums = pairs.collect();
-        columns /= 2;
+        if level > 1 {
+            sums = sums_of_four(&sums, width >> (level - 1));
+        }
         // Halves go to the even neighbour: upwards each level would be paler than the last.
         let (shift, half) = (2 * level, 1u32 << (2 * level - 1));
         let mean = |sum: &u32| ((sum + half - 1 + (sum >> shift & 1)) >> shift) as u8;
         levels.push(sums.iter().map(mean).collect());
     }
     levels
+}
+
+/// Of every two by two numbers in rows of so many.
+fn sums_of_four<T: Copy + Into<u32> + Sync>(numbers: &[T], columns: usize) -> Vec<u32> {
+    let of_rows = numbers.par_chunks(2 * columns).flat_map_iter(|rows| {
+        let (above, below) = rows.split_at(columns);
+        let pairs = above.chunks(2).zip(below.chunks(2));
+        let sum = |numbers: &[T]| numbers.iter().map(|n| (*n).into()).sum::<u32>();
+        pairs.map(move |(a, b)| sum(a) + sum(b))
+    });
+    of_rows.collect()
 }
 
 #[cfg(test)]
