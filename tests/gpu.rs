@@ -320,7 +320,7 @@ fn timed_passes_are_parts_of_the_job() {
     let passes = renderer.pass_times();
     assert_eq!(passes.is_empty(), !has_clock);
     let names: Vec<_> = passes.iter().map(|pass| pass.name).collect();
-    let of_eye = ["fill", "background", "lamps", "glare", "sensor"];
+    let of_eye = ["clear", "background", "lamps", "glare", "sensor"];
     assert!(
         !has_clock || names == [of_eye, of_eye].concat(),
         "{names:?}"

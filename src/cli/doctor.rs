@@ -8,7 +8,9 @@ use serde::Serialize;
 
 const AFTER: &str = "\
 A figure is the best median of rounds of 20 frames. With --profile, times are medians of frames that are
-drawn one by one: preparing a job, waiting for its pictures, and the adapter's own time in each pass.
+drawn one by one, a pair of the rig or a picture of the wayside camera: preparing it; drawing it, and the
+adapter's own time in each pass; developing it, which is the sensor's part where the processor does that;
+beside the time that its bytes take through memory, and the plain renderer's for the same picture.
 
 Examples:
   metrotwin doctor
@@ -31,7 +33,7 @@ pub(super) fn doctor(args: &DoctorArgs) -> Result<(), Failure> {
     let failed = |error| Failure::run(anyhow::Error::from_boxed(error));
     if args.profile {
         let cases = Cases {
-            cases: profile().map_err(failed)?,
+            cases: profile(&|case| eprintln!("{case} ...")).map_err(failed)?,
         };
         return say(
             args,

@@ -4,15 +4,20 @@
 //! The adapter times its passes by its own clock. What it copies between them, and what it waits for the
 //! processor, is the rest of the time from the first pass's begin to the last one's end. One job at a time is
 //! drawn, so that nothing else is drawn meanwhile: in a run the next one is prepared while one is drawn.
+//!
+//! What no renderer of this kind can undercut is the time that its bytes take through memory: the signal that
+//! comes back is written and read, a word of every pixel's map is read, a byte of every pixel is written.
 
 use super::costs::Stopwatch;
 use super::speed::{Error, POST, TRAIN, Watched, scene};
 use super::summary::Cost;
 use super::{RunOptions, run_on};
 use crate::scenario::Scenario;
+use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::gpu::{GpuRenderer, PassTime};
 use crate::twin::render::{Job, Renderer};
 use serde::Serialize;
+use std::hint::black_box;
 
 /// What is drawn: its name, the scene, and its changes.
 const CASES: [(&str, &str, &[&str]); 8] = [
@@ -44,6 +49,14 @@ const CASES: [(&str, &str, &[&str]); 8] = [
     ),
 ];
 
+/// Of a pixel: its word in the map, and its grey.
+const BYTES_A_PIXEL: f64 = 5.0;
+/// Larger than any cache.
+const COPIED_BYTES: usize = 64 << 20;
+const COPIES: usize = 5;
+/// Jobs that the plain renderer draws.
+const PLAIN_JOBS: usize = 3;
+
 /// Down the line, 20 to 30 m before the device.
 const WORKER: &str = "workers=[{path=[{time_s=0.0, chainage_m=1510.0, lateral_m=0.3}, \
                       {time_s=7.0, chainage_m=1500.0, lateral_m=0.3}]}]";
@@ -57,8 +70,14 @@ pub struct DrawingProfile {
     pub pixels: u64,
     /// Preparing a job and handing it over, milliseconds; medians, as all times here.
     pub submit_ms: f64,
-    /// From then until its images are there.
-    pub wait_ms: f64,
+    /// From then until it is drawn.
+    pub draw_ms: f64,
+    /// From then until its images are there: what the processor adds of the sensor.
+    pub develop_ms: f64,
+    /// The time of its bytes through memory.
+    pub memory_ms: f64,
+    /// The plain renderer's time for a job: some of them.
+    pub plain_ms: f64,
     /// The adapter's time in each pass, in the order drawn; none where it has no clock.
     pub passes: Vec<PassCost>,
     /// Between the passes.
@@ -76,13 +95,47 @@ pub struct PassCost {
     pub ns_per_pixel: f64,
 }
 
-/// Draws every case on the preferred adapter.
-pub fn profile() -> Result<Vec<DrawingProfile>, Error> {
-    CASES.iter().map(profile_of).collect()
+/// Draws every case on the preferred adapter; tells `progress` what is drawn.
+pub fn profile(progress: &dyn Fn(&str)) -> Result<Vec<DrawingProfile>, Error> {
+    let memory = memory_bytes_per_ms();
+    let cases = CASES.iter().map(|case| {
+        progress(case.0);
+        profile_of(case, memory)
+    });
+    cases.collect()
+}
+
+/// How fast memory copies, by the fastest of some copies: bytes read and written a millisecond.
+fn memory_bytes_per_ms() -> f64 {
+    let (from, mut to) = (vec![1u8; COPIED_BYTES], vec![0u8; COPIED_BYTES]);
+    let copies = (0..COPIES).map(|_| {
+        let ((), taken_s) = Stopwatch::default().time(|| black_box(&mut to).copy_from_slice(black_box(&from)));
+        taken_s
+    });
+    let best_s = copies.fold(f64::INFINITY, f64::min);
+    2.0 * COPIED_BYTES as f64 / (1e3 * best_s).max(1e-9)
+}
+
+fn median(values: impl Iterator<Item = f64>) -> f64 {
+    Cost::of(&mut values.collect::<Vec<f64>>()).map_or(0.0, |cost| cost.p50)
+}
+
+/// Of the plain renderer, from the last jobs.
+fn plain_ms(scenario: &Scenario, jobs: &[Job]) -> Result<f64, Error> {
+    let mut renderer = CpuRenderer::quick(super::scene(scenario));
+    let mut taken_ms = Vec::new();
+    for job in &jobs[jobs.len().saturating_sub(PLAIN_JOBS)..] {
+        let draw = || renderer.submit(job).and_then(|()| renderer.collect());
+        let (images, taken_s) = Stopwatch::default().time(draw);
+        images?;
+        taken_ms.push(1e3 * taken_s);
+    }
+    Ok(median(taken_ms.into_iter()))
 }
 
 fn profile_of(
     (case, text, changes): &(&'static str, &str, &[&str]),
+    memory_bytes_per_ms: f64,
 ) -> Result<DrawingProfile, Error> {
     let scenario = scene(text, 1, changes)?;
     let mut renderer = GpuRenderer::new(super::scene(&scenario))?;
@@ -94,10 +147,7 @@ fn profile_of(
     let drawn: Vec<Drawn> = drawn.collect::<Result<_, Error>>()?;
     // The first ones build what later ones use.
     let drawn = &drawn[drawn.len() / 2..];
-    let median = |of: &dyn Fn(&Drawn) -> f64| {
-        let mut values: Vec<f64> = drawn.iter().map(of).collect();
-        Cost::of(&mut values).map_or(0.0, |cost| cost.p50)
-    };
+    let median = |of: &dyn Fn(&Drawn) -> f64| median(drawn.iter().map(of));
     let lenses = jobs.first().map_or(&[][..], |job| &job.views[..]).iter();
     let lenses = lenses.map(|view| &view.camera.intrinsics);
     let pixels = lenses
@@ -112,11 +162,15 @@ fn profile_of(
             ns_per_pixel,
         }
     });
+    let bytes = median(&|drawn| drawn.bytes_back as f64);
     Ok(DrawingProfile {
         case,
         pixels,
         submit_ms: median(&|drawn| drawn.submit_ms),
-        wait_ms: median(&|drawn| drawn.wait_ms),
+        draw_ms: median(&|drawn| drawn.draw_ms),
+        develop_ms: median(&|drawn| drawn.develop_ms),
+        memory_ms: (2.0 * bytes + BYTES_A_PIXEL * pixels as f64) / memory_bytes_per_ms,
+        plain_ms: plain_ms(&scenario, &jobs)?,
         passes: passes.collect(),
         between_ms: median(&Drawn::between_ms),
     })
@@ -141,7 +195,9 @@ fn jobs(scenario: &Scenario, renderer: &mut GpuRenderer) -> Result<Vec<Job>, Err
 /// One job as it was drawn.
 struct Drawn {
     submit_ms: f64,
-    wait_ms: f64,
+    draw_ms: f64,
+    develop_ms: f64,
+    bytes_back: u64,
     passes: Vec<PassTime>,
 }
 
@@ -149,11 +205,15 @@ fn draw(renderer: &mut GpuRenderer, job: &Job) -> Result<Drawn, Error> {
     let mut watch = Stopwatch::default();
     let (submitted, submit_s) = watch.time(|| renderer.submit(job));
     submitted?;
-    let (collected, wait_s) = watch.time(|| renderer.collect());
+    let (bytes_back, draw_s) = watch.time(|| renderer.wait_until_drawn());
+    let bytes_back = bytes_back?;
+    let (collected, develop_s) = watch.time(|| renderer.collect());
     collected?;
     Ok(Drawn {
         submit_ms: 1e3 * submit_s,
-        wait_ms: 1e3 * wait_s,
+        draw_ms: 1e3 * draw_s,
+        develop_ms: 1e3 * develop_s,
+        bytes_back,
         passes: renderer.pass_times(),
     })
 }
@@ -206,7 +266,9 @@ mod tests {
         };
         let drawn = Drawn {
             submit_ms: 0.0,
-            wait_ms: 0.0,
+            draw_ms: 0.0,
+            develop_ms: 0.0,
+            bytes_back: 0,
             passes: vec![
                 pass("a", 0.0, 2.0),
                 pass("b", 2.5, 3.0),

@@ -22,6 +22,14 @@ impl Back {
         }
     }
 
+    /// How much comes back.
+    pub fn bytes(&self) -> u64 {
+        match self {
+            Self::Image(back) => back.bytes(),
+            Self::Signal(back) => back.bytes,
+        }
+    }
+
     /// The image, of which `keep` says what is kept of each digital number, once the adapter is done; gives
     /// the buffer free.
     pub fn image<T: Primitive + Send>(

@@ -21,8 +21,8 @@
 //!    exposes every row at a time of its own, so a vertex lands on the row v for which
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
-//!    that of headlights is added there. What moves by pixels within the exposure is drawn at several
-//!    instants.
+//!    that of headlights is added there. What is painted on the walls is smeared along the line as far as the
+//!    camera goes in the exposure; where bodies move, all is drawn at several instants (`smear.rs`).
 //! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture. Then rail
 //!    heads and a wet bed are drawn once more, for what they mirror ([`gloss`](super::gloss)).
 //! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
@@ -35,9 +35,9 @@
 //!
 //! The processor is the adapter there, and draws pixels slowly. So (`areas.rs`)
 //!
-//! - of what a camera at rest sees of the tunnel, steady and blinking light are kept apart; a frame is
-//!   steady + share * blinking, and only what differs is drawn: bodies, shadows, headlights' light, lamps,
-//!   mirrored light;
+//! - of what a camera at rest sees of the tunnel, steady and blinking light are kept in memory, apart; a
+//!   frame is steady + share * blinking, and only what differs is drawn over it: bodies, shadows, headlights'
+//!   light, lamps, mirrored light;
 //! - what a moving camera sees is drawn in quarter size, and in full where it is brighter than 1.5 grey levels;
 //! - the signal comes back in these layers and is put together and developed in vector code
 //!   ([`develop`](super::develop)).
@@ -187,6 +187,13 @@ impl GpuRenderer {
     /// The times of the passes of the job that was collected last.
     pub fn pass_times(&mut self) -> Vec<PassTime> {
         self.clock.as_mut().map_or(Vec::new(), PassClock::take)
+    }
+
+    /// Waits until the oldest job is drawn. Its images are then on the way back, a number of bytes.
+    pub fn wait_until_drawn(&mut self) -> Result<u64, RenderError> {
+        let job = (self.in_flight.front()).ok_or(RenderError::NothingSubmitted)?;
+        self.gpu.wait_for(job.submission.clone())?;
+        Ok(job.views.iter().map(Back::bytes).sum())
     }
 
     /// From now on every pixel is drawn in full and developed on the adapter, as on hardware. A software

@@ -73,6 +73,11 @@ impl<'t> Pieces<'t> {
         piece
     }
 
+    /// Bytes of all of them.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
     /// Copies all of them, into the smallest of the buffers that are free and large enough; if there is none,
     /// one goes for a larger.
     pub fn copy(

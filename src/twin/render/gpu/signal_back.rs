@@ -28,6 +28,8 @@ pub enum Under {
 /// See the module's page.
 pub struct SignalBack {
     pub buffer: wgpu::Buffer,
+    /// In it.
+    pub bytes: u64,
     pub size_px: (u32, u32),
     pub parts: Vec<Piece>,
     pub under: Under,
@@ -64,6 +66,7 @@ impl SignalBack {
             glare: pieces.add(&target.glare, target.glare.whole(), 1),
             map: Arc::clone(map),
             developer,
+            bytes: pieces.size(),
             buffer: pieces.copy(&gpu.device, encoder, free),
         }
     }

@@ -152,6 +152,11 @@ impl ReadBack {
         }
     }
 
+    /// Its size.
+    pub fn bytes(&self) -> u64 {
+        self.buffer.size()
+    }
+
     /// Asks for access as soon as the copy is done. Whether that went well shows in `image`.
     pub fn request(&self) {
         self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
