@@ -54,8 +54,8 @@ const BYTES_A_PIXEL: f64 = 5.0;
 /// Larger than any cache.
 const COPIED_BYTES: usize = 64 << 20;
 const COPIES: usize = 5;
-/// Jobs that the plain renderer draws.
-const PLAIN_JOBS: usize = 3;
+/// Jobs that the plain renderer draws: at long exposures it takes many seconds for each.
+const PLAIN_JOBS: usize = 1;
 
 /// Down the line, 20 to 30 m before the device.
 const WORKER: &str = "workers=[{path=[{time_s=0.0, chainage_m=1510.0, lateral_m=0.3}, \
@@ -76,7 +76,7 @@ pub struct DrawingProfile {
     pub develop_ms: f64,
     /// The time of its bytes through memory.
     pub memory_ms: f64,
-    /// The plain renderer's time for a job: some of them.
+    /// The plain renderer's time for a job.
     pub plain_ms: f64,
     /// The adapter's time in each pass, in the order drawn; none where it has no clock.
     pub passes: Vec<PassCost>,
@@ -109,7 +109,8 @@ pub fn profile(progress: &dyn Fn(&str)) -> Result<Vec<DrawingProfile>, Error> {
 fn memory_bytes_per_ms() -> f64 {
     let (from, mut to) = (vec![1u8; COPIED_BYTES], vec![0u8; COPIED_BYTES]);
     let copies = (0..COPIES).map(|_| {
-        let ((), taken_s) = Stopwatch::default().time(|| black_box(&mut to).copy_from_slice(black_box(&from)));
+        let ((), taken_s) =
+            Stopwatch::default().time(|| black_box(&mut to).copy_from_slice(black_box(&from)));
         taken_s
     });
     let best_s = copies.fold(f64::INFINITY, f64::min);
