@@ -54,8 +54,6 @@ const BYTES_A_PIXEL: f64 = 5.0;
 /// Larger than any cache.
 const COPIED_BYTES: usize = 64 << 20;
 const COPIES: usize = 5;
-/// Jobs that the plain renderer draws: at long exposures it takes many seconds for each.
-const PLAIN_JOBS: usize = 1;
 
 /// Down the line, 20 to 30 m before the device.
 const WORKER: &str = "workers=[{path=[{time_s=0.0, chainage_m=1510.0, lateral_m=0.3}, \
@@ -76,7 +74,7 @@ pub struct DrawingProfile {
     pub develop_ms: f64,
     /// The time of its bytes through memory.
     pub memory_ms: f64,
-    /// The plain renderer's time for a job.
+    /// The plain renderer's time for the last job.
     pub plain_ms: f64,
     /// The adapter's time in each pass, in the order drawn; none where it has no clock.
     pub passes: Vec<PassCost>,
@@ -117,21 +115,16 @@ fn memory_bytes_per_ms() -> f64 {
     2.0 * COPIED_BYTES as f64 / (1e3 * best_s).max(1e-9)
 }
 
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    Cost::of(&mut values.collect::<Vec<f64>>()).map_or(0.0, |cost| cost.p50)
-}
-
-/// Of the plain renderer, from the last jobs.
+/// Of the plain renderer, for the last job: at long exposures each takes many seconds.
 fn plain_ms(scenario: &Scenario, jobs: &[Job]) -> Result<f64, Error> {
+    let Some(job) = jobs.last() else {
+        return Ok(0.0);
+    };
     let mut renderer = CpuRenderer::quick(super::scene(scenario));
-    let mut taken_ms = Vec::new();
-    for job in &jobs[jobs.len().saturating_sub(PLAIN_JOBS)..] {
-        let draw = || renderer.submit(job).and_then(|()| renderer.collect());
-        let (images, taken_s) = Stopwatch::default().time(draw);
-        images?;
-        taken_ms.push(1e3 * taken_s);
-    }
-    Ok(median(taken_ms.into_iter()))
+    let draw = || renderer.submit(job).and_then(|()| renderer.collect());
+    let (images, taken_s) = Stopwatch::default().time(draw);
+    images?;
+    Ok(1e3 * taken_s)
 }
 
 fn profile_of(
@@ -148,7 +141,10 @@ fn profile_of(
     let drawn: Vec<Drawn> = drawn.collect::<Result<_, Error>>()?;
     // The first ones build what later ones use.
     let drawn = &drawn[drawn.len() / 2..];
-    let median = |of: &dyn Fn(&Drawn) -> f64| median(drawn.iter().map(of));
+    let median = |of: &dyn Fn(&Drawn) -> f64| {
+        let mut values: Vec<f64> = drawn.iter().map(of).collect();
+        Cost::of(&mut values).map_or(0.0, |cost| cost.p50)
+    };
     let lenses = jobs.first().map_or(&[][..], |job| &job.views[..]).iter();
     let lenses = lenses.map(|view| &view.camera.intrinsics);
     let pixels = lenses

@@ -10,13 +10,10 @@ use super::View;
 use super::gpu::layout::BRIGHTEST_E;
 use super::normals::{TEXELS, normals};
 use super::pixel_map::{Dark, GAIN_STEP, HOT, LEVEL_SHIFT};
+use super::rounding::{greatest, least, rounded};
 
 /// Pixels that are worked at together: four a texel.
 const BLOCK_PX: usize = 4 * TEXELS;
-/// Added to a number below it, it leaves no bits behind the point: 2^23.
-const WHOLE: f32 = 8_388_608.0;
-/// The bits of the number that was added.
-const WHOLE_BITS: u32 = (1 << 23) - 1;
 
 /// A view's sensor.
 #[derive(Clone, Copy, Debug)]
@@ -103,23 +100,10 @@ impl Developer {
         };
         let charge_e = held_e * gain + (level * step_e + self.dark_e);
         let read_e = self.read_noise_e;
-        let deviation_e = most(charge_e + read_e * read_e, 0.0).sqrt();
+        let deviation_e = greatest(charge_e + read_e * read_e, 0.0).sqrt();
         // A full pixel has no shot noise, but still read noise.
         let electrons = least(charge_e + deviation_e * n, self.full_well_e + read_e * n);
         let dn = self.black_dn + dn_per_e * electrons;
-        // Rounds to the nearest whole number, to the even one of two.
-        (least(most(dn, 0.0), self.white_dn) + WHOLE).to_bits() & WHOLE_BITS
+        rounded(dn, self.white_dn)
     }
-}
-
-/// The lesser of two numbers, in one instruction, which that of the standard library is not.
-#[inline(always)]
-fn least(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// The greater.
-#[inline(always)]
-fn most(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }

@@ -19,6 +19,7 @@ mod normals;
 pub mod paint;
 pub mod photometry;
 pub mod pixel_map;
+mod rounding;
 #[cfg(test)]
 #[path = "../../../tests/common/sample.rs"]
 pub mod sample;

@@ -18,6 +18,7 @@
 
 use super::glass::Shade;
 use super::normals::pair;
+use super::rounding::rounded;
 use super::{Pattern, View};
 use crate::bus::Intrinsics;
 use crate::twin::random::{Stream, pcg4d};
@@ -134,16 +135,6 @@ fn level_bits(level: f32) -> u32 {
         2.0 * LEVEL_MAX,
     );
     from_least.wrapping_sub(LEVEL_MAX as u32) << LEVEL_SHIFT
-}
-
-/// A number from 0 to `most`, as a whole one.
-#[inline(always)]
-fn rounded(number: f32, most: f32) -> u32 {
-    // Added to a number below it, 2^23 leaves no bits behind the point.
-    const WHOLE: f32 = 8_388_608.0;
-    let number = if number > 0.0 { number } else { 0.0 };
-    let number = if number < most { number } else { most };
-    (number + WHOLE).to_bits() & ((1 << 23) - 1)
 }
 
 /// The words of a camera's pixels.

@@ -10,7 +10,6 @@ use super::rectangle::Rectangle;
 use super::texture::Texture;
 use super::textures::Textures;
 use crate::twin::render::RenderError;
-use std::ops::Range;
 
 /// Tunnel and bodies on the adapter.
 pub struct Surfaces<'a> {
@@ -88,7 +87,7 @@ impl<'a> Recorder<'a> {
         let all = [layers.signal.whole()];
         let bound = self.surfaces(level, headlights, surfaces.textures);
         let (view, empty) = (self.view, self.empty());
-        for (k, instant) in view.tunnel_instants().enumerate() {
+        for (k, instant) in view.list.tunnel_instants.clone().enumerate() {
             let onto = signals[usize::from(k > 0)];
             let depth = Some((&layers.depth, wgpu::LoadOp::Clear(0.0)));
             let mut pass = (self.passes).begin("coarse", &[(onto, empty)], depth);
@@ -314,15 +313,6 @@ impl<'a> Recorder<'a> {
 }
 
 impl PreparedView {
-    /// The instants that show the tunnel's motion.
-    fn tunnel_instants(&self) -> Range<u32> {
-        if self.list.all_moves {
-            self.list.instants.clone()
-        } else {
-            0..1
-        }
-    }
-
     fn draw_instant<'c>(
         &self,
         pass: &mut wgpu::RenderPass<'_>,

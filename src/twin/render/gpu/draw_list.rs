@@ -62,9 +62,10 @@ pub struct DrawList {
     pub instants: Range<u32>,
     /// Those that show what is mirrored.
     pub mirrored_instants: Range<u32>,
-    /// Part of the picture in which instants differ, and whether that is all of it.
+    /// Part of the picture in which instants differ.
     pub moving: Rectangle,
-    pub all_moves: bool,
+    /// Those of them that show the tunnel's motion: all, where that is the whole picture.
+    pub tunnel_instants: Range<u32>,
     /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
     /// number; the first row is 1.
     pub shares: Vec<f32>,
@@ -295,7 +296,11 @@ impl DrawList {
         let exposure_s = framed.view.camera.shutter.exposure_s;
         self.instants = self.add_instants(count, exposure_s);
         self.mirrored_instants = self.add_instants(mirrored, exposure_s);
-        self.all_moves = count > 1 && self.moving == framed.whole();
+        self.tunnel_instants = if self.moving == framed.whole() {
+            self.instants.clone()
+        } else {
+            0..1
+        };
     }
 
     /// Copies the placements for so many instants; one is the middle that is there already.

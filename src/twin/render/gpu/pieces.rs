@@ -13,6 +13,7 @@ const ALIGNMENT: u64 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT as u64;
 const ROOM: u64 = 1 << 20;
 
 /// A part of a texture in a buffer.
+#[derive(Clone, Copy)]
 pub struct Piece {
     pub part: Rectangle,
     offset: u64,
@@ -59,7 +60,7 @@ impl Piece {
 /// Where pieces are to lie in a buffer.
 #[derive(Default)]
 pub struct Pieces<'t> {
-    copies: Vec<(&'t Texture, Rectangle, u64, u32)>,
+    copies: Vec<(&'t Texture, Piece)>,
     size: u64,
 }
 
@@ -67,8 +68,7 @@ impl<'t> Pieces<'t> {
     /// Room for one of a texture with so many 16-bit words a texel.
     pub fn add(&mut self, texture: &'t Texture, part: Rectangle, words_a_texel: u32) -> Piece {
         let piece = Piece::after(self.size, part, words_a_texel);
-        self.copies
-            .push((texture, part, piece.offset, piece.stride));
+        self.copies.push((texture, piece));
         self.size = piece.end();
         piece
     }
@@ -97,8 +97,9 @@ impl<'t> Pieces<'t> {
                 empty_buffer(device, self.size.max(1).next_multiple_of(ROOM), usage)
             }
         };
-        for (texture, part, offset, stride) in self.copies {
-            texture.copy_part_to_buffer(part, &buffer, (offset, stride), encoder);
+        for (texture, piece) in self.copies {
+            let to = (piece.offset, piece.stride);
+            texture.copy_part_to_buffer(piece.part, &buffer, to, encoder);
         }
         buffer
     }

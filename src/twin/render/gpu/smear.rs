@@ -65,11 +65,11 @@ impl<'a> Smear<'a> {
     /// How many instants of a row's exposure show all motion in it but that along the line, and the part of
     /// the picture that they are needed in.
     pub fn instants(&self, bodies: &[Body], chunks: &[Arc<Chunk>]) -> (u32, Rectangle) {
-        let other_ways = |chunk: &Chunk| match chunk.crossed {
+        let same = |chunk: &Chunk| match chunk.crossed {
             true => Vector3::zeros(),
             false => chunk.along * self.along_m(chunk),
         };
-        let tunnel = count(self.tunnel_px(chunks, other_ways));
+        let tunnel = count(self.tunnel_px(chunks, same));
         let tunnel = tunnel.max(count_of(self.travel().norm() / EVEN_M));
         let bodies_px = bodies.iter().map(|body| self.body_px(body));
         let all = tunnel.max(count(FULL_CONTRAST * bodies_px.fold(0.0, f64::max)));
@@ -86,7 +86,7 @@ impl<'a> Smear<'a> {
         count(self.tunnel_px(chunks, |_| Vector3::zeros()))
     }
 
-    /// By how much the tunnel moves in the picture but for a way in which it is the same.
+    /// By how much the tunnel moves in the picture, but for a way along which a chunk is the same.
     fn tunnel_px(&self, chunks: &[Arc<Chunk>], same: impl Fn(&Chunk) -> Vector3<f64>) -> f64 {
         if self.most_px() < SHARP_PX {
             return 0.0;
