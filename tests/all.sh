@@ -2,8 +2,8 @@
 # Every test of metrotwin, on any Linux machine. The renderer's tests need a Vulkan adapter; where
 # the machine has none, Mesa's software driver (lavapipe) is installed, so nothing is skipped.
 #
-#   tests/all.sh                 all tests
-#   tests/all.sh --test cli      what follows goes to `cargo test`
+#   tests/all.sh                       all tests
+#   tests/all.sh --test program cli    what follows goes to `cargo test`
 set -euo pipefail
 cd "$(dirname "$0")/.."
 

@@ -10,17 +10,19 @@ use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{Contents, images, path_of, plots, scene, texts};
 use crate::bus::TrainId;
-use rerun::external::re_sdk_types::blueprint::archetypes::{
+use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
     TextLogColumns, TimeAxis, TimePanelBlueprint, ViewBlueprint, ViewContents, ViewportBlueprint,
 };
-use rerun::external::re_sdk_types::blueprint::components::{
+use re_sdk_types::blueprint::components::{
     BackgroundKind, ContainerKind, Eye3DKind, PanelState, PlayState, RootContainer, TimeRange,
 };
-use rerun::external::re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use re_sdk_types::blueprint::datatypes::{TextLogColumn, TextLogColumnKind};
+use re_sdk_types::components::Color;
+use re_sdk_types::datatypes;
 use rerun::{
-    AsComponents, Color, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId,
-    StoreKind, datatypes,
+    AsComponents, RecordingStream, RecordingStreamBuilder, RecordingStreamResult, StoreId,
+    StoreKind,
 };
 use std::ops::Range;
 

@@ -15,7 +15,8 @@ use crate::scenario::RecordSettings;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, GrayImage, ImageEncoder};
 use jpeg_encoder::{ColorType, Encoder};
-use rerun::{Boxes2D, EncodedImage, LineStrips2D, MediaType, Pinhole, Points2D};
+use re_sdk_types::archetypes::{Boxes2D, EncodedImage, LineStrips2D, Pinhole, Points2D};
+use re_sdk_types::components::MediaType;
 
 /// The left eye's frame, with its image plane under it.
 pub(super) const LEFT: &str = "world/rig/left";

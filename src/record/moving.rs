@@ -11,11 +11,12 @@ use crate::track::TrackPoint;
 use crate::twin::geometry::{Body, Hull, Shape};
 use crate::twin::physics::TrainState;
 use nalgebra::{Isometry3, Point3, Vector3};
-use rerun::components::RotationQuat;
-use rerun::{
-    AsComponents, Boxes3D, Capsules3D, Color, Cylinders3D, Ellipsoids3D, FillMode, LineStrips3D,
-    Mesh3D, Points3D, Transform3D,
+use re_sdk_types::archetypes::{
+    Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, LineStrips3D, Mesh3D, Points3D, Transform3D,
 };
+use re_sdk_types::components::RotationQuat;
+use re_sdk_types::components::{Color, FillMode};
+use rerun::AsComponents;
 use std::collections::BTreeSet;
 use std::rc::Rc;
 

@@ -2,7 +2,7 @@
 
 use crate::bus::{DangerLevel, Identity, Indicator, Method};
 use crate::track::Material;
-use rerun::{Color, Radius};
+use re_sdk_types::components::{Color, Radius};
 
 /// As it really is.
 pub(super) const TRUTH: Color = rgb(240, 240, 240);
@@ -25,7 +25,9 @@ pub(super) const BLOB: Color = rgb(130, 160, 190);
 
 /// An opaque colour.
 pub(super) const fn rgb(r: u8, g: u8, b: u8) -> Color {
-    Color(rerun::datatypes::Rgba32(u32::from_be_bytes([r, g, b, 255])))
+    Color(re_sdk_types::datatypes::Rgba32(u32::from_be_bytes([
+        r, g, b, 255,
+    ])))
 }
 
 /// Name and colour of an estimator.

@@ -9,8 +9,9 @@ use crate::bus::{
 };
 use crate::twin::physics::TrainState;
 use palette::rgb;
-use rerun::external::re_sdk_types::blueprint::components::Corner2D;
-use rerun::{Color, Scalars, SeriesLines};
+use re_sdk_types::archetypes::{Scalars, SeriesLines};
+use re_sdk_types::blueprint::components::Corner2D;
+use re_sdk_types::components::Color;
 use std::collections::BTreeMap;
 
 const KMH: f64 = 3.6;

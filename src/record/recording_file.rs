@@ -7,7 +7,7 @@ use super::whole_files::{PartFile, Result, broken, make_folder_of, part_name};
 use rerun::external::re_log_encoding::{DecoderApp, EncodeError, Encoder, EncodingOptions};
 use rerun::log::{Chunk, LogMsg};
 use rerun::sink::{LogSink, SinkFlushError};
-use rerun::{StoreId, StoreKind};
+use rerun::{SizeBytes, StoreId, StoreKind};
 use std::error::Error;
 use std::fs::{self, File};
 use std::io::BufReader;
@@ -19,6 +19,8 @@ use std::time::Duration;
 pub(super) const SIM_TIME: &str = "sim_time";
 /// Recorded time of a batch in the finished file.
 const BATCH_NS: i64 = 10_000_000_000;
+/// Memory of a batch from which it is written without waiting for more: what the viewer, too, keeps in one.
+const BATCH_BYTES: u64 = 384 << 10;
 
 /// A recording on its way into a file; clones are the same one.
 #[derive(Clone)]
@@ -134,19 +136,33 @@ impl Batches {
             self.pass_on()?;
             self.begin_ns = first_ns;
         }
-        let mut waiting = self.waiting.iter_mut();
-        match waiting.find(|(_, earlier)| earlier.concatenable(&batch)) {
-            Some((_, earlier)) => *earlier = Chunk::concat_and_sort(earlier, &batch)?,
-            None => self.waiting.push((store.clone(), batch)),
+        let mut waiting = self.waiting.iter();
+        let Some(k) = waiting.position(|(_, earlier)| earlier.concatenable(&batch)) else {
+            self.waiting.push((store.clone(), batch));
+            return Ok(());
+        };
+        let joined = Chunk::concat_and_sort(&self.waiting[k].1, &batch)?;
+        if joined.heap_size_bytes() < BATCH_BYTES {
+            self.waiting[k].1 = joined;
+            return Ok(());
         }
-        Ok(())
+        let (store, _) = self.waiting.remove(k);
+        write(&mut self.encoder, store, &joined)
     }
 
     fn pass_on(&mut self) -> Result<(), Box<dyn Error + Send + Sync>> {
         for (store, batch) in self.waiting.drain(..) {
-            let message = LogMsg::ArrowMsg(store, batch.to_arrow_msg()?);
-            self.encoder.append(&message)?;
+            write(&mut self.encoder, store, &batch)?;
         }
         Ok(())
     }
+}
+
+fn write(
+    encoder: &mut Encoder<PartFile>,
+    store: StoreId,
+    batch: &Chunk,
+) -> Result<(), Box<dyn Error + Send + Sync>> {
+    encoder.append(&LogMsg::ArrowMsg(store, batch.to_arrow_msg()?))?;
+    Ok(())
 }

@@ -9,11 +9,13 @@ use crate::session::Opening;
 use crate::track::uid::Uid;
 use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
-use rerun::components::{MeshFaceRendering, RotationQuat};
-use rerun::{
-    AsComponents, Boxes3D, Color, FillMode, LineStrips3D, Mesh3D, Points3D, Quaternion,
-    Transform3D, ViewCoordinates,
+use re_sdk_types::archetypes::{
+    Boxes3D, LineStrips3D, Mesh3D, Points3D, Transform3D, ViewCoordinates,
 };
+use re_sdk_types::components::{Color, FillMode};
+use re_sdk_types::components::{MeshFaceRendering, RotationQuat};
+use re_sdk_types::datatypes::Quaternion;
+use rerun::AsComponents;
 use std::collections::BTreeMap;
 
 /// The vehicle frame of the leading car.

@@ -9,10 +9,10 @@ use super::recording_file::{RecordingFile, SIM_TIME};
 use super::whole_files::{Result, failed};
 use crate::bus::SimTime;
 use rerun::external::re_log_types::{BlueprintActivationCommand, LogMsg};
-use rerun::log::ChunkBatcherConfig;
+use rerun::log::{ChunkBatcherConfig, TimeColumn};
 use rerun::{
     ApplicationId, AsComponents, RecordingStream, RecordingStreamBuilder,
-    SerializedComponentColumn, StoreId, StoreKind, TimeCell, TimeColumn,
+    SerializedComponentColumn, StoreId, StoreKind, TimeCell,
 };
 use std::path::PathBuf;
 use std::time::Duration;

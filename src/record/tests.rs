@@ -17,10 +17,10 @@ use crate::bus::{
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::Tunnel;
+use re_sdk_types::blueprint::archetypes::ViewBlueprint;
+use re_sdk_types::components::Name;
 use rerun::StoreKind;
-use rerun::components::Name;
 use rerun::external::re_log_encoding::DecoderApp;
-use rerun::external::re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use rerun::log::{Chunk, LogMsg};
 use session::{Extent, play};
 use std::collections::{BTreeMap, BTreeSet};

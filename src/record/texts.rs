@@ -8,7 +8,8 @@ use crate::bus::{
     ObstacleWarning, ProtectionReport, SimTime, TrainId, Via, WaysideReport,
 };
 use crate::session::Opening;
-use rerun::{Color, TextDocument, TextLog, TextLogLevel};
+use re_sdk_types::archetypes::{TextDocument, TextLog};
+use re_sdk_types::components::{Color, TextLogLevel};
 use std::collections::BTreeMap;
 
 /// The log.

@@ -1,4 +1,4 @@
-//! The structs that Rust and the shaders share, laid out as WGSL lays them out. `tests/shaders.rs`
+//! The structs that Rust and the shaders share, laid out as WGSL lays them out. `tests/pictures/shaders.rs`
 //! holds every offset against the shader's.
 
 use bytemuck::{Pod, Zeroable};

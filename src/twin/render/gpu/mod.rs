@@ -43,7 +43,7 @@
 //!   ([`develop`](super::develop)).
 //!
 //! No pixel is off by more than a grey level, no block of 32 x 32 by more than 0.02 in the mean
-//! (`tests/parts.rs`). [`GpuRenderer::draw_whole`] draws all, as on hardware.
+//! (`tests/pictures/parts.rs`). [`GpuRenderer::draw_whole`] draws all, as on hardware.
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!

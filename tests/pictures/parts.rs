@@ -1,0 +1,156 @@
+//! What a software adapter leaves out: pictures of which only parts are drawn in full, and which the
+//! processor develops, against those that are drawn and developed whole, over all shipped scenarios.
+
+use metrotwin::scenario::{Override, Scenario};
+use metrotwin::session::{Event, Observer, ObserverError, RunOptions, run, scene};
+use metrotwin::twin::render::gpu::GpuRenderer;
+use metrotwin::twin::render::{Job, RawImage, Renderer};
+use std::path::{Path, PathBuf};
+
+/// Side of a block, pixels.
+const BLOCK_PX: u32 = 32;
+/// Of all exposures one in so many is drawn twice.
+const EVERY: usize = 17;
+/// A run is broken off at this time, with this error.
+const ENOUGH_S: f64 = 4.0;
+const ENOUGH: &str = "seen enough";
+/// Digital numbers a grey level, of a converter of 12 bits.
+const DN_PER_GREY: f64 = 16.0;
+
+/// Shipped scenarios whose first seconds do not show what comes later, and what else is to be seen: a train
+/// in the light of whose headlights a wayside camera is, also behind a lens that bends lines; exposures in which
+/// the train moves far.
+const CHANGED: [(&str, &[&str]); 4] = [
+    ("forgotten_toolbox", &["train.start_chainage_m=1455.0"]),
+    (
+        "forgotten_toolbox",
+        &[
+            "train.start_chainage_m=1455.0",
+            "wayside=[{device=\"W1530\", camera={frames_per_s=10.0, distortion={k1=-0.1}}}]",
+        ],
+    ),
+    ("line_run", &["rig.exposure_us=2000.0"]),
+    ("line_run", &["rig.yaw_deg=0.0", "rig.exposure_us=100.0"]),
+];
+
+/// Keeps some of what a run draws.
+#[derive(Default)]
+struct Jobs {
+    seen: usize,
+    kept: Vec<Job>,
+}
+
+impl Observer for Jobs {
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        if let Event::Exposure(exposure) = event {
+            if self.seen.is_multiple_of(EVERY) {
+                let mut job = exposure.job.clone();
+                job.views.iter_mut().for_each(|view| view.sensor.bits = 12);
+                self.kept.push(job);
+            }
+            self.seen += 1;
+            if exposure.job.time.secs() > ENOUGH_S {
+                return Err(ObserverError {
+                    what: ENOUGH.into(),
+                    source: "no more pictures are asked for".into(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn shipped() -> Vec<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenarios");
+    let files = std::fs::read_dir(folder).unwrap();
+    let files = files.map(|entry| entry.unwrap().path());
+    let mut files: Vec<_> = files
+        .filter(|path| path.extension() == Some("toml".as_ref()))
+        .collect();
+    files.sort();
+    assert!(files.len() >= 7, "{files:?}");
+    files
+}
+
+fn drawn(renderer: &mut GpuRenderer, job: &Job) -> Vec<RawImage> {
+    renderer.submit(job).unwrap();
+    renderer.collect_raw().unwrap()
+}
+
+/// The greatest differences, grey levels: of a pixel, and of the mean of a block over what half precision,
+/// of 11 bits, may take of its level.
+fn apart(part: &RawImage, whole: &RawImage) -> [f64; 2] {
+    let (width, height) = part.dimensions();
+    let (columns, rows) = (width / BLOCK_PX, height / BLOCK_PX);
+    let mut sums = vec![[0.0; 2]; (columns * rows) as usize];
+    let mut worst = 0.0f64;
+    for ((u, v, a), b) in part.enumerate_pixels().zip(whole.pixels()) {
+        let grey = (f64::from(a[0]) - f64::from(b[0])) / DN_PER_GREY;
+        worst = worst.max(grey.abs());
+        let (column, row) = (u / BLOCK_PX, v / BLOCK_PX);
+        if column < columns && row < rows {
+            let [differences, levels] = &mut sums[(row * columns + column) as usize];
+            *differences += grey;
+            *levels += f64::from(b[0]) / DN_PER_GREY;
+        }
+    }
+    let over = |[difference, level]: [f64; 2]| difference.abs() - level * 2f64.powi(-11);
+    let block = sums.into_iter().map(over).fold(0.0, f64::max);
+    [worst, block / f64::from(BLOCK_PX * BLOCK_PX)]
+}
+
+/// Draws some of what a scenario's first seconds show, both ways; the greatest differences, and of how many
+/// pictures.
+fn compare(path: &Path, changes: &[&str]) -> ([f64; 2], usize) {
+    let changes = changes.iter().map(|change| change.parse().unwrap());
+    let changes: Vec<Override> = changes.collect();
+    let scenario = Scenario::load(path, &changes).unwrap();
+    let mut jobs = Jobs::default();
+    if let Err(error) = run(&scenario, &RunOptions::default(), &mut [&mut jobs]) {
+        assert!(format!("{error:?}").contains(ENOUGH), "{error}");
+    }
+    let mut parts = GpuRenderer::new(scene(&scenario)).unwrap();
+    let mut whole = GpuRenderer::new(scene(&scenario)).unwrap();
+    whole.draw_whole();
+    let (mut worst, mut pictures) = ([0.0f64; 2], 0);
+    for job in &jobs.kept {
+        let pairs = drawn(&mut parts, job)
+            .into_iter()
+            .zip(drawn(&mut whole, job));
+        for (part, whole) in pairs {
+            let found = apart(&part, &whole);
+            worst = [0, 1].map(|k| worst[k].max(found[k]));
+            pictures += 1;
+        }
+    }
+    (worst, pictures)
+}
+
+/// A part that shows light and is not drawn, a kept tunnel that is out of date or in another light, another
+/// noise, a signal that is read back from the wrong place: no pixel is off by more than a grey level, no
+/// block by more than a fiftieth.
+#[test]
+fn what_is_left_out_does_not_show() {
+    let shipped = shipped();
+    let as_shipped = shipped.iter().map(|path| (path.clone(), &[][..]));
+    let changed = CHANGED.iter().map(|(name, changes)| {
+        let path = shipped
+            .iter()
+            .find(|path| path.file_stem() == Some((*name).as_ref()));
+        (path.unwrap().clone(), *changes)
+    });
+    let (mut failed, mut pictures) = (Vec::new(), 0);
+    for (path, changes) in as_shipped.chain(changed) {
+        let ([pixel, block], compared) = compare(&path, changes);
+        pictures += compared;
+        let name = path.file_stem().unwrap().to_string_lossy();
+        println!(
+            "{name} {changes:?}: {compared} pictures, {pixel:.2} grey in a pixel, {block:.4} in a block"
+        );
+        if pixel > 1.0 || block > 0.02 {
+            failed.push(format!("{name} {changes:?}: {pixel} {block}"));
+        }
+    }
+    assert!(failed.is_empty(), "{failed:#?}");
+    assert!(pictures > 100, "{pictures} pictures");
+}

@@ -1,0 +1,31 @@
+//! The program as its users and their scripts meet it: what it says, what it writes, how it ends.
+#![cfg(feature = "twin")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and says what it measured"
+)]
+
+#[path = "../common/fuzz.rs"]
+mod fuzz;
+#[path = "../common/program.rs"]
+mod program;
+#[path = "../common/recordings.rs"]
+mod recordings;
+
+mod cli;
+mod cli_input;
+mod digest;
+#[cfg(unix)]
+mod folders;
+mod frames;
+#[cfg(unix)]
+mod kills;
+#[cfg(target_os = "linux")]
+mod memory;
+mod schema;
+#[cfg(target_os = "linux")]
+mod signals;
+mod studies;

@@ -1,0 +1,19 @@
+//! Whole runs by the library: what equipment hears, says and comes to.
+#![cfg(feature = "twin")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test fails by panicking, and says what it measured"
+)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod determinism;
+mod fault_matrix;
+mod faults;
+mod messages;
+mod trains;
+mod validation;
