@@ -102,16 +102,3 @@ fn shade_split(in: Lit) -> Split {
     let light = albedo(in) * in.white_e + vec2f(in.own_e, 0.0);
     return Split(vec4f(min(light, vec2f(BRIGHTEST_E)), 0.0, 0.0), vec4u(in.shares, 0u, 0u, 0u));
 }
-
-// Light of headlights alone, over a picture without it.
-@vertex
-fn project_headlit(in: Vertex) -> Lit {
-    var dark = in;
-    dark.light_lx = vec2f(0.0);
-    return lit(dark);
-}
-
-@fragment
-fn shade_headlit(in: Lit) -> @location(0) vec4f {
-    return vec4f(min(albedo(in) * in.white_e.x, BRIGHTEST_E), 0.0, 0.0, 1.0);
-}

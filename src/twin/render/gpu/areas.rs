@@ -30,8 +30,18 @@ const EYES: usize = 33;
 const QUARTERED: u32 = 4;
 /// What is nearer to the camera's plane is behind it.
 const NEAR_M: f64 = 0.05;
-/// A mark.
-const MARKED: [u64; 1] = [1];
+/// Marks of a tile: it is drawn, it is in the light of headlights.
+const DRAWN: u64 = 1;
+const HEADLIT: u64 = 2;
+
+/// Parts of a picture.
+#[derive(Debug, Default)]
+pub struct Parts {
+    /// That are drawn in full.
+    pub drawn: Vec<Rectangle>,
+    /// In which headlights light the tunnel.
+    pub headlit: Vec<Rectangle>,
+}
 
 /// What is known of a view when its parts are chosen.
 pub struct PartSearch<'a> {
@@ -45,42 +55,47 @@ pub struct PartSearch<'a> {
 
 impl PartSearch<'_> {
     /// All of the picture.
-    pub fn whole(&self) -> Vec<Rectangle> {
-        vec![self.framed.whole()]
+    pub fn whole(&self) -> Parts {
+        Parts {
+            drawn: vec![self.framed.whole()],
+            headlit: Vec::new(),
+        }
     }
 
     /// The parts in which a picture differs from one that is kept.
-    pub fn changed(&self) -> Vec<Rectangle> {
+    pub fn changed(&self) -> Parts {
         self.parts(HEADLIT_GREY, false)
     }
 
     /// The parts in which a picture differs from a small one.
-    pub fn lit(&self) -> Vec<Rectangle> {
+    pub fn lit(&self) -> Parts {
         self.parts(LIT_GREY, true)
     }
 
     /// The parts with more light than so much, by headlights or by lamps too.
-    fn parts(&self, grey: f64, by_lamps: bool) -> Vec<Rectangle> {
-        let [width_px, height_px] = self.framed.size_px();
-        let mut marks = Marks::new((width_px, height_px), 1);
+    fn parts(&self, grey: f64, by_lamps: bool) -> Parts {
+        let size_px = self.framed.size_px();
+        let mut marks = Marks::new(size_px.into(), 1);
         let luminance_cd_m2 = grey / self.framed.view.grey_per_cd_m2();
         self.mark_tunnel(&mut marks, luminance_cd_m2, by_lamps);
         self.mark_bodies(&mut marks);
         for tile in &self.shadows.tiles {
-            marks.add_part(&self.between(tile.low_px, tile.high_px), &MARKED);
+            marks.add_part(&self.between(tile.low_px, tile.high_px), &[DRAWN]);
         }
         for lamp in &self.lamps.lamps {
-            marks.add_part(&self.between(lamp.low, lamp.high), &MARKED);
+            marks.add_part(&self.between(lamp.low, lamp.high), &[DRAWN]);
         }
-        let mut parts = rectangles(&marks, self.framed.size_px());
+        let [mut drawn, mut headlit] =
+            [DRAWN, HEADLIT].map(|mark| rectangles(&marks, mark, size_px));
+        join(&mut headlit);
         if by_lamps {
-            join(&mut parts);
+            join(&mut drawn);
         }
-        let drawn: u32 = parts.iter().map(Rectangle::area).sum();
-        if f64::from(drawn) > MOST_SHARE * f64::from(width_px * height_px) {
-            return self.whole();
+        let area: u32 = drawn.iter().map(Rectangle::area).sum();
+        if f64::from(area) > MOST_SHARE * f64::from(self.framed.whole().area()) {
+            drawn = vec![self.framed.whole()];
         }
-        parts
+        Parts { drawn, headlit }
     }
 
     fn between(&self, low: [f32; 2], high: [f32; 2]) -> Rectangle {
@@ -102,13 +117,12 @@ impl PartSearch<'_> {
                 };
                 let lit = by_lamps && f64::from(patch.peak_cd_m2) > luminance_cd_m2;
                 let mirrors = patch.glossy && !call.glossy.is_empty();
-                let drawn = lit
-                    || mirrors
-                    || call.headlit
-                        && self.most_lx(&patch.cell) > dark_lx
-                        && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
-                if drawn && !patch.cell.turns_away(eye) {
-                    eyes.mark(marks, &patch.cell, self.framed.size_px(), QUARTERED);
+                let headlit = call.headlit
+                    && self.most_lx(&patch.cell) > dark_lx
+                    && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
+                if (lit || mirrors || headlit) && !patch.cell.turns_away(eye) {
+                    let mark = if headlit { DRAWN | HEADLIT } else { DRAWN };
+                    eyes.mark((marks, mark), &patch.cell, self.framed.size_px(), QUARTERED);
                 }
             }
         }
@@ -126,7 +140,7 @@ impl PartSearch<'_> {
     fn mark_bodies(&self, marks: &mut Marks) {
         let eyes = Eyes::exposed(self.framed, self.job.time);
         for body in &self.job.bodies {
-            marks.add(&TileBounds::of_outline(self.framed, &eyes, body), &MARKED);
+            marks.add(&TileBounds::of_outline(self.framed, &eyes, body), &[DRAWN]);
         }
     }
 }
@@ -183,29 +197,35 @@ impl<'a> ShutterEyes<'a> {
     }
 
     /// Marks the tiles in which a cell is seen.
-    fn mark(&self, marks: &mut Marks, cell: &SurfaceCell, size_px: [u32; 2], quartered: u32) {
+    fn mark(
+        &self,
+        (marks, mark): (&mut Marks, u64),
+        cell: &SurfaceCell,
+        size_px: [u32; 2],
+        quartered: u32,
+    ) {
         let seen = cell.corners().map(|corner| self.seen(&corner));
         if seen.iter().all(Option::is_none) {
             return;
         }
         if seen.iter().any(Option::is_none) && quartered > 0 {
             for quarter in cell.quarters() {
-                self.mark(marks, &quarter, size_px, quartered - 1);
+                self.mark((marks, mark), &quarter, size_px, quartered - 1);
             }
             return;
         }
         let none = (Point2::from([f64::MAX; 2]), Point2::from([f64::MIN; 2]));
         let (low, high) = (seen.iter().flatten().flatten())
             .fold(none, |(low, high), p| (low.inf(p), high.sup(p)));
-        marks.add_part(&Rectangle::between(low, high, size_px), &MARKED);
+        marks.add_part(&Rectangle::between(low, high, size_px), &[mark]);
     }
 }
 
 /// The tiles with a mark, as rectangles: runs along a row, and runs of the same columns below each other.
-fn rectangles(marks: &Marks, size_px: [u32; 2]) -> Vec<Rectangle> {
+fn rectangles(marks: &Marks, mark: u64, size_px: [u32; 2]) -> Vec<Rectangle> {
     let mut runs: Vec<Rectangle> = Vec::new();
     for (column, row, set) in marks.tiles() {
-        if set.first().is_none_or(|word| *word == 0) {
+        if set.first().is_none_or(|word| word & mark == 0) {
             continue;
         }
         let at = [column, row].map(|k| k * TILE_PX);

@@ -206,56 +206,44 @@ impl<'a> Recorder<'a> {
         let mut pass = passes.begin("kept", &targets, depth);
         view.draw_instant(&mut pass, 0, &bound, view.list.tunnel(), surfaces);
         drop(pass);
-        layers.keep(self.gpu, encoder)
+        layers.keep(self.gpu, encoder, &view.list)
     }
 
     /// The parts of a picture that differ from a tunnel that is kept, in the mean over the exposure.
     fn draw_changed(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
-        let (view, target) = (self.view, self.target);
-        let level = &view.full;
-        let headlit: Vec<_> = view.list.tunnel().filter(|call| call.headlit).collect();
-        let bodies = view.list.bodies();
-        let (mut added, mut bound) = (Vec::new(), Vec::new());
-        if !headlit.is_empty() {
-            let background = self.pipelines.background(&self.gpu.device, headlights);
-            added.push(self.bound(level, (&background.headlit, false), surfaces.textures));
-        }
-        if !bodies.is_empty() {
-            bound = self.surfaces(level, headlights, surfaces.textures);
-        }
+        let (view, target, level) = (self.view, self.target, &self.view.full);
+        let (signal, depth) = (&target.layers.signal, &target.layers.depth);
         let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
-        let moving = [view.list.moving];
-        let signals = [&target.layers.signal, &target.instant];
-        let restored = |parts: &[Rectangle]| kept.planes.upload(self.gpu, parts, &view.list.shares);
-        let mut under = restored(&parts);
+        let share_rows = kept.share_rows(&view.list);
+        let shares = (&view.list.shares[..], &share_rows[..]);
+        let restored = kept.planes.upload(self.gpu, &parts, shares);
+        restored.copy_to(signal, self.passes.encoder);
+        let bodies = view.list.bodies();
+        if bodies.is_empty() && view.headlit.is_empty() {
+            return;
+        }
+        let bound = self.surfaces(level, headlights, surfaces.textures);
+        depth.copy_from(&kept.depth, self.passes.encoder);
+        if !view.headlit.is_empty() {
+            let headlit = view.headlit.iter().map(|a| (a.part, &a.calls[..]));
+            self.draw_areas(signal, &headlit.collect::<Vec<_>>(), 0, &bound, surfaces);
+        }
+        let (moving, signals) = (view.list.moving, [signal, &target.instant]);
+        if view.list.instants.len() > 1 {
+            (target.tunnel).copy_part_from(signal, moving, self.passes.encoder);
+        }
         for (k, instant) in view.list.instants.clone().enumerate() {
-            if k == 1 {
-                under = restored(&moving);
-            }
             let onto = signals[usize::from(k > 0)];
-            under.copy_to(onto, self.passes.encoder);
-            if !bodies.is_empty() {
-                (target.layers.depth).copy_from(&kept.depth, self.passes.encoder);
-            }
-            let depth = Some((self.depth(), wgpu::LoadOp::Load));
-            let mut pass = (self.passes).begin("background", &[(onto, KEEP)], depth);
             if k > 0 {
-                view.list.moving.clip(&mut pass);
+                onto.copy_part_from(&target.tunnel, moving, self.passes.encoder);
+                depth.copy_from(&kept.depth, self.passes.encoder);
             }
-            pass.set_blend_constant(grey(1.0));
-            view.draw_instant(
-                &mut pass,
-                instant,
-                &added,
-                headlit.iter().copied(),
-                surfaces,
-            );
-            // Those that stand still elsewhere too, for their depth.
-            self.target.layers.signal.whole().clip(&mut pass);
+            let depth = Some((depth, wgpu::LoadOp::Load));
+            let mut pass = (self.passes).begin("background", &[(onto, KEEP)], depth);
             view.draw_instant(&mut pass, instant, &bound, bodies.iter(), surfaces);
             drop(pass);
             if k > 0 {
-                self.mix_in(level, signals, k, &moving);
+                self.mix_in(level, signals, k, &[moving]);
             }
         }
     }

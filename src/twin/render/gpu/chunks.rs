@@ -10,6 +10,7 @@ use crate::track::Tunnel;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
+use std::f32::consts::PI;
 use std::sync::Arc;
 
 /// Range drawn before and behind a camera.
@@ -177,7 +178,8 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
             .map(|v| Probe {
                 at: place(v),
                 normal: Vector3::from(v.normal).cast(),
-                reflected_per_lx: v.brightest_per_lx(),
+                // As of white.
+                reflected_per_lx: v.paint / PI,
             })
             .collect(),
         glossy: (mesh.vertices.iter())

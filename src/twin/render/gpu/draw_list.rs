@@ -77,7 +77,8 @@ pub struct DrawList {
     pub mirrored: Vec<Mirrored>,
     /// Rows in which they may be.
     mirror_rows: Range<u32>,
-    lamps: Vec<usize>,
+    /// The lamps that have rows in the table of shares, from its second row on.
+    pub lamps: Vec<usize>,
     /// Whether anything is so bright that motion shows.
     lit: bool,
 }
@@ -93,7 +94,13 @@ impl DrawList {
         &self.calls[self.tunnel().count()..]
     }
 
-    /// Numbers of the draw calls that may show in a part of the picture.
+    /// Row of a lamp in the table of shares; the first where it does not blink here.
+    pub fn share_row(&self, lamp: usize) -> usize {
+        let known = self.lamps.iter().position(|k| *k == lamp);
+        known.map_or(0, |at| at + 1)
+    }
+
+    /// Indices of the draw calls that may show in a part of the picture.
     pub fn seen_in(&self, framed: &Framed<'_>, part: &Rectangle) -> Vec<usize> {
         let window = framed.window(part);
         let shows = |call: &DrawCall| match &call.chunk {

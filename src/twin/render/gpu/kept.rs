@@ -4,6 +4,7 @@
 //! of any exposure is steady + share * blinking, with the share of the row. Headlights, bodies, shadows and
 //! mirrored light come on top.
 
+use super::draw_list::DrawList;
 use super::layout::BRIGHTEST_E;
 use super::pieces::{Piece, Pieces, Uploaded, narrow, widen};
 use super::rectangle::Rectangle;
@@ -16,6 +17,7 @@ use crate::twin::render::RenderError;
 use crate::twin::render::cache::Cache;
 use nalgebra::Isometry3;
 use pulp::Arch;
+use std::iter;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -50,14 +52,24 @@ impl KeptKey {
 /// A tunnel: its light in memory, its depth on the adapter.
 pub struct KeptTunnel {
     pub planes: Arc<Planes>,
+    /// Lamps of the scene whose blinking shows in it.
+    lamps: Vec<usize>,
     pub depth: Texture,
+}
+
+impl KeptTunnel {
+    /// For the rows that its planes name, those of a picture's table of shares.
+    pub fn share_rows(&self, list: &DrawList) -> Vec<usize> {
+        let rows = self.lamps.iter().map(|lamp| list.share_row(*lamp));
+        iter::once(0).chain(rows).collect()
+    }
 }
 
 /// A tunnel as it is drawn, to be kept.
 pub struct KeptLayers {
     /// Steady and blinking light, electrons.
     pub light: Texture,
-    /// The lamp's row in the table of shares.
+    /// Whose blinking it is: the lamp's row in the table of shares.
     pub lamp: Texture,
     pub depth: Texture,
 }
@@ -73,11 +85,12 @@ impl KeptLayers {
         }
     }
 
-    /// Draws what the encoder holds, waits for it, and brings the light to memory.
+    /// Draws what the encoder holds of a list, waits for it, and brings the light to memory.
     pub fn keep(
         self,
         gpu: &Gpu,
         mut encoder: wgpu::CommandEncoder,
+        list: &DrawList,
     ) -> Result<KeptTunnel, RenderError> {
         let mut pieces = Pieces::default();
         let back = [(&self.light, 2), (&self.lamp, 1)]
@@ -90,6 +103,7 @@ impl KeptLayers {
             (buffer.get_mapped_range(..)).map_err(|e| RenderError::Device(e.to_string()))?;
         Ok(KeptTunnel {
             planes: Arc::new(Planes::of(&bytes, back.each_ref())),
+            lamps: list.lamps.clone(),
             depth: self.depth,
         })
     }
@@ -142,14 +156,14 @@ impl Planes {
         planes
     }
 
-    /// The signal of row `v` under these shares, of which each lamp has one for each of `rows` rows.
+    /// The signal of row `v` under a table of shares, see [`KeptTunnel::share_rows`].
     #[inline(always)]
-    pub fn row(&self, v: usize, shares: &[f32], out: &mut [f32]) {
+    pub fn row(&self, v: usize, shares: (&[f32], &[usize]), out: &mut [f32]) {
         self.part_of_row((v, 0), shares, out, |signal_e| signal_e);
     }
 
     /// That of a part of the picture, for the adapter to draw over.
-    pub fn upload(&self, gpu: &Gpu, parts: &[Rectangle], shares: &[f32]) -> Uploaded {
+    pub fn upload(&self, gpu: &Gpu, parts: &[Rectangle], shares: (&[f32], &[usize])) -> Uploaded {
         let arch = Arch::new();
         Uploaded::new(gpu, parts, |u, v, out| {
             arch.dispatch(|| {
@@ -166,7 +180,7 @@ impl Planes {
     fn part_of_row<T>(
         &self,
         (v, u): (usize, usize),
-        shares: &[f32],
+        (shares, share_rows): (&[f32], &[usize]),
         out: &mut [T],
         make: impl Fn(f32) -> T,
     ) {
@@ -179,7 +193,8 @@ impl Planes {
             if to <= from {
                 continue;
             }
-            let share = shares.get(lamp * height + v).copied().unwrap_or(1.0);
+            let row = share_rows.get(*lamp).copied().unwrap_or(0);
+            let share = shares.get(row * height + v).copied().unwrap_or(1.0);
             let pixels = steady[from..to].iter().zip(&blinking[from..to]);
             for (to, (steady, blinking)) in out[from - u..to - u].iter_mut().zip(pixels) {
                 *to = make(widen(*steady) + share * widen(*blinking));

@@ -213,12 +213,14 @@ impl GpuRenderer {
         let framed = Framed::new(view);
         let developer = Developer::of(view).filter(|_| !self.whole);
         let blurred = framed.defocus_reach_px() > 0;
-        let kept_key = KeptKey::of(&framed);
-        // What is blurred, and what the adapter develops, it has to have as a whole.
-        let extent = match &kept_key {
-            _ if blurred || developer.is_none() => Extent::Whole,
-            Some(_) => Extent::Changed,
-            None => Extent::Lit,
+        let kept_key = KeptKey::of(&framed).filter(|_| !self.whole);
+        // To blur a picture or to develop it, the adapter needs all of it.
+        let extent = if blurred || developer.is_none() {
+            Extent::Whole
+        } else if kept_key.is_some() {
+            Extent::Changed
+        } else {
+            Extent::Lit
         };
         let meshes = (&mut self.chunks, bodies);
         let prepared = PreparedView::new(gpu, &framed, job, &self.scene, meshes, extent);

@@ -25,8 +25,6 @@ pub struct Background {
     pub lit: [[wgpu::RenderPipeline; 2]; 2],
     /// Steady and blinking light apart, without headlights.
     pub split: wgpu::RenderPipeline,
-    /// That of headlights alone, times the blend constant and added.
-    pub headlit: wgpu::RenderPipeline,
     /// What glossy surfaces mirror, times the blend constant and added.
     pub gloss: wgpu::RenderPipeline,
 }
@@ -113,17 +111,33 @@ impl Pipelines {
             let light = [Some(target(SIGNAL, None))];
             let lit = |banded, smeared| {
                 let constants = [headlights, ("BANDED", banded), ("SMEARED", smeared)];
-                surface(device, &self.background, "lit", &constants, &light)
+                surface(
+                    device,
+                    (&self.background, "lit"),
+                    &constants,
+                    &light,
+                    drawn_depth(),
+                )
             };
             let flags = [0.0, 1.0];
             let split = [target(LIGHT, None), target(LAMP, None)].map(Some);
             let added = [Some(target(SIGNAL, Some(ADD)))];
-            let add = |shader, kind| surface(device, shader, kind, &[headlights], &added);
             Background {
                 lit: flags.map(|banded| flags.map(|smeared| lit(banded, smeared))),
-                split: surface(device, &self.background, "split", &[], &split),
-                headlit: add(&self.background, "headlit"),
-                gloss: add(&self.gloss, "gloss"),
+                split: surface(
+                    device,
+                    (&self.background, "split"),
+                    &[],
+                    &split,
+                    drawn_depth(),
+                ),
+                gloss: surface(
+                    device,
+                    (&self.gloss, "gloss"),
+                    &[headlights],
+                    &added,
+                    added_depth(),
+                ),
             }
         })
     }
@@ -181,15 +195,31 @@ fn depths(written: bool, compare: wgpu::CompareFunction) -> wgpu::DepthStencilSt
     }
 }
 
-/// Draws surfaces into the depth buffer, or adds to those that are there if a target blends.
+/// Of surfaces that hide each other.
+fn drawn_depth() -> wgpu::DepthStencilState {
+    depths(true, wgpu::CompareFunction::Greater)
+}
+
+/// Of surfaces that are added to what was drawn: they must not be behind themselves by a rounding.
+fn added_depth() -> wgpu::DepthStencilState {
+    wgpu::DepthStencilState {
+        bias: wgpu::DepthBiasState {
+            constant: 16,
+            slope_scale: 0.01,
+            clamp: 0.0,
+        },
+        ..depths(false, wgpu::CompareFunction::Greater)
+    }
+}
+
+/// Draws surfaces as a shader's two entries for a kind of light do.
 fn surface(
     device: &wgpu::Device,
-    shader: &wgpu::ShaderModule,
-    kind: &str,
+    (shader, kind): (&wgpu::ShaderModule, &str),
     constants: &[(&str, f64)],
     targets: &[Option<wgpu::ColorTargetState>],
+    depth: wgpu::DepthStencilState,
 ) -> wgpu::RenderPipeline {
-    let adds = targets.iter().flatten().any(|t| t.blend.is_some());
     let entries = [format!("project_{kind}"), format!("shade_{kind}")];
     let layout = |stride, step_mode, attributes| {
         Some(wgpu::VertexBufferLayout {
@@ -209,15 +239,7 @@ fn surface(
                 &PLACEMENT,
             ),
         ],
-        depth: Some(wgpu::DepthStencilState {
-            // The same surface again must not be behind itself by a rounding.
-            bias: wgpu::DepthBiasState {
-                constant: if adds { 16 } else { 0 },
-                slope_scale: if adds { 0.01 } else { 0.0 },
-                clamp: 0.0,
-            },
-            ..depths(!adds, wgpu::CompareFunction::Greater)
-        }),
+        depth: Some(depth),
         targets,
         constants,
     };

@@ -46,6 +46,8 @@ pub struct PreparedView {
     pub shadows: ViewShadows,
     /// What is drawn in full.
     pub areas: Vec<Area>,
+    /// Where headlights light a tunnel that is kept; the draw calls are the tunnel's alone.
+    pub headlit: Vec<Area>,
     /// Signal where nothing is drawn: of the air before what is too far away.
     pub beyond_e: f64,
 }
@@ -103,7 +105,15 @@ impl PreparedView {
             Extent::Lit => search.lit(),
             Extent::Changed => search.changed(),
         };
-        let small = extent == Extent::Lit && parts != search.whole();
+        let small = extent == Extent::Lit && parts.drawn != [framed.whole()];
+        let areas = |parts: Vec<Rectangle>, first_calls: usize| {
+            let area = |part| {
+                let mut calls = list.seen_in(framed, &part);
+                calls.retain(|call| *call < first_calls);
+                Area { part, calls }
+            };
+            parts.into_iter().map(area).collect()
+        };
         let rows = framed.view.camera.intrinsics.height_px;
         Self {
             full: Level {
@@ -113,12 +123,11 @@ impl PreparedView {
             coarse: small.then(|| coarse_level(gpu, constants, rows, &list)),
             poses: gpu.storage(&framed.poses()),
             placements: gpu.upload(wgpu::BufferUsages::VERTEX, &list.placements, 1),
-            areas: (parts.into_iter())
-                .map(|part| Area {
-                    calls: list.seen_in(framed, &part),
-                    part,
-                })
-                .collect(),
+            areas: areas(parts.drawn, list.calls.len()),
+            headlit: match extent {
+                Extent::Changed => areas(parts.headlit, list.tunnel().count()),
+                _ => Vec::new(),
+            },
             lamps,
             shadows,
             beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),

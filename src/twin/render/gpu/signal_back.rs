@@ -21,8 +21,8 @@ pub enum Under {
     Nothing,
     /// A picture in texels of [`COARSE_PX`].
     Coarse(Piece),
-    /// A tunnel that is kept, under shares of its lamps.
-    Kept(Arc<Planes>, Vec<f32>),
+    /// A tunnel that is kept, with a table of shares and those of its rows that it needs.
+    Kept(Arc<Planes>, Vec<f32>, Vec<usize>),
 }
 
 /// See the module's page.
@@ -50,7 +50,10 @@ impl SignalBack {
     ) -> Self {
         let mut pieces = Pieces::default();
         let under = match (kept, &view.coarse) {
-            (Some(kept), _) => Under::Kept(Arc::clone(&kept.planes), view.list.shares),
+            (Some(kept), _) => {
+                let rows = kept.share_rows(&view.list);
+                Under::Kept(Arc::clone(&kept.planes), view.list.shares, rows)
+            }
             (None, Some(_)) => {
                 let coarse = &target.coarse.signal;
                 Under::Coarse(pieces.add(coarse, coarse.whole(), 1))
@@ -149,7 +152,7 @@ impl<T, F: Fn(u32) -> T> WithSimd for ComposedRow<'_, T, F> {
         match &back.under {
             Under::Nothing => {}
             Under::Coarse(piece) => enlarge(piece, self.bytes, v, coarse_e, signals_e),
-            Under::Kept(planes, shares) => planes.row(v, shares, signals_e),
+            Under::Kept(planes, shares, rows) => planes.row(v, (shares, rows), signals_e),
         }
         for piece in back.parts.iter().filter(|piece| piece.has_row(v as u32)) {
             let [from, end] = [piece.part.at[0], piece.part.ends()[0]].map(|u| u as usize);

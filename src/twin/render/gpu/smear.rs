@@ -100,7 +100,8 @@ impl<'a> Smear<'a> {
             let probes = chunk.probes.iter();
             probes.filter_map(move |probe| self.flow_px(&probe.at, way))
         });
-        BETWEEN_PROBES * flow_px.fold(0.0, f64::max)
+        // Turning moves what is far away as much, also where none of the probes is in the picture.
+        (BETWEEN_PROBES * flow_px.fold(0.0, f64::max)).max(self.turned_px())
     }
 
     /// The part of the picture that shows bodies which move in it.

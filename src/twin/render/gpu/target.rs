@@ -24,6 +24,8 @@ pub struct ViewTarget {
     pub glare: Texture,
     /// Signal at one instant of an exposure that shows motion, and what is blurred on the way.
     pub instant: Texture,
+    /// A tunnel that does not move, under the bodies of all instants.
+    pub tunnel: Texture,
     /// The same of a small picture.
     pub coarse: SurfaceLayers,
     pub coarse_instant: Texture,
@@ -82,6 +84,7 @@ impl ViewTarget {
             layers: SurfaceLayers::new(device, size_px),
             glare: Texture::new(device, (glare_columns, size_px.1), SIGNAL, glare_usage),
             instant: signal_texture(device, size_px),
+            tunnel: signal_texture(device, size_px),
             coarse: SurfaceLayers::new(device, coarse_px),
             coarse_instant: signal_texture(device, coarse_px),
             finishing: OnceCell::new(),

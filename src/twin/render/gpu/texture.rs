@@ -81,6 +81,18 @@ impl Texture {
         encoder.copy_buffer_to_texture(wgpu::TexelCopyBufferInfo { buffer, layout }, to, size);
     }
 
+    /// Copies a part of another of its size and format.
+    pub fn copy_part_from(
+        &self,
+        other: &Self,
+        part: Rectangle,
+        encoder: &mut wgpu::CommandEncoder,
+    ) {
+        let (from, size, _) = other.part(part, (0, 0));
+        let (to, ..) = self.part(part, (0, 0));
+        encoder.copy_texture_to_texture(from, to, size);
+    }
+
     /// Copies all of another of its size and format.
     pub fn copy_from(&self, other: &Self, encoder: &mut wgpu::CommandEncoder) {
         let (from, to) = (other.texture.as_image_copy(), self.texture.as_image_copy());

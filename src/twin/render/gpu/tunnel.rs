@@ -18,9 +18,6 @@ use nalgebra::{Point3, Rotation3, Vector3};
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// A painted surface is at most this many times as bright as its material in the mean.
-const BRIGHTEST_PAINT: f64 = 2.0;
-
 /// Length of a patch, where its ends are stations.
 const PATCH_M: f64 = 0.5;
 /// What is so near to a station is on it.
@@ -87,9 +84,8 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         if stations.len() < 2 {
             continue;
         }
-        let rail_q_m = (paintings.of_range.get(section))
-            .and_then(|k| paintings.all.get(*k))
-            .map_or(0.0, Painting::rail_q_m);
+        let painting = (paintings.of_range.get(section)).and_then(|k| paintings.all.get(*k));
+        let rail_q_m = painting.map_or(0.0, Painting::rail_q_m);
         let facets = facets_of(range, rail_q_m, site.cutting);
         for side in FacetSide::ALL {
             let first = mesh.indices.len();
@@ -97,7 +93,9 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
             for facet in facets.iter().filter(|f| FacetSide::of(f, range) == side) {
                 let vertices = mesh.vertices.len();
                 site.add_strip(&mut mesh, facet, &stations);
-                site.add_patches(&mut patches, facet, &stations, &mesh.vertices[vertices..]);
+                let brightest = painting.map_or(1.0, |p| p.most_albedo(facet.q_m)) as f32;
+                let vertices = &mesh.vertices[vertices..];
+                site.add_patches(&mut patches, (facet, brightest), &stations, vertices);
             }
             if mesh.indices.len() > first {
                 let around = box_around(&mesh, first, tunnel.alignment.at(middle_m).heading_rad);
@@ -166,20 +164,6 @@ fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] 
     })
 }
 
-impl Vertex {
-    /// The most luminance that a lux makes here, cd/m^2.
-    pub fn brightest_per_lx(&self) -> f32 {
-        self.albedo * (BRIGHTEST_PAINT / PI) as f32
-    }
-
-    /// The most luminance that the surface here may have.
-    fn peak_cd_m2(&self) -> f32 {
-        // A lamp that is on gives more than its mean over time; no code is on for less than half.
-        let [steady, blinking] = self.light_lx;
-        self.brightest_per_lx() * (steady + 2.0 * blinking) + self.luminance_cd_m2
-    }
-}
-
 impl Site<'_> {
     fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
         let first = mesh.vertices.len() as u32;
@@ -194,16 +178,24 @@ impl Site<'_> {
         mesh.add_ribbon(first, [&sides[0], &sides[1]]);
     }
 
-    /// The patches of a strip with these vertices, from station to station.
+    /// The patches of a strip with these vertices, from station to station; nothing on it has more albedo
+    /// than `brightest`.
     fn add_patches(
         &self,
         patches: &mut Vec<Patch>,
-        facet: &Facet,
+        (facet, brightest): (&Facet, f32),
         stations: &[f64],
         vertices: &[Vertex],
     ) {
         let detail = self.cutting.key.detail;
         let start_m = self.cutting.key.start_m();
+        // Without a lamp nothing blinks.
+        let on_per_mean = self.lamp.map_or(1.0, |lamp| 1.0 / lamp.duty().max(1e-9)) as f32;
+        let reflected_per_lx = |v: &Vertex| v.paint * brightest / PI as f32;
+        let peak_cd_m2 = |v: &Vertex| {
+            let [steady, blinking] = v.light_lx;
+            reflected_per_lx(v) * (steady + on_per_mean * blinking)
+        };
         let mut from_m = stations[0];
         let last_m = stations[stations.len() - 1];
         for to_m in &stations[1..] {
@@ -221,8 +213,8 @@ impl Site<'_> {
             let most = |of: &dyn Fn(&Vertex) -> f32| corners.clone().map(of).fold(0.0, f32::max);
             patches.push(Patch {
                 cell: SurfaceCell::still((0.25 * (a + b + c + d)).into(), half, Some(normal)),
-                peak_cd_m2: most(&Vertex::peak_cd_m2),
-                reflected_per_lx: most(&Vertex::brightest_per_lx),
+                peak_cd_m2: most(&peak_cd_m2),
+                reflected_per_lx: most(&reflected_per_lx),
                 glossy: most(&|v| v.gloss[0]) > 0.0,
             });
             from_m = *to_m;

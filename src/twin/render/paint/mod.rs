@@ -82,6 +82,8 @@ pub struct Painting {
     /// 255 times albedo, row by row (a row runs along the line); level k has `width >> k` columns
     /// and `height >> k` rows.
     pub levels: Vec<Vec<u8>>,
+    /// The brightest texel of each row.
+    brightest: Vec<u8>,
     rail_row: usize,
 }
 
@@ -148,9 +150,13 @@ impl Painting {
                 sharp.extend_from_slice(&painted[y * strip..][..strip]);
             }
         }
+        let brightest = sharp.chunks_exact(width.max(1));
         Self {
             width: width as u32,
             height: height as u32,
+            brightest: brightest
+                .map(|row| row.iter().copied().max().unwrap_or(0))
+                .collect(),
             levels: pyramid(sharp, width),
             rail_row,
         }
@@ -165,6 +171,23 @@ impl Painting {
     /// Albedo at a point.
     pub fn albedo(&self, s_m: f64, q_m: f64) -> f64 {
         self.sample(0, [s_m, q_m])
+    }
+
+    /// No point between these two ways along the outline has more.
+    pub fn most_albedo(&self, mut q_m: [f64; 2]) -> f64 {
+        q_m.sort_by(f64::total_cmp);
+        let last = self.brightest.len().saturating_sub(1);
+        let [low, high] = q_m.map(|q_m| q_m * f64::from(TEXELS_PER_M) - 0.5);
+        // Between two rows both count.
+        let (low, high) = (
+            (low.max(0.0) as usize).min(last),
+            (high.max(0.0).ceil() as usize).min(last),
+        );
+        let rows = self.brightest.get(low..=high).unwrap_or_default();
+        rows.iter()
+            .copied()
+            .max()
+            .map_or(1.0, |byte| f64::from(byte) / 255.0)
     }
 
     /// Mean albedo over a parallelogram around a point (s, q), whose sides are `across`, such as

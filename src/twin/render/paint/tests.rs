@@ -194,3 +194,24 @@ fn equal_sections_share_a_painting() {
     assert_eq!(paintings.all.len(), 2);
     assert!(paintings.all[1] == Painting::of(&station()));
 }
+
+/// Provokes a bound that misses rows or the way between two: no point has more, and some row comes up to it.
+#[test]
+fn most_albedo_is_a_bound_that_is_reached() {
+    let painting = Painting::of(&bored());
+    let height_m = f64::from(painting.height) / f64::from(TEXELS_PER_M);
+    for k in 0..200 {
+        let q_m = height_m * f64::from(k) / 200.0;
+        let between = [q_m + 0.11, q_m];
+        let most = painting.most_albedo(between);
+        let mut found = 0.0f64;
+        for i in 0..painting.width {
+            for j in 0..8 {
+                let s_m = (f64::from(i) + 0.5) * TEXEL_M;
+                found = found.max(painting.albedo(s_m, q_m + 0.11 * f64::from(j) / 7.0));
+            }
+        }
+        assert!(found <= most + 1e-12, "{q_m}: {found} over {most}");
+        assert!(found > 0.7 * most, "{q_m}: {found} far under {most}");
+    }
+}
