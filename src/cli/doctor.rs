@@ -7,10 +7,12 @@ use crate::session::{DrawingProfile, measure, profile};
 use serde::Serialize;
 
 const AFTER: &str = "\
-A figure is the best median of rounds of 20 frames. With --profile, times are medians of frames that are
-drawn one by one, a pair of the rig or a picture of the wayside camera: preparing it; drawing it, and the
-adapter's own time in each pass; developing it, which is the sensor's part where the processor does that;
-beside the time that its bytes take through memory, and the plain renderer's for the same picture.
+Each figure is the best median of rounds of 20 frames. With --profile, frames are drawn one by one, a stereo
+pair or a wayside frame each, and times are medians:
+  prepare  until the job is handed over
+  draw     until the adapter is done, with its own time in each pass
+  develop  until the images are there; includes the sensor where the processor computes it
+For comparison: the time to move the same bytes through memory, and the plain renderer's for the last job.
 
 Examples:
   metrotwin doctor

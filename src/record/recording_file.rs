@@ -19,7 +19,7 @@ use std::time::Duration;
 pub(super) const SIM_TIME: &str = "sim_time";
 /// Recorded time of a batch in the finished file.
 const BATCH_NS: i64 = 10_000_000_000;
-/// Memory of a batch from which it is written without waiting for more: what the viewer, too, keeps in one.
+/// A batch that takes this much memory is written at once; the viewer has the same limit.
 const BATCH_BYTES: u64 = 384 << 10;
 
 /// A recording on its way into a file; clones are the same one.

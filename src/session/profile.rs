@@ -9,7 +9,7 @@
 //! comes back is written and read, a word of every pixel's map is read, a byte of every pixel is written.
 
 use super::costs::Stopwatch;
-use super::speed::{Error, POST, TRAIN, Watched, scene};
+use super::speed::{Error, POST, TRAIN, Watched, scenario};
 use super::summary::Cost;
 use super::{RunOptions, run_on};
 use crate::scenario::Scenario;
@@ -131,7 +131,7 @@ fn profile_of(
     (case, text, changes): &(&'static str, &str, &[&str]),
     memory_bytes_per_ms: f64,
 ) -> Result<DrawingProfile, Error> {
-    let scenario = scene(text, 1, changes)?;
+    let scenario = scenario(text, 1, changes)?;
     let mut renderer = GpuRenderer::new(super::scene(&scenario))?;
     let jobs = jobs(&scenario, &mut renderer)?;
     // A run ends with pictures on their way.
@@ -247,7 +247,7 @@ mod tests {
     #[test]
     fn the_cases_are_right() {
         for (case, text, changes) in CASES {
-            let scenario = scene(text, 1, changes).unwrap();
+            let scenario = scenario(text, 1, changes).unwrap();
             let cameras = scenario.wayside.len() + usize::from(scenario.rig().is_some());
             assert_eq!(cameras, 1, "{case}");
         }

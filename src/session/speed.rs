@@ -70,12 +70,12 @@ pub struct Speeds {
 
 /// Measures this machine: the best medians of rounds of 20 frames.
 pub fn measure() -> Result<Speeds, Error> {
-    let mut renderer = renderer(&scene(TRAIN, 1, &[])?, RendererChoice::Auto)?;
+    let mut renderer = renderer(&scenario(TRAIN, 1, &[])?, RendererChoice::Auto)?;
     let drawn_by = renderer.backend();
     let rounds = if drawn_by.backend == "cpu" { 1 } else { ROUNDS };
     let (mut watched, options) = (Watched::default(), RunOptions::default());
-    let train = scene(TRAIN, rounds, &[])?;
-    for scenario in [&train, &scene(POST, rounds, &[])?] {
+    let train = scenario(TRAIN, rounds, &[])?;
+    for scenario in [&train, &scenario(POST, rounds, &[])?] {
         run_on(scenario, renderer.as_mut(), &options, &mut [&mut watched])?;
     }
     let renderer = renderer.as_mut();
@@ -91,9 +91,9 @@ pub fn measure() -> Result<Speeds, Error> {
     })
 }
 
-/// A scene with some changes, for as long as so many rounds of frames take, after the first one, which also
-/// builds what later ones use, and those of which the detector learns its reference.
-pub(super) fn scene(text: &str, rounds: usize, changes: &[&str]) -> Result<Scenario, Error> {
+/// The scenario in `text` with some changes. It lasts for `rounds` rounds of frames, and for those that are not
+/// timed: the first ones, which build what later ones use, and those of which the detector learns its reference.
+pub(super) fn scenario(text: &str, rounds: usize, changes: &[&str]) -> Result<Scenario, Error> {
     let tunnel = Tunnel::from_toml(TUNNEL)?;
     let mut document = text.parse::<toml::Table>()?;
     for change in changes {
@@ -190,8 +190,8 @@ mod tests {
     /// A change of the shipped tunnel or of a default that the scene cannot live with.
     #[test]
     fn the_scenes_are_right() {
-        assert!(scene(TRAIN, 1, &[]).unwrap().rig().is_some());
-        let post = scene(POST, 1, &[]).unwrap();
+        assert!(scenario(TRAIN, 1, &[]).unwrap().rig().is_some());
+        let post = scenario(POST, 1, &[]).unwrap();
         assert_eq!(post.wayside.len(), 1);
         assert_eq!(post.file.stack.wayside.reference_frames as usize, LEARNING);
     }

@@ -1,7 +1,7 @@
 //! The parts of a picture that a software adapter draws in full.
 //!
-//! Most of a dark tunnel is less than a grey level bright. What a moving camera sees of it is drawn in
-//! quarter size, and in full only where there is more light ([`LIT_GREY`]), or where something is seen
+//! Most of a dark tunnel is less than a grey level bright. What a moving camera sees of it is drawn with one
+//! pixel for 4 x 4, and in full only where there is more light ([`LIT_GREY`]), or where something is seen
 //! that the small picture does not have: bodies, shadows, lamps, mirrored light. What a camera at rest sees
 //! is kept from frame to frame, but for just these.
 
@@ -24,10 +24,10 @@ const HEADLIT_GREY: f64 = 0.03;
 const MOST_SHARE: f64 = 0.6;
 /// Parts that a moving camera's picture is drawn in: each costs a look at everything that may be in it.
 const MOST_PARTS: usize = 2;
-/// So many tell where a camera is through a frame.
-const EYES: usize = 33;
-/// What reaches behind the camera is looked at in quarters, and these in quarters, so many times.
-const QUARTERED: u32 = 4;
+/// Poses of the camera through a frame.
+const POSES: usize = 33;
+/// How many times a cell that reaches behind the camera is split into quarters.
+const MOST_SPLITS: u32 = 4;
 /// What is nearer to the camera's plane is behind it.
 const NEAR_M: f64 = 0.05;
 /// Marks of a tile: it is drawn, it is in the light of headlights.
@@ -122,7 +122,12 @@ impl PartSearch<'_> {
                     && (bright(&patch.cell.centre) || patch.cell.corners().iter().any(bright));
                 if (lit || mirrors || headlit) && !patch.cell.turns_away(eye) {
                     let mark = if headlit { DRAWN | HEADLIT } else { DRAWN };
-                    eyes.mark((marks, mark), &patch.cell, self.framed.size_px(), QUARTERED);
+                    eyes.mark(
+                        (marks, mark),
+                        &patch.cell,
+                        self.framed.size_px(),
+                        MOST_SPLITS,
+                    );
                 }
             }
         }
@@ -156,7 +161,11 @@ impl<'a> ShutterEyes<'a> {
     fn of(framed: &'a Framed<'a>) -> Self {
         let view = framed.view;
         let span_s = (view.camera.shutter).frame_span_s(view.camera.intrinsics.height_px);
-        let count = if view.motion.poses.len() > 1 { EYES } else { 1 };
+        let count = if view.motion.poses.len() > 1 {
+            POSES
+        } else {
+            1
+        };
         let step_s = span_s / (count.max(2) - 1) as f64;
         let at = |k: usize| view.motion.pose_at(view.start.plus(k as f64 * step_s));
         Self {
@@ -202,15 +211,15 @@ impl<'a> ShutterEyes<'a> {
         (marks, mark): (&mut Marks, u64),
         cell: &SurfaceCell,
         size_px: [u32; 2],
-        quartered: u32,
+        splits: u32,
     ) {
         let seen = cell.corners().map(|corner| self.seen(&corner));
         if seen.iter().all(Option::is_none) {
             return;
         }
-        if seen.iter().any(Option::is_none) && quartered > 0 {
+        if seen.iter().any(Option::is_none) && splits > 0 {
             for quarter in cell.quarters() {
-                self.mark((marks, mark), &quarter, size_px, quartered - 1);
+                self.mark((marks, mark), &quarter, size_px, splits - 1);
             }
             return;
         }

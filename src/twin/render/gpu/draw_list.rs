@@ -36,9 +36,9 @@ pub struct DrawCall {
     pub chunk: Option<Arc<Chunk>>,
     /// Which of its parts.
     pub part: usize,
-    /// Number of their texture.
+    /// Index of its texture.
     pub texture: usize,
-    /// Number of their placement.
+    /// Index of its placement in mid-exposure.
     pub mesh: u32,
     /// Whether headlights light them.
     pub headlit: bool,
@@ -56,7 +56,7 @@ pub struct DrawList {
     /// Of every mesh in the middle of the exposure; then, one after the other, at instants that show motion
     /// and at those that show what is mirrored.
     pub placements: Vec<Placement>,
-    /// Number of meshes.
+    /// How many meshes there are.
     meshes: u32,
     /// Instants that show motion; the middle alone where nothing moves.
     pub instants: Range<u32>,
@@ -64,7 +64,8 @@ pub struct DrawList {
     pub mirrored_instants: Range<u32>,
     /// Part of the picture in which instants differ.
     pub moving: Rectangle,
-    /// Those of them that show the tunnel's motion: all, where that is the whole picture.
+    /// The instants at which the small picture of the tunnel is drawn: [`Self::instants`] if what moves is the
+    /// whole picture, else the middle alone.
     pub tunnel_instants: Range<u32>,
     /// Light of lamps over their mean: for every lamp a row, in which every row of the picture has a
     /// number; the first row is 1.

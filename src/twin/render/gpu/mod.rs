@@ -22,7 +22,7 @@
 //!    v = row(project(vertex, pose(time(v)))). The vertex shader solves this with a table of poses
 //!    (Aitken's acceleration, three projections). Light of the lamps is stored at the vertices,
 //!    that of headlights is added there. What is painted on the walls is smeared along the line as far as the
-//!    camera goes in the exposure; where bodies move, all is drawn at several instants (`smear.rs`).
+//!    camera goes in the exposure; any other motion is drawn at several instants (`smear.rs`).
 //! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture. Then rail
 //!    heads and a wet bed are drawn once more, for what they mirror ([`gloss`](super::gloss)).
 //! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
@@ -31,6 +31,8 @@
 //!    The glare is summed up in a texture of its own, a texel for every fourth pixel.
 //! 4. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
 //!
+//! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
+//!
 //! # What is left out on a software adapter
 //!
 //! The processor is the adapter there, and draws pixels slowly. So (`areas.rs`)
@@ -38,14 +40,14 @@
 //! - of what a camera at rest sees of the tunnel, steady and blinking light are kept in memory, apart; a
 //!   frame is steady + share * blinking, and only what differs is drawn over it: bodies, shadows, headlights'
 //!   light, lamps, mirrored light;
-//! - what a moving camera sees is drawn in quarter size, and in full where it is brighter than 1.5 grey levels;
+//! - what a moving camera sees is drawn with one pixel for 4 x 4, and in full where it is brighter than 1.5 grey
+//!   levels;
 //! - the signal comes back in these layers and is put together and developed in vector code
 //!   ([`develop`](super::develop)).
 //!
-//! No pixel is off by more than a grey level, no block of 32 x 32 by more than 0.02 in the mean
-//! (`tests/pictures/parts.rs`). [`GpuRenderer::draw_whole`] draws all, as on hardware.
-//!
-//! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
+//! `tests/pictures/parts.rs` holds this against [`GpuRenderer::draw_whole`], which draws all, as on hardware, and
+//! keeps nothing: it fails where the mean of a block of 32 x 32 is off by more than 0.02 grey levels beyond the
+//! rounding of half precision, or one pixel of 10,000 by more than a grey level.
 //!
 //! # What it does not do
 //!
@@ -196,8 +198,7 @@ impl GpuRenderer {
         Ok(job.views.iter().map(Back::bytes).sum())
     }
 
-    /// From now on every pixel is drawn in full and developed on the adapter, as on hardware. A software
-    /// adapter draws what has light only, and leaves the sensor to the processor.
+    /// From now on every pixel of every frame is drawn in full and developed on the adapter, as on hardware.
     pub fn draw_whole(&mut self) {
         self.whole = true;
     }
@@ -213,14 +214,13 @@ impl GpuRenderer {
         let framed = Framed::new(view);
         let developer = Developer::of(view).filter(|_| !self.whole);
         let blurred = framed.defocus_reach_px() > 0;
-        let kept_key = KeptKey::of(&framed).filter(|_| !self.whole);
         // To blur a picture or to develop it, the adapter needs all of it.
-        let extent = if blurred || developer.is_none() {
-            Extent::Whole
-        } else if kept_key.is_some() {
-            Extent::Changed
-        } else {
-            Extent::Lit
+        let needs_all = blurred || developer.is_none();
+        let kept_key = KeptKey::of(&framed).filter(|_| !needs_all);
+        let extent = match &kept_key {
+            _ if needs_all => Extent::Whole,
+            Some(_) => Extent::Changed,
+            None => Extent::Lit,
         };
         let meshes = (&mut self.chunks, bodies);
         let prepared = PreparedView::new(gpu, &framed, job, &self.scene, meshes, extent);

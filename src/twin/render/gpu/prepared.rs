@@ -64,7 +64,7 @@ pub struct Level {
 /// A part of the picture, and what may be seen in it.
 pub struct Area {
     pub part: Rectangle,
-    /// Numbers of draw calls.
+    /// Indices of the draw calls that may show in it.
     pub calls: Vec<usize>,
 }
 
@@ -88,7 +88,7 @@ impl PreparedView {
             mirrored: list.mirrored.len() as u32,
             ..framed.constants(job)
         };
-        // Half of what lies beyond the end of what is drawn, as it is seen, is nearer than this.
+        // In the picture, half the area of what lies beyond [`AHEAD_M`] is nearer than this.
         let beyond_m = SQRT_2 * AHEAD_M;
         let lamps = LampTable::new(framed, scene, airlight_cd_m2);
         let shadows = ViewShadows::new(framed, job, scene, &chunks);

@@ -20,17 +20,17 @@ use std::sync::Arc;
 
 /// What moves by less than this within the exposure may be drawn sharp.
 const SHARP_PX: f64 = 0.5;
-/// Of the square of contrast an edge of a body has so many times as much as what is painted.
-const FULL_CONTRAST: f64 = 2.0;
+/// Square of the contrast of a body's edge, over that of an edge on the tunnel.
+const BODY_CONTRAST_SQUARED: f64 = 2.0;
 /// Most instants.
 const MAX_INSTANTS: f64 = 64.0;
 /// Light of the tunnel's lamps is even over this way.
 const EVEN_M: f64 = 0.25;
 /// No surface is taken to be nearer to a camera than this.
 const NEAREST_M: f64 = 0.3;
-/// So much farther than the probes of near chunks something between them may move.
+/// Places between the probes of near chunks may move by this many times as much as the probes.
 const BETWEEN_PROBES: f64 = 1.25;
-/// Chunks farther from a camera than this move less in its picture than near ones do.
+/// Only chunks nearer than this are probed; by the camera's travel farther ones move less in the picture.
 const PROBED_M: f64 = 15.0;
 /// What moves by less than this in a whole exposure stands still.
 const STILL_PX: f64 = 0.05;
@@ -72,7 +72,7 @@ impl<'a> Smear<'a> {
         let tunnel = count(self.tunnel_px(chunks, same));
         let tunnel = tunnel.max(count_of(self.travel().norm() / EVEN_M));
         let bodies_px = bodies.iter().map(|body| self.body_px(body));
-        let all = tunnel.max(count(FULL_CONTRAST * bodies_px.fold(0.0, f64::max)));
+        let all = tunnel.max(count(BODY_CONTRAST_SQUARED * bodies_px.fold(0.0, f64::max)));
         let part = match (all, tunnel) {
             (1, _) => Rectangle::default(),
             (_, 1) => self.around(bodies),
@@ -162,8 +162,8 @@ impl<'a> Smear<'a> {
 }
 
 /// Instants that show a motion by so many pixels.
-fn count(most_px: f64) -> u32 {
-    count_of((most_px / SHARP_PX).sqrt())
+fn count(moved_px: f64) -> u32 {
+    count_of((moved_px / SHARP_PX).sqrt())
 }
 
 fn count_of(parts: f64) -> u32 {
