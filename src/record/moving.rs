@@ -14,8 +14,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::{
     Boxes3D, Capsules3D, Cylinders3D, Ellipsoids3D, LineStrips3D, Mesh3D, Points3D, Transform3D,
 };
-use re_sdk_types::components::RotationQuat;
-use re_sdk_types::components::{Color, FillMode};
+use re_sdk_types::components::{Color, FillMode, RotationQuat};
 use rerun::AsComponents;
 use std::collections::BTreeSet;
 use std::rc::Rc;

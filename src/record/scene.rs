@@ -12,8 +12,7 @@ use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::{
     Boxes3D, LineStrips3D, Mesh3D, Points3D, Transform3D, ViewCoordinates,
 };
-use re_sdk_types::components::{Color, FillMode};
-use re_sdk_types::components::{MeshFaceRendering, RotationQuat};
+use re_sdk_types::components::{Color, FillMode, MeshFaceRendering, RotationQuat};
 use re_sdk_types::datatypes::Quaternion;
 use rerun::AsComponents;
 use std::collections::BTreeMap;
