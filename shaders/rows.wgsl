@@ -51,7 +51,8 @@ fn seen_at(v: f32, late_s: f32, p: vec3f, velocity: vec3f) -> vec3f {
     let b = poses[k + 1u];
     let early = vec3f(dot(a.x, moved), dot(a.y, moved), dot(a.z, moved));
     let late = vec3f(dot(b.x, moved), dot(b.y, moved), dot(b.z, moved));
-    return mix(early, late, x - f32(k));
+    // Exact where the camera rests, which `mix` is not.
+    return early + (x - f32(k)) * (late - early);
 }
 
 // Distorted image coordinates at depth 1, times the depth.
@@ -89,7 +90,8 @@ fn clip_of(c: vec3f) -> vec4f {
 fn eye_in(v: f32, late_s: f32) -> vec3f {
     let x = v * view.pose_per_row + view.pose_middle + late_s / view.pose_step_s;
     let k = u32(clamp(floor(x), 0.0, view.pose_last - 1.0));
-    return mix(eye_of(poses[k]), eye_of(poses[k + 1u]), x - f32(k));
+    let early = eye_of(poses[k]);
+    return early + (x - f32(k)) * (eye_of(poses[k + 1u]) - early);
 }
 
 fn eye_of(pose: Pose) -> vec3f {
