@@ -4,6 +4,7 @@ use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
 use super::kept::{KeptLayers, KeptTunnel};
 use super::layout::Part;
+use super::pipeline::Background;
 use super::prepared::{Level, PreparedView};
 use super::recorder::{BLACK, KEEP, Passes, Recorder, grey};
 use super::rectangle::Rectangle;
@@ -61,12 +62,23 @@ impl<'a> Recorder<'a> {
 
     /// What draws surfaces without headlights, and with so many if any surface is in their light.
     fn surfaces(&self, level: &Level, headlights: usize, textures: &Textures) -> Vec<Bound<'a>> {
-        let (pipelines, list) = (self.pipelines, &self.view.list);
-        let headlit = list.calls.iter().any(|call| call.headlit);
+        let list = &self.view.list;
+        let [banded, smeared] = [list.banded, list.smeared].map(usize::from);
+        let lit = |background: &'a Background| &background.lit[banded][smeared];
+        self.under_headlights(level, headlights, textures, lit)
+    }
+
+    fn under_headlights(
+        &self,
+        level: &Level,
+        headlights: usize,
+        textures: &Textures,
+        pipeline: impl Fn(&'a Background) -> &'a wgpu::RenderPipeline,
+    ) -> Vec<Bound<'a>> {
+        let headlit = self.view.list.calls.iter().any(|call| call.headlit);
         ([0, headlights][..=usize::from(headlit)].iter())
             .map(|n| {
-                let background = pipelines.background(&self.gpu.device, *n);
-                let pipeline = &background.lit[usize::from(list.banded)][usize::from(list.smeared)];
+                let pipeline = pipeline(self.pipelines.background(&self.gpu.device, *n));
                 self.bound(level, (pipeline, true), textures)
             })
             .collect()
@@ -219,15 +231,12 @@ impl<'a> Recorder<'a> {
         let restored = kept.planes.upload(self.gpu, &parts, shares);
         restored.copy_to(signal, self.passes.encoder);
         let bodies = view.list.bodies();
-        if bodies.is_empty() && view.headlit.is_empty() {
+        self.draw_headlit(kept, headlights, surfaces);
+        if bodies.is_empty() {
             return;
         }
         let bound = self.surfaces(level, headlights, surfaces.textures);
         depth.copy_from(&kept.depth, self.passes.encoder);
-        if !view.headlit.is_empty() {
-            let headlit = view.headlit.iter().map(|a| (a.part, &a.calls[..]));
-            self.draw_areas(signal, &headlit.collect::<Vec<_>>(), 0, &bound, surfaces);
-        }
         let (moving, signals) = (view.list.moving, [signal, &target.instant]);
         if view.list.instants.len() > 1 {
             (target.tunnel).copy_part_from(signal, moving, self.passes.encoder);
@@ -245,6 +254,24 @@ impl<'a> Recorder<'a> {
             if k > 0 {
                 self.mix_in(level, signals, k, &[moving]);
             }
+        }
+    }
+
+    /// Draws what headlights light of a kept tunnel: once more, but only what nothing hides.
+    fn draw_headlit(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
+        let (view, signal) = (self.view, &self.target.layers.signal);
+        if view.headlit.is_empty() {
+            return;
+        }
+        let banded = usize::from(view.list.banded);
+        let relit = |background: &'a Background| &background.relit[banded];
+        let bound = self.under_headlights(&view.full, headlights, surfaces.textures, relit);
+        let depth = Some((&kept.depth, wgpu::LoadOp::Load));
+        let mut pass = (self.passes).begin("headlights", &[(signal, KEEP)], depth);
+        for area in &view.headlit {
+            area.part.clip(&mut pass);
+            let calls = area.calls.iter().map(|call| &view.list.calls[*call]);
+            view.draw_instant(&mut pass, 0, &bound, calls, surfaces);
         }
     }
 

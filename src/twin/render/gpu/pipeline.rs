@@ -23,6 +23,8 @@ pub struct Background {
     /// Where the blinking of lamps does not show, and where it does; each with paint that is sharp and
     /// with paint that is smeared.
     pub lit: [[wgpu::RenderPipeline; 2]; 2],
+    /// The same with sharp paint, where the depth is that of the surface already.
+    pub relit: [wgpu::RenderPipeline; 2],
     /// Steady and blinking light apart, without headlights.
     pub split: wgpu::RenderPipeline,
     /// What glossy surfaces mirror, times the blend constant and added.
@@ -109,21 +111,18 @@ impl Pipelines {
         self.backgrounds[headlights].get_or_init(|| {
             let headlights = ("HEADLIGHTS", headlights as f64);
             let light = [Some(target(SIGNAL, None))];
-            let lit = |banded, smeared| {
+            let lit = |banded, smeared, depth| {
                 let constants = [headlights, ("BANDED", banded), ("SMEARED", smeared)];
-                surface(
-                    device,
-                    (&self.background, "lit"),
-                    &constants,
-                    &light,
-                    drawn_depth(),
-                )
+                let entries = (&self.background, "lit");
+                surface(device, entries, &constants, &light, depth)
             };
+            let same = depths(false, wgpu::CompareFunction::Equal);
             let flags = [0.0, 1.0];
             let split = [target(LIGHT, None), target(LAMP, None)].map(Some);
             let added = [Some(target(SIGNAL, Some(ADD)))];
             Background {
-                lit: flags.map(|banded| flags.map(|smeared| lit(banded, smeared))),
+                lit: flags.map(|banded| flags.map(|smeared| lit(banded, smeared, drawn_depth()))),
+                relit: flags.map(|banded| lit(banded, 0.0, same.clone())),
                 split: surface(
                     device,
                     (&self.background, "split"),

@@ -59,9 +59,7 @@ impl<'a> Recorder<'a> {
     /// How far away what the picture shows is.
     pub fn depth(&self) -> &'a Texture {
         match self.kept {
-            Some(kept) if self.view.list.bodies().is_empty() && self.view.headlit.is_empty() => {
-                &kept.depth
-            }
+            Some(kept) if self.view.list.bodies().is_empty() => &kept.depth,
             _ => &self.target.layers.depth,
         }
     }
