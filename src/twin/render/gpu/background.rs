@@ -4,7 +4,7 @@ use super::bodies::BodyMeshes;
 use super::draw_list::DrawCall;
 use super::kept::{KeptLayers, KeptTunnel};
 use super::layout::Part;
-use super::pipeline::Background;
+use super::pipeline::Kind;
 use super::prepared::{Level, PreparedView};
 use super::recorder::{BLACK, KEEP, Passes, Recorder, grey};
 use super::rectangle::Rectangle;
@@ -33,18 +33,15 @@ impl Surfaces<'_> {
 }
 
 /// A pipeline with a bind group a texture.
-struct Bound<'a> {
-    pipeline: &'a wgpu::RenderPipeline,
+struct Bound {
+    pipeline: wgpu::RenderPipeline,
     paintings: Vec<wgpu::BindGroup>,
 }
 
-impl<'a> Recorder<'a> {
-    fn bound(
-        &self,
-        level: &Level,
-        (pipeline, blinks): (&'a wgpu::RenderPipeline, bool),
-        textures: &Textures,
-    ) -> Bound<'a> {
+impl Recorder<'_> {
+    fn bound(&self, level: &Level, kind: Kind, textures: &Textures) -> Bound {
+        let pipeline = self.pipelines.get(&self.gpu.device, kind);
+        let blinks = kind != Kind::Split;
         let painted = (textures.all.iter()).map(|painting| {
             let shares = blinks.then(|| (2, level.shares.binding()));
             let resources = [
@@ -52,20 +49,24 @@ impl<'a> Recorder<'a> {
                 (3, painting.binding()),
                 (4, wgpu::BindingResource::Sampler(&textures.sampler)),
             ];
-            self.bind_some(level, pipeline, resources.into_iter().chain(shares))
+            self.bind_some(level, &pipeline, resources.into_iter().chain(shares))
         });
+        let paintings = painted.collect();
         Bound {
             pipeline,
-            paintings: painted.collect(),
+            paintings,
         }
     }
 
     /// What draws surfaces without headlights, and with so many if any surface is in their light.
-    fn surfaces(&self, level: &Level, headlights: usize, textures: &Textures) -> Vec<Bound<'a>> {
+    fn surfaces(&self, level: &Level, headlights: usize, textures: &Textures) -> Vec<Bound> {
         let list = &self.view.list;
-        let [banded, smeared] = [list.banded, list.smeared].map(usize::from);
-        let lit = |background: &'a Background| &background.lit[banded][smeared];
-        self.under_headlights(level, headlights, textures, lit)
+        let (banded, smeared) = (list.banded, list.smeared);
+        self.under_headlights(level, headlights, textures, |headlights| Kind::Lit {
+            headlights,
+            banded,
+            smeared,
+        })
     }
 
     fn under_headlights(
@@ -73,14 +74,11 @@ impl<'a> Recorder<'a> {
         level: &Level,
         headlights: usize,
         textures: &Textures,
-        pipeline: impl Fn(&'a Background) -> &'a wgpu::RenderPipeline,
-    ) -> Vec<Bound<'a>> {
+        kind: impl Fn(usize) -> Kind,
+    ) -> Vec<Bound> {
         let headlit = self.view.list.calls.iter().any(|call| call.headlit);
         ([0, headlights][..=usize::from(headlit)].iter())
-            .map(|n| {
-                let pipeline = pipeline(self.pipelines.background(&self.gpu.device, *n));
-                self.bound(level, (pipeline, true), textures)
-            })
+            .map(|n| self.bound(level, kind(*n), textures))
             .collect()
     }
 
@@ -165,7 +163,7 @@ impl<'a> Recorder<'a> {
         onto: &Texture,
         areas: &[(Rectangle, &[usize])],
         instant: u32,
-        bound: &[Bound<'_>],
+        bound: &[Bound],
         surfaces: &Surfaces<'_>,
     ) {
         let view = self.view;
@@ -189,11 +187,12 @@ impl<'a> Recorder<'a> {
             ..Part::default()
         };
         let parts: Vec<_> = parts.iter().map(part).collect();
-        let (clear, table) = (&self.pipelines.clear, self.gpu.storage(&parts));
-        let group = self.bind(&self.view.full, clear, &[table.as_entire_binding()]);
+        let clear = self.pipelines.get(&self.gpu.device, Kind::Clear);
+        let table = self.gpu.storage(&parts);
+        let group = self.bind(&self.view.full, &clear, &[table.as_entire_binding()]);
         let depth = Some((&self.target.layers.depth, wgpu::LoadOp::Load));
         let mut pass = self.passes.begin("clear", &[(onto, KEEP)], depth);
-        pass.set_pipeline(clear);
+        pass.set_pipeline(&clear);
         pass.set_bind_group(0, &group, &[]);
         pass.draw(0..6, 0..parts.len() as u32);
     }
@@ -205,8 +204,7 @@ impl<'a> Recorder<'a> {
         surfaces: &Surfaces<'_>,
     ) -> Result<KeptTunnel, RenderError> {
         let (view, empty) = (self.view, self.empty());
-        let background = self.pipelines.background(&self.gpu.device, 0);
-        let bound = [self.bound(&view.full, (&background.split, false), surfaces.textures)];
+        let bound = [self.bound(&view.full, Kind::Split, surfaces.textures)];
         let layers = KeptLayers::new(self.gpu, size_px);
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         let depth = Some((&layers.depth, wgpu::LoadOp::Clear(0.0)));
@@ -263,8 +261,8 @@ impl<'a> Recorder<'a> {
         if view.headlit.is_empty() {
             return;
         }
-        let banded = usize::from(view.list.banded);
-        let relit = |background: &'a Background| &background.relit[banded];
+        let banded = view.list.banded;
+        let relit = |headlights| Kind::Relit { headlights, banded };
         let bound = self.under_headlights(&view.full, headlights, surfaces.textures, relit);
         let depth = Some((&kept.depth, wgpu::LoadOp::Load));
         let mut pass = (self.passes).begin("headlights", &[(signal, KEEP)], depth);
@@ -284,11 +282,11 @@ impl<'a> Recorder<'a> {
         k: usize,
         parts: &[Rectangle],
     ) {
-        let blend = &self.pipelines.blend;
-        let group = self.bind(level, blend, &[instant.binding()]);
+        let blend = self.pipelines.get(&self.gpu.device, Kind::Blend);
+        let group = self.bind(level, &blend, &[instant.binding()]);
         let mut pass = (self.passes).begin("instants", &[(mean, KEEP)], None);
         pass.set_blend_constant(grey(1.0 / (k + 1) as f64));
-        pass.set_pipeline(blend);
+        pass.set_pipeline(&blend);
         pass.set_bind_group(0, &group, &[]);
         for part in parts {
             part.clip(&mut pass);
@@ -303,17 +301,17 @@ impl<'a> Recorder<'a> {
         if glossy.clone().next().is_none() {
             return;
         }
-        let background = (self.pipelines).background(&self.gpu.device, headlights);
+        let gloss = (self.pipelines).get(&self.gpu.device, Kind::Gloss { headlights });
         let mirrored = self.gpu.storage(&list.mirrored);
         let resources = [
             view.poses.as_entire_binding(),
             view.full.shares.binding(),
             mirrored.as_entire_binding(),
         ];
-        let group = self.bind(&view.full, &background.gloss, &resources);
+        let group = self.bind(&view.full, &gloss, &resources);
         let depth = Some((self.depth(), wgpu::LoadOp::Load));
         let mut pass = self.passes.begin("gloss", &[(signal, KEEP)], depth);
-        pass.set_pipeline(&background.gloss);
+        pass.set_pipeline(&gloss);
         pass.set_bind_group(0, &group, &[]);
         pass.set_blend_constant(grey(1.0 / list.mirrored_instants.len() as f64));
         pass.set_vertex_buffer(1, view.placements.slice(..));
@@ -332,7 +330,7 @@ impl PreparedView {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         instant: u32,
-        bound: &[Bound<'_>],
+        bound: &[Bound],
         calls: impl Iterator<Item = &'c DrawCall>,
         surfaces: &Surfaces<'_>,
     ) {
@@ -342,7 +340,7 @@ impl PreparedView {
             let at = self.list.placed(call, instant);
             // Where headlights are left out, there may be nothing but what draws without them.
             let bound = &bound[usize::from(call.headlit).min(bound.len() - 1)];
-            pass.set_pipeline(bound.pipeline);
+            pass.set_pipeline(&bound.pipeline);
             pass.set_bind_group(0, &bound.paintings[call.texture], &[]);
             pass.draw_indexed(call.indices.clone(), 0, at..at + 1);
         }

@@ -154,16 +154,14 @@ struct InFlight {
 }
 
 impl GpuRenderer {
-    /// Opens the preferred adapter and compiles the shaders.
+    /// Opens the preferred adapter.
     pub fn new(scene: Scene) -> Result<Self, RenderError> {
         let gpu = Gpu::open()?;
-        let pipelines = Pipelines::new(&gpu.device);
-        gpu.check()?;
         let mut scene = LitScene::new(scene);
         let textures = Textures::new(&gpu, &scene.paintings);
         scene.paintings.forget_texels();
         Ok(Self {
-            pipelines,
+            pipelines: Pipelines::default(),
             chunks: Chunks::default(),
             textures,
             scene,
@@ -210,7 +208,8 @@ impl GpuRenderer {
         (job, view): (&Job, &View),
         bodies: &BodyMeshes,
     ) -> Result<Back, RenderError> {
-        let (gpu, headlights, size_px) = (&self.gpu, job.headlights.len(), size_px(view));
+        let (gpu, size_px) = (&self.gpu, size_px(view));
+        let headlights = job.headlights.len().min(layout::MAX_HEADLIGHTS);
         let framed = Framed::new(view);
         let developer = Developer::of(view).filter(|_| !self.whole);
         let blurred = framed.defocus_reach_px() > 0;

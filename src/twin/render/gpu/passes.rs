@@ -1,6 +1,7 @@
 //! The passes over the finished background: shadows, focus, lamps, glare and sensor.
 
 use super::layout::{MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS};
+use super::pipeline::Kind;
 use super::recorder::{BLACK, KEEP, Recorder};
 use super::texture::Texture;
 use wgpu::Buffer;
@@ -24,17 +25,11 @@ impl Recorder<'_> {
             tables.each_ref().map(Buffer::as_entire_binding);
         let depth = self.depth().binding();
         let resources = [depth, tiles, lists, sources, blockers, slabs];
-        let pipelines = &self.pipelines.shadows;
         let (border, end) = (shadows.capsule_tiles as u32, shadows.tiles.len() as u32);
-        for (pipeline, tiles) in pipelines.iter().zip([0..border, border..end]) {
+        for (others, tiles) in [(false, 0..border), (true, border..end)] {
             if !tiles.is_empty() {
-                self.draw_rectangles(
-                    "shadows",
-                    (&target.layers.signal, KEEP),
-                    pipeline,
-                    &resources,
-                    tiles,
-                );
+                let onto = (&target.layers.signal, KEEP);
+                self.draw_rectangles("shadows", onto, Kind::Shadows { others }, &resources, tiles);
             }
         }
     }
@@ -43,9 +38,9 @@ impl Recorder<'_> {
     pub fn blur(&mut self) {
         let (sharp, blurred) = (&self.target.layers, &self.target.instant);
         let ways = [(&sharp.signal, blurred), (blurred, &sharp.signal)];
-        for (pipeline, (from, to)) in self.pipelines.focus.iter().zip(ways) {
+        for (down, (from, to)) in [false, true].into_iter().zip(ways) {
             let resources = [from.binding(), sharp.depth.binding()];
-            self.draw_rectangles("focus", (to, BLACK), pipeline, &resources, 0..1);
+            self.draw_rectangles("focus", (to, BLACK), Kind::Focus { down }, &resources, 0..1);
         }
     }
 
@@ -62,14 +57,8 @@ impl Recorder<'_> {
         ];
         let [lamps, rows, instants] = tables.each_ref().map(Buffer::as_entire_binding);
         let resources = [lamps, rows, instants, self.depth().binding()];
-        let (discs, all) = (&self.pipelines.discs, 0..table.lamps.len() as u32);
-        self.draw_rectangles(
-            "lamps",
-            (&target.layers.signal, KEEP),
-            discs,
-            &resources,
-            all,
-        );
+        let (onto, all) = ((&target.layers.signal, KEEP), 0..table.lamps.len() as u32);
+        self.draw_rectangles("lamps", onto, Kind::Discs, &resources, all);
     }
 
     /// Glare, in its own texture.
@@ -77,8 +66,8 @@ impl Recorder<'_> {
         let (gpu, table) = (self.gpu, &self.view.lamps);
         let tables = [gpu.storage(&table.glares), gpu.storage(&table.glare_rows)];
         let resources = tables.each_ref().map(Buffer::as_entire_binding);
-        let (glare, all) = (&self.pipelines.glare, 0..table.glares.len() as u32);
-        self.draw_rectangles("glare", (&self.target.glare, BLACK), glare, &resources, all);
+        let (onto, all) = ((&self.target.glare, BLACK), 0..table.glares.len() as u32);
+        self.draw_rectangles("glare", onto, Kind::Glare, &resources, all);
     }
 
     /// Fixed pattern, noise and bits.
@@ -91,14 +80,8 @@ impl Recorder<'_> {
             finishing.signal_words.as_entire_binding(),
             map.binding(),
         ];
-        let pipeline = self.pipelines.sensor(&self.gpu.device, blooming);
         // Every pixel is written, so nothing needs clearing.
-        self.draw_rectangles(
-            "sensor",
-            (&finishing.finished, KEEP),
-            pipeline,
-            &resources,
-            0..1,
-        );
+        let (onto, sensor) = ((&finishing.finished, KEEP), Kind::Sensor { blooming });
+        self.draw_rectangles("sensor", onto, sensor, &resources, 0..1);
     }
 }

@@ -1,9 +1,10 @@
 //! The pipelines of the passes.
 
-use super::layout::{MAX_HEADLIGHTS, Placement, Vertex};
+use super::layout::{Placement, Vertex};
 use super::shaders::shader_source;
 use crate::twin::render::sensor::BLOOMING_REACH;
-use std::cell::OnceCell;
+use std::cell::RefCell;
+use std::collections::HashMap;
 use std::mem::size_of;
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -18,40 +19,61 @@ pub const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
 /// Whose blinking it is: a row of the table of shares.
 pub const LAMP: wgpu::TextureFormat = wgpu::TextureFormat::R16Uint;
 
-/// Tunnel and bodies.
-pub struct Background {
-    /// Where the blinking of lamps does not show, and where it does; each with paint that is sharp and
-    /// with paint that is smeared.
-    pub lit: [[wgpu::RenderPipeline; 2]; 2],
+/// What a pipeline draws.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// Tunnel and bodies under so many headlights; whether the blinking of lamps shows, and whether paint is
+    /// smeared.
+    Lit {
+        headlights: usize,
+        banded: bool,
+        smeared: bool,
+    },
     /// The same with sharp paint, where the depth is that of the surface already.
-    pub relit: [wgpu::RenderPipeline; 2],
-    /// Steady and blinking light apart, without headlights.
-    pub split: wgpu::RenderPipeline,
+    Relit { headlights: usize, banded: bool },
+    /// Steady and blinking light of the tunnel apart, without headlights.
+    Split,
     /// What glossy surfaces mirror, times the blend constant and added.
-    pub gloss: wgpu::RenderPipeline,
+    Gloss { headlights: usize },
+    /// Nothing, in parts of the picture.
+    Clear,
+    /// Mixes a share of one picture into another.
+    Blend,
+    /// Blurs along columns, or else along rows.
+    Focus { down: bool },
+    /// Shadows of any bodies, or else of capsules, over the background.
+    Shadows { others: bool },
+    /// Lamps' discs, over the background by coverage.
+    Discs,
+    /// Lamps' glare, added up.
+    Glare,
+    /// The sensor, where charge over the full well spills or does not.
+    Sensor { blooming: bool },
 }
 
-/// One pipeline a pass.
+impl Kind {
+    /// The shader that it is in.
+    fn shader(self) -> &'static str {
+        match self {
+            Self::Lit { .. } | Self::Relit { .. } | Self::Split => "background",
+            Self::Gloss { .. } => "gloss",
+            Self::Clear => "clear",
+            Self::Blend => "blend",
+            Self::Focus { .. } => "focus",
+            Self::Shadows { .. } => "shadows",
+            Self::Discs => "lamps",
+            Self::Glare => "glare",
+            Self::Sensor { .. } => "sensor",
+        }
+    }
+}
+
+/// Pipelines and shaders, each made when first asked for: a software adapter takes long for them, and keeps
+/// megabytes of each.
+#[derive(Default)]
 pub struct Pipelines {
-    /// Tunnel and bodies under 0, 1, ... headlights, each made when first asked for.
-    backgrounds: [OnceCell<Background>; MAX_HEADLIGHTS + 1],
-    background: wgpu::ShaderModule,
-    gloss: wgpu::ShaderModule,
-    /// Nothing, in parts of the picture.
-    pub clear: wgpu::RenderPipeline,
-    /// Mixes a share of one picture into another.
-    pub blend: wgpu::RenderPipeline,
-    /// Blurs along rows, and along columns.
-    pub focus: [wgpu::RenderPipeline; 2],
-    /// Shadows of capsules, and of any bodies, over the background.
-    pub shadows: [wgpu::RenderPipeline; 2],
-    /// Lamps' discs, over the background by coverage.
-    pub discs: wgpu::RenderPipeline,
-    /// Lamps' glare, added up.
-    pub glare: wgpu::RenderPipeline,
-    /// The sensor without and with blooming, each made when first asked for.
-    sensors: [OnceCell<wgpu::RenderPipeline>; 2],
-    sensor: wgpu::ShaderModule,
+    made: RefCell<HashMap<Kind, wgpu::RenderPipeline>>,
+    shaders: RefCell<HashMap<&'static str, wgpu::ShaderModule>>,
 }
 
 struct Stage<'a> {
@@ -59,97 +81,88 @@ struct Stage<'a> {
     entries: [&'a str; 2],
     buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
     depth: Option<wgpu::DepthStencilState>,
-    targets: &'a [Option<wgpu::ColorTargetState>],
+    targets: &'a [wgpu::ColorTargetState],
     constants: &'a [(&'a str, f64)],
 }
 
 impl Pipelines {
-    /// Compiles all shaders.
-    pub fn new(device: &wgpu::Device) -> Self {
-        let shader = |name: &str| {
+    /// The pipeline of a kind.
+    pub fn get(&self, device: &wgpu::Device, kind: Kind) -> wgpu::RenderPipeline {
+        let mut made = self.made.borrow_mut();
+        let pipeline = made.entry(kind).or_insert_with(|| self.make(device, kind));
+        pipeline.clone()
+    }
+
+    fn shader(&self, device: &wgpu::Device, name: &'static str) -> wgpu::ShaderModule {
+        let make = || {
             device.create_shader_module(wgpu::ShaderModuleDescriptor {
                 label: Some(name),
                 source: wgpu::ShaderSource::Wgsl(shader_source(name).unwrap_or_default().into()),
             })
         };
-        let (lamps, glare, blend) = (shader("lamps"), shader("glare"), shader("blend"));
-        let (focus, shadows, clear) = (shader("focus"), shader("shadows"), shader("clear"));
-        let flat = |shader: &_, entries: [&str; 2], target, constants: &[(&str, f64)]| {
-            flat_pipeline(device, shader, entries, target, constants)
-        };
-        let flags = [0.0, 1.0];
+        let mut shaders = self.shaders.borrow_mut();
+        shaders.entry(name).or_insert_with(make).clone()
+    }
+
+    fn make(&self, device: &wgpu::Device, kind: Kind) -> wgpu::RenderPipeline {
+        let shader = self.shader(device, kind.shader());
         let over = Some(wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING);
-        Self {
-            backgrounds: [const { OnceCell::new() }; MAX_HEADLIGHTS + 1],
-            background: shader("background"),
-            gloss: shader("gloss"),
-            clear: clearing(device, &clear),
-            blend: flat(&blend, ["whole", "share"], target(SIGNAL, Some(SHARE)), &[]),
-            focus: flags.map(|down| {
-                let target = target(SIGNAL, None);
-                flat(&focus, ["whole", "focus"], target, &[("DOWN", down)])
-            }),
-            shadows: flags.map(|others| {
-                let target = target(SIGNAL, Some(FADE));
-                flat(
-                    &shadows,
-                    ["tile_corner", "shade"],
-                    target,
-                    &[("OTHERS", others)],
-                )
-            }),
-            discs: flat(&lamps, ["disc_corner", "disc"], target(SIGNAL, over), &[]),
-            glare: flat(&glare, ["glare_corner", "glare"], target(SIGNAL, over), &[]),
-            sensors: [const { OnceCell::new() }; 2],
-            sensor: shader("sensor"),
+        let signal = |blend| target(SIGNAL, blend);
+        let flag = |name, set| [(name, f64::from(u8::from(set)))];
+        let flat = |entries, target, constants: &[_]| {
+            flat_pipeline(device, &shader, entries, target, constants)
+        };
+        let surface = |entries, constants: &[_], targets: &[_], depth| {
+            surface(device, (&shader, entries), constants, targets, depth)
+        };
+        match kind {
+            Kind::Lit {
+                headlights,
+                banded,
+                smeared,
+            } => {
+                let constants = lighting(headlights, banded, smeared);
+                surface("lit", &constants, &[signal(None)], drawn_depth())
+            }
+            Kind::Relit { headlights, banded } => {
+                let constants = lighting(headlights, banded, false);
+                let same = depths(false, wgpu::CompareFunction::Equal);
+                surface("lit", &constants, &[signal(None)], same)
+            }
+            Kind::Split => {
+                let targets = [target(LIGHT, None), target(LAMP, None)];
+                surface("split", &[], &targets, drawn_depth())
+            }
+            Kind::Gloss { headlights } => {
+                let constants = [("HEADLIGHTS", headlights as f64)];
+                surface("gloss", &constants, &[signal(Some(ADD))], added_depth())
+            }
+            Kind::Clear => clearing(device, &shader),
+            Kind::Blend => flat(["whole", "share"], signal(Some(SHARE)), &[]),
+            Kind::Focus { down } => flat(["whole", "focus"], signal(None), &flag("DOWN", down)),
+            Kind::Shadows { others } => {
+                let constants = flag("OTHERS", others);
+                flat(["tile_corner", "shade"], signal(Some(FADE)), &constants)
+            }
+            Kind::Discs => flat(["disc_corner", "disc"], signal(over), &[]),
+            Kind::Glare => flat(["glare_corner", "glare"], signal(over), &[]),
+            Kind::Sensor { blooming } => {
+                let reach = if blooming { BLOOMING_REACH } else { 0 };
+                let constants = [("BLOOMING_REACH", reach as f64)];
+                flat(["whole", "develop"], target(RAW, None), &constants)
+            }
         }
     }
+}
 
-    /// The pipelines that draw tunnel and bodies under so many headlights.
-    pub fn background(&self, device: &wgpu::Device, headlights: usize) -> &Background {
-        let headlights = headlights.min(MAX_HEADLIGHTS);
-        self.backgrounds[headlights].get_or_init(|| {
-            let headlights = ("HEADLIGHTS", headlights as f64);
-            let light = [Some(target(SIGNAL, None))];
-            let lit = |banded, smeared, depth| {
-                let constants = [headlights, ("BANDED", banded), ("SMEARED", smeared)];
-                let entries = (&self.background, "lit");
-                surface(device, entries, &constants, &light, depth)
-            };
-            let same = depths(false, wgpu::CompareFunction::Equal);
-            let flags = [0.0, 1.0];
-            let split = [target(LIGHT, None), target(LAMP, None)].map(Some);
-            let added = [Some(target(SIGNAL, Some(ADD)))];
-            Background {
-                lit: flags.map(|banded| flags.map(|smeared| lit(banded, smeared, drawn_depth()))),
-                relit: flags.map(|banded| lit(banded, 0.0, same.clone())),
-                split: surface(
-                    device,
-                    (&self.background, "split"),
-                    &[],
-                    &split,
-                    drawn_depth(),
-                ),
-                gloss: surface(
-                    device,
-                    (&self.gloss, "gloss"),
-                    &[headlights],
-                    &added,
-                    added_depth(),
-                ),
-            }
-        })
-    }
-
-    /// The pipeline that develops a picture, where charge over the full well spills or does not.
-    pub fn sensor(&self, device: &wgpu::Device, blooming: bool) -> &wgpu::RenderPipeline {
-        self.sensors[usize::from(blooming)].get_or_init(|| {
-            let reach = if blooming { BLOOMING_REACH } else { 0 };
-            let reach = [("BLOOMING_REACH", reach as f64)];
-            let target = target(RAW, None);
-            flat_pipeline(device, &self.sensor, ["whole", "develop"], target, &reach)
-        })
-    }
+/// The constants of a background.
+fn lighting(headlights: usize, banded: bool, smeared: bool) -> [(&'static str, f64); 3] {
+    let flag = |set| f64::from(u8::from(set));
+    [
+        ("HEADLIGHTS", headlights as f64),
+        ("BANDED", flag(banded)),
+        ("SMEARED", flag(smeared)),
+    ]
 }
 
 /// Draws rectangles, without buffers or depth.
@@ -165,7 +178,7 @@ fn flat_pipeline(
         entries,
         buffers: &[],
         depth: None,
-        targets: &[Some(target)],
+        targets: &[target],
         constants,
     };
     pipeline(device, stage)
@@ -178,7 +191,7 @@ fn clearing(device: &wgpu::Device, shader: &wgpu::ShaderModule) -> wgpu::RenderP
         entries: ["part_corner", "clear"],
         buffers: &[],
         depth: Some(depths(true, wgpu::CompareFunction::Always)),
-        targets: &[Some(target(SIGNAL, None))],
+        targets: &[target(SIGNAL, None)],
         constants: &[],
     };
     pipeline(device, stage)
@@ -216,7 +229,7 @@ fn surface(
     device: &wgpu::Device,
     (shader, kind): (&wgpu::ShaderModule, &str),
     constants: &[(&str, f64)],
-    targets: &[Option<wgpu::ColorTargetState>],
+    targets: &[wgpu::ColorTargetState],
     depth: wgpu::DepthStencilState,
 ) -> wgpu::RenderPipeline {
     let entries = [format!("project_{kind}"), format!("shade_{kind}")];
@@ -292,6 +305,7 @@ fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
         constants: stage.constants,
         ..Default::default()
     };
+    let targets: Vec<_> = stage.targets.iter().cloned().map(Some).collect();
     device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
         label: Some(stage.entries[1]),
         layout: None,
@@ -308,7 +322,7 @@ fn pipeline(device: &wgpu::Device, stage: Stage<'_>) -> wgpu::RenderPipeline {
             module: stage.shader,
             entry_point: Some(stage.entries[1]),
             compilation_options: options,
-            targets: stage.targets,
+            targets: &targets,
         }),
         multiview_mask: None,
         cache: None,

@@ -3,7 +3,7 @@
 use super::adapter::Gpu;
 use super::kept::KeptTunnel;
 use super::pass_clock::PassClock;
-use super::pipeline::Pipelines;
+use super::pipeline::{Kind, Pipelines};
 use super::prepared::{Level, PreparedView};
 use super::target::ViewTarget;
 use super::texture::Texture;
@@ -69,14 +69,15 @@ impl<'a> Recorder<'a> {
         &mut self,
         name: &'static str,
         (onto, load): (&Texture, wgpu::LoadOp<wgpu::Color>),
-        pipeline: &wgpu::RenderPipeline,
+        kind: Kind,
         resources: &[wgpu::BindingResource<'_>],
         instances: Range<u32>,
     ) {
-        let group = self.bind(&self.view.full, pipeline, resources);
+        let pipeline = self.pipelines.get(&self.gpu.device, kind);
+        let group = self.bind(&self.view.full, &pipeline, resources);
         let mut pass = self.passes.begin(name, &[(onto, load)], None);
         if !instances.is_empty() {
-            pass.set_pipeline(pipeline);
+            pass.set_pipeline(&pipeline);
             pass.set_bind_group(0, &group, &[]);
             pass.draw(0..6, instances);
         }
