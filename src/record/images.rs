@@ -3,20 +3,18 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
+use super::image_files::{Format, ImageFiles, Row};
 use super::palette::{self, ui};
 use super::stream::RowStream;
-use super::whole_files::{Result, failed};
+use super::whole_files::Result;
 use super::{path_of, slug};
 use crate::bus::{
     DangerLevel, DetectedObstacle, Ellipse, Frame, Intrinsics, LedReport, PixelBox, SimTime, Spot,
     StereoPair, TrainId, WaysideReport,
 };
 use crate::scenario::RecordSettings;
-use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, GrayImage, ImageEncoder};
-use jpeg_encoder::{ColorType, Encoder};
+use image::GrayImage;
 use re_sdk_types::archetypes::{Boxes2D, EncodedImage, LineStrips2D, Pinhole, Points2D};
-use re_sdk_types::components::MediaType;
 
 /// The left eye's frame, with its image plane under it.
 pub(super) const LEFT: &str = "world/rig/left";
@@ -110,7 +108,7 @@ pub(super) struct Images {
     every_frame: bool,
     stereo: Rate,
     wayside: Vec<Rate>,
-    scaled: GrayImage,
+    files: ImageFiles,
 }
 
 impl Images {
@@ -128,7 +126,7 @@ impl Images {
             every_frame: settings.overlay_every_frame,
             stereo: Rate::new(settings.stereo_image_hz),
             wayside: vec![Rate::new(settings.wayside_image_hz); devices],
-            scaled: GrayImage::default(),
+            files: ImageFiles::default(),
         }
     }
 
@@ -139,11 +137,12 @@ impl Images {
             return Ok(());
         }
         let eyes = [(&pair.left, &report.left), (&pair.right, &report.right)];
-        for (path, (frame, spots)) in self.eyes.iter().zip(eyes) {
-            self.stream.at_frame(frame.start, frame.number);
+        for (path, (frame, spots)) in self.eyes.clone().iter().zip(eyes) {
             if keep {
-                self.jpeg(&format!("{path}/image"), &frame.image)?;
+                let at = (frame.start, frame.number);
+                self.file(format!("{path}/image"), at, &frame.image, self.jpeg(1.0))?;
             }
+            self.stream.at_frame(frame.start, frame.number);
             self.log_spots(path, spots)?;
         }
         Ok(())
@@ -162,47 +161,55 @@ impl Images {
             return Ok(());
         }
         let paths = WaysidePaths::new(device.1);
-        self.stream.at_frame(start, report.number);
         if keep {
-            self.jpeg(&format!("{}/image", paths.camera), image)?;
+            let at = (start, report.number);
+            self.file(format!("{}/image", paths.camera), at, image, self.jpeg(1.0))?;
             if let Some(difference) = &report.difference {
-                self.brighten(difference);
-                self.jpeg(&paths.difference, &self.scaled)?;
+                self.file(paths.difference, at, difference, self.jpeg(self.gain))?;
             }
             if let Some(binary) = &report.binary {
-                self.png(&paths.binary, binary)?;
+                self.file(paths.binary, at, binary, Format::Png)?;
             }
         }
+        self.stream.at_frame(start, report.number);
         self.log_obstacles(&paths.camera, report, image.height())
     }
 
-    fn brighten(&mut self, difference: &GrayImage) {
-        self.scaled.clone_from(difference);
-        for grey in self.scaled.iter_mut() {
-            *grey = (f64::from(*grey) * self.gain).min(255.0) as u8;
+    fn jpeg(&self, gain: f64) -> Format {
+        let quality = self.quality;
+        Format::Jpeg { quality, gain }
+    }
+
+    /// Has an image's file made, and logs an earlier one that is ready.
+    fn file(
+        &mut self,
+        path: String,
+        (start, number): (SimTime, u32),
+        image: &GrayImage,
+        format: Format,
+    ) -> Result {
+        let row = Row {
+            path,
+            start,
+            number,
+        };
+        match self.files.add(row, image, format)? {
+            Some(ready) => self.log_file(&ready),
+            None => Ok(()),
         }
     }
 
-    fn jpeg(&self, path: &str, image: &GrayImage) -> Result {
-        // 65535 pixels a side is the limit of JPEG itself.
-        let (Ok(width), Ok(height)) = (image.width().try_into(), image.height().try_into()) else {
-            return self.png(path, image);
-        };
-        let mut bytes = Vec::with_capacity(image.len() / 4);
-        Encoder::new(&mut bytes, self.quality)
-            .encode(image.as_raw(), width, height, ColorType::Luma)
-            .map_err(failed(path))?;
-        let encoded = EncodedImage::new(bytes).with_media_type(MediaType::jpeg());
-        self.stream.log(path, &encoded)
+    fn log_file(&self, (row, file): &(Row, EncodedImage)) -> Result {
+        self.stream.at_frame(row.start, row.number);
+        self.stream.log(&row.path, file)
     }
 
-    fn png(&self, path: &str, image: &GrayImage) -> Result {
-        let mut bytes = Vec::new();
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter)
-            .write_image(image, image.width(), image.height(), ExtendedColorType::L8)
-            .map_err(failed(path))?;
-        let encoded = EncodedImage::new(bytes).with_media_type(MediaType::png());
-        self.stream.log(path, &encoded)
+    /// Logs all images so far.
+    pub(super) fn flush(&mut self) -> Result {
+        while let Some(ready) = self.files.next()? {
+            self.log_file(&ready)?;
+        }
+        Ok(())
     }
 
     /// Boxes of lamps, with names where they have one, fitted ellipses and centres.

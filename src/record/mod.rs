@@ -31,6 +31,7 @@
 
 mod blueprint;
 pub mod dataset;
+mod image_files;
 mod images;
 mod listing;
 mod moving;
@@ -376,6 +377,9 @@ impl Open {
     /// the file does not depend on threads.
     fn flush(&mut self) -> Result {
         self.lay_out(None)?;
+        for view in self.views.values_mut() {
+            view.images.flush()?;
+        }
         self.stream.flush()?;
         for view in self.views.values_mut() {
             view.moving.flush()?;
