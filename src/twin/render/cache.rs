@@ -18,6 +18,11 @@ impl<K: PartialEq, T> Cache<K, T> {
         }
     }
 
+    /// Forgets some.
+    pub fn forget(&mut self, which: impl Fn(&K) -> bool) {
+        self.kept.retain(|(key, _)| !which(key));
+    }
+
     /// Forgets all.
     pub fn clear(&mut self) {
         self.kept.clear();

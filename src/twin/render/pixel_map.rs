@@ -39,8 +39,8 @@ const GAIN_MASK: u32 = 0xffff;
 const WORDS: f64 = 4_294_967_296.0;
 /// Pixels that are worked at together: loops over so many become vector code.
 const BLOCK_PX: usize = 64;
-/// Cameras whose maps a renderer keeps.
-pub const KEPT_MAPS: usize = 8;
+/// Cameras of a scene whose maps a renderer keeps.
+pub const KEPT_MAPS: usize = 32;
 
 /// All that a map depends on.
 #[derive(Clone, Copy, Debug, PartialEq)]

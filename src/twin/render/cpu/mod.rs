@@ -203,6 +203,7 @@ impl Renderer for CpuRenderer {
     fn set_scene(&mut self, scene: Scene) {
         self.scene.replace(scene);
         self.kept.clear();
+        self.maps.clear();
         self.finished.clear();
     }
 

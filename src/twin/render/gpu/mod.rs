@@ -239,6 +239,9 @@ impl GpuRenderer {
             target,
             kept: None,
         };
+        if let Some(key) = &kept_key {
+            self.kept.forget(|other| other.is_outdated_by(key));
+        }
         let draw_kept = |_: &KeptKey| recorder.draw_kept(size_px, &surfaces);
         let kept = kept_key.map(|key| self.kept.try_get(key, draw_kept));
         let kept = kept.transpose()?;
@@ -296,6 +299,8 @@ impl Renderer for GpuRenderer {
         }
         self.chunks = Chunks::default();
         self.kept.clear();
+        self.maps.clear();
+        self.maps_in_memory.clear();
         self.targets.clear();
         self.spare.clear();
         self.in_flight.clear();
