@@ -4,9 +4,6 @@ struct Part {
     // Bounds, pixels.
     low: vec2f,
     high: vec2f,
-    // Signal where nothing is drawn.
-    empty_e: f32,
-    unused: f32,
 }
 
 @group(0) @binding(1) var<storage, read> parts: array<Part>;
@@ -14,15 +11,15 @@ struct Part {
 struct Corner {
     // Infinitely far away.
     @builtin(position) clip: vec4f,
-    @location(0) @interpolate(flat, either) empty_e: f32,
+    @location(0) @interpolate(flat, either) beyond_e: f32,
 }
 
 @vertex
 fn part_corner(@builtin(vertex_index) k: u32, @builtin(instance_index) part: u32) -> Corner {
-    return Corner(rectangle(k, parts[part].low, parts[part].high), parts[part].empty_e);
+    return Corner(rectangle(k, parts[part].low, parts[part].high), view.beyond_e);
 }
 
 @fragment
 fn clear(in: Corner) -> @location(0) vec4f {
-    return vec4f(in.empty_e, 0.0, 0.0, 1.0);
+    return vec4f(in.beyond_e, 0.0, 0.0, 1.0);
 }

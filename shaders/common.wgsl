@@ -51,6 +51,8 @@ struct ViewConstants {
     reach_px: i32,
     // Lamps that glossy surfaces mirror.
     mirrored: u32,
+    // Signal where nothing is drawn.
+    beyond_e: f32,
     headlights: array<ViewHeadlight, MAX_HEADLIGHTS>,
 }
 

@@ -70,7 +70,7 @@ fn unit(word: vec2u) -> vec2f {
 }
 
 // Four standard normal numbers by Box and Muller's transform.
-fn normals(key: vec3u, counter: u32) -> vec4f {
+fn gaussian(key: vec3u, counter: u32) -> vec4f {
     let word = pcg4d(vec4u(key, counter));
     let radius = sqrt(max(-2.0 * log(unit(word.xz)), vec2f(0.0)));
     let turn = 2.0 * PI * unit(word.yw);
@@ -120,7 +120,7 @@ fn converted(in: Texel) -> vec4f {
     if BLOOMING_REACH > 0 {
         charge += spilled_e(in, charge);
     }
-    let n = in.noise * normals(in.key, u32(at.y) * in.width + u32(at.x));
+    let n = in.noise * gaussian(in.key, u32(at.y) * in.width + u32(at.x));
     let read_e = in.read_noise_e;
     let deviation = sqrt(max(charge + read_e * read_e, vec4f(0.0)));
     // A full pixel has no shot noise, but still read noise.

@@ -3,7 +3,7 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
-use super::image_files::{Format, ImageFiles, Row};
+use super::image_encoder::{Format, ImageEncoder, Row};
 use super::palette::{self, ui};
 use super::stream::RowStream;
 use super::whole_files::Result;
@@ -108,7 +108,7 @@ pub(super) struct Images {
     every_frame: bool,
     stereo: Rate,
     wayside: Vec<Rate>,
-    files: ImageFiles,
+    encoder: ImageEncoder,
 }
 
 impl Images {
@@ -126,7 +126,7 @@ impl Images {
             every_frame: settings.overlay_every_frame,
             stereo: Rate::new(settings.stereo_image_hz),
             wayside: vec![Rate::new(settings.wayside_image_hz); devices],
-            files: ImageFiles::default(),
+            encoder: ImageEncoder::default(),
         }
     }
 
@@ -140,7 +140,7 @@ impl Images {
         for (path, (frame, spots)) in self.eyes.clone().iter().zip(eyes) {
             if keep {
                 let at = (frame.start, frame.number);
-                self.file(format!("{path}/image"), at, &frame.image, self.jpeg(1.0))?;
+                self.encode(format!("{path}/image"), at, &frame.image, self.jpeg(1.0))?;
             }
             self.stream.at_frame(frame.start, frame.number);
             self.log_spots(path, spots)?;
@@ -163,12 +163,12 @@ impl Images {
         let paths = WaysidePaths::new(device.1);
         if keep {
             let at = (start, report.number);
-            self.file(format!("{}/image", paths.camera), at, image, self.jpeg(1.0))?;
+            self.encode(format!("{}/image", paths.camera), at, image, self.jpeg(1.0))?;
             if let Some(difference) = &report.difference {
-                self.file(paths.difference, at, difference, self.jpeg(self.gain))?;
+                self.encode(paths.difference, at, difference, self.jpeg(self.gain))?;
             }
             if let Some(binary) = &report.binary {
-                self.file(paths.binary, at, binary, Format::Png)?;
+                self.encode(paths.binary, at, binary, Format::Png)?;
             }
         }
         self.stream.at_frame(start, report.number);
@@ -180,8 +180,8 @@ impl Images {
         Format::Jpeg { quality, gain }
     }
 
-    /// Has an image's file made, and logs an earlier one that is ready.
-    fn file(
+    /// Has an image encoded, and logs an earlier one.
+    fn encode(
         &mut self,
         path: String,
         (start, number): (SimTime, u32),
@@ -193,21 +193,21 @@ impl Images {
             start,
             number,
         };
-        match self.files.add(row, image, format)? {
-            Some(ready) => self.log_file(&ready),
+        match self.encoder.add(row, image, format)? {
+            Some(ready) => self.log_image(&ready),
             None => Ok(()),
         }
     }
 
-    fn log_file(&self, (row, file): &(Row, EncodedImage)) -> Result {
+    fn log_image(&self, (row, image): &(Row, EncodedImage)) -> Result {
         self.stream.at_frame(row.start, row.number);
-        self.stream.log(&row.path, file)
+        self.stream.log(&row.path, image)
     }
 
     /// Logs all images so far.
     pub(super) fn flush(&mut self) -> Result {
-        while let Some(ready) = self.files.next()? {
-            self.log_file(&ready)?;
+        while let Some(ready) = self.encoder.next()? {
+            self.log_image(&ready)?;
         }
         Ok(())
     }

@@ -31,7 +31,7 @@
 
 mod blueprint;
 pub mod dataset;
-mod image_files;
+mod image_encoder;
 mod images;
 mod listing;
 mod moving;
@@ -66,7 +66,7 @@ use scene::RecordedScene;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::rc::Rc;
-use stream::{BATCH_S, RowStream, Target};
+use stream::{FLUSH_S, RowStream, Target};
 use texts::Texts;
 use whole_files::Result;
 
@@ -244,7 +244,7 @@ impl Open {
             views: views.collect::<Result<_>>()?,
             first_camera: opening.wayside.first().map(|d| d.world_from_camera),
             laid_out: false,
-            flush_at: SimTime::ZERO.plus(BATCH_S),
+            flush_at: SimTime::ZERO.plus(FLUSH_S),
             texts: Texts::open(stream.clone(), opening)?,
             stream,
             contents,
@@ -331,7 +331,7 @@ impl Open {
             }
         };
         if time >= self.flush_at {
-            self.flush_at = time.plus(BATCH_S);
+            self.flush_at = time.plus(FLUSH_S);
             self.flush()?;
         }
         Ok(())
@@ -377,20 +377,21 @@ impl Open {
     /// the file does not depend on threads.
     fn flush(&mut self) -> Result {
         self.lay_out(None)?;
-        for view in self.views.values_mut() {
-            view.images.flush()?;
-        }
+        // An image that could not be encoded must not cost the rest.
+        let images = self.views.values_mut().map(|view| view.images.flush());
+        let images = images.fold(Ok(()), Result::and);
         self.stream.flush()?;
         for view in self.views.values_mut() {
             view.moving.flush()?;
             view.plots.flush()?;
         }
-        Ok(())
+        images
     }
 
     fn close(mut self) -> Result {
-        self.flush()?;
-        self.stream.finish()
+        let flushed = self.flush();
+        self.stream.finish()?;
+        flushed
     }
 }
 

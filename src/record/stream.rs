@@ -32,10 +32,9 @@ pub(super) enum Target {
     Viewer(String),
 }
 
-/// Simulated time between batches: no more of a recording is lost with a process that is killed, and
-/// a viewer shows them as they come. With what passes until the next event it is less than a second. A
-/// finished file has larger ones.
-pub(super) const BATCH_S: f64 = 0.8;
+/// Simulated time between flushes. A killed process loses no more of a recording than this and the time to
+/// the next event, together under a second; a viewer lags as far. A finished file has larger batches.
+pub(super) const FLUSH_S: f64 = 0.8;
 
 /// An open stream; clones of it are the same one.
 #[derive(Clone)]

@@ -44,7 +44,7 @@ pub fn gpu(scene: Scene) -> Box<dyn Renderer> {
 /// The same as it draws on hardware.
 pub fn whole(scene: Scene) -> Box<dyn Renderer> {
     let mut renderer = on_adapter(scene);
-    renderer.draw_whole();
+    renderer.draw_parts(false);
     Box::new(renderer)
 }
 

@@ -303,7 +303,7 @@ fn timed_passes_are_parts_of_the_job() {
     let scene = sample::scene();
     let job = sample::stereo_job(&scene.tunnel, 101.0, 60.0 / 3.6);
     let mut renderer = GpuRenderer::new(scene).unwrap();
-    renderer.draw_whole();
+    renderer.draw_parts(false);
     let untimed = draw(&mut renderer, &job);
     let has_clock = renderer.time_passes();
     let begin = std::time::Instant::now();

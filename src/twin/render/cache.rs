@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::convert::Infallible;
 
-/// Values by key; the oldest goes when there are too many.
+/// Values by key. When there are too many, the one made first goes, used or not.
 pub struct Cache<K, T> {
     kept: VecDeque<(K, T)>,
     most: usize,
@@ -16,6 +16,22 @@ impl<K: PartialEq, T> Cache<K, T> {
             kept: VecDeque::new(),
             most,
         }
+    }
+
+    /// The value of a key, if it is there.
+    pub fn known(&self, key: &K) -> Option<&T> {
+        let of_key = self.kept.iter().find(|(k, _)| k == key);
+        of_key.map(|(_, value)| value)
+    }
+
+    /// Whether there is one with such a key.
+    pub fn any(&self, which: impl Fn(&K) -> bool) -> bool {
+        self.kept.iter().any(|(key, _)| which(key))
+    }
+
+    /// Whether no more can be added without one going.
+    pub fn is_full(&self) -> bool {
+        self.kept.len() >= self.most
     }
 
     /// Forgets some.

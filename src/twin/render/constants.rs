@@ -14,5 +14,7 @@ pub const DARK_DISC_ALBEDO: f64 = 0.3;
 pub const FAINT_E: f64 = 1.5;
 /// From one texel of glare to the next along a row, pixels.
 pub const GLARE_STEP_PX: f64 = 4.0;
+/// The largest finite number of half precision: a brighter signal, electrons, counts as this one.
+pub const BRIGHTEST_E: f64 = 65_504.0;
 /// Signals are followed up to this many times the full well.
 pub const SATURATION: f64 = 4.0;

@@ -7,13 +7,13 @@
 //! reordered, so every processor gives the same bytes.
 
 use super::View;
-use super::gpu::layout::BRIGHTEST_E;
-use super::normals::{TEXELS, normals};
+use super::constants::BRIGHTEST_E;
+use super::gaussian::{BLOCK_TEXELS, gaussian};
 use super::pixel_map::{Dark, GAIN_STEP, HOT, LEVEL_SHIFT};
 use super::rounding::{greatest, least, rounded};
 
 /// Pixels that are worked at together: four a texel.
-const BLOCK_PX: usize = 4 * TEXELS;
+const BLOCK_PX: usize = 4 * BLOCK_TEXELS;
 
 /// A view's sensor.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +53,8 @@ impl Developer {
         })
     }
 
-    /// Digital numbers of row `v` from its signal in electrons and its words of the pixel map; `keep` makes
-    /// of each what is kept.
+    /// Digital numbers of row `v` from its signal in electrons and its words of the pixel map, each converted to
+    /// a pixel of the image.
     #[inline(always)]
     pub fn row<T>(
         &self,
@@ -62,7 +62,7 @@ impl Developer {
         signals_e: &[f32],
         words: &[u32],
         out: &mut [T],
-        keep: impl Fn(u32) -> T,
+        convert: impl Fn(u32) -> T,
     ) {
         let dn_per_e: [f32; BLOCK_PX] = std::array::from_fn(|u| self.dn_per_e[v % 2 * 2 + u % 2]);
         let mut noise = [0.0; BLOCK_PX];
@@ -70,16 +70,16 @@ impl Developer {
         let blocks = signals_e.chunks(BLOCK_PX).zip(words.chunks(BLOCK_PX));
         for ((signals_e, words), out) in blocks.zip(out.chunks_mut(BLOCK_PX)) {
             if let Some(key) = self.noise {
-                normals(key, counter, &mut noise);
+                gaussian(key, counter, &mut noise);
             }
-            counter += TEXELS as u32;
+            counter += BLOCK_TEXELS as u32;
             let mut digital = [0; BLOCK_PX];
             let pixels = signals_e.iter().zip(words).zip(&noise).zip(&dn_per_e);
             for (to, (((signal_e, word), n), dn_per_e)) in digital.iter_mut().zip(pixels) {
                 *to = self.digital(*signal_e, *word, *n, *dn_per_e);
             }
             for (to, from) in out.iter_mut().zip(&digital) {
-                *to = keep(*from);
+                *to = convert(*from);
             }
         }
     }

@@ -16,8 +16,8 @@
 //! Exposure, dark current and DSNU come in when the word is read, so a map stays what it is when
 //! the exposure changes.
 
+use super::gaussian::pair;
 use super::glass::Shade;
-use super::normals::pair;
 use super::rounding::rounded;
 use super::{Pattern, View};
 use crate::bus::Intrinsics;

@@ -7,9 +7,11 @@
 
 use super::draw_list::DrawList;
 use super::lamps::LampTable;
+use super::layout::NEAR_M;
 use super::rectangle::Rectangle;
 use super::shadows::ViewShadows;
-use super::tiles::{Eyes, Marks, SurfaceCell, TILE_PX, TileBounds};
+use super::surface::SurfaceCell;
+use super::tiles::{Eyes, Marks, TILE_PX, TileBounds};
 use super::view::Framed;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::photometry::headlights_lx;
@@ -28,8 +30,8 @@ const MOST_PARTS: usize = 2;
 const POSES: usize = 33;
 /// How many times a cell that reaches behind the camera is split into quarters.
 const MOST_SPLITS: u32 = 4;
-/// What is nearer to the camera's plane is behind it.
-const NEAR_M: f64 = 0.05;
+/// Headlights are taken to be no nearer than this to what they light.
+const LEAST_AWAY_M: f64 = 0.05;
 /// Marks of a tile: it is drawn, it is in the light of headlights.
 const DRAWN: u64 = 1;
 const HEADLIT: u64 = 2;
@@ -137,7 +139,7 @@ impl PartSearch<'_> {
     fn most_lx(&self, cell: &SurfaceCell) -> f64 {
         let beams = self.job.headlights.iter().map(|light| {
             let away_m = (cell.centre - light.place()).norm() - cell.half_diagonal_m();
-            light.intensity_cd / away_m.max(NEAR_M).powi(2)
+            light.intensity_cd / away_m.max(LEAST_AWAY_M).powi(2)
         });
         beams.sum()
     }
@@ -145,7 +147,8 @@ impl PartSearch<'_> {
     fn mark_bodies(&self, marks: &mut Marks) {
         let eyes = Eyes::exposed(self.framed, self.job.time);
         for body in &self.job.bodies {
-            marks.add(&TileBounds::of_outline(self.framed, &eyes, body), &[DRAWN]);
+            let bounds = TileBounds::of_outline(self.framed, &eyes, body);
+            marks.add_part(&bounds.rectangle(self.framed.size_px()), &[DRAWN]);
         }
     }
 }

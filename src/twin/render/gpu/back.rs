@@ -30,15 +30,14 @@ impl Back {
         }
     }
 
-    /// The image, of which `keep` says what is kept of each digital number, once the adapter is done; gives
-    /// the buffer free.
+    /// The image, each digital number converted to a pixel, once the adapter is done. Frees the buffer.
     pub fn image<T: Primitive + Send>(
         &self,
-        keep: impl Fn(u32) -> T + Copy + Sync,
+        convert: impl Fn(u32) -> T + Copy + Sync,
     ) -> Result<Image<T>, RenderError> {
         match self {
-            Self::Image(back) => back.image(keep),
-            Self::Signal(back) => back.image(keep),
+            Self::Image(back) => back.image(convert),
+            Self::Signal(back) => back.image(convert),
         }
     }
 }

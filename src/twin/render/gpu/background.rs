@@ -1,6 +1,7 @@
 //! The passes that draw tunnel and bodies, and what they mirror.
 
 use super::bodies::BodyMeshes;
+use super::chunks::InSight;
 use super::draw_list::DrawCall;
 use super::kept::{KeptLayers, KeptTunnel};
 use super::layout::Part;
@@ -32,14 +33,27 @@ impl Surfaces<'_> {
     }
 }
 
-/// A pipeline with a bind group a texture.
-struct Bound {
+/// A pipeline, with a bind group for each texture.
+struct BoundPipeline {
     pipeline: wgpu::RenderPipeline,
     paintings: Vec<wgpu::BindGroup>,
 }
 
+/// What draws surfaces that headlights do not light, and those that they do.
+struct LitPipelines {
+    dark: BoundPipeline,
+    headlit: Option<BoundPipeline>,
+}
+
+impl LitPipelines {
+    fn of(&self, call: &DrawCall) -> &BoundPipeline {
+        let headlit = self.headlit.as_ref().filter(|_| call.headlit);
+        headlit.unwrap_or(&self.dark)
+    }
+}
+
 impl Recorder<'_> {
-    fn bound(&self, level: &Level, kind: Kind, textures: &Textures) -> Bound {
+    fn bound(&self, level: &Level, kind: Kind, textures: &Textures) -> BoundPipeline {
         let pipeline = self.pipelines.get(&self.gpu.device, kind);
         let blinks = kind != Kind::Split;
         let painted = (textures.all.iter()).map(|painting| {
@@ -52,34 +66,35 @@ impl Recorder<'_> {
             self.bind_some(level, &pipeline, resources.into_iter().chain(shares))
         });
         let paintings = painted.collect();
-        Bound {
+        BoundPipeline {
             pipeline,
             paintings,
         }
     }
 
-    /// What draws surfaces without headlights, and with so many if any surface is in their light.
-    fn surfaces(&self, level: &Level, headlights: usize, textures: &Textures) -> Vec<Bound> {
+    /// The pipelines that draw surfaces under so many headlights.
+    fn lit_pipelines(&self, level: &Level, headlights: usize, textures: &Textures) -> LitPipelines {
         let list = &self.view.list;
         let (banded, smeared) = (list.banded, list.smeared);
-        self.under_headlights(level, headlights, textures, |headlights| Kind::Lit {
+        self.pipelines_of(level, headlights, textures, |headlights| Kind::Lit {
             headlights,
             banded,
             smeared,
         })
     }
 
-    fn under_headlights(
+    fn pipelines_of(
         &self,
         level: &Level,
         headlights: usize,
         textures: &Textures,
         kind: impl Fn(usize) -> Kind,
-    ) -> Vec<Bound> {
-        let headlit = self.view.list.calls.iter().any(|call| call.headlit);
-        ([0, headlights][..=usize::from(headlit)].iter())
-            .map(|n| self.bound(level, kind(*n), textures))
-            .collect()
+    ) -> LitPipelines {
+        let any = self.view.list.calls.iter().any(|call| call.headlit);
+        LitPipelines {
+            dark: self.bound(level, kind(0), textures),
+            headlit: any.then(|| self.bound(level, kind(headlights), textures)),
+        }
     }
 
     /// What nothing has been drawn over.
@@ -95,7 +110,7 @@ impl Recorder<'_> {
         let layers = &self.target.coarse;
         let signals = [&layers.signal, &self.target.coarse_instant];
         let all = [layers.signal.whole()];
-        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let bound = self.lit_pipelines(level, headlights, surfaces.textures);
         let (view, empty) = (self.view, self.empty());
         for (k, instant) in view.list.tunnel_instants.clone().enumerate() {
             let onto = signals[usize::from(k > 0)];
@@ -129,7 +144,7 @@ impl Recorder<'_> {
             return;
         }
         let level = &view.full;
-        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let bound = self.lit_pipelines(level, headlights, surfaces.textures);
         let all: Vec<_> = view.areas.iter().map(|a| (a.part, &a.calls[..])).collect();
         let moving = all
             .iter()
@@ -163,7 +178,7 @@ impl Recorder<'_> {
         onto: &Texture,
         areas: &[(Rectangle, &[usize])],
         instant: u32,
-        bound: &[Bound],
+        bound: &LitPipelines,
         surfaces: &Surfaces<'_>,
     ) {
         let view = self.view;
@@ -183,8 +198,6 @@ impl Recorder<'_> {
         let part = |part: &Rectangle| Part {
             low: part.at.map(|x| x as f32 - 0.5),
             high: part.ends().map(|x| x as f32 - 0.5),
-            empty_e: self.view.beyond_e as f32,
-            ..Part::default()
         };
         let parts: Vec<_> = parts.iter().map(part).collect();
         let clear = self.pipelines.get(&self.gpu.device, Kind::Clear);
@@ -201,10 +214,14 @@ impl Recorder<'_> {
     pub fn draw_kept(
         &self,
         size_px: (u32, u32),
+        in_sight: &InSight,
         surfaces: &Surfaces<'_>,
     ) -> Result<KeptTunnel, RenderError> {
         let (view, empty) = (self.view, self.empty());
-        let bound = [self.bound(&view.full, Kind::Split, surfaces.textures)];
+        let bound = LitPipelines {
+            dark: self.bound(&view.full, Kind::Split, surfaces.textures),
+            headlit: None,
+        };
         let layers = KeptLayers::new(self.gpu, size_px);
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         let depth = Some((&layers.depth, wgpu::LoadOp::Clear(0.0)));
@@ -216,24 +233,23 @@ impl Recorder<'_> {
         let mut pass = passes.begin("kept", &targets, depth);
         view.draw_instant(&mut pass, 0, &bound, view.list.tunnel(), surfaces);
         drop(pass);
-        layers.keep(self.gpu, encoder, &view.list)
+        layers.keep(self.gpu, encoder, in_sight, &view.list)
     }
 
     /// The parts of a picture that differ from a tunnel that is kept, in the mean over the exposure.
     fn draw_changed(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
         let (view, target, level) = (self.view, self.target, &self.view.full);
         let (signal, depth) = (&target.layers.signal, &target.layers.depth);
-        let parts: Vec<_> = view.areas.iter().map(|area| area.part).collect();
         let share_rows = kept.share_rows(&view.list);
         let shares = (&view.list.shares[..], &share_rows[..]);
-        let restored = kept.planes.upload(self.gpu, &parts, shares);
+        let restored = kept.planes.upload(self.gpu, &view.parts, shares);
         restored.copy_to(signal, self.passes.encoder);
         let bodies = view.list.bodies();
         self.draw_headlit(kept, headlights, surfaces);
         if bodies.is_empty() {
             return;
         }
-        let bound = self.surfaces(level, headlights, surfaces.textures);
+        let bound = self.lit_pipelines(level, headlights, surfaces.textures);
         depth.copy_from(&kept.depth, self.passes.encoder);
         let (moving, signals) = (view.list.moving, [signal, &target.instant]);
         if view.list.instants.len() > 1 {
@@ -258,17 +274,19 @@ impl Recorder<'_> {
     /// Draws what headlights light of a kept tunnel: once more, but only what nothing hides.
     fn draw_headlit(&mut self, kept: &KeptTunnel, headlights: usize, surfaces: &Surfaces<'_>) {
         let (view, signal) = (self.view, &self.target.layers.signal);
-        if view.headlit.is_empty() {
+        if view.areas.is_empty() {
             return;
         }
         let banded = view.list.banded;
         let relit = |headlights| Kind::Relit { headlights, banded };
-        let bound = self.under_headlights(&view.full, headlights, surfaces.textures, relit);
+        let bound = self.pipelines_of(&view.full, headlights, surfaces.textures, relit);
         let depth = Some((&kept.depth, wgpu::LoadOp::Load));
         let mut pass = (self.passes).begin("headlights", &[(signal, KEEP)], depth);
-        for area in &view.headlit {
+        let tunnel = view.list.tunnel().count();
+        for area in &view.areas {
             area.part.clip(&mut pass);
-            let calls = area.calls.iter().map(|call| &view.list.calls[*call]);
+            let calls = area.calls.iter().filter(|call| **call < tunnel);
+            let calls = calls.map(|call| &view.list.calls[*call]);
             view.draw_instant(&mut pass, 0, &bound, calls, surfaces);
         }
     }
@@ -330,7 +348,7 @@ impl PreparedView {
         &self,
         pass: &mut wgpu::RenderPass<'_>,
         instant: u32,
-        bound: &[Bound],
+        bound: &LitPipelines,
         calls: impl Iterator<Item = &'c DrawCall>,
         surfaces: &Surfaces<'_>,
     ) {
@@ -338,8 +356,7 @@ impl PreparedView {
         for call in calls {
             surfaces.set_buffers(pass, call);
             let at = self.list.placed(call, instant);
-            // Where headlights are left out, there may be nothing but what draws without them.
-            let bound = &bound[usize::from(call.headlit).min(bound.len() - 1)];
+            let bound = bound.of(call);
             pass.set_pipeline(&bound.pipeline);
             pass.set_bind_group(0, &bound.paintings[call.texture], &[]);
             pass.draw_indexed(call.indices.clone(), 0, at..at + 1);

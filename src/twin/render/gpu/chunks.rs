@@ -7,17 +7,17 @@ use super::layout::Vertex;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::Tunnel;
+use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::f32::consts::PI;
 use std::sync::Arc;
 
-/// Range drawn before and behind a camera.
-pub const AHEAD_M: f64 = 160.0;
+/// Drawn behind a camera; before it, what is in sight.
 const BEHIND_M: f64 = 20.0;
 /// Jobs after which an unseen chunk is dropped.
-const KEEP_JOBS: u64 = 200;
+const KEEP_JOBS: u64 = 64;
 /// Steps of the search for a camera far from where one was last.
 const SEARCH_STEP_M: f64 = 20.0;
 /// Farther from the line than this the chainage found is not believed.
@@ -60,7 +60,16 @@ pub struct Probe {
     pub reflected_per_lx: f32,
 }
 
-/// Every so many corners one is a probe.
+/// What a camera may see of the tunnel.
+#[derive(Clone)]
+pub struct InSight {
+    /// The camera's chainage.
+    pub s_m: f64,
+    /// Near ones first.
+    pub chunks: Vec<Arc<Chunk>>,
+}
+
+/// One corner in so many is a probe.
 const PROBE_EVERY: usize = 16;
 
 /// The same of those that mirror.
@@ -84,13 +93,8 @@ impl Chunks {
             .retain(|_, (_, near_in)| job - *near_in < KEEP_JOBS);
     }
 
-    /// The camera's chainage, and the chunks in sight, near ones first.
-    pub fn in_sight(
-        &mut self,
-        gpu: &Gpu,
-        scene: &LitScene,
-        framed: &Framed<'_>,
-    ) -> (f64, Vec<Arc<Chunk>>) {
+    /// What is in sight of a camera.
+    pub fn in_sight(&mut self, gpu: &Gpu, scene: &LitScene, framed: &Framed<'_>) -> InSight {
         let tunnel = &scene.tunnel;
         let eye = framed.reference();
         let s_m = self.locate(tunnel, &eye);
@@ -98,16 +102,16 @@ impl Chunks {
         let ahead = framed.middle.rotation * Vector3::z();
         let (sin, cos) = frame.heading_rad.sin_cos();
         let (back_m, forth_m) = if ahead.x * cos + ahead.y * sin >= 0.0 {
-            (BEHIND_M, AHEAD_M)
+            (BEHIND_M, SIGHT_M)
         } else {
-            (AHEAD_M, BEHIND_M)
+            (SIGHT_M, BEHIND_M)
         };
         let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
         let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
-        let moves = framed.view.motion.poses.len() > 1;
+        let moves = !framed.rests();
         let place = tunnel.alignment.track_from_world(&eye, s_m);
         let bend = Bend::of(&framed.view.camera.intrinsics, &place);
-        let mut in_sight = Vec::new();
+        let mut chunks = Vec::new();
         for index in first..=last {
             let from_m = index as f64 * CHUNK_M;
             let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
@@ -121,12 +125,12 @@ impl Chunks {
             // Kept whether it is in the picture or beside it: the next view may turn there.
             *near_in = self.job;
             if framed.may_see(&chunk.origin, chunk.radius_m) {
-                in_sight.push(Arc::clone(chunk));
+                chunks.push(Arc::clone(chunk));
             }
         }
         let away_m = |chunk: &Chunk| (chunk.key.start_m() + 0.5 * CHUNK_M - s_m).abs();
-        in_sight.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
-        (s_m, in_sight)
+        chunks.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
+        InSight { s_m, chunks }
     }
 
     /// Chainage of a camera: by Newton's method from where the last one was, else by search.

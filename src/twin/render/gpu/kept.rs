@@ -4,8 +4,8 @@
 //! of any exposure is steady + share * blinking, with the share of the row. Headlights, bodies, shadows and
 //! mirrored light come on top.
 
+use super::chunks::InSight;
 use super::draw_list::DrawList;
-use super::layout::BRIGHTEST_E;
 use super::pieces::{Piece, Pieces, Uploaded, narrow, widen};
 use super::rectangle::Rectangle;
 use super::target::kept_texture;
@@ -15,6 +15,7 @@ use super::{adapter::Gpu, pipeline};
 use crate::bus::Intrinsics;
 use crate::twin::render::RenderError;
 use crate::twin::render::cache::Cache;
+use crate::twin::render::constants::BRIGHTEST_E;
 use nalgebra::Isometry3;
 use pulp::Arch;
 use std::iter;
@@ -28,19 +29,32 @@ pub const MOST_KEPT: usize = 16;
 pub type KeptTunnels = Cache<KeptKey, KeptTunnel>;
 
 /// What the picture of a tunnel depends on, but for blinking and headlights.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct KeptKey {
     lens: Intrinsics,
     pose: Isometry3<f64>,
     electrons_per_cd_m2: f64,
+    /// Decides which lamps' blinking shows.
     grey_per_cd_m2: f64,
+}
+
+/// Exposures that differ by this share make the same picture.
+const SAME_EXPOSURE: f64 = 1e-9;
+
+impl PartialEq for KeptKey {
+    fn eq(&self, other: &Self) -> bool {
+        let same = |a: f64, b: f64| (a - b).abs() <= SAME_EXPOSURE * a.abs();
+        self.is_of_same_camera(other)
+            && same(self.electrons_per_cd_m2, other.electrons_per_cd_m2)
+            && same(self.grey_per_cd_m2, other.grey_per_cd_m2)
+    }
 }
 
 impl KeptKey {
     /// Of a view; none where the camera moves.
     pub fn of(framed: &Framed<'_>) -> Option<Self> {
         let view = framed.view;
-        (view.motion.poses.len() == 1).then(|| Self {
+        framed.rests().then(|| Self {
             lens: view.camera.intrinsics,
             pose: framed.middle,
             electrons_per_cd_m2: view.electrons_per_cd_m2(),
@@ -48,15 +62,17 @@ impl KeptKey {
         })
     }
 
-    /// Whether it is of the same camera, exposed in another way.
-    pub fn is_outdated_by(&self, other: &Self) -> bool {
-        self != other && self.lens == other.lens && self.pose == other.pose
+    /// Whether it is of the same camera, exposed in whatever way.
+    pub fn is_of_same_camera(&self, other: &Self) -> bool {
+        self.lens == other.lens && self.pose == other.pose
     }
 }
 
 /// A tunnel: its light in memory, its depth on the adapter.
 pub struct KeptTunnel {
     pub planes: Arc<Planes>,
+    /// What of the tunnel was drawn: so what is drawn over it has the same meshes.
+    pub in_sight: InSight,
     /// Lamps of the scene whose blinking shows in it.
     lamps: Vec<usize>,
     pub depth: Texture,
@@ -95,6 +111,7 @@ impl KeptLayers {
         self,
         gpu: &Gpu,
         mut encoder: wgpu::CommandEncoder,
+        in_sight: &InSight,
         list: &DrawList,
     ) -> Result<KeptTunnel, RenderError> {
         let mut pieces = Pieces::default();
@@ -108,6 +125,7 @@ impl KeptLayers {
             (buffer.get_mapped_range(..)).map_err(|e| RenderError::Device(e.to_string()))?;
         Ok(KeptTunnel {
             planes: Arc::new(Planes::of(&bytes, back.each_ref())),
+            in_sight: in_sight.clone(),
             lamps: list.lamps.clone(),
             depth: self.depth,
         })

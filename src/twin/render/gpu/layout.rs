@@ -6,8 +6,6 @@ use bytemuck::{Pod, Zeroable};
 /// Headlights beyond this many do not light a view; the nearest ones do.
 pub const MAX_HEADLIGHTS: usize = 16;
 
-/// The largest number of half precision, in which signals are kept.
-pub const BRIGHTEST_E: f64 = 65_504.0;
 /// Depth is reversed: 1 at this optical depth, 0 at infinity. What is nearer is not seen.
 pub const NEAR_M: f64 = 0.05;
 
@@ -158,8 +156,10 @@ shared_with_shaders! {
         pub reach_px: i32,
         /// Lamps that glossy surfaces mirror.
         pub mirrored: u32,
+        /// Signal where nothing is drawn.
+        pub beyond_e: f32,
         /// Fills the stride.
-        pub unused: [u32; 2],
+        pub unused: u32,
         /// Headlights.
         pub headlights: [ViewHeadlight; MAX_HEADLIGHTS],
     }
@@ -170,10 +170,6 @@ shared_with_shaders! {
         pub low: [f32; 2],
         /// Lower right.
         pub high: [f32; 2],
-        /// Signal where nothing is drawn.
-        pub empty_e: f32,
-        /// Fills the stride.
-        pub unused: f32,
     }
 
     /// A lamp's disc in a view.

@@ -25,11 +25,12 @@
 //!    camera goes in the exposure; any other motion is drawn at several instants (`smear.rs`).
 //! 2. *Shadows.* Where bodies may hide a light, what they hide of its disc fades the picture. Then rail
 //!    heads and a wet bed are drawn once more, for what they mirror ([`gloss`](super::gloss)).
-//! 3. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
+//! 3. *Focus.* What is out of focus is blurred along rows, then along columns.
+//! 4. *Lamps.* The share of a pixel that a disc covers, through the lens's point spread, has a
 //!    closed form along the row and is summed over a few lines across it, at each of the instants
 //!    of the row's exposure; where the disc is and how bright in each comes from double precision.
 //!    The glare is summed up in a texture of its own, a texel for every fourth pixel.
-//! 4. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
+//! 5. *Sensor.* Glare, fixed pattern, shot and read noise, bits ([`sensor`](super::sensor)).
 //!
 //! World coordinates never reach the adapter: all is relative to where the camera is in mid-frame.
 //!
@@ -45,9 +46,11 @@
 //! - the signal comes back in these layers and is put together and developed in vector code
 //!   ([`develop`](super::develop)).
 //!
-//! `tests/pictures/parts.rs` holds this against [`GpuRenderer::draw_whole`], which draws all, as on hardware, and
-//! keeps nothing: it fails where the mean of a block of 32 x 32 is off by more than 0.02 grey levels beyond the
-//! rounding of half precision, or one pixel of 10,000 by more than a grey level.
+//! A view that is out of focus, or whose charge spills, is drawn whole and developed on the adapter.
+//!
+//! `tests/pictures/parts.rs` holds this against pictures drawn whole
+//! ([`GpuRenderer::draw_parts`]): no pixel may be off by more than a grey level, no block of 32 x 32 by more than
+//! 0.02 in the mean beyond the rounding of half precision.
 //!
 //! # What it does not do
 //!
@@ -74,7 +77,6 @@ pub mod layout;
 mod mesh;
 mod pass_clock;
 mod passes;
-mod patch;
 mod pieces;
 mod pipeline;
 mod prepared;
@@ -86,6 +88,7 @@ mod shadows;
 mod signal_back;
 mod smear;
 mod spread;
+mod surface;
 mod target;
 mod texture;
 mod textures;
@@ -112,7 +115,7 @@ use chunks::Chunks;
 use image::{GrayImage, Primitive};
 use kept::{KeptKey, KeptTunnels, MOST_KEPT};
 use pass_clock::PassClock;
-use pipeline::Pipelines;
+use pipeline::{Kind, Pipelines};
 use prepared::{Extent, PreparedView};
 use recorder::{Passes, Recorder};
 use signal_back::SignalBack;
@@ -133,17 +136,17 @@ pub struct GpuRenderer {
     scene: LitScene,
     chunks: Chunks,
     textures: Textures,
-    maps: Cache<MapKey, Texture>,
-    maps_in_memory: Cache<MapKey, Arc<PixelMap>>,
+    map_textures: Cache<MapKey, Texture>,
+    maps: Cache<MapKey, Arc<PixelMap>>,
     targets: Cache<(u32, u32), ViewTarget>,
     kept: KeptTunnels,
-    spare: Vec<ReadBack>,
+    free_images: Vec<ReadBack>,
     /// Buffers that signals came back in.
-    free: Vec<wgpu::Buffer>,
+    free_signals: Vec<wgpu::Buffer>,
     in_flight: VecDeque<InFlight>,
     clock: Option<PassClock>,
-    /// See [`GpuRenderer::draw_whole`].
-    whole: bool,
+    /// See [`GpuRenderer::draw_parts`].
+    draws_parts: bool,
 }
 
 struct InFlight {
@@ -157,28 +160,38 @@ impl GpuRenderer {
     /// Opens the preferred adapter.
     pub fn new(scene: Scene) -> Result<Self, RenderError> {
         let gpu = Gpu::open()?;
+        let pipelines = Pipelines::default();
+        // A driver that cannot draw says so here.
+        let lit = Kind::Lit {
+            headlights: 0,
+            banded: true,
+            smeared: false,
+        };
+        pipelines.get(&gpu.device, lit);
+        gpu.check()?;
         let mut scene = LitScene::new(scene);
         let textures = Textures::new(&gpu, &scene.paintings);
         scene.paintings.forget_texels();
         Ok(Self {
-            pipelines: Pipelines::default(),
+            pipelines,
             chunks: Chunks::default(),
             textures,
             scene,
+            map_textures: Cache::new(KEPT_MAPS),
             maps: Cache::new(KEPT_MAPS),
-            maps_in_memory: Cache::new(KEPT_MAPS),
             targets: Cache::new(KEPT_TARGETS),
             kept: Cache::new(MOST_KEPT),
-            spare: Vec::new(),
-            free: Vec::new(),
+            free_images: Vec::new(),
+            free_signals: Vec::new(),
             in_flight: VecDeque::new(),
             clock: None,
-            whole: !gpu.is_software(),
+            draws_parts: gpu.is_software(),
             gpu,
         })
     }
 
-    /// From now on one job at a time is drawn, and its passes are timed; false where the adapter has no clock.
+    /// Times the passes from now on; jobs must then be drawn one at a time. False where the adapter has no
+    /// clock.
     pub fn time_passes(&mut self) -> bool {
         self.clock = self.gpu.has_clock().then(|| PassClock::new(&self.gpu));
         self.clock.is_some()
@@ -196,9 +209,16 @@ impl GpuRenderer {
         Ok(job.views.iter().map(Back::bytes).sum())
     }
 
-    /// From now on every pixel of every frame is drawn in full and developed on the adapter, as on hardware.
-    pub fn draw_whole(&mut self) {
-        self.whole = true;
+    /// Whether, from now on, only parts of pictures are drawn in full, tunnels are kept and the processor
+    /// develops; or else every pixel of every frame is drawn and developed on the adapter. The first is the
+    /// default on software adapters, the second on hardware.
+    pub fn draw_parts(&mut self, parts: bool) {
+        self.draws_parts = parts;
+    }
+
+    /// Whether what a camera sees of the tunnel may be kept: each as last exposed, for as many as there is room.
+    fn may_keep(&self, key: &KeptKey) -> bool {
+        !self.kept.is_full() || self.kept.any(|other| other.is_of_same_camera(key))
     }
 
     /// Records all passes of a view and the way back of its image.
@@ -211,17 +231,22 @@ impl GpuRenderer {
         let (gpu, size_px) = (&self.gpu, size_px(view));
         let headlights = job.headlights.len().min(layout::MAX_HEADLIGHTS);
         let framed = Framed::new(view);
-        let developer = Developer::of(view).filter(|_| !self.whole);
+        let developer = Developer::of(view).filter(|_| self.draws_parts);
         let blurred = framed.defocus_reach_px() > 0;
         // To blur a picture or to develop it, the adapter needs all of it.
         let needs_all = blurred || developer.is_none();
-        let kept_key = KeptKey::of(&framed).filter(|_| !needs_all);
+        let kept_key = KeptKey::of(&framed).filter(|key| !needs_all && self.may_keep(key));
         let extent = match &kept_key {
             _ if needs_all => Extent::Whole,
             Some(_) => Extent::Changed,
             None => Extent::Lit,
         };
-        let meshes = (&mut self.chunks, bodies);
+        let known = kept_key.as_ref().and_then(|key| self.kept.known(key));
+        let in_sight = match known {
+            Some(kept) => kept.in_sight.clone(),
+            None => self.chunks.in_sight(gpu, &self.scene, &framed),
+        };
+        let meshes = (&in_sight, bodies);
         let prepared = PreparedView::new(gpu, &framed, job, &self.scene, meshes, extent);
         let target = (self.targets).get(size_px, |size_px| ViewTarget::new(&gpu.device, *size_px));
         let surfaces = Surfaces {
@@ -239,38 +264,30 @@ impl GpuRenderer {
             target,
             kept: None,
         };
-        if let Some(key) = &kept_key {
-            self.kept.forget(|other| other.is_outdated_by(key));
+        if let Some(key) = kept_key.as_ref().filter(|_| known.is_none()) {
+            self.kept.forget(|other| other.is_of_same_camera(key));
         }
-        let draw_kept = |_: &KeptKey| recorder.draw_kept(size_px, &surfaces);
+        let draw_kept = |_: &KeptKey| recorder.draw_kept(size_px, &in_sight, &surfaces);
         let kept = kept_key.map(|key| self.kept.try_get(key, draw_kept));
         let kept = kept.transpose()?;
         recorder.kept = kept;
-        recorder.draw_background(headlights, &surfaces);
-        recorder.draw_shadows();
-        recorder.draw_gloss(headlights, &surfaces);
-        if blurred {
-            recorder.blur();
-        }
-        recorder.draw_lamps();
-        recorder.draw_glare();
+        recorder.draw_signal(headlights, &surfaces, blurred);
         Ok(match developer {
             Some(developer) => {
-                let map = self.maps_in_memory.get(MapKey::new(view), make_map);
-                let to = (&mut *encoder, &mut self.free);
+                let map = self.maps.get(MapKey::new(view), make_map);
+                let to = (&mut *encoder, &mut self.free_signals);
                 let signal = SignalBack::of(gpu, to, target, prepared, kept, (map, developer));
                 Back::Signal(Box::new(signal))
             }
             None => {
-                let map = (self.maps).get(MapKey::new(view), |key| {
+                let map = (self.map_textures).get(MapKey::new(view), |key| {
                     target::map_texture(gpu, &key.make_map(), size_px)
                 });
                 recorder.draw_sensor(map, view.sensor.blooming > 0.0);
-                let spare = self.spare.iter().position(|back| back.size_px == size_px);
-                let back = spare.map_or_else(
-                    || ReadBack::new(&gpu.device, size_px),
-                    |at| self.spare.swap_remove(at),
-                );
+                let free = &mut self.free_images;
+                let known = free.iter().position(|back| back.size_px == size_px);
+                let back = known.map(|at| free.swap_remove(at));
+                let back = back.unwrap_or_else(|| ReadBack::new(&gpu.device, size_px));
                 target.copy_back(target.finishing(&gpu.device), &back, encoder);
                 Back::Image(back)
             }
@@ -299,10 +316,11 @@ impl Renderer for GpuRenderer {
         }
         self.chunks = Chunks::default();
         self.kept.clear();
+        self.map_textures.clear();
         self.maps.clear();
-        self.maps_in_memory.clear();
         self.targets.clear();
-        self.spare.clear();
+        self.free_images.clear();
+        self.free_signals.clear();
         self.in_flight.clear();
     }
 
@@ -344,21 +362,21 @@ impl Renderer for GpuRenderer {
 }
 
 impl GpuRenderer {
-    /// The images of the oldest job; `keep` makes of a digital number and the bits that eight leave over
-    /// what is kept.
+    /// The images of the oldest job; `convert` makes a pixel of a digital number and the number of its bits
+    /// beyond eight.
     fn collected<T: Primitive + Send>(
         &mut self,
-        keep: impl Fn(u32, u32) -> T + Copy + Sync,
+        convert: impl Fn(u32, u32) -> T + Copy + Sync,
     ) -> Result<Vec<Image<T>>, RenderError> {
         let job = (self.in_flight.pop_front()).ok_or(RenderError::NothingSubmitted)?;
         self.gpu.wait_for(job.submission)?;
         let mut images = Vec::with_capacity(job.views.len());
         for (view, spare_bits) in job.views.into_iter().zip(job.spare_bits) {
-            let keep = move |dn: u32| keep(dn, spare_bits);
-            images.push(view.image(keep));
+            let convert = move |dn: u32| convert(dn, spare_bits);
+            images.push(view.image(convert));
             match view {
-                Back::Image(back) => self.spare.push(back),
-                Back::Signal(back) => self.free.push(back.buffer),
+                Back::Image(back) => self.free_images.push(back),
+                Back::Signal(back) => self.free_signals.push(back.buffer),
             }
         }
         images.into_iter().collect()

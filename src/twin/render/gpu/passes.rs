@@ -1,5 +1,6 @@
-//! The passes over the finished background: shadows, focus, lamps, glare and sensor.
+//! The passes in their order, and those over the finished background: shadows, focus, lamps, glare, sensor.
 
+use super::background::Surfaces;
 use super::layout::{MAX_BLOCKERS, MAX_SLABS, MAX_SOURCES, MAX_WORDS};
 use super::pipeline::Kind;
 use super::recorder::{BLACK, KEEP, Recorder};
@@ -7,8 +8,20 @@ use super::texture::Texture;
 use wgpu::Buffer;
 
 impl Recorder<'_> {
+    /// All that comes before the sensor, under so many headlights.
+    pub fn draw_signal(&mut self, headlights: usize, surfaces: &Surfaces<'_>, blurred: bool) {
+        self.draw_background(headlights, surfaces);
+        self.draw_shadows();
+        self.draw_gloss(headlights, surfaces);
+        if blurred {
+            self.blur();
+        }
+        self.draw_lamps();
+        self.draw_glare();
+    }
+
     /// Fades the background where bodies hide its light.
-    pub fn draw_shadows(&mut self) {
+    fn draw_shadows(&mut self) {
         let (gpu, target, shadows) = (self.gpu, self.target, &self.view.shadows);
         if shadows.tiles.is_empty() {
             return;
@@ -35,7 +48,7 @@ impl Recorder<'_> {
     }
 
     /// Blurs what is out of focus, along rows and then along columns.
-    pub fn blur(&mut self) {
+    fn blur(&mut self) {
         let (sharp, blurred) = (&self.target.layers, &self.target.instant);
         let ways = [(&sharp.signal, blurred), (blurred, &sharp.signal)];
         for (down, (from, to)) in [false, true].into_iter().zip(ways) {
@@ -45,7 +58,7 @@ impl Recorder<'_> {
     }
 
     /// Discs over the background.
-    pub fn draw_lamps(&mut self) {
+    fn draw_lamps(&mut self) {
         let (gpu, target, table) = (self.gpu, self.target, &self.view.lamps);
         if table.lamps.is_empty() {
             return;
@@ -62,7 +75,7 @@ impl Recorder<'_> {
     }
 
     /// Glare, in its own texture.
-    pub fn draw_glare(&mut self) {
+    fn draw_glare(&mut self) {
         let (gpu, table) = (self.gpu, &self.view.lamps);
         let tables = [gpu.storage(&table.glares), gpu.storage(&table.glare_rows)];
         let resources = tables.each_ref().map(Buffer::as_entire_binding);

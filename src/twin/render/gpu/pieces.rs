@@ -78,8 +78,8 @@ impl<'t> Pieces<'t> {
         self.size
     }
 
-    /// Copies all of them, into the smallest of the buffers that are free and large enough; if there is none,
-    /// one goes for a larger.
+    /// Copies all of them, into the smallest of the free buffers that are large enough. If none is, one of
+    /// them is dropped and a larger one made.
     pub fn copy(
         self,
         device: &wgpu::Device,

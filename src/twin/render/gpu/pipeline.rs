@@ -29,7 +29,7 @@ pub enum Kind {
         banded: bool,
         smeared: bool,
     },
-    /// The same with sharp paint, where the depth is that of the surface already.
+    /// A kept tunnel once more, under headlights: only where its depth is the kept one.
     Relit { headlights: usize, banded: bool },
     /// Steady and blinking light of the tunnel apart, without headlights.
     Split,

@@ -3,15 +3,16 @@
 use super::adapter::Gpu;
 use super::areas::PartSearch;
 use super::bodies::BodyMeshes;
-use super::chunks::{AHEAD_M, Chunks};
+use super::chunks::InSight;
 use super::draw_list::DrawList;
 use super::lamps::LampTable;
-use super::layout::{BRIGHTEST_E, ViewConstants};
+use super::layout::ViewConstants;
 use super::rectangle::Rectangle;
 use super::shadows::ViewShadows;
 use super::target::COARSE_PX;
 use super::texture::Texture;
 use super::view::Framed;
+use crate::twin::render::constants::{BRIGHTEST_E, SIGHT_M};
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use std::f64::consts::SQRT_2;
@@ -45,9 +46,9 @@ pub struct PreparedView {
     /// Shadows of bodies.
     pub shadows: ViewShadows,
     /// What is drawn in full.
+    pub parts: Vec<Rectangle>,
+    /// The same with what is seen in it; over a tunnel that is kept, only where headlights light it.
     pub areas: Vec<Area>,
-    /// Where headlights light a tunnel that is kept; the draw calls are the tunnel's alone.
-    pub headlit: Vec<Area>,
     /// Signal where nothing is drawn: of the air before what is too far away.
     pub beyond_e: f64,
 }
@@ -75,23 +76,25 @@ impl PreparedView {
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (chunks, bodies): (&mut Chunks, &BodyMeshes),
+        (in_sight, bodies): (&InSight, &BodyMeshes),
         extent: Extent,
     ) -> Self {
-        let (s_m, chunks) = chunks.in_sight(gpu, scene, framed);
-        let list = DrawList::new(framed, job, scene, (&chunks, bodies));
-        let airlight_cd_m2 = scene.airlight_cd_m2(s_m);
+        let chunks = &in_sight.chunks;
+        let list = DrawList::new(framed, job, scene, (chunks, bodies));
+        let airlight_cd_m2 = scene.airlight_cd_m2(in_sight.s_m);
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
+        // In the picture, half the area of what lies beyond [`SIGHT_M`] is nearer than this.
+        let beyond_m = SQRT_2 * SIGHT_M;
+        let beyond_e = ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E);
         let constants = ViewConstants {
             extinction_per_m: scene.air.extinction_per_m as f32,
             airlight_e: air_e as f32,
             mirrored: list.mirrored.len() as u32,
+            beyond_e: beyond_e as f32,
             ..framed.constants(job)
         };
-        // In the picture, half the area of what lies beyond [`AHEAD_M`] is nearer than this.
-        let beyond_m = SQRT_2 * AHEAD_M;
         let lamps = LampTable::new(framed, scene, airlight_cd_m2);
-        let shadows = ViewShadows::new(framed, job, scene, &chunks);
+        let shadows = ViewShadows::new(framed, job, scene, chunks);
         let search = PartSearch {
             framed,
             job,
@@ -106,11 +109,10 @@ impl PreparedView {
             Extent::Changed => search.changed(),
         };
         let small = extent == Extent::Lit && parts.drawn != [framed.whole()];
-        let areas = |parts: Vec<Rectangle>, first_calls: usize| {
-            let area = |part| {
-                let mut calls = list.seen_in(framed, &part);
-                calls.retain(|call| *call < first_calls);
-                Area { part, calls }
+        let areas = |parts: Vec<Rectangle>| {
+            let area = |part| Area {
+                calls: list.seen_in(framed, &part),
+                part,
             };
             parts.into_iter().map(area).collect()
         };
@@ -123,14 +125,14 @@ impl PreparedView {
             coarse: small.then(|| coarse_level(gpu, constants, rows, &list)),
             poses: gpu.storage(&framed.poses()),
             placements: gpu.upload(wgpu::BufferUsages::VERTEX, &list.placements, 1),
-            areas: areas(parts.drawn, list.calls.len()),
-            headlit: match extent {
-                Extent::Changed => areas(parts.headlit, list.tunnel().count()),
-                _ => Vec::new(),
+            parts: parts.drawn.clone(),
+            areas: match extent {
+                Extent::Changed => areas(parts.headlit),
+                _ => areas(parts.drawn),
             },
             lamps,
             shadows,
-            beyond_e: ((1.0 - scene.air.transmission(beyond_m)) * air_e).min(BRIGHTEST_E),
+            beyond_e,
             list,
         }
     }

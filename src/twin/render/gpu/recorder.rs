@@ -56,7 +56,7 @@ impl<'a> Recorder<'a> {
             })
     }
 
-    /// How far away what the picture shows is.
+    /// Depth of the picture: the kept one where no bodies were drawn over it.
     pub fn depth(&self) -> &'a Texture {
         match self.kept {
             Some(kept) if self.view.list.bodies().is_empty() => &kept.depth,

@@ -2,7 +2,7 @@
 
 use super::layout;
 use crate::twin::lights::HEADLIGHT_RADIUS_M;
-use crate::twin::render::constants::GLARE_STEP_PX;
+use crate::twin::render::constants::{BRIGHTEST_E, GLARE_STEP_PX};
 use crate::twin::render::disc::DISC_PLACES;
 use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::photometry::OFFSET_M;
@@ -48,7 +48,7 @@ pub fn shader_source(name: &str) -> Option<String> {
 /// Declarations of the constants that the shaders share with the rest of the program.
 fn constants() -> String {
     let reals = [
-        ("BRIGHTEST_E", layout::BRIGHTEST_E),
+        ("BRIGHTEST_E", BRIGHTEST_E),
         ("NEAR_M", layout::NEAR_M),
         ("GLARE_STEP_PX", GLARE_STEP_PX),
         ("MIRROR_REACH_M", MIRROR_REACH_M),

@@ -60,8 +60,8 @@ impl SignalBack {
             }
             (None, None) => Under::Nothing,
         };
-        let parts = view.areas.iter().map(|area| area.part);
-        let parts = parts.map(|part| pieces.add(&target.layers.signal, part, 1));
+        let parts = view.parts.iter();
+        let parts = parts.map(|part| pieces.add(&target.layers.signal, *part, 1));
         Self {
             size_px: target.size_px,
             parts: parts.collect(),
@@ -79,10 +79,10 @@ impl SignalBack {
         self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
-    /// The finished image, of which `keep` says what is kept of each digital number. Gives the buffer free.
+    /// The finished image, each digital number converted to a pixel. Frees the buffer.
     pub fn image<T: Primitive + Send>(
         &self,
-        keep: impl Fn(u32) -> T + Copy + Sync,
+        convert: impl Fn(u32) -> T + Copy + Sync,
     ) -> Result<Image<T>, RenderError> {
         let (width, height) = self.size_px;
         let mut image = vec![T::DEFAULT_MIN_VALUE; width as usize * height as usize];
@@ -101,7 +101,7 @@ impl SignalBack {
                         v,
                         buffers,
                         out,
-                        keep,
+                        convert,
                     });
                 },
             );
@@ -136,7 +136,7 @@ struct ComposedRow<'a, T, F> {
     v: usize,
     buffers: &'a mut RowBuffers,
     out: &'a mut [T],
-    keep: F,
+    convert: F,
 }
 
 impl<T, F: Fn(u32) -> T> WithSimd for ComposedRow<'_, T, F> {
@@ -164,7 +164,8 @@ impl<T, F: Fn(u32) -> T> WithSimd for ComposedRow<'_, T, F> {
         add_glare(back.glare.row(self.bytes, v as u32), signals_e);
         let words = back.map.row(v);
         let signals_e = &signals_e[..self.out.len()];
-        back.developer.row(v, signals_e, words, self.out, self.keep);
+        back.developer
+            .row(v, signals_e, words, self.out, self.convert);
     }
 }
 

@@ -165,9 +165,8 @@ impl ReadBack {
         self.buffer.map_async(wgpu::MapMode::Read, .., |_| {});
     }
 
-    /// The image, of which `keep` says what is kept of each digital number, once the adapter is done; gives
-    /// the buffer free.
-    pub fn image<T: Primitive>(&self, keep: impl Fn(u32) -> T) -> Result<Image<T>, RenderError> {
+    /// The image, each digital number converted to a pixel, once the adapter is done. Frees the buffer.
+    pub fn image<T: Primitive>(&self, convert: impl Fn(u32) -> T) -> Result<Image<T>, RenderError> {
         let (width, height) = self.size_px;
         let mut pixels = Vec::with_capacity(width as usize * height as usize);
         {
@@ -178,7 +177,7 @@ impl ReadBack {
                 let numbers = words
                     .iter()
                     .map(|word| u32::from(u16::from_le_bytes(*word)));
-                pixels.extend(numbers.map(&keep));
+                pixels.extend(numbers.map(&convert));
             }
         }
         self.buffer.unmap();

@@ -4,8 +4,7 @@ use super::detail::{CHUNK_M, ChunkKey, Cutting, Detail, finer_stations, stations
 use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
-use super::patch::Patch;
-use super::tiles::SurfaceCell;
+use super::surface::{Patch, SurfaceCell};
 use crate::track::{OutlinePoint, TrackPoint, Tunnel};
 use crate::twin::geometry::STATION_STEP_M;
 use crate::twin::reflectance::mean_albedo;

@@ -62,6 +62,12 @@ impl<'a> Framed<'a> {
         }
     }
 
+    /// Whether the camera is in one place for all rows.
+    pub fn rests(&self) -> bool {
+        let poses = &self.view.motion.poses;
+        poses.windows(2).all(|pair| pair[0] == pair[1])
+    }
+
     /// Width and height of the picture.
     pub fn size_px(&self) -> [u32; 2] {
         let lens = &self.view.camera.intrinsics;

@@ -18,7 +18,8 @@ use super::chunks::Chunk;
 use super::detail::CHUNK_M;
 use super::layout::{Blocker, MAX_SLABS, MAX_WORDS, ShadowSource, Slab, Tile};
 use super::region::Region;
-use super::tiles::{Marks, SurfaceCell, TILE_PX, TileBounds};
+use super::surface::SurfaceCell;
+use super::tiles::{Marks, TILE_PX, TileBounds};
 use super::view::Framed;
 use crate::track::Tunnel;
 use crate::twin::geometry::Shape;
@@ -89,8 +90,8 @@ impl Marker<'_> {
             }
         } else {
             let bounds = TileBounds::of_cell(framed, &candidates.eyes, cell);
-            self.marks
-                .add(&bounds, &candidates.collect(&casts, &region));
+            let part = bounds.rectangle(framed.size_px());
+            (self.marks).add_part(&part, &candidates.collect(&casts, &region));
         }
     }
 
@@ -113,8 +114,10 @@ impl Marker<'_> {
                 }
             } else {
                 let bounds = TileBounds::of_body(framed, &candidates.eyes, body);
+                let part = bounds.rectangle(framed.size_px());
                 for ball in balls {
-                    self.marks.add(&bounds, &candidates.collect(&casts, ball));
+                    self.marks
+                        .add_part(&part, &candidates.collect(&casts, ball));
                 }
             }
         }

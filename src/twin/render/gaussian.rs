@@ -1,11 +1,11 @@
-//! Normal numbers for many texels at a time: those of `normals` in `shaders/sensor.wgsl`.
+//! Normal numbers for many texels at a time: those of `gaussian` in `shaders/sensor.wgsl`.
 
 use crate::twin::random::pcg4d;
 use std::f32::consts::TAU;
 
 /// Texels that are worked at together. A whole loop over so many becomes vector code; over fewer it would
 /// be unrolled first.
-pub const TEXELS: usize = 64;
+pub const BLOCK_TEXELS: usize = 64;
 /// 2^-24.
 const UNIT: f32 = 1.0 / 16_777_216.0;
 /// Bits of 2^-0.5.
@@ -18,16 +18,16 @@ const QUARTER_BITS: u32 = 22;
 
 /// Four standard normal numbers for each texel from `counter` on, by Box and Muller's transform.
 #[inline(always)]
-pub fn normals(key: [u32; 3], counter: u32, out: &mut [f32; 4 * TEXELS]) {
+pub fn gaussian(key: [u32; 3], counter: u32, out: &mut [f32; 4 * BLOCK_TEXELS]) {
     let [a, b, c, d] = words(key, counter);
-    let (mut first, mut second) = ([0.0; TEXELS], [0.0; TEXELS]);
+    let (mut first, mut second) = ([0.0; BLOCK_TEXELS], [0.0; BLOCK_TEXELS]);
     for (radius, word) in first.iter_mut().zip(&a) {
         *radius = radius_of(*word);
     }
     for (radius, word) in second.iter_mut().zip(&c) {
         *radius = radius_of(*word);
     }
-    for k in 0..TEXELS {
+    for k in 0..BLOCK_TEXELS {
         let ([sin_b, cos_b], [sin_d, cos_d]) = (sin_cos(b[k]), sin_cos(d[k]));
         out[4 * k] = first[k] * cos_b;
         out[4 * k + 1] = second[k] * cos_d;
@@ -45,10 +45,10 @@ pub fn pair(a: u32, b: u32) -> [f32; 2] {
 
 /// The words of each counter.
 #[inline(always)]
-fn words([x, y, z]: [u32; 3], counter: u32) -> [[u32; TEXELS]; 4] {
-    let mut all = [[0; TEXELS]; 4];
+fn words([x, y, z]: [u32; 3], counter: u32) -> [[u32; BLOCK_TEXELS]; 4] {
+    let mut all = [[0; BLOCK_TEXELS]; 4];
     let [to_a, to_b, to_c, to_d] = &mut all;
-    for k in 0..TEXELS {
+    for k in 0..BLOCK_TEXELS {
         let [a, b, c, d] = pcg4d([x, y, z, counter.wrapping_add(k as u32)]);
         (to_a[k], to_b[k], to_c[k], to_d[k]) = (a, b, c, d);
     }
@@ -120,11 +120,11 @@ mod tests {
     #[test]
     fn numbers_are_those_of_double_precision() {
         let unit = |word: u32| (f64::from(word >> 8) + 0.5) / 16_777_216.0;
-        let mut found = [0.0; 4 * TEXELS];
+        let mut found = [0.0; 4 * BLOCK_TEXELS];
         let mut worst = 0.0f64;
         for block in 0..2000u32 {
             let (key, counter) = ([block, 77, block * 3], block.wrapping_mul(0x9e37_79b9));
-            normals(key, counter, &mut found);
+            gaussian(key, counter, &mut found);
             for (k, found) in (0..).zip(found.chunks_exact(4)) {
                 let word = pcg4d([key[0], key[1], key[2], counter.wrapping_add(k)]);
                 let radius = |w: u32| (-2.0 * unit(w).ln()).sqrt();

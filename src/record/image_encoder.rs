@@ -1,4 +1,4 @@
-//! Image files for a recording, made by a thread of its own while the run goes on.
+//! Images of a recording as JPEG and PNG, encoded by a thread of its own while the run goes on.
 //!
 //! They come back in the order in which they went in, each after a fixed number of others has gone in, so
 //! what a recording holds does not depend on how fast the thread is.
@@ -6,7 +6,7 @@
 use super::whole_files::{Result, failed};
 use crate::bus::SimTime;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
-use image::{ExtendedColorType, GrayImage, ImageEncoder};
+use image::{ExtendedColorType, GrayImage, ImageEncoder as _};
 use jpeg_encoder::{ColorType, Encoder};
 use re_sdk_types::archetypes::EncodedImage;
 use re_sdk_types::components::MediaType;
@@ -41,8 +41,8 @@ type Encoded = std::result::Result<EncodedImage, Box<dyn Error + Send + Sync>>;
 
 /// The thread, and what it has been given.
 #[derive(Default)]
-pub(super) struct ImageFiles {
-    encoder: Option<EncoderThread>,
+pub(super) struct ImageEncoder {
+    thread: Option<EncoderThread>,
     waiting: VecDeque<Row>,
     /// Images to copy the next ones into.
     free: Vec<GrayImage>,
@@ -50,38 +50,38 @@ pub(super) struct ImageFiles {
 
 struct EncoderThread {
     /// It ends when this is dropped.
-    to: Sender<(GrayImage, Format)>,
-    from: Receiver<(GrayImage, Encoded)>,
+    images: Sender<(GrayImage, Format)>,
+    encoded: Receiver<(GrayImage, Encoded)>,
 }
 
-impl ImageFiles {
-    /// Takes an image; gives the oldest one's file once too many wait.
+impl ImageEncoder {
+    /// Takes an image; gives the oldest one, encoded, once too many wait.
     pub(super) fn add(
         &mut self,
         row: Row,
         image: &GrayImage,
         format: Format,
     ) -> Result<Option<(Row, EncodedImage)>> {
-        if self.encoder.is_none() {
-            self.encoder = Some(EncoderThread::start().map_err(failed(&row.path))?);
+        if self.thread.is_none() {
+            self.thread = Some(EncoderThread::start().map_err(failed(&row.path))?);
         }
         let mut copy = self.free.pop().unwrap_or_default();
         copy.clone_from(image);
         // A thread that has ended is found out when its work is asked for.
-        if let Some(encoder) = &self.encoder {
-            encoder.to.send((copy, format)).ok();
+        if let Some(thread) = &self.thread {
+            thread.images.send((copy, format)).ok();
         }
         self.waiting.push_back(row);
         let too_many = self.waiting.len() > MOST_WAITING;
         if too_many { self.next() } else { Ok(None) }
     }
 
-    /// The oldest image's file, if any waits.
+    /// The oldest image, encoded, if any waits.
     pub(super) fn next(&mut self) -> Result<Option<(Row, EncodedImage)>> {
-        let Some((encoder, row)) = self.encoder.as_ref().zip(self.waiting.pop_front()) else {
+        let Some((thread, row)) = self.thread.as_ref().zip(self.waiting.pop_front()) else {
             return Ok(None);
         };
-        let (image, encoded) = encoder.from.recv().map_err(failed(&row.path))?;
+        let (image, encoded) = thread.encoded.recv().map_err(failed(&row.path))?;
         self.free.push(image);
         let encoded = encoded.map_err(failed(&row.path))?;
         Ok(Some((row, encoded)))
@@ -90,28 +90,33 @@ impl ImageFiles {
 
 impl EncoderThread {
     fn start() -> io::Result<Self> {
-        let (to, images) = channel::<(GrayImage, Format)>();
-        let (files, from) = channel();
+        let (images, given) = channel::<(GrayImage, Format)>();
+        let (done, encoded) = channel();
         let work = move || {
-            for (mut image, format) in images {
-                let encoded = encode(&mut image, format);
-                if files.send((image, encoded)).is_err() {
+            for (mut image, format) in given {
+                let file = encode(&mut image, format);
+                if done.send((image, file)).is_err() {
                     return;
                 }
             }
         };
         thread::Builder::new().name("images".into()).spawn(work)?;
-        Ok(Self { to, from })
+        Ok(Self { images, encoded })
     }
 }
 
 fn encode(image: &mut GrayImage, format: Format) -> Encoded {
-    // 65535 pixels a side is the limit of JPEG itself.
-    let sides = (image.width().try_into(), image.height().try_into());
-    let (Format::Jpeg { quality, gain }, (Ok(width), Ok(height))) = (format, sides) else {
-        return png(image);
-    };
-    brighten(image, gain);
+    match format {
+        Format::Jpeg { quality, gain } => {
+            brighten(image, gain);
+            jpeg(image, quality)
+        }
+        Format::Png => png(image),
+    }
+}
+
+fn jpeg(image: &GrayImage, quality: u8) -> Encoded {
+    let (width, height) = (image.width().try_into()?, image.height().try_into()?);
     let mut bytes = Vec::with_capacity(image.len() / 4);
     Encoder::new(&mut bytes, quality).encode(image.as_raw(), width, height, ColorType::Luma)?;
     Ok(EncodedImage::new(bytes).with_media_type(MediaType::jpeg()))
@@ -147,7 +152,7 @@ mod tests {
     /// Files in another order, lost ones, a gain or a format that is another image's.
     #[test]
     fn files_come_back_in_order_and_hold_their_image() {
-        let mut files = ImageFiles::default();
+        let mut files = ImageEncoder::default();
         let mut found = Vec::new();
         for number in 0..20 {
             // The first takes longest.
