@@ -17,6 +17,7 @@
 
 mod piece;
 mod profile;
+mod stretch;
 #[cfg(test)]
 mod tests;
 

@@ -51,6 +51,8 @@ mod check;
 mod file;
 mod furniture;
 mod gauge;
+pub mod geodesy;
+
 mod place;
 mod reversal;
 mod route;

@@ -86,6 +86,29 @@ impl PlanPiece {
         )
     }
 
+    /// The same with more chainage.
+    pub fn shifted(&self, more_m: f64) -> Self {
+        Self {
+            s0: self.s0 + more_m,
+            ..*self
+        }
+    }
+
+    /// What is left of the piece from `from_m` on, where chainage is 0 then.
+    pub fn from(&self, from_m: f64) -> Self {
+        let ds = from_m - self.s0;
+        if ds <= 0.0 {
+            return Self { s0: -ds, ..*self };
+        }
+        let rest = |change: LinearChange| LinearChange {
+            start: change.at(ds),
+            rate: change.rate,
+        };
+        let mut rest = self.next(ds, rest(self.curvature), rest(self.cant));
+        rest.s0 = 0.0;
+        rest
+    }
+
     /// The piece that begins `ds` further.
     pub fn next(&self, ds: f64, curvature: LinearChange, cant: LinearChange) -> Self {
         let (s0, heading0) = (self.s0 + ds, self.heading(ds));

@@ -32,6 +32,25 @@ impl Parabola {
         )
     }
 
+    /// The same with more chainage.
+    pub fn shifted(&self, more_m: f64) -> Self {
+        Self {
+            s0: self.s0 + more_m,
+            ..*self
+        }
+    }
+
+    /// The same, known by its height and slope at another chainage.
+    pub fn begun_at(&self, s_m: f64) -> Self {
+        let (z0, slope0) = self.at(s_m);
+        Self {
+            s0: s_m,
+            z0,
+            slope0,
+            ..*self
+        }
+    }
+
     /// The stretch from here to `end_m` of a line of `length_m`, as met from its other end.
     pub fn reversed(&self, end_m: f64, length_m: f64) -> Self {
         let (z0, slope) = self.at(end_m);

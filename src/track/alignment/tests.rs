@@ -22,7 +22,7 @@ fn grade(from_m: f64, slope: f64, radius_m: f64) -> Grade {
 }
 
 /// Both ways round, compound, with a tight radius, on a grade.
-fn winding() -> Alignment {
+pub(super) fn winding() -> Alignment {
     let elements = [
         PlanElement::straight(120.0),
         clothoid(60.0, 0.0, 1.0 / 350.0),
