@@ -52,7 +52,7 @@ mod file;
 mod furniture;
 mod gauge;
 pub mod geodesy;
-
+pub mod network;
 mod place;
 mod reversal;
 mod route;

@@ -71,7 +71,6 @@ impl Alignment {
 #[cfg(test)]
 mod tests {
     use super::super::tests::winding;
-    use super::*;
 
     /// Provokes: a stretch that is elsewhere, leans or climbs otherwise than the line it is of, cut at a joint
     /// of elements, within one, or at the line's ends; an end that does not run on straight.

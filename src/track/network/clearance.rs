@@ -1,0 +1,74 @@
+//! Where trains on two tracks are in each other's way.
+
+use super::{Leg, TrackEnd};
+use super::{Network, Route, Switch, SwitchLeg};
+use crate::track::Direction;
+
+/// Steps of the search for a clearance point.
+const STEP_M: f64 = 0.25;
+/// No clearance point is looked for farther from the toe.
+const FARTHEST_M: f64 = 200.0;
+
+impl Network {
+    /// How far behind its toe the legs of a switch are so far apart, in plan: a train that stands farther in on
+    /// one leg clears trains on the other, if the distance is that of two trains that pass. None where they
+    /// never are.
+    pub fn clearance_m(&self, switch: &Switch, apart_m: f64) -> Option<f64> {
+        let other = self.track(switch.through.track)?;
+        let steps = (1..).map(|k| f64::from(k) * STEP_M);
+        let mut near_s_m = self.chainage_behind(switch.through, 0.0)?;
+        for behind_m in steps.take_while(|m| *m <= FARTHEST_M) {
+            let place = self.chainage_behind(switch.diverging, behind_m)?;
+            let track = self.track(switch.diverging.track)?;
+            let across = other.track_from_world(&track.at(place).origin, near_s_m);
+            near_s_m = across.s_m;
+            if across.l_m.abs() >= apart_m {
+                return Some(behind_m);
+            }
+        }
+        None
+    }
+
+    /// Chainage so far behind an end, into its track; none where the track is shorter.
+    fn chainage_behind(&self, end: TrackEnd, behind_m: f64) -> Option<f64> {
+        let length_m = self.track(end.track)?.length_m();
+        let s_m = match end.way {
+            Direction::Up => length_m - behind_m,
+            Direction::Down => behind_m,
+        };
+        (0.0..=length_m).contains(&s_m).then_some(s_m)
+    }
+
+    /// Switches at which two routes are in each other's way: both run over one of its tracks nearer to the toe
+    /// than where trains on its legs clear each other. A switch whose legs never clear each other counts all
+    /// along.
+    pub fn conflicts(&self, a: &Route, b: &Route, apart_m: f64) -> Vec<usize> {
+        let fouls = |route: &Route, switch: &Switch, within_m: f64| {
+            route
+                .legs()
+                .iter()
+                .any(|leg| self.is_near(leg, switch, within_m))
+        };
+        let switches = self.switches.iter().enumerate();
+        let conflict = switches.filter(|(_, switch)| {
+            let within_m = self.clearance_m(switch, apart_m).unwrap_or(f64::INFINITY);
+            fouls(a, switch, within_m) && fouls(b, switch, within_m)
+        });
+        conflict.map(|(number, _)| number).collect()
+    }
+
+    /// Whether a leg of a route comes nearer to a switch's toe than so far, on one of the switch's legs.
+    fn is_near(&self, leg: &Leg, switch: &Switch, within_m: f64) -> bool {
+        let ends = [SwitchLeg::Through, SwitchLeg::Diverging].map(|side| switch.leg(side));
+        ends.into_iter()
+            .filter(|end| end.track == leg.track)
+            .any(|end| {
+                let (low_m, high_m) = leg.stretch_m();
+                let length_m = self.track(end.track).map_or(0.0, |track| track.length_m());
+                match end.way {
+                    Direction::Up => length_m - high_m < within_m,
+                    Direction::Down => low_m < within_m,
+                }
+            })
+    }
+}

@@ -1,0 +1,327 @@
+//! Tracks joined at their ends: lines that go on, switches, buffers, open ends.
+//!
+//! A track has no branches: it ends where a switch begins. A switch joins three ends of tracks in one place,
+//! its toe, where all three have one pose: the track before the toe, and the two legs, of which the through one
+//! goes straight on and the diverging one curves away. So every place of a network is a chainage of one track,
+//! and a way over it is a list of tracks ([`Route`]), which yields one [`Alignment`] to run on.
+//!
+//! ```
+//! use metrotwin::track::network::{Ends, Network, Switch, TrackEnd};
+//! use metrotwin::track::{Alignment, Direction, Place, PlanElement, Side, TrackId};
+//! use nalgebra::Point3;
+//!
+//! // 100 m, then a switch to the left.
+//! let line = |x: f64, element| Alignment::new(Point3::new(x, 0.0, 0.0), 0.0, &[element], &[]);
+//! let tracks = vec![
+//!     line(0.0, PlanElement::straight(100.0)),
+//!     line(100.0, PlanElement::straight(300.0)),
+//!     line(100.0, PlanElement::arc(60.0, 1.0 / 190.0, 0.0)),
+//! ];
+//! let [low, high] = [Direction::Down, Direction::Up].map(|way| move |k| TrackEnd { track: TrackId(k), way });
+//! let switch = Switch {
+//!     name: "W1".into(),
+//!     toe: high(0),
+//!     through: low(1),
+//!     diverging: low(2),
+//! };
+//! let network = Network::new(tracks, vec![switch], vec![
+//!     Ends::Open(low(0)),
+//!     Ends::Buffer(high(1)),
+//!     Ends::Open(high(2)),
+//! ])?;
+//! let place = |track, s_m| Place { track: TrackId(track), s_m };
+//! let route = network.shortest((place(0, 20.0), Direction::Up), place(2, 50.0)).unwrap();
+//! assert!((route.length_m() - 130.0).abs() < 1e-9);
+//! assert_eq!(network.hand(&network.switches[0]), Side::Left);
+//! # Ok::<(), metrotwin::track::network::NetworkError>(())
+//! ```
+//!
+//! Not here: the blades of a switch and how they move (they are the world's), what stands along the tracks.
+
+mod clearance;
+mod error;
+mod route;
+mod search;
+#[cfg(test)]
+mod tests;
+
+pub use error::NetworkError;
+pub use route::{Leg, Route};
+
+use super::{Alignment, Direction, Place, Side, TrackFrame, TrackId, TrackPoint};
+use nalgebra::Point3;
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+/// Ends that meet may be this far apart: less than any survey finds.
+const MOST_GAP_M: f64 = 1e-3;
+/// And have headings and slopes that differ by this much.
+const MOST_KINK_RAD: f64 = 1e-4;
+/// A place is looked for from stations this far apart.
+const STATION_M: f64 = 20.0;
+
+/// An end of a track: the one that is reached by running this way along it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TrackEnd {
+    /// The track.
+    pub track: TrackId,
+    /// Up to its last chainage, or down to 0.
+    pub way: Direction,
+}
+
+/// A switch, with the ends of tracks that meet at its toe.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Switch {
+    /// As on the map.
+    pub name: String,
+    /// End of the track from which it is run facing.
+    pub toe: TrackEnd,
+    /// End of the leg that goes straight on.
+    pub through: TrackEnd,
+    /// End of the leg that curves away.
+    pub diverging: TrackEnd,
+}
+
+/// A leg of a switch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum SwitchLeg {
+    /// Straight on.
+    Through,
+    /// Away to a side.
+    Diverging,
+}
+
+/// Ends of tracks that no switch joins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ends {
+    /// The line goes on.
+    Joined(TrackEnd, TrackEnd),
+    /// A buffer stop.
+    Buffer(TrackEnd),
+    /// Beyond what is modelled.
+    Open(TrackEnd),
+}
+
+/// What is at an end of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Beyond {
+    /// Another track, entered at this end.
+    Track(TrackEnd),
+    /// A switch, by its number, run facing.
+    Facing(usize),
+    /// A switch run trailing, from this leg.
+    Trailing(usize, SwitchLeg),
+    /// A buffer stop.
+    Buffer,
+    /// Nothing that is modelled.
+    Open,
+}
+
+/// Tracks and switches.
+#[derive(Clone, Debug)]
+pub struct Network {
+    /// The centrelines, by number.
+    pub tracks: Vec<Alignment>,
+    /// The switches.
+    pub switches: Vec<Switch>,
+    beyond: BTreeMap<TrackEnd, Beyond>,
+}
+
+impl Switch {
+    /// The end of a leg.
+    pub fn leg(&self, leg: SwitchLeg) -> TrackEnd {
+        match leg {
+            SwitchLeg::Through => self.through,
+            SwitchLeg::Diverging => self.diverging,
+        }
+    }
+}
+
+impl Network {
+    /// Joins tracks. Every end of every track must be named once; what meets must be in one place and go on
+    /// without a kink.
+    pub fn new(
+        tracks: Vec<Alignment>,
+        switches: Vec<Switch>,
+        ends: Vec<Ends>,
+    ) -> Result<Self, NetworkError> {
+        let mut network = Self {
+            tracks,
+            switches: Vec::new(),
+            beyond: BTreeMap::new(),
+        };
+        for (number, switch) in switches.iter().enumerate() {
+            network.name(switch.toe, Beyond::Facing(number))?;
+            for leg in [SwitchLeg::Through, SwitchLeg::Diverging] {
+                network.name(switch.leg(leg), Beyond::Trailing(number, leg))?;
+                network.check_joint(switch.toe, switch.leg(leg))?;
+            }
+        }
+        for ends in ends {
+            match ends {
+                Ends::Joined(a, b) => {
+                    network.name(a, Beyond::Track(b))?;
+                    network.name(b, Beyond::Track(a))?;
+                    network.check_joint(a, b)?;
+                }
+                Ends::Buffer(end) => network.name(end, Beyond::Buffer)?,
+                Ends::Open(end) => network.name(end, Beyond::Open)?,
+            }
+        }
+        network.switches = switches;
+        let loose = network.ends().find(|end| !network.beyond.contains_key(end));
+        match loose {
+            Some(end) => Err(NetworkError::Loose(end)),
+            None => Ok(network),
+        }
+    }
+
+    /// A network of one track, open at both ends.
+    pub fn of_one(track: Alignment) -> Self {
+        let ends = [Direction::Down, Direction::Up].map(|way| {
+            let track = TrackId::default();
+            (TrackEnd { track, way }, Beyond::Open)
+        });
+        Self {
+            tracks: vec![track],
+            switches: Vec::new(),
+            beyond: ends.into(),
+        }
+    }
+
+    /// All ends of all tracks.
+    pub fn ends(&self) -> impl Iterator<Item = TrackEnd> {
+        let tracks = (0..self.tracks.len()).map(|k| TrackId(k as u16));
+        tracks.flat_map(|track| [Direction::Down, Direction::Up].map(|way| TrackEnd { track, way }))
+    }
+
+    fn name(&mut self, end: TrackEnd, beyond: Beyond) -> Result<(), NetworkError> {
+        if self.track(end.track).is_none() {
+            return Err(NetworkError::NoTrack(end.track));
+        }
+        match self.beyond.insert(end, beyond) {
+            Some(_) => Err(NetworkError::NamedTwice(end)),
+            None => Ok(()),
+        }
+    }
+
+    fn check_joint(&self, from: TrackEnd, to: TrackEnd) -> Result<(), NetworkError> {
+        let (Some(out), Some(back)) = (self.leaving(from), self.leaving(to)) else {
+            return Ok(());
+        };
+        let gap_m = (out.origin - back.origin).norm();
+        if gap_m > MOST_GAP_M {
+            return Err(NetworkError::Gap { from, to, gap_m });
+        }
+        let turn = (out.heading_rad - back.heading_rad - PI).rem_euclid(TAU);
+        let kink_rad = turn.min(TAU - turn).max((out.slope + back.slope).abs());
+        if kink_rad > MOST_KINK_RAD {
+            return Err(NetworkError::Kink { from, to, kink_rad });
+        }
+        Ok(())
+    }
+
+    /// The pose of a track's end, looking out of the track.
+    pub fn leaving(&self, end: TrackEnd) -> Option<TrackFrame> {
+        let track = self.track(end.track)?;
+        Some(match end.way {
+            Direction::Up => track.at(track.length_m()),
+            Direction::Down => {
+                let frame = track.at(0.0);
+                TrackFrame {
+                    heading_rad: frame.heading_rad + PI,
+                    slope: -frame.slope,
+                    curvature_per_m: -frame.curvature_per_m,
+                    roll_rad: -frame.roll_rad,
+                    ..frame
+                }
+            }
+        })
+    }
+
+    /// The centreline of a track.
+    pub fn track(&self, id: TrackId) -> Option<&Alignment> {
+        self.tracks.get(usize::from(id.0))
+    }
+
+    /// What is beyond an end.
+    pub fn beyond(&self, end: TrackEnd) -> Beyond {
+        self.beyond.get(&end).copied().unwrap_or(Beyond::Open)
+    }
+
+    /// The ends at which a train may enter the next track that leaves a track at an end: two where it runs a
+    /// switch facing, none at a buffer or an open end.
+    pub fn next(&self, end: TrackEnd) -> impl Iterator<Item = TrackEnd> {
+        let ends = match self.beyond(end) {
+            Beyond::Track(next) => [Some(next), None],
+            Beyond::Facing(switch) => {
+                let switch = &self.switches[switch];
+                [Some(switch.through), Some(switch.diverging)]
+            }
+            Beyond::Trailing(switch, _) => [Some(self.switches[switch].toe), None],
+            Beyond::Buffer | Beyond::Open => [None, None],
+        };
+        ends.into_iter().flatten()
+    }
+
+    /// The side to which a switch's diverging leg curves, looking from its toe.
+    pub fn hand(&self, switch: &Switch) -> Side {
+        let curvature = |end: TrackEnd| {
+            let into = TrackEnd {
+                way: end.way.reversed(),
+                ..end
+            };
+            // Looking into the track, just behind its first piece's begin.
+            let track = self.track(end.track)?;
+            let at_m = match into.way {
+                Direction::Up => 0.0,
+                Direction::Down => track.length_m() - 1e-6,
+            };
+            Some(into.way.sign() * track.at(at_m).curvature_per_m)
+        };
+        let [through, diverging] = [switch.through, switch.diverging].map(curvature);
+        if diverging > through {
+            Side::Left
+        } else {
+            Side::Right
+        }
+    }
+
+    /// World position of a point on a track; none where there is no such track.
+    pub fn world_from_track(&self, track: TrackId, point: TrackPoint) -> Option<Point3<f64>> {
+        Some(self.track(track)?.world_from_track(point))
+    }
+
+    /// The places of all tracks within a distance of a world position, in plan, nearest first, each with the
+    /// point as that track has it.
+    pub fn near(&self, world: &Point3<f64>, within_m: f64) -> Vec<(TrackId, TrackPoint)> {
+        let mut found: Vec<_> = (0u16..)
+            .zip(&self.tracks)
+            .filter_map(|(k, track)| Some((TrackId(k), nearest(track, world)?)))
+            .filter(|(_, point)| point.l_m.abs() <= within_m)
+            .collect();
+        found.sort_by(|a, b| f64::total_cmp(&a.1.l_m.abs(), &b.1.l_m.abs()));
+        found
+    }
+
+    /// Whether a place is on a track of this network.
+    pub fn has(&self, place: Place) -> bool {
+        self.track(place.track)
+            .is_some_and(|track| (0.0..=track.length_m()).contains(&place.s_m))
+    }
+}
+
+/// The point of a track that is square to a world position; none where that lies beyond the track's ends.
+fn nearest(track: &Alignment, world: &Point3<f64>) -> Option<TrackPoint> {
+    let length_m = track.length_m();
+    let count = (length_m / STATION_M).ceil().max(1.0);
+    let station = |k: u32| length_m * f64::from(k) / count;
+    let away_m = |s_m: f64| (track.at(s_m).origin - world).xy().norm();
+    let near_s_m = (0..=count as u32)
+        .map(station)
+        .min_by(|a, b| f64::total_cmp(&away_m(*a), &away_m(*b)))?;
+    let point = track.track_from_world(world, near_s_m);
+    (-1e-9..=length_m + 1e-9)
+        .contains(&point.s_m)
+        .then_some(point)
+}
