@@ -96,7 +96,8 @@ fn other(path: &Path, text: &str, _: FileKind, _: &CheckArgs) -> Result<String, 
     ))
 }
 
-fn read(path: &Path) -> Result<String, Failure> {
+/// The text of a file.
+pub(super) fn read(path: &Path) -> Result<String, Failure> {
     read_text(path, ReadLimit::TOML).map_err(|source| {
         let path = path.to_owned();
         Failure::file(&path.clone(), "", FileError::Read { path, source })

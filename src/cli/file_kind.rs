@@ -33,6 +33,8 @@ impl FileKind {
 }
 
 /// Keys that only tunnels have.
-const TUNNEL_KEYS: [&str; 6] = ["plan", "grades", "sections", "lamps", "lamp", "balises"];
+const TUNNEL_KEYS: [&str; 7] = [
+    "plan", "datum", "grades", "sections", "lamps", "lamp", "balises",
+];
 /// Keys that only vehicles have.
 const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

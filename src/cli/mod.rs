@@ -9,6 +9,7 @@
 //! metrotwin generate SCENARIO concrete scenarios drawn from a template
 //! metrotwin study run STUDY   many runs, and what they come to
 //! metrotwin check FILE...     tunnels and scenarios: errors and a short report
+//! metrotwin export geojson    a tunnel on a map
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
 
@@ -25,6 +26,8 @@ mod check_scenario;
 mod doctor;
 #[cfg(feature = "twin")]
 mod driver_noise;
+#[cfg(feature = "twin")]
+mod export;
 #[cfg(feature = "twin")]
 mod frames;
 #[cfg(feature = "twin")]
@@ -92,6 +95,8 @@ enum Command {
     Study(study::StudyArgs),
     Check(check::CheckArgs),
     #[cfg(feature = "twin")]
+    Export(export::ExportArgs),
+    #[cfg(feature = "twin")]
     Doctor(doctor::DoctorArgs),
 }
 
@@ -100,7 +105,10 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     start_messages(cli.verbose);
     #[cfg(feature = "twin")]
-    if !matches!(cli.command, Command::Check(_) | Command::Generate(_)) {
+    if !matches!(
+        cli.command,
+        Command::Check(_) | Command::Export(_) | Command::Generate(_)
+    ) {
         driver_noise::silence();
     }
     let result = match cli.command {
@@ -113,6 +121,8 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "twin")]
         Command::Study(args) => study::study(&args),
         Command::Check(args) => check::check(&args),
+        #[cfg(feature = "twin")]
+        Command::Export(args) => export::export(&args),
         #[cfg(feature = "twin")]
         Command::Doctor(args) => doctor::doctor(&args),
     };

@@ -10,7 +10,7 @@ use crate::stack::Equipment;
 use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
 use crate::stack::wayside::WaysideDetection;
-use crate::track::{Direction, Route, Tunnel};
+use crate::track::{Direction, TrackRoute, Tunnel};
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
@@ -202,12 +202,12 @@ impl Maps {
         Self { up: scenario.map() }
     }
 
-    fn of(&self, direction: Direction) -> (Route, Arc<Tunnel>) {
+    fn of(&self, direction: Direction) -> (TrackRoute, Arc<Tunnel>) {
         let map = match direction {
             Direction::Up => self.up.clone(),
             Direction::Down => Arc::new(self.up.reversed()),
         };
-        (Route::new(&self.up, direction), map)
+        (TrackRoute::new(&self.up, direction), map)
     }
 }
 

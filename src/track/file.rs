@@ -1,6 +1,7 @@
 //! Tunnel files as a user writes them: TOML, every key with its unit and default.
 
 use super::furniture::{Balise, BaseStation, LONGEST_M, StoppingPlace, WaysideSite};
+use super::geodesy::{Datum, Geodetic};
 use super::section::Side;
 use super::uid::LineCode;
 use crate::settings::{Checker, Problem, Settings, put_range, settings};
@@ -22,6 +23,8 @@ settings! {
         /// Light that reaches every surface after many reflections, lux.
         #[serde(default = "two_lux")]
         ambient_lx: f64, in 0.0..=1e5;
+        /// Where the world's origin is on the earth. Default: nowhere, and the line is on no map.
+        datum: Option<DatumEntry>, nested;
         /// Where the line begins in the world.
         #[serde(default)]
         start: StartEntry, nested;
@@ -64,6 +67,36 @@ impl TunnelFile {
 
 fn two_lux() -> f64 {
     2.0
+}
+
+settings! {
+    /// Where the world's origin is on the earth, on WGS 84.
+    pub struct DatumEntry {
+        /// North of the equator, degrees.
+        latitude_deg: f64, in -85.0..=85.0;
+        /// East of Greenwich, degrees.
+        longitude_deg: f64, in -180.0..=180.0;
+        /// Over the ellipsoid, metres.
+        #[serde(default)]
+        height_m: f64, in -1000.0..=9000.0;
+        /// Direction of the world's x axis, degrees from east towards north.
+        #[serde(default)]
+        heading_deg: f64, in -360.0..=360.0;
+    }
+}
+
+impl DatumEntry {
+    /// As it is reckoned with.
+    pub fn datum(&self) -> Datum {
+        Datum {
+            place: Geodetic {
+                latitude_deg: self.latitude_deg,
+                longitude_deg: self.longitude_deg,
+                height_m: self.height_m,
+            },
+            heading_deg: self.heading_deg,
+        }
+    }
 }
 
 settings! {

@@ -42,7 +42,7 @@
 //! of metro) and CJJ 96 (gauges of metros), simplified where their items say so; lamps and rig
 //! after Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
 //!
-//! Not here: switches and second tracks, rail profiles (rails are boxes), sections that lean with
+//! Not here: tunnel files with several tracks (what joins them is in [`network`]), rail profiles (rails are boxes), sections that lean with
 //! the cant (only the rails' heads follow it), irregularities of the track (they are the world's,
 //! not the survey's).
 
@@ -55,8 +55,8 @@ pub mod geodesy;
 pub mod network;
 mod place;
 mod reversal;
-mod route;
 mod section;
+mod track_route;
 pub mod uid;
 pub mod waveform;
 
@@ -65,17 +65,19 @@ pub use file::TunnelFile;
 pub use furniture::{Balise, BaseStation, LampSite, StoppingPlace, WaysideSite};
 pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
 pub use place::{Direction, Place, TrackId};
-pub use route::Route;
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
+pub use track_route::TrackRoute;
 
 /// A tunnel, checked and ready to use.
 #[derive(Clone, Debug)]
 pub struct Tunnel {
     /// Short name, as in the file.
     pub name: String,
+    /// Where the world is on the earth, if that is known.
+    pub datum: Option<geodesy::Datum>,
     /// Where the track runs.
     pub alignment: Alignment,
     /// What stands around it, in order of chainage, without gaps.

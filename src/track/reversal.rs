@@ -50,6 +50,7 @@ impl Tunnel {
         };
         Self {
             name: self.name.clone(),
+            datum: self.datum,
             alignment: self.alignment.reversed(),
             sections: backwards(&self.sections, |range| SectionRange {
                 from_m: from_end(range.to_m),

@@ -43,6 +43,7 @@ pub fn tunnel() -> Tunnel {
         .collect();
     Tunnel {
         name: "sample".into(),
+        datum: None,
         alignment,
         sections: vec![SectionRange {
             from_m: 0.0,

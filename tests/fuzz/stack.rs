@@ -17,7 +17,7 @@ use metrotwin::stack::positioning::{CabMount, LampPositioning};
 use metrotwin::stack::protection::TrainProtection;
 use metrotwin::stack::wayside::WaysideDetection;
 use metrotwin::track::uid::Uid;
-use metrotwin::track::{Direction, Route};
+use metrotwin::track::{Direction, TrackRoute};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -238,7 +238,7 @@ struct Stack {
 impl Stack {
     fn new(scenario: &Scenario, draw: &mut Draw) -> Self {
         let (map, onboard) = (scenario.map(), &scenario.onboard[0]);
-        let route = Route::new(&map, Direction::Up);
+        let route = TrackRoute::new(&map, Direction::Up);
         let rig = onboard.rig.as_ref().unwrap();
         let mut sheet = rig.calibration();
         let mut calibration = scenario.wayside[0].calibration.clone();
@@ -351,7 +351,7 @@ impl Ride {
         let mut settings = scenario.onboard[0].protection.clone();
         settings.initial_chainage_m = has_position.then_some(1300.0);
         settings.starts_under_way = Some(true);
-        let route = Route::new(&map, Direction::Up);
+        let route = TrackRoute::new(&map, Direction::Up);
         Self {
             protection: TrainProtection::new(TRAIN, route, &settings, map),
             permitted_mps: f64::NAN,

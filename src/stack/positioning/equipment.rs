@@ -10,7 +10,7 @@ use crate::bus::{
 };
 use crate::stack::Equipment;
 use crate::stack::led::LedSettings;
-use crate::track::{Route, Tunnel};
+use crate::track::{TrackRoute, Tunnel};
 use std::sync::Arc;
 
 /// How often a second it is looked whether the rig has fallen silent.
@@ -25,7 +25,7 @@ const LENGTH_SIGMA_M: f64 = 0.05;
 pub struct CabMount {
     end: TrainEnd,
     /// The route that the cab looks along.
-    route: Route,
+    route: TrackRoute,
     /// How far the train head is behind the cab's end, as the cab looks, with its standard deviation.
     head_behind_m: f64,
     length_sigma_m: f64,
@@ -33,7 +33,7 @@ pub struct CabMount {
 
 impl CabMount {
     /// In the cab of an end of a train of a length; `route` is the way that this cab looks.
-    pub fn new(end: TrainEnd, route: Route, train_length_m: f64) -> Self {
+    pub fn new(end: TrainEnd, route: TrackRoute, train_length_m: f64) -> Self {
         let (head_behind_m, length_sigma_m) = match end {
             TrainEnd::Front => (0.0, 0.0),
             TrainEnd::Rear => (train_length_m, LENGTH_SIGMA_M),
@@ -156,7 +156,7 @@ mod tests {
     /// Backwards, and with all else that the odometer says.
     #[test]
     fn the_rear_cab_runs_backwards() {
-        let route = Route::new(&tunnel("manchester"), Direction::Down);
+        let route = TrackRoute::new(&tunnel("manchester"), Direction::Down);
         let sample = OdometerSample {
             time: SimTime::from_secs(1.0),
             distance_m: 12.0,

@@ -9,7 +9,7 @@ use crate::bus::{
     ProtectionReport, Receiver, SimTime, Ticker, TrainReport, Via,
 };
 use crate::stack::Equipment;
-use crate::track::{Direction, Route, Tunnel};
+use crate::track::{Direction, TrackRoute, Tunnel};
 use std::sync::Arc;
 
 /// Cycles of the protection a second.
@@ -20,14 +20,19 @@ const CYCLE_HZ: f64 = 10.0;
 #[derive(Debug)]
 pub struct TrainProtection {
     node: Node,
-    route: Route,
+    route: TrackRoute,
     protection: Protection,
     cycles: Ticker,
 }
 
 impl TrainProtection {
     /// On a node, with the surveyed map of the route, as the train runs it.
-    pub fn new(node: Node, route: Route, settings: &ProtectionSettings, map: Arc<Tunnel>) -> Self {
+    pub fn new(
+        node: Node,
+        route: TrackRoute,
+        settings: &ProtectionSettings,
+        map: Arc<Tunnel>,
+    ) -> Self {
         let initial_chainage_m = settings.initial_chainage_m.map(|s_m| route.run_m(s_m));
         let settings = ProtectionSettings {
             initial_chainage_m,
@@ -174,7 +179,7 @@ mod tests {
     /// heard `content` of `sender` by radio.
     fn authority_end_m(direction: Direction, sender: Node, content: Content) -> Option<f64> {
         let up = map(0.0);
-        let route = Route::new(&up, direction);
+        let route = TrackRoute::new(&up, direction);
         let map = match direction {
             Direction::Up => up,
             Direction::Down => Arc::new(up.reversed()),

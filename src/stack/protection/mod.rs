@@ -8,7 +8,7 @@
 //! # use metrotwin::track::{Alignment, PlanElement, Tunnel};
 //! # let straight = PlanElement { length_m: 2000.0, start_per_m: 0.0, end_per_m: 0.0,
 //! #     start_cant_m: 0.0, end_cant_m: 0.0 };
-//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(),
+//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(), datum: None,
 //! #     alignment: Alignment::new(nalgebra::Point3::origin(), 0.0, &[straight], &[]),
 //! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
 //! #     line_number: 1, stations: vec![], ambient_lx: 5.0 });

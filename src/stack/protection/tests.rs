@@ -26,6 +26,7 @@ pub(super) fn map(permille: f64) -> Arc<Tunnel> {
     };
     Arc::new(Tunnel {
         name: "test".into(),
+        datum: None,
         alignment: Alignment::new(Point3::origin(), 0.3, &[straight], &[grade]),
         sections: vec![],
         lamps: vec![],

@@ -74,6 +74,7 @@ pub fn tunnel(curvature_per_m: f64) -> Arc<Tunnel> {
     };
     Arc::new(Tunnel {
         name: "test".into(),
+        datum: None,
         alignment: Alignment::new(Point3::new(3.0, -7.0, 11.0), 0.4, &[element], &[]),
         sections: vec![SectionRange {
             from_m: 0.0,

@@ -6,7 +6,7 @@ mod line;
 mod sections;
 
 use super::Tunnel;
-use super::file::TunnelFile;
+use super::file::{DatumEntry, TunnelFile};
 use super::gauge::Gauge;
 use super::section::OutlinePoint;
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
@@ -36,6 +36,7 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     let sections = sections::sections(&file.sections, alignment.length_m(), check);
     let mut tunnel = Tunnel {
         name: file.name.clone(),
+        datum: file.datum.as_ref().map(DatumEntry::datum),
         alignment,
         sections,
         lamps: Vec::new(),

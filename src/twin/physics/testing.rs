@@ -17,6 +17,7 @@ pub(super) fn line(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {
     };
     Arc::new(Tunnel {
         name: "test".to_owned(),
+        datum: None,
         alignment: Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, elements, &[grade]),
         sections: Vec::new(),
         lamps: Vec::new(),

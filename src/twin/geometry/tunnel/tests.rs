@@ -65,6 +65,7 @@ fn section() -> CrossSection {
 fn tunnel() -> Tunnel {
     Tunnel {
         name: "test".into(),
+        datum: None,
         alignment: alignment(),
         sections: vec![SectionRange {
             from_m: 0.0,

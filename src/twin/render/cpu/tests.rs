@@ -24,6 +24,7 @@ fn hall() -> Tunnel {
     let corner = |l_m: f64, h_m: f64| OutlinePoint { l_m, h_m };
     Tunnel {
         name: "hall".into(),
+        datum: None,
         alignment: Alignment::new(
             Point3::origin(),
             0.0,

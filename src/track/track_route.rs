@@ -1,7 +1,7 @@
-//! The way of a train over its track.
+//! The way of a train over a line of one track; over several it is a [`network::Route`](super::network::Route).
 //!
 //! A train counts distance in its own running direction, from the end of the track behind it; so do
-//! its driver, its equipment and the physics under it. [`Route`] goes between that and the chainage
+//! its driver, its equipment and the physics under it. [`TrackRoute`] goes between that and the chainage
 //! of the track, which is what trains, posts and people tell each other.
 
 use super::{Direction, Place, TrackId, Tunnel};
@@ -9,13 +9,13 @@ use super::{Direction, Place, TrackId, Tunnel};
 /// The whole of one track, run in one direction.
 ///
 /// ```
-/// use metrotwin::track::{Direction, Route, TrackId};
-/// let down = Route { track: TrackId::default(), direction: Direction::Down, length_m: 3000.0 };
+/// use metrotwin::track::{Direction, TrackRoute, TrackId};
+/// let down = TrackRoute { track: TrackId::default(), direction: Direction::Down, length_m: 3000.0 };
 /// assert!((down.run_m(2900.0) - 100.0).abs() < 1e-9);
 /// assert!((down.place(100.0).s_m - 2900.0).abs() < 1e-9);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Route {
+pub struct TrackRoute {
     /// The track.
     pub track: TrackId,
     /// Which way along it.
@@ -24,7 +24,7 @@ pub struct Route {
     pub length_m: f64,
 }
 
-impl Route {
+impl TrackRoute {
     /// Over the track of a tunnel.
     pub fn new(tunnel: &Tunnel, direction: Direction) -> Self {
         Self {

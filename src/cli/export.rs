@@ -1,0 +1,143 @@
+//! `metrotwin export`: what other programs read.
+
+use super::check::read;
+use super::fault::Failure;
+use super::print;
+use crate::track::geodesy::Datum;
+use crate::track::{TrackPoint, Tunnel};
+use nalgebra::Point3;
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Points of a line are so close that a chord is under 2 cm off a curve of 150 m.
+const STEP_M: f64 = 5.0;
+
+const AFTER: &str = "\
+Examples:
+  metrotwin export geojson tunnels/chengdu_line1.toml > chengdu_line1.geojson";
+
+/// Write a tunnel in a format of others, on standard output
+#[derive(clap::Args)]
+#[command(after_help = AFTER)]
+pub(super) struct ExportArgs {
+    #[command(subcommand)]
+    format: Format,
+}
+
+#[derive(clap::Subcommand)]
+enum Format {
+    /// GeoJSON (RFC 7946): the centreline, lamps, devices, balises, base stations and stations, for maps
+    Geojson {
+        /// Tunnel file with a [datum]
+        #[arg(value_name = "TUNNEL")]
+        tunnel: PathBuf,
+    },
+}
+
+pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
+    let Format::Geojson { tunnel: path } = &args.format;
+    let text = read(path)?;
+    let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
+    let datum = tunnel.datum.ok_or_else(|| {
+        Failure::input(
+            format!("{} does not say where on the earth it is", path.display()),
+            "add a table [datum] with latitude_deg and longitude_deg of the world's origin",
+        )
+    })?;
+    let collection = json!({
+        "type": "FeatureCollection",
+        "features": features(&tunnel, &datum),
+    });
+    print(&serde_json::to_string(&collection).map_err(Failure::run)?)
+}
+
+/// What stands on the map, the centreline first.
+fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
+    let line = &tunnel.alignment;
+    let position = |world: &Point3<f64>| {
+        let place = datum.geodetic(world);
+        json!([place.longitude_deg, place.latitude_deg, place.height_m])
+    };
+    let feature = |shape: &str, coordinates: Value, properties: Value| {
+        json!({
+            "type": "Feature",
+            "geometry": { "type": shape, "coordinates": coordinates },
+            "properties": properties,
+        })
+    };
+    let steps = (line.length_m() / STEP_M).ceil().max(1.0);
+    let stations = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
+    let course: Vec<_> = stations.map(|s_m| position(&line.at(s_m).origin)).collect();
+    let course = feature(
+        "LineString",
+        json!(course),
+        json!({ "kind": "track", "name": tunnel.name, "length_m": line.length_m() }),
+    );
+    let point = |kind: &str, name: &str, [s_m, l_m, h_m]: [f64; 3]| {
+        let world = line.world_from_track(TrackPoint { s_m, l_m, h_m });
+        let properties = json!({ "kind": kind, "name": name, "chainage_m": s_m });
+        feature("Point", position(&world), properties)
+    };
+    let lamps = tunnel.lamps.iter().map(|lamp| {
+        let at = [lamp.chainage_m, lamp.lateral_m, lamp.height_m];
+        point("lamp", &lamp.uid.to_string(), at)
+    });
+    let wayside = (tunnel.wayside.iter()).map(|site| {
+        let at = [site.chainage_m, site.lateral_m, site.height_m];
+        point("wayside", &site.name, at)
+    });
+    let on_line = |kind, name, s_m| point(kind, name, [s_m, 0.0, 0.0]);
+    let balises = (tunnel.balises.iter()).map(|b| on_line("balise", &b.name, b.chainage_m));
+    let bases = tunnel.base_stations.iter();
+    let bases = bases.map(|b| on_line("base_station", &b.name, b.chainage_m));
+    let stations = (tunnel.stations.iter()).map(|s| on_line("station", &s.name, s.chainage_m));
+    let points = lamps
+        .chain(wayside)
+        .chain(balises)
+        .chain(bases)
+        .chain(stations);
+    std::iter::once(course).chain(points).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// Provokes: latitude and longitude in the wrong order, things left out, a line whose length on the earth
+    /// is not that of the tunnel.
+    #[test]
+    fn a_tunnel_lies_where_its_datum_says() {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let datum = tunnel.datum.unwrap();
+        let features = features(&tunnel, &datum);
+        let of = |kind: &str| {
+            let of_kind = features.iter().filter(|f| f["properties"]["kind"] == kind);
+            of_kind.count()
+        };
+        assert_eq!(of("track"), 1);
+        assert_eq!(of("lamp"), tunnel.lamps.len());
+        assert_eq!(of("balise"), tunnel.balises.len());
+        assert_eq!(
+            of("wayside") + of("station"),
+            tunnel.wayside.len() + tunnel.stations.len()
+        );
+        let line = features[0]["geometry"]["coordinates"].as_array().unwrap();
+        let degrees: Vec<[f64; 2]> = line
+            .iter()
+            .map(|p| [0, 1].map(|k| p[k].as_f64().unwrap()))
+            .collect();
+        // On a sphere with the earth's mean curvature at this latitude, to a part in a thousand.
+        let radius_m = 6_367_000.0;
+        let length_m: f64 = degrees
+            .windows(2)
+            .map(|pair| {
+                let [east, north] = [0, 1].map(|k| (pair[1][k] - pair[0][k]).to_radians());
+                radius_m * (east * pair[0][1].to_radians().cos()).hypot(north)
+            })
+            .sum();
+        assert!((length_m / 3000.0 - 1.0).abs() < 3e-3, "{length_m}");
+        assert!((degrees[0][0] - 104.066).abs() < 1e-6 && (degrees[0][1] - 30.657).abs() < 1e-6);
+    }
+}
