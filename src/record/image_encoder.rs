@@ -137,6 +137,7 @@ fn brighten(image: &mut GrayImage, gain: f64) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use image::Luma;

@@ -103,6 +103,7 @@ fn structs_agree() {
         focus_per_m,
         reach_px,
         mirrored,
+        beyond_e,
         headlights
     );
     same_layout!(

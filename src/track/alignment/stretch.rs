@@ -69,6 +69,7 @@ impl Alignment {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::super::tests::winding;
 

@@ -43,6 +43,7 @@ mod error;
 mod route;
 mod search;
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
 pub use error::NetworkError;

@@ -50,7 +50,7 @@ impl Network {
             }
             before.insert(end, came_from);
             if end.track == to.track {
-                let way_m = at_m + self.into_m(end, to)?;
+                let way_m = at_m + self.entered_m(end, to)?;
                 if best.is_none_or(|(best_m, _)| way_m < best_m) {
                     best = Some((way_m, end));
                 }
@@ -137,7 +137,7 @@ impl Network {
     }
 
     /// From where a track is entered that is run towards an end, to a place on it.
-    fn into_m(&self, end: TrackEnd, to: Place) -> Option<f64> {
+    fn entered_m(&self, end: TrackEnd, to: Place) -> Option<f64> {
         self.left_m(to, end.way.reversed())
     }
 

@@ -266,10 +266,9 @@ fn a_point_mass_stays_on_random_routes() {
                 tracks.push(entered.track);
             }
             let last_m = network.track(end.track).unwrap().length_m();
-            let to_m = match (tracks.len(), end.way) {
-                (1, Direction::Up) | (2.., Direction::Up) => last_m,
-                (_, Direction::Down) => 0.0,
-                (0, Direction::Up) => unreachable!("a route has a track"),
+            let to_m = match end.way {
+                Direction::Up => last_m,
+                Direction::Down => 0.0,
             };
             let route = network.route_over((from, way), &tracks, to_m).unwrap();
             run_along(&network, &route);

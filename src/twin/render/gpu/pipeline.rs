@@ -4,7 +4,7 @@ use super::layout::{Placement, Vertex};
 use super::shaders::shader_source;
 use crate::twin::render::sensor::BLOOMING_REACH;
 use std::cell::RefCell;
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::mem::size_of;
 
 /// Signal in electrons; half precision keeps 11 bits, finer than the shot noise anywhere.
@@ -20,7 +20,7 @@ pub const LIGHT: wgpu::TextureFormat = wgpu::TextureFormat::Rg16Float;
 pub const LAMP: wgpu::TextureFormat = wgpu::TextureFormat::R16Uint;
 
 /// What a pipeline draws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Kind {
     /// Tunnel and bodies under so many headlights; whether the blinking of lamps shows, and whether paint is
     /// smeared.
@@ -72,8 +72,8 @@ impl Kind {
 /// megabytes of each.
 #[derive(Default)]
 pub struct Pipelines {
-    made: RefCell<HashMap<Kind, wgpu::RenderPipeline>>,
-    shaders: RefCell<HashMap<&'static str, wgpu::ShaderModule>>,
+    made: RefCell<BTreeMap<Kind, wgpu::RenderPipeline>>,
+    shaders: RefCell<BTreeMap<&'static str, wgpu::ShaderModule>>,
 }
 
 struct Stage<'a> {
