@@ -20,7 +20,7 @@ use std::thread;
 const MOST_WAITING: usize = 4;
 
 /// Where an image belongs in a recording.
-pub(super) struct Row {
+pub(super) struct ImageRow {
     pub(super) path: String,
     pub(super) start: SimTime,
     pub(super) number: u32,
@@ -32,7 +32,7 @@ pub(super) enum Format {
     Jpeg {
         quality: u8,
         /// Greys are multiplied by this first.
-        gain: f64,
+        gain: Option<f64>,
     },
     Png,
 }
@@ -43,7 +43,7 @@ type Encoded = std::result::Result<EncodedImage, Box<dyn Error + Send + Sync>>;
 #[derive(Default)]
 pub(super) struct ImageEncoder {
     thread: Option<EncoderThread>,
-    waiting: VecDeque<Row>,
+    waiting: VecDeque<ImageRow>,
     /// Images to copy the next ones into.
     free: Vec<GrayImage>,
 }
@@ -58,10 +58,10 @@ impl ImageEncoder {
     /// Takes an image; gives the oldest one, encoded, once too many wait.
     pub(super) fn add(
         &mut self,
-        row: Row,
+        row: ImageRow,
         image: &GrayImage,
         format: Format,
-    ) -> Result<Option<(Row, EncodedImage)>> {
+    ) -> Result<Option<(ImageRow, EncodedImage)>> {
         if self.thread.is_none() {
             self.thread = Some(EncoderThread::start().map_err(failed(&row.path))?);
         }
@@ -77,7 +77,7 @@ impl ImageEncoder {
     }
 
     /// The oldest image, encoded, if any waits.
-    pub(super) fn next(&mut self) -> Result<Option<(Row, EncodedImage)>> {
+    pub(super) fn next(&mut self) -> Result<Option<(ImageRow, EncodedImage)>> {
         let Some((thread, row)) = self.thread.as_ref().zip(self.waiting.pop_front()) else {
             return Ok(None);
         };
@@ -108,7 +108,9 @@ impl EncoderThread {
 fn encode(image: &mut GrayImage, format: Format) -> Encoded {
     match format {
         Format::Jpeg { quality, gain } => {
-            brighten(image, gain);
+            if let Some(gain) = gain {
+                brighten(image, gain);
+            }
             jpeg(image, quality)
         }
         Format::Png => png(image),
@@ -142,8 +144,8 @@ mod tests {
     use super::*;
     use image::Luma;
 
-    fn row(number: u32) -> Row {
-        Row {
+    fn row(number: u32) -> ImageRow {
+        ImageRow {
             path: "camera/image".into(),
             start: SimTime::ZERO,
             number,
@@ -163,7 +165,7 @@ mod tests {
                 0 => Format::Png,
                 _ => Format::Jpeg {
                     quality: 90,
-                    gain: 2.0,
+                    gain: Some(2.0),
                 },
             };
             let done = files.add(row(number), &image, format).unwrap();

@@ -3,7 +3,7 @@
 //! rerun puts the corner of the top left pixel at (0, 0), we its centre, so everything drawn into
 //! an image moves by half a pixel.
 
-use super::image_encoder::{Format, ImageEncoder, Row};
+use super::image_encoder::{Format, ImageEncoder, ImageRow};
 use super::palette::{self, ui};
 use super::stream::RowStream;
 use super::whole_files::Result;
@@ -140,7 +140,7 @@ impl Images {
         for (path, (frame, spots)) in self.eyes.clone().iter().zip(eyes) {
             if keep {
                 let at = (frame.start, frame.number);
-                self.encode(format!("{path}/image"), at, &frame.image, self.jpeg(1.0))?;
+                self.encode(format!("{path}/image"), at, &frame.image, self.jpeg(None))?;
             }
             self.stream.at_frame(frame.start, frame.number);
             self.log_spots(path, spots)?;
@@ -163,9 +163,14 @@ impl Images {
         let paths = WaysidePaths::new(device.1);
         if keep {
             let at = (start, report.number);
-            self.encode(format!("{}/image", paths.camera), at, image, self.jpeg(1.0))?;
+            self.encode(
+                format!("{}/image", paths.camera),
+                at,
+                image,
+                self.jpeg(None),
+            )?;
             if let Some(difference) = &report.difference {
-                self.encode(paths.difference, at, difference, self.jpeg(self.gain))?;
+                self.encode(paths.difference, at, difference, self.jpeg(Some(self.gain)))?;
             }
             if let Some(binary) = &report.binary {
                 self.encode(paths.binary, at, binary, Format::Png)?;
@@ -175,7 +180,7 @@ impl Images {
         self.log_obstacles(&paths.camera, report, image.height())
     }
 
-    fn jpeg(&self, gain: f64) -> Format {
+    fn jpeg(&self, gain: Option<f64>) -> Format {
         let quality = self.quality;
         Format::Jpeg { quality, gain }
     }
@@ -188,7 +193,7 @@ impl Images {
         image: &GrayImage,
         format: Format,
     ) -> Result {
-        let row = Row {
+        let row = ImageRow {
             path,
             start,
             number,
@@ -199,7 +204,7 @@ impl Images {
         }
     }
 
-    fn log_image(&self, (row, image): &(Row, EncodedImage)) -> Result {
+    fn log_image(&self, (row, image): &(ImageRow, EncodedImage)) -> Result {
         self.stream.at_frame(row.start, row.number);
         self.stream.log(&row.path, image)
     }

@@ -70,6 +70,17 @@ pub struct TrackEnd {
     pub way: Direction,
 }
 
+impl TrackEnd {
+    /// The other end of its track: a train that enters there runs towards this one.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        Self {
+            way: self.way.reversed(),
+            ..self
+        }
+    }
+}
+
 /// A switch, with the ends of tracks that meet at its toe.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Switch {
@@ -268,10 +279,7 @@ impl Network {
     /// The side to which a switch's diverging leg curves, looking from its toe.
     pub fn hand(&self, switch: &Switch) -> Side {
         let curvature = |end: TrackEnd| {
-            let into = TrackEnd {
-                way: end.way.reversed(),
-                ..end
-            };
+            let into = end.opposite();
             // Looking into the track, just behind its first piece's begin.
             let track = self.track(end.track)?;
             let at_m = match into.way {

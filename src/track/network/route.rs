@@ -148,10 +148,7 @@ impl Network {
                 from: end,
                 to: *track,
             })?;
-            end = TrackEnd {
-                way: next.way.reversed(),
-                ..next
-            };
+            end = next.opposite();
             entered.push(end);
         }
         let to = Place {

@@ -97,10 +97,7 @@ impl Network {
                 continue;
             };
             for next in self.next(*end) {
-                let end = TrackEnd {
-                    way: next.way.reversed(),
-                    ..next
-                };
+                let end = next.opposite();
                 if tracks.contains(&end) {
                     continue;
                 }
@@ -147,9 +144,7 @@ impl Network {
         at_m: f64,
         queue: &mut BinaryHeap<Reverse<(Metres, TrackEnd, TrackEnd)>>,
     ) {
-        queue.extend(self.next(end).map(|next| {
-            let way = next.way.reversed();
-            Reverse((Metres(at_m), TrackEnd { way, ..next }, end))
-        }));
+        let entered = self.next(end).map(TrackEnd::opposite);
+        queue.extend(entered.map(|next| Reverse((Metres(at_m), next, end))));
     }
 }

@@ -70,7 +70,7 @@ pub struct Labeller {
 }
 
 /// One row's rays.
-struct Row<'a> {
+struct LabelRow<'a> {
     v: usize,
     pose: Isometry3<f64>,
     rays: &'a [[f64; 2]],
@@ -82,7 +82,7 @@ struct RowLabels<'a> {
     surface: &'a mut [Surface],
 }
 
-impl Row<'_> {
+impl LabelRow<'_> {
     fn eye(&self) -> Point3<f64> {
         self.pose.translation.vector.into()
     }
@@ -125,7 +125,7 @@ impl Labeller {
             .zip(labels.surface.par_chunks_mut(width.max(1)))
             .enumerate();
         rows.for_each(|(v, (depth_m, surface))| {
-            let row = Row {
+            let row = LabelRow {
                 v,
                 pose: projection.pose(v as f64),
                 rays: &rays[v * width..(v + 1) * width],
@@ -240,12 +240,12 @@ fn all_depths(
     let rows = depth_m.par_chunks_mut(width.max(1)).enumerate();
     rows.for_each(|(v, depth_m)| {
         let rays = &rays[v * width..(v + 1) * width];
-        cast_tunnel(tunnel, &Row { v, pose, rays }, depth_m);
+        cast_tunnel(tunnel, &LabelRow { v, pose, rays }, depth_m);
     });
     depth_m
 }
 
-fn cast_tunnel(tunnel: &TunnelCaster, row: &Row<'_>, depth_m: &mut [f64]) {
+fn cast_tunnel(tunnel: &TunnelCaster, row: &LabelRow<'_>, depth_m: &mut [f64]) {
     let eye = row.eye();
     let segment = tunnel.segment_of(&eye, None);
     for (u, depth_m) in depth_m.iter_mut().enumerate() {
@@ -261,7 +261,7 @@ impl RowLabels<'_> {
     /// depth so far.
     fn put(
         &mut self,
-        row: &Row<'_>,
+        row: &LabelRow<'_>,
         bounds: ImageBounds,
         thing: Surface,
         meets: impl Fn(&Vector3<f64>, f64) -> Option<f64>,
@@ -274,7 +274,7 @@ impl RowLabels<'_> {
         }
     }
 
-    fn put_bodies(&mut self, row: &Row<'_>, job: &Job, projection: &Projection<'_>) {
+    fn put_bodies(&mut self, row: &LabelRow<'_>, job: &Job, projection: &Projection<'_>) {
         let (eye, after_s) = (row.eye(), projection.after_s(row.v as f64));
         for (k, body) in job.bodies.iter().enumerate() {
             let solid = Solid::at(body, after_s);
@@ -287,7 +287,7 @@ impl RowLabels<'_> {
         }
     }
 
-    fn put_lamps(&mut self, row: &Row<'_>, lamps: &[LampLight], projection: &Projection<'_>) {
+    fn put_lamps(&mut self, row: &LabelRow<'_>, lamps: &[LampLight], projection: &Projection<'_>) {
         for (k, lamp) in lamps.iter().enumerate() {
             let way = lamp.centre - row.eye();
             if way.norm_squared() > LAMP_SIGHT_M * LAMP_SIGHT_M || way.dot(&lamp.facing) >= 0.0 {
