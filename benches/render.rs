@@ -17,7 +17,7 @@
 mod sample;
 
 use metrotwin::bus::Intrinsics;
-use metrotwin::track::Tunnel;
+use metrotwin::track::Track;
 use metrotwin::twin::lights::{Headlight, LampLight};
 use metrotwin::twin::render::gpu::GpuRenderer;
 use metrotwin::twin::render::{Job, Renderer};
@@ -55,9 +55,9 @@ fn report(name: &str, renderer: &mut dyn Renderer, jobs: &[Job]) {
 }
 
 /// A train's, with its head at `s_m`.
-fn headlights(tunnel: &Tunnel, s_m: f64) -> Vec<Headlight> {
+fn headlights(track: &Track, s_m: f64) -> Vec<Headlight> {
     let light = |l_m: f64| Headlight {
-        world_from_light: sample::on_bed(tunnel, s_m, l_m, 1.5),
+        world_from_light: sample::on_bed(track, s_m, l_m, 1.5),
         intensity_cd: 40_000.0,
         exponent: 56.0,
     };
@@ -69,7 +69,7 @@ fn table() {
     println!("\npairs a second       lamps in view   30 us   500 us   2000 us");
     for (lamps, what) in [(0, "none"), (1, "as shipped"), (3, "three times")] {
         let mut scene = sample::scene();
-        let tunnel = scene.tunnel.clone();
+        let track = scene.track.clone();
         let shipped = std::mem::take(&mut scene.lamps);
         for k in 0..lamps {
             let aside_m = 3.0 * f64::from(k);
@@ -86,7 +86,7 @@ fn table() {
                 let jobs: Vec<_> = (0..10)
                     .map(|k| {
                         sized(
-                            &tunnel,
+                            &track,
                             100.0 + f64::from(k),
                             (width_px, height_px),
                             exposure_s,
@@ -103,8 +103,8 @@ fn table() {
 
 /// A pair of the sample rig at 60 km/h with images of another size and exposure; the same field of
 /// view and time from first row to last.
-fn sized(tunnel: &Tunnel, s_m: f64, (width_px, height_px): (u32, u32), exposure_s: f64) -> Job {
-    let mut job = sample::stereo_job(tunnel, s_m, 60.0 / 3.6);
+fn sized(track: &Track, s_m: f64, (width_px, height_px): (u32, u32), exposure_s: f64) -> Job {
+    let mut job = sample::stereo_job(track, s_m, 60.0 / 3.6);
     for view in &mut job.views {
         let (lens, shutter) = (&mut view.camera.intrinsics, &mut view.camera.shutter);
         let scale = f64::from(width_px) / f64::from(lens.width_px);
@@ -117,22 +117,22 @@ fn sized(tunnel: &Tunnel, s_m: f64, (width_px, height_px): (u32, u32), exposure_
 
 fn main() {
     let scene = sample::scene();
-    let tunnel = scene.tunnel.clone();
+    let track = scene.track.clone();
     let mut renderer = GpuRenderer::new(scene).unwrap();
     let stereo: Vec<_> = (0..20)
-        .map(|k| sample::stereo_job(&tunnel, 100.0 + f64::from(k), 60.0 / 3.6))
+        .map(|k| sample::stereo_job(&track, 100.0 + f64::from(k), 60.0 / 3.6))
         .collect();
     println!("{:?}", renderer.backend());
     report("stereo", &mut renderer, &stereo);
     let lit: Vec<_> = (stereo.iter().zip(0..))
         .map(|(job, k)| Job {
-            headlights: headlights(&tunnel, 100.5 + f64::from(k)),
+            headlights: headlights(&track, 100.5 + f64::from(k)),
             ..job.clone()
         })
         .collect();
     report("stereo, by headlights", &mut renderer, &lit);
     let wayside: Vec<_> = (0..20)
-        .map(|_| sample::wayside_job(&tunnel, 100.0))
+        .map(|_| sample::wayside_job(&track, 100.0))
         .collect();
     report("wayside", &mut renderer, &wayside);
     table();

@@ -4,7 +4,7 @@ use super::check::read;
 use super::fault::Failure;
 use super::print;
 use crate::track::geodesy::Datum;
-use crate::track::{TrackPoint, Tunnel};
+use crate::track::{Track, TrackPoint, Tunnel};
 use nalgebra::Point3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -26,7 +26,7 @@ pub(super) struct ExportArgs {
 
 #[derive(clap::Subcommand)]
 enum Format {
-    /// GeoJSON (RFC 7946): the centreline, lamps, devices, balises, base stations and stations, for maps
+    /// GeoJSON (RFC 7946): tracks, switches, lamps, devices, balises, base stations and stations, for maps
     Geojson {
         /// Tunnel file with a [datum]
         #[arg(value_name = "TUNNEL")]
@@ -51,46 +51,59 @@ pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
     print(&serde_json::to_string(&collection).map_err(Failure::run)?)
 }
 
-/// What stands on the map, the centreline first.
+/// What stands on the map: of every track its centreline first; then the switches.
 fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
-    let line = &tunnel.alignment;
-    let position = |world: &Point3<f64>| {
-        let place = datum.geodetic(world);
-        json!([place.longitude_deg, place.latitude_deg, place.height_m])
-    };
-    let feature = |shape: &str, coordinates: Value, properties: Value| {
-        json!({
-            "type": "Feature",
-            "geometry": { "type": shape, "coordinates": coordinates },
-            "properties": properties,
-        })
-    };
+    let network = &tunnel.network;
+    let tracks = network.tracks.iter();
+    let of_tracks = tracks.flat_map(|track| of_track(track, datum));
+    let switches = network.switches.iter().filter_map(|switch| {
+        let toe = network.leaving(switch.toe)?.origin;
+        let properties = json!({ "kind": "switch", "name": switch.name });
+        Some(feature("Point", position(datum, &toe), properties))
+    });
+    of_tracks.chain(switches).collect()
+}
+
+fn feature(shape: &str, coordinates: Value, properties: Value) -> Value {
+    json!({
+        "type": "Feature",
+        "geometry": { "type": shape, "coordinates": coordinates },
+        "properties": properties,
+    })
+}
+
+fn position(datum: &Datum, world: &Point3<f64>) -> Value {
+    let place = datum.geodetic(world);
+    json!([place.longitude_deg, place.latitude_deg, place.height_m])
+}
+
+fn of_track(track: &Track, datum: &Datum) -> Vec<Value> {
+    let line = &track.alignment;
     let steps = (line.length_m() / STEP_M).ceil().max(1.0);
-    let stations = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
-    let course: Vec<_> = stations.map(|s_m| position(&line.at(s_m).origin)).collect();
-    let course = feature(
-        "LineString",
-        json!(course),
-        json!({ "kind": "track", "name": tunnel.name, "length_m": line.length_m() }),
-    );
+    let chainages = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
+    let course = chainages.map(|s_m| position(datum, &line.at(s_m).origin));
+    let course: Vec<_> = course.collect();
+    let properties = json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let course = feature("LineString", json!(course), properties);
     let point = |kind: &str, name: &str, [s_m, l_m, h_m]: [f64; 3]| {
         let world = line.world_from_track(TrackPoint { s_m, l_m, h_m });
-        let properties = json!({ "kind": kind, "name": name, "chainage_m": s_m });
-        feature("Point", position(&world), properties)
+        let properties =
+            json!({ "kind": kind, "name": name, "track": track.name, "chainage_m": s_m });
+        feature("Point", position(datum, &world), properties)
     };
-    let lamps = tunnel.lamps.iter().map(|lamp| {
+    let lamps = track.lamps.iter().map(|lamp| {
         let at = [lamp.chainage_m, lamp.lateral_m, lamp.height_m];
         point("lamp", &lamp.uid.to_string(), at)
     });
-    let wayside = (tunnel.wayside.iter()).map(|site| {
+    let wayside = (track.wayside.iter()).map(|site| {
         let at = [site.chainage_m, site.lateral_m, site.height_m];
         point("wayside", &site.name, at)
     });
     let on_line = |kind, name, s_m| point(kind, name, [s_m, 0.0, 0.0]);
-    let balises = (tunnel.balises.iter()).map(|b| on_line("balise", &b.name, b.chainage_m));
-    let bases = tunnel.base_stations.iter();
+    let balises = (track.balises.iter()).map(|b| on_line("balise", &b.name, b.chainage_m));
+    let bases = track.base_stations.iter();
     let bases = bases.map(|b| on_line("base_station", &b.name, b.chainage_m));
-    let stations = (tunnel.stations.iter()).map(|s| on_line("station", &s.name, s.chainage_m));
+    let stations = (track.stations.iter()).map(|s| on_line("station", &s.name, s.chainage_m));
     let points = lamps
         .chain(wayside)
         .chain(balises)
@@ -117,11 +130,12 @@ mod tests {
             of_kind.count()
         };
         assert_eq!(of("track"), 1);
-        assert_eq!(of("lamp"), tunnel.lamps.len());
-        assert_eq!(of("balise"), tunnel.balises.len());
+        let track = tunnel.first_track();
+        assert_eq!(of("lamp"), track.lamps.len());
+        assert_eq!(of("balise"), track.balises.len());
         assert_eq!(
             of("wayside") + of("station"),
-            tunnel.wayside.len() + tunnel.stations.len()
+            track.wayside.len() + track.stations.len()
         );
         let line = features[0]["geometry"]["coordinates"].as_array().unwrap();
         let degrees: Vec<[f64; 2]> = line

@@ -85,7 +85,7 @@ impl<'a> Devices<'a> {
         if self.views.is_empty() {
             return None;
         }
-        let line = &self.scenario.tunnel.alignment;
+        let line = &self.scenario.tunnel.first_track().alignment;
         let is_unseen = |o: &&ObstacleSettings| {
             let mut moves = o.velocity_mps.iter().chain(&o.spin_rad_s);
             let stays = moves.all(|v| v.abs() <= 0.0);
@@ -106,7 +106,7 @@ impl<'a> Devices<'a> {
     /// What lies before a wayside camera while it learns what the clear track looks like.
     fn in_the_reference(&self) -> Option<String> {
         let detection = &self.scenario.file.stack.wayside;
-        let line = &self.scenario.tunnel.alignment;
+        let line = &self.scenario.tunnel.first_track().alignment;
         let early = |o: &&ObstacleSettings| {
             self.views.iter().any(|(post, view)| {
                 let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
@@ -164,7 +164,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
         return None;
     }
     let [from_m, to_m] = way_m(onboard, scenario)?;
-    let balises = &scenario.tunnel.balises;
+    let balises = &scenario.tunnel.first_track().balises;
     let meets_balise = (balises.iter()).any(|b| (from_m..=to_m).contains(&b.chainage_m));
     let key = match onboard.train {
         0 => "stack.protection",
@@ -194,7 +194,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
 fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
     onboard.rig.as_ref()?;
     let [from_m, to_m] = way_m(onboard, scenario)?;
-    let lamps = &scenario.tunnel.lamps;
+    let lamps = &scenario.tunnel.first_track().lamps;
     let (first, last) = (lamps.first()?, lamps.last()?);
     let passes = lamps
         .iter()
@@ -218,7 +218,7 @@ fn way_m(onboard: &OnboardSettings, scenario: &Scenario) -> Option<[f64; 2]> {
     Some(match train.direction {
         Direction::Up => [
             start_m,
-            stop_m.unwrap_or(scenario.tunnel.alignment.length_m()),
+            stop_m.unwrap_or(scenario.tunnel.first_track().alignment.length_m()),
         ],
         Direction::Down => [stop_m.unwrap_or(0.0), start_m],
     })

@@ -4,7 +4,7 @@ use super::tunnel::indented;
 use crate::bus::{CameraModel, RigCalibration, TrainId};
 use crate::scenario::sampling::Template;
 use crate::scenario::{OnboardSettings, Scenario};
-use crate::track::{Direction, Tunnel};
+use crate::track::{Direction, Track};
 use crate::twin::physics::VehicleFile;
 use crate::twin::sensors::visible_interval;
 
@@ -110,7 +110,10 @@ fn rig(onboard: &OnboardSettings, scenario: &Scenario) -> Vec<String> {
     vec![
         format!("{name}: {}", frames(&calibration.left, rig.pairs_per_s)),
         format!("{name}: {}", view(&calibration, onboard, scenario)),
-        format!("{name}: {}", stripes(&calibration.left, &scenario.tunnel)),
+        format!(
+            "{name}: {}",
+            stripes(&calibration.left, scenario.tunnel.first_track())
+        ),
         format!("{name}: about {pairs:.0} pairs of images"),
     ]
 }
@@ -133,11 +136,11 @@ fn frames(camera: &CameraModel, per_s: f64) -> String {
 
 /// Visible interval of the lamp in the middle, and how it changes along the line.
 fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) -> String {
-    let tunnel = &*onboard.seen_from_rig(&scenario.tunnel);
-    let seen = tunnel
+    let track = &*onboard.seen_from_rig(scenario.tunnel.first_track());
+    let seen = track
         .lamps
         .iter()
-        .filter_map(|lamp| visible_interval(rig, tunnel, lamp));
+        .filter_map(|lamp| visible_interval(rig, track, lamp));
     let (mut near, mut far): (Vec<f64>, Vec<f64>) = seen.unzip();
     near.sort_by(f64::total_cmp);
     far.sort_by(f64::total_cmp);
@@ -148,7 +151,7 @@ fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) ->
         (_, Some(middle), _) => format!("{middle:.1} m"),
         _ => "nowhere".to_owned(),
     };
-    let unseen = match tunnel.lamps.len() - near.len() {
+    let unseen = match track.lamps.len() - near.len() {
         0 => String::new(),
         n => format!("; {n} lamps never"),
     };
@@ -170,9 +173,9 @@ fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) ->
 }
 
 /// How the lamps' code meets the shutter.
-fn stripes(camera: &CameraModel, tunnel: &Tunnel) -> String {
+fn stripes(camera: &CameraModel, track: &Track) -> String {
     let shutter = camera.shutter;
-    match tunnel.lamps.first() {
+    match track.lamps.first() {
         Some(lamp) if shutter.line_time_s > 0.0 => format!(
             "a chip of {:.1} us makes a stripe of {:.2} rows; a row is exposed for {:.2} of a chip",
             lamp.chip_s * 1e6,

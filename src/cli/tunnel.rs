@@ -1,15 +1,41 @@
 //! What a tunnel file says, in a few lines.
 
 use crate::settings::{LONGEST_KEY, shortened};
-use crate::track::Tunnel;
+use crate::track::network::Network;
+use crate::track::{Track, Tunnel};
 
-/// Length, radii, grades, sections, lamps, devices.
+/// Of a tunnel with one track, its length, radii, grades, sections, lamps, devices; of a network, that of each
+/// track.
 pub(super) fn report(tunnel: &Tunnel) -> String {
-    let length_m = tunnel.alignment.length_m();
+    let Network {
+        tracks, switches, ..
+    } = &tunnel.network;
+    let head = format!("tunnel `{}`, line {}", tunnel.name, tunnel.line_number);
+    if let [track] = &tracks[..] {
+        let (length, lines) = of_track(track);
+        return indented(&[vec![format!("{head}: {length}")], lines].concat());
+    }
+    let length_m: f64 = tracks.iter().map(|t| t.alignment.length_m()).sum();
+    let (tracks_count, switches) = (tracks.len(), switches.len());
+    let mut text = indented(&[format!(
+        "{head}: {tracks_count} tracks, {length_m:.1} m, {switches} switches"
+    )]);
+    for track in tracks {
+        let (length, lines) = of_track(track);
+        let name = shortened(&track.name, LONGEST_KEY);
+        text += &indented(&[format!("track `{name}`: {length}")]);
+        text += &indented(&lines.iter().map(|l| format!("  {l}")).collect::<Vec<_>>());
+    }
+    text
+}
+
+/// Length and radii, and all else.
+fn of_track(track: &Track) -> (String, Vec<String>) {
+    let length_m = track.alignment.length_m();
     let mut tightest = 0.0f64;
     let (mut lowest, mut steepest) = (f64::INFINITY, f64::NEG_INFINITY);
     for s in 0..=length_m as u32 {
-        let frame = tunnel.alignment.at(f64::from(s));
+        let frame = track.alignment.at(f64::from(s));
         tightest = tightest.max(frame.curvature_per_m.abs());
         lowest = lowest.min(frame.slope * 1e3);
         steepest = steepest.max(frame.slope * 1e3);
@@ -18,25 +44,21 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
         true => "straight".to_owned(),
         false => format!("tightest radius {:.0} m", 1.0 / tightest),
     };
-    let mut lines = vec![
-        format!(
-            "tunnel `{}`, line {}: {length_m:.1} m, {plan}",
-            tunnel.name, tunnel.line_number
-        ),
-        format!("grades from {lowest:.1} to {steepest:.1} permille"),
-        format!("{} stretches of cross-section", tunnel.sections.len()),
-        lamps(tunnel),
-    ];
-    let devices = tunnel.wayside.iter().map(|d| {
+    let devices = track.wayside.iter().map(|d| {
         let at = place(&d.name, d.chainage_m);
         format!("{at}, writes to balise {}", d.balise)
     });
-    let balises = tunnel.balises.iter().map(|b| place(&b.name, b.chainage_m));
-    let stations = tunnel.stations.iter().map(|s| place(&s.name, s.chainage_m));
-    lines.push(named("wayside devices", devices.collect()));
-    lines.push(named("balises", balises.collect()));
-    lines.push(named("stations", stations.collect()));
-    indented(&lines)
+    let balises = track.balises.iter().map(|b| place(&b.name, b.chainage_m));
+    let stations = track.stations.iter().map(|s| place(&s.name, s.chainage_m));
+    let lines = vec![
+        format!("grades from {lowest:.1} to {steepest:.1} permille"),
+        format!("{} stretches of cross-section", track.sections.len()),
+        lamps(track),
+        named("wayside devices", devices.collect()),
+        named("balises", balises.collect()),
+        named("stations", stations.collect()),
+    ];
+    (format!("{length_m:.1} m, {plan}"), lines)
 }
 
 fn place(name: &str, chainage_m: f64) -> String {
@@ -58,17 +80,17 @@ fn named(what: &str, list: Vec<String>) -> String {
 
 const MOST_LISTED: usize = 20;
 
-fn lamps(tunnel: &Tunnel) -> String {
-    match (tunnel.lamps.first(), tunnel.lamps.last()) {
+fn lamps(track: &Track) -> String {
+    match (track.lamps.first(), track.lamps.last()) {
         (Some(first), Some(last)) => {
-            let gaps = tunnel
+            let gaps = track
                 .lamps
                 .windows(2)
                 .map(|w| w[1].chainage_m - w[0].chainage_m);
             let widest = gaps.fold(0.0, f64::max);
             format!(
                 "{} lamps from {} to {} m, at most {widest:.1} m apart; chips of {:.1} us, {:?} code",
-                tunnel.lamps.len(),
+                track.lamps.len(),
                 first.chainage_m,
                 last.chainage_m,
                 first.chip_s * 1e6,

@@ -226,7 +226,7 @@ fn world(contents: &Contents, (position, target): ([f32; 3], [f32; 3])) -> Pane 
     if contents.head() {
         eye = eye.with_tracking_entity(scene::HEAD);
     }
-    Pane::new("3D", "Tunnel", "world")
+    Pane::new("3D", "Track", "world")
         .with("EyeControls3D", eye)
         .with("LineGrid3D", LineGrid3D::new().with_visible(false))
         .with(

@@ -7,7 +7,7 @@ use super::whole_files::Result;
 use crate::scenario::RecordSettings;
 use crate::session::Opening;
 use crate::track::uid::Uid;
-use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Tunnel};
+use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Track};
 use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::{
     Boxes3D, LineStrips3D, Mesh3D, Points3D, Transform3D, ViewCoordinates,
@@ -36,7 +36,7 @@ pub(super) struct RecordedScene {
 
 impl RecordedScene {
     /// Of a line.
-    pub(super) fn new(tunnel: &Tunnel) -> Self {
+    pub(super) fn new(tunnel: &Track) -> Self {
         let alignment = tunnel.alignment.clone();
         let middle = alignment.at(alignment.length_m() / 2.0).origin;
         Self {
@@ -97,7 +97,7 @@ impl RecordedScene {
         Ok(())
     }
 
-    fn log_tunnel(&self, stream: &RowStream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
+    fn log_tunnel(&self, stream: &RowStream, tunnel: &Track, ring_step_m: f64) -> Result {
         let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
         let mut mesh = Sweep::default();
         for range in &tunnel.sections {
@@ -118,7 +118,7 @@ impl RecordedScene {
         stream.log_static("world/rails", &rails)
     }
 
-    fn log_lamps_and_balises(&self, stream: &RowStream, tunnel: &Tunnel) -> Result {
+    fn log_lamps_and_balises(&self, stream: &RowStream, tunnel: &Track) -> Result {
         let lamps = &tunnel.lamps;
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))

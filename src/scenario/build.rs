@@ -6,7 +6,7 @@ use super::parts::{Parts, all_errors, read};
 use super::{Override, ScenarioError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
-use crate::track::{Direction, Tunnel};
+use crate::track::{Direction, Track, Tunnel};
 use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
 use std::borrow::Cow;
@@ -45,9 +45,9 @@ impl OnboardSettings {
         self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
     }
 
-    /// A tunnel as the rig's cab looks along it.
-    pub fn seen_from_rig<'t>(&self, tunnel: &'t Tunnel) -> Cow<'t, Tunnel> {
-        tunnel.along(self.rig_end().looks(self.direction))
+    /// A track as the rig's cab looks along it.
+    pub fn seen_from_rig<'t>(&self, track: &'t Track) -> Cow<'t, Track> {
+        track.along(self.rig_end().looks(self.direction))
     }
 
     /// Its speed is supervised.
@@ -174,7 +174,11 @@ impl Scenario {
                 .iter()
                 .any(|post| post.calibration.name == name)
         };
-        map.wayside.retain(|site| in_use(&site.name));
+        for track in &mut map.network.tracks {
+            Arc::make_mut(track)
+                .wayside
+                .retain(|site| in_use(&site.name));
+        }
         Arc::new(map)
     }
 
@@ -185,7 +189,7 @@ impl Scenario {
         mut problems: Vec<Problem>,
     ) -> Result<Self, FileError> {
         let mut check = Checker::new("", &mut problems);
-        let wayside = check::in_tunnel(&file, &tunnel, &mut check);
+        let wayside = check::in_tunnel(&file, tunnel.first_track(), &mut check);
         check_history(&file, &mut check);
         if !problems.is_empty() {
             return Err(FileError::Problems(problems));

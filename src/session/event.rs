@@ -4,7 +4,7 @@ use crate::bus::{
     CameraFault, Frame, LedReport, Message, Node, RigCalibration, SimTime, StereoPair, TrainId,
     WaysideCalibration, WaysideReport,
 };
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, TrainState};
 use crate::twin::render::Job;
@@ -18,7 +18,7 @@ pub struct Opening<'a> {
     /// Seed of the run.
     pub seed: u64,
     /// The line.
-    pub tunnel: &'a Tunnel,
+    pub tunnel: &'a Track,
     /// Trains with equipment, and the rig of a bench.
     pub trains: &'a [TrainOpening],
     /// Wayside devices in use.

@@ -10,7 +10,7 @@ use crate::stack::Equipment;
 use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
 use crate::stack::wayside::WaysideDetection;
-use crate::track::{Direction, TrackRoute, Tunnel};
+use crate::track::{Direction, Track, TrackRoute};
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
@@ -94,7 +94,7 @@ impl Fitting {
         let node = Node::Train(train);
         if scenario.file.bench.is_none() {
             self.add_motion_sensors(onboard, &node, seed);
-            let antenna = BaliseAntenna::new(train, scenario.tunnel.clone(), world);
+            let antenna = BaliseAntenna::new(train, scenario.tunnel.first_track().clone(), world);
             self.add_sensor(node.clone(), antenna);
         }
         if let Some(rig) = &onboard.rig {
@@ -139,7 +139,7 @@ impl Fitting {
         let node = Node::Post(name.clone());
         if let (Some(settings), Some(pose)) = (&post.lidar, post.actual.world_from_lidar) {
             let stream = Stream::new(scenario.file.seed, 0, &format!("wayside_lidar/{name}"));
-            let lidar = Lidar::new(settings, &scenario.tunnel, &pose, stream);
+            let lidar = Lidar::new(settings, scenario.tunnel.first_track(), &pose, stream);
             let delay_s = 1e-3 * scenario.file.stack.latency_ms;
             let lidar = WaysideLidar::new(lidar, delay_s);
             self.add_sensor(node.clone(), lidar);
@@ -193,16 +193,18 @@ fn one_of_onboard(
 
 /// The surveyed map, as trains meet it that run up or down the line.
 pub struct Maps {
-    up: Arc<Tunnel>,
+    up: Arc<Track>,
 }
 
 impl Maps {
     /// Of a scenario's line.
     pub fn new(scenario: &Scenario) -> Self {
-        Self { up: scenario.map() }
+        Self {
+            up: scenario.map().first_track().clone(),
+        }
     }
 
-    fn of(&self, direction: Direction) -> (TrackRoute, Arc<Tunnel>) {
+    fn of(&self, direction: Direction) -> (TrackRoute, Arc<Track>) {
         let map = match direction {
             Direction::Up => self.up.clone(),
             Direction::Down => Arc::new(self.up.reversed()),

@@ -168,14 +168,14 @@ pub fn renderer(
 
 /// What stands still in a scenario.
 pub fn scene(scenario: &Scenario) -> Scene {
-    let tunnel = scenario.tunnel.clone();
-    let lamps = lamps::shining(&tunnel, &scenario.file.faults.lamps, scenario.file.seed);
+    let track = scenario.tunnel.first_track().clone();
+    let lamps = lamps::shining(&track, &scenario.file.faults.lamps, scenario.file.seed);
     let everywhere = f64::NEG_INFINITY..f64::INFINITY;
     let zones = scenario.physics.track.rail_zones.iter();
     let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));
     let rails = std::iter::once((everywhere, scenario.physics.track.rail)).chain(zones);
     Scene {
-        tunnel,
+        track,
         lamps,
         air: scenario.file.air.air(),
         wet: Wet {

@@ -139,13 +139,12 @@ mod tests {
     use crate::bus::TrainCommand;
     use crate::track::Tunnel;
     use crate::twin::physics::{ObstacleSettings, PhysicsSettings, TrainSettings};
-    use std::sync::Arc;
 
     /// Fails where a train that is held, or braked for want of a position, braked for an obstacle.
     #[test]
     fn only_a_running_train_brakes_for_an_obstacle() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
         for (start_speed_kmh, authority_end_m, braked) in [
             (40.0, Some(200.0), true),
             (40.0, None, false),
@@ -192,7 +191,7 @@ mod tests {
     #[test]
     fn every_run_has_a_closest_approach() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
         let train = TrainSettings {
             start_chainage_m: 150.0,
             start_speed_kmh: 40.0,
@@ -252,7 +251,7 @@ mod tests {
     #[test]
     fn the_margin_is_to_what_is_in_the_way() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
         let lying = |chainage_m, lateral_m| ObstacleSettings {
             chainage_m,
             lateral_m,

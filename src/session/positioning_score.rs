@@ -4,7 +4,7 @@ use super::cost_tally::CostTally;
 use super::summary::{ErrorStatistics, Positioning};
 use crate::bus::{Identity, Intrinsics, LedReport, Method, PositionFix, SimTime};
 use crate::track::uid::Uid;
-use crate::track::{Direction, Tunnel};
+use crate::track::{Direction, Track};
 use nalgebra::{Isometry3, Point2, Point3};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -36,7 +36,7 @@ impl RigPlace {
 /// Scores positioning.
 #[derive(Debug)]
 pub struct PositioningScore {
-    tunnel: Arc<Tunnel>,
+    tunnel: Arc<Track>,
     methods: BTreeMap<Method, Errors>,
     named: BTreeSet<Uid>,
     pairs: u32,
@@ -47,7 +47,7 @@ pub struct PositioningScore {
 
 impl PositioningScore {
     /// Of a run on `tunnel` with these methods.
-    pub fn new(tunnel: Arc<Tunnel>, methods: &[Method]) -> Self {
+    pub fn new(tunnel: Arc<Track>, methods: &[Method]) -> Self {
         Self {
             tunnel,
             methods: methods.iter().map(|m| (*m, Errors::default())).collect(),

@@ -58,7 +58,7 @@ impl FieldOfView {
         if scenario.wayside.is_empty() {
             return Vec::new();
         }
-        let walls = Arc::new(TunnelCaster::new(&scenario.tunnel));
+        let walls = Arc::new(TunnelCaster::new(scenario.tunnel.first_track()));
         let posts = scenario.wayside.iter();
         posts.map(|post| Self::new(walls.clone(), post)).collect()
     }

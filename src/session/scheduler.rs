@@ -81,10 +81,15 @@ impl<'s, 'o> Session<'s, 'o> {
         observers: &'s mut [&'o mut dyn Observer],
     ) -> Result<Self, SessionError> {
         let seed = scenario.file.seed;
-        let world = World::new(scenario.tunnel.clone(), &scenario.physics, seed, 0)?;
+        let world = World::new(
+            scenario.tunnel.first_track().clone(),
+            &scenario.physics,
+            seed,
+            0,
+        )?;
         let mut fitting = Fitting::new(scenario, &world);
         add(&mut fitting);
-        let stations = &scenario.tunnel.base_stations;
+        let stations = &scenario.tunnel.first_track().base_stations;
         let radio = Stream::new(seed, 0, "radio");
         let links = Links::new(&scenario.file.radio, stations, fitting.nodes(), radio);
         let latency_ms = match scenario.file.bench {
@@ -269,7 +274,7 @@ impl<'s, 'o> Session<'s, 'o> {
             train,
         }))?;
         if let Source::Wayside(post) = source {
-            let line = &self.scenario.tunnel.alignment;
+            let line = &self.scenario.tunnel.first_track().alignment;
             self.posts.expose(post, header.number, &self.world, line);
         }
         let pending = Pending {

@@ -27,7 +27,7 @@ impl Session<'_, '_> {
         let opening = Opening {
             scenario: &self.scenario.file.name,
             seed: self.scenario.file.seed,
-            tunnel: &self.scenario.tunnel,
+            tunnel: self.scenario.tunnel.first_track(),
             trains: &trains,
             wayside: &calibrations,
         };
@@ -138,7 +138,7 @@ impl Session<'_, '_> {
 
     pub(super) fn show_truth(&mut self, now: SimTime) -> Result<(), SessionError> {
         if self.truth_ticker.due(now, 0.0).is_some() {
-            let (world, line) = (&self.world, &self.scenario.tunnel.alignment);
+            let (world, line) = (&self.world, &self.scenario.tunnel.first_track().alignment);
             for (id, score) in &mut self.trains {
                 if let Some(truth) = world.train(*id) {
                     score.on_motion(&truth, world, line);

@@ -37,9 +37,9 @@ impl TrainScore {
     pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&OnboardSettings>) -> Self {
         let train = scenario.physics.trains.get(id.index());
         let rig = onboard.and_then(|onboard| onboard.rig.as_ref());
-        let positioning = onboard
-            .filter(|o| o.positions())
-            .map(|onboard| PositioningScore::new(scenario.tunnel.clone(), &onboard.led.methods));
+        let positioning = onboard.filter(|o| o.positions()).map(|onboard| {
+            PositioningScore::new(scenario.tunnel.first_track().clone(), &onboard.led.methods)
+        });
         let eyes = EYES.into_iter().filter(|_| positioning.is_some());
         Self {
             id,

@@ -2,7 +2,7 @@
 //! its lamps, devices and balises are. Knows the settings room alone.
 //!
 //! ```
-//! use metrotwin::track::Tunnel;
+//! use metrotwin::track::Track;
 //!
 //! let tunnel = Tunnel::from_toml(
 //!     r#"
@@ -28,8 +28,9 @@
 //!     spacing_m = 10.0
 //!     "#,
 //! )?;
-//! assert_eq!(tunnel.lamps.len(), 36);
-//! assert!((tunnel.alignment.at(200.0).curvature_per_m - 1.0 / 500.0).abs() < 1e-15);
+//! let track = tunnel.first_track();
+//! assert_eq!(track.lamps.len(), 36);
+//! assert!((track.alignment.at(200.0).curvature_per_m - 1.0 / 500.0).abs() < 1e-15);
 //! # Ok::<(), metrotwin::settings::FileError>(())
 //! ```
 //!
@@ -57,6 +58,7 @@ mod place;
 mod reversal;
 mod section;
 mod track_route;
+mod tunnel;
 pub mod uid;
 pub mod waveform;
 
@@ -70,15 +72,14 @@ pub use section::{
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
 pub use track_route::TrackRoute;
+pub use tunnel::Tunnel;
 
-/// A tunnel, checked and ready to use.
+/// One track: where it runs, what it lies in, and what stands along it.
 #[derive(Clone, Debug)]
-pub struct Tunnel {
-    /// Short name, as in the file.
+pub struct Track {
+    /// As on the map.
     pub name: String,
-    /// Where the world is on the earth, if that is known.
-    pub datum: Option<geodesy::Datum>,
-    /// Where the track runs.
+    /// Its centreline.
     pub alignment: Alignment,
     /// What stands around it, in order of chainage, without gaps.
     pub sections: Vec<SectionRange>,
@@ -90,15 +91,28 @@ pub struct Tunnel {
     pub balises: Vec<Balise>,
     /// Radio base stations.
     pub base_stations: Vec<BaseStation>,
-    /// Line number, the first part of every lamp's UID.
-    pub line_number: u8,
     /// Where trains stop.
     pub stations: Vec<StoppingPlace>,
     /// Light that reaches every surface after many reflections, lux.
     pub ambient_lx: f64,
 }
 
-impl Tunnel {
+impl Track {
+    /// A track with nothing around it, in the dark.
+    pub fn bare(name: &str, alignment: Alignment) -> Self {
+        Self {
+            name: name.to_owned(),
+            alignment,
+            sections: Vec::new(),
+            lamps: Vec::new(),
+            wayside: Vec::new(),
+            balises: Vec::new(),
+            base_stations: Vec::new(),
+            stations: Vec::new(),
+            ambient_lx: 0.0,
+        }
+    }
+
     /// The cross-section at a chainage; the first and the last one go on beyond the ends.
     pub fn section_at(&self, s_m: f64) -> Option<&CrossSection> {
         let k = self.sections.partition_point(|r| r.to_m <= s_m);

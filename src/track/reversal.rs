@@ -1,14 +1,14 @@
-//! A tunnel as met by who runs down the line: chainage counts from its end, its left is right. What
+//! A track as met by who runs down the line: chainage counts from its end, its left is right. What
 //! stands in it stays where it is in the world.
 
 use super::{
     Balise, BaseStation, CrossSection, Direction, LampSite, OutlinePoint, SectionRange,
-    StoppingPlace, Tunnel, WaysideSite,
+    StoppingPlace, Track, WaysideSite,
 };
 use std::borrow::Cow;
 
-impl Tunnel {
-    /// The tunnel as met in a direction.
+impl Track {
+    /// The track as met in a direction.
     pub fn along(&self, direction: Direction) -> Cow<'_, Self> {
         match direction {
             Direction::Up => Cow::Borrowed(self),
@@ -16,10 +16,10 @@ impl Tunnel {
         }
     }
 
-    /// The tunnel in the other direction.
+    /// The track in the other direction.
     ///
     /// ```
-    /// # use metrotwin::track::Tunnel;
+    /// # use metrotwin::track::Track;
     /// let tunnel = Tunnel::from_toml(include_str!("../../tunnels/test_bench.toml"))?;
     /// let reversed = tunnel.reversed();
     /// let (lamp, same) = (&tunnel.lamps[0], &reversed.lamps[tunnel.lamps.len() - 1]);
@@ -50,7 +50,6 @@ impl Tunnel {
         };
         Self {
             name: self.name.clone(),
-            datum: self.datum,
             alignment: self.alignment.reversed(),
             sections: backwards(&self.sections, |range| SectionRange {
                 from_m: from_end(range.to_m),
@@ -65,7 +64,6 @@ impl Tunnel {
             wayside: sorted(&self.wayside, turned_site, |site| site.chainage_m),
             balises: sorted(&self.balises, turned_balise, |balise| balise.chainage_m),
             base_stations: sorted(&self.base_stations, turned_base, |base| base.chainage_m),
-            line_number: self.line_number,
             stations: sorted(&self.stations, turned_station, |stop| stop.chainage_m),
             ambient_lx: self.ambient_lx,
         }
@@ -104,17 +102,19 @@ impl CrossSection {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::track::TrackPoint;
+    use crate::track::{TrackPoint, Tunnel};
+    use std::sync::Arc;
 
-    fn tunnel() -> Tunnel {
-        Tunnel::from_toml(include_str!("../../tunnels/chengdu_line1.toml")).unwrap()
+    fn track() -> Arc<Track> {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        Tunnel::from_toml(text).unwrap().first_track().clone()
     }
 
-    /// Provokes: a lamp or device that is elsewhere, or looks elsewhere, in the reversed tunnel, or a
+    /// Provokes: a lamp or device that is elsewhere, or looks elsewhere, in the reversed track, or a
     /// list that does not ascend.
     #[test]
     fn all_stays_where_it_is() {
-        let (tunnel, reversed) = (tunnel(), tunnel().reversed());
+        let (track, reversed) = (track(), track().reversed());
         let line = &reversed.alignment;
         let ascending = |list: Vec<f64>| list.windows(2).all(|pair| pair[0] <= pair[1]);
         for lamp in &reversed.lamps {
@@ -124,10 +124,10 @@ mod tests {
                 h_m: lamp.height_m,
             });
             assert!((place - lamp.centre).norm() < 1e-9, "{}", lamp.uid);
-            assert_eq!(tunnel.lamp(lamp.uid).unwrap().facing, lamp.facing);
+            assert_eq!(track.lamp(lamp.uid).unwrap().facing, lamp.facing);
         }
-        assert_eq!(tunnel.lamps.len(), reversed.lamps.len());
-        for site in &tunnel.wayside {
+        assert_eq!(track.lamps.len(), reversed.lamps.len());
+        for site in &track.wayside {
             let same = reversed.wayside.iter().find(|s| s.name == site.name);
             let axis = |line: &crate::track::Alignment, site: &WaysideSite| {
                 let heading = line.at(site.chainage_m).heading_rad + site.yaw_deg.to_radians();
@@ -138,7 +138,7 @@ mod tests {
                 };
                 (line.world_from_track(place), heading.cos(), heading.sin())
             };
-            let (a, b) = (axis(&tunnel.alignment, site), axis(line, same.unwrap()));
+            let (a, b) = (axis(&track.alignment, site), axis(line, same.unwrap()));
             assert!((a.0 - b.0).norm() < 1e-9 && (a.1 - b.1).hypot(a.2 - b.2) < 1e-9);
         }
         assert!(ascending(
@@ -151,20 +151,20 @@ mod tests {
             reversed.stations.iter().map(|s| s.chainage_m).collect()
         ));
         let length_m = line.length_m();
-        for balise in &tunnel.balises {
+        for balise in &track.balises {
             let same = reversed.balise(&balise.name).unwrap();
             assert!((same.chainage_m + balise.chainage_m - length_m).abs() < 1e-9);
         }
-        assert!(!tunnel.balises.is_empty() && !tunnel.base_stations.is_empty());
+        assert!(!track.balises.is_empty() && !track.base_stations.is_empty());
     }
 
     /// Provokes: an outline that is not mirrored, runs the wrong way round, has the material of a
     /// neighbouring edge, or stands at another chainage.
     #[test]
     fn sections_are_mirrored() {
-        let (tunnel, reversed) = (tunnel(), tunnel().reversed());
-        let length_m = tunnel.alignment.length_m();
-        for range in &tunnel.sections {
+        let (track, reversed) = (track(), track().reversed());
+        let length_m = track.alignment.length_m();
+        for range in &track.sections {
             let middle_m = 0.5 * (range.from_m + range.to_m);
             let mirrored = reversed.section_at(length_m - middle_m).unwrap();
             assert_eq!(mirrored.mirrored(), range.section);

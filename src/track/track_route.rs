@@ -4,7 +4,7 @@
 //! its driver, its equipment and the physics under it. [`TrackRoute`] goes between that and the chainage
 //! of the track, which is what trains, posts and people tell each other.
 
-use super::{Direction, Place, TrackId, Tunnel};
+use super::{Direction, Place, Track, TrackId};
 
 /// The whole of one track, run in one direction.
 ///
@@ -25,12 +25,12 @@ pub struct TrackRoute {
 }
 
 impl TrackRoute {
-    /// Over the track of a tunnel.
-    pub fn new(tunnel: &Tunnel, direction: Direction) -> Self {
+    /// Over a track.
+    pub fn new(track: &Track, direction: Direction) -> Self {
         Self {
             track: TrackId::default(),
             direction,
-            length_m: tunnel.alignment.length_m(),
+            length_m: track.alignment.length_m(),
         }
     }
 

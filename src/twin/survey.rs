@@ -20,7 +20,8 @@
 
 use super::random::Stream;
 use crate::settings::settings;
-use crate::track::{TrackPoint, Tunnel};
+use crate::track::{Track, TrackPoint, Tunnel};
+use std::sync::Arc;
 
 /// Distance of the control points.
 const CONTROL_M: f64 = 120.0;
@@ -51,11 +52,19 @@ impl SurveySettings {
     /// The map of a tunnel as it was surveyed, with the errors of a run's seed.
     pub fn map(&self, tunnel: &Tunnel, seed: u64) -> Tunnel {
         let mut map = tunnel.clone();
+        for track in &mut map.network.tracks {
+            *track = Arc::new(self.track(track, seed));
+        }
+        map
+    }
+
+    fn track(&self, track: &Track, seed: u64) -> Track {
+        let mut map = track.clone();
         let controls = Stream::new(seed, 0, "survey/control points");
         let cants = Stream::new(seed, 0, "survey/cant");
         if self.cant_sigma_mm > 0.0 {
             let more_m = |s_m| 1e-3 * self.cant_sigma_mm * between_controls(&cants, s_m);
-            map.alignment = tunnel.alignment.canted_more(more_m);
+            map.alignment = track.alignment.canted_more(more_m);
         }
         for balise in &mut map.balises {
             let stream = Stream::new(seed, 0, &format!("survey/{}", balise.name));
@@ -98,19 +107,20 @@ mod tests {
         balise_sigma_m: 0.0,
     };
 
-    fn line() -> Tunnel {
-        Tunnel::from_toml(include_str!("../../tunnels/chengdu_line1.toml")).unwrap()
+    fn line() -> Track {
+        let text = include_str!("../../tunnels/chengdu_line1.toml");
+        Track::clone(Tunnel::from_toml(text).unwrap().first_track())
     }
 
     /// Fails where an axis is swapped or drawn with another sigma, and where the centre and the
     /// coordinates of a lamp part.
     #[test]
     fn errors_are_as_set() {
-        let tunnel = line();
-        let map = SETTINGS.map(&tunnel, 1);
+        let track = line();
+        let map = SETTINGS.track(&track, 1);
         let mut squares = [0.0; 3];
-        for (is, said) in tunnel.lamps.iter().zip(&map.lamps) {
-            let seen = (tunnel.alignment).track_from_world(&said.centre, is.chainage_m);
+        for (is, said) in track.lamps.iter().zip(&map.lamps) {
+            let seen = (track.alignment).track_from_world(&said.centre, is.chainage_m);
             assert!((seen.s_m - said.chainage_m).abs() < 1e-6);
             let errors = [
                 seen.s_m - is.chainage_m,
@@ -121,7 +131,7 @@ mod tests {
                 *sum += error * error;
             }
         }
-        let n = tunnel.lamps.len() as f64;
+        let n = track.lamps.len() as f64;
         for (square, sigma) in squares.into_iter().zip([0.015, 0.010, 0.005]) {
             // The rms of n normal errors is good to sigma / sqrt(2 n).
             let off = (square / n).sqrt() / sigma - 1.0;
@@ -133,7 +143,7 @@ mod tests {
     /// is off by some millimetres, and balises are off.
     #[test]
     fn control_points_cant_and_balises_have_errors() {
-        let tunnel = line();
+        let track = line();
         let settings = SurveySettings {
             control_sigma_m: 0.05,
             cant_sigma_mm: 4.0,
@@ -143,8 +153,8 @@ mod tests {
         let (mut near, mut all, mut cants, mut balises) = (0.0, 0.0, 0.0, 0.0);
         let seeds = 40u32;
         for seed in 0..u64::from(seeds) {
-            let map = settings.map(&tunnel, seed);
-            let lamps = tunnel.lamps.iter().zip(&map.lamps);
+            let map = settings.track(&track, seed);
+            let lamps = track.lamps.iter().zip(&map.lamps);
             let errors: Vec<f64> = lamps
                 .map(|(is, said)| said.chainage_m - is.chainage_m)
                 .collect();
@@ -157,14 +167,14 @@ mod tests {
                 .iter()
                 .map(|e| mean_square(*e, errors.len()))
                 .sum::<f64>();
-            let line = (&tunnel.alignment, &map.alignment);
+            let line = (&track.alignment, &map.alignment);
             for k in 0..20u32 {
                 let s_m = 600.0 + 50.0 * f64::from(k);
                 let turned_rad = line.1.at(s_m).roll_rad - line.0.at(s_m).roll_rad;
                 cants += mean_square(1.5 * turned_rad, 20);
             }
-            for (is, said) in tunnel.balises.iter().zip(&map.balises) {
-                balises += mean_square(said.chainage_m - is.chainage_m, tunnel.balises.len());
+            for (is, said) in track.balises.iter().zip(&map.balises) {
+                balises += mean_square(said.chainage_m - is.chainage_m, track.balises.len());
             }
             for lamp in &map.lamps {
                 let at = map
@@ -185,14 +195,14 @@ mod tests {
     /// Fails where a lamp's error depends on what other lamps there are, or not on the seed.
     #[test]
     fn a_lamp_has_its_own_error() {
-        let mut tunnel = line();
-        let whole = SETTINGS.map(&tunnel, 1);
-        tunnel.lamps.drain(..100);
-        assert_eq!(SETTINGS.map(&tunnel, 1).lamps, whole.lamps[100..]);
-        assert_ne!(SETTINGS.map(&tunnel, 2).lamps, whole.lamps[100..]);
+        let mut track = line();
+        let whole = SETTINGS.track(&track, 1);
+        track.lamps.drain(..100);
+        assert_eq!(SETTINGS.track(&track, 1).lamps, whole.lamps[100..]);
+        assert_ne!(SETTINGS.track(&track, 2).lamps, whole.lamps[100..]);
         assert_eq!(
-            SurveySettings::default().map(&tunnel, 1).lamps,
-            tunnel.lamps
+            SurveySettings::default().track(&track, 1).lamps,
+            track.lamps
         );
     }
 }

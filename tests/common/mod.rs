@@ -63,11 +63,11 @@ pub fn draw(renderer: &mut dyn Renderer, job: &Job) -> Vec<GrayImage> {
 
 /// Nothing but lamps, and nothing else shines.
 pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
-    let mut tunnel = sample::tunnel();
-    tunnel.ambient_lx = 0.0;
-    tunnel.sections.clear();
+    let mut track = sample::track();
+    track.ambient_lx = 0.0;
+    track.sections.clear();
     Scene {
-        tunnel: tunnel.into(),
+        track: track.into(),
         lamps,
         air: Air::default(),
         wet: Wet::default(),

@@ -4,7 +4,7 @@
 use metrotwin::bus::{CameraModel, Intrinsics, Shutter, SimTime};
 use metrotwin::track::uid::{LineCode, Uid};
 use metrotwin::track::{
-    Alignment, BED_M, CrossSection, LampSite, PlanElement, SectionRange, TrackPoint, Tunnel,
+    Alignment, BED_M, CrossSection, LampSite, PlanElement, SectionRange, Track, TrackPoint,
 };
 use metrotwin::twin::air::Air;
 use metrotwin::twin::geometry::{Body, Shape};
@@ -31,7 +31,7 @@ const RADIUS_M: f64 = 3.4;
 const CENTRE_M: f64 = 1.7;
 
 /// The line with its lamps.
-pub fn tunnel() -> Tunnel {
+pub fn track() -> Track {
     let half_m = 0.5 * LENGTH_M;
     let plan = [
         PlanElement::straight(half_m),
@@ -41,9 +41,8 @@ pub fn tunnel() -> Tunnel {
     let lamps = (0..(LENGTH_M / LAMP_SPACING_M) as u16)
         .map(|k| lamp_site(&alignment, k))
         .collect();
-    Tunnel {
+    Track {
         name: "sample".into(),
-        datum: None,
         alignment,
         sections: vec![SectionRange {
             from_m: 0.0,
@@ -54,7 +53,6 @@ pub fn tunnel() -> Tunnel {
         wayside: Vec::new(),
         balises: Vec::new(),
         base_stations: Vec::new(),
-        line_number: 1,
         stations: Vec::new(),
         ambient_lx: 5.0,
     }
@@ -62,14 +60,14 @@ pub fn tunnel() -> Tunnel {
 
 /// The sample tunnel with its lamps blinking their names, each with a phase of its own.
 pub fn scene() -> Scene {
-    let tunnel = tunnel();
-    let lamps = tunnel
+    let track = track();
+    let lamps = track
         .lamps
         .iter()
         .map(|site| LampLight::from_site(site, 1e-4 * f64::from(site.uid.lamp % 17)))
         .collect();
     Scene {
-        tunnel: Arc::new(tunnel),
+        track: Arc::new(track),
         lamps,
         air: Air::default(),
         wet: Wet::default(),
@@ -78,13 +76,8 @@ pub fn scene() -> Scene {
 
 /// A camera fixed to the track frame at `at`, turned `yaw_rad` to the left and `pitch_rad` up
 /// from the direction up the line: `world_from_camera`.
-pub fn camera_pose(
-    tunnel: &Tunnel,
-    at: TrackPoint,
-    yaw_rad: f64,
-    pitch_rad: f64,
-) -> Isometry3<f64> {
-    let line = tunnel.alignment.at(at.s_m).world_from_line();
+pub fn camera_pose(track: &Track, at: TrackPoint, yaw_rad: f64, pitch_rad: f64) -> Isometry3<f64> {
+    let line = track.alignment.at(at.s_m).world_from_line();
     // Camera x is right, y is down, z is forward.
     let vehicle_from_camera = Rotation3::from_matrix_unchecked(nalgebra::Matrix3::new(
         0.0, 0.0, 1.0, //
@@ -94,14 +87,14 @@ pub fn camera_pose(
     let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad)
         * Rotation3::from_axis_angle(&Vector3::y_axis(), -pitch_rad);
     Isometry3::from_parts(
-        Translation3::from(tunnel.alignment.world_from_track(at)),
+        Translation3::from(track.alignment.world_from_track(at)),
         line.rotation * UnitQuaternion::from_rotation_matrix(&(turn * vehicle_from_camera)),
     )
 }
 
 /// The left eye of a rig on a train at chainage `s_m` at time 0, running at `speed_mps`; the view
 /// of frame 0.
-pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
+pub fn rig_view(track: &Track, s_m: f64, speed_mps: f64) -> View {
     let step_s = 1e-3;
     let poses = (-1..=30)
         .map(|k| {
@@ -110,7 +103,7 @@ pub fn rig_view(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> View {
                 l_m: 1.08,
                 h_m: 1.75,
             };
-            camera_pose(tunnel, at, 41f64.to_radians(), 26f64.to_radians())
+            camera_pose(track, at, 41f64.to_radians(), 26f64.to_radians())
         })
         .collect();
     let motion = CameraMotion {
@@ -151,8 +144,8 @@ fn view(
 }
 
 /// Both eyes of the rig of [`rig_view`], the right one 0.12 m to the right.
-pub fn stereo_job(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> Job {
-    let left = rig_view(tunnel, s_m, speed_mps);
+pub fn stereo_job(track: &Track, s_m: f64, speed_mps: f64) -> Job {
+    let left = rig_view(track, s_m, speed_mps);
     let mut right = left.clone();
     right.noise.stream = Stream::new(1, 0, "sample rig right");
     for pose in &mut right.motion.poses {
@@ -165,18 +158,18 @@ pub fn stereo_job(tunnel: &Tunnel, s_m: f64, speed_mps: f64) -> Job {
 }
 
 /// A camera on the right wall that looks up the line over [`worker`] and a 0.3 m box.
-pub fn wayside_job(tunnel: &Tunnel, s_m: f64) -> Job {
+pub fn wayside_job(track: &Track, s_m: f64) -> Job {
     let at = TrackPoint {
         s_m,
         l_m: -2.4,
         h_m: 3.0,
     };
-    let pose = camera_pose(tunnel, at, 8f64.to_radians(), -12f64.to_radians());
+    let pose = camera_pose(track, at, 8f64.to_radians(), -12f64.to_radians());
     let half_m = 0.15;
-    let mut bodies = worker(tunnel, s_m + 18.0, 0.4);
+    let mut bodies = worker(track, s_m + 18.0, 0.4);
     bodies.push(body(
         Shape::Box(Vector3::repeat(half_m)),
-        on_bed(tunnel, s_m + 12.0, -0.3, half_m),
+        on_bed(track, s_m + 12.0, -0.3, half_m),
         0.5,
     ));
     Job {
@@ -192,9 +185,9 @@ pub fn wayside_job(tunnel: &Tunnel, s_m: f64) -> Job {
 }
 
 /// Somebody standing on the bed in a dark coat: legs, arms, trunk and head.
-pub fn worker(tunnel: &Tunnel, s_m: f64, l_m: f64) -> Vec<Body> {
+pub fn worker(track: &Track, s_m: f64, l_m: f64) -> Vec<Body> {
     let part = |shape: Shape, left_m: f64, up_m: f64, albedo: f64| {
-        body(shape, on_bed(tunnel, s_m, l_m + left_m, up_m), albedo)
+        body(shape, on_bed(track, s_m, l_m + left_m, up_m), albedo)
     };
     vec![
         part(Shape::Capsule(0.09, 0.34), 0.12, 0.43, 0.1),
@@ -217,15 +210,15 @@ fn body(shape: Shape, world_from_body: Isometry3<f64>, albedo: f64) -> Body {
 }
 
 /// A pose `up_m` above the bed, axes along the line.
-pub fn on_bed(tunnel: &Tunnel, s_m: f64, l_m: f64, up_m: f64) -> Isometry3<f64> {
+pub fn on_bed(track: &Track, s_m: f64, l_m: f64, up_m: f64) -> Isometry3<f64> {
     let at = TrackPoint {
         s_m,
         l_m,
         h_m: BED_M + up_m,
     };
     Isometry3::from_parts(
-        Translation3::from(tunnel.alignment.world_from_track(at)),
-        tunnel.alignment.at(s_m).world_from_line().rotation,
+        Translation3::from(track.alignment.world_from_track(at)),
+        track.alignment.at(s_m).world_from_line().rotation,
     )
 }
 

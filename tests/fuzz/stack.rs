@@ -237,7 +237,8 @@ struct Stack {
 
 impl Stack {
     fn new(scenario: &Scenario, draw: &mut Draw) -> Self {
-        let (map, onboard) = (scenario.map(), &scenario.onboard[0]);
+        let map = scenario.map().first_track().clone();
+        let onboard = &scenario.onboard[0];
         let route = TrackRoute::new(&map, Direction::Up);
         let rig = onboard.rig.as_ref().unwrap();
         let mut sheet = rig.calibration();
@@ -347,7 +348,7 @@ struct Ride {
 
 impl Ride {
     fn new(scenario: &Scenario, has_position: bool) -> Self {
-        let map = scenario.map();
+        let map = scenario.map().first_track().clone();
         let mut settings = scenario.onboard[0].protection.clone();
         settings.initial_chainage_m = has_position.then_some(1300.0);
         settings.starts_under_way = Some(true);

@@ -99,7 +99,7 @@ fn lamps_at_100_kmh_are_where_they_belong() {
     let lamps = sample::scene().lamps;
     for ahead_m in [2.0, 3.0, 4.5] {
         let lamp = always_on(lamps[10].clone());
-        let mut view = sample::rig_view(&sample::tunnel(), 105.0 - ahead_m, SPEED_MPS);
+        let mut view = sample::rig_view(&sample::track(), 105.0 - ahead_m, SPEED_MPS);
         plain(&mut view, lamp.luminance_cd_m2);
         let right = expected(&view, 4, |ray, pose, _| {
             let c = pose * lamp.centre;
@@ -166,7 +166,7 @@ fn balls_are_in_place(mut view: View, centre: Point3<f64>, velocity_mps: Vector3
 #[test]
 fn bodies_at_100_kmh_are_where_they_belong() {
     for (u, v) in [(200.0, 150.0), (640.0, 360.0), (1050.0, 560.0)] {
-        let view = sample::rig_view(&sample::tunnel(), 100.0, SPEED_MPS);
+        let view = sample::rig_view(&sample::track(), 100.0, SPEED_MPS);
         let ray = view.camera.intrinsics.ray(u, v).normalize();
         let middle = view.motion.pose_at(SimTime::from_secs(0.008));
         let centre = middle * Point3::from(ray * 6.0);
@@ -182,16 +182,16 @@ fn bodies_at_100_kmh_are_where_they_belong() {
 /// Provokes bodies that stand still during a frame, or move from the wrong time.
 #[test]
 fn moving_bodies_are_where_they_belong() {
-    let tunnel = sample::tunnel();
-    let mut view = sample::wayside_job(&tunnel, 80.0).views.remove(0);
+    let track = sample::track();
+    let mut view = sample::wayside_job(&track, 80.0).views.remove(0);
     // In a long one the ball's picture grows: its middle is not that of the exposure's middle.
     view.camera.shutter.exposure_s = 1e-3;
-    let centre = tunnel.alignment.world_from_track(TrackPoint {
+    let centre = track.alignment.world_from_track(TrackPoint {
         s_m: 90.0,
         l_m: 0.0,
         h_m: 1.5,
     });
-    let along = tunnel.alignment.at(90.0).world_from_line() * Vector3::x();
+    let along = track.alignment.at(90.0).world_from_line() * Vector3::x();
     balls_are_in_place(view, centre, along * -SPEED_MPS, "passing ball");
 }
 
@@ -199,8 +199,8 @@ fn moving_bodies_are_where_they_belong() {
 #[test]
 fn same_job_same_bytes() {
     let scene = sample::scene();
-    let a = sample::stereo_job(&scene.tunnel, 40.0, SPEED_MPS);
-    let b = sample::wayside_job(&scene.tunnel, 300.0);
+    let a = sample::stereo_job(&scene.track, 40.0, SPEED_MPS);
+    let b = sample::wayside_job(&scene.track, 300.0);
     let mut one = gpu(scene.clone());
     let first = draw(&mut *one, &a);
     let other = draw(&mut *one, &b);
@@ -220,8 +220,8 @@ fn same_job_same_bytes() {
 #[test]
 fn views_do_not_touch_each_other() {
     let scene = sample::scene();
-    let mut all = sample::wayside_job(&scene.tunnel, 300.0);
-    let pair = sample::stereo_job(&scene.tunnel, 290.0, SPEED_MPS);
+    let mut all = sample::wayside_job(&scene.track, 300.0);
+    let pair = sample::stereo_job(&scene.track, 290.0, SPEED_MPS);
     all.views.splice(0..0, pair.views);
     let mut renderer = gpu(scene);
     let together = draw(&mut *renderer, &all);
@@ -245,7 +245,7 @@ fn views_do_not_touch_each_other() {
 #[test]
 fn a_flooded_deep_well_is_white() {
     let scene = sample::scene();
-    let mut view = sample::rig_view(&scene.tunnel, 102.0, 0.0);
+    let mut view = sample::rig_view(&scene.track, 102.0, 0.0);
     view.sensor.full_well_e = 6e4;
     view.sensor.pattern = Pattern::Rggb;
     view.lens.transmission = 1.0;
@@ -276,10 +276,10 @@ fn another_scene_is_as_good_as_new() {
     let mut second = sample::scene();
     second.air = Air::of_visibility(60.0);
     second.lamps.truncate(second.lamps.len() / 2);
-    let tunnel = first.tunnel.clone();
+    let track = first.track.clone();
     let jobs = [
-        sample::stereo_job(&tunnel, 70.0, 15.0),
-        sample::wayside_job(&tunnel, 100.0),
+        sample::stereo_job(&track, 70.0, 15.0),
+        sample::wayside_job(&track, 100.0),
     ];
     for (name, make) in [("quick", quick as Make), ("gpu", gpu)] {
         let mut used = make(first.clone());
@@ -301,7 +301,7 @@ fn another_scene_is_as_good_as_new() {
 #[test]
 fn timed_passes_are_parts_of_the_job() {
     let scene = sample::scene();
-    let job = sample::stereo_job(&scene.tunnel, 101.0, 60.0 / 3.6);
+    let job = sample::stereo_job(&scene.track, 101.0, 60.0 / 3.6);
     let mut renderer = GpuRenderer::new(scene).unwrap();
     renderer.draw_parts(false);
     let untimed = draw(&mut renderer, &job);

@@ -23,7 +23,7 @@
 use crate::common::{Make, cpu, draw, gpu, sample};
 use image::GrayImage;
 use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
-use metrotwin::track::{TrackPoint, Tunnel};
+use metrotwin::track::{Track, TrackPoint};
 use metrotwin::twin::geometry::{Body, Hull, Shape};
 use metrotwin::twin::lights::{Headlight, LampLight};
 use metrotwin::twin::reflectance::Wet;
@@ -54,7 +54,7 @@ fn scaled(view: &mut View, gain: f64, divisor: u32) {
 }
 
 /// Poses a millisecond apart of a train that bounces, pitches and sways as it runs.
-fn shaken(tunnel: &Tunnel, s_m: f64, start: SimTime) -> CameraMotion {
+fn shaken(track: &Track, s_m: f64, start: SimTime) -> CameraMotion {
     let poses = (-2..40)
         .map(|k| {
             let t = 1e-3 * f64::from(k);
@@ -65,7 +65,7 @@ fn shaken(tunnel: &Tunnel, s_m: f64, start: SimTime) -> CameraMotion {
                 h_m: 1.75 + 0.006 * swing(17.0),
             };
             let (yaw, pitch) = (41.0 + 0.2 * swing(23.0), 26.0 + 0.4 * swing(13.0));
-            sample::camera_pose(tunnel, at, yaw.to_radians(), pitch.to_radians())
+            sample::camera_pose(track, at, yaw.to_radians(), pitch.to_radians())
         })
         .collect();
     CameraMotion {
@@ -78,24 +78,24 @@ fn shaken(tunnel: &Tunnel, s_m: f64, start: SimTime) -> CameraMotion {
 /// The sample scene, with so much light on all surfaces that every pattern shows.
 fn floodlit() -> Scene {
     let mut scene = sample::scene();
-    let mut tunnel = (*scene.tunnel).clone();
-    tunnel.ambient_lx = 20_000.0;
-    scene.tunnel = tunnel.into();
+    let mut track = (*scene.track).clone();
+    track.ambient_lx = 20_000.0;
+    scene.track = track.into();
     scene
 }
 
 /// The rig at 100 km/h.
-fn rig_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
-    let mut view = sample::rig_view(tunnel, s_m, SPEED_MPS);
+fn rig_job(track: &Track, s_m: f64, gain: f64) -> Job {
+    let mut view = sample::rig_view(track, s_m, SPEED_MPS);
     view.start = SimTime::from_secs(12.345);
-    view.motion = shaken(tunnel, s_m, view.start);
+    view.motion = shaken(track, s_m, view.start);
     scaled(&mut view, gain, 2);
     Job {
         time: view.start.plus(-5e-3),
-        headlights: vec![headlight(tunnel, s_m + 1.0)],
+        headlights: vec![headlight(track, s_m + 1.0)],
         bodies: vec![Body {
             shape: Shape::Cylinder(0.1, 0.25),
-            world_from_body: sample::on_bed(tunnel, s_m + 2.0, 2.2, 3.1),
+            world_from_body: sample::on_bed(track, s_m + 2.0, 2.2, 3.1),
             velocity_mps: Vector3::new(3.0, -2.0, 1.0),
             albedo: 0.4,
             luminance_cd_m2: 0.0,
@@ -104,9 +104,9 @@ fn rig_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
     }
 }
 
-fn headlight(tunnel: &Tunnel, s_m: f64) -> Headlight {
+fn headlight(track: &Track, s_m: f64) -> Headlight {
     Headlight {
-        world_from_light: sample::on_bed(tunnel, s_m, 0.8, 1.2),
+        world_from_light: sample::on_bed(track, s_m, 0.8, 1.2),
         intensity_cd: 40_000.0,
         exponent: 60.0,
     }
@@ -128,20 +128,20 @@ fn boulder() -> Shape {
 
 /// The wayside camera over a worker, a box and a boulder, and a train that comes with its
 /// headlights on.
-fn wayside_job(tunnel: &Tunnel, s_m: f64, gain: f64) -> Job {
-    let mut job = sample::wayside_job(tunnel, s_m);
+fn wayside_job(track: &Track, s_m: f64, gain: f64) -> Job {
+    let mut job = sample::wayside_job(track, s_m);
     scaled(&mut job.views[0], gain, 2);
-    job.headlights.push(headlight(tunnel, s_m - 30.0));
+    job.headlights.push(headlight(track, s_m - 30.0));
     job.bodies.push(Body {
         shape: boulder(),
-        world_from_body: sample::on_bed(tunnel, s_m + 12.0, -0.6, 0.6),
+        world_from_body: sample::on_bed(track, s_m + 12.0, -0.6, 0.6),
         velocity_mps: Vector3::zeros(),
         albedo: 0.35,
         luminance_cd_m2: 0.0,
     });
     job.bodies.push(Body {
         shape: Shape::Box(Vector3::new(10.0, 1.4, 1.8)),
-        world_from_body: sample::on_bed(tunnel, s_m + 60.0, 0.0, 2.0),
+        world_from_body: sample::on_bed(track, s_m + 60.0, 0.0, 2.0),
         velocity_mps: Vector3::new(-8.0, -4.0, 0.0),
         albedo: 0.6,
         luminance_cd_m2: 0.0,
@@ -237,7 +237,7 @@ fn save(dir: &str, name: &str, gpu: &GrayImage, cpu: &GrayImage) {
 #[test]
 fn the_rig_in_lamp_light() {
     for s_m in [100.0, 101.6, 98.2, 300.5, 401.5] {
-        let job = rig_job(&sample::tunnel(), s_m, 1.0);
+        let job = rig_job(&sample::track(), s_m, 1.0);
         compare(&format!("rig_{s_m:.0}"), &sample::scene(), &job);
     }
 }
@@ -246,7 +246,7 @@ fn the_rig_in_lamp_light() {
 #[test]
 fn the_rig_in_floodlight() {
     for s_m in [100.0, 101.6, 300.5, 401.5] {
-        let job = rig_job(&sample::tunnel(), s_m, 2.0);
+        let job = rig_job(&sample::track(), s_m, 2.0);
         compare(&format!("flood_rig_{s_m:.0}"), &floodlit(), &job);
     }
 }
@@ -254,12 +254,12 @@ fn the_rig_in_floodlight() {
 /// Provokes bodies and headlights that are drawn elsewhere, and a far tunnel that is not there.
 #[test]
 fn the_wayside_view() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     for s_m in [100.0, 270.0, 420.0] {
-        let flat = wayside_job(&tunnel, s_m, 0.01);
+        let flat = wayside_job(&track, s_m, 0.01);
         compare(&format!("flood_way_{s_m}"), &floodlit(), &flat);
         for gain in [1.0, 10.0] {
-            let lit = wayside_job(&tunnel, s_m, gain);
+            let lit = wayside_job(&track, s_m, gain);
             let name = format!("way_{s_m}_gain_{gain}");
             compare(&name, &sample::scene(), &lit);
         }
@@ -270,13 +270,13 @@ fn the_wayside_view() {
 /// bed and rails, by lamps and by headlights that come.
 #[test]
 fn wet_ground_mirrors() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     let mut scene = sample::scene();
     scene.wet = Wet {
         ranges: vec![(0.0..130.0, true)],
     };
     for (s_m, exposure_s, gain) in [(100.0, 16e-3, 1.0), (100.0, 1e-3, 15.0), (60.0, 2e-4, 40.0)] {
-        let mut job = wayside_job(&tunnel, s_m, gain);
+        let mut job = wayside_job(&track, s_m, gain);
         let view = &mut job.views[0];
         view.camera.shutter.exposure_s = exposure_s;
         view.camera.intrinsics.cy_px -= 0.25 * f64::from(view.camera.intrinsics.height_px);
@@ -290,10 +290,10 @@ fn wet_ground_mirrors() {
 /// pupil, the other has formulas for lamps and blurs the rest by its depth.
 #[test]
 fn out_of_focus() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     for (camera, focus_m, mut job) in [
-        ("rig", 0.3, rig_job(&tunnel, 100.0, 1.0)),
-        ("way", 0.5, wayside_job(&tunnel, 100.0, 1.0)),
+        ("rig", 0.3, rig_job(&track, 100.0, 1.0)),
+        ("way", 0.5, wayside_job(&track, 100.0, 1.0)),
     ] {
         let view = &mut job.views[0];
         view.pixel_m *= 2.0;
@@ -309,9 +309,7 @@ fn out_of_focus() {
 /// Provokes a pupil or a circle of confusion of another size: the edge of a board at 4 m, of which a
 /// lens in focus at 1 m makes a ramp whose slope has the variance of a disc along a line, c^2 / 16.
 fn an_edge_is_a_ramp(name: &str, make: Make) {
-    let mut view = sample::wayside_job(&sample::tunnel(), 100.0)
-        .views
-        .remove(0);
+    let mut view = sample::wayside_job(&sample::track(), 100.0).views.remove(0);
     even(&mut view);
     view.camera.intrinsics = Intrinsics::centred(480, 120, 1100.0);
     view.lens.focus_m = Some(1.0);
@@ -327,9 +325,9 @@ fn an_edge_is_a_ramp(name: &str, make: Make) {
     let confusion_px = view.confusion_px(4.0);
     let mut scene = sample::scene();
     scene.lamps.clear();
-    let mut tunnel = (*scene.tunnel).clone();
-    (tunnel.ambient_lx, tunnel.sections) = (0.0, Vec::new());
-    scene.tunnel = tunnel.into();
+    let mut track = (*scene.track).clone();
+    (track.ambient_lx, track.sections) = (0.0, Vec::new());
+    scene.track = track.into();
     let job = Job {
         bodies: vec![board],
         views: vec![view],
@@ -380,9 +378,9 @@ const WIDE: DistortionCoefficients = DistortionCoefficients {
 /// order or together: with the coefficients of a real wide lens.
 #[test]
 fn through_a_real_lens_read_upwards_and_at_once() {
-    let tunnel = sample::tunnel();
-    let rig = |s_m, gain| ("rig", rig_job(&tunnel, s_m, gain));
-    let way = |s_m, gain| ("way", wayside_job(&tunnel, s_m, gain));
+    let track = sample::track();
+    let rig = |s_m, gain| ("rig", rig_job(&track, s_m, gain));
+    let way = |s_m, gain| ("way", wayside_job(&track, s_m, gain));
     let lit = [rig(100.0, 1.0), rig(300.5, 1.0), way(100.0, 1.0)];
     let flooded = [rig(101.6, 2.0), rig(401.5, 2.0), way(270.0, 0.01)];
     let all = (lit.into_iter().map(|job| (sample::scene(), "bent", job))).chain(
@@ -446,10 +444,10 @@ fn disc_box(view: &View, lamp: &LampLight) -> Option<[u32; 4]> {
 /// at the size that the stack sees.
 #[test]
 fn the_box_of_a_lamp_at_full_size() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     let mut compared = 0;
     for s_m in [100.0, 101.6, 401.5] {
-        let mut job = quiet(&rig_job(&tunnel, s_m, 1.0));
+        let mut job = quiet(&rig_job(&track, s_m, 1.0));
         job.views[0].camera.intrinsics = Intrinsics::centred(1280, 720, 1040.0);
         let gpu = draw(&mut *gpu(sample::scene()), &job).remove(0);
         let cpu = draw(&mut *cpu(sample::scene()), &job).remove(0);
@@ -493,7 +491,7 @@ fn noise_by_band(renderer: &mut dyn Renderer, job: &Job) -> Vec<(f64, f64, f64)>
 /// Provokes noise of another strength, or noise that depends on brightness in another way.
 #[test]
 fn noise_is_equal_in_distribution() {
-    let job = rig_job(&sample::tunnel(), 100.0, 1200.0);
+    let job = rig_job(&sample::track(), 100.0, 1200.0);
     let one = noise_by_band(&mut *gpu(sample::scene()), &job);
     let other = noise_by_band(&mut *cpu(sample::scene()), &job);
     let mut compared = 0;
@@ -588,10 +586,10 @@ fn rim(lamp: &LampLight) -> impl Iterator<Item = (Point3<f64>, Vector3<f64>)> {
 /// seen from the running train. (The rasteriser moves corners only: it draws the sides straight,
 /// which over 100 rows is good to 0.01 px.)
 fn a_board_obeys_the_row_times(make: Make) {
-    let tunnel = sample::tunnel();
-    let mut view = sample::rig_view(&tunnel, 150.0, SPEED_MPS);
+    let track = sample::track();
+    let mut view = sample::rig_view(&track, 150.0, SPEED_MPS);
     view.start = SimTime::from_secs(3.2);
-    view.motion = shaken(&tunnel, 150.0, view.start);
+    view.motion = shaken(&track, 150.0, view.start);
     even(&mut view);
     let middle = view.motion.pose_at(view.start.plus(8e-3));
     // Across the camera's axis, tilted in the image.

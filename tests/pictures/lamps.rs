@@ -45,12 +45,12 @@ fn plain(view: &mut View, lamp: &mut LampLight, grey: f64) {
 /// The rig on a train that runs at a speed, at a chainage of the sample line, and the lamp next
 /// ahead of it.
 fn passing(s_m: f64, kmh: f64) -> (View, LampLight) {
-    let tunnel = sample::tunnel();
-    let next = tunnel
+    let track = sample::track();
+    let next = track
         .lamps
         .partition_point(|site| site.chainage_m < s_m + 1.5);
     let lamp = sample::scene().lamps[next].clone();
-    (sample::rig_view(&tunnel, s_m, kmh / 3.6), lamp)
+    (sample::rig_view(&track, s_m, kmh / 3.6), lamp)
 }
 
 /// Points of the rim, `n` of them.
@@ -305,16 +305,16 @@ fn rows_in_a_lamp_are_the_waveform() {
 fn far_lamps_keep_their_light() {
     for (name, make) in RENDERERS {
         for ahead in [2, 3, 5] {
-            let tunnel = sample::tunnel();
-            let next = tunnel.lamps.partition_point(|site| site.chainage_m < 101.0);
+            let track = sample::track();
+            let next = track.lamps.partition_point(|site| site.chainage_m < 101.0);
             let mut lamp = steady(sample::scene().lamps[next + ahead].clone());
-            let mut view = sample::rig_view(&tunnel, 101.0, 0.0);
+            let mut view = sample::rig_view(&track, 101.0, 0.0);
             let at = TrackPoint {
                 s_m: 101.0,
                 l_m: 1.08,
                 h_m: 1.75,
             };
-            let pose = sample::camera_pose(&tunnel, at, 0.1, 0.05);
+            let pose = sample::camera_pose(&track, at, 0.1, 0.05);
             view.motion = CameraMotion::still(pose);
             plain(&mut view, &mut lamp, 200.0);
             let polygon = outline(&view, &rim(&lamp, 360));

@@ -25,7 +25,7 @@ fn both(test: impl Fn(&mut dyn Renderer, &str)) {
 
 /// A still camera of twelve bits without any fixed pattern.
 fn camera() -> View {
-    let mut view = sample::rig_view(&sample::tunnel(), 100.0, 0.0);
+    let mut view = sample::rig_view(&sample::track(), 100.0, 0.0);
     view.camera.intrinsics = Intrinsics::centred(SIZE_PX.0, SIZE_PX.1, 300.0);
     view.motion.poses.truncate(1);
     view.lens.halo_share = 0.0;
@@ -63,9 +63,7 @@ fn all_over(view: &View, electrons: f64) -> Body {
 /// electrons.
 #[test]
 fn a_known_scene_gives_the_electrons_worked_by_hand() {
-    let mut view = sample::wayside_job(&sample::tunnel(), 100.0)
-        .views
-        .remove(0);
+    let mut view = sample::wayside_job(&sample::track(), 100.0).views.remove(0);
     view.pixel_m = 3.75e-6;
     view.camera.shutter.exposure_s = 1e-3;
     (view.lens.f_number, view.lens.transmission) = (2.0, 0.9);

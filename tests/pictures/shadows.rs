@@ -24,7 +24,7 @@ fn scene() -> Scene {
     scene.lamps.truncate(1);
     let lamp = &mut scene.lamps[0];
     lamp.centre = Point3::from(
-        sample::on_bed(&scene.tunnel, S_M, 0.0, LAMP_M)
+        sample::on_bed(&scene.track, S_M, 0.0, LAMP_M)
             .translation
             .vector,
     );
@@ -35,7 +35,7 @@ fn scene() -> Scene {
 fn ball(scene: &Scene) -> Body {
     Body {
         shape: Shape::Sphere(BALL_RADIUS_M),
-        world_from_body: sample::on_bed(&scene.tunnel, S_M, 0.0, BALL_M),
+        world_from_body: sample::on_bed(&scene.track, S_M, 0.0, BALL_M),
         velocity_mps: Vector3::zeros(),
         albedo: 0.5,
         luminance_cd_m2: 0.0,
@@ -49,8 +49,8 @@ fn view(scene: &Scene) -> View {
         l_m: -0.8,
         h_m: 1.6,
     };
-    let mut view = sample::wayside_job(&scene.tunnel, S_M).views.remove(0);
-    let pose = sample::camera_pose(&scene.tunnel, at, 0.46, -0.78);
+    let mut view = sample::wayside_job(&scene.track, S_M).views.remove(0);
+    let pose = sample::camera_pose(&scene.track, at, 0.46, -0.78);
     view.motion = CameraMotion::still(pose);
     view.sensor.noise = false;
     view.sensor.black_level_grey = BLACK;
@@ -106,7 +106,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
     let shaded = draw(renderer, &job).remove(0);
     let [umbra_m, middle_m, penumbra_m] = [lamp.radius_m, 0.0, -lamp.radius_m].map(edge_m);
     println!("umbra {umbra_m:.3} m, middle {middle_m:.3} m, penumbra {penumbra_m:.3} m");
-    let foot = sample::on_bed(&scene.tunnel, S_M, 0.0, 0.0);
+    let foot = sample::on_bed(&scene.track, S_M, 0.0, 0.0);
     let (mut inside, mut outside, mut between) = (0, 0, 0);
     let (mut halfway, mut halfway_sum) = (0, 0.0);
     for (u, v, pixel) in free.enumerate_pixels() {
@@ -124,7 +124,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
         }
         let p = foot * at;
         let lamp_lx = BlinkingLamp::new(lamp.clone()).irradiance_lx(&p, &Vector3::z());
-        let ambient = scene.tunnel.ambient_lx / (scene.tunnel.ambient_lx + lamp_lx);
+        let ambient = scene.track.ambient_lx / (scene.track.ambient_lx + lamp_lx);
         let hidden = (1.0 - left / light) / (1.0 - ambient);
         // A pixel of two millimetres, and places that do not reach the rim of the disc.
         if away_m < umbra_m - 0.004 {
@@ -168,8 +168,8 @@ fn a_ball_has_umbra_and_penumbra_on_the_gpu() {
 
 /// A worker, a box, a cylinder, a boulder, and a train that comes with its headlights on.
 fn busy_job(scene: &Scene, s_m: f64) -> Job {
-    let tunnel = &scene.tunnel;
-    let mut job = sample::wayside_job(tunnel, s_m);
+    let track = &scene.track;
+    let mut job = sample::wayside_job(track, s_m);
     let body = |shape, world_from_body, velocity_mps| Body {
         shape,
         world_from_body,
@@ -191,23 +191,23 @@ fn busy_job(scene: &Scene, s_m: f64) -> Job {
     job.bodies.extend([
         body(
             Shape::Hull(boulder.into()),
-            sample::on_bed(tunnel, s_m + 9.0, 0.9, 0.3),
+            sample::on_bed(track, s_m + 9.0, 0.9, 0.3),
             still,
         ),
         body(
             Shape::Cylinder(0.15, 0.5),
-            sample::on_bed(tunnel, s_m + 14.0, 1.2, 0.6) * tilt,
+            sample::on_bed(track, s_m + 14.0, 1.2, 0.6) * tilt,
             Vector3::new(0.0, -3.0, 1.0),
         ),
         body(
             Shape::Box(Vector3::new(10.0, 1.4, 1.8)),
-            sample::on_bed(tunnel, s_m + 45.0, 0.0, 2.0),
+            sample::on_bed(track, s_m + 45.0, 0.0, 2.0),
             Vector3::new(-8.0, -4.0, 0.0),
         ),
     ]);
     // In the train's front.
     job.headlights.extend([-0.8, 0.8].map(|l_m| Headlight {
-        world_from_light: sample::on_bed(tunnel, s_m + 35.05, l_m, 1.2)
+        world_from_light: sample::on_bed(track, s_m + 35.05, l_m, 1.2)
             * Isometry3::rotation(Vector3::z() * PI),
         intensity_cd: 40_000.0,
         exponent: 60.0,

@@ -23,7 +23,7 @@ fn apart(a: &GrayImage, b: &GrayImage) -> f64 {
 
 /// A small picture of the rig at 100 km/h with a long exposure, `grey` levels for a luminance.
 fn small_view(exposure_s: f64, luminance_cd_m2: f64, grey: f64) -> View {
-    let mut view = sample::rig_view(&sample::tunnel(), 101.0, 100.0 / 3.6);
+    let mut view = sample::rig_view(&sample::track(), 101.0, 100.0 / 3.6);
     view.camera.intrinsics = Intrinsics::centred(320, 180, 260.0);
     view.camera.shutter.exposure_s = exposure_s;
     view.camera.shutter.line_time_s = 80e-6;
@@ -96,9 +96,9 @@ enum Motion {
 /// Walls in floodlight, and a board that moves across.
 fn a_lit_tunnel_that_passes(name: &str, make: Make) {
     let mut scene = sample::scene();
-    let mut tunnel = (*scene.tunnel).clone();
-    tunnel.ambient_lx = 20_000.0;
-    scene.tunnel = tunnel.into();
+    let mut track = (*scene.track).clone();
+    track.ambient_lx = 20_000.0;
+    scene.track = track.into();
     scene.lamps.clear();
     for (exposure_s, motion) in [
         (30e-6, Motion::AlongTheLine),

@@ -264,12 +264,12 @@ fn all_faults_at_once_are_survived_and_reproducible() {
 fn lamps(faults: &str) -> Scene {
     let mut scene = sample::scene();
     let faults: FaultSettings = read_toml(faults).unwrap();
-    age(&mut scene.lamps, &faults.lamps, &scene.tunnel, 1);
+    age(&mut scene.lamps, &faults.lamps, &scene.track, 1);
     scene
 }
 
 fn draw(renderer: &mut dyn Renderer, time_s: f64) -> image::GrayImage {
-    let mut job: Job = sample::wayside_job(&sample::tunnel(), 103.7);
+    let mut job: Job = sample::wayside_job(&sample::track(), 103.7);
     job.time = SimTime::from_secs(time_s);
     job.views[0].camera.intrinsics = Intrinsics::centred(320, 180, 182.0);
     renderer.submit(&job).unwrap();
@@ -307,15 +307,15 @@ fn lamps_fail_in_time_on_the_gpu() {
 fn dim_lamps_give_as_much_less() {
     let scene = |faults: &str| {
         let mut scene = lamps(faults);
-        let mut tunnel = (*scene.tunnel).clone();
-        tunnel.ambient_lx = 0.0;
-        scene.tunnel = tunnel.into();
+        let mut track = (*scene.track).clone();
+        track.ambient_lx = 0.0;
+        scene.track = track.into();
         scene
     };
     let whole = draw(cpu(scene("")).as_mut(), 0.0);
     let text = "lamps = [{ fault = { kind = 'dim', level = 0.5 } }]";
     let half = draw(cpu(scene(text)).as_mut(), 0.0);
-    let black = sample::wayside_job(&sample::tunnel(), 100.0).views[0]
+    let black = sample::wayside_job(&sample::track(), 100.0).views[0]
         .sensor
         .black_level_grey;
     let (mut sum, mut sum_half, mut n) = (0.0, 0.0, 0);

@@ -39,7 +39,7 @@ mod tests {
     /// Fails where rows change their instant, or light gets lost.
     #[test]
     fn rows_keep_their_instant_and_their_light() {
-        let view = sample::rig_view(&sample::tunnel(), 100.0, 20.0);
+        let view = sample::rig_view(&sample::track(), 100.0, 20.0);
         for period_s in [2e-3, 10e-6] {
             let clean = clean(&view, period_s);
             for v in [0.0, 359.5, 719.0] {

@@ -217,7 +217,7 @@ mod tests {
 
     /// The left eye at 160 km/h, without noise and halo, bright enough that a lamp is not white.
     fn view(s_m: f64) -> View {
-        let mut view = sample::rig_view(&sample::tunnel(), s_m, SPEED_MPS);
+        let mut view = sample::rig_view(&sample::track(), s_m, SPEED_MPS);
         view.sensor.bits = 12;
         // It would move the centre of the light.
         view.lens.vignetting = 0.0;
@@ -228,7 +228,7 @@ mod tests {
     /// What the table says of the lamps in a view of a job.
     fn seen(scene: &Scene, job: &Job) -> Vec<LampRow> {
         let sight = Projection::new(&job.views[0], job.time);
-        LampRow::all(7, job, &sight, &Labeller::new(scene), &scene.tunnel.lamps)
+        LampRow::all(7, job, &sight, &Labeller::new(scene), &scene.track.lamps)
     }
 
     /// Area and centroid of a polygon.
@@ -309,7 +309,7 @@ mod tests {
             (lamp.waveform.rise_s, lamp.waveform.fall_s) = (0.0, 0.0);
         }
         for first_row in [0, 719] {
-            let mut view = sample::rig_view(&sample::tunnel(), 100.4, SPEED_MPS);
+            let mut view = sample::rig_view(&sample::track(), 100.4, SPEED_MPS);
             view.camera.shutter.first_row = first_row;
             let exposure_s = view.camera.shutter.exposure_s;
             let job = Job {

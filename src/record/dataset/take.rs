@@ -231,7 +231,7 @@ impl DataSet<'_> {
             ImageRow::all(frame_id, sight).try_for_each(|row| table.push(&row))?;
         }
         if let Some(table) = &mut tables.lamps {
-            let sites = &self.scenario.tunnel.lamps;
+            let sites = &self.scenario.tunnel.first_track().lamps;
             let rows = LampRow::all(frame_id, job, sight, &self.labeller, sites);
             rows.iter().try_for_each(|row| table.push(row))?;
         }
@@ -240,7 +240,7 @@ impl DataSet<'_> {
         };
         let train_m = frame.exposed.train.as_ref().map(|train| train.chainage_m);
         let near_m = self.cameras[k].chainage_m.or(train_m).unwrap_or(0.0);
-        let line = (&self.scenario.tunnel.alignment, near_m);
+        let line = (&self.scenario.tunnel.first_track().alignment, near_m);
         for instance in obstacles::instances(job, &frame.exposed.owners, sight, labels) {
             let Some(row) = ObstacleRow::new(frame_id, job, sight, line, &instance) else {
                 continue;

@@ -5,7 +5,7 @@
 use crate::bus::*;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, Balise, Grade, PlanElement, TrackPoint, Tunnel};
+use crate::track::{Alignment, Balise, Grade, PlanElement, Track, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::physics::{TrainState, WheelForces};
 use crate::twin::render::sample;
@@ -31,7 +31,7 @@ const OBSTACLE_FROM_S: f64 = 1.0;
 const SIZE: (u32, u32) = (160, 90);
 
 /// A straight, a transition and a curve of 400 m radius, on a grade.
-pub(crate) fn tunnel() -> Tunnel {
+pub(crate) fn tunnel() -> Track {
     let element = |length_m, start_per_m, end_per_m| PlanElement {
         length_m,
         start_per_m,
@@ -49,13 +49,13 @@ pub(crate) fn tunnel() -> Tunnel {
         slope: 0.01,
         radius_m: 0.0,
     };
-    Tunnel {
+    Track {
         alignment: Alignment::new(Point3::new(5000.0, 8000.0, 20.0), 0.4, &plan, &[grade]),
         balises: vec![Balise {
             name: "B1".into(),
             chainage_m: 120.0,
         }],
-        ..sample::tunnel()
+        ..sample::track()
     }
 }
 
@@ -71,7 +71,7 @@ fn camera(f_px: f64) -> CameraModel {
     }
 }
 
-fn device(tunnel: &Tunnel) -> WaysideCalibration {
+fn device(tunnel: &Track) -> WaysideCalibration {
     let place = TrackPoint {
         s_m: 205.0,
         l_m: -2.2,

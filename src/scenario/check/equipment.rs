@@ -131,16 +131,16 @@ impl LineCheck<'_, '_> {
     /// A rig must see lamps on the way that its train runs.
     fn view(&mut self, at: &str, rig: &RigSettings, train: usize) {
         let direction = rig.end.looks(self.file.direction(train));
-        let tunnel = self.tunnel;
-        if tunnel.lamps.is_empty() {
+        let track = self.track;
+        if track.lamps.is_empty() {
             self.check.problem(
                 at,
-                format!("tunnel `{}` has no lamps to see", tunnel.name),
+                format!("tunnel `{}` has no lamps to see", track.name),
                 "choose a tunnel with lamps, or take out [rig]",
             );
             return;
         }
-        let way = tunnel.along(direction);
+        let way = track.along(direction);
         let every = way.lamps.len().div_ceil(LAMPS_TRIED);
         let seen = |rig: &RigSettings| {
             let calibration = rig.calibration();

@@ -3,22 +3,18 @@
 use crate::scenario::WaysidePost;
 use crate::scenario::file::{BenchSettings, ScenarioFile, WaysidePostSettings};
 use crate::settings::{Checker, name_advice};
-use crate::track::Tunnel;
+use crate::track::Track;
 
 /// Checks against the line, and the wayside devices at their places. A part with a wrong value is not
 /// held against the line: what would be said follows from it, and numbers out of their range would
 /// take any time or memory.
 pub(in crate::scenario) fn in_tunnel(
     file: &ScenarioFile,
-    tunnel: &Tunnel,
+    track: &Track,
     check: &mut Checker<'_>,
 ) -> Vec<WaysidePost> {
-    file.faults.check_in(tunnel, &mut check.below("faults"));
-    let mut line = LineCheck {
-        file,
-        tunnel,
-        check,
-    };
+    file.faults.check_in(track, &mut check.below("faults"));
+    let mut line = LineCheck { file, track, check };
     line.trains();
     line.bench();
     line.obstacles();
@@ -34,7 +30,7 @@ pub(in crate::scenario) fn in_tunnel(
 /// A scenario held against its line.
 pub(super) struct LineCheck<'a, 'c> {
     pub(super) file: &'a ScenarioFile,
-    pub(super) tunnel: &'a Tunnel,
+    pub(super) track: &'a Track,
     pub(super) check: &'a mut Checker<'c>,
 }
 
@@ -84,7 +80,7 @@ impl LineCheck<'_, '_> {
                 !self.is_inside(&format!("{at}.{key}"), "it", place)
             });
             if outside == [false; 2] {
-                cable.check_reach(&self.tunnel.alignment, &mut self.check.below(&at));
+                cable.check_reach(&self.track.alignment, &mut self.check.below(&at));
             }
         }
     }
@@ -109,7 +105,7 @@ impl LineCheck<'_, '_> {
     }
 
     pub(super) fn is_on_line(&mut self, key: &str, who: &str, chainage_m: f64) -> bool {
-        let end_m = self.tunnel.alignment.length_m();
+        let end_m = self.track.alignment.length_m();
         let inside = (0.0..=end_m).contains(&chainage_m);
         if !inside {
             self.check.problem(
@@ -123,7 +119,7 @@ impl LineCheck<'_, '_> {
 
     fn is_in_the_open(&mut self, at: &str, place: [f64; 3]) -> bool {
         let [chainage_m, lateral_m, height_m] = place;
-        let section = self.tunnel.section_at(chainage_m);
+        let section = self.track.section_at(chainage_m);
         let open = section.is_none_or(|section| section.contains(lateral_m, height_m));
         if !open {
             self.check.problem(
@@ -143,19 +139,15 @@ impl LineCheck<'_, '_> {
         if !self.check.is_right(at) {
             return None;
         }
-        let tunnel = self.tunnel;
+        let track = self.track;
         let key = &format!("{at}.device");
-        let Some(site) = tunnel.wayside.iter().find(|site| site.name == post.device) else {
-            let names: Vec<_> = tunnel
-                .wayside
-                .iter()
-                .map(|site| site.name.clone())
-                .collect();
+        let Some(site) = track.wayside.iter().find(|site| site.name == post.device) else {
+            let names: Vec<_> = track.wayside.iter().map(|site| site.name.clone()).collect();
             self.check.problem(
                 key,
                 format!(
                     "tunnel `{}` has no wayside device `{}`",
-                    tunnel.name, post.device
+                    track.name, post.device
                 ),
                 name_advice(
                     &post.device,
@@ -167,8 +159,8 @@ impl LineCheck<'_, '_> {
             return None;
         };
         let with_lidar = post.lidar.is_some();
-        let calibration = post.camera.calibration(site, tunnel, with_lidar);
-        let actual = post.camera.actual(site, tunnel, with_lidar);
+        let calibration = post.camera.calibration(site, track, with_lidar);
+        let actual = post.camera.actual(site, track, with_lidar);
         if calibration.is_none() {
             self.check.problem(
                 key,

@@ -37,7 +37,7 @@ impl LineCheck<'_, '_> {
     }
 
     fn train(&mut self, at: &str, train: &TrainSettings) {
-        let end_m = self.tunnel.alignment.length_m();
+        let end_m = self.track.alignment.length_m();
         let (head_m, length_m) = (train.start_chainage_m, train.length_m());
         let start_key = format!("{at}.start_chainage_m");
         self.is_on_line(&start_key, "the train head", head_m);

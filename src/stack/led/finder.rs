@@ -284,7 +284,7 @@ fn middle(bounds: &PixelBox) -> Point2<f64> {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::{TestWorld, tunnel};
+    use crate::stack::led::testing::{TestWorld, track};
     use nalgebra::Translation3;
 
     /// Drawn lamps: the found centre's column against the projected one, and the stripes' name.
@@ -323,7 +323,7 @@ mod tests {
     #[test]
     fn a_near_lamp_is_read_from_one_image() {
         for code in ["manchester", "nrz"] {
-            let map = tunnel(code);
+            let map = track(code);
             for k in (3..190).step_by(23) {
                 let lamp = &map.lamps[k];
                 let world = TestWorld::new(&map, lamp.chainage_m - 1.1, 0.0);
@@ -336,7 +336,7 @@ mod tests {
     /// Disparity within 0.15 px, from 9 m ahead to 0.8 m, for any name and phase.
     #[test]
     fn disparities_are_good_to_a_seventh_of_a_pixel() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let mut squares = 0.0;
         for k in 0..24 {
             let lamp = &map.lamps[7 * k + 3];
@@ -356,7 +356,7 @@ mod tests {
     /// No light, all light, no pixels: nothing found, no panic.
     #[test]
     fn images_without_a_lamp_give_nothing() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let camera = crate::stack::led::testing::rig().left;
         let mut finder = LampFinder::new(&LedSettings::default(), &camera, &map.lamps);
         for (w, h) in [(0, 0), (1, 1), (3, 200), (1280, 720)] {

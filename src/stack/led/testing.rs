@@ -6,7 +6,7 @@ use crate::bus::{
     StereoPair,
 };
 use crate::track::waveform::Waveform;
-use crate::track::{LampSite, Tunnel};
+use crate::track::{LampSite, Track, Tunnel};
 use image::GrayImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
@@ -83,11 +83,11 @@ pub fn wide_rig() -> RigCalibration {
 }
 
 /// Lamps every 10 m from chainage 10 of a straight line of 2 km.
-pub fn tunnel(code: &str) -> Tunnel {
+pub fn track(code: &str) -> Track {
     let text = format!(
         "name = 'straight'\n[[plan]]\nkind = 'straight'\nlength_m = 2000.0\n[lamps]\nfrom_m = 10.0\ncode = '{code}'\n"
     );
-    Tunnel::from_toml(&text).unwrap()
+    Track::clone(Tunnel::from_toml(&text).unwrap().first_track())
 }
 
 /// An eye that draws.
@@ -124,7 +124,7 @@ pub struct TestWorld {
 
 impl TestWorld {
     /// At rest at a chainage, or passing it at time 0.
-    pub fn new(map: &Tunnel, start_m: f64, speed_mps: f64) -> Self {
+    pub fn new(map: &Track, start_m: f64, speed_mps: f64) -> Self {
         Self {
             lamps: map.lamps.clone(),
             rig: rig(),

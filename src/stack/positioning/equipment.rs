@@ -10,7 +10,7 @@ use crate::bus::{
 };
 use crate::stack::Equipment;
 use crate::stack::led::LedSettings;
-use crate::track::{TrackRoute, Tunnel};
+use crate::track::{Track, TrackRoute};
 use std::sync::Arc;
 
 /// How often a second it is looked whether the rig has fallen silent.
@@ -57,7 +57,7 @@ impl CabMount {
     }
 
     /// A fix of the cab, as one of the head.
-    fn of_head(&self, fix: PositionFix, map: &Tunnel) -> PositionFix {
+    fn of_head(&self, fix: PositionFix, map: &Track) -> PositionFix {
         let run_m = fix.chainage_m - self.head_behind_m;
         PositionFix {
             chainage_m: self.route.chainage_m(run_m),
@@ -76,7 +76,7 @@ impl CabMount {
 pub struct LampPositioning {
     node: Node,
     mount: CabMount,
-    map: Arc<Tunnel>,
+    map: Arc<Track>,
     positioner: LedPositioner,
     watch: Ticker,
     reports: Vec<Message>,
@@ -90,7 +90,7 @@ impl LampPositioning {
         mount: CabMount,
         settings: &LedSettings,
         rig: RigCalibration,
-        map: Arc<Tunnel>,
+        map: Arc<Track>,
     ) -> Self {
         Self {
             node,
@@ -150,13 +150,13 @@ impl Equipment for LampPositioning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::tunnel;
+    use crate::stack::led::testing::track;
     use crate::track::Direction;
 
     /// Backwards, and with all else that the odometer says.
     #[test]
     fn the_rear_cab_runs_backwards() {
-        let route = TrackRoute::new(&tunnel("manchester"), Direction::Down);
+        let route = TrackRoute::new(&track("manchester"), Direction::Down);
         let sample = OdometerSample {
             time: SimTime::from_secs(1.0),
             distance_m: 12.0,

@@ -5,7 +5,7 @@
 //! dark. It says nothing of lamps while the position is unknown or the eye has a fault.
 
 use crate::bus::Intrinsics;
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::track::uid::Uid;
 use nalgebra::{Isometry3, Point2, Point3};
 
@@ -37,7 +37,7 @@ impl LampPresence {
     /// the lamps that have gone out of its sight without ever having been seen.
     pub fn check(
         &mut self,
-        map: &Tunnel,
+        map: &Track,
         lens: &Intrinsics,
         world_from_eye: &Isometry3<f64>,
         spots: impl Iterator<Item = Point2<f64>> + Clone,

@@ -8,7 +8,7 @@
 //! use metrotwin::bus::*;
 //! use metrotwin::stack::led::LedSettings;
 //! use metrotwin::stack::positioning::LedPositioner;
-//! use metrotwin::track::Tunnel;
+//! use metrotwin::track::Track;
 //! use std::sync::Arc;
 //!
 //! let map = Tunnel::from_toml("

@@ -16,7 +16,7 @@
 
 use crate::bus::Identity;
 use crate::stack::led::ChipVotes;
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::track::uid::Uid;
 use nalgebra::Vector3;
 
@@ -139,7 +139,7 @@ impl Naming {
         followed: &mut Followed,
         reading: PairReading,
         expected: Option<Expected>,
-        map: &Tunnel,
+        map: &Track,
     ) -> Verdict {
         let on_map = |uid: &Uid| map.lamp(*uid).is_some();
         let own = match reading {
@@ -170,7 +170,7 @@ impl Naming {
         &self,
         followed: &Followed,
         expected: Option<Expected>,
-        map: &Tunnel,
+        map: &Track,
     ) -> Verdict {
         if let Some(uid) = followed.believed {
             return Verdict::Named(uid, Identity::Followed);
@@ -184,7 +184,7 @@ impl Naming {
         }
     }
 
-    fn stands_there(&self, uid: Uid, expected: Expected, map: &Tunnel) -> bool {
+    fn stands_there(&self, uid: Uid, expected: Expected, map: &Track) -> bool {
         let Some(k) = map.lamps.iter().position(|l| l.uid == uid) else {
             return false;
         };
@@ -193,13 +193,13 @@ impl Naming {
     }
 }
 
-fn nearest_lamp(map: &Tunnel, chainage_m: f64) -> Option<usize> {
+fn nearest_lamp(map: &Track, chainage_m: f64) -> Option<usize> {
     let off = |k: &usize| (map.lamps[*k].chainage_m - chainage_m).abs();
     (0..map.lamps.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
 /// Distance to the nearer neighbour, 10 m for a lamp alone.
-fn spacing_m(map: &Tunnel, k: usize) -> f64 {
+fn spacing_m(map: &Track, k: usize) -> f64 {
     let to = |other: Option<usize>| {
         let neighbour = other.and_then(|o| map.lamps.get(o))?;
         Some((neighbour.chainage_m - map.lamps[k].chainage_m).abs())
@@ -216,7 +216,7 @@ fn spacing_m(map: &Tunnel, k: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::stack::led::StripeReading;
-    use crate::stack::led::testing::tunnel;
+    use crate::stack::led::testing::track;
     use crate::track::uid::LineCode;
 
     const NAMING: Naming = Naming {
@@ -236,7 +236,7 @@ mod tests {
     /// A wrong name that passes the check sum once must not move the train.
     #[test]
     fn one_wrong_reading_is_not_believed() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let (a, b) = (map.lamps[20].uid, map.lamps[90].uid);
         let s = map.lamps[20].chainage_m;
         let mut lamp = followed();
@@ -262,7 +262,7 @@ mod tests {
     /// Two equal readings start a position, and end a wrong one.
     #[test]
     fn agreeing_readings_are() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let uid = map.lamps[20].uid;
         for (expected, verdict) in [
             (None, Verdict::Named(uid, Identity::Decoded)),
@@ -287,7 +287,7 @@ mod tests {
     /// name.
     #[test]
     fn what_was_joined_once_is_one_reading() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let uid = map.lamps[20].uid;
         let expected = at(map.lamps[90].chainage_m);
         let mut lamp = followed();
@@ -320,7 +320,7 @@ mod tests {
     /// Within the gate the expected lamp, between two lamps none.
     #[test]
     fn a_far_lamp_takes_the_expected_name() {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let s = map.lamps[20].chainage_m;
         let named = Verdict::Named(map.lamps[20].uid, Identity::Predicted);
         for off in [-3.9, 0.0, 3.9] {

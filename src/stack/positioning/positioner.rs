@@ -11,7 +11,7 @@ use crate::bus::{
 };
 use crate::stack::camera_watch::CameraWatch;
 use crate::stack::led::{ChipVotes, LampFinder, LampImage, LedSettings};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::track::uid::Uid;
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3, Vector3};
@@ -24,7 +24,7 @@ use std::sync::Arc;
 pub struct LedPositioner {
     settings: LedSettings,
     rig: RigCalibration,
-    map: Arc<Tunnel>,
+    map: Arc<Track>,
     /// One an eye, left and right.
     watches: [CameraWatch; 2],
     /// One an eye, left and right.
@@ -63,7 +63,7 @@ const MOST_EXPOSURE_S: f64 = 1.0;
 
 impl LedPositioner {
     /// For one rig on one line.
-    pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Tunnel>) -> Self {
+    pub fn new(settings: &LedSettings, rig: RigCalibration, map: Arc<Track>) -> Self {
         let finder = |eye: &CameraModel| LampFinder::new(settings, eye, &map.lamps);
         let finders = [finder(&rig.left), finder(&rig.right)];
         let watch = |eye: &CameraModel| {

@@ -5,7 +5,7 @@ use super::attitude::CarAttitude;
 use crate::bus::{ImuSample, OdometerSample, SimTime};
 use crate::stack::led::LedSettings;
 use crate::stack::odometry::Odometry;
-use crate::track::{Alignment, Tunnel};
+use crate::track::{Alignment, Track};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion};
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ struct LastFix {
 /// Dead reckoning from fix to fix.
 #[derive(Debug)]
 pub struct DeadReckoning {
-    map: Arc<Tunnel>,
+    map: Arc<Track>,
     odometry: Odometry,
     attitude: CarAttitude,
     last_fix: Option<LastFix>,
@@ -27,7 +27,7 @@ pub struct DeadReckoning {
 
 impl DeadReckoning {
     /// Nothing known yet.
-    pub fn new(settings: &LedSettings, map: Arc<Tunnel>) -> Self {
+    pub fn new(settings: &LedSettings, map: Arc<Track>) -> Self {
         Self {
             map,
             odometry: Odometry::default(),
@@ -112,13 +112,13 @@ impl DeadReckoning {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::stack::led::testing::tunnel;
+    use crate::stack::led::testing::track;
 
     /// While the odometer is silent the train does not know where it is; when it counts again, it
     /// does.
     #[test]
     fn a_position_is_lost_with_the_odometer() {
-        let map = Arc::new(tunnel("manchester"));
+        let map = Arc::new(track("manchester"));
         let mut reckoning = DeadReckoning::new(&LedSettings::default(), map);
         let counted = |reckoning: &mut DeadReckoning, time_s: f64| {
             reckoning.on_odometer(&OdometerSample {

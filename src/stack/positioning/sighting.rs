@@ -4,7 +4,7 @@ use super::reckoning::DeadReckoning;
 use super::stereo::{Pairing, at_rest, from_size, pinhole, triangulate};
 use crate::bus::{Identity, Intrinsics, RigCalibration, SimTime};
 use crate::stack::led::{LampImage, LedSettings};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::track::uid::Uid;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -51,7 +51,7 @@ impl Sighting {
 pub struct Measurement<'a> {
     pub settings: &'a LedSettings,
     pub rig: &'a RigCalibration,
-    pub map: &'a Tunnel,
+    pub map: &'a Track,
     pub reckoning: &'a DeadReckoning,
 }
 

@@ -66,14 +66,14 @@ impl LampSmear<'_> {
 mod tests {
     use super::*;
     use crate::bus::RigCalibration;
-    use crate::stack::led::testing::{rig, tunnel, wide_rig};
+    use crate::stack::led::testing::{rig, track, wide_rig};
 
     /// Lamps on the left wall and on a nearer pillar between them, on the other side of the line
     /// first: each pixel of either eye, straight or wide, takes the lamp that is there, and without
     /// a position the first.
     #[test]
     fn smear_is_of_the_lamp_that_is_looked_at() {
-        let mut lamps = tunnel("manchester").lamps;
+        let mut lamps = track("manchester").lamps;
         (lamps[0].lateral_m, lamps[4].lateral_m) = (-2.0, 1.8);
         let head_m = lamps[4].chainage_m - 2.0;
         let (rig, wide) = (rig(), wide_rig());

@@ -6,8 +6,8 @@ use crate::bus::{
     OdometerSample, RigCalibration, SimTime, StereoPair,
 };
 use crate::stack::led::LedSettings;
-use crate::stack::led::testing::{SplitMix64, TestWorld, rig, tunnel, wide_rig};
-use crate::track::Tunnel;
+use crate::stack::led::testing::{SplitMix64, TestWorld, rig, track, wide_rig};
+use crate::track::Track;
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -58,7 +58,7 @@ fn mean(errors: &[f64]) -> f64 {
 /// At rest, from far to near: a name within twelve pairs, every fix within the paper's bound.
 #[test]
 fn val_static_points_stay_within_the_papers_maximum() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     for (k, ahead) in [
         (30, 9.0),
         (71, 7.5),
@@ -87,7 +87,7 @@ struct Run {
 
 /// Runs past four lamps after a start between two, and checks that no name is wrong.
 fn run(settings: &LedSettings, code: &str, kmh: f64, clock_ppm: f64) -> Run {
-    let map = Arc::new(tunnel(code));
+    let map = Arc::new(track(code));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, kmh / 3.6);
     world.clock_ppm = clock_ppm;
     let mut positioner = LedPositioner::new(settings, world.rig, map.clone());
@@ -154,7 +154,7 @@ struct Told {
 /// Runs past three lamps at 100 km/h with the right eye's frames said to be 1 ms late; the fixes'
 /// errors with their sigmas.
 fn run_with(told: Told) -> (Vec<f64>, Vec<f64>) {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 100.0 / 3.6);
     world.rig = told.built;
     world.right_later_s = 1e-3;
@@ -250,7 +250,7 @@ fn val_a_real_rig_is_as_good_as_a_straight_one_where_its_sheet_is_right() {
 /// frame that says none has the one before.
 #[test]
 fn rows_are_timed_by_the_exposure_that_each_frame_says() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 1.1, 0.0);
     let settings = LedSettings {
         agreeing_reads: 1,
@@ -292,7 +292,7 @@ fn rows_are_timed_by_the_exposure_that_each_frame_says() {
 /// claimed.
 #[test]
 fn a_global_shutter_names_no_lamp() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 6.0, 15.0);
     for eye in [&mut world.rig.left, &mut world.rig.right] {
         eye.shutter.line_time_s = 0.0;
@@ -308,7 +308,7 @@ fn a_global_shutter_names_no_lamp() {
 
 /// The world of a rig whose calibration, mounting and lamp are off by errors drawn with the stack's
 /// own sigmas, and what the map then says of lamp `k`.
-fn drawn_world(map: &Tunnel, k: usize, noise: &mut SplitMix64) -> (TestWorld, Tunnel) {
+fn drawn_world(map: &Track, k: usize, noise: &mut SplitMix64) -> (TestWorld, Track) {
     let stated = LedSettings::default();
     let mut world = TestWorld::new(map, 0.0, 0.0);
     let mut turn = |sigma_deg: f64| {
@@ -341,7 +341,7 @@ fn drawn_world(map: &Tunnel, k: usize, noise: &mut SplitMix64) -> (TestWorld, Tu
 #[test]
 fn val_sigma_is_what_fixes_scatter_by() {
     const RIGS: usize = 60;
-    let map = tunnel("manchester");
+    let map = track("manchester");
     let settings = LedSettings {
         agreeing_reads: 1,
         ..LedSettings::default()
@@ -399,7 +399,7 @@ fn deblurring_does_no_harm() {
 #[test]
 fn the_gyro_holds_the_position_of_a_swinging_car() {
     const SWING: f64 = 0.07;
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     world.yaw_rad = |t| SWING * (TAU * t).sin();
     let mut with_gyro = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
@@ -439,7 +439,7 @@ fn the_gyro_holds_the_position_of_a_swinging_car() {
 /// The position must not jump to the wrong lamp on the way.
 #[test]
 fn a_contradicting_name_is_not_used_at_once() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 3.0, 15.0);
     let stranger = map.lamps[90].uid;
     world.lamps[31].uid = stranger;
@@ -468,7 +468,7 @@ fn a_contradicting_name_is_not_used_at_once() {
 /// Drives past three lamps with each pair worked on before it is read, every odometer sample given.
 fn drive_with(
     world: &TestWorld,
-    map: &Arc<Tunnel>,
+    map: &Arc<Track>,
     pairs: u32,
     mut work: impl FnMut(u32, StereoPair) -> Option<StereoPair>,
 ) -> Vec<LedReport> {
@@ -495,7 +495,7 @@ fn drive_with(
 /// off a pair later. None is given, from the first repetition on; afterwards it goes on as before.
 #[test]
 fn a_frozen_rig_gives_no_fix() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let mut held = None;
     let reports = drive_with(&world, &map, 50, |k, mut pair| {
@@ -521,7 +521,7 @@ fn a_frozen_rig_gives_no_fix() {
 /// camera can do, and no stereo is claimed. The right one goes by its own lens and place.
 #[test]
 fn one_eye_goes_on_alone() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let alike = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let mut unlike = alike.clone();
     let focal_px = 0.9 * unlike.rig.left.intrinsics.fx_px;
@@ -572,7 +572,7 @@ fn one_eye_goes_on_alone() {
 /// Frames lost singly and in a row, past several lamps: what comes is used, and its gaps told.
 #[test]
 fn lost_pairs_are_counted_and_survived() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     let lost = |k: u32| k % 3 == 1 || (30..42).contains(&k);
     let reports = drive_with(&world, &map, 60, |k, pair| (!lost(k)).then_some(pair));
@@ -587,7 +587,7 @@ fn lost_pairs_are_counted_and_survived() {
 /// as late. One that is late, but not so late, is a fix of its own time.
 #[test]
 fn a_late_pair_is_a_fix_of_its_time_or_none() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     let world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
     for (late_s, used) in [(1.0, true), (8.0, false)] {
         let mut positioner = LedPositioner::new(&LedSettings::default(), world.rig, map.clone());
@@ -622,7 +622,7 @@ fn a_late_pair_is_a_fix_of_its_time_or_none() {
 /// other; the position does not shift to a neighbour. Lost pairs and a dead eye make no lamp dark.
 #[test]
 fn dark_lamps_are_told_and_skipped() {
-    let map = Arc::new(tunnel("manchester"));
+    let map = Arc::new(track("manchester"));
     for eye_dies in [false, true] {
         let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 15.0);
         let out = [map.lamps[32].uid, map.lamps[33].uid];
@@ -655,7 +655,7 @@ fn val_lamps_out() {
     println!("lamps out   error mean     p95     max   published   availability   told dark");
     let mut whole = None;
     for (share, published_m) in [(0.0, 0.09), (0.055, 0.11), (0.11, 0.15), (0.22, 0.18)] {
-        let map = tunnel("manchester");
+        let map = track("manchester");
         let mut world = TestWorld::new(&map, map.lamps[30].chainage_m - 8.0, 60.0 / 3.6);
         let (mut surveyed, mut noise) = (map.clone(), SplitMix64::new(7));
         for lamp in &mut surveyed.lamps {

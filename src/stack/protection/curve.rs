@@ -13,7 +13,7 @@
 
 use super::ProtectionSettings;
 use crate::numerics::bisected;
-use crate::track::Tunnel;
+use crate::track::Track;
 
 /// Standard gravity.
 const G_MPS2: f64 = 9.80665;
@@ -37,7 +37,7 @@ pub(super) struct Grades {
 
 impl Grades {
     /// From the map, with a kilometre beyond both ends.
-    pub fn new(map: &Tunnel, settings: &ProtectionSettings) -> Self {
+    pub fn new(map: &Track, settings: &ProtectionSettings) -> Self {
         let steps = (settings.length_m().clamp(STEP_M, 1000.0) / STEP_M).round() as usize;
         let first_m = -BEYOND_M;
         let count = ((map.alignment.length_m() + 2.0 * BEYOND_M) / STEP_M).clamp(2.0, 1e6) as usize;

@@ -9,7 +9,7 @@ use crate::bus::{
     ProtectionReport, Receiver, SimTime, Ticker, TrainReport, Via,
 };
 use crate::stack::Equipment;
-use crate::track::{Direction, TrackRoute, Tunnel};
+use crate::track::{Direction, Track, TrackRoute};
 use std::sync::Arc;
 
 /// Cycles of the protection a second.
@@ -31,7 +31,7 @@ impl TrainProtection {
         node: Node,
         route: TrackRoute,
         settings: &ProtectionSettings,
-        map: Arc<Tunnel>,
+        map: Arc<Track>,
     ) -> Self {
         let initial_chainage_m = settings.initial_chainage_m.map(|s_m| route.run_m(s_m));
         let settings = ProtectionSettings {

@@ -11,7 +11,7 @@
 //! # let map = std::sync::Arc::new(Tunnel { name: "t".into(), datum: None,
 //! #     alignment: Alignment::new(nalgebra::Point3::origin(), 0.0, &[straight], &[]),
 //! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
-//! #     line_number: 1, stations: vec![], ambient_lx: 5.0 });
+//! #     stations: vec![], ambient_lx: 5.0 });
 //! let settings = ProtectionSettings { initial_chainage_m: Some(500.0), ..Default::default() };
 //! let mut protection = Protection::new(&settings, map);
 //! let time = SimTime::from_secs(1.0);
@@ -84,7 +84,7 @@ use crate::bus::{
     BrakeDemand, DangerLevel, DriverDisplay, ObstacleWarning, OdometerSample, PositionEstimate,
     PositionFix, PositionSource, ProtectionReport, SimTime, Supervision, TrainCommand,
 };
-use crate::track::{Direction, TrackId, Tunnel};
+use crate::track::{Direction, Track, TrackId};
 use adhesion::{Adhesion, Grip};
 use curve::Grades;
 use display::{Ahead, Situation};
@@ -125,7 +125,7 @@ impl Known {
 #[derive(Clone, Debug)]
 pub struct Protection {
     settings: ProtectionSettings,
-    map: Arc<Tunnel>,
+    map: Arc<Track>,
     grades: Grades,
     position: Position,
     obstacles: Obstacles,
@@ -138,7 +138,7 @@ pub struct Protection {
 
 impl Protection {
     /// Switched on, with the driver's position setting if there is one.
-    pub fn new(settings: &ProtectionSettings, map: Arc<Tunnel>) -> Self {
+    pub fn new(settings: &ProtectionSettings, map: Arc<Track>) -> Self {
         Self {
             grades: Grades::new(&map, settings),
             position: Position::new(settings),

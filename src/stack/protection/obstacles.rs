@@ -7,7 +7,7 @@
 
 use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
-use crate::track::Tunnel;
+use crate::track::Track;
 
 /// A device of the map, or another train.
 #[derive(Clone, Debug)]
@@ -63,7 +63,7 @@ pub(super) struct Obstacles {
 
 impl Obstacles {
     /// With the devices of a map.
-    pub fn new(settings: &ProtectionSettings, map: &Tunnel) -> Self {
+    pub fn new(settings: &ProtectionSettings, map: &Track) -> Self {
         let reach_m = settings.device_reach_m;
         let devices = map.wayside.iter().map(|site| {
             let watched_m = (site.chainage_m - reach_m, site.chainage_m + reach_m);

@@ -11,7 +11,7 @@ use nalgebra::{Point3, Vector3};
 const PULSE_M: f64 = std::f64::consts::TAU * 0.43 / 128.0;
 
 /// 4 km of straight line on a constant gradient.
-pub(super) fn map(permille: f64) -> Arc<Tunnel> {
+pub(super) fn map(permille: f64) -> Arc<Track> {
     let straight = PlanElement {
         length_m: 4000.0,
         start_per_m: 0.0,
@@ -24,9 +24,8 @@ pub(super) fn map(permille: f64) -> Arc<Tunnel> {
         slope: permille / 1000.0,
         radius_m: 0.0,
     };
-    Arc::new(Tunnel {
+    Arc::new(Track {
         name: "test".into(),
-        datum: None,
         alignment: Alignment::new(Point3::origin(), 0.3, &[straight], &[grade]),
         sections: vec![],
         lamps: vec![],
@@ -36,7 +35,6 @@ pub(super) fn map(permille: f64) -> Arc<Tunnel> {
             chainage_m: 700.0,
         }],
         base_stations: vec![],
-        line_number: 1,
         stations: vec![],
         ambient_lx: 5.0,
     })
@@ -598,7 +596,7 @@ fn nonsense_changes_nothing() {
 /// of it stays.
 #[test]
 fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
-    let mut map = Tunnel::clone(&map(0.0));
+    let mut map = Track::clone(&map(0.0));
     map.wayside.push(crate::track::WaysideSite {
         name: "W1".into(),
         chainage_m: 1800.0,

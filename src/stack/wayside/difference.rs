@@ -293,7 +293,7 @@ impl Difference {
 #[cfg(test)]
 mod tests {
     use super::super::sight::Sight;
-    use super::super::test_scene::{calibration, tunnel, words};
+    use super::super::test_scene::{calibration, track, words};
     use super::*;
 
     fn random(len: usize, seed: u32, modulus: u32) -> Vec<u8> {
@@ -321,7 +321,7 @@ mod tests {
     fn fast_equals_obvious() {
         let settings = WaysideSettings::default();
         for (w, h) in [(101usize, 67usize), (8, 9), (160, 96)] {
-            let map = tunnel(0.0);
+            let map = track(0.0);
             let sight = Sight::new(
                 &settings,
                 calibration(&map, w as u32, h as u32),

@@ -14,7 +14,7 @@
 //! ```
 
 use crate::bus::{DetectedObstacle, TrainReport, WaysideCalibration};
-use crate::track::{Direction, Tunnel};
+use crate::track::{Direction, Track};
 use nalgebra::Vector2;
 
 /// Curves flatter than this count as straight, 1/m (a radius of 20 km).
@@ -59,7 +59,7 @@ pub fn curve_m(
 /// nearest to the train. For an obstacle beyond the device it is the other way round, and the
 /// projection is added.
 pub fn train_distance_m(
-    map: &Tunnel,
+    map: &Track,
     calibration: &WaysideCalibration,
     train: &TrainReport,
     obstacle: &DetectedObstacle,
@@ -145,7 +145,7 @@ mod tests {
     #[test]
     fn both_distances_on_a_map() {
         use crate::bus::{Blob, DangerLevel, PixelBox, SimTime};
-        use crate::stack::wayside::test_scene::{calibration, tunnel};
+        use crate::stack::wayside::test_scene::{calibration, track};
         use crate::track::TrackPoint;
         for (curvature, s) in [
             (0.0, 160.0),
@@ -153,7 +153,7 @@ mod tests {
             (1.0 / 300.0, 160.0),
             (-1.0 / 300.0, 230.0),
         ] {
-            let map = tunnel(curvature);
+            let map = track(curvature);
             let calibration = calibration(&map, 64, 36);
             let position = map.alignment.world_from_track(TrackPoint {
                 s_m: s,

@@ -6,7 +6,7 @@ use crate::bus::{
     TrainReport, WaysideCalibration, WaysideReport,
 };
 use crate::stack::Equipment;
-use crate::track::Tunnel;
+use crate::track::Track;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -37,7 +37,7 @@ impl WaysideDetection {
     pub fn new(
         settings: &WaysideSettings,
         calibration: WaysideCalibration,
-        map: Arc<Tunnel>,
+        map: Arc<Track>,
     ) -> Self {
         let name = calibration.name.clone();
         let site = map.wayside.iter().find(|site| site.name == name);

@@ -11,7 +11,7 @@
 //! # let map = std::sync::Arc::new(Tunnel { name: "t".into(), datum: None,
 //! #     alignment: Alignment::new(Point3::origin(), 0.0, &[straight], &[]),
 //! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
-//! #     line_number: 1, stations: vec![], ambient_lx: 5.0 });
+//! #     stations: vec![], ambient_lx: 5.0 });
 //! // On the left wall at chainage 200 m, 2.5 m up, looking down the line at approaching trains.
 //! let axes = Matrix3::new(0.0, 0.1, -1.0, 1.0, 0.0, 0.0, 0.0, -1.0, -0.1);
 //! let calibration = WaysideCalibration {
@@ -128,7 +128,7 @@ use crate::bus::{
     DangerLevel, DetectedObstacle, Frame, LidarScan, ObstacleWarning, PixelBox, Plan, SimTime,
     TrainReport, WaysideCalibration, WaysideReport,
 };
-use crate::track::Tunnel;
+use crate::track::Track;
 use announce::Announcer;
 use bed::{BedLight, ClearBed};
 use cells::GaugeCells;
@@ -190,7 +190,7 @@ impl WaysideDetector {
     pub fn new(
         settings: &WaysideSettings,
         calibration: WaysideCalibration,
-        map: Arc<Tunnel>,
+        map: Arc<Track>,
     ) -> Self {
         let intrinsics = calibration.camera.intrinsics;
         let (width, height) = (intrinsics.width_px as usize, intrinsics.height_px as usize);

@@ -8,7 +8,7 @@
 use super::WaysideSettings;
 use crate::bus::{PixelBox, WaysideCalibration};
 use crate::numerics::bisected;
-use crate::track::{CrossSection, Edge, TrackPoint, Tunnel};
+use crate::track::{CrossSection, Edge, Track, TrackPoint};
 use nalgebra::{Point2, Point3, Vector3};
 use std::sync::Arc;
 
@@ -114,7 +114,7 @@ pub(super) struct GaugeSpan {
 #[derive(Clone, Debug)]
 pub(super) struct Sight {
     calibration: WaysideCalibration,
-    map: Arc<Tunnel>,
+    map: Arc<Track>,
     /// In order of chainage; the device's own station is `here`.
     stations: Vec<Station>,
     here: usize,
@@ -127,7 +127,7 @@ impl Sight {
     pub fn new(
         settings: &WaysideSettings,
         calibration: WaysideCalibration,
-        map: Arc<Tunnel>,
+        map: Arc<Track>,
     ) -> Self {
         let mut profiles: Vec<SectionProfile> = map
             .sections
@@ -172,7 +172,7 @@ impl Sight {
         &self.calibration
     }
 
-    pub fn map(&self) -> &Tunnel {
+    pub fn map(&self) -> &Track {
         &self.map
     }
 

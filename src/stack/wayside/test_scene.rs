@@ -7,7 +7,7 @@ use crate::bus::{
 };
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, RAIL_OFFSET_M, SectionRange,
-    Tunnel,
+    Track,
 };
 use image::GrayImage;
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -64,7 +64,7 @@ pub fn section() -> CrossSection {
 }
 
 /// 600 m of level line, curved to the left with `curvature_per_m`.
-pub fn tunnel(curvature_per_m: f64) -> Arc<Tunnel> {
+pub fn track(curvature_per_m: f64) -> Arc<Track> {
     let element = PlanElement {
         length_m: 600.0,
         start_per_m: curvature_per_m,
@@ -72,9 +72,8 @@ pub fn tunnel(curvature_per_m: f64) -> Arc<Tunnel> {
         start_cant_m: 0.0,
         end_cant_m: 0.0,
     };
-    Arc::new(Tunnel {
+    Arc::new(Track {
         name: "test".into(),
-        datum: None,
         alignment: Alignment::new(Point3::new(3.0, -7.0, 11.0), 0.4, &[element], &[]),
         sections: vec![SectionRange {
             from_m: 0.0,
@@ -85,7 +84,6 @@ pub fn tunnel(curvature_per_m: f64) -> Arc<Tunnel> {
         wayside: vec![],
         balises: vec![],
         base_stations: vec![],
-        line_number: 1,
         stations: vec![],
         ambient_lx: 5.0,
     })
@@ -93,7 +91,7 @@ pub fn tunnel(curvature_per_m: f64) -> Arc<Tunnel> {
 
 /// A camera on the left wall at [`DEVICE_M`] that looks down the line and a little down and
 /// inwards; a lidar just under it.
-pub fn calibration(map: &Tunnel, width: u32, height: u32) -> WaysideCalibration {
+pub fn calibration(map: &Track, width: u32, height: u32) -> WaysideCalibration {
     let line = map.alignment.at(DEVICE_M).world_from_line();
     let forward = Vector3::new(-1.0, -0.06, -0.07).normalize();
     let right = forward.cross(&Vector3::z()).normalize();
@@ -158,7 +156,7 @@ impl Crate {
 
 /// What the camera of the tests sees.
 pub struct TestScene {
-    pub map: Arc<Tunnel>,
+    pub map: Arc<Track>,
     pub calibration: WaysideCalibration,
     background: Vec<f64>,
     /// Of every pixel, in line axes.
@@ -177,7 +175,7 @@ impl TestScene {
     /// Through a lens of choice.
     pub fn through(lens: Intrinsics) -> Self {
         let (width, height) = (lens.width_px, lens.height_px);
-        let map = tunnel(0.0);
+        let map = track(0.0);
         let mut calibration = calibration(&map, width, height);
         calibration.camera.intrinsics = lens;
         let i = calibration.camera.intrinsics;
@@ -310,7 +308,7 @@ fn bed_distance_m(eye: &Point3<f64>, ray: &Vector3<f64>) -> f64 {
 }
 
 /// Origin (chainage, left, height) and rotation of a pose in line axes.
-fn line_from(map: &Tunnel, pose: &Isometry3<f64>) -> (Point3<f64>, UnitQuaternion<f64>) {
+fn line_from(map: &Track, pose: &Isometry3<f64>) -> (Point3<f64>, UnitQuaternion<f64>) {
     let line_from = map.alignment.at(0.0).world_from_line().inv_mul(pose);
     (
         Point3::from(line_from.translation.vector),

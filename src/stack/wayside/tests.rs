@@ -471,7 +471,7 @@ fn odd_input_is_survived() {
 #[test]
 fn foot_inverts_projection() {
     for curvature in [0.0, 1.0 / 300.0, -1.0 / 250.0] {
-        let map = tunnel(curvature);
+        let map = track(curvature);
         let calibration = calibration(&map, 1920, 1080);
         let sight = Sight::new(
             &WaysideSettings::default(),

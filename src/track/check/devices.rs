@@ -1,33 +1,33 @@
-//! Wayside devices of a tunnel file, and whatever else has a name and a place.
+//! Wayside devices of a track file, and whatever else has a name and a place.
 
 use super::{free_standing, on_line};
 use crate::settings::{Checker, did_you_mean};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::track::furniture::WaysideSite;
 use crate::track::section::OutlinePoint;
 use std::collections::BTreeMap;
 
 /// Checks wayside devices against rock, gauge and balises.
-pub(super) fn check_wayside(tunnel: &Tunnel, check: &mut Checker<'_>) {
-    for (k, w) in tunnel.wayside.iter().enumerate() {
+pub(super) fn check_wayside(track: &Track, check: &mut Checker<'_>) {
+    for (k, w) in track.wayside.iter().enumerate() {
         let device = format!("wayside[{k}]");
-        if on_line(&format!("{device}.chainage_m"), w.chainage_m, tunnel, check) {
+        if on_line(&format!("{device}.chainage_m"), w.chainage_m, track, check) {
             let place = [OutlinePoint::new(w.lateral_m, w.height_m)];
-            free_standing(&device, tunnel, w.chainage_m, &place, check);
+            free_standing(&device, track, w.chainage_m, &place, check);
         }
-        check_balise(&format!("{device}.balise"), w, tunnel, check);
+        check_balise(&format!("{device}.balise"), w, track, check);
     }
 }
 
-fn check_balise(key: &str, w: &WaysideSite, tunnel: &Tunnel, check: &mut Checker<'_>) {
+fn check_balise(key: &str, w: &WaysideSite, track: &Track, check: &mut Checker<'_>) {
     if w.balise.trim().is_empty() {
         let remedy = "name the one of `[[balises]]` that gets its messages";
         check.problem(key, "is empty", remedy);
         return;
     }
-    match tunnel.balise(&w.balise) {
+    match track.balise(&w.balise) {
         None => {
-            let names: Vec<String> = tunnel.balises.iter().map(|b| b.name.clone()).collect();
+            let names: Vec<String> = track.balises.iter().map(|b| b.name.clone()).collect();
             let remedy = match did_you_mean(&w.balise, &names) {
                 Some(name) => format!("did you mean \"{name}\"?"),
                 None => "name one of `[[balises]]`".to_owned(),
@@ -47,12 +47,12 @@ fn check_balise(key: &str, w: &WaysideSite, tunnel: &Tunnel, check: &mut Checker
 }
 
 /// Chainages on the line, and names that are there twice.
-pub(super) fn check_named(tunnel: &Tunnel, check: &mut Checker<'_>) {
-    let wayside = tunnel.wayside.iter().map(|w| (&w.name, w.chainage_m));
-    let balises = tunnel.balises.iter().map(|b| (&b.name, b.chainage_m));
-    let base_stations = tunnel.base_stations.iter();
+pub(super) fn check_named(track: &Track, check: &mut Checker<'_>) {
+    let wayside = track.wayside.iter().map(|w| (&w.name, w.chainage_m));
+    let balises = track.balises.iter().map(|b| (&b.name, b.chainage_m));
+    let base_stations = track.base_stations.iter();
     let base_stations = base_stations.map(|b| (&b.name, b.chainage_m));
-    let stations = tunnel.stations.iter().map(|s| (&s.name, s.chainage_m));
+    let stations = track.stations.iter().map(|s| (&s.name, s.chainage_m));
     for (table, places) in [
         ("wayside", wayside.collect::<Vec<_>>()),
         ("balises", balises.collect()),
@@ -62,7 +62,7 @@ pub(super) fn check_named(tunnel: &Tunnel, check: &mut Checker<'_>) {
         let mut named: BTreeMap<&str, usize> = BTreeMap::new();
         for (k, (name, chainage_m)) in places.into_iter().enumerate() {
             let place = format!("{table}[{k}]");
-            on_line(&format!("{place}.chainage_m"), chainage_m, tunnel, check);
+            on_line(&format!("{place}.chainage_m"), chainage_m, track, check);
             let first = *named.entry(name).or_insert(k);
             if name.trim().is_empty() {
                 let what = "is empty, and messages and figures go by names";

@@ -6,7 +6,7 @@ use crate::track::file::{LAST_LAMP, LampEntry, LampRowEntry, TunnelFile};
 use crate::track::furniture::LampSite;
 use crate::track::section::OutlinePoint;
 use crate::track::uid::Uid;
-use crate::track::{TrackPoint, Tunnel};
+use crate::track::{Track, TrackPoint};
 use nalgebra::{Unit, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -15,30 +15,25 @@ use std::f64::consts::TAU;
 type Placed = (String, LampSite);
 
 /// Places every lamp of the file, in order of chainage.
-pub(super) fn place(file: &TunnelFile, tunnel: &Tunnel, check: &mut Checker<'_>) -> Vec<LampSite> {
+pub(super) fn place(file: &TunnelFile, track: &Track, check: &mut Checker<'_>) -> Vec<LampSite> {
     let common = file.lamps.clone().unwrap_or_default();
     let row = match &file.lamps {
-        Some(row) => row_entries(row, tunnel, check),
+        Some(row) => row_entries(row, track, check),
         None => Vec::new(),
     };
     let row = row
         .iter()
-        .map(|entry| ("lamps".to_owned(), site(&common, entry, tunnel)));
+        .map(|entry| ("lamps".to_owned(), site(file, &common, entry, track)));
     let mut placed: Vec<Placed> = row.collect();
     for (k, entry) in file.lamp.iter().enumerate() {
         let key = format!("lamp[{k}]");
-        if on_line(
-            &format!("{key}.chainage_m"),
-            entry.chainage_m,
-            tunnel,
-            check,
-        ) {
-            placed.push((key, site(&common, entry, tunnel)));
+        if on_line(&format!("{key}.chainage_m"), entry.chainage_m, track, check) {
+            placed.push((key, site(file, &common, entry, track)));
         }
     }
     check_uids(&placed, check);
     for (key, lamp) in &placed {
-        free_standing(key, tunnel, lamp.chainage_m, &rim(lamp, tunnel), check);
+        free_standing(key, track, lamp.chainage_m, &rim(lamp, track), check);
     }
     let mut sites: Vec<LampSite> = placed.into_iter().map(|(_, site)| site).collect();
     sites.sort_by(|a, b| a.chainage_m.total_cmp(&b.chainage_m));
@@ -46,8 +41,8 @@ pub(super) fn place(file: &TunnelFile, tunnel: &Tunnel, check: &mut Checker<'_>)
 }
 
 /// The row as single lamps; none where its numbers make no sense.
-fn row_entries(row: &LampRowEntry, tunnel: &Tunnel, check: &mut Checker<'_>) -> Vec<LampEntry> {
-    let to_m = row.to_m.unwrap_or(tunnel.alignment.length_m());
+fn row_entries(row: &LampRowEntry, track: &Track, check: &mut Checker<'_>) -> Vec<LampEntry> {
+    let to_m = row.to_m.unwrap_or(track.alignment.length_m());
     if to_m < row.from_m {
         check.problem(
             "lamps.to_m",
@@ -56,8 +51,8 @@ fn row_entries(row: &LampRowEntry, tunnel: &Tunnel, check: &mut Checker<'_>) -> 
         );
         return Vec::new();
     }
-    let begins = on_line("lamps.from_m", row.from_m, tunnel, check);
-    let ends = on_line("lamps.to_m", to_m, tunnel, check);
+    let begins = on_line("lamps.from_m", row.from_m, track, check);
+    let ends = on_line("lamps.to_m", to_m, track, check);
     if !(begins && ends) {
         return Vec::new();
     }
@@ -83,25 +78,25 @@ fn row_entries(row: &LampRowEntry, tunnel: &Tunnel, check: &mut Checker<'_>) -> 
     (0..count as u16).map(entry).collect()
 }
 
-fn site(common: &LampRowEntry, entry: &LampEntry, tunnel: &Tunnel) -> LampSite {
+fn site(file: &TunnelFile, common: &LampRowEntry, entry: &LampEntry, track: &Track) -> LampSite {
     let lateral_m = entry.lateral_m.unwrap_or(common.lateral_m);
     let height_m = entry.height_m.unwrap_or(common.height_m);
     let yaw_deg = entry.aim_yaw_deg.unwrap_or(common.aim_yaw_deg);
     let pitch_deg = entry.aim_pitch_deg.unwrap_or(common.aim_pitch_deg);
     let (yaw, pitch) = (yaw_deg.to_radians(), pitch_deg.to_radians());
-    let track = tunnel.alignment.at(entry.chainage_m);
-    let across = -track.left() * lateral_m.signum();
+    let frame = track.alignment.at(entry.chainage_m);
+    let across = -frame.left() * lateral_m.signum();
     let facing =
-        (across * yaw.cos() - track.ahead() * yaw.sin()) * pitch.cos() + Vector3::z() * pitch.sin();
+        (across * yaw.cos() - frame.ahead() * yaw.sin()) * pitch.cos() + Vector3::z() * pitch.sin();
     LampSite {
         uid: Uid {
-            line: tunnel.line_number,
+            line: file.line_number,
             lamp: entry.number,
         },
         chainage_m: entry.chainage_m,
         lateral_m,
         height_m,
-        centre: tunnel.alignment.world_from_track(TrackPoint {
+        centre: track.alignment.world_from_track(TrackPoint {
             s_m: entry.chainage_m,
             l_m: lateral_m,
             h_m: height_m,
@@ -131,8 +126,8 @@ fn check_uids(placed: &[Placed], check: &mut Checker<'_>) {
 }
 
 /// The disc's centre and rim in the cross-section.
-fn rim(lamp: &LampSite, tunnel: &Tunnel) -> Vec<OutlinePoint> {
-    let left = tunnel.alignment.at(lamp.chainage_m).left();
+fn rim(lamp: &LampSite, track: &Track) -> Vec<OutlinePoint> {
+    let left = track.alignment.at(lamp.chainage_m).left();
     let radius_m = 0.5 * lamp.diameter_m;
     // Two radii of the disc; where it faces up or down any horizontal one will do.
     let level = Vector3::z().cross(&lamp.facing);

@@ -1,14 +1,15 @@
-//! From the file as written to a [`Tunnel`]: every number checked, every problem collected.
+//! From the file as written to a [`Track`]: every number checked, every problem collected.
 
 mod devices;
 mod lamps;
 mod line;
 mod sections;
 
-use super::Tunnel;
 use super::file::{DatumEntry, TunnelFile};
 use super::gauge::Gauge;
+use super::network::Network;
 use super::section::OutlinePoint;
+use super::{Track, Tunnel};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 
 /// Chainages closer than this are the same place.
@@ -34,28 +35,31 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     let check = &mut check;
     let alignment = line::alignment(file, check);
     let sections = sections::sections(&file.sections, alignment.length_m(), check);
-    let mut tunnel = Tunnel {
+    let mut track = Track {
         name: file.name.clone(),
-        datum: file.datum.as_ref().map(DatumEntry::datum),
         alignment,
         sections,
         lamps: Vec::new(),
         wayside: file.wayside.clone(),
         balises: file.balises.clone(),
         base_stations: file.base_stations.clone(),
-        line_number: file.line_number,
         stations: file.stations.clone(),
         ambient_lx: file.ambient_lx,
     };
-    tunnel.lamps = lamps::place(file, &tunnel, check);
-    devices::check_wayside(&tunnel, check);
-    devices::check_named(&tunnel, check);
-    tunnel
+    track.lamps = lamps::place(file, &track, check);
+    devices::check_wayside(&track, check);
+    devices::check_named(&track, check);
+    Tunnel {
+        name: file.name.clone(),
+        datum: file.datum.as_ref().map(DatumEntry::datum),
+        line_number: file.line_number,
+        network: Network::of_one(track),
+    }
 }
 
 /// Whether a chainage is on the line; a problem if not.
-fn on_line(key: &str, s_m: f64, tunnel: &Tunnel, check: &mut Checker<'_>) -> bool {
-    let length_m = tunnel.alignment.length_m();
+fn on_line(key: &str, s_m: f64, track: &Track, check: &mut Checker<'_>) -> bool {
+    let length_m = track.alignment.length_m();
     let on = (-SAME_M..=length_m + SAME_M).contains(&s_m);
     if !on {
         check.problem(
@@ -70,15 +74,15 @@ fn on_line(key: &str, s_m: f64, tunnel: &Tunnel, check: &mut Checker<'_>) -> boo
 /// A problem where any of some points (l, h) lies in the rock or where the train runs.
 fn free_standing(
     key: &str,
-    tunnel: &Tunnel,
+    track: &Track,
     s_m: f64,
     points: &[OutlinePoint],
     check: &mut Checker<'_>,
 ) {
-    let Some(section) = tunnel.section_at(s_m) else {
+    let Some(section) = track.section_at(s_m) else {
         return;
     };
-    let gauge = Gauge::b1(tunnel.alignment.at(s_m).curvature_per_m);
+    let gauge = Gauge::b1(track.alignment.at(s_m).curvature_per_m);
     if let Some(p) = points.iter().find(|p| !section.contains(p.l_m, p.h_m)) {
         check.problem(
             key,
@@ -108,9 +112,14 @@ fn free_standing(
 mod tests {
     use super::*;
     use crate::track::TrackPoint;
+    use std::sync::Arc;
 
     const CHENGDU: &str = include_str!("../../../tunnels/chengdu_line1.toml");
     const BENCH: &str = include_str!("../../../tunnels/test_bench.toml");
+
+    fn track(text: &str) -> Arc<Track> {
+        Tunnel::from_toml(text).unwrap().first_track().clone()
+    }
 
     fn problems(text: &str) -> Vec<Problem> {
         match Tunnel::from_toml(text) {
@@ -123,7 +132,7 @@ mod tests {
     /// Distances of the paper's rig: its camera hangs 1.7 m aside of the lamps and 1.5 m below.
     #[test]
     fn val_shipped_tunnels_have_the_figures_of_the_paper() {
-        let line = Tunnel::from_toml(CHENGDU).unwrap();
+        let line = track(CHENGDU);
         assert_eq!(line.lamps.len(), 299);
         assert!((line.alignment.length_m() - 3000.0).abs() < 1e-12);
         for pair in line.lamps.windows(2) {
@@ -134,7 +143,7 @@ mod tests {
             let ahead_m = device.chainage_m - line.balise(&device.balise).unwrap().chainage_m;
             assert!((300.0..=500.0).contains(&ahead_m));
         }
-        let bench = Tunnel::from_toml(BENCH).unwrap();
+        let bench = track(BENCH);
         assert!((bench.lamps[2].chainage_m - 200.0).abs() < 1e-9);
         for lamp in line.lamps.iter().chain(&bench.lamps) {
             let camera = (lamp.lateral_m - 1.7, lamp.height_m - 1.5);
@@ -146,7 +155,7 @@ mod tests {
     /// Provokes: a lamp that faces the wall, or trains that go away from it.
     #[test]
     fn lamps_face_the_trains_that_come() {
-        let line = Tunnel::from_toml(CHENGDU).unwrap();
+        let line = track(CHENGDU);
         for lamp in &line.lamps {
             let back = TrackPoint {
                 s_m: lamp.chainage_m - 5.0,
@@ -166,7 +175,7 @@ mod tests {
     /// Clothoids take their ends from their neighbours, and cant goes with curvature.
     #[test]
     fn clothoids_join_their_neighbours() {
-        let line = Tunnel::from_toml(CHENGDU).unwrap().alignment;
+        let line = &track(CHENGDU).alignment;
         let middle = line.at(430.0);
         assert!((middle.curvature_per_m - 0.5 / 500.0).abs() < 1e-12);
         assert!((middle.roll_rad + (0.05f64 / 1.5).asin()).abs() < 1e-12);
@@ -275,8 +284,8 @@ mod tests {
                 ] {
                     let odd_text = format!("{}{odd}{}", &text[..at], &rest[end..]);
                     if let Ok(tunnel) = Tunnel::from_toml(&odd_text) {
-                        let s_m = 0.5 * tunnel.alignment.length_m();
-                        assert!(tunnel.alignment.at(s_m).origin.x.is_finite());
+                        let line = &tunnel.first_track().alignment;
+                        assert!(line.at(0.5 * line.length_m()).origin.x.is_finite());
                     }
                 }
             }
@@ -289,8 +298,8 @@ mod tests {
         let line = "name = 't'\n[[plan]]\nkind = 'straight'\nlength_m = 50.0\n";
         let with = |section: &str| format!("{line}[[sections]]\nfrom_m = 0.0\n{section}");
         for kind in ["circular", "horseshoe", "rectangular", "open"] {
-            let tunnel = Tunnel::from_toml(&with(&format!("kind = '{kind}'"))).unwrap();
-            let section = tunnel.section_at(25.0).unwrap();
+            let track = track(&with(&format!("kind = '{kind}'")));
+            let section = track.section_at(25.0).unwrap();
             assert_eq!(section.closed, kind != "open");
             assert!(section.contains(0.0, 3.0) && !section.contains(0.0, -1.0));
         }

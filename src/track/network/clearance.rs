@@ -14,12 +14,12 @@ impl Network {
     /// one leg clears trains on the other, if the distance is that of two trains that pass. None where they
     /// never are.
     pub fn clearance_m(&self, switch: &Switch, apart_m: f64) -> Option<f64> {
-        let other = self.track(switch.through.track)?;
+        let other = self.alignment(switch.through.track)?;
         let steps = (1..).map(|k| f64::from(k) * STEP_M);
         let mut near_s_m = self.chainage_behind(switch.through, 0.0)?;
         for behind_m in steps.take_while(|m| *m <= FARTHEST_M) {
             let place = self.chainage_behind(switch.diverging, behind_m)?;
-            let track = self.track(switch.diverging.track)?;
+            let track = self.alignment(switch.diverging.track)?;
             let across = other.track_from_world(&track.at(place).origin, near_s_m);
             near_s_m = across.s_m;
             if across.l_m.abs() >= apart_m {
@@ -31,7 +31,7 @@ impl Network {
 
     /// Chainage so far behind an end, into its track; none where the track is shorter.
     fn chainage_behind(&self, end: TrackEnd, behind_m: f64) -> Option<f64> {
-        let length_m = self.track(end.track)?.length_m();
+        let length_m = self.alignment(end.track)?.length_m();
         let s_m = match end.way {
             Direction::Up => length_m - behind_m,
             Direction::Down => behind_m,
@@ -64,7 +64,9 @@ impl Network {
             .filter(|end| end.track == leg.track)
             .any(|end| {
                 let (low_m, high_m) = leg.stretch_m();
-                let length_m = self.track(end.track).map_or(0.0, |track| track.length_m());
+                let length_m = self
+                    .alignment(end.track)
+                    .map_or(0.0, |track| track.length_m());
                 match end.way {
                     Direction::Up => length_m - high_m < within_m,
                     Direction::Down => low_m < within_m,

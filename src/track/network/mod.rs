@@ -7,15 +7,19 @@
 //!
 //! ```
 //! use metrotwin::track::network::{Ends, Network, Switch, TrackEnd};
-//! use metrotwin::track::{Alignment, Direction, Place, PlanElement, Side, TrackId};
+//! use metrotwin::track::{Alignment, Direction, Place, PlanElement, Side, Track, TrackId};
 //! use nalgebra::Point3;
+//! use std::sync::Arc;
 //!
 //! // 100 m, then a switch to the left.
-//! let line = |x: f64, element| Alignment::new(Point3::new(x, 0.0, 0.0), 0.0, &[element], &[]);
+//! let track = |name, x: f64, element| {
+//!     let line = Alignment::new(Point3::new(x, 0.0, 0.0), 0.0, &[element], &[]);
+//!     Arc::new(Track::bare(name, line))
+//! };
 //! let tracks = vec![
-//!     line(0.0, PlanElement::straight(100.0)),
-//!     line(100.0, PlanElement::straight(300.0)),
-//!     line(100.0, PlanElement::arc(60.0, 1.0 / 190.0, 0.0)),
+//!     track("A", 0.0, PlanElement::straight(100.0)),
+//!     track("B", 100.0, PlanElement::straight(300.0)),
+//!     track("C", 100.0, PlanElement::arc(60.0, 1.0 / 190.0, 0.0)),
 //! ];
 //! let [low, high] = [Direction::Down, Direction::Up].map(|way| move |k| TrackEnd { track: TrackId(k), way });
 //! let switch = Switch {
@@ -49,10 +53,11 @@ mod tests;
 pub use error::NetworkError;
 pub use route::{Leg, Route};
 
-use super::{Alignment, Direction, Place, Side, TrackFrame, TrackId, TrackPoint};
+use super::{Alignment, Direction, Place, Side, Track, TrackFrame, TrackId, TrackPoint};
 use nalgebra::Point3;
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
 
 /// Ends that meet may be this far apart: less than any survey finds.
 const MOST_GAP_M: f64 = 1e-3;
@@ -132,8 +137,8 @@ pub enum Beyond {
 /// Tracks and switches.
 #[derive(Clone, Debug)]
 pub struct Network {
-    /// The centrelines, by number.
-    pub tracks: Vec<Alignment>,
+    /// The tracks, by number.
+    pub tracks: Vec<Arc<Track>>,
     /// The switches.
     pub switches: Vec<Switch>,
     beyond: BTreeMap<TrackEnd, Beyond>,
@@ -153,7 +158,7 @@ impl Network {
     /// Joins tracks. Every end of every track must be named once; what meets must be in one place and go on
     /// without a kink.
     pub fn new(
-        tracks: Vec<Alignment>,
+        tracks: Vec<Arc<Track>>,
         switches: Vec<Switch>,
         ends: Vec<Ends>,
     ) -> Result<Self, NetworkError> {
@@ -189,13 +194,13 @@ impl Network {
     }
 
     /// A network of one track, open at both ends.
-    pub fn of_one(track: Alignment) -> Self {
+    pub fn of_one(track: Track) -> Self {
         let ends = [Direction::Down, Direction::Up].map(|way| {
             let track = TrackId::default();
             (TrackEnd { track, way }, Beyond::Open)
         });
         Self {
-            tracks: vec![track],
+            tracks: vec![Arc::new(track)],
             switches: Vec::new(),
             beyond: ends.into(),
         }
@@ -235,7 +240,7 @@ impl Network {
 
     /// The pose of a track's end, looking out of the track.
     pub fn leaving(&self, end: TrackEnd) -> Option<TrackFrame> {
-        let track = self.track(end.track)?;
+        let track = self.alignment(end.track)?;
         Some(match end.way {
             Direction::Up => track.at(track.length_m()),
             Direction::Down => {
@@ -251,9 +256,14 @@ impl Network {
         })
     }
 
-    /// The centreline of a track.
-    pub fn track(&self, id: TrackId) -> Option<&Alignment> {
+    /// A track.
+    pub fn track(&self, id: TrackId) -> Option<&Arc<Track>> {
         self.tracks.get(usize::from(id.0))
+    }
+
+    /// The centreline of a track.
+    pub fn alignment(&self, id: TrackId) -> Option<&Alignment> {
+        self.track(id).map(|track| &track.alignment)
     }
 
     /// What is beyond an end.
@@ -281,7 +291,7 @@ impl Network {
         let curvature = |end: TrackEnd| {
             let into = end.opposite();
             // Looking into the track, just behind its first piece's begin.
-            let track = self.track(end.track)?;
+            let track = self.alignment(end.track)?;
             let at_m = match into.way {
                 Direction::Up => 0.0,
                 Direction::Down => track.length_m() - 1e-6,
@@ -298,7 +308,7 @@ impl Network {
 
     /// World position of a point on a track; none where there is no such track.
     pub fn world_from_track(&self, track: TrackId, point: TrackPoint) -> Option<Point3<f64>> {
-        Some(self.track(track)?.world_from_track(point))
+        Some(self.alignment(track)?.world_from_track(point))
     }
 
     /// The places of all tracks within a distance of a world position, in plan, nearest first, each with the
@@ -306,7 +316,7 @@ impl Network {
     pub fn near(&self, world: &Point3<f64>, within_m: f64) -> Vec<(TrackId, TrackPoint)> {
         let mut found: Vec<_> = (0u16..)
             .zip(&self.tracks)
-            .filter_map(|(k, track)| Some((TrackId(k), nearest(track, world)?)))
+            .filter_map(|(k, track)| Some((TrackId(k), nearest(&track.alignment, world)?)))
             .filter(|(_, point)| point.l_m.abs() <= within_m)
             .collect();
         found.sort_by(|a, b| f64::total_cmp(&a.1.l_m.abs(), &b.1.l_m.abs()));
@@ -315,7 +325,7 @@ impl Network {
 
     /// Whether a place is on a track of this network.
     pub fn has(&self, place: Place) -> bool {
-        self.track(place.track)
+        self.alignment(place.track)
             .is_some_and(|track| (0.0..=track.length_m()).contains(&place.s_m))
     }
 }

@@ -167,7 +167,7 @@ impl Network {
     ) -> Result<Route, NetworkError> {
         let last = tracks.len().saturating_sub(1);
         let leg = |(k, end): (usize, &TrackEnd)| {
-            let length_m = self.track(end.track).map_or(0.0, Alignment::length_m);
+            let length_m = self.alignment(end.track).map_or(0.0, Alignment::length_m);
             let (begin_m, end_m) = match end.way {
                 Direction::Up => (0.0, length_m),
                 Direction::Down => (length_m, 0.0),
@@ -196,10 +196,10 @@ impl Network {
     }
 
     /// The line that a route runs on, from its begin: it stays where the tracks are in the world.
-    pub fn alignment(&self, route: &Route) -> Option<Alignment> {
+    pub fn route_alignment(&self, route: &Route) -> Option<Alignment> {
         let line = |leg: &Leg| {
             let (low_m, high_m) = leg.stretch_m();
-            let stretch = self.track(leg.track)?.stretch(low_m, high_m);
+            let stretch = self.alignment(leg.track)?.stretch(low_m, high_m);
             Some(match leg.direction {
                 Direction::Up => stretch,
                 Direction::Down => stretch.reversed(),

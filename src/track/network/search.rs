@@ -55,7 +55,7 @@ impl Network {
                     best = Some((way_m, end));
                 }
             }
-            let length_m = self.track(end.track).map_or(0.0, Alignment::length_m);
+            let length_m = self.alignment(end.track).map_or(0.0, Alignment::length_m);
             self.enter_next(end, at_m + length_m, &mut queue);
         }
         let (_, last) = best?;
@@ -107,7 +107,7 @@ impl Network {
                     let route = self.route_by(from, &tracks, to).ok();
                     found.extend(route.filter(|route| route.length_m() <= most_m));
                 }
-                let length_m = self.track(end.track).map_or(0.0, Alignment::length_m);
+                let length_m = self.alignment(end.track).map_or(0.0, Alignment::length_m);
                 open.push((tracks, at_m + length_m));
             }
         }
@@ -124,7 +124,7 @@ impl Network {
     /// From a place to the end of its track.
     fn left_m(&self, from: Place, direction: Direction) -> Option<f64> {
         let length_m = self
-            .track(from.track)
+            .alignment(from.track)
             .filter(|_| self.has(from))?
             .length_m();
         Some(match direction {

@@ -140,7 +140,12 @@ fn grown(seed: u64, tracks: usize) -> Network {
             _ => Ends::Open(tip),
         });
     }
-    Network::new(lines, switches, ends).unwrap()
+    Network::new(bare(lines), switches, ends).unwrap()
+}
+
+fn bare(lines: Vec<Alignment>) -> Vec<Arc<Track>> {
+    let tracks = lines.into_iter().map(|line| Track::bare("", line));
+    tracks.map(Arc::new).collect()
 }
 
 fn leaving(lines: &[Alignment], end: TrackEnd) -> TrackFrame {
@@ -201,7 +206,7 @@ fn passing_loop() -> Network {
         switch("W2", low(3), high(2), high(1)),
     ];
     let ends = vec![Ends::Open(low(0)), Ends::Buffer(high(3))];
-    Network::new(tracks, switches, ends).unwrap()
+    Network::new(bare(tracks), switches, ends).unwrap()
 }
 
 /// Provokes: a place that is elsewhere in the world, on another track, or at another chainage, in networks of
@@ -214,7 +219,7 @@ fn places_and_coordinates_go_both_ways() {
         assert!(network.tracks.len() >= 199 && network.switches.len() > 40);
         for _ in 0..400 {
             let track = TrackId(numbers.below(network.tracks.len()) as u16);
-            let length_m = network.track(track).unwrap().length_m();
+            let length_m = network.alignment(track).unwrap().length_m();
             let point = TrackPoint {
                 s_m: numbers.between(0.0, length_m),
                 l_m: numbers.between(-2.0, 2.0),
@@ -245,7 +250,7 @@ fn a_point_mass_stays_on_random_routes() {
         let mut numbers = Numbers(seed);
         for _ in 0..100 {
             let track = TrackId(numbers.below(network.tracks.len()) as u16);
-            let length_m = network.track(track).unwrap().length_m();
+            let length_m = network.alignment(track).unwrap().length_m();
             let from = Place {
                 track,
                 s_m: numbers.between(0.0, length_m),
@@ -262,7 +267,7 @@ fn a_point_mass_stays_on_random_routes() {
                 end = entered.opposite();
                 tracks.push(entered.track);
             }
-            let last_m = network.track(end.track).unwrap().length_m();
+            let last_m = network.alignment(end.track).unwrap().length_m();
             let to_m = match end.way {
                 Direction::Up => last_m,
                 Direction::Down => 0.0,
@@ -277,7 +282,7 @@ fn a_point_mass_stays_on_random_routes() {
 
 /// Runs a point mass at 20 m/s.
 fn run_along(network: &Network, route: &Route) {
-    let line = network.alignment(route).unwrap();
+    let line = network.route_alignment(route).unwrap();
     assert!((line.length_m() - route.length_m()).abs() < 1e-8);
     let reversed = route.reversed();
     let (step_m, mut run_m) = (0.7, 0.0);
@@ -285,7 +290,7 @@ fn run_along(network: &Network, route: &Route) {
     while run_m < route.length_m() {
         let frame = line.at(run_m);
         let (place, way) = route.place(run_m);
-        let track = network.track(place.track).unwrap().at(place.s_m);
+        let track = network.alignment(place.track).unwrap().at(place.s_m);
         assert!((track.origin - frame.origin).norm() < 1e-9, "{run_m}");
         let heading = track.heading_rad + if way == Direction::Down { PI } else { 0.0 };
         assert!((heading - frame.heading_rad).sin().abs() < 1e-9);
@@ -304,7 +309,7 @@ fn run_along(network: &Network, route: &Route) {
         assert!(again.fold(f64::INFINITY, f64::min) < 1e-9);
         let (mirrored, back) = reversed.place(route.length_m() - run_m);
         // At a joint it may be on either track, but it is in the same place.
-        let same = network.track(mirrored.track).unwrap().at(mirrored.s_m);
+        let same = network.alignment(mirrored.track).unwrap().at(mirrored.s_m);
         assert!((same.origin - frame.origin).norm() < 1e-8, "{run_m}");
         if mirrored.track == place.track {
             assert!((mirrored.s_m - place.s_m).abs() < 1e-8 && back == way.reversed());
@@ -318,8 +323,8 @@ fn run_along(network: &Network, route: &Route) {
 #[test]
 fn ways_through_a_passing_loop() {
     let network = passing_loop();
-    let through_m = network.tracks[2].length_m();
-    let platform_m = network.tracks[1].length_m();
+    let through_m = network.tracks[2].alignment.length_m();
+    let platform_m = network.tracks[1].alignment.length_m();
     assert!(platform_m > through_m);
     let (from, to) = ((place(0, 50.0), Direction::Up), place(3, 20.0));
     let shortest = network.shortest(from, to).unwrap();
@@ -391,7 +396,7 @@ fn routes_conflict_where_they_foul_a_switch() {
         &[TrackId(2), TrackId(3)],
         50.0,
     );
-    let fouls = on(1, 60.0, network.tracks[1].length_m() - 5.0);
+    let fouls = on(1, 60.0, network.tracks[1].alignment.length_m() - 5.0);
     assert_eq!(
         network.conflicts(out.as_ref().unwrap(), &fouls, APART_M),
         [1]
@@ -420,7 +425,7 @@ fn what_does_not_meet_is_no_network() {
     let joined = |tracks, more: Vec<Ends>| {
         let mut ends = vec![Ends::Open(low(0)), Ends::Open(high(1))];
         ends.extend(more);
-        Network::new(tracks, Vec::new(), ends)
+        Network::new(bare(tracks), Vec::new(), ends)
     };
     let meet = vec![Ends::Joined(high(0), low(1))];
     let two = |x, y, heading| vec![straight(0.0, 0.0, 0.0), straight(x, y, heading)];

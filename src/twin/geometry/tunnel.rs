@@ -12,7 +12,7 @@
 //! them is not drawn and stays dark.
 
 use super::section::SectionCaster;
-use crate::track::{Material, Tunnel};
+use crate::track::{Material, Track};
 use nalgebra::{Point3, Vector2, Vector3};
 
 /// The swept tunnel with its rails, ready for rays.
@@ -85,11 +85,11 @@ const OVERLAP_M: f64 = 0.05;
 
 impl TunnelCaster {
     /// Sweeps the cross-sections of a tunnel along its line.
-    pub fn new(tunnel: &Tunnel) -> Self {
-        let stations: Vec<_> = station_chainages(tunnel)
+    pub fn new(track: &Track) -> Self {
+        let stations: Vec<_> = station_chainages(track)
             .into_iter()
             .map(|s_m| {
-                let frame = tunnel.alignment.at(s_m);
+                let frame = track.alignment.at(s_m);
                 let (sin, cos) = frame.heading_rad.sin_cos();
                 Station {
                     s_m,
@@ -109,7 +109,7 @@ impl TunnelCaster {
                     chord,
                     left: Vector2::new(-chord.y, chord.x),
                     slope: step.z / length,
-                    section: tunnel
+                    section: track
                         .sections
                         .iter()
                         .position(|r| r.from_m <= mid && mid < r.to_m),
@@ -119,7 +119,7 @@ impl TunnelCaster {
         Self {
             stations,
             segments,
-            sections: tunnel
+            sections: track
                 .sections
                 .iter()
                 .map(|r| SectionCaster::new(&r.section))
@@ -284,15 +284,15 @@ impl TunnelCaster {
 }
 
 /// Multiples of the step, and the ends of cross-sections, which may lie between them.
-fn station_chainages(tunnel: &Tunnel) -> Vec<f64> {
-    let begin = tunnel.sections.first().map_or(0.0, |r| r.from_m);
-    let end = tunnel.sections.last().map_or(0.0, |r| r.to_m);
+fn station_chainages(track: &Track) -> Vec<f64> {
+    let begin = track.sections.first().map_or(0.0, |r| r.from_m);
+    let end = track.sections.last().map_or(0.0, |r| r.to_m);
     let (first, last) = (
         (begin / STATION_STEP_M).ceil() as i64,
         (end / STATION_STEP_M).floor() as i64,
     );
     let steps = (first..=last).map(|k| k as f64 * STATION_STEP_M);
-    let ends = tunnel.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
+    let ends = track.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
     let mut all: Vec<f64> = steps.chain(ends).collect();
     all.sort_by(f64::total_cmp);
     all.dedup_by(|b, a| *b - *a < 1e-6);

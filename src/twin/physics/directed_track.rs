@@ -10,7 +10,7 @@ use super::deviation::Deviation;
 use super::irregularity::Irregularity;
 use super::settings::TrackSettings;
 use super::suspension::Axes;
-use crate::track::{Alignment, Direction, TrackFrame, Tunnel};
+use crate::track::{Alignment, Direction, Track, TrackFrame};
 use rapier3d_f64::math::Vector;
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ struct TrackCondition {
 pub(super) struct DirectedTrack {
     pub direction: Direction,
     /// The tunnel as it is met.
-    pub tunnel: Arc<Tunnel>,
+    pub tunnel: Arc<Track>,
     /// Stiffness (N/m) and damping (N s/m) of a rail under a wheel.
     pub support: (f64, f64),
     condition: Arc<TrackCondition>,
@@ -36,7 +36,7 @@ pub(super) struct DirectedTrack {
 impl DirectedTrack {
     /// Up the line.
     pub(super) fn new(
-        tunnel: Arc<Tunnel>,
+        tunnel: Arc<Track>,
         irregularity: Irregularity,
         settings: &TrackSettings,
     ) -> Self {

@@ -3,7 +3,7 @@
 
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, groups};
 use crate::track::{
-    BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Tunnel, rail_outline,
+    BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Track, rail_outline,
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
@@ -26,7 +26,7 @@ pub(super) struct Ground {
 
 impl Ground {
     /// Lays what is missing around a chainage.
-    pub(super) fn lay(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, s_m: f64) {
+    pub(super) fn lay(&mut self, world: &mut PhysicsWorld, tunnel: &Track, s_m: f64) {
         let first = ((s_m - BEHIND_M) / SLAB_M).floor() as i64;
         let last = ((s_m + AHEAD_M) / SLAB_M).ceil() as i64;
         for k in first..last {
@@ -37,7 +37,7 @@ impl Ground {
     }
 }
 
-fn lay_slabs(world: &mut PhysicsWorld, tunnel: &Tunnel, s_m: f64) {
+fn lay_slabs(world: &mut PhysicsWorld, tunnel: &Track, s_m: f64) {
     let frame = tunnel.alignment.at(s_m);
     let level = frame.world_from_line();
     match tunnel.section_at(s_m) {

@@ -13,7 +13,7 @@
 //! use metrotwin::track::TunnelFile;
 //! use metrotwin::twin::physics::{PhysicsSettings, World};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let tunnel = std::sync::Arc::new(metrotwin::track::Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?);
+//! # let tunnel = metrotwin::track::Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?.first_track().clone();
 //! let mut world = World::new(tunnel, &PhysicsSettings::default(), 1, 0)?;
 //! let go = TrainCommand { permitted_speed_mps: 20.0, ..TrainCommand::default() };
 //! for _ in 0..5000 {
@@ -109,7 +109,7 @@ pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand, TrainId};
 use crate::settings::Settings;
-use crate::track::{Direction, Tunnel};
+use crate::track::{Direction, Track};
 use directed_track::DirectedTrack;
 use irregularity::Irregularity;
 use rapier3d_f64::math::Vector;
@@ -120,7 +120,7 @@ use train::{RUN_IN_S, Train};
 
 /// Everything that moves.
 pub struct World {
-    tunnel: Arc<Tunnel>,
+    tunnel: Arc<Track>,
     rapier: PhysicsWorld,
     /// By number.
     trains: Vec<Train>,
@@ -135,7 +135,7 @@ pub struct World {
 impl World {
     /// A world at time zero. Everything random in it depends on `seed` and run `index` only.
     pub fn new(
-        tunnel: Arc<Tunnel>,
+        tunnel: Arc<Track>,
         settings: &PhysicsSettings,
         seed: u64,
         index: u64,

@@ -16,7 +16,7 @@ use super::train::Train;
 use super::truth::{BodyLabel, BodyOwner};
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
-use crate::track::{Alignment, Tunnel};
+use crate::track::{Alignment, Track};
 use crate::twin::geometry::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
 
@@ -54,7 +54,7 @@ impl Surroundings {
     /// it depends on `seed` and run `index`.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        tunnel: &Track,
         settings: &PhysicsSettings,
         [seed, index]: [u64; 2],
         trains: &[Train],
@@ -122,7 +122,7 @@ impl Surroundings {
     pub(super) fn after_step(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        tunnel: &Track,
         now: SimTime,
     ) -> Result<(), PhysicsError> {
         self.steps += 1;
@@ -136,7 +136,7 @@ impl Surroundings {
     fn watch_awake(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        tunnel: &Track,
         now: SimTime,
     ) -> Result<(), PhysicsError> {
         let look = self.steps.is_multiple_of(LOOK_STEPS);
@@ -179,7 +179,7 @@ impl Surroundings {
     fn lay_ground(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        tunnel: &Track,
         body: RigidBodyHandle,
         entity: Entity,
     ) {
@@ -227,7 +227,7 @@ impl Surroundings {
     }
 
     /// Lets appear, let go, walk, put down and pick up what is due.
-    fn go_on(&mut self, world: &mut PhysicsWorld, tunnel: &Tunnel, now_s: f64) {
+    fn go_on(&mut self, world: &mut PhysicsWorld, tunnel: &Track, now_s: f64) {
         while let Some(next) = self.to_come.pop_if(|next| next.settings.appears_s <= now_s) {
             self.insert(world, tunnel, &next);
         }
@@ -258,7 +258,7 @@ impl Surroundings {
     fn insert(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Tunnel,
+        tunnel: &Track,
         piece: &SingleObstacle,
     ) -> usize {
         let number = self.obstacles.len();

@@ -22,7 +22,7 @@ fn car(name: &str) -> Vehicle {
     Vehicle::new(VehicleFile::shipped(name).unwrap())
 }
 
-fn straight() -> Arc<Tunnel> {
+fn straight() -> Arc<Track> {
     line(&[PlanElement::straight(3000.0)], 0.0)
 }
 

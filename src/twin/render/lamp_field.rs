@@ -1,7 +1,7 @@
 //! The lamps of a scene and their light at a place.
 
 use super::photometry::{BlinkingLamp, LAMP_REACH_M};
-use crate::track::{TrackPoint, Tunnel};
+use crate::track::{Track, TrackPoint};
 use crate::twin::air::Air;
 use crate::twin::lights::LampLight;
 use nalgebra::{Point3, Vector3};
@@ -110,7 +110,7 @@ impl LampField {
     /// the line to [`AIRLIGHT_REACH_M`] on both sides and 2 m above top of rail, of what it
     /// scatters. Ambient light of E lux on every surface is a luminance of E / pi from all sides,
     /// so 4 E pass any place.
-    pub fn airlight_cd_m2(&self, tunnel: &Tunnel, s_m: f64) -> f64 {
+    pub fn airlight_cd_m2(&self, track: &Track, s_m: f64) -> f64 {
         if self.air.is_clear() {
             return 0.0;
         }
@@ -122,10 +122,10 @@ impl LampField {
                     l_m: 0.0,
                     h_m: 2.0,
                 };
-                self.scalar_lx(&tunnel.alignment.world_from_track(place))
+                self.scalar_lx(&track.alignment.world_from_track(place))
             })
             .sum();
-        let mean_lx = lamps_lx / f64::from(2 * places + 1) + 4.0 * tunnel.ambient_lx;
+        let mean_lx = lamps_lx / f64::from(2 * places + 1) + 4.0 * track.ambient_lx;
         self.air.scattered_share * mean_lx / (4.0 * PI)
     }
 }
@@ -181,18 +181,18 @@ mod tests {
     /// of luminance L comes from all sides, air that absorbs nothing glows with L.
     #[test]
     fn evenly_lit_mist_is_as_bright_as_what_lights_it() {
-        let mut tunnel = sample::tunnel();
-        tunnel.ambient_lx = 12.0 * PI;
+        let mut track = sample::track();
+        track.ambient_lx = 12.0 * PI;
         let mut air = Air::of_visibility(80.0);
         let dark = LampField::new(&[], air);
-        assert!((dark.airlight_cd_m2(&tunnel, 100.0) - 12.0).abs() < 1e-9);
+        assert!((dark.airlight_cd_m2(&track, 100.0) - 12.0).abs() < 1e-9);
         air.scattered_share = 0.7;
         let dust = LampField::new(&[], air);
-        assert!((dust.airlight_cd_m2(&tunnel, 100.0) - 8.4).abs() < 1e-9);
+        assert!((dust.airlight_cd_m2(&track, 100.0) - 8.4).abs() < 1e-9);
         // Lamps add to it, clear air has none.
         let lamps = sample::scene().lamps;
         let clear = LampField::new(&lamps, Air::default());
-        assert!(clear.airlight_cd_m2(&tunnel, 100.0).abs() < 1e-300);
-        assert!(LampField::new(&lamps, air).airlight_cd_m2(&tunnel, 100.0) > 8.5);
+        assert!(clear.airlight_cd_m2(&track, 100.0).abs() < 1e-300);
+        assert!(LampField::new(&lamps, air).airlight_cd_m2(&track, 100.0) > 8.5);
     }
 }

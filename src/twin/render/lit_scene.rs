@@ -4,7 +4,7 @@ use super::lamp_field::LampField;
 use super::paint::Paintings;
 use super::scene::Scene;
 use crate::bus::SimTime;
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::air::Air;
 use crate::twin::lights::LampLight;
 use crate::twin::reflectance::Wet;
@@ -13,7 +13,7 @@ use std::sync::Arc;
 /// A scene with what is worked out of it once.
 pub struct LitScene {
     /// The line with its cross-sections.
-    pub tunnel: Arc<Tunnel>,
+    pub track: Arc<Track>,
     /// What there is to see through.
     pub air: Air,
     /// Where bed and rails mirror.
@@ -31,13 +31,13 @@ pub struct LitScene {
 impl LitScene {
     /// At time 0.
     pub fn new(scene: Scene) -> Self {
-        let paintings = Paintings::of(&scene.tunnel);
+        let paintings = Paintings::of(&scene.track);
         Self::painted(scene, paintings)
     }
 
     fn painted(scene: Scene, paintings: Paintings) -> Self {
         Self {
-            tunnel: scene.tunnel,
+            track: scene.track,
             air: scene.air,
             wet: scene.wet,
             paintings,
@@ -49,9 +49,9 @@ impl LitScene {
 
     /// Takes another scene; whether it had to be painted anew.
     pub fn replace(&mut self, scene: Scene) -> bool {
-        let anew = self.tunnel.sections != scene.tunnel.sections;
+        let anew = self.track.sections != scene.track.sections;
         let paintings = if anew {
-            Paintings::of(&scene.tunnel)
+            Paintings::of(&scene.track)
         } else {
             std::mem::take(&mut self.paintings)
         };
@@ -75,6 +75,6 @@ impl LitScene {
 
     /// Luminance of endless air about a chainage.
     pub fn airlight_cd_m2(&self, s_m: f64) -> f64 {
-        self.lamps.airlight_cd_m2(&self.tunnel, s_m)
+        self.lamps.airlight_cd_m2(&self.track, s_m)
     }
 }

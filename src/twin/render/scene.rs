@@ -3,7 +3,7 @@
 use super::constants::SATURATION;
 use super::sensor::{LensSettings, SensorSettings};
 use crate::bus::{CameraModel, SimTime};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::air::Air;
 use crate::twin::geometry::Body;
 use crate::twin::lights::{Headlight, LampLight};
@@ -16,7 +16,7 @@ use std::sync::Arc;
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// The line with its cross-sections.
-    pub tunnel: Arc<Tunnel>,
+    pub track: Arc<Track>,
     /// The lamps as they really are (the survey may be wrong about them).
     pub lamps: Vec<LampLight>,
     /// What there is to see through.

@@ -2,23 +2,23 @@
 
 use super::{Output, Sensor, SensorError};
 use crate::bus::{Content, TrainId};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::physics::World;
 use std::sync::Arc;
 
 /// Says the name of each balise that the head passes, in the step in which it does.
 pub struct BaliseAntenna {
     train: TrainId,
-    tunnel: Arc<Tunnel>,
+    track: Arc<Track>,
     last_m: Option<f64>,
 }
 
 impl BaliseAntenna {
     /// Under the head of a train.
-    pub fn new(train: TrainId, tunnel: Arc<Tunnel>, world: &World) -> Self {
+    pub fn new(train: TrainId, track: Arc<Track>, world: &World) -> Self {
         Self {
             train,
-            tunnel,
+            track,
             last_m: world.head_m(train),
         }
     }
@@ -31,7 +31,7 @@ impl Sensor for BaliseAntenna {
         else {
             return Ok(Vec::new());
         };
-        let passed = self.tunnel.balises_passed(from_m, to_m);
+        let passed = self.track.balises_passed(from_m, to_m);
         let sample =
             |name: &str| Output::at_once(world.time(), Content::BalisePassed(name.to_owned()));
         Ok(passed.map(sample).collect())
@@ -43,6 +43,7 @@ impl Sensor for BaliseAntenna {
 mod tests {
     use super::*;
     use crate::track::Direction;
+    use crate::track::Tunnel;
     use crate::twin::physics::{PhysicsSettings, TrainSettings};
     use crate::twin::sensors::SensorSample;
 
@@ -51,7 +52,7 @@ mod tests {
     fn each_balise_is_read_once_either_way() {
         let text = "name = 'line'\nplan = [{ kind = 'straight', length_m = 400.0 }]\n\
                     balises = [{ name = 'B1', chainage_m = 200.0 }, { name = 'B2', chainage_m = 206.0 }]";
-        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+        let track = Tunnel::from_toml(text).unwrap().first_track().clone();
         for (direction, start_chainage_m, expected) in [
             (Direction::Up, 195.0, ["B1", "B2"]),
             (Direction::Down, 211.0, ["B2", "B1"]),
@@ -67,8 +68,8 @@ mod tests {
                 trains: vec![train],
                 ..PhysicsSettings::default()
             };
-            let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
-            let mut antenna = BaliseAntenna::new(TrainId(0), tunnel.clone(), &world);
+            let mut world = World::new(track.clone(), &settings, 1, 0).unwrap();
+            let mut antenna = BaliseAntenna::new(TrainId(0), track.clone(), &world);
             let mut read = Vec::new();
             while world.time().secs() < 1.5 {
                 world.step(&[]).unwrap();

@@ -7,7 +7,7 @@
 use super::{ClockSettings, ExposureSettings};
 use crate::bus::{CameraModel, DistortionCoefficients, Intrinsics, Shutter, WaysideCalibration};
 use crate::settings::{Checker, settings};
-use crate::track::{TrackPoint, Tunnel, WaysideSite};
+use crate::track::{Track, TrackPoint, WaysideSite};
 use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -377,24 +377,24 @@ impl CameraSettings {
     pub fn calibration(
         &self,
         site: &WaysideSite,
-        tunnel: &Tunnel,
+        track: &Track,
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
         let sheet = Self {
             calibration_error: WaysideError::default(),
             ..*self
         };
-        sheet.actual(site, tunnel, with_lidar)
+        sheet.actual(site, track, with_lidar)
     }
 
     /// The device as it really hangs and looks, through which the world is drawn.
     pub fn actual(
         &self,
         site: &WaysideSite,
-        tunnel: &Tunnel,
+        track: &Track,
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
-        let balise = tunnel.balise(&site.balise)?;
+        let balise = track.balise(&site.balise)?;
         let error = self.calibration_error;
         let place = TrackPoint {
             s_m: site.chainage_m + error.chainage_m,
@@ -403,10 +403,10 @@ impl CameraSettings {
         };
         let yaw_rad = site.yaw_deg.to_radians() + error.yaw_deg.to_radians();
         let pitch_rad = site.pitch_deg.to_radians() + error.pitch_deg.to_radians();
-        let heading_rad = tunnel.alignment.at(place.s_m).heading_rad + yaw_rad;
+        let heading_rad = track.alignment.at(place.s_m).heading_rad + yaw_rad;
         // Forward, left, up at the device's axis.
         let world_from_housing = Isometry3::from_parts(
-            Translation3::from(tunnel.alignment.world_from_track(place)),
+            Translation3::from(track.alignment.world_from_track(place)),
             yaw_pitch(heading_rad, pitch_rad),
         );
         Some(WaysideCalibration {
@@ -499,6 +499,7 @@ fn axes(columns: Matrix3<f64>) -> Isometry3<f64> {
 mod tests {
     use super::*;
     use crate::settings::{Problem, Settings};
+    use crate::track::Tunnel;
 
     /// A table with one key that takes the rig's sensor and glass for the rest.
     #[test]
@@ -520,15 +521,15 @@ mod tests {
     #[test]
     fn calibration_error_moves_the_actual_device_only() {
         let text = include_str!("../../../tunnels/chengdu_line1.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap();
-        let site = &tunnel.wayside[0];
+        let track = Track::clone(Tunnel::from_toml(text).unwrap().first_track());
+        let site = &track.wayside[0];
         let mut camera = CameraSettings::default();
-        let exact = camera.calibration(site, &tunnel, true).unwrap();
-        assert_eq!(camera.actual(site, &tunnel, true), Some(exact.clone()));
+        let exact = camera.calibration(site, &track, true).unwrap();
+        assert_eq!(camera.actual(site, &track, true), Some(exact.clone()));
         camera.calibration_error.pitch_deg = 0.5;
         camera.calibration_error.height_m = 0.02;
-        assert_eq!(camera.calibration(site, &tunnel, true), Some(exact.clone()));
-        let actual = camera.actual(site, &tunnel, true).unwrap();
+        assert_eq!(camera.calibration(site, &track, true), Some(exact.clone()));
+        let actual = camera.actual(site, &track, true).unwrap();
         let turned = |a: &Isometry3<f64>, b: &Isometry3<f64>| a.rotation.angle_to(&b.rotation);
         let half_deg = 0.5f64.to_radians();
         let by = turned(&actual.world_from_camera, &exact.world_from_camera);
@@ -595,16 +596,16 @@ mod tests {
     #[test]
     fn a_wayside_housing_looks_where_its_site_says() {
         let text = include_str!("../../../tunnels/chengdu_line1.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap();
-        let site = &tunnel.wayside[0];
+        let track = Track::clone(Tunnel::from_toml(text).unwrap().first_track());
+        let site = &track.wayside[0];
         let device = CameraSettings::default()
-            .calibration(site, &tunnel, true)
+            .calibration(site, &track, true)
             .unwrap();
         let axis = device.world_from_camera * Vector3::z();
         let lidar = device.world_from_lidar.unwrap();
         assert!((axis - lidar * Vector3::y()).norm() < 1e-12);
         assert!((axis.z - site.pitch_deg.to_radians().sin()).abs() < 1e-12);
-        let line = tunnel.alignment.at(site.chainage_m).world_from_line() * Vector3::x();
+        let line = track.alignment.at(site.chainage_m).world_from_line() * Vector3::x();
         let along = axis.dot(&Vector3::new(line.x, line.y, 0.0).normalize());
         assert!(
             (along - site.pitch_deg.to_radians().cos() * site.yaw_deg.to_radians().cos()).abs()

@@ -1,7 +1,7 @@
 //! From where a rig sees a lamp whole.
 
 use crate::bus::{CameraModel, RigCalibration};
-use crate::track::{LampSite, Tunnel};
+use crate::track::{LampSite, Track};
 use nalgebra::Point3;
 
 /// Train positions, as metres from the head to the lamp, at which both eyes see the whole disc
@@ -9,7 +9,7 @@ use nalgebra::Point3;
 /// the track without vibration. `None` where the rig never sees the lamp.
 pub fn visible_interval(
     rig: &RigCalibration,
-    tunnel: &Tunnel,
+    track: &Track,
     lamp: &LampSite,
 ) -> Option<(f64, f64)> {
     let rim = rim(lamp);
@@ -17,7 +17,7 @@ pub fn visible_interval(
     let mut run: Option<(f64, f64)> = None;
     for k in REACH_STEPS {
         let ahead_m = f64::from(k) * REACH_STEP_M;
-        if !sees(rig, tunnel, lamp, &rim, lamp.chainage_m - ahead_m) {
+        if !sees(rig, track, lamp, &rim, lamp.chainage_m - ahead_m) {
             run = None;
             continue;
         }
@@ -31,12 +31,12 @@ pub fn visible_interval(
 }
 
 /// Whether both eyes ever see the whole disc.
-pub fn ever_sees(rig: &RigCalibration, tunnel: &Tunnel, lamp: &LampSite) -> bool {
+pub fn ever_sees(rig: &RigCalibration, track: &Track, lamp: &LampSite) -> bool {
     let rim = rim(lamp);
     REACH_STEPS
         .step_by(4)
         .map(|k| lamp.chainage_m - f64::from(k) * REACH_STEP_M)
-        .any(|head_m| sees(rig, tunnel, lamp, &rim, head_m))
+        .any(|head_m| sees(rig, track, lamp, &rim, head_m))
 }
 
 /// A lamp is looked for from 5 m behind the head to 80 m ahead of it.
@@ -60,12 +60,12 @@ fn rim(lamp: &LampSite) -> [Point3<f64>; 16] {
 
 fn sees(
     rig: &RigCalibration,
-    tunnel: &Tunnel,
+    track: &Track,
     lamp: &LampSite,
     rim: &[Point3<f64>],
     head_m: f64,
 ) -> bool {
-    let world_from_left = tunnel.alignment.at(head_m).world_from_rails() * rig.vehicle_from_left;
+    let world_from_left = track.alignment.at(head_m).world_from_rails() * rig.vehicle_from_left;
     let left_from_world = world_from_left.inverse();
     let towards = Point3::from(world_from_left.translation.vector) - lamp.centre;
     let right_from_left = rig.left_from_right.inverse();
@@ -85,18 +85,23 @@ fn sees(
 mod tests {
     use super::super::RigSettings;
     use super::*;
+    use crate::track::Tunnel;
 
-    fn bench() -> Tunnel {
-        Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml")).unwrap()
+    fn bench() -> Track {
+        Track::clone(
+            Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))
+                .unwrap()
+                .first_track(),
+        )
     }
 
     /// What the defaults are chosen for: a whole unit of 10 m, and the figures of the header.
     #[test]
     fn the_reference_rig_sees_a_whole_unit() {
-        let tunnel = bench();
+        let track = bench();
         let rig = RigSettings::default();
         let see = |rig: &RigSettings| {
-            visible_interval(&rig.calibration(), &tunnel, &tunnel.lamps[0]).unwrap()
+            visible_interval(&rig.calibration(), &track, &track.lamps[0]).unwrap()
         };
         let (near_m, far_m) = see(&rig);
         // The eye is 0.5 m behind the head; steps of 5 cm.

@@ -9,7 +9,7 @@
 use super::ClockSettings;
 use crate::bus::{LidarReturn, LidarScan, SimTime};
 use crate::settings::{Checker, settings};
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::geometry::{Body, Solid, TunnelCaster};
 use crate::twin::random::Stream;
 use crate::twin::reflectance::mean_albedo;
@@ -101,11 +101,11 @@ impl Lidar {
     /// drawn from `stream`. The tunnel does not move, so it is ranged here, once.
     pub fn new(
         settings: &LidarSettings,
-        tunnel: &Tunnel,
+        track: &Track,
         world_from_lidar: &Isometry3<f64>,
         stream: Stream,
     ) -> Self {
-        let caster = TunnelCaster::new(tunnel);
+        let caster = TunnelCaster::new(track);
         let origin = Point3::from(world_from_lidar.translation.vector);
         let segment = caster.segment_of(&origin, None);
         let side = settings.side_shots();
@@ -206,26 +206,26 @@ mod tests {
     use crate::twin::render::sample;
 
     /// 20 m down the straight of the sample tunnel, on the right wall, looking up the line.
-    fn mount(tunnel: &Tunnel) -> Isometry3<f64> {
+    fn mount(track: &Track) -> Isometry3<f64> {
         let at = crate::track::TrackPoint {
             s_m: 20.0,
             l_m: -2.0,
             h_m: 2.5,
         };
         // The camera's z forward and y down are the lidar's y and -z.
-        sample::camera_pose(tunnel, at, 0.0, 0.0)
+        sample::camera_pose(track, at, 0.0, 0.0)
             * nalgebra::UnitQuaternion::from_axis_angle(&Vector3::x_axis(), 0.25 * TAU)
     }
 
     fn lidar(settings: &LidarSettings) -> Lidar {
-        let tunnel = sample::tunnel();
+        let track = sample::track();
         let stream = Stream::new(1, 0, "lidar");
-        Lidar::new(settings, &tunnel, &mount(&tunnel), stream)
+        Lidar::new(settings, &track, &mount(&track), stream)
     }
 
     /// A board across the line, `away_m` in front of the lidar at the time of its pose.
     fn board(away_m: f64, albedo: f64, speed_mps: f64) -> Body {
-        let pose = mount(&sample::tunnel()) * Isometry3::translation(0.0, away_m + 0.5, 0.0);
+        let pose = mount(&sample::track()) * Isometry3::translation(0.0, away_m + 0.5, 0.0);
         Body {
             shape: Shape::Box(Vector3::new(20.0, 0.5, 20.0)),
             velocity_mps: pose * Vector3::new(0.0, speed_mps, 0.0),

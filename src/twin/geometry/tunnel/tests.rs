@@ -62,10 +62,9 @@ fn section() -> CrossSection {
     }
 }
 
-fn tunnel() -> Tunnel {
-    Tunnel {
+fn track() -> Track {
+    Track {
         name: "test".into(),
-        datum: None,
         alignment: alignment(),
         sections: vec![SectionRange {
             from_m: 0.0,
@@ -76,14 +75,13 @@ fn tunnel() -> Tunnel {
         wayside: Vec::new(),
         balises: Vec::new(),
         base_stations: Vec::new(),
-        line_number: 1,
         stations: Vec::new(),
         ambient_lx: 0.0,
     }
 }
 
 /// The same surface as triangles between stations.
-fn mesh(tunnel: &Tunnel) -> TriMesh {
+fn mesh(track: &Track) -> TriMesh {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     let rails = [1.0, -1.0].map(|side| rail_outline(side * RAIL_OFFSET_M));
     for outline in [section()].into_iter().chain(rails) {
@@ -96,7 +94,7 @@ fn mesh(tunnel: &Tunnel) -> TriMesh {
                     l_m: p.l_m,
                     h_m: p.h_m,
                 };
-                let p = tunnel.alignment.world_from_track(at);
+                let p = track.alignment.world_from_track(at);
                 vertices.push(DVec3::new(p.x, p.y, p.z));
             }
         }
@@ -117,7 +115,7 @@ struct Cast {
 }
 
 /// Random rays from inside the tunnel, many of them nearly along it.
-fn rays(tunnel: &Tunnel, count: u64) -> impl Iterator<Item = Cast> {
+fn rays(track: &Track, count: u64) -> impl Iterator<Item = Cast> {
     let random = Stream::new(3, 0, "rays");
     (0..count).map(move |k| {
         let number = |j: u64| random.uniform(8 * k + j);
@@ -126,7 +124,7 @@ fn rays(tunnel: &Tunnel, count: u64) -> impl Iterator<Item = Cast> {
             l_m: 3.0 * number(1) - 1.5,
             h_m: 0.2 + 3.0 * number(2),
         };
-        let d = tunnel.alignment.at(inside.s_m).world_from_line()
+        let d = track.alignment.at(inside.s_m).world_from_line()
             * Vector3::new(
                 (2.0 * number(3) - 1.0) * 8.0,
                 2.0 * number(4) - 1.0,
@@ -134,7 +132,7 @@ fn rays(tunnel: &Tunnel, count: u64) -> impl Iterator<Item = Cast> {
             );
         Cast {
             inside,
-            o: tunnel.alignment.world_from_track(inside),
+            o: track.alignment.world_from_track(inside),
             d: d.normalize(),
         }
     })
@@ -145,10 +143,10 @@ fn rays(tunnel: &Tunnel, count: u64) -> impl Iterator<Item = Cast> {
 /// from the ruled surface by fractions of a millimetre, seen at the ray's grazing angle.
 #[test]
 fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
-    let tunnel = tunnel();
-    let (caster, mesh) = (TunnelCaster::new(&tunnel), mesh(&tunnel));
+    let track = track();
+    let (caster, mesh) = (TunnelCaster::new(&track), mesh(&track));
     let (mut hits, mut odd) = (0, 0);
-    for Cast { o, d, inside } in rays(&tunnel, 10_000) {
+    for Cast { o, d, inside } in rays(&track, 10_000) {
         let segment = caster.segment_of(&o, None);
         assert_eq!(segment, inside.s_m.floor() as usize);
         let ours = caster.cast(segment, &o, &d, 160.0);
@@ -176,14 +174,14 @@ fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
 /// Fails where a hit's track coordinates are not those of its place in the world.
 #[test]
 fn hits_know_where_they_are_on_the_line() {
-    let tunnel = tunnel();
-    let caster = TunnelCaster::new(&tunnel);
-    for Cast { o, d, .. } in rays(&tunnel, 1000) {
+    let track = track();
+    let caster = TunnelCaster::new(&track);
+    for Cast { o, d, .. } in rays(&track, 1000) {
         let Some(hit) = caster.cast(caster.segment_of(&o, None), &o, &d, 160.0) else {
             continue;
         };
         let at = caster.surface_at(&o, &d, &hit);
-        let truth = tunnel.alignment.track_from_world(&at.position, at.s_m);
+        let truth = track.alignment.track_from_world(&at.position, at.s_m);
         // Between stations the tunnel is straight, the line is not: a sagitta of 0.6 mm.
         assert!((at.s_m - truth.s_m).abs() < 2e-3, "{at:?} {truth:?}");
         assert!((at.l_m - truth.l_m).abs() < 2e-3, "{at:?} {truth:?}");
@@ -194,7 +192,7 @@ fn hits_know_where_they_are_on_the_line() {
 /// Fails where a wall shows through the step between two cross-sections, or a gap has walls.
 #[test]
 fn between_cross_sections_it_is_dark() {
-    let mut tunnel = tunnel();
+    let mut track = track();
     let mut wide = section();
     for p in &mut wide.points {
         p.l_m *= 1.5;
@@ -204,9 +202,9 @@ fn between_cross_sections_it_is_dark() {
         to_m,
         section,
     };
-    tunnel.sections = vec![range(0.0, 20.3, wide), range(20.3, 40.0, section())];
-    let caster = TunnelCaster::new(&tunnel);
-    let frame = tunnel.alignment.at(10.0).world_from_line();
+    track.sections = vec![range(0.0, 20.3, wide), range(20.3, 40.0, section())];
+    let caster = TunnelCaster::new(&track);
+    let frame = track.alignment.at(10.0).world_from_line();
     let cast = |l_m: f64, up_m: f64, d: Vector3<f64>| {
         let o = frame * Point3::new(0.0, l_m, up_m);
         let d = frame * d;

@@ -8,18 +8,19 @@
 //! curves take is creep, and not in it. Then adhesion, the mark and the energy book.
 
 use super::*;
+use crate::track::Tunnel;
 
 const G_MPS2: f64 = model::G_MPS2;
 
 /// Numbers of the equation of motion.
 struct Motion<'a> {
-    tunnel: &'a Tunnel,
+    tunnel: &'a Track,
     train: &'a TrainSettings,
     file: VehicleFile,
 }
 
 impl<'a> Motion<'a> {
-    fn new(tunnel: &'a Tunnel, train: &'a TrainSettings) -> Self {
+    fn new(tunnel: &'a Track, train: &'a TrainSettings) -> Self {
         Self {
             tunnel,
             train,
@@ -85,18 +86,18 @@ impl<'a> Motion<'a> {
 }
 
 /// A line with tunnel walls: the real one's first cross-section all along.
-fn in_tunnel(plain: Arc<Tunnel>) -> Arc<Tunnel> {
+fn in_tunnel(plain: Arc<Track>) -> Arc<Track> {
     let mut sections = chengdu().sections.clone();
     sections.truncate(1);
-    Arc::new(Tunnel {
+    Arc::new(Track {
         sections,
-        ..Tunnel::clone(&plain)
+        ..Track::clone(&plain)
     })
 }
 
-fn chengdu() -> Arc<Tunnel> {
+fn chengdu() -> Arc<Track> {
     let text = include_str!("../../../../tunnels/chengdu_line1.toml");
-    Arc::new(Tunnel::from_toml(text).unwrap())
+    Tunnel::from_toml(text).unwrap().first_track().clone()
 }
 
 fn train(cars: u32, speed_kmh: f64) -> TrainSettings {
@@ -123,7 +124,7 @@ fn compare(what: &str, got: f64, want: f64, share: f64) {
 }
 
 /// Grades that a long train covers two of.
-fn hills() -> Arc<Tunnel> {
+fn hills() -> Arc<Track> {
     let grade = |from_m, permille: f64, radius_m| Grade {
         from_m,
         slope: 1e-3 * permille,
@@ -137,9 +138,9 @@ fn hills() -> Arc<Tunnel> {
     ];
     let plan = [PlanElement::straight(4000.0)];
     let alignment = Alignment::new(Point3::origin(), 0.4, &plan, &grades);
-    Arc::new(Tunnel {
+    Arc::new(Track {
         alignment,
-        ..Tunnel::clone(&straight(4000.0))
+        ..Track::clone(&straight(4000.0))
     })
 }
 

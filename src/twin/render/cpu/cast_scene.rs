@@ -62,7 +62,7 @@ impl CastScene {
     pub fn new(scene: Scene) -> Self {
         let lit = LitScene::new(scene);
         Self {
-            tunnel: TunnelCaster::new(&lit.tunnel),
+            tunnel: TunnelCaster::new(&lit.track),
             lit,
         }
     }
@@ -70,7 +70,7 @@ impl CastScene {
     /// Takes another scene.
     pub fn replace(&mut self, scene: Scene) {
         self.lit.replace(scene);
-        self.tunnel = TunnelCaster::new(&self.lit.tunnel);
+        self.tunnel = TunnelCaster::new(&self.lit.track);
     }
 
     /// Indices of the lamps whose light a view shows on surfaces.
@@ -128,7 +128,7 @@ impl CastScene {
         let albedo = self.albedo(&at, ray, hit.t, pixel.aside)
             * self.lit.wet.albedo_factor(at.material, at.s_m);
         let lux =
-            self.lit.tunnel.ambient_lx + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
+            self.lit.track.ambient_lx + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
         TunnelPixel {
             hit: Some(hit),
             albedo,

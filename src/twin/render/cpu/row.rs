@@ -222,7 +222,7 @@ impl<'a> RowRays<'a> {
                 view,
                 spread,
                 self.row,
-                (self.scene.lit.tunnel.ambient_lx, self.haze(lamp)),
+                (self.scene.lit.track.ambient_lx, self.haze(lamp)),
                 depth,
                 luminances,
             );
@@ -266,7 +266,7 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let lux = scene.lit.tunnel.ambient_lx
+                let lux = scene.lit.track.ambient_lx
                     + scene.lit.lamps.irradiance_lx(&at, &normal)
                     + self.by_job_lx(&at, &normal);
                 let body = solid.body();

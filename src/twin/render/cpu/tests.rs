@@ -4,7 +4,7 @@ use crate::bus::{CameraModel, Shutter, SimTime};
 use crate::track::uid::{ChipFrame, LineCode, Uid};
 use crate::track::waveform::{Ripple, Waveform};
 use crate::track::{
-    Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Tunnel,
+    Alignment, CrossSection, Material, OutlinePoint, PlanElement, SectionRange, Track,
 };
 use crate::twin::air::Air;
 use crate::twin::geometry::{Body, Shape};
@@ -20,11 +20,10 @@ use std::sync::Arc;
 const AMBIENT_LX: f64 = 50.0;
 
 /// A straight box, 8 m wide and 10 m high, up the x axis, of plain walkway concrete.
-fn hall() -> Tunnel {
+fn hall() -> Track {
     let corner = |l_m: f64, h_m: f64| OutlinePoint { l_m, h_m };
-    Tunnel {
+    Track {
         name: "hall".into(),
-        datum: None,
         alignment: Alignment::new(
             Point3::origin(),
             0.0,
@@ -55,7 +54,6 @@ fn hall() -> Tunnel {
         wayside: Vec::new(),
         balises: Vec::new(),
         base_stations: Vec::new(),
-        line_number: 1,
         stations: Vec::new(),
         ambient_lx: AMBIENT_LX,
     }
@@ -63,7 +61,7 @@ fn hall() -> Tunnel {
 
 fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
     CpuRenderer::oracle(Scene {
-        tunnel: Arc::new(hall()),
+        track: Arc::new(hall()),
         lamps,
         air: Air::default(),
         wet: Wet::default(),
@@ -181,7 +179,7 @@ fn a_wall_has_the_luminance_of_the_closed_form() {
 fn val_mist_keeps_koschmieders_contrast() {
     let visibility_m = 30.0;
     let scene = |air| Scene {
-        tunnel: Arc::new(hall()),
+        track: Arc::new(hall()),
         lamps: Vec::new(),
         air,
         wet: Wet::default(),
@@ -381,10 +379,10 @@ fn noise_has_the_mean_and_variance_of_the_sensor() {
 /// camera's view is not what it would see now.
 #[test]
 fn threads_and_kept_views_change_no_byte() {
-    let mut job = sample::wayside_job(&sample::tunnel(), 280.0);
+    let mut job = sample::wayside_job(&sample::track(), 280.0);
     job.views[0].camera.intrinsics = Intrinsics::centred(320, 180, 180.0);
     job.headlights.push(Headlight {
-        world_from_light: sample::on_bed(&sample::tunnel(), 270.0, 0.0, 1.5),
+        world_from_light: sample::on_bed(&sample::track(), 270.0, 0.0, 1.5),
         intensity_cd: 40_000.0,
         exponent: 30.0,
     });
@@ -435,13 +433,13 @@ fn empty_jobs_give_empty_images() {
 /// corners, a body before a dark wall, a lamp behind a body.
 #[test]
 fn the_quick_renderer_draws_what_the_oracle_draws() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     for k in 0..6 {
         let s_m = 60.0 + 31.7 * f64::from(k);
-        let mut job = sample::stereo_job(&tunnel, s_m, 27.8);
-        job.bodies = sample::worker(&tunnel, s_m + 4.0, 1.4);
+        let mut job = sample::stereo_job(&track, s_m, 27.8);
+        job.bodies = sample::worker(&track, s_m + 4.0, 1.4);
         job.headlights = vec![Headlight {
-            world_from_light: sample::on_bed(&tunnel, s_m, 0.0, 1.5),
+            world_from_light: sample::on_bed(&track, s_m, 0.0, 1.5),
             intensity_cd: 40_000.0,
             exponent: 30.0,
         }];

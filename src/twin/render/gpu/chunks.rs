@@ -6,7 +6,7 @@ use super::detail::{CHUNK_M, ChunkKey, Detail};
 use super::layout::Vertex;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
-use crate::track::Tunnel;
+use crate::track::Track;
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
@@ -95,10 +95,10 @@ impl Chunks {
 
     /// What is in sight of a camera.
     pub fn in_sight(&mut self, gpu: &Gpu, scene: &LitScene, framed: &Framed<'_>) -> InSight {
-        let tunnel = &scene.tunnel;
+        let track = &scene.track;
         let eye = framed.reference();
-        let s_m = self.locate(tunnel, &eye);
-        let frame = tunnel.alignment.at(s_m);
+        let s_m = self.locate(track, &eye);
+        let frame = track.alignment.at(s_m);
         let ahead = framed.middle.rotation * Vector3::z();
         let (sin, cos) = frame.heading_rad.sin_cos();
         let (back_m, forth_m) = if ahead.x * cos + ahead.y * sin >= 0.0 {
@@ -109,7 +109,7 @@ impl Chunks {
         let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
         let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
         let moves = !framed.rests();
-        let place = tunnel.alignment.track_from_world(&eye, s_m);
+        let place = track.alignment.track_from_world(&eye, s_m);
         let bend = Bend::of(&framed.view.camera.intrinsics, &place);
         let mut chunks = Vec::new();
         for index in first..=last {
@@ -134,14 +134,14 @@ impl Chunks {
     }
 
     /// Chainage of a camera: by Newton's method from where the last one was, else by search.
-    fn locate(&mut self, tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
+    fn locate(&mut self, track: &Track, eye: &Point3<f64>) -> f64 {
         let on_line = |s_m: f64| {
-            let t = tunnel.alignment.track_from_world(eye, s_m);
+            let t = track.alignment.track_from_world(eye, s_m);
             (t.l_m.abs() < NEAR_LINE_M && (t.s_m - s_m).abs() < 4.0 * SEARCH_STEP_M)
                 .then_some(t.s_m)
         };
         let s_m = on_line(self.last_seen_s_m).unwrap_or_else(|| {
-            let near = nearest_station(tunnel, eye);
+            let near = nearest_station(track, eye);
             on_line(near).unwrap_or(near)
         });
         self.last_seen_s_m = s_m;
@@ -149,13 +149,13 @@ impl Chunks {
     }
 }
 
-fn nearest_station(tunnel: &Tunnel, eye: &Point3<f64>) -> f64 {
-    let from_m = tunnel.sections.first().map_or(0.0, |r| r.from_m);
-    let to_m = tunnel.sections.last().map_or(0.0, |r| r.to_m);
+fn nearest_station(track: &Track, eye: &Point3<f64>) -> f64 {
+    let from_m = track.sections.first().map_or(0.0, |r| r.from_m);
+    let to_m = track.sections.last().map_or(0.0, |r| r.to_m);
     let steps = ((to_m - from_m) / SEARCH_STEP_M).ceil().clamp(1.0, 1e5) as u32;
     (0..=steps)
         .map(|k| from_m + (to_m - from_m) * f64::from(k) / f64::from(steps))
-        .map(|s_m| ((tunnel.alignment.at(s_m).origin - eye).norm(), s_m))
+        .map(|s_m| ((track.alignment.at(s_m).origin - eye).norm(), s_m))
         .min_by(|a, b| f64::total_cmp(&a.0, &b.0))
         .map_or(from_m, |(_, s_m)| s_m)
 }
@@ -167,7 +167,7 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
         lamp,
         parts,
     } = chunk_mesh(scene, key);
-    let heading_rad = scene.tunnel.alignment.at(key.start_m()).heading_rad;
+    let heading_rad = scene.track.alignment.at(key.start_m()).heading_rad;
     let (sin, cos) = heading_rad.sin_cos();
     let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
     Chunk {
@@ -199,11 +199,7 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
 /// See [`Chunk::crossed`].
 fn is_crossed(scene: &LitScene, from_m: f64) -> bool {
     let to_m = from_m + CHUNK_M;
-    let borders = scene
-        .tunnel
-        .sections
-        .iter()
-        .flat_map(|r| [r.from_m, r.to_m]);
+    let borders = scene.track.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
     let ends = |m: f64| scene.wet.at(m - BESIDE_M) != scene.wet.at(m + BESIDE_M);
     borders.into_iter().any(|m| (from_m..=to_m).contains(&m)) || ends(from_m) || ends(to_m)
 }

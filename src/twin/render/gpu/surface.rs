@@ -1,7 +1,7 @@
 //! Pieces of surfaces: what is known of them before anything is drawn.
 
 use super::region::Region;
-use crate::track::{CrossSection, RAIL_OFFSET_M, TrackFrame, Tunnel};
+use crate::track::{CrossSection, RAIL_OFFSET_M, Track, TrackFrame};
 use crate::twin::geometry::Body;
 use nalgebra::{Point3, Vector3};
 
@@ -81,16 +81,16 @@ impl SurfaceCell {
     }
 
     /// All of a stretch of the tunnel, rails too.
-    pub fn of(tunnel: &Tunnel, from_m: f64, length_m: f64) -> Vec<Self> {
+    pub fn of(track: &Track, from_m: f64, length_m: f64) -> Vec<Self> {
         let mut cells = Vec::new();
         let steps = (length_m / CELL_M).ceil().max(1.0);
         let half_m = 0.5 * length_m / steps;
         for k in 0..steps as u32 {
             let s_m = from_m + (2.0 * f64::from(k) + 1.0) * half_m;
-            let Some(section) = tunnel.section_at(s_m) else {
+            let Some(section) = track.section_at(s_m) else {
                 continue;
             };
-            let frame = tunnel.alignment.at(s_m);
+            let frame = track.alignment.at(s_m);
             Self::of_walls(section, &frame, half_m, &mut cells);
             for l_m in [-RAIL_OFFSET_M, RAIL_OFFSET_M] {
                 let [foot, head] = [-0.2, 0.1].map(|h_m| frame.world_from_section(l_m, h_m));

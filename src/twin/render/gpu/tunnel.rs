@@ -5,7 +5,7 @@ use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
-use crate::track::{OutlinePoint, TrackPoint, Tunnel};
+use crate::track::{OutlinePoint, Track, TrackPoint};
 use crate::twin::geometry::STATION_STEP_M;
 use crate::twin::reflectance::mean_albedo;
 use crate::twin::render::gloss::Gloss;
@@ -62,23 +62,23 @@ struct Site<'a> {
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
 pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
-    let (tunnel, field, paintings) = (&scene.tunnel, &scene.lamps, &scene.paintings);
+    let (track, field, paintings) = (&scene.track, &scene.lamps, &scene.paintings);
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let middle_m = from_m + 0.5 * CHUNK_M;
-    let middle = tunnel.alignment.at(middle_m).origin;
+    let middle = track.alignment.at(middle_m).origin;
     let lamp = strongest(field, &middle);
     let near: Vec<_> = (field.near(&middle))
-        .map(|lamp| tunnel.alignment.track_from_world(&lamp.centre, middle_m))
+        .map(|lamp| track.alignment.track_from_world(&lamp.centre, middle_m))
         .collect();
     let site = Site {
         scene,
         lamp: lamp.map(|k| &field.lamps()[k]),
         cutting: Cutting { key, lamps: &near },
-        origin: tunnel.alignment.at(from_m).origin,
+        origin: track.alignment.at(from_m).origin,
     };
     let mut mesh = Mesh::default();
     let mut parts = Vec::new();
-    for (section, range) in tunnel.sections.iter().enumerate() {
+    for (section, range) in track.sections.iter().enumerate() {
         let stations = stations(range, from_m, to_m, key.detail.step_m());
         if stations.len() < 2 {
             continue;
@@ -97,7 +97,7 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
                 site.add_patches(&mut patches, (facet, brightest), &stations, vertices);
             }
             if mesh.indices.len() > first {
-                let around = box_around(&mesh, first, tunnel.alignment.at(middle_m).heading_rad);
+                let around = box_around(&mesh, first, track.alignment.at(middle_m).heading_rad);
                 parts.push(side_of(&mut mesh, first, section, around, patches));
             }
         }
@@ -201,11 +201,11 @@ impl Site<'_> {
             if to_m - from_m < PATCH_M - NEAR_STATION_M && *to_m < last_m {
                 continue;
             }
-            let at = |s_m, end| ruled(&self.scene.tunnel, s_m, facet.ends[end], detail).coords;
+            let at = |s_m, end| ruled(&self.scene.track, s_m, facet.ends[end], detail).coords;
             let [a, b] = [0, 1].map(|end| at(from_m, end));
             let [c, d] = [0, 1].map(|end| at(*to_m, end));
             let half = [0.25 * (c + d - a - b), 0.25 * (b + d - a - c)];
-            let normal = facet_normal(&self.scene.tunnel, facet, 0.5 * (from_m + to_m));
+            let normal = facet_normal(&self.scene.track, facet, 0.5 * (from_m + to_m));
             let stretch_m = from_m - NEAR_STATION_M..=to_m + NEAR_STATION_M;
             let inside = |v: &&Vertex| stretch_m.contains(&(start_m + f64::from(v.place_m[0])));
             let corners = vertices.iter().filter(inside);
@@ -221,12 +221,12 @@ impl Site<'_> {
     }
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
-        let normal = facet_normal(&self.scene.tunnel, facet, s_m);
-        let p = ruled(&self.scene.tunnel, s_m, end, self.cutting.key.detail);
+        let normal = facet_normal(&self.scene.track, facet, s_m);
+        let p = ruled(&self.scene.track, s_m, end, self.cutting.key.detail);
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
-        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.scene.tunnel.ambient_lx;
+        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.scene.track.ambient_lx;
         // What begins or ends with the chunk does so for all of it.
         let start_m = self.cutting.key.start_m();
         let inside_m = s_m - start_m;
@@ -249,9 +249,9 @@ impl Site<'_> {
 }
 
 /// A point of the surface, which runs straight from ring to ring.
-fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3<f64> {
+fn ruled(track: &Track, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3<f64> {
     let at = |s_m: f64| {
-        tunnel.alignment.world_from_track(TrackPoint {
+        track.alignment.world_from_track(TrackPoint {
             s_m,
             l_m: end.l_m,
             h_m: end.h_m,
@@ -267,8 +267,8 @@ fn ruled(tunnel: &Tunnel, s_m: f64, end: OutlinePoint, detail: Detail) -> Point3
 }
 
 /// Normal of a facet on the side of the tunnel's inside.
-fn facet_normal(tunnel: &Tunnel, facet: &Facet, s_m: f64) -> Vector3<f64> {
-    let frame = tunnel.alignment.at(s_m);
+fn facet_normal(track: &Track, facet: &Facet, s_m: f64) -> Vector3<f64> {
+    let frame = track.alignment.at(s_m);
     let (sin, cos) = frame.heading_rad.sin_cos();
     let along = Vector3::new(cos, sin, frame.slope);
     let [a, b] = facet.ends;
@@ -297,7 +297,7 @@ mod tests {
     fn lining_faces_inwards() {
         let ChunkMesh { origin, mesh, .. } =
             chunk(&LitScene::new(sample::scene()), 13, Detail::Near);
-        let tunnel = sample::tunnel();
+        let track = sample::track();
         let mut seen = 0;
         for v in mesh
             .vertices
@@ -305,8 +305,8 @@ mod tests {
             .filter(|v| (v.albedo - 0.3).abs() < 1e-6)
         {
             let p = origin + Vector3::from(v.position_m).cast::<f64>();
-            let t = tunnel.alignment.track_from_world(&p, 67.0);
-            let axis = tunnel.alignment.world_from_track(TrackPoint {
+            let t = track.alignment.track_from_world(&p, 67.0);
+            let axis = track.alignment.world_from_track(TrackPoint {
                 l_m: 0.0,
                 h_m: 1.7,
                 ..t

@@ -280,7 +280,7 @@ mod tests {
     #[test]
     fn nothing_that_is_seen_is_left_out() {
         let scene = LitScene::new(sample::scene());
-        let tunnel = &scene.tunnel;
+        let track = &scene.track;
         let meshes = [8, 9, 10, 11, 12, 30, 80, 81, 82, 100].map(|index| {
             let key = ChunkKey {
                 index,
@@ -292,7 +292,7 @@ mod tests {
         let (mut seen, mut left_out) = (0, 0);
         for (k, s_m) in [50.0, 52.5, 404.0].into_iter().cycle().take(72).enumerate() {
             let turn = 15f64.to_radians() * k as f64;
-            let mut view = sample::rig_view(tunnel, s_m, 160.0 / 3.6);
+            let mut view = sample::rig_view(track, s_m, 160.0 / 3.6);
             for (pose, step) in view.motion.poses.iter_mut().zip(-1..) {
                 let at = TrackPoint {
                     s_m: s_m + 160.0 / 3.6 * 1e-3 * f64::from(step),
@@ -301,7 +301,7 @@ mod tests {
                 };
                 // Shaken by 17 degrees a second, as a bogie's ride on bad rails.
                 let pitch = 0.5 * (7.0 * turn).sin() + 3e-4 * f64::from(step);
-                *pose = sample::camera_pose(tunnel, at, turn, pitch);
+                *pose = sample::camera_pose(track, at, turn, pitch);
             }
             if k % 2 == 1 {
                 view.camera.intrinsics.distortion = Distortion::new(lenses::EUROC[0]);

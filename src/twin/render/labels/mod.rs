@@ -98,7 +98,7 @@ impl Labeller {
     /// Of a scene.
     pub fn new(scene: &Scene) -> Self {
         Self {
-            tunnel: TunnelCaster::new(&scene.tunnel),
+            tunnel: TunnelCaster::new(&scene.track),
             lamps: scene.lamps.clone(),
             still: Cache::new(KEPT),
             lenses: Cache::new(KEPT),

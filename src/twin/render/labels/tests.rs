@@ -22,7 +22,7 @@ fn small(mut view: View) -> View {
 
 fn rig_job(s_m: f64) -> Job {
     Job {
-        views: vec![small(sample::rig_view(&sample::tunnel(), s_m, SPEED_MPS))],
+        views: vec![small(sample::rig_view(&sample::track(), s_m, SPEED_MPS))],
         ..Job::default()
     }
 }
@@ -31,7 +31,7 @@ fn rig_job(s_m: f64) -> Job {
 /// place: the bed is a plane, so its depth is known in closed form, row by row.
 #[test]
 fn depth_of_the_bed_is_that_of_a_plane() {
-    let tunnel = sample::tunnel();
+    let tunnel = sample::track();
     let mut view = small(sample::rig_view(&tunnel, 50.0, 0.0));
     // A camera that looks down at the bed between the rails and sinks at 20 m/s.
     view.motion.poses = (0..32)
@@ -88,7 +88,7 @@ fn what_a_pixel_shows_is_seen_in_that_pixel() {
 #[test]
 fn every_point_in_view_has_its_row() {
     for first_row in [0, 719] {
-        let mut view = sample::rig_view(&sample::tunnel(), 100.0, 160.0 / 3.6);
+        let mut view = sample::rig_view(&sample::track(), 100.0, 160.0 / 3.6);
         view.camera.shutter.first_row = first_row;
         let projection = Projection::new(&view, view.start);
         let pose = projection.pose(359.5);
@@ -143,7 +143,7 @@ fn interpolated_rows_agree_with_exact_ones() {
 /// to A, on walls and on a body that moves and turns.
 #[test]
 fn flow_there_and_back_is_nothing() {
-    let tunnel = sample::tunnel();
+    let tunnel = sample::track();
     let body = |turned: f64, l_m: f64| Body {
         shape: Shape::Box(Vector3::new(0.6, 0.5, 0.4)),
         world_from_body: sample::on_bed(&tunnel, 104.5, l_m, 3.4)
@@ -202,7 +202,7 @@ fn flow_there_and_back_is_nothing() {
 /// Fails where a part out of the frame, or a hidden one, is counted as seen.
 #[test]
 fn the_whole_of_a_ball_is_a_disc() {
-    let tunnel = sample::tunnel();
+    let tunnel = sample::track();
     let view = small(sample::rig_view(&tunnel, 100.0, 0.0));
     let pose = view.motion.pose_at(view.start);
     let ball = |x: f64| Body {

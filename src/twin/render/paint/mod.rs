@@ -54,7 +54,7 @@ mod ground;
 mod lining;
 mod unroll;
 
-use crate::track::{CrossSection, Material, Tunnel, rail_outline};
+use crate::track::{CrossSection, Material, Track, rail_outline};
 use brush::{Chance, Strip, ValueNoise, chance};
 use rayon::prelude::*;
 use unroll::{OutlinePlace, Unrolled};
@@ -98,10 +98,10 @@ pub struct Paintings {
 
 impl Paintings {
     /// Paints all cross-sections of a tunnel.
-    pub fn of(tunnel: &Tunnel) -> Self {
+    pub fn of(track: &Track) -> Self {
         let mut sections: Vec<&CrossSection> = Vec::new();
         let mut of_range = Vec::new();
-        for range in &tunnel.sections {
+        for range in &track.sections {
             let known = sections.iter().position(|s| **s == range.section);
             of_range.push(known.unwrap_or(sections.len()));
             if known.is_none() {

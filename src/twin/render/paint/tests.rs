@@ -184,12 +184,12 @@ fn a_rails_head_is_brighter_than_its_sides() {
 /// Fails where equal cross-sections are painted twice, or ranges get another's painting.
 #[test]
 fn equal_sections_share_a_painting() {
-    let mut tunnel = sample::tunnel();
-    let first = tunnel.sections[0].clone();
+    let mut track = sample::track();
+    let first = track.sections[0].clone();
     let (mut second, mut third) = (first.clone(), first.clone());
     (second.section, third.from_m) = (station(), 200.0);
-    tunnel.sections = vec![first, second, third];
-    let paintings = Paintings::of(&tunnel);
+    track.sections = vec![first, second, third];
+    let paintings = Paintings::of(&track);
     assert_eq!(paintings.of_range, [0, 1, 0]);
     assert_eq!(paintings.all.len(), 2);
     assert!(paintings.all[1] == Painting::of(&station()));

@@ -182,15 +182,15 @@ fn a_train_throws_no_shadow_by_its_own_light() {
 /// same light taken as by all lamps and all bodies together.
 #[test]
 fn every_shadow_is_found() {
-    let tunnel = sample::tunnel();
+    let track = sample::track();
     let scene = CastScene::new(sample::scene());
-    let mut job = sample::wayside_job(&tunnel, 300.0);
+    let mut job = sample::wayside_job(&track, 300.0);
     job.time = SimTime::from_secs(0.01);
     for body in &mut job.bodies {
         body.velocity_mps = Vector3::new(3.0, -9.0, 1.0);
     }
     job.headlights = vec![Headlight {
-        world_from_light: sample::on_bed(&tunnel, 306.0, 0.5, 1.5),
+        world_from_light: sample::on_bed(&track, 306.0, 0.5, 1.5),
         ..headlight()
     }];
     let view = &job.views[0];
