@@ -33,8 +33,8 @@ impl FileKind {
 }
 
 /// Keys that only tunnels have.
-const TUNNEL_KEYS: [&str; 7] = [
-    "plan", "datum", "grades", "sections", "lamps", "lamp", "balises",
+const TUNNEL_KEYS: [&str; 8] = [
+    "plan", "datum", "grades", "sections", "lamps", "lamp", "balises", "switches",
 ];
 /// Keys that only vehicles have.
 const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

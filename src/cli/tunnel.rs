@@ -1,8 +1,8 @@
 //! What a tunnel file says, in a few lines.
 
 use crate::settings::{LONGEST_KEY, shortened};
-use crate::track::network::Network;
-use crate::track::{Track, Tunnel};
+use crate::track::network::{Network, Switch};
+use crate::track::{Side, Track, Tunnel};
 
 /// Of a tunnel with one track, its length, radii, grades, sections, lamps, devices; of a network, that of each
 /// track.
@@ -16,17 +16,46 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
         return indented(&[vec![format!("{head}: {length}")], lines].concat());
     }
     let length_m: f64 = tracks.iter().map(|t| t.alignment.length_m()).sum();
-    let (tracks_count, switches) = (tracks.len(), switches.len());
-    let mut text = indented(&[format!(
-        "{head}: {tracks_count} tracks, {length_m:.1} m, {switches} switches"
-    )]);
-    for track in tracks {
-        let (length, lines) = of_track(track);
-        let name = shortened(&track.name, LONGEST_KEY);
-        text += &indented(&[format!("track `{name}`: {length}")]);
-        text += &indented(&lines.iter().map(|l| format!("  {l}")).collect::<Vec<_>>());
-    }
-    text
+    let (tracks_count, switches_count) = (tracks.len(), switches.len());
+    let mut lines = vec![format!(
+        "{head}: {tracks_count} tracks, {length_m:.1} m, {switches_count} switches"
+    )];
+    lines.extend(tracks.iter().map(|track| of_one_of_many(track)));
+    lines.extend(switches.iter().map(|s| of_switch(&tunnel.network, s)));
+    indented(&lines)
+}
+
+/// A track in one line.
+fn of_one_of_many(track: &Track) -> String {
+    let (length, _) = of_track(track);
+    let name = shortened(&track.name, LONGEST_KEY);
+    let counts = [
+        (track.lamps.len(), "lamps"),
+        (track.wayside.len(), "wayside devices"),
+        (track.balises.len(), "balises"),
+    ];
+    let counts = counts.iter().filter(|(count, _)| *count > 0);
+    let counts = counts.map(|(count, what)| format!(", {count} {what}"));
+    let stations = track.stations.iter().map(|s| place(&s.name, s.chainage_m));
+    let stations = stations.map(|station| format!(", {station}"));
+    let rest: String = counts.chain(stations).collect();
+    format!("track `{name}`: {length}{rest}")
+}
+
+/// A switch in one line.
+fn of_switch(network: &Network, switch: &Switch) -> String {
+    let hand = match network.hand(switch) {
+        Side::Left => "left",
+        Side::Right => "right",
+    };
+    let metres = |m: Option<f64>| m.map_or("nowhere".to_owned(), |m| format!("{m:.1} m"));
+    format!(
+        "switch `{}`: to the {hand}, {:.0} km/h; behind the toe the frog at {}, clear from {}",
+        shortened(&switch.name, LONGEST_KEY),
+        3.6 * switch.diverging_mps,
+        metres(network.frog_m(switch)),
+        metres(network.clear_from_m(switch)),
+    )
 }
 
 /// Length and radii, and all else.

@@ -65,10 +65,11 @@ impl<'a> Checker<'a> {
         );
     }
 
-    /// Nothing is wrong at or below one of its keys.
+    /// Nothing is wrong at or below one of its keys; in the whole file, if that is empty.
     pub fn is_right(&self, key: &str) -> bool {
         let at = self.key(key);
-        !self.problems.iter().any(|p| is_within(&p.key, &at))
+        let within = |p: &Problem| at.is_empty() || is_within(&p.key, &at);
+        !self.problems.iter().any(within)
     }
 
     /// A checker of what stands below one of its keys.

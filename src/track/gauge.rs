@@ -63,6 +63,17 @@ impl Gauge {
         }
     }
 
+    /// Half of its width where it is widest.
+    pub fn widest_m(&self) -> f64 {
+        let widest = HALF_WIDTHS.iter().map(|(_, l_m)| *l_m).fold(0.0, f64::max);
+        widest + self.widening_m
+    }
+
+    /// Its height over top of rail.
+    pub fn top_m(&self) -> f64 {
+        HALF_WIDTHS[HALF_WIDTHS.len() - 1].0
+    }
+
     /// Half of its width at a height; `None` under top of rail and over its top.
     pub fn half_width_m(&self, h_m: f64) -> Option<f64> {
         HALF_WIDTHS

@@ -202,6 +202,53 @@ impl CrossSection {
         }
     }
 
+    /// A trough without a roof: walls of a height at `left_m` and `right_m` from the centreline.
+    pub fn trough(left_m: f64, right_m: f64, wall_m: f64) -> Self {
+        Self {
+            points: vec![
+                OutlinePoint::new(left_m, wall_m),
+                OutlinePoint::new(left_m, BED_M),
+                OutlinePoint::new(-right_m, BED_M),
+                OutlinePoint::new(-right_m, wall_m),
+            ],
+            materials: vec![
+                Material::Lining,
+                Material::Bed,
+                Material::Lining,
+                Material::Lining,
+            ],
+            closed: false,
+        }
+    }
+
+    /// Of a track that lies in the section of another one.
+    pub fn shared() -> Self {
+        Self {
+            points: Vec::new(),
+            materials: Vec::new(),
+            closed: false,
+        }
+    }
+
+    /// Whether it is that of another track.
+    pub fn is_shared(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// Whether (l, h) is inside the tunnel or, for an open section, over its bed or on a level with it.
+    pub fn covers(&self, l_m: f64, h_m: f64) -> bool {
+        match self.closed {
+            true => self.contains(l_m, h_m),
+            false => {
+                let sides = self.points.iter().map(|p| p.l_m);
+                let (low_m, high_m) = sides.fold((f64::MAX, f64::MIN), |(low, high), l_m| {
+                    (low.min(l_m), high.max(l_m))
+                });
+                (low_m..=high_m).contains(&l_m)
+            }
+        }
+    }
+
     /// Closes walls that run from the right foot over the crown to the left foot by the bed.
     fn on_bed(walls: Vec<OutlinePoint>, walkway: Option<Side>) -> Self {
         let mut materials = vec![Material::Lining; walls.len()];

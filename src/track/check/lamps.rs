@@ -2,7 +2,7 @@
 
 use super::{free_standing, on_line};
 use crate::settings::Checker;
-use crate::track::file::{LAST_LAMP, LampEntry, LampRowEntry, TunnelFile};
+use crate::track::file::{LAST_LAMP, LampEntry, LampRowEntry, TrackEntry};
 use crate::track::furniture::LampSite;
 use crate::track::section::OutlinePoint;
 use crate::track::uid::Uid;
@@ -11,24 +11,32 @@ use nalgebra::{Unit, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
-/// A lamp and the key that it comes from: `lamps` for one of the row.
+/// A lamp and the key that it comes from: that of its row for one of a row.
 type Placed = (String, LampSite);
 
 /// Places every lamp of the file, in order of chainage.
-pub(super) fn place(file: &TunnelFile, track: &Track, check: &mut Checker<'_>) -> Vec<LampSite> {
-    let common = file.lamps.clone().unwrap_or_default();
-    let row = match &file.lamps {
-        Some(row) => row_entries(row, track, check),
-        None => Vec::new(),
-    };
-    let row = row
-        .iter()
-        .map(|entry| ("lamps".to_owned(), site(file, &common, entry, track)));
-    let mut placed: Vec<Placed> = row.collect();
-    for (k, entry) in file.lamp.iter().enumerate() {
+pub(super) fn place(
+    entry: &TrackEntry,
+    line_number: u8,
+    track: &Track,
+    check: &mut Checker<'_>,
+) -> Vec<LampSite> {
+    let common = entry.lamps.clone().unwrap_or_default();
+    let first = entry.lamps.iter().map(|row| ("lamps".to_owned(), row));
+    let more = entry.lamp_rows.iter().enumerate();
+    let more = more.map(|(k, row)| (format!("lamp_rows[{k}]"), row));
+    let mut placed: Vec<Placed> = Vec::new();
+    for (key, row) in first.chain(more) {
+        let entries = row_entries(row, track, &mut check.below(&key));
+        let sites = entries
+            .iter()
+            .map(|lamp| site(line_number, row, lamp, track));
+        placed.extend(sites.map(|site| (key.clone(), site)));
+    }
+    for (k, entry) in entry.lamp.iter().enumerate() {
         let key = format!("lamp[{k}]");
         if on_line(&format!("{key}.chainage_m"), entry.chainage_m, track, check) {
-            placed.push((key, site(file, &common, entry, track)));
+            placed.push((key, site(line_number, &common, entry, track)));
         }
     }
     check_uids(&placed, check);
@@ -45,14 +53,14 @@ fn row_entries(row: &LampRowEntry, track: &Track, check: &mut Checker<'_>) -> Ve
     let to_m = row.to_m.unwrap_or(track.alignment.length_m());
     if to_m < row.from_m {
         check.problem(
-            "lamps.to_m",
+            "to_m",
             format!("{to_m} m is before the row's begin at {} m", row.from_m),
             "let the row end further up the line",
         );
         return Vec::new();
     }
-    let begins = on_line("lamps.from_m", row.from_m, track, check);
-    let ends = on_line("lamps.to_m", to_m, track, check);
+    let begins = on_line("from_m", row.from_m, track, check);
+    let ends = on_line("to_m", to_m, track, check);
     if !(begins && ends) {
         return Vec::new();
     }
@@ -61,7 +69,7 @@ fn row_entries(row: &LampRowEntry, track: &Track, check: &mut Checker<'_>) -> Ve
     let numbers_left = f64::from(LAST_LAMP) + 1.0 - f64::from(row.first_number);
     if !(0.0..=numbers_left).contains(&count) {
         check.problem(
-            "lamps.spacing_m",
+            "spacing_m",
             format!(
                 "{count} lamps from number {} need numbers over {LAST_LAMP}",
                 row.first_number,
@@ -78,7 +86,7 @@ fn row_entries(row: &LampRowEntry, track: &Track, check: &mut Checker<'_>) -> Ve
     (0..count as u16).map(entry).collect()
 }
 
-fn site(file: &TunnelFile, common: &LampRowEntry, entry: &LampEntry, track: &Track) -> LampSite {
+fn site(line_number: u8, common: &LampRowEntry, entry: &LampEntry, track: &Track) -> LampSite {
     let lateral_m = entry.lateral_m.unwrap_or(common.lateral_m);
     let height_m = entry.height_m.unwrap_or(common.height_m);
     let yaw_deg = entry.aim_yaw_deg.unwrap_or(common.aim_yaw_deg);
@@ -90,7 +98,7 @@ fn site(file: &TunnelFile, common: &LampRowEntry, entry: &LampEntry, track: &Tra
         (across * yaw.cos() - frame.ahead() * yaw.sin()) * pitch.cos() + Vector3::z() * pitch.sin();
     LampSite {
         uid: Uid {
-            line: file.line_number,
+            line: line_number,
             lamp: entry.number,
         },
         chainage_m: entry.chainage_m,
@@ -111,16 +119,24 @@ fn site(file: &TunnelFile, common: &LampRowEntry, entry: &LampEntry, track: &Tra
     }
 }
 
-/// UIDs that are there twice. Numbers of the row count up, so only single lamps can repeat one.
+/// UIDs that are there twice; of a row once.
 fn check_uids(placed: &[Placed], check: &mut Checker<'_>) {
     let mut seen: BTreeMap<Uid, &str> = BTreeMap::new();
+    let mut said: Option<&str> = None;
     for (key, lamp) in placed {
-        if let Some(first) = seen.insert(lamp.uid, key) {
+        if let Some(first) = seen.insert(lamp.uid, key)
+            && said != Some(key)
+        {
+            let number = match key.starts_with("lamp[") {
+                true => "number",
+                false => "first_number",
+            };
             check.problem(
-                &format!("{key}.number"),
+                &format!("{key}.{number}"),
                 format!("`{first}` gives UID {} too", lamp.uid),
                 "give each lamp a number of its own",
             );
+            said = Some(key);
         }
     }
 }

@@ -3,40 +3,64 @@
 use super::SAME_M;
 use crate::settings::Checker;
 use crate::track::alignment::{Alignment, Grade, PlanElement};
-use crate::track::file::{PlanShape, TunnelFile};
+use crate::track::file::{PlanShape, TrackEntry};
 use crate::track::furniture::LONGEST_M;
 use nalgebra::Point3;
 
-pub(super) fn alignment(file: &TunnelFile, check: &mut Checker<'_>) -> Alignment {
-    let elements = plan(file, check);
-    let length_m = elements.iter().map(|e| e.length_m).sum();
-    let grades = grades(file, length_m, check);
-    let start = &file.start;
-    Alignment::new(
-        Point3::new(start.east_m, start.north_m, start.up_m),
-        start.heading_deg.to_radians(),
-        &elements,
-        &grades,
-    )
+/// Where a track runs, but for its place in the world.
+#[derive(Clone, Debug)]
+pub(super) struct Course {
+    pub elements: Vec<PlanElement>,
+    /// None: on as what it is joined to.
+    pub grades: Vec<Grade>,
+}
+
+impl Course {
+    /// Of a track as written, level so far.
+    pub(super) fn of(entry: &TrackEntry, check: &mut Checker<'_>) -> Self {
+        Self {
+            elements: plan(entry, check),
+            grades: Vec::new(),
+        }
+    }
+
+    /// Length in plan.
+    pub(super) fn length_m(&self) -> f64 {
+        self.elements.iter().map(|e| e.length_m).sum()
+    }
+
+    /// The line that begins at a pose.
+    pub(super) fn from(&self, origin: Point3<f64>, heading_rad: f64, slope: f64) -> Alignment {
+        let on = [Grade {
+            from_m: 0.0,
+            slope,
+            radius_m: 0.0,
+        }];
+        let grades = match self.grades.is_empty() {
+            true => &on[..],
+            false => &self.grades,
+        };
+        Alignment::new(origin, heading_rad, &self.elements, grades)
+    }
 }
 
 /// Curvature and cant (of the right rail over the left one) that a straight or an arc has and a
 /// clothoid joins.
 type Bend = (f64, f64);
 
-fn plan(file: &TunnelFile, check: &mut Checker<'_>) -> Vec<PlanElement> {
-    if file.plan.is_empty() {
+fn plan(entry: &TrackEntry, check: &mut Checker<'_>) -> Vec<PlanElement> {
+    if entry.plan.is_empty() {
         check.problem("plan", "has no elements", "add at least one `[[plan]]`");
     }
-    let bends: Vec<Option<Bend>> = file.plan.iter().map(|e| bend(&e.shape)).collect();
+    let bends: Vec<Option<Bend>> = entry.plan.iter().map(|e| bend(&e.shape)).collect();
     let at = |k: Option<usize>| k.and_then(|k| bends.get(k).copied().flatten());
-    let elements = file.plan.iter().enumerate().map(|(k, entry)| {
+    let elements = entry.plan.iter().enumerate().map(|(k, element)| {
         let own = at(Some(k));
         // A clothoid beside a clothoid or an end of the line meets it without curvature.
         let start = own.or_else(|| at(k.checked_sub(1))).unwrap_or_default();
         let end = own.or_else(|| at(Some(k + 1))).unwrap_or_default();
         PlanElement {
-            length_m: entry.length_m,
+            length_m: element.length_m,
             start_per_m: start.0,
             end_per_m: end.0,
             start_cant_m: start.1,
@@ -81,8 +105,9 @@ fn bend(shape: &PlanShape) -> Option<Bend> {
     }
 }
 
-fn grades(file: &TunnelFile, length_m: f64, check: &mut Checker<'_>) -> Vec<Grade> {
-    let grades = file.grades.iter().map(|g| Grade {
+/// Grades of a track of a length.
+pub(super) fn grades(entry: &TrackEntry, length_m: f64, check: &mut Checker<'_>) -> Vec<Grade> {
+    let grades = entry.grades.iter().map(|g| Grade {
         from_m: g.from_m,
         slope: g.grade_permille / 1000.0,
         radius_m: g.vertical_radius_m,

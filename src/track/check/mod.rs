@@ -1,16 +1,25 @@
 //! From the file as written to a [`Track`]: every number checked, every problem collected.
 
 mod devices;
+mod joints;
 mod lamps;
 mod line;
+mod neighbours;
+mod placing;
 mod sections;
+mod switches;
+mod whole;
 
-use super::file::{DatumEntry, TunnelFile};
+use super::file::{DatumEntry, TrackEntry, TunnelFile};
 use super::gauge::Gauge;
 use super::network::Network;
 use super::section::OutlinePoint;
-use super::{Track, Tunnel};
+use super::{Alignment, Track, Tunnel};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
+use joints::Joints;
+use line::Course;
+use placing::Order;
+use std::sync::Arc;
 
 /// Chainages closer than this are the same place.
 const SAME_M: f64 = 1e-6;
@@ -31,30 +40,91 @@ impl Tunnel {
 
 fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     file.check("", problems);
-    let mut check = Checker::new("", problems);
-    let check = &mut check;
-    let alignment = line::alignment(file, check);
-    let sections = sections::sections(&file.sections, alignment.length_m(), check);
-    let mut track = Track {
-        name: file.name.clone(),
-        alignment,
-        sections,
-        lamps: Vec::new(),
-        wayside: file.wayside.clone(),
-        balises: file.balises.clone(),
-        base_stations: file.base_stations.clone(),
-        stations: file.stations.clone(),
-        ambient_lx: file.ambient_lx,
-    };
-    track.lamps = lamps::place(file, &track, check);
-    devices::check_wayside(&track, check);
-    devices::check_named(&track, check);
+    let check = &mut Checker::new("", problems);
+    let entries = file.tracks();
+    let joints = joints::joints(&entries, &file.switches, check);
+    let lines = lines(file, &entries, &joints, check);
+    let tracks = entries.iter().zip(lines).enumerate();
+    let tracks = tracks.map(|(k, (entry, line))| {
+        let check = &mut check.below(&key_of(file, k));
+        Arc::new(track(file, entry, line, check))
+    });
+    let tracks: Vec<Arc<Track>> = tracks.collect();
+    let named = tracks.clone();
+    let network = Network::new(tracks, joints.switches, joints.ends).unwrap_or_else(|error| {
+        // What is wrong has been said in full, where the file says it.
+        if check.is_right("") {
+            check.problem("track", error.to_string(), "join the tracks in another way");
+        }
+        Network::unjoined(named)
+    });
+    // Where tracks are not where they should be, all else follows from that.
+    if check.is_right("") {
+        switches::check_switches(&network, check);
+        neighbours::check_neighbours(&network, |track| key_of(file, track.0.into()), check);
+        whole::check_names(&network, check);
+        whole::check_reach(&network, check);
+    }
     Tunnel {
         name: file.name.clone(),
         datum: file.datum.as_ref().map(DatumEntry::datum),
         line_number: file.line_number,
-        network: Network::of_one(track),
+        network,
     }
+}
+
+/// Key of a track in the file; none for the only one, whose keys are the file's.
+fn key_of(file: &TunnelFile, track: usize) -> String {
+    match file.track.is_empty() {
+        true => String::new(),
+        false => format!("track[{track}]"),
+    }
+}
+
+/// The centrelines.
+fn lines(
+    file: &TunnelFile,
+    entries: &[TrackEntry],
+    joints: &Joints,
+    check: &mut Checker<'_>,
+) -> Vec<Alignment> {
+    let courses = entries.iter().enumerate();
+    let courses = courses.map(|(k, entry)| Course::of(entry, &mut check.below(&key_of(file, k))));
+    let mut courses: Vec<Course> = courses.collect();
+    let order = Order::of(entries, joints, check);
+    placing::close(entries, joints, &order, &mut courses, check);
+    for (k, (entry, course)) in entries.iter().zip(&mut courses).enumerate() {
+        let check = &mut check.below(&key_of(file, k));
+        course.grades = line::grades(entry, course.length_m(), check);
+    }
+    let lines = order.place(entries, &courses);
+    placing::check_joints(entries, joints, &lines, check);
+    lines
+}
+
+/// A track with what stands along it.
+fn track(
+    file: &TunnelFile,
+    entry: &TrackEntry,
+    alignment: Alignment,
+    check: &mut Checker<'_>,
+) -> Track {
+    let sections = sections::sections(&entry.sections, alignment.length_m(), check);
+    let mut track = Track {
+        name: entry.name.clone(),
+        alignment,
+        sections,
+        lamps: Vec::new(),
+        wayside: entry.wayside.clone(),
+        balises: entry.balises.clone(),
+        base_stations: entry.base_stations.clone(),
+        stations: entry.stations.clone(),
+        ambient_lx: entry.ambient_lx.unwrap_or(file.ambient_lx),
+    };
+    track.lamps = lamps::place(entry, file.line_number, &track, check);
+    devices::check_wayside(&track, check);
+    devices::check_named(&track, check);
+    track
 }
 
 /// Whether a chainage is on the line; a problem if not.
@@ -106,6 +176,10 @@ fn free_standing(
         );
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+mod network_tests;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]

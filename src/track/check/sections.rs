@@ -135,6 +135,16 @@ fn section(shape: &SectionShape, check: &mut Checker<'_>) -> CrossSection {
                 walkway,
             )
         }
+        SectionShape::Trough {
+            left_m,
+            right_m,
+            wall_m,
+        } => CrossSection::trough(
+            left_m.unwrap_or(2.9),
+            right_m.unwrap_or(2.9),
+            wall_m.unwrap_or(4.0),
+        ),
+        SectionShape::Shared {} => CrossSection::shared(),
         SectionShape::Open { width_m } => CrossSection::open(0.5 * width_m.unwrap_or(6.0)),
     }
 }

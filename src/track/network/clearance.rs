@@ -1,15 +1,44 @@
 //! Where trains on two tracks are in each other's way.
 
-use super::{Leg, TrackEnd};
-use super::{Network, Route, Switch, SwitchLeg};
-use crate::track::Direction;
+use super::{Leg, Network, Route, Switch, SwitchLeg, TrackEnd, turned_round};
+use crate::track::{Direction, Gauge, RAIL_OFFSET_M, TrackFrame};
 
 /// Steps of the search for a clearance point.
 const STEP_M: f64 = 0.25;
 /// No clearance point is looked for farther from the toe.
 const FARTHEST_M: f64 = 200.0;
 
+/// Just inside a leg.
+const INSIDE_M: f64 = 1e-6;
+
 impl Network {
+    /// How far behind the toe the rails of its legs cross: the point of the frog, about.
+    pub fn frog_m(&self, switch: &Switch) -> Option<f64> {
+        self.clearance_m(switch, 2.0 * RAIL_OFFSET_M)
+    }
+
+    /// How far behind the toe trains on both legs clear each other.
+    pub fn clear_from_m(&self, switch: &Switch) -> Option<f64> {
+        self.clearance_m(switch, self.clear_m(switch))
+    }
+
+    /// Distance of the centrelines of legs at which trains on them clear each other: their gauges, with what cars
+    /// swing out in the curve of the diverging leg.
+    pub fn clear_m(&self, switch: &Switch) -> f64 {
+        let legs = [switch.through, switch.diverging].map(|end| self.entered(end));
+        let curvatures = legs.map(|leg| leg.map_or(0.0, |frame| frame.curvature_per_m));
+        curvatures.map(|k| Gauge::b1(k).widest_m()).iter().sum()
+    }
+
+    /// A track just behind an end, as a train has it that enters there.
+    pub fn entered(&self, end: TrackEnd) -> Option<TrackFrame> {
+        let line = self.alignment(end.track)?;
+        Some(match end.way {
+            Direction::Down => line.at(INSIDE_M),
+            Direction::Up => turned_round(&line.at(line.length_m() - INSIDE_M)),
+        })
+    }
+
     /// How far behind its toe the legs of a switch are so far apart, in plan: a train that stands farther in on
     /// one leg clears trains on the other, if the distance is that of two trains that pass. None where they
     /// never are.

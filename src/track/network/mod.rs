@@ -27,6 +27,8 @@
 //!     toe: high(0),
 //!     through: low(1),
 //!     diverging: low(2),
+//!     diverging_mps: 30.0 / 3.6,
+//!     throw_s: 4.0,
 //! };
 //! let network = Network::new(tracks, vec![switch], vec![
 //!     Ends::Open(low(0)),
@@ -53,16 +55,18 @@ mod tests;
 pub use error::NetworkError;
 pub use route::{Leg, Route};
 
-use super::{Alignment, Direction, Place, Side, Track, TrackFrame, TrackId, TrackPoint};
-use nalgebra::Point3;
+use super::{
+    Alignment, CANT_BASE_M, Direction, Place, Side, Track, TrackFrame, TrackId, TrackPoint,
+};
+use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 /// Ends that meet may be this far apart: less than any survey finds.
-const MOST_GAP_M: f64 = 1e-3;
+pub(super) const MOST_GAP_M: f64 = 1e-3;
 /// And have headings and slopes that differ by this much.
-const MOST_KINK_RAD: f64 = 1e-4;
+pub(super) const MOST_KINK_RAD: f64 = 1e-4;
 /// A place is looked for from stations this far apart.
 const STATION_M: f64 = 20.0;
 
@@ -87,7 +91,7 @@ impl TrackEnd {
 }
 
 /// A switch, with the ends of tracks that meet at its toe.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Switch {
     /// As on the map.
     pub name: String,
@@ -97,6 +101,10 @@ pub struct Switch {
     pub through: TrackEnd,
     /// End of the leg that curves away.
     pub diverging: TrackEnd,
+    /// Permitted speed on that leg.
+    pub diverging_mps: f64,
+    /// Time that the blades take from one end position to the other.
+    pub throw_s: f64,
 }
 
 /// A leg of a switch.
@@ -193,16 +201,17 @@ impl Network {
         }
     }
 
-    /// A network of one track, open at both ends.
+    /// A network of one track.
     pub fn of_one(track: Track) -> Self {
-        let ends = [Direction::Down, Direction::Up].map(|way| {
-            let track = TrackId::default();
-            (TrackEnd { track, way }, Beyond::Open)
-        });
+        Self::unjoined(vec![Arc::new(track)])
+    }
+
+    /// Tracks that all are open at both ends.
+    pub fn unjoined(tracks: Vec<Arc<Track>>) -> Self {
         Self {
-            tracks: vec![Arc::new(track)],
+            tracks,
             switches: Vec::new(),
-            beyond: ends.into(),
+            beyond: BTreeMap::new(),
         }
     }
 
@@ -226,12 +235,11 @@ impl Network {
         let (Some(out), Some(back)) = (self.leaving(from), self.leaving(to)) else {
             return Ok(());
         };
-        let gap_m = (out.origin - back.origin).norm();
+        let joint = Joint::of(&out, &back);
+        let (gap_m, kink_rad) = (joint.gap_m.norm(), joint.kink_rad());
         if gap_m > MOST_GAP_M {
             return Err(NetworkError::Gap { from, to, gap_m });
         }
-        let turn = (out.heading_rad - back.heading_rad - PI).rem_euclid(TAU);
-        let kink_rad = turn.min(TAU - turn).max((out.slope + back.slope).abs());
         if kink_rad > MOST_KINK_RAD {
             return Err(NetworkError::Kink { from, to, kink_rad });
         }
@@ -240,20 +248,7 @@ impl Network {
 
     /// The pose of a track's end, looking out of the track.
     pub fn leaving(&self, end: TrackEnd) -> Option<TrackFrame> {
-        let track = self.alignment(end.track)?;
-        Some(match end.way {
-            Direction::Up => track.at(track.length_m()),
-            Direction::Down => {
-                let frame = track.at(0.0);
-                TrackFrame {
-                    heading_rad: frame.heading_rad + PI,
-                    slope: -frame.slope,
-                    curvature_per_m: -frame.curvature_per_m,
-                    roll_rad: -frame.roll_rad,
-                    ..frame
-                }
-            }
-        })
+        Some(leaving(self.alignment(end.track)?, end.way))
     }
 
     /// A track.
@@ -288,17 +283,8 @@ impl Network {
 
     /// The side to which a switch's diverging leg curves, looking from its toe.
     pub fn hand(&self, switch: &Switch) -> Side {
-        let curvature = |end: TrackEnd| {
-            let into = end.opposite();
-            // Looking into the track, just behind its first piece's begin.
-            let track = self.alignment(end.track)?;
-            let at_m = match into.way {
-                Direction::Up => 0.0,
-                Direction::Down => track.length_m() - 1e-6,
-            };
-            Some(into.way.sign() * track.at(at_m).curvature_per_m)
-        };
-        let [through, diverging] = [switch.through, switch.diverging].map(curvature);
+        let legs = [switch.through, switch.diverging].map(|end| self.entered(end));
+        let [through, diverging] = legs.map(|leg| leg.map(|frame| frame.curvature_per_m));
         if diverging > through {
             Side::Left
         } else {
@@ -327,6 +313,60 @@ impl Network {
     pub fn has(&self, place: Place) -> bool {
         self.alignment(place.track)
             .is_some_and(|track| (0.0..=track.length_m()).contains(&place.s_m))
+    }
+}
+
+/// How far two ends that meet are from being one line.
+pub(super) struct Joint {
+    /// From the first to the second: ahead as the first looks out, to its left, up.
+    pub gap_m: Vector3<f64>,
+    /// Turn to the left from one to the other.
+    pub turn_rad: f64,
+    /// Change of the rise over run.
+    pub slope_step: f64,
+    /// Change of the cant, of the right rail over the left one.
+    pub cant_step_m: f64,
+}
+
+impl Joint {
+    /// Of the poses of two ends, each looking out of its track.
+    pub(super) fn of(out: &TrackFrame, back: &TrackFrame) -> Self {
+        let to = back.origin - out.origin;
+        let turn_rad = (back.heading_rad + PI - out.heading_rad).rem_euclid(TAU);
+        Self {
+            gap_m: Vector3::new(to.dot(&out.ahead()), to.dot(&out.left()), to.z),
+            turn_rad: if turn_rad > PI {
+                turn_rad - TAU
+            } else {
+                turn_rad
+            },
+            slope_step: -back.slope - out.slope,
+            cant_step_m: CANT_BASE_M * (back.roll_rad.sin() + out.roll_rad.sin()),
+        }
+    }
+
+    /// In plan or in the profile, whichever is more.
+    pub(super) fn kink_rad(&self) -> f64 {
+        self.turn_rad.abs().max(self.slope_step.abs())
+    }
+}
+
+/// The pose of an end of a line, looking out of it.
+pub(super) fn leaving(line: &Alignment, way: Direction) -> TrackFrame {
+    match way {
+        Direction::Up => line.at(line.length_m()),
+        Direction::Down => turned_round(&line.at(0.0)),
+    }
+}
+
+/// The track as who looks the other way has it.
+pub(super) fn turned_round(frame: &TrackFrame) -> TrackFrame {
+    TrackFrame {
+        heading_rad: frame.heading_rad + PI,
+        slope: -frame.slope,
+        curvature_per_m: -frame.curvature_per_m,
+        roll_rad: -frame.roll_rad,
+        ..*frame
     }
 }
 

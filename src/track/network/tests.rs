@@ -130,6 +130,8 @@ fn grown(seed: u64, tracks: usize) -> Network {
                     toe: tip,
                     through: add(&mut numbers, 0.0),
                     diverging: add(&mut numbers, side / 190.0),
+                    diverging_mps: 10.0,
+                    throw_s: 4.0,
                 });
             }
         }
@@ -200,6 +202,8 @@ fn passing_loop() -> Network {
         toe,
         through,
         diverging,
+        diverging_mps: 10.0,
+        throw_s: 4.0,
     };
     let switches = vec![
         switch("W1", high(0), low(2), low(1)),
