@@ -14,7 +14,7 @@
     reason = "a benchmark measures time and prints its figures, and may fail by panicking"
 )]
 
-use metrotwin::track::{Track, Tunnel};
+use metrotwin::track::Tunnel;
 use metrotwin::twin::physics::{ObstacleSettings, PhysicsSettings, TrainSettings, World};
 use std::sync::Arc;
 use std::time::Instant;
@@ -22,7 +22,7 @@ use std::time::Instant;
 const STEPS: u32 = 2000;
 
 /// Microseconds a step.
-fn cost_us(tunnel: &Arc<Track>, trains: u32, cars: u32, obstacles: u32) -> f64 {
+fn cost_us(tunnel: &Arc<Tunnel>, trains: u32, cars: u32, obstacles: u32) -> f64 {
     let train = |k: u32| TrainSettings {
         cars,
         start_chainage_m: 700.0 - 200.0 * f64::from(k),
@@ -56,7 +56,7 @@ fn cost_us(tunnel: &Arc<Track>, trains: u32, cars: u32, obstacles: u32) -> f64 {
 
 fn main() {
     let text = include_str!("../tunnels/chengdu_line1.toml");
-    let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
+    let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
     let report = |trains, cars, obstacles| {
         let us = cost_us(&tunnel, trains, cars, obstacles);
         let faster = 1000.0 / us;

@@ -1,6 +1,7 @@
 //! Commands to the train, and the driver's display.
 
 use super::SimTime;
+use crate::track::Place;
 use serde::{Deserialize, Serialize};
 
 /// How hard the protection brakes.
@@ -99,8 +100,8 @@ pub struct DriverDisplay {
     pub power: bool,
     /// Which lamp is lit.
     pub lamp: Indicator,
-    /// Where the train takes itself to be, chainage.
-    pub position_m: Option<f64>,
+    /// Where the train takes its head to be.
+    pub position: Option<Place>,
     /// Distance to the obstacle ahead.
     pub distance_to_obstacle_m: Option<f64>,
     /// One line of text.
@@ -127,8 +128,8 @@ pub enum Supervision {
 pub struct ProtectionReport {
     /// When.
     pub time: SimTime,
-    /// Estimated chainage of the train head.
-    pub position_m: Option<f64>,
+    /// Estimated place of the train head.
+    pub position: Option<Place>,
     /// One sigma of it.
     pub sigma_m: Option<f64>,
     /// Estimated speed.
@@ -142,7 +143,7 @@ pub struct ProtectionReport {
     /// How far the supervision has gone.
     pub supervision: Supervision,
     /// Where the movement authority ends, while something limits it.
-    pub authority_end_m: Option<f64>,
+    pub authority_end: Option<Place>,
     /// Slide and slip protection acts on the wheelset of the odometer.
     pub wheels_slide: bool,
     /// The emergency brake is held to stop the train before the nearest high danger, by the rate that is

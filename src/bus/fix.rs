@@ -2,6 +2,7 @@
 
 use super::{CameraHealth, SimTime};
 use crate::track::uid::Uid;
+use crate::track::{Place, TrackId};
 use nalgebra::{Point2, Point3, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -156,6 +157,8 @@ pub struct PositionFix {
     pub time: SimTime,
     /// By which method.
     pub method: Method,
+    /// The track that the train head is on.
+    pub track: TrackId,
     /// Chainage of the train head.
     pub chainage_m: f64,
     /// One sigma along the track.
@@ -168,6 +171,16 @@ pub struct PositionFix {
     pub identity: Identity,
     /// The lamp in the left eye's frame.
     pub lamp_in_camera: Vector3<f64>,
+}
+
+impl PositionFix {
+    /// Place of the train head.
+    pub fn place(&self) -> Place {
+        Place {
+            track: self.track,
+            s_m: self.chainage_m,
+        }
+    }
 }
 
 /// Everything said of one pair.

@@ -1,7 +1,7 @@
 //! What a wayside device sees, knows and says.
 
 use super::{CameraHealth, CameraModel, PixelBox, SimTime};
-use crate::track::{Direction, TrackId};
+use crate::track::{Direction, Stretch, TrackId};
 use image::GrayImage;
 use nalgebra::{Isometry3, Point3};
 use schemars::JsonSchema;
@@ -40,6 +40,8 @@ pub struct WaysideCalibration {
     pub world_from_camera: Isometry3<f64>,
     /// Where the lidar is and looks (its own frame: X right, Y along the axis, Z up).
     pub world_from_lidar: Option<Isometry3<f64>>,
+    /// The track that it watches.
+    pub track: TrackId,
     /// Chainage of the device (point A of the distance formulas).
     pub chainage_m: f64,
     /// Chainage of the balise (point C) that its distances count from.
@@ -113,9 +115,9 @@ pub struct DetectedObstacle {
 }
 
 /// What a train tells of itself to wayside devices and other trains.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrainReport {
-    /// Its track.
+    /// The track that its head is on.
     pub track: TrackId,
     /// Chainage of its head.
     pub chainage_m: f64,
@@ -123,7 +125,9 @@ pub struct TrainReport {
     pub sigma_m: f64,
     /// Its length over couplers.
     pub length_m: f64,
-    /// Which way it runs.
+    /// What it stands on, from its tail to its head, if its position is right.
+    pub occupied: Vec<Stretch>,
+    /// Which way its head runs along its track.
     pub direction: Direction,
     /// Speed that way.
     pub speed_mps: f64,

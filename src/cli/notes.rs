@@ -4,7 +4,8 @@ use super::report::train_name;
 use crate::bus::TrainId;
 use crate::scenario::{OnboardSettings, Scenario, WaysidePost};
 use crate::session::FieldOfView;
-use crate::track::{Alignment, BED_M, Direction, TrackPoint};
+use crate::track::network::{Itinerary, Network};
+use crate::track::{BED_M, TrackId, TrackPoint};
 use crate::twin::physics::{ObstacleSettings, TrainSettings};
 
 /// Everything that `check` and `run` say of it.
@@ -28,29 +29,31 @@ pub(super) fn of(scenario: &Scenario) -> Vec<String> {
 
 /// An obstacle that appears where a train stands.
 fn inside_a_train(scenario: &Scenario) -> Option<String> {
-    let holds = |train: &TrainSettings, o: &ObstacleSettings| {
+    let network = &scenario.tunnel.network;
+    let holds = |train: &TrainSettings, way: &Itinerary, o: &ObstacleSettings| {
         let stands_until_s = match train.start_speed_kmh > 0.0 {
             true => 0.0,
             false => train.start_s,
         };
-        let [from_m, to_m] = train.stands_m();
         let [width_m, height_m] = train.profile_m();
+        let tail_m = way.start_m - train.length_m();
+        let track = track_of(network, o);
+        let mut stands = way.route.stretches(tail_m, way.start_m);
         o.appears_s <= stands_until_s
-            && (from_m..=to_m).contains(&o.chainage_m)
+            && stands.any(|s| s.track == track && (s.from_m..=s.to_m).contains(&o.chainage_m))
             && o.lateral_m.abs() < 0.5 * width_m
             && o.height_m < height_m
     };
     let mut single = scenario.physics.obstacles.iter().filter(|o| is_single(o));
     single.find_map(|o| {
-        let mut trains = scenario.physics.trains.iter().enumerate();
-        let (k, train) = trains.find(|(_, train)| holds(train, o))?;
-        let [from_m, to_m] = train.stands_m();
+        let trains = scenario.physics.trains.iter().zip(&scenario.itineraries);
+        let (k, (train, _)) = trains.enumerate().find(|(_, (train, way))| holds(train, way, o))?;
         Some(format!(
-            "`{}` appears at {} m, in or under {}, which stands from {from_m:.1} to {to_m:.1} m: place it \
-             clear of the train",
+            "`{}` appears at {} m, in or under {}, which stands there, {:.1} m long: place it clear of the train",
             o.name,
             o.chainage_m,
-            train_name(scenario, TrainId::from_index(k))
+            train_name(scenario, TrainId::from_index(k)),
+            train.length_m()
         ))
     })
 }
@@ -85,12 +88,12 @@ impl<'a> Devices<'a> {
         if self.views.is_empty() {
             return None;
         }
-        let line = &self.scenario.tunnel.first_track().alignment;
+        let network = &self.scenario.tunnel.network;
         let is_unseen = |o: &&ObstacleSettings| {
             let mut moves = o.velocity_mps.iter().chain(&o.spin_rad_s);
             let stays = moves.all(|v| v.abs() <= 0.0);
             let mut views = self.views.iter();
-            is_single(o) && stays && !views.any(|(_, view)| shows(view, o, line))
+            is_single(o) && stays && !views.any(|(_, view)| shows(view, o, network))
         };
         let unseen = self.scenario.physics.obstacles.iter().find(is_unseen)?;
         let views = self.views.iter();
@@ -106,7 +109,7 @@ impl<'a> Devices<'a> {
     /// What lies before a wayside camera while it learns what the clear track looks like.
     fn in_the_reference(&self) -> Option<String> {
         let detection = &self.scenario.file.stack.wayside;
-        let line = &self.scenario.tunnel.first_track().alignment;
+        let network = &self.scenario.tunnel.network;
         let early = |o: &&ObstacleSettings| {
             self.views.iter().any(|(post, view)| {
                 let learns_s = f64::from(detection.reference_frames) / post.camera.frames_per_s;
@@ -114,7 +117,7 @@ impl<'a> Devices<'a> {
                 o.appears_s < learns_s
                     && o.held_until_s.is_none()
                     && away_m < detection.reach_m
-                    && shows(view, o, line)
+                    && shows(view, o, network)
             })
         };
         let first = self.scenario.physics.obstacles.iter().find(early)?;
@@ -126,8 +129,15 @@ impl<'a> Devices<'a> {
     }
 }
 
+/// The track that an obstacle is on.
+fn track_of(network: &Network, o: &ObstacleSettings) -> TrackId {
+    let named = o.track.as_ref().and_then(|name| network.named(name));
+    named.unwrap_or_default()
+}
+
 /// Whether the middle of an obstacle is in a picture, where it appears or on the bed below that.
-fn shows(view: &FieldOfView, o: &ObstacleSettings, line: &Alignment) -> bool {
+fn shows(view: &FieldOfView, o: &ObstacleSettings, network: &Network) -> bool {
+    let line = &network.tracks[usize::from(track_of(network, o).0)].alignment;
     let over_lowest_m = o.middle_m().unwrap_or(o.height_m) - o.height_m;
     [o.height_m, BED_M].iter().any(|lowest_m| {
         view.has_in_view(&line.world_from_track(TrackPoint {
@@ -164,7 +174,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
         return None;
     }
     let [from_m, to_m] = way_m(onboard, scenario)?;
-    let balises = &scenario.tunnel.first_track().balises;
+    let balises = &scenario.along(onboard.id())?.balises;
     let meets_balise = (balises.iter()).any(|b| (from_m..=to_m).contains(&b.chainage_m));
     let key = match onboard.train {
         0 => "stack.protection",
@@ -194,7 +204,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
 fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
     onboard.rig.as_ref()?;
     let [from_m, to_m] = way_m(onboard, scenario)?;
-    let lamps = &scenario.tunnel.first_track().lamps;
+    let lamps = &scenario.along(onboard.id())?.lamps;
     let (first, last) = (lamps.first()?, lamps.last()?);
     let passes = lamps
         .iter()
@@ -210,16 +220,10 @@ fn without_lamps(onboard: &OnboardSettings, scenario: &Scenario) -> Option<Strin
     })
 }
 
-/// The stretch from where a train starts to the end of the line, or its stop.
+/// The stretch of its route from where a train starts to its stop, or the end of the route.
 fn way_m(onboard: &OnboardSettings, scenario: &Scenario) -> Option<[f64; 2]> {
-    let train = scenario.physics.trains.get(usize::from(onboard.train))?;
-    let start_m = train.start_chainage_m;
-    let stop_m = train.stop_at_m;
-    Some(match train.direction {
-        Direction::Up => [
-            start_m,
-            stop_m.unwrap_or(scenario.tunnel.first_track().alignment.length_m()),
-        ],
-        Direction::Down => [stop_m.unwrap_or(0.0), start_m],
-    })
+    scenario.physics.trains.get(usize::from(onboard.train))?;
+    let way = scenario.itineraries.get(onboard.id().index())?;
+    let end_m = way.stop_m.unwrap_or(way.route.length_m());
+    Some([way.start_m, end_m])
 }

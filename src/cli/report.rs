@@ -136,7 +136,10 @@ fn frames(camera: &CameraModel, per_s: f64) -> String {
 
 /// Visible interval of the lamp in the middle, and how it changes along the line.
 fn view(rig: &RigCalibration, onboard: &OnboardSettings, scenario: &Scenario) -> String {
-    let track = &*onboard.seen_from_rig(scenario.tunnel.first_track());
+    let Some(track) = scenario.seen_from_rig(onboard) else {
+        return "a lamp is seen nowhere".to_owned();
+    };
+    let track = &*track;
     let seen = track
         .lamps
         .iter()

@@ -16,7 +16,7 @@ use crate::bus::{
 };
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
-use crate::track::Track;
+use crate::track::{Track, TrackId};
 use re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use re_sdk_types::components::Name;
 use rerun::StoreKind;
@@ -236,6 +236,7 @@ fn message(observer: &mut dyn Observer, time: SimTime, content: Content) {
 /// A warning that comes at once.
 fn warning(device: &str, t_s: f64, danger: DangerLevel) -> Content {
     Content::Warning(ObstacleWarning {
+        track: TrackId::default(),
         device: device.into(),
         number: 1,
         issued: SimTime::from_secs(t_s),

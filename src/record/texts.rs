@@ -193,7 +193,8 @@ fn markdown(display: &DriverDisplay) -> String {
     let (lamp, meaning) = palette::driver_lamp(display.lamp);
     let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.1} m"));
     let power = if display.power { "on" } else { "off" };
-    let [position, distance] = [display.position_m, display.distance_to_obstacle_m].map(metres);
+    let position = metres(display.position.map(|place| place.s_m));
+    let distance = metres(display.distance_to_obstacle_m);
     let text = &display.text;
     format!(
         "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\

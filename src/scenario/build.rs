@@ -6,10 +6,10 @@ use super::parts::{Parts, all_errors, read};
 use super::{Override, ScenarioError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
-use crate::track::{Direction, Track, Tunnel};
+use crate::track::network::{Itinerary, Network};
+use crate::track::{Direction, Place, Track, Tunnel};
 use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
-use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -22,6 +22,8 @@ pub struct Scenario {
     pub tunnel: Arc<Tunnel>,
     /// Train, track, obstacles, workers.
     pub physics: PhysicsSettings,
+    /// The ways of the trains by their numbers; of a bench, that of its rig.
+    pub itineraries: Vec<Itinerary>,
     /// Sensors and equipment of the trains that have any, in the order of their numbers; of a bench,
     /// those of its rig.
     pub onboard: Vec<OnboardSettings>,
@@ -45,11 +47,6 @@ impl OnboardSettings {
         self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
     }
 
-    /// A track as the rig's cab looks along it.
-    pub fn seen_from_rig<'t>(&self, track: &'t Track) -> Cow<'t, Track> {
-        track.along(self.rig_end().looks(self.direction))
-    }
-
     /// Its speed is supervised.
     pub fn protects(&self) -> bool {
         self.equipment.contains(&OnboardEquipment::Protection)
@@ -59,7 +56,6 @@ impl OnboardSettings {
     fn first(file: &ScenarioFile) -> Self {
         Self {
             train: 0,
-            direction: Direction::default(),
             rig: file.rig.clone(),
             imu: file.imu,
             odometer: file.odometer,
@@ -82,7 +78,6 @@ impl OnboardSettings {
         all.sort_by_key(|onboard| onboard.train);
         for onboard in &mut all {
             let number = onboard.train.into();
-            onboard.direction = file.direction(number);
             let train = file.trains().nth(number);
             let protection = &mut onboard.protection;
             let length_m = train.map(TrainSettings::length_m);
@@ -165,6 +160,22 @@ impl Scenario {
         self.first()?.rig.as_ref()
     }
 
+    /// The track along the way of a train.
+    pub fn along(&self, train: TrainId) -> Option<Arc<Track>> {
+        let way = self.itineraries.get(train.index())?;
+        Some(self.tunnel.network.along(&way.route))
+    }
+
+    /// The track as the cab of a rig looks along it.
+    pub fn seen_from_rig(&self, onboard: &OnboardSettings) -> Option<Arc<Track>> {
+        let way = self.itineraries.get(onboard.id().index())?;
+        let route = match onboard.rig_end() {
+            TrainEnd::Front => way.route.clone(),
+            TrainEnd::Rear => way.route.reversed(),
+        };
+        Some(self.tunnel.network.along(&route))
+    }
+
     /// The map of the line that the stack is given: its lamps as surveyed, and the wayside devices that
     /// are in use.
     pub fn map(&self) -> Arc<Tunnel> {
@@ -189,7 +200,7 @@ impl Scenario {
         mut problems: Vec<Problem>,
     ) -> Result<Self, FileError> {
         let mut check = Checker::new("", &mut problems);
-        let wayside = check::in_tunnel(&file, tunnel.first_track(), &mut check);
+        let wayside = check::in_tunnel(&file, &tunnel, &mut check);
         check_history(&file, &mut check);
         if !problems.is_empty() {
             return Err(FileError::Problems(problems));
@@ -199,6 +210,7 @@ impl Scenario {
             ..file.physics()
         };
         let onboard = OnboardSettings::all(&file);
+        let itineraries = itineraries(&file, &tunnel.network);
         if let (Some(bench), Some(rig)) = (&file.bench, &file.rig) {
             file.duration_s = bench.duration_s(rig.pairs_per_s);
         }
@@ -207,10 +219,23 @@ impl Scenario {
             file,
             tunnel: Arc::new(tunnel),
             physics,
+            itineraries,
             onboard,
             wayside,
         })
     }
+}
+
+/// Ways of all trains, which were checked; on a bench that of its rig.
+fn itineraries(file: &ScenarioFile, network: &Network) -> Vec<Itinerary> {
+    let trains = file
+        .trains()
+        .filter_map(|train| train.itinerary(network).ok());
+    let bench = file.bench.iter().filter_map(|_| {
+        let start = (Place::on_first_track(0.0), Direction::Up);
+        network.itinerary(start, &[], None, 0.0)
+    });
+    trains.chain(bench).collect()
 }
 
 /// A file with some of its keys set anew.

@@ -6,7 +6,6 @@ use crate::settings::settings;
 use crate::stack::led::LedSettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
-use crate::track::Direction;
 use crate::twin::air::AirSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
@@ -123,9 +122,6 @@ settings! {
     pub struct OnboardSettings {
         /// Which train: 1 is the first of `other_trains`.
         train: u8;
-        /// Which way that train runs; whoever reads the scenario puts it here.
-        #[serde(skip)]
-        direction: Direction;
         /// Its stereo rig. Default: none.
         rig: Option<RigSettings>, nested;
         /// Its inertial unit.
@@ -252,11 +248,6 @@ impl ScenarioFile {
     /// All trains, by number.
     pub(super) fn trains(&self) -> impl Iterator<Item = &TrainSettings> {
         self.train.iter().chain(&self.other_trains)
-    }
-
-    /// Which way the `k`-th of [`Self::trains`] runs.
-    pub(super) fn direction(&self, k: usize) -> Direction {
-        self.trains().nth(k).map_or(Direction::Up, |t| t.direction)
     }
 
     /// Key of the `k`-th of [`Self::trains`].

@@ -4,13 +4,14 @@
 //!
 #![doc = include_str!("../../docs/extending.md")]
 
-use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainId};
+use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainEnd, TrainId};
 use crate::scenario::{OnboardEquipment, OnboardSettings, Scenario, WaysidePost};
 use crate::stack::Equipment;
 use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
 use crate::stack::wayside::WaysideDetection;
-use crate::track::{Direction, Track, TrackRoute};
+use crate::track::Tunnel;
+use crate::track::network::Route;
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
@@ -94,7 +95,7 @@ impl Fitting {
         let node = Node::Train(train);
         if scenario.file.bench.is_none() {
             self.add_motion_sensors(onboard, &node, seed);
-            let antenna = BaliseAntenna::new(train, scenario.tunnel.first_track().clone(), world);
+            let antenna = BaliseAntenna::new(train, world);
             self.add_sensor(node.clone(), antenna);
         }
         if let Some(rig) = &onboard.rig {
@@ -139,7 +140,12 @@ impl Fitting {
         let node = Node::Post(name.clone());
         if let (Some(settings), Some(pose)) = (&post.lidar, post.actual.world_from_lidar) {
             let stream = Stream::new(scenario.file.seed, 0, &format!("wayside_lidar/{name}"));
-            let lidar = Lidar::new(settings, scenario.tunnel.first_track(), &pose, stream);
+            let lidar = Lidar::new(
+                settings,
+                &scenario.tunnel.network.tracks[usize::from(post.actual.track.0)],
+                &pose,
+                stream,
+            );
             let delay_s = 1e-3 * scenario.file.stack.latency_ms;
             let lidar = WaysideLidar::new(lidar, delay_s);
             self.add_sensor(node.clone(), lidar);
@@ -148,7 +154,8 @@ impl Fitting {
         let camera = WaysideCamera::new(&post.actual, &post.camera, faults, scenario.file.seed);
         self.add_sensor(node.clone(), camera);
         let (settings, calibration) = (&scenario.file.stack.wayside, post.calibration.clone());
-        let detection = WaysideDetection::new(settings, calibration, maps.up.clone());
+        let map = maps.map.network.tracks[usize::from(calibration.track.0)].clone();
+        let detection = WaysideDetection::new(settings, calibration, map);
         self.equipment.push(Fitted {
             node,
             equipment: Box::new(detection),
@@ -173,15 +180,19 @@ fn one_of_onboard(
     let equipment: Box<dyn Equipment> = match kind {
         OnboardEquipment::Led => {
             let rig = onboard.rig.as_ref()?;
-            let (route, map) = maps.of(rig.end.looks(onboard.direction));
+            let route = match rig.end {
+                TrainEnd::Front => maps.route(onboard.id()),
+                TrainEnd::Rear => maps.route(onboard.id()).reversed(),
+            };
             let mount = CabMount::new(rig.end, route, onboard.protection.length_m());
-            let (node, sheet) = (node.clone(), rig.calibration());
-            Box::new(LampPositioning::new(node, mount, &onboard.led, sheet, map))
+            let (node, sheet, network) = (node.clone(), rig.calibration(), &maps.map.network);
+            let led = &onboard.led;
+            Box::new(LampPositioning::new(node, mount, led, sheet, network))
         }
         OnboardEquipment::Protection => {
-            let (route, map) = maps.of(onboard.direction);
             let (node, settings) = (node.clone(), &onboard.protection);
-            Box::new(TrainProtection::new(node, route, settings, map))
+            let (route, network) = (maps.route(onboard.id()), &maps.map.network);
+            Box::new(TrainProtection::new(node, network, route, settings))
         }
     };
     Some(Fitted {
@@ -191,25 +202,28 @@ fn one_of_onboard(
     })
 }
 
-/// The surveyed map, as trains meet it that run up or down the line.
+/// The surveyed map, and the routes that trains are told to run.
 pub struct Maps {
-    up: Arc<Track>,
+    map: Arc<Tunnel>,
+    routes: Vec<Route>,
 }
 
 impl Maps {
-    /// Of a scenario's line.
+    /// Of a scenario.
     pub fn new(scenario: &Scenario) -> Self {
         Self {
-            up: scenario.map().first_track().clone(),
+            map: scenario.map(),
+            routes: scenario
+                .itineraries
+                .iter()
+                .map(|way| way.route.clone())
+                .collect(),
         }
     }
 
-    fn of(&self, direction: Direction) -> (TrackRoute, Arc<Track>) {
-        let map = match direction {
-            Direction::Up => self.up.clone(),
-            Direction::Down => Arc::new(self.up.reversed()),
-        };
-        (TrackRoute::new(&self.up, direction), map)
+    /// The route of a train.
+    fn route(&self, train: TrainId) -> Route {
+        self.routes[train.index()].clone()
     }
 }
 

@@ -169,7 +169,11 @@ pub fn renderer(
 /// What stands still in a scenario.
 pub fn scene(scenario: &Scenario) -> Scene {
     let track = scenario.tunnel.first_track().clone();
-    let lamps = lamps::shining(&track, &scenario.file.faults.lamps, scenario.file.seed);
+    let lamps = lamps::shining(
+        &scenario.tunnel,
+        &scenario.file.faults.lamps,
+        scenario.file.seed,
+    );
     let everywhere = f64::NEG_INFINITY..f64::INFINITY;
     let zones = scenario.physics.track.rail_zones.iter();
     let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));

@@ -2,8 +2,9 @@
 
 use super::summary::ProtectionFigures;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime, TrainId};
-use crate::track::{Alignment, Gauge};
+use crate::track::{Alignment, Gauge, Place};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
+use nalgebra::Isometry3;
 
 /// What a run came to.
 #[derive(Default)]
@@ -28,7 +29,7 @@ impl Outcome {
     /// A cycle of the protection, for a driver who aims at `aim_mps`. A train that stands is not
     /// braked for an obstacle, but held.
     pub fn on_cycle(&mut self, now: SimTime, report: &ProtectionReport, aim_mps: f64) {
-        let obstacle = report.authority_end_m.is_some();
+        let obstacle = report.authority_end.is_some();
         self.slowed_by_obstacle = obstacle && report.permitted_mps < aim_mps;
         if obstacle && !self.standing && report.command.brake != BrakeDemand::None {
             self.brake_commanded.get_or_insert(now);
@@ -39,8 +40,8 @@ impl Outcome {
     }
 
     /// Follows whether the train has run, and since when it stands.
-    pub fn on_motion(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
-        self.approach(id, train, world, line);
+    pub fn on_motion(&mut self, id: TrainId, train: &TrainState, world: &World) {
+        self.approach(id, train, world);
         self.speed_mps = Some(train.speed_mps);
         self.standing = train.standing;
         self.has_run |= !train.standing;
@@ -59,7 +60,7 @@ impl Outcome {
     }
 
     /// Follows how near the train comes to what is ahead of it, until it hits something.
-    fn approach(&mut self, id: TrainId, train: &TrainState, world: &World, line: &Alignment) {
+    fn approach(&mut self, id: TrainId, train: &TrainState, world: &World) {
         if self.has_hit {
             return;
         }
@@ -70,7 +71,7 @@ impl Outcome {
             let brake_mps2 = world.emergency_brake_mps2(id);
             brake_mps2.map(|brake_mps2| 0.0 - stopping_way_m(speed_mps, brake_mps2))
         } else {
-            ahead_m(id, train, world, line).map(|ahead_m| ahead_m.max(0.0))
+            ahead_m(id, train, world).map(|ahead_m| ahead_m.max(0.0))
         };
         self.closest_m = [self.closest_m, now_m]
             .into_iter()
@@ -86,7 +87,7 @@ impl Outcome {
 
     /// The figures; `None` without a train.
     pub fn protection(&self, id: TrainId, world: &World) -> Option<ProtectionFigures> {
-        world.head_m(id)?;
+        world.head(id)?;
         let impacts = world.impacts().iter().filter(|hit| hit.train == id);
         let impacts: Vec<_> = impacts.cloned().collect();
         Some(ProtectionFigures {
@@ -105,31 +106,60 @@ fn stopping_way_m(speed_mps: f64, brake_mps2: f64) -> f64 {
     speed_mps * speed_mps / (2.0 * brake_mps2)
 }
 
-/// From the head to the nearest obstacle or train that it would meet. What has fallen just behind the
+/// From the head to the nearest obstacle or train that it would meet on its route. What has fallen just behind the
 /// head counts too.
-fn ahead_m(id: TrainId, train: &TrainState, world: &World, line: &Alignment) -> Option<f64> {
-    let to_m = |s_m| train.direction.ahead_m(train.chainage_m, s_m);
-    let obstacles = world.obstacles().filter(|o| fouls(line, o));
-    let near_end_m =
-        |o: ObstacleTruth<'_>| to_m(o.chainage_m - train.direction.sign() * o.half_extents_m.x);
-    let obstacles = obstacles.map(near_end_m);
+fn ahead_m(id: TrainId, train: &TrainState, world: &World) -> Option<f64> {
+    let line = &world.along_route(id)?.alignment;
+    let obstacles = world.obstacles();
+    let obstacles = obstacles.filter_map(|o| on_route(id, train, world, &o));
     let others = world.train_ids().filter(|other| *other != id);
-    let trains = others.filter_map(|other| {
-        let (state, length_m) = (world.train(other)?, world.train_length_m(other)?);
-        let tail_m = state.chainage_m - state.direction.sign() * length_m;
-        Some(to_m(state.chainage_m).min(to_m(tail_m)))
-    });
+    let trains = others.flat_map(|other| nearest_cars_m(line, world, other));
     obstacles
         .chain(trains)
+        .map(|run_m| run_m - train.run_m)
         .filter(|ahead_m| *ahead_m > -1.0)
         .min_by(f64::total_cmp)
 }
 
-/// Whether any of an obstacle is within the gauge across the track.
-fn fouls(line: &Alignment, o: &ObstacleTruth<'_>) -> bool {
-    let gauge = Gauge::b1(line.at(o.chainage_m).curvature_per_m);
+/// Where the near end of an obstacle is along the train's route, if any of it is within the gauge there.
+fn on_route(id: TrainId, train: &TrainState, world: &World, o: &ObstacleTruth<'_>) -> Option<f64> {
+    let (route, line) = (world.route(id)?, &world.along_route(id)?.alignment);
+    let place = Place {
+        track: o.track,
+        s_m: o.chainage_m,
+    };
+    let centre = o.world_from_body.translation.vector.into();
+    let (run_m, lateral_m) = match route.run_near_m(place, train.run_m) {
+        Some(run_m) => (run_m, o.lateral_m),
+        None => {
+            let point = line.nearest(&centre)?;
+            (point.s_m, point.l_m)
+        }
+    };
+    let gauge = Gauge::b1(line.at(run_m).curvature_per_m);
     let half = o.half_extents_m;
-    gauge.fouled_by([o.lateral_m, o.height_m], [half.y, half.z])
+    let fouls = gauge.fouled_by([lateral_m, o.height_m], [half.y, half.z]);
+    fouls.then_some(run_m - half.x)
+}
+
+/// The near ends of the cars of another train that stand in the gauge of a route, along it.
+fn nearest_cars_m(line: &Alignment, world: &World, other: TrainId) -> Vec<f64> {
+    let (Some(state), Some(length_m), Some(half_m)) = (
+        world.train(other),
+        world.train_length_m(other),
+        world.car_half_extents_m(other),
+    ) else {
+        return Vec::new();
+    };
+    let cars = &state.world_from_cars;
+    let half_car_m = 0.5 * length_m / cars.len().max(1) as f64;
+    let near_end = |car: &Isometry3<f64>| {
+        let point = line.nearest(&car.translation.vector.into())?;
+        let gauge = Gauge::b1(line.at(point.s_m).curvature_per_m);
+        let fouls = gauge.fouled_by([point.l_m, half_m.z], [half_m.y, half_m.z]);
+        fouls.then_some(point.s_m - half_car_m)
+    };
+    cars.iter().filter_map(near_end).collect()
 }
 
 #[cfg(test)]
@@ -139,12 +169,13 @@ mod tests {
     use crate::bus::TrainCommand;
     use crate::track::Tunnel;
     use crate::twin::physics::{ObstacleSettings, PhysicsSettings, TrainSettings};
+    use std::sync::Arc;
 
     /// Fails where a train that is held, or braked for want of a position, braked for an obstacle.
     #[test]
     fn only_a_running_train_brakes_for_an_obstacle() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
         for (start_speed_kmh, authority_end_m, braked) in [
             (40.0, Some(200.0), true),
             (40.0, None, false),
@@ -164,7 +195,7 @@ mod tests {
                 ..TrainCommand::default()
             };
             let report = ProtectionReport {
-                authority_end_m,
+                authority_end: authority_end_m.map(Place::on_first_track),
                 command,
                 ..ProtectionReport::default()
             };
@@ -172,7 +203,7 @@ mod tests {
             for _ in 0..100 {
                 world.step(&[command]).unwrap();
                 let train = world.train(TrainId(0)).unwrap();
-                outcome.on_motion(TrainId(0), &train, &world, &tunnel.alignment);
+                outcome.on_motion(TrainId(0), &train, &world);
                 outcome.on_cycle(world.time(), &report, 20.0);
             }
             let protection = outcome.protection(TrainId(0), &world).unwrap();
@@ -191,7 +222,7 @@ mod tests {
     #[test]
     fn every_run_has_a_closest_approach() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
         let train = TrainSettings {
             start_chainage_m: 150.0,
             start_speed_kmh: 40.0,
@@ -219,7 +250,7 @@ mod tests {
                 }
                 world.step(&[command]).unwrap();
                 let train = world.train(TrainId(0)).unwrap();
-                outcome.on_motion(TrainId(0), &train, &world, &tunnel.alignment);
+                outcome.on_motion(TrainId(0), &train, &world);
             }
             let figures = outcome.protection(TrainId(0), &world).unwrap();
             let head_m = world.train(TrainId(0)).unwrap().chainage_m;
@@ -251,14 +282,18 @@ mod tests {
     #[test]
     fn the_margin_is_to_what_is_in_the_way() {
         let text = include_str!("../../tunnels/test_bench.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap().first_track().clone();
+        let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
         let lying = |chainage_m, lateral_m| ObstacleSettings {
             chainage_m,
             lateral_m,
             ..ObstacleSettings::default()
         };
         let settings = PhysicsSettings {
-            trains: Vec::new(),
+            trains: vec![TrainSettings {
+                cars: 1,
+                start_chainage_m: 40.0,
+                ..TrainSettings::default()
+            }],
             obstacles: vec![lying(190.0, 2.5), lying(200.0, 0.5), lying(150.0, 0.0)],
             ..PhysicsSettings::default()
         };
@@ -266,12 +301,11 @@ mod tests {
         while world.time().secs() < 1.5 {
             world.step(&[]).unwrap();
         }
-        let head_at = |chainage_m| TrainState {
-            chainage_m,
+        let head_at = |run_m| TrainState {
+            run_m,
             ..TrainState::default()
         };
-        let line = &tunnel.alignment;
-        let margin_m = |head_m| ahead_m(TrainId(0), &head_at(head_m), &world, line);
+        let margin_m = |head_m| ahead_m(TrainId(0), &head_at(head_m), &world);
         let margin = margin_m(180.0).unwrap();
         assert!((margin - (20.0 - 0.15)).abs() < 0.1, "{margin}");
         assert_eq!(margin_m(202.0), None);

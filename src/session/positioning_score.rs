@@ -3,11 +3,10 @@
 use super::cost_tally::CostTally;
 use super::summary::{ErrorStatistics, Positioning};
 use crate::bus::{Identity, Intrinsics, LedReport, Method, PositionFix, SimTime};
+use crate::track::Tunnel;
 use crate::track::uid::Uid;
-use crate::track::{Direction, Track};
 use nalgebra::{Isometry3, Point2, Point3};
 use std::collections::{BTreeMap, BTreeSet};
-use std::sync::Arc;
 
 /// A lamp counts as passed when it was at least this far ahead of the rig's end as the run began, so
 /// that the camera had the chance to see the whole approach.
@@ -20,36 +19,28 @@ struct Errors {
     wrong_uid: u32,
 }
 
-/// The end of a train that its rig is at, and which way the train runs.
-#[derive(Clone, Copy, Debug)]
-struct RigPlace {
-    chainage_m: f64,
-    direction: Direction,
-}
-
-impl RigPlace {
-    fn ahead_m(&self, chainage_m: f64) -> f64 {
-        self.direction.ahead_m(self.chainage_m, chainage_m)
-    }
-}
-
 /// Scores positioning.
 #[derive(Debug)]
 pub struct PositioningScore {
-    tunnel: Arc<Track>,
+    /// Names and centres of all lamps.
+    lamps: Vec<(Uid, Point3<f64>)>,
+    /// Lamps that the rig passes on its way with their luminous side to it, with their distances along the route.
+    on_way: Vec<(Uid, f64)>,
     methods: BTreeMap<Method, Errors>,
     named: BTreeSet<Uid>,
     pairs: u32,
     costs: CostTally,
-    /// Where the rig was first, and how far it has run from there.
-    run: Option<(RigPlace, f64)>,
+    /// Where the rig was first along the route, and how far it has run from there.
+    run: Option<(f64, f64)>,
 }
 
 impl PositioningScore {
-    /// Of a run on `tunnel` with these methods.
-    pub fn new(tunnel: Arc<Track>, methods: &[Method]) -> Self {
+    /// Of a rig on a way, with these methods. Of the lamps of the tunnel it passes `on_way`.
+    pub fn new(tunnel: &Tunnel, on_way: Vec<(Uid, f64)>, methods: &[Method]) -> Self {
+        let lamps = tunnel.network.tracks.iter().flat_map(|track| &track.lamps);
         Self {
-            tunnel,
+            lamps: lamps.map(|lamp| (lamp.uid, lamp.centre)).collect(),
+            on_way,
             methods: methods.iter().map(|m| (*m, Errors::default())).collect(),
             named: BTreeSet::new(),
             pairs: 0,
@@ -58,14 +49,10 @@ impl PositioningScore {
         }
     }
 
-    /// The end of the train that the rig is at was here.
-    pub fn rig_at(&mut self, chainage_m: f64, direction: Direction) {
-        let place = RigPlace {
-            chainage_m,
-            direction,
-        };
-        let (first, run_m) = self.run.get_or_insert((place, 0.0));
-        *run_m = run_m.max(first.ahead_m(chainage_m));
+    /// The end of the train that the rig is at was here along the route.
+    pub fn rig_at(&mut self, at_m: f64) {
+        let (first_m, run_m) = self.run.get_or_insert((at_m, 0.0));
+        *run_m = run_m.max(at_m - *first_m);
     }
 
     /// One report, the cost of making it, and the true pose of the left eye at a time.
@@ -122,21 +109,20 @@ impl PositioningScore {
             let p = intrinsics.project(&world_from_left.inverse_transform_point(centre))?;
             Some((p - pixel).norm())
         };
-        self.tunnel
-            .lamps
+        self.lamps
             .iter()
-            .filter(|l| (l.centre.coords - world_from_left.translation.vector).norm() < 60.0)
-            .filter_map(|l| Some((distance(&l.centre)?, l.uid)))
+            .filter(|(_, at)| (at.coords - world_from_left.translation.vector).norm() < 60.0)
+            .filter_map(|(uid, at)| Some((distance(at)?, *uid)))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .map(|(_, uid)| uid)
     }
 
     /// Share of the lamps passed whose name was read from the stripes.
     fn decode_rate(&self) -> Option<f64> {
-        let (first, run_m) = self.run?;
-        let passed = |s_m: f64| (APPROACH_M..=run_m).contains(&first.ahead_m(s_m));
-        let lamps = || self.tunnel.lamps.iter().filter(|l| passed(l.chainage_m));
-        let named = lamps().filter(|l| self.named.contains(&l.uid)).count();
+        let (first_m, run_m) = self.run?;
+        let passed = |s_m: f64| (APPROACH_M..=run_m).contains(&(s_m - first_m));
+        let lamps = || self.on_way.iter().filter(|(_, s_m)| passed(*s_m));
+        let named = lamps().filter(|(uid, _)| self.named.contains(uid)).count();
         (lamps().count() > 0).then(|| named as f64 / lamps().count() as f64)
     }
 

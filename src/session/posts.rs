@@ -6,7 +6,6 @@ use super::summary::Wayside;
 use super::wayside_score::WaysideScore;
 use crate::bus::{Node, SimTime, WaysideReport};
 use crate::scenario::{Scenario, WaysidePost};
-use crate::track::Alignment;
 use crate::twin::physics::World;
 use std::collections::VecDeque;
 
@@ -48,9 +47,9 @@ impl Posts {
     }
 
     /// A frame of a post is over.
-    pub fn expose(&mut self, post: usize, number: u32, world: &World, line: &Alignment) {
+    pub fn expose(&mut self, post: usize, number: u32, world: &World) {
         if let Some(post) = self.posts.get_mut(post) {
-            let present = post.view.present(world, line);
+            let present = post.view.present(world);
             post.exposed.push_back((number, present));
         }
     }

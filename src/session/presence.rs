@@ -3,7 +3,7 @@
 use super::image_box::ImageBox;
 use crate::bus::{SimTime, TrainId, WaysideCalibration};
 use crate::scenario::{Scenario, WaysidePost};
-use crate::track::{Alignment, BED_M};
+use crate::track::{BED_M, TrackId, TrackPoint};
 use crate::twin::geometry::TunnelCaster;
 use crate::twin::physics::{WorkerTruth, World};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
@@ -85,14 +85,17 @@ impl FieldOfView {
     }
 
     /// Everything that the device may rightly report.
-    pub fn present(&self, world: &World, line: &Alignment) -> Vec<Presence> {
+    pub fn present(&self, world: &World) -> Vec<Presence> {
         let obstacles = world.obstacles().map(|o| {
             let pose = &o.world_from_body;
+            let centre = pose.translation.vector.into();
+            let place = [o.chainage_m, o.lateral_m];
+            let [chainage_m, lateral_m] = self.as_watched(world, o.track, place, &centre);
             Presence {
                 name: o.name.to_owned(),
                 size_m: o.size_m.max(),
-                chainage_m: o.chainage_m,
-                lateral_m: o.lateral_m,
+                chainage_m,
+                lateral_m,
                 half_length_m: o.half_extents_m.x,
                 half_width_m: o.half_extents_m.y,
                 image_boxes: self
@@ -104,22 +107,52 @@ impl FieldOfView {
                 obstacle: true,
             }
         });
-        let workers = world.workers().map(|w| Presence {
-            name: w.name.to_owned(),
-            size_m: w.stature_m,
-            chainage_m: w.chainage_m,
-            lateral_m: w.lateral_m,
-            half_length_m: STRIDE_REACH_M,
-            half_width_m: STRIDE_REACH_M,
-            image_boxes: self.worker_box(&w, line).into_iter().collect(),
-            lies_in_view_since: None,
-            obstacle: false,
+        let workers = world.workers().map(|w| {
+            let feet = TrackPoint {
+                s_m: w.chainage_m,
+                l_m: w.lateral_m,
+                h_m: BED_M,
+            };
+            let feet = world.network().world_from_track(w.track, feet);
+            let place = [w.chainage_m, w.lateral_m];
+            let [chainage_m, lateral_m] =
+                feet.map_or(place, |feet| self.as_watched(world, w.track, place, &feet));
+            Presence {
+                name: w.name.to_owned(),
+                size_m: w.stature_m,
+                chainage_m,
+                lateral_m,
+                half_length_m: STRIDE_REACH_M,
+                half_width_m: STRIDE_REACH_M,
+                image_boxes: self.worker_box(&w, world).into_iter().collect(),
+                lies_in_view_since: None,
+                obstacle: false,
+            }
         });
         let trains = world.train_ids().filter_map(|id| self.train(world, id));
         obstacles.chain(workers).chain(trains).collect()
     }
 
-    fn worker_box(&self, worker: &WorkerTruth<'_>, line: &Alignment) -> Option<ImageBox> {
+    /// A place (chainage, left of the centreline) of a track as the track has it that the device watches.
+    fn as_watched(
+        &self,
+        world: &World,
+        track: TrackId,
+        place: [f64; 2],
+        at: &Point3<f64>,
+    ) -> [f64; 2] {
+        if track == self.device.track {
+            return place;
+        }
+        let line = world.network().alignment(self.device.track);
+        line.map_or(place, |line| {
+            let point = line.track_from_world(at, self.device.chainage_m);
+            [point.s_m, point.l_m]
+        })
+    }
+
+    fn worker_box(&self, worker: &WorkerTruth<'_>, world: &World) -> Option<ImageBox> {
+        let line = world.network().alignment(worker.track)?;
         let half_m = Vector3::new(STRIDE_REACH_M, STRIDE_REACH_M, 0.5 * worker.stature_m);
         let world_from_line = line.at(worker.chainage_m).world_from_line();
         let middle = Translation3::new(0.0, worker.lateral_m, BED_M + half_m.z);
@@ -129,13 +162,16 @@ impl FieldOfView {
     fn train(&self, world: &World, id: TrainId) -> Option<Presence> {
         let (state, length_m) = (world.train(id)?, world.train_length_m(id)?);
         let half_m = world.car_half_extents_m(id)?;
-        let to_middle_m = 0.5 * length_m * state.direction.sign();
+        let middle_m = state.run_m - 0.5 * length_m;
+        let (middle, _) = world.route(id)?.place(middle_m);
+        let at = world.along_route(id)?.alignment.at(middle_m).origin;
+        let [chainage_m, lateral_m] = self.as_watched(world, middle.track, [middle.s_m, 0.0], &at);
         let cars = state.world_from_cars.iter();
         Some(Presence {
             name: "train".into(),
             size_m: length_m,
-            chainage_m: state.chainage_m - to_middle_m,
-            lateral_m: 0.0,
+            chainage_m,
+            lateral_m,
             half_length_m: 0.5 * length_m,
             half_width_m: half_m.y,
             image_boxes: cars

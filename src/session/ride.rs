@@ -2,7 +2,6 @@
 
 use super::summary::TrainFigures;
 use crate::bus::TrainId;
-use crate::track::Direction;
 use crate::twin::physics::{TrainState, World};
 use nalgebra::Vector3;
 
@@ -11,7 +10,6 @@ use nalgebra::Vector3;
 pub struct Ride {
     first_m: Option<f64>,
     last_m: f64,
-    direction: Direction,
     standing: bool,
     samples: u32,
     squares: Vector3<f64>,
@@ -20,9 +18,8 @@ pub struct Ride {
 impl Ride {
     /// Enters the truth at one time.
     pub fn on_motion(&mut self, train: &TrainState) {
-        self.first_m.get_or_insert(train.chainage_m);
-        self.last_m = train.chainage_m;
-        self.direction = train.direction;
+        self.first_m.get_or_insert(train.run_m);
+        self.last_m = train.run_m;
         self.standing = train.standing;
         let accel = train.floor_accel_mps2;
         self.squares += accel.component_mul(&accel);
@@ -30,21 +27,15 @@ impl Ride {
     }
 
     /// The figures; `None` without a train.
-    pub fn finish(
-        &self,
-        id: TrainId,
-        world: &World,
-        stop_at_m: Option<f64>,
-        derailed: bool,
-    ) -> Option<TrainFigures> {
+    pub fn finish(&self, id: TrainId, world: &World, derailed: bool) -> Option<TrainFigures> {
         let (energy, first_m) = (world.energy(id)?, self.first_m?);
         let rms = (self.squares / f64::from(self.samples)).map(f64::sqrt);
         let worst = world.wheel_extremes(id)?;
         Some(TrainFigures {
-            run_m: self.direction.ahead_m(first_m, self.last_m),
-            stop_error_m: stop_at_m
+            run_m: self.last_m - first_m,
+            stop_error_m: (world.stop_m(id))
                 .filter(|_| self.standing)
-                .map(|mark_m| self.direction.ahead_m(mark_m, self.last_m)),
+                .map(|mark_m| self.last_m - mark_m),
             derailed,
             floor_accel_rms_mps2: rms.into(),
             least_wheel_load_share: worst.least_normal_n / world.wheel_load_n(id)?,

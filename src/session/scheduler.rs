@@ -81,17 +81,16 @@ impl<'s, 'o> Session<'s, 'o> {
         observers: &'s mut [&'o mut dyn Observer],
     ) -> Result<Self, SessionError> {
         let seed = scenario.file.seed;
-        let world = World::new(
-            scenario.tunnel.first_track().clone(),
-            &scenario.physics,
-            seed,
-            0,
-        )?;
+        let world = World::new(scenario.tunnel.clone(), &scenario.physics, seed, 0)?;
         let mut fitting = Fitting::new(scenario, &world);
         add(&mut fitting);
-        let stations = &scenario.tunnel.first_track().base_stations;
         let radio = Stream::new(seed, 0, "radio");
-        let links = Links::new(&scenario.file.radio, stations, fitting.nodes(), radio);
+        let links = Links::new(
+            &scenario.file.radio,
+            &scenario.tunnel.network,
+            fitting.nodes(),
+            radio,
+        );
         let latency_ms = match scenario.file.bench {
             // The rig goes on when its pairs have been read.
             Some(_) => 0.0,
@@ -101,7 +100,7 @@ impl<'s, 'o> Session<'s, 'o> {
         let ids = world
             .train_ids()
             .chain(scenario.onboard.iter().map(|o| o.id()));
-        let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id))));
+        let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id), &world)));
         Ok(Self {
             trains: trains.collect(),
             posts: Posts::new(scenario),
@@ -274,8 +273,7 @@ impl<'s, 'o> Session<'s, 'o> {
             train,
         }))?;
         if let Source::Wayside(post) = source {
-            let line = &self.scenario.tunnel.first_track().alignment;
-            self.posts.expose(post, header.number, &self.world, line);
+            self.posts.expose(post, header.number, &self.world);
         }
         let pending = Pending {
             sensor,
@@ -291,7 +289,7 @@ impl<'s, 'o> Session<'s, 'o> {
         let onboard = self.scenario.onboard.iter().find(|o| o.id() == id);
         let end = onboard.map_or(TrainEnd::Front, OnboardSettings::rig_end);
         Some(TrainPoint {
-            chainage_m: self.world.chainage_at(id, time)?,
+            chainage_m: self.world.place_at(id, time)?.s_m,
             speed_mps: self.world.train(id)?.speed_mps,
             world_from_vehicle: self.world.vehicle_at(id, end, time)?,
         })
@@ -305,7 +303,7 @@ impl<'s, 'o> Session<'s, 'o> {
         }
         loop {
             let world = &self.world;
-            let Some(message) = self.links.receive(now, |id| world.head_m(id)) else {
+            let Some(message) = self.links.receive(now, |id| world.head(id)) else {
                 return Ok(());
             };
             if let Receiver::Node(node) = message.receiver.clone() {
@@ -395,7 +393,7 @@ impl<'s, 'o> Session<'s, 'o> {
         }
         if message.receiver != Receiver::Own {
             let world = &self.world;
-            self.links.send(message, |id| world.head_m(id));
+            self.links.send(message, |id| world.head(id));
             return;
         }
         let sender = &message.sender;

@@ -138,10 +138,10 @@ impl Session<'_, '_> {
 
     pub(super) fn show_truth(&mut self, now: SimTime) -> Result<(), SessionError> {
         if self.truth_ticker.due(now, 0.0).is_some() {
-            let (world, line) = (&self.world, &self.scenario.tunnel.first_track().alignment);
+            let world = &self.world;
             for (id, score) in &mut self.trains {
                 if let Some(truth) = world.train(*id) {
-                    score.on_motion(&truth, world, line);
+                    score.on_motion(&truth, world);
                     let left_eye = score.left_eye(world);
                     self.observers.show(&Event::Train {
                         train: *id,

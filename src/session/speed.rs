@@ -136,7 +136,7 @@ impl Observer for Watched {
 /// Means of [`STEPS`] steps of the world.
 fn step_seconds(scenario: &Scenario) -> Result<Vec<f64>, Error> {
     let mut world = World::new(
-        scenario.tunnel.first_track().clone(),
+        scenario.tunnel.clone(),
         &scenario.physics,
         scenario.file.seed,
         0,

@@ -7,13 +7,18 @@ use super::positioning_score::PositioningScore;
 use super::ride::Ride;
 use super::summary::TrainSummary;
 use crate::bus::{
-    EYES, LedReport, Method, ProtectionReport, RigCalibration, SimTime, TrainEnd, TrainId,
+    EYES, LedReport, Method, PositionFix, ProtectionReport, RigCalibration, SimTime, TrainEnd,
+    TrainId,
 };
 use crate::scenario::{OnboardSettings, Scenario};
-use crate::track::Alignment;
+use crate::track::uid::Uid;
+use crate::track::{LampSite, Track};
 use crate::twin::physics::{TrainState, World};
-use crate::twin::sensors::SensorError;
+use crate::twin::sensors::{RigSettings, SensorError};
 use nalgebra::Isometry3;
+
+/// Lamps farther beside the route stand on another track.
+const OWN_LAMPS_M: f64 = 4.0;
 
 /// The scores of one train.
 pub struct TrainScore {
@@ -27,18 +32,26 @@ pub struct TrainScore {
     stereo_frames: u32,
     /// Speed that its driver aims at.
     aim_mps: f64,
-    stop_at_m: Option<f64>,
     /// How its cameras do, by what the equipment says.
     pub health: Health,
 }
 
 impl TrainScore {
     /// Before the first step.
-    pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&OnboardSettings>) -> Self {
+    pub fn new(
+        scenario: &Scenario,
+        id: TrainId,
+        onboard: Option<&OnboardSettings>,
+        world: &World,
+    ) -> Self {
         let train = scenario.physics.trains.get(id.index());
         let rig = onboard.and_then(|onboard| onboard.rig.as_ref());
-        let positioning = onboard.filter(|o| o.positions()).map(|onboard| {
-            PositioningScore::new(scenario.tunnel.first_track().clone(), &onboard.led.methods)
+        let positioning = onboard.filter(|o| o.positions()).zip(rig);
+        let positioning = positioning.map(|(onboard, rig)| {
+            let first = scenario.tunnel.first_track();
+            let way = world.along_route(id).unwrap_or(first);
+            let lamps = passed_by(rig, way);
+            PositioningScore::new(&scenario.tunnel, lamps, &onboard.led.methods)
         });
         let eyes = EYES.into_iter().filter(|_| positioning.is_some());
         Self {
@@ -51,19 +64,17 @@ impl TrainScore {
             dark_lamps: Vec::new(),
             stereo_frames: 0,
             aim_mps: train.map_or(f64::INFINITY, |t| t.cruise_speed_kmh / 3.6),
-            stop_at_m: train.and_then(|t| t.stop_at_m),
         }
     }
 
     /// Takes down where the train really is.
-    pub fn on_motion(&mut self, train: &TrainState, world: &World, line: &Alignment) {
-        self.outcome.on_motion(self.id, train, world, line);
+    pub fn on_motion(&mut self, train: &TrainState, world: &World) {
+        self.outcome.on_motion(self.id, train, world);
         self.ride.on_motion(train);
         if let Some(positioning) = &mut self.positioning {
             let rear = matches!(self.rig, Some((_, TrainEnd::Rear)));
             let behind_m = world.train_length_m(self.id).filter(|_| rear);
-            let behind_m = train.direction.sign() * behind_m.unwrap_or(0.0);
-            positioning.rig_at(train.chainage_m - behind_m, train.direction);
+            positioning.rig_at(train.run_m - behind_m.unwrap_or(0.0));
         }
     }
 
@@ -85,7 +96,7 @@ impl TrainScore {
         positioning.report(report, cost_ms, &rig.left.intrinsics, left_at);
         let mut truths_m = Vec::with_capacity(report.fixes.len());
         for fix in &report.fixes {
-            let true_m = head_at(world, self.id, fix.time)
+            let true_m = true_chainage_m(world, self.id, fix)
                 .ok_or(SensorError::PoseForgotten(fix.time.secs()))?;
             positioning.fix(fix, true_m);
             truths_m.push(true_m);
@@ -130,17 +141,49 @@ impl TrainScore {
             cameras: self.health.cameras,
             dark_lamps: self.dark_lamps,
             protection: self.outcome.protection(self.id, world),
-            train: self.ride.finish(self.id, world, self.stop_at_m, derailed),
+            train: self.ride.finish(self.id, world, derailed),
         }
     }
 }
 
-/// Chainage of a train's head at a time. The stamp of a clock that is fast may lie ahead of the world:
-/// over that moment the speed goes on.
-fn head_at(world: &World, id: TrainId, time: SimTime) -> Option<f64> {
-    world.chainage_at(id, time).or_else(|| {
+/// Lamps that a rig passes on a way with their luminous side to it, with their chainages on the way. Those across a
+/// neighbouring track are not its own.
+fn passed_by(rig: &RigSettings, way: &Track) -> Vec<(Uid, f64)> {
+    // It looks the way that its cab looks, or back.
+    let looks = rig.end.sign() * rig.yaw_deg.to_radians().cos();
+    let shows = |lamp: &&LampSite| {
+        let ahead = way.alignment.at(lamp.chainage_m).ahead();
+        looks * lamp.facing.dot(&ahead) < 0.0 && lamp.lateral_m.abs() <= OWN_LAMPS_M
+    };
+    let lamps = way.lamps.iter().filter(shows);
+    lamps.map(|lamp| (lamp.uid, lamp.chainage_m)).collect()
+}
+
+/// Where the head of a train really was at the time of a fix, as a chainage of the track that the fix is on.
+fn true_chainage_m(world: &World, id: TrainId, fix: &PositionFix) -> Option<f64> {
+    let route = world.route(id)?;
+    let run_m = run_at(world, id, fix.time)?;
+    let (place, _) = route.place(run_m);
+    if place.track == fix.track {
+        return Some(place.s_m);
+    }
+    // Over a joint the way from one to the other counts; beside the route the place across.
+    if let Some(fix_m) = route.run_near_m(fix.place(), run_m) {
+        let (_, direction) = route.place(fix_m);
+        return Some(fix.chainage_m - direction.sign() * (fix_m - run_m));
+    }
+    let head = world.along_route(id)?.alignment.at(run_m).origin;
+    let line = world.network().alignment(fix.track)?;
+    Some(line.track_from_world(&head, fix.chainage_m).s_m)
+}
+
+/// Distance of a train's head along its route at a time. The stamp of a clock that is fast may lie ahead of the
+/// world: over that moment the speed goes on.
+fn run_at(world: &World, id: TrainId, time: SimTime) -> Option<f64> {
+    world.run_at(id, time).or_else(|| {
         let train = world.train(id)?;
         let ahead_s = time.since(train.time);
-        (ahead_s > 0.0).then_some(train.chainage_m + train.speed_mps * ahead_s)
+        let speed_mps = train.direction.sign() * train.speed_mps;
+        (ahead_s > 0.0).then_some(train.run_m + speed_mps * ahead_s)
     })
 }

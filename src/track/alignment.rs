@@ -132,6 +132,9 @@ impl TrackFrame {
 /// (EN 13848-1), whatever the width of their heads.
 pub const CANT_BASE_M: f64 = 1.5;
 
+/// The point nearest to a position is looked for from stations this far apart.
+const STATION_M: f64 = 20.0;
+
 /// A chain from its last stretch to its first, each turned round knowing where it ends. The last one
 /// runs on for ever, and so does the first one of the result: it ends, and begins, in one place.
 fn backwards<T>(chain: &[T], begin_m: impl Fn(&T) -> f64, turn: impl Fn(&T, f64) -> T) -> Vec<T> {
@@ -308,5 +311,19 @@ impl Alignment {
             l_m: to.dot(&f.left()),
             h_m: to.z,
         }
+    }
+
+    /// The point of the line that is square to a world position; none where that lies beyond the line's ends.
+    pub fn nearest(&self, world: &Point3<f64>) -> Option<TrackPoint> {
+        let count = (self.length_m / STATION_M).ceil().max(1.0);
+        let station = |k: u32| self.length_m * f64::from(k) / count;
+        let away_m = |s_m: f64| (self.at(s_m).origin - world).xy().norm();
+        let near_s_m = (0..=count as u32)
+            .map(station)
+            .min_by(|a, b| f64::total_cmp(&away_m(*a), &away_m(*b)))?;
+        let point = self.track_from_world(world, near_s_m);
+        (-1e-9..=self.length_m + 1e-9)
+            .contains(&point.s_m)
+            .then_some(point)
     }
 }

@@ -57,7 +57,6 @@ pub mod network;
 mod place;
 mod reversal;
 mod section;
-mod track_route;
 mod tunnel;
 pub mod uid;
 pub mod waveform;
@@ -66,12 +65,11 @@ pub use alignment::{Alignment, CANT_BASE_M, Grade, PlanElement, TrackFrame, Trac
 pub use file::TunnelFile;
 pub use furniture::{Balise, BaseStation, LampSite, StoppingPlace, WaysideSite};
 pub use gauge::{Gauge, RAIL_OFFSET_M, RAIL_WIDTH_M, rail_outline};
-pub use place::{Direction, Place, TrackId};
+pub use place::{Direction, Place, Stretch, TrackId};
 pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
-pub use track_route::TrackRoute;
 pub use tunnel::Tunnel;
 
 /// One track: where it runs, what it lies in, and what stands along it.

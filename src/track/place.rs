@@ -27,6 +27,39 @@ pub struct Place {
     pub s_m: f64,
 }
 
+impl Place {
+    /// Of a line that has one track, or is taken as one.
+    pub fn on_first_track(s_m: f64) -> Self {
+        Self {
+            track: TrackId::default(),
+            s_m,
+        }
+    }
+}
+
+/// A stretch of one track.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Stretch {
+    /// Which track.
+    pub track: TrackId,
+    /// Lower chainage.
+    pub from_m: f64,
+    /// Higher chainage.
+    pub to_m: f64,
+}
+
+impl Stretch {
+    /// Longer by so much at both ends.
+    #[must_use]
+    pub fn widened(&self, by_m: f64) -> Self {
+        Self {
+            from_m: self.from_m - by_m,
+            to_m: self.to_m + by_m,
+            ..*self
+        }
+    }
+}
+
 /// Which way along a track.
 #[derive(
     Clone,

@@ -2,20 +2,11 @@
 //! stands in it stays where it is in the world.
 
 use super::{
-    Balise, BaseStation, CrossSection, Direction, LampSite, OutlinePoint, SectionRange,
-    StoppingPlace, Track, WaysideSite,
+    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, StoppingPlace, Track,
+    WaysideSite,
 };
-use std::borrow::Cow;
 
 impl Track {
-    /// The track as met in a direction.
-    pub fn along(&self, direction: Direction) -> Cow<'_, Self> {
-        match direction {
-            Direction::Up => Cow::Borrowed(self),
-            Direction::Down => Cow::Owned(self.reversed()),
-        }
-    }
-
     /// The track in the other direction.
     ///
     /// ```

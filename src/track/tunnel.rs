@@ -1,8 +1,8 @@
 //! All tracks of a tunnel file.
 
-use super::Track;
 use super::geodesy::Datum;
 use super::network::Network;
+use super::{LampSite, Track};
 use std::sync::Arc;
 
 /// A tunnel, checked and ready to use: tracks, the switches that join them, and what stands along them.
@@ -27,6 +27,11 @@ impl Tunnel {
             line_number: 1,
             network: Network::of_one(track),
         }
+    }
+
+    /// The lamps of all tracks.
+    pub fn lamps(&self) -> impl Iterator<Item = &LampSite> {
+        self.network.tracks.iter().flat_map(|track| &track.lamps)
     }
 
     /// Its first track, which is the only one in many files.

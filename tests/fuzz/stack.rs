@@ -17,7 +17,7 @@ use metrotwin::stack::positioning::{CabMount, LampPositioning};
 use metrotwin::stack::protection::TrainProtection;
 use metrotwin::stack::wayside::WaysideDetection;
 use metrotwin::track::uid::Uid;
-use metrotwin::track::{Direction, TrackRoute};
+use metrotwin::track::{Stretch, TrackId};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -86,6 +86,11 @@ impl Corpus {
         let report = TrainReport {
             chainage_m: 1500.0,
             length_m: 118.0,
+            occupied: vec![Stretch {
+                track: TrackId::default(),
+                from_m: 1382.0,
+                to_m: 1500.0,
+            }],
             ..TrainReport::default()
         };
         corpus.add(&by_radio(
@@ -139,6 +144,7 @@ impl Observer for Corpus {
 fn led_report() -> LedReport {
     let time = SimTime::from_secs(1.0);
     let fix = PositionFix {
+        track: TrackId::default(),
         time,
         method: Method::Stereo,
         chainage_m: 1308.0,
@@ -166,6 +172,7 @@ fn warning(danger: DangerLevel, from_chainage_m: f64, issued_s: f64) -> Obstacle
         number: 1,
         issued: SimTime::from_secs(issued_s),
         danger,
+        track: TrackId::default(),
         from_chainage_m,
         to_chainage_m: from_chainage_m + 1.0,
         blind: false,
@@ -237,9 +244,9 @@ struct Stack {
 
 impl Stack {
     fn new(scenario: &Scenario, draw: &mut Draw) -> Self {
-        let map = scenario.map().first_track().clone();
+        let map = scenario.map();
         let onboard = &scenario.onboard[0];
-        let route = TrackRoute::new(&map, Direction::Up);
+        let (network, route) = (&map.network, scenario.itineraries[0].route.clone());
         let rig = onboard.rig.as_ref().unwrap();
         let mut sheet = rig.calibration();
         let mut calibration = scenario.wayside[0].calibration.clone();
@@ -252,11 +259,14 @@ impl Stack {
                 .filter(|c| small(&c.camera.intrinsics))
                 .unwrap_or(calibration);
         }
-        let mount = CabMount::new(rig.end, route, onboard.protection.length_m());
-        let positioning = LampPositioning::new(TRAIN, mount, &onboard.led, sheet, map.clone());
-        let detection =
-            WaysideDetection::new(&scenario.file.stack.wayside, calibration, map.clone());
-        let protection = TrainProtection::new(TRAIN, route, &onboard.protection, map);
+        let mount = CabMount::new(rig.end, route.clone(), onboard.protection.length_m());
+        let positioning = LampPositioning::new(TRAIN, mount, &onboard.led, sheet, network);
+        let detection = WaysideDetection::new(
+            &scenario.file.stack.wayside,
+            calibration,
+            map.first_track().clone(),
+        );
+        let protection = TrainProtection::new(TRAIN, network, route, &onboard.protection);
         Self {
             equipment: [
                 Box::new(positioning),
@@ -348,13 +358,13 @@ struct Ride {
 
 impl Ride {
     fn new(scenario: &Scenario, has_position: bool) -> Self {
-        let map = scenario.map().first_track().clone();
+        let map = scenario.map();
         let mut settings = scenario.onboard[0].protection.clone();
         settings.initial_chainage_m = has_position.then_some(1300.0);
         settings.starts_under_way = Some(true);
-        let route = TrackRoute::new(&map, Direction::Up);
+        let route = scenario.itineraries[0].route.clone();
         Self {
-            protection: TrainProtection::new(TRAIN, route, &settings, map),
+            protection: TrainProtection::new(TRAIN, &map.network, route, &settings),
             permitted_mps: f64::NAN,
         }
     }

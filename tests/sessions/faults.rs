@@ -7,6 +7,7 @@ use metrotwin::session::{
     Event, Observer, ObserverError, RendererChoice, RunOptions, Summary, run,
 };
 use metrotwin::settings::read_toml;
+use metrotwin::track::Tunnel;
 use metrotwin::twin::faults::{FaultSettings, age};
 use metrotwin::twin::lights::LampLight;
 use metrotwin::twin::render::{Job, Renderer, Scene};
@@ -264,7 +265,8 @@ fn all_faults_at_once_are_survived_and_reproducible() {
 fn lamps(faults: &str) -> Scene {
     let mut scene = sample::scene();
     let faults: FaultSettings = read_toml(faults).unwrap();
-    age(&mut scene.lamps, &faults.lamps, &scene.track, 1);
+    let tunnel = Tunnel::of_one(sample::track());
+    age(&mut scene.lamps, &faults.lamps, &tunnel, 1);
     scene
 }
 

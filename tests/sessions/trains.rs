@@ -84,8 +84,11 @@ impl Observer for Placed {
                 message,
             } => {
                 if let Content::Protection(report) = &message.content
-                    && let (Some(true_m), Some(m), Some(sigma_m)) =
-                        (self.true_m, report.position_m, report.sigma_m)
+                    && let (Some(true_m), Some(m), Some(sigma_m)) = (
+                        self.true_m,
+                        report.position.map(|place| place.s_m),
+                        report.sigma_m,
+                    )
                 {
                     let off_m = (true_m - m).abs();
                     self.worst_sigmas = self.worst_sigmas.max(off_m / sigma_m);

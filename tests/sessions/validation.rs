@@ -188,7 +188,7 @@ impl Observer for ErrorByTime {
         match event {
             Event::Message { message, .. } => {
                 if let Content::Protection(report) = &message.content {
-                    self.said = report.position_m.map(|m| (report.time, m));
+                    self.said = report.position.map(|place| (report.time, place.s_m));
                 }
             }
             Event::Train { truth, .. } => {

@@ -5,7 +5,7 @@
 use crate::bus::*;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, Balise, Grade, PlanElement, Track, TrackPoint};
+use crate::track::{Alignment, Balise, Grade, Place, PlanElement, Track, TrackId, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::physics::{TrainState, WheelForces};
 use crate::twin::render::sample;
@@ -78,6 +78,7 @@ fn device(tunnel: &Track) -> WaysideCalibration {
         h_m: 3.2,
     };
     WaysideCalibration {
+        track: TrackId::default(),
         name: "W 205".into(),
         camera: camera(190.0),
         world_from_camera: sample::camera_pose(tunnel, place, 0.05, -0.06),
@@ -234,7 +235,7 @@ impl Session<'_> {
         };
         let report = ProtectionReport {
             time: SimTime::from_secs(t_s),
-            position_m: Some(position_m),
+            position: Some(Place::on_first_track(position_m)),
             sigma_m: Some(0.1),
             speed_mps,
             permitted_mps,
@@ -247,7 +248,7 @@ impl Session<'_> {
             display: DriverDisplay {
                 power: true,
                 lamp,
-                position_m: Some(position_m),
+                position: Some(Place::on_first_track(position_m)),
                 distance_to_obstacle_m: distance_m,
                 text: "Obstacle reported by W 205".into(),
             },
@@ -264,6 +265,7 @@ impl Session<'_> {
         let fix = |(method, sigma_m): (Method, f64)| {
             let chainage_m = run(t_s).0 + sigma_m * (t_s * 11.0).sin();
             PositionFix {
+                track: TrackId::default(),
                 time,
                 method,
                 chainage_m,

@@ -130,17 +130,26 @@ impl LineCheck<'_, '_> {
 
     /// A rig must see lamps on the way that its train runs.
     fn view(&mut self, at: &str, rig: &RigSettings, train: usize) {
-        let direction = rig.end.looks(self.file.direction(train));
-        let track = self.track;
-        if track.lamps.is_empty() {
+        let network = &self.tunnel.network;
+        // On a bench the rig looks along the first track.
+        let train = self.file.trains().nth(train).cloned().unwrap_or_default();
+        let Ok(itinerary) = train.itinerary(network) else {
+            return;
+        };
+        let (_, direction) = itinerary.route.place(itinerary.start_m);
+        let (route, direction) = match rig.end {
+            TrainEnd::Front => (itinerary.route, direction),
+            TrainEnd::Rear => (itinerary.route.reversed(), direction.reversed()),
+        };
+        let way = network.along(&route);
+        if way.lamps.is_empty() {
             self.check.problem(
                 at,
-                format!("tunnel `{}` has no lamps to see", track.name),
+                format!("tunnel `{}` has no lamps to see", self.tunnel.name),
                 "choose a tunnel with lamps, or take out [rig]",
             );
             return;
         }
-        let way = track.along(direction);
         let every = way.lamps.len().div_ceil(LAMPS_TRIED);
         let seen = |rig: &RigSettings| {
             let calibration = rig.calibration();

@@ -35,11 +35,7 @@ fn faults_must_be_able_to_strike() {
         );
         let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
         file.check("", &mut problems);
-        in_tunnel(
-            &file,
-            tunnel.first_track(),
-            &mut Checker::new("", &mut problems),
-        );
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
     };
     let lamp = |rest: &str| keys(&format!("[[faults.lamps]]\n{rest}\n"));
@@ -99,7 +95,7 @@ fn trains_stand_clear_of_each_other() {
         );
         let mut problems = Vec::new();
         let mut check = Checker::new("", &mut problems);
-        in_tunnel(&read_toml(&text).unwrap(), tunnel.first_track(), &mut check);
+        in_tunnel(&read_toml(&text).unwrap(), &tunnel, &mut check);
         problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
     };
     assert_eq!(keys(420.0), [""; 0]);
@@ -120,11 +116,7 @@ fn a_train_that_runs_down_stands_up_the_line_of_its_head() {
         );
         let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
         file.check("", &mut problems);
-        in_tunnel(
-            &file,
-            tunnel.first_track(),
-            &mut Checker::new("", &mut problems),
-        );
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         problems
     };
     let keys = |start_m: f64, rest: &str| -> Vec<String> {
@@ -174,11 +166,7 @@ fn equipment_knows_its_train_and_its_devices() {
             "name = 'test'\ntunnel = 'given'\n[train]\n{train}start_chainage_m = 300.0\n{more}"
         );
         let (file, mut problems) = (read_toml::<ScenarioFile>(&text).unwrap(), Vec::new());
-        in_tunnel(
-            &file,
-            tunnel.first_track(),
-            &mut Checker::new("", &mut problems),
-        );
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
         problems.into_iter().map(|p| p.key).collect()
     };
     let length = |length_m: f64| format!("[stack.protection]\ntrain_length_m = {length_m}\n");

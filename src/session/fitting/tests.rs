@@ -24,13 +24,7 @@ fn scenario(more: &str) -> Scenario {
 }
 
 fn world(scenario: &Scenario) -> World {
-    World::new(
-        scenario.tunnel.first_track().clone(),
-        &scenario.physics,
-        1,
-        0,
-    )
-    .unwrap()
+    World::new(scenario.tunnel.clone(), &scenario.physics, 1, 0).unwrap()
 }
 
 /// Steps the world to a time and hands on all that the sensors give.

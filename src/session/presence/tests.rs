@@ -34,23 +34,15 @@ fn a_device_answers_for_what_it_has_in_view() {
     let mut file: ScenarioFile = read_toml(SCENARIO).unwrap();
     file.stack.wayside.reach_m = 50.0;
     let scenario = Scenario::new(file, tunnel).unwrap();
-    let mut world = World::new(
-        scenario.tunnel.first_track().clone(),
-        &scenario.physics,
-        1,
-        0,
-    )
-    .unwrap();
+    let mut world = World::new(scenario.tunnel.clone(), &scenario.physics, 1, 0).unwrap();
     while world.time().secs() < 2.0 {
         world.step(&[]).unwrap();
     }
     let post = &scenario.wayside[0];
     let [view] = FieldOfView::of_all(&scenario).try_into().ok().unwrap();
-    let lying: Vec<_> = (view
-        .present(&world, &scenario.tunnel.first_track().alignment)
-        .into_iter())
-    .filter(|p| p.lies_in_view_since.is_some())
-    .collect();
+    let lying: Vec<_> = (view.present(&world).into_iter())
+        .filter(|p| p.lies_in_view_since.is_some())
+        .collect();
     let names: Vec<_> = lying.iter().map(|p| p.name.as_str()).collect();
     assert_eq!(names, ["seen", "far away"]);
     // It fell from 0.67 m over the bed, and is still since it came to rest.

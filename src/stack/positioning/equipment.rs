@@ -1,7 +1,7 @@
 //! Lamp positioning as a piece of equipment of a train.
 //!
-//! Inside, distances are those of the route that the rig's cab looks along; what it says is the
-//! chainage of the train head. A rig in the rear cab runs backwards along the opposite route.
+//! Inside, distances are those of the route that the rig's cab looks along; what it says is the place
+//! of the train head. A rig in the rear cab runs backwards along the opposite route.
 
 use super::LedPositioner;
 use crate::bus::{
@@ -10,7 +10,8 @@ use crate::bus::{
 };
 use crate::stack::Equipment;
 use crate::stack::led::LedSettings;
-use crate::track::{Track, TrackRoute};
+use crate::track::Track;
+use crate::track::network::{Network, Route};
 use std::sync::Arc;
 
 /// How often a second it is looked whether the rig has fallen silent.
@@ -21,11 +22,11 @@ const WATCH_HZ: f64 = 10.0;
 const LENGTH_SIGMA_M: f64 = 0.05;
 
 /// The cab that the rig is in.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct CabMount {
     end: TrainEnd,
     /// The route that the cab looks along.
-    route: TrackRoute,
+    route: Route,
     /// How far the train head is behind the cab's end, as the cab looks, with its standard deviation.
     head_behind_m: f64,
     length_sigma_m: f64,
@@ -33,7 +34,7 @@ pub struct CabMount {
 
 impl CabMount {
     /// In the cab of an end of a train of a length; `route` is the way that this cab looks.
-    pub fn new(end: TrainEnd, route: TrackRoute, train_length_m: f64) -> Self {
+    pub fn new(end: TrainEnd, route: Route, train_length_m: f64) -> Self {
         let (head_behind_m, length_sigma_m) = match end {
             TrainEnd::Front => (0.0, 0.0),
             TrainEnd::Rear => (train_length_m, LENGTH_SIGMA_M),
@@ -59,8 +60,10 @@ impl CabMount {
     /// A fix of the cab, as one of the head.
     fn of_head(&self, fix: PositionFix, map: &Track) -> PositionFix {
         let run_m = fix.chainage_m - self.head_behind_m;
+        let (place, _) = self.route.place(run_m);
         PositionFix {
-            chainage_m: self.route.chainage_m(run_m),
+            track: place.track,
+            chainage_m: place.s_m,
             sigma_m: fix.sigma_m.hypot(self.length_sigma_m),
             position: match self.end {
                 TrainEnd::Front => fix.position,
@@ -83,15 +86,15 @@ pub struct LampPositioning {
 }
 
 impl LampPositioning {
-    /// On a node, with the rig's calibration sheet, and the surveyed map of the route that its cab looks
-    /// along.
+    /// On a node, with the rig's calibration sheet, and the surveyed network.
     pub fn new(
         node: Node,
         mount: CabMount,
         settings: &LedSettings,
         rig: RigCalibration,
-        map: Arc<Track>,
+        network: &Network,
     ) -> Self {
+        let map = network.along(&mount.route);
         Self {
             node,
             mount,
@@ -148,6 +151,7 @@ impl Equipment for LampPositioning {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
     use crate::stack::led::testing::track;
@@ -156,14 +160,15 @@ mod tests {
     /// Backwards, and with all else that the odometer says.
     #[test]
     fn the_rear_cab_runs_backwards() {
-        let route = TrackRoute::new(&track("manchester"), Direction::Down);
+        let network = Network::of_one(track("manchester"));
+        let route = network.only_track(Direction::Down).unwrap();
         let sample = OdometerSample {
             time: SimTime::from_secs(1.0),
             distance_m: 12.0,
             speed_mps: 6.0,
             slides: true,
         };
-        let said = |end| CabMount::new(end, route, 118.0).of_cab(&sample);
+        let said = |end| CabMount::new(end, route.clone(), 118.0).of_cab(&sample);
         assert_eq!(said(TrainEnd::Front), sample);
         let backwards = OdometerSample {
             distance_m: -12.0,

@@ -2,6 +2,7 @@
 
 use super::sighting::{Measurement, PairLamps, Sighting};
 use crate::bus::{CameraModel, Method, PositionFix};
+use crate::track::TrackId;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
 /// How well a lamp was measured by the rig.
@@ -74,6 +75,7 @@ impl Measurement<'_> {
         (sigma_m <= self.settings.max_sigma_m).then_some(PositionFix {
             time: sighting.time,
             method,
+            track: TrackId::default(),
             chainage_m,
             sigma_m,
             position,

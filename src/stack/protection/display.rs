@@ -35,7 +35,7 @@ pub(super) fn display(report: &ProtectionReport, s: &Situation) -> DriverDisplay
     DriverDisplay {
         power: true,
         lamp,
-        position_m: report.position_m,
+        position: report.position,
         distance_to_obstacle_m: s.obstacle.map(|o| o.distance_m),
         text: text(report, s),
     }
@@ -81,7 +81,7 @@ fn text(report: &ProtectionReport, s: &Situation) -> String {
                 ahead.distance_m
             )
         }
-        None if report.position_m.is_none() => format!("Position unknown{action}{slide}"),
+        None if report.position.is_none() => format!("Position unknown{action}{slide}"),
         None => format!(
             "Permitted {:.0} km/h{action}{slide}",
             report.permitted_mps * 3.6

@@ -1,7 +1,6 @@
 //! Train protection as a piece of equipment of a train.
 //!
-//! Inside, distances are those of the train's route; what it hears and says is in chainage of the
-//! track.
+//! Inside, distances are those of the train's route; what it hears and says is in places of the network.
 
 use super::{Protection, ProtectionSettings};
 use crate::bus::{
@@ -9,8 +8,8 @@ use crate::bus::{
     ProtectionReport, Receiver, SimTime, Ticker, TrainReport, Via,
 };
 use crate::stack::Equipment;
-use crate::track::{Direction, Track, TrackRoute};
-use std::sync::Arc;
+use crate::track::network::{Network, Route, RouteEnvelope};
+use crate::track::{Direction, Place, TrackId};
 
 /// Cycles of the protection a second.
 const CYCLE_HZ: f64 = 10.0;
@@ -20,47 +19,60 @@ const CYCLE_HZ: f64 = 10.0;
 #[derive(Debug)]
 pub struct TrainProtection {
     node: Node,
-    route: TrackRoute,
+    envelope: RouteEnvelope,
+    /// Where the head was last taken to be, along the route.
+    head_m: f64,
     protection: Protection,
     cycles: Ticker,
 }
 
 impl TrainProtection {
-    /// On a node, with the surveyed map of the route, as the train runs it.
-    pub fn new(
-        node: Node,
-        route: TrackRoute,
-        settings: &ProtectionSettings,
-        map: Arc<Track>,
-    ) -> Self {
-        let initial_chainage_m = settings.initial_chainage_m.map(|s_m| route.run_m(s_m));
+    /// On a node, of a train that runs a route, with the surveyed network.
+    pub fn new(node: Node, network: &Network, route: Route, settings: &ProtectionSettings) -> Self {
         let settings = ProtectionSettings {
-            initial_chainage_m,
+            initial_chainage_m: initial_run_m(settings, network, &route),
             ..settings.clone()
         };
+        let map = network.along(&route);
         Self {
             node,
-            route,
+            envelope: RouteEnvelope::new(network, route),
+            head_m: settings.initial_chainage_m.unwrap_or(0.0),
             protection: Protection::new(&settings, map),
             cycles: Ticker::new(CYCLE_HZ),
         }
     }
 
-    fn on_fix(&mut self, fix: &PositionFix) {
-        let chainage_m = self.route.run_m(fix.chainage_m);
-        self.protection.on_fix(&PositionFix {
-            chainage_m,
-            ..fix.clone()
-        });
+    fn route(&self) -> &Route {
+        self.envelope.route()
     }
 
-    /// A warning with distances of the route.
+    /// A fix on another track than those of the route is none.
+    fn on_fix(&mut self, fix: &PositionFix) {
+        if let Some(run_m) = self.route().run_near_m(fix.place(), self.head_m) {
+            self.protection.on_fix(&PositionFix {
+                track: TrackId::default(),
+                chainage_m: run_m,
+                ..fix.clone()
+            });
+        }
+    }
+
+    /// A warning with distances of the route: the nearest stretch of it that is not behind the train. What is not
+    /// in the way of the route is no danger on it.
     fn on_route(&self, warning: &ObstacleWarning) -> ObstacleWarning {
-        let (from_chainage_m, to_chainage_m) =
-            (self.route).stretch_m(warning.from_chainage_m, warning.to_chainage_m);
+        let runs = || self.envelope.runs_over(warning.stretch());
+        let ahead = runs().filter(|(_, to_m)| *to_m >= self.head_m);
+        let nearest = ahead.min_by(|a, b| a.0.total_cmp(&b.0)).or(runs().last());
+        let (from_chainage_m, to_chainage_m) = nearest.unwrap_or_default();
         ObstacleWarning {
+            track: TrackId::default(),
             from_chainage_m,
             to_chainage_m,
+            danger: match nearest {
+                Some(_) => warning.danger,
+                None => DangerLevel::None,
+            },
             ..warning.clone()
         }
     }
@@ -71,39 +83,66 @@ impl TrainProtection {
         let Node::Train(id) = sender else {
             return;
         };
-        let sign = report.direction.sign();
         let margin_m = self.protection.settings.position_sigmas * report.sigma_m;
-        let head_m = report.chainage_m + sign * margin_m;
-        let tail_m = report.chainage_m - sign * (report.length_m + margin_m);
-        let (from_chainage_m, to_chainage_m) = match report.direction {
-            Direction::Up => (tail_m, head_m),
-            Direction::Down => (head_m, tail_m),
-        };
+        let stretches = report.occupied.iter().map(|s| s.widened(margin_m));
+        let runs = stretches.flat_map(|stretch| self.envelope.runs_over(stretch));
+        let whole = runs.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+        let (from_chainage_m, to_chainage_m) = whole.unwrap_or_default();
         let warning = ObstacleWarning {
             device: id.to_string(),
             number: 0,
             issued: report.time,
-            danger: DangerLevel::High,
+            danger: match whole {
+                Some(_) => DangerLevel::High,
+                None => DangerLevel::None,
+            },
+            track: TrackId::default(),
             from_chainage_m,
             to_chainage_m,
             blind: false,
         };
-        let warning = self.on_route(&warning);
         self.protection.on_warning(&warning, received);
     }
 
-    /// With the chainages of the track.
-    fn in_chainage(&self, report: ProtectionReport) -> ProtectionReport {
-        let on_track = |run_m: Option<f64>| run_m.map(|run_m| self.route.chainage_m(run_m));
+    /// With places on the tracks.
+    fn in_places(&self, report: ProtectionReport) -> ProtectionReport {
+        let on_track = |run: Option<Place>| run.map(|run| self.route().place(run.s_m).0);
         let mut display = report.display;
-        display.position_m = on_track(display.position_m);
+        display.position = on_track(display.position);
         ProtectionReport {
-            position_m: on_track(report.position_m),
-            authority_end_m: on_track(report.authority_end_m),
+            position: on_track(report.position),
+            authority_end: on_track(report.authority_end),
             display,
             ..report
         }
     }
+
+    /// What the train tells all others of a cycle's report, in distances of the route.
+    fn train_report(&self, report: &ProtectionReport, now: SimTime) -> Option<TrainReport> {
+        let head_m = report.position?.s_m;
+        let length_m = self.protection.settings.length_m();
+        let (place, direction) = self.route().place(head_m);
+        Some(TrainReport {
+            track: place.track,
+            chainage_m: place.s_m,
+            sigma_m: report.sigma_m.unwrap_or_default(),
+            length_m,
+            occupied: self.route().stretches(head_m - length_m, head_m).collect(),
+            direction,
+            speed_mps: report.speed_mps,
+            time: now,
+        })
+    }
+}
+
+/// The driver's setting, along the route. On a route that comes to that place more than once, the first time.
+fn initial_run_m(settings: &ProtectionSettings, network: &Network, route: &Route) -> Option<f64> {
+    let track = match &settings.initial_track {
+        Some(name) => network.named(name)?,
+        None => route.place(0.0).0.track,
+    };
+    let s_m = settings.initial_chainage_m?;
+    route.runs_m(Place { track, s_m }).next()
 }
 
 impl Equipment for TrainProtection {
@@ -128,7 +167,7 @@ impl Equipment for TrainProtection {
                 let state = self.on_route(state);
                 (self.protection).on_heartbeat(&state, message.sent_at, message.received_at);
             }
-            Content::Train(report) if report.track == self.route.track => {
+            Content::Train(report) => {
                 self.on_train(&message.sender, report, message.received_at);
             }
             _ => {}
@@ -140,56 +179,59 @@ impl Equipment for TrainProtection {
             return Vec::new();
         }
         let report = self.protection.cycle(now);
-        let report = self.in_chainage(report);
+        if let Some(head) = report.position {
+            self.head_m = head.s_m;
+        }
         let own = |content| Message::own(self.node.clone(), now, content);
-        let position = report.position_m.map(|chainage_m| {
-            let train = TrainReport {
-                track: self.route.track,
-                chainage_m,
-                sigma_m: report.sigma_m.unwrap_or_default(),
-                length_m: self.protection.settings.length_m(),
-                direction: self.route.direction,
-                speed_mps: report.speed_mps,
-                time: now,
-            };
-            Message::to(Receiver::All, self.node.clone(), now, Content::Train(train))
-        });
-        let estimate = self.protection.estimate(now, self.route.direction);
+        let train = self
+            .train_report(&report, now)
+            .map(|train| Message::to(Receiver::All, self.node.clone(), now, Content::Train(train)));
+        let estimate = self.protection.estimate(now, Direction::Up);
         let estimate = estimate.map(|estimate| {
+            let (place, direction) = self.route().place(estimate.s_m);
             own(Content::Position(PositionEstimate {
-                track: self.route.track,
-                s_m: self.route.chainage_m(estimate.s_m),
+                track: place.track,
+                direction,
+                s_m: place.s_m,
                 ..estimate
             }))
         });
         let command = own(Content::Command(report.command));
-        let report = own(Content::Protection(report));
+        let report = own(Content::Protection(self.in_places(report)));
         let own = [report, command].into_iter().chain(estimate);
-        own.chain(position).collect()
+        own.chain(train).collect()
     }
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::super::tests::map;
     use super::*;
     use crate::bus::{OdometerSample, TrainId};
+    use crate::track::{Stretch, Track};
+
+    /// What a train stands on that is all on one track.
+    fn occupied(head_m: f64, length_m: f64, direction: Direction) -> Stretch {
+        let tail_m = head_m - direction.sign() * length_m;
+        Stretch {
+            track: TrackId::default(),
+            from_m: head_m.min(tail_m),
+            to_m: head_m.max(tail_m),
+        }
+    }
 
     /// The equipment of a train at 2000 m of a line of 4 km, and where its authority ends after it has
     /// heard `content` of `sender` by radio.
     fn authority_end_m(direction: Direction, sender: Node, content: Content) -> Option<f64> {
-        let up = map(0.0);
-        let route = TrackRoute::new(&up, direction);
-        let map = match direction {
-            Direction::Up => up,
-            Direction::Down => Arc::new(up.reversed()),
-        };
+        let network = Network::of_one(Track::clone(&map(0.0)));
+        let route = network.only_track(direction).unwrap();
         let settings = ProtectionSettings {
             initial_chainage_m: Some(2000.0),
             ..ProtectionSettings::default()
         };
         let node = Node::Train(TrainId(0));
-        let mut equipment = TrainProtection::new(node.clone(), route, &settings, map);
+        let mut equipment = TrainProtection::new(node.clone(), &network, route, &settings);
         let time = SimTime::from_secs(1.0);
         let odometer = OdometerSample {
             time,
@@ -203,8 +245,8 @@ mod tests {
         let said = equipment.cycle(time);
         said.iter().find_map(|message| match &message.content {
             Content::Protection(report) => {
-                assert_eq!(report.position_m, Some(2000.0));
-                report.authority_end_m
+                assert_eq!(report.position.unwrap().s_m, 2000.0);
+                report.authority_end.map(|end| end.s_m)
             }
             _ => None,
         })
@@ -220,6 +262,7 @@ mod tests {
                 number: 0,
                 issued: SimTime::ZERO,
                 danger: DangerLevel::High,
+                track: TrackId::default(),
                 from_chainage_m,
                 to_chainage_m: from_chainage_m + 1.0,
                 blind: false,
@@ -237,6 +280,7 @@ mod tests {
                 chainage_m,
                 sigma_m: 2.0,
                 length_m: 100.0,
+                occupied: vec![occupied(chainage_m, 100.0, direction)],
                 direction,
                 ..TrainReport::default()
             })

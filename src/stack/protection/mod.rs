@@ -84,7 +84,7 @@ use crate::bus::{
     BrakeDemand, DangerLevel, DriverDisplay, ObstacleWarning, OdometerSample, PositionEstimate,
     PositionFix, PositionSource, ProtectionReport, SimTime, Supervision, TrainCommand,
 };
-use crate::track::{Direction, Track, TrackId};
+use crate::track::{Direction, Place, Track, TrackId};
 use adhesion::{Adhesion, Grip};
 use curve::Grades;
 use display::{Ahead, Situation};
@@ -268,14 +268,15 @@ impl Protection {
     fn report(&self, now: &Known, limits: Limits, supervision: Supervision) -> ProtectionReport {
         let mut report = ProtectionReport {
             time: now.time,
-            position_m: now.head_m(),
+            position: now.head_m().map(Place::on_first_track),
             sigma_m: now.train.map(|t| t.sigma_m),
             speed_mps: now.speed_mps(),
             permitted_mps: limits.permitted_mps,
             service_mps: limits.service_mps,
             emergency_mps: limits.emergency_mps,
             supervision,
-            authority_end_m: now.obstacle_m.map(|m| m - self.settings.safety_distance_m),
+            authority_end: (now.obstacle_m)
+                .map(|m| Place::on_first_track(m - self.settings.safety_distance_m)),
             wheels_slide: now.grip.slides,
             stops_in_time: self.stops_in_time(now),
             command: TrainCommand {

@@ -7,7 +7,7 @@
 
 use super::ProtectionSettings;
 use crate::bus::{DangerLevel, ObstacleWarning, SimTime};
-use crate::track::Track;
+use crate::track::{Track, TrackId};
 
 /// A device of the map, or another train.
 #[derive(Clone, Debug)]
@@ -39,6 +39,7 @@ impl WarningSource {
             // Whatever the device says next is newer.
             issued: SimTime::from_nanos(i64::MIN),
             danger: DangerLevel::None,
+            track: TrackId::default(),
             from_chainage_m: from_m,
             to_chainage_m: to_m,
             blind: true,

@@ -13,6 +13,8 @@ settings! {
         /// Position that the driver set before departure, m of chainage of the train head; without
         /// it the first fix or balise tells.
         initial_chainage_m: Option<f64> = None, in -1e5..=1e6;
+        /// Name of the track that it is on. Default: that on which the train starts.
+        initial_track: Option<String> = None;
         /// One sigma of that position, m.
         initial_sigma_m: f64 = 5.0, in LEAST_SIGMA_M..=1e3;
         /// The movement authority ends this far before an obstacle, m: room to clear it. The

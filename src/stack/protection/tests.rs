@@ -4,7 +4,7 @@
 use super::*;
 use crate::bus::{Identity, Indicator, Method, ObstacleWarning};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, Balise, Grade, PlanElement};
+use crate::track::{Alignment, Balise, Grade, PlanElement, TrackId};
 use nalgebra::{Point3, Vector3};
 
 /// Distance of one odometer pulse: 128 a turn of a wheel of 0.43 m radius.
@@ -42,6 +42,7 @@ pub(super) fn map(permille: f64) -> Arc<Track> {
 
 fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> ObstacleWarning {
     ObstacleWarning {
+        track: TrackId::default(),
         device: "W1".into(),
         number,
         issued,
@@ -54,6 +55,7 @@ fn warning(number: u32, issued: SimTime, danger: DangerLevel, from_m: f64) -> Ob
 
 pub(super) fn fix(time: SimTime, chainage_m: f64, sigma_m: f64) -> PositionFix {
     PositionFix {
+        track: TrackId::default(),
         time,
         method: Method::Stereo,
         chainage_m,
@@ -420,20 +422,20 @@ fn position_comes_from_fix_or_balise() {
     let unknown = ProtectionSettings::default();
     let mut b = Bench::new(&unknown);
     let r = b.cycle(0.0, 5.0);
-    assert_eq!(r.position_m, None);
+    assert_eq!(r.position, None);
     assert!((r.permitted_mps - 25.0 / 3.6).abs() < 1e-9);
     b.protection.on_balise("nowhere", b.time);
-    assert_eq!(b.cycle(0.5, 5.0).position_m, None);
+    assert_eq!(b.cycle(0.5, 5.0).position, None);
     b.hear(0, 0.0, DangerLevel::High, 3000.0);
     assert_eq!(b.cycle(1.0, 5.0).supervision, Supervision::Service);
     b.protection.on_balise("B7", b.time);
     let r = b.cycle(1.5, 5.0);
-    assert!((r.position_m.unwrap() - 700.5).abs() < 1e-9);
+    assert!((r.position.unwrap().s_m - 700.5).abs() < 1e-9);
     assert_eq!(r.supervision, Supervision::Permitted);
-    assert_eq!(r.authority_end_m, Some(3000.0 - 25.0));
+    assert_eq!(r.authority_end, Some(Place::on_first_track(3000.0 - 25.0)));
     b.protection.on_fix(&fix(b.time, 701.0, 0.3));
     let r = b.cycle(2.0, 5.0);
-    assert!((r.position_m.unwrap() - 701.4).abs() < 0.15);
+    assert!((r.position.unwrap().s_m - 701.4).abs() < 0.15);
     assert!(r.sigma_m.unwrap() < 0.5);
 }
 
@@ -588,7 +590,7 @@ fn nonsense_changes_nothing() {
     });
     let r = b.cycle(0.0, 0.0);
     assert_eq!(r.command.brake, BrakeDemand::Service);
-    assert!((r.position_m.unwrap() - 1000.0).abs() < 1e-9);
+    assert!((r.position.unwrap().s_m - 1000.0).abs() < 1e-9);
 }
 
 /// A device of the map that is silent watches nothing: its stretch counts as occupied until its
@@ -620,7 +622,7 @@ fn a_clear_track_is_clear_as_long_as_its_device_is_heard() {
             speed_mps: 0.0,
             slides: false,
         });
-        protection.cycle(time).authority_end_m
+        protection.cycle(time).authority_end.map(|end| end.s_m)
     };
     let clear = |number: u32, time_s: f64| {
         let issued = SimTime::from_secs(time_s);

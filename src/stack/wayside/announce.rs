@@ -2,7 +2,7 @@
 //! while either lasts, once when it is over; and a heartbeat, which says the same once more.
 
 use super::sight::ends;
-use crate::bus::{DangerLevel, ObstacleWarning, SimTime, WaysideReport};
+use crate::bus::{DangerLevel, ObstacleWarning, SimTime, WaysideCalibration, WaysideReport};
 
 #[derive(Clone, Debug)]
 pub(super) struct Announcer {
@@ -14,13 +14,14 @@ pub(super) struct Announcer {
 }
 
 impl Announcer {
-    pub fn new(device: &str) -> Self {
+    pub fn new(device: &WaysideCalibration) -> Self {
         Self {
             last: ObstacleWarning {
-                device: device.to_owned(),
+                device: device.name.clone(),
                 number: 0,
                 issued: SimTime::ZERO,
                 danger: DangerLevel::None,
+                track: device.track,
                 from_chainage_m: 0.0,
                 to_chainage_m: 0.0,
                 blind: false,

@@ -6,7 +6,7 @@ use crate::bus::{
     TrainReport, WaysideCalibration, WaysideReport,
 };
 use crate::stack::Equipment;
-use crate::track::Track;
+use crate::track::{Track, TrackId};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -21,6 +21,7 @@ const REPORT_LIFE_S: f64 = 5.0;
 pub struct WaysideDetection {
     node: Node,
     name: String,
+    track: TrackId,
     /// The balise that stores its messages.
     balise: Option<String>,
     detector: WaysideDetector,
@@ -33,7 +34,7 @@ pub struct WaysideDetection {
 }
 
 impl WaysideDetection {
-    /// Of a device as calibrated, with the surveyed map, which knows its balise.
+    /// Of a device as calibrated, with the surveyed map of its track, which knows its balise.
     pub fn new(
         settings: &WaysideSettings,
         calibration: WaysideCalibration,
@@ -45,6 +46,7 @@ impl WaysideDetection {
             node: Node::Post(name.clone()),
             balise: site.map(|site| site.balise.clone()),
             name,
+            track: calibration.track,
             detector: WaysideDetector::new(settings, calibration, map),
             scan: None,
             trains: BTreeMap::new(),
@@ -55,12 +57,12 @@ impl WaysideDetection {
         }
     }
 
-    /// The trains that have reported lately.
+    /// The trains with their heads on the device's track that have reported lately.
     fn trains(&self, now: SimTime) -> Vec<TrainReport> {
-        let reports = self.trains.values().copied();
-        reports
-            .filter(|train| now.since(train.time) <= REPORT_LIFE_S)
-            .collect()
+        let is_here = |train: &&TrainReport| {
+            train.track == self.track && now.since(train.time) <= REPORT_LIFE_S
+        };
+        self.trains.values().filter(is_here).cloned().collect()
     }
 
     fn send(&mut self, receiver: Receiver, now: SimTime, content: Content) {
@@ -100,9 +102,9 @@ impl Equipment for WaysideDetection {
         match (&message.content, &message.sender) {
             (Content::Scan(scan), _) => self.scan = Some(scan.clone()),
             (Content::Train(report), Node::Train(id)) => {
-                let newest = self.trains.entry(*id).or_insert(*report);
+                let newest = self.trains.entry(*id).or_insert_with(|| report.clone());
                 if report.time > newest.time {
-                    *newest = *report;
+                    newest.clone_from(report);
                 }
             }
             (Content::Frame(frame), _) => {

@@ -179,7 +179,7 @@ fn reckoned(trains: &[TrainReport], time: SimTime) -> Vec<TrainReport> {
         TrainReport {
             chainage_m: train.chainage_m + train.direction.sign() * run_m,
             time,
-            ..*train
+            ..train.clone()
         }
     };
     trains.iter().map(on).collect()
@@ -194,7 +194,7 @@ impl WaysideDetector {
     ) -> Self {
         let intrinsics = calibration.camera.intrinsics;
         let (width, height) = (intrinsics.width_px as usize, intrinsics.height_px as usize);
-        let announcer = Announcer::new(&calibration.name);
+        let announcer = Announcer::new(&calibration);
         let sight = Sight::new(settings, calibration, map);
         Self {
             settings: settings.clone(),

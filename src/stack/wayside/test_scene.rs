@@ -5,6 +5,7 @@
 use crate::bus::{
     CameraModel, Frame, Intrinsics, LidarReturn, LidarScan, Shutter, SimTime, WaysideCalibration,
 };
+use crate::track::TrackId;
 use crate::track::{
     Alignment, CrossSection, Material, OutlinePoint, PlanElement, RAIL_OFFSET_M, SectionRange,
     Track,
@@ -104,6 +105,7 @@ pub fn calibration(map: &Track, width: u32, height: u32) -> WaysideCalibration {
     let camera = attitude(right, down, forward);
     let lidar = attitude(right, forward, -down);
     WaysideCalibration {
+        track: TrackId::default(),
         name: "W1".into(),
         camera: CameraModel {
             intrinsics: Intrinsics::centred(width, height, f64::from(width) * 0.573),

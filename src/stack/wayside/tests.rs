@@ -400,7 +400,7 @@ fn the_border_of_the_blind_zone_changes_no_obstacle() {
     for n in 10..110u32 {
         let frame = scene.frame(n, STEADY, &item);
         let train = train_report(40.0 + 0.5 * f64::from(n), 0.0, frame.start);
-        let report = d.on_frame(&frame, None, &[train]);
+        let report = d.on_frame(&frame, None, std::slice::from_ref(&train));
         if n < 14 {
             continue;
         }

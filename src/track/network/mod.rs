@@ -44,19 +44,25 @@
 //!
 //! Not here: the blades of a switch and how they move (they are the world's), what stands along the tracks.
 
+mod along;
 mod clearance;
+mod envelope;
 mod error;
+mod itinerary;
 mod route;
 mod search;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
+pub use envelope::RouteEnvelope;
 pub use error::NetworkError;
+pub use itinerary::Itinerary;
 pub use route::{Leg, Route};
 
 use super::{
-    Alignment, CANT_BASE_M, Direction, Place, Side, Track, TrackFrame, TrackId, TrackPoint,
+    Alignment, CANT_BASE_M, CrossSection, Direction, Place, Side, Track, TrackFrame, TrackId,
+    TrackPoint,
 };
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -67,8 +73,11 @@ use std::sync::Arc;
 pub(super) const MOST_GAP_M: f64 = 1e-3;
 /// And have headings and slopes that differ by this much.
 pub(super) const MOST_KINK_RAD: f64 = 1e-4;
-/// A place is looked for from stations this far apart.
-const STATION_M: f64 = 20.0;
+
+/// No section is wider to one side.
+const WIDEST_M: f64 = 60.0;
+/// A section holds a track if it holds a point so far above its top of rail.
+const JUST_ABOVE_M: f64 = 0.1;
 
 /// An end of a track: the one that is reached by running this way along it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -256,6 +265,12 @@ impl Network {
         self.tracks.get(usize::from(id.0))
     }
 
+    /// The track of a name.
+    pub fn named(&self, name: &str) -> Option<TrackId> {
+        let found = self.tracks.iter().position(|track| track.name == name);
+        found.map(|k| TrackId(k as u16))
+    }
+
     /// The centreline of a track.
     pub fn alignment(&self, id: TrackId) -> Option<&Alignment> {
         self.track(id).map(|track| &track.alignment)
@@ -302,11 +317,33 @@ impl Network {
     pub fn near(&self, world: &Point3<f64>, within_m: f64) -> Vec<(TrackId, TrackPoint)> {
         let mut found: Vec<_> = (0u16..)
             .zip(&self.tracks)
-            .filter_map(|(k, track)| Some((TrackId(k), nearest(&track.alignment, world)?)))
+            .filter_map(|(k, track)| Some((TrackId(k), track.alignment.nearest(world)?)))
             .filter(|(_, point)| point.l_m.abs() <= within_m)
             .collect();
         found.sort_by(|a, b| f64::total_cmp(&a.1.l_m.abs(), &b.1.l_m.abs()));
         found
+    }
+
+    /// The place on another track whose section a place shares; none where it has one of its own.
+    pub fn host(&self, place: Place) -> Option<Place> {
+        let track = self.track(place.track)?;
+        track.section_at(place.s_m).filter(|own| own.is_shared())?;
+        let world = track.alignment.at(place.s_m).origin;
+        let others = self.near(&world, WIDEST_M).into_iter();
+        let others = others.filter(|(other, _)| *other != place.track);
+        let mut hosts = others.filter(|(other, point)| {
+            let section = self
+                .track(*other)
+                .and_then(|other| other.section_at(point.s_m));
+            let holds =
+                |section: &CrossSection| section.covers(point.l_m, point.h_m + JUST_ABOVE_M);
+            section.is_some_and(|section| !section.is_shared() && holds(section))
+        });
+        let (track, point) = hosts.next()?;
+        Some(Place {
+            track,
+            s_m: point.s_m,
+        })
     }
 
     /// Whether a place is on a track of this network.
@@ -368,19 +405,4 @@ pub(super) fn turned_round(frame: &TrackFrame) -> TrackFrame {
         roll_rad: -frame.roll_rad,
         ..*frame
     }
-}
-
-/// The point of a track that is square to a world position; none where that lies beyond the track's ends.
-fn nearest(track: &Alignment, world: &Point3<f64>) -> Option<TrackPoint> {
-    let length_m = track.length_m();
-    let count = (length_m / STATION_M).ceil().max(1.0);
-    let station = |k: u32| length_m * f64::from(k) / count;
-    let away_m = |s_m: f64| (track.at(s_m).origin - world).xy().norm();
-    let near_s_m = (0..=count as u32)
-        .map(station)
-        .min_by(|a, b| f64::total_cmp(&away_m(*a), &away_m(*b)))?;
-    let point = track.track_from_world(world, near_s_m);
-    (-1e-9..=length_m + 1e-9)
-        .contains(&point.s_m)
-        .then_some(point)
 }

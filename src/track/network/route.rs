@@ -1,7 +1,7 @@
 //! The way of a train over a network.
 
 use super::{Network, NetworkError, TrackEnd};
-use crate::track::{Alignment, Direction, Place, TrackId};
+use crate::track::{Alignment, Direction, Place, Stretch, TrackId};
 
 /// A stretch of one track, run in one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,6 +70,11 @@ impl Route {
         self.at_m[self.legs.len()]
     }
 
+    /// Distance along the route at which leg `k` begins.
+    pub(super) fn begin_m(&self, k: usize) -> f64 {
+        self.at_m[k]
+    }
+
     /// The leg at a distance along the route, by its number; beyond the ends the first or the last one.
     fn leg_at(&self, run_m: f64) -> usize {
         let begun = self.at_m[1..self.legs.len()].partition_point(|at_m| *at_m <= run_m);
@@ -85,14 +90,82 @@ impl Route {
         (Place { track, s_m }, leg.direction)
     }
 
+    /// The chainages that leg `k` stands for: its own, and those beyond it on the track where the route begins or
+    /// ends, as [`Self::place`] has them.
+    fn reach_m(&self, k: usize) -> (f64, f64) {
+        let leg = &self.legs[k];
+        let (mut low_m, mut high_m) = leg.stretch_m();
+        let begins_low = leg.direction == Direction::Up;
+        if k == 0 {
+            match begins_low {
+                true => low_m = f64::NEG_INFINITY,
+                false => high_m = f64::INFINITY,
+            }
+        }
+        if k + 1 == self.legs.len() {
+            match begins_low {
+                true => high_m = f64::INFINITY,
+                false => low_m = f64::NEG_INFINITY,
+            }
+        }
+        (low_m, high_m)
+    }
+
     /// The distances along the route at which it comes to a place: none, one, or more where it runs in a
-    /// circle.
+    /// circle. Places beyond its ends on the same track count as well.
     pub fn runs_m(&self, place: Place) -> impl Iterator<Item = f64> {
-        let legs = self.legs.iter().zip(&self.at_m);
-        legs.filter_map(move |(leg, at_m)| {
-            let (low_m, high_m) = leg.stretch_m();
+        let legs = self.legs.iter().zip(&self.at_m).enumerate();
+        legs.filter_map(move |(k, (leg, at_m))| {
+            let (low_m, high_m) = self.reach_m(k);
             let on = leg.track == place.track && (low_m..=high_m).contains(&place.s_m);
             on.then(|| at_m + leg.direction.ahead_m(leg.from_m, place.s_m))
+        })
+    }
+
+    /// Of the distances at which it comes to a place, the one nearest to another distance.
+    pub fn run_near_m(&self, place: Place, near_m: f64) -> Option<f64> {
+        let away = |run_m: &f64| (run_m - near_m).abs();
+        self.runs_m(place)
+            .min_by(|a, b| away(a).total_cmp(&away(b)))
+    }
+
+    /// The distances from which to which the route runs over a stretch of track, in order.
+    pub fn runs_over(&self, stretch: Stretch) -> impl Iterator<Item = (f64, f64)> {
+        let legs = self.legs.iter().zip(&self.at_m).enumerate();
+        legs.filter_map(move |(k, (leg, at_m))| {
+            let (low_m, high_m) = self.reach_m(k);
+            let (from_m, to_m) = (stretch.from_m.max(low_m), stretch.to_m.min(high_m));
+            let run_m = |s_m| at_m + leg.direction.ahead_m(leg.from_m, s_m);
+            (leg.track == stretch.track && from_m <= to_m).then(|| match leg.direction {
+                Direction::Up => (run_m(from_m), run_m(to_m)),
+                Direction::Down => (run_m(to_m), run_m(from_m)),
+            })
+        })
+    }
+
+    /// The stretches of track between two distances along the route, in order.
+    pub fn stretches(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = Stretch> {
+        let last = self.legs.len() - 1;
+        let legs = self.legs.iter().enumerate();
+        legs.filter_map(move |(k, leg)| {
+            let begin_m = if k == 0 {
+                f64::NEG_INFINITY
+            } else {
+                self.at_m[k]
+            };
+            let end_m = if k == last {
+                f64::INFINITY
+            } else {
+                self.at_m[k + 1]
+            };
+            let (from_m, to_m) = (from_m.max(begin_m), to_m.min(end_m));
+            let s_m = |run_m: f64| leg.from_m + leg.direction.sign() * (run_m - self.at_m[k]);
+            let [a_m, b_m] = [from_m, to_m].map(s_m);
+            (from_m <= to_m).then(|| Stretch {
+                track: leg.track,
+                from_m: a_m.min(b_m),
+                to_m: a_m.max(b_m),
+            })
         })
     }
 

@@ -122,7 +122,7 @@ impl Network {
     }
 
     /// From a place to the end of its track.
-    fn left_m(&self, from: Place, direction: Direction) -> Option<f64> {
+    pub(super) fn left_m(&self, from: Place, direction: Direction) -> Option<f64> {
         let length_m = self
             .alignment(from.track)
             .filter(|_| self.has(from))?

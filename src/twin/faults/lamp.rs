@@ -3,7 +3,7 @@
 use super::check_times;
 use crate::bus::SimTime;
 use crate::settings::{Checker, settings};
-use crate::track::Track;
+use crate::track::Tunnel;
 use crate::track::waveform::Ripple;
 use crate::twin::lights::{LampChange, LampLight};
 use crate::twin::random::Stream;
@@ -14,6 +14,8 @@ settings! {
     pub struct LampFaultSettings {
         /// Numbers of the lamps (the second part of their UID). Default: any.
         numbers: Option<Vec<u16>>;
+        /// Only of the track of this name. Default: of all tracks.
+        track: Option<String>;
         /// Only from this chainage on, m. Default: from the line's beginning.
         from_m: Option<f64>, in -1e6..=1e6;
         /// Only up to this chainage, m. Default: to the line's end.
@@ -76,25 +78,25 @@ impl LampFaultSettings {
     }
 
     /// A fault that strikes nothing is a slip of the pen.
-    pub(super) fn check_in(&self, track: &Track, check: &mut Checker<'_>, at: &str) {
-        let Some(first) = track.lamps.first() else {
+    pub(super) fn check_in(&self, tunnel: &Tunnel, check: &mut Checker<'_>, at: &str) {
+        let Some(first) = tunnel.lamps().next() else {
             check.problem(
                 at,
-                format!("tunnel `{}` has no lamps", track.name),
+                format!("tunnel `{}` has no lamps", tunnel.name),
                 "take this out, or choose a tunnel with lamps",
             );
             return;
         };
-        let has = |number: u16| track.lamps.iter().any(|l| l.uid.lamp == number);
+        let has = |number: u16| tunnel.lamps().any(|l| l.uid.lamp == number);
         let missing = (self.numbers.iter().flatten()).find(|number| !has(**number));
         if let Some(number) = missing {
-            let last = track.lamps.last().unwrap_or(first);
+            let last = tunnel.lamps().last().unwrap_or(first);
             check.problem(
                 &format!("{at}.numbers"),
-                format!("tunnel `{}` has no lamp {number}", track.name),
+                format!("tunnel `{}` has no lamp {number}", tunnel.name),
                 format!("its lamps are {} to {}", first.uid.lamp, last.uid.lamp),
             );
-        } else if self.candidates(track).next().is_none() {
+        } else if self.candidates(tunnel).next().is_none() {
             check.problem(
                 &format!("{at}.from_m"),
                 "there is no such lamp in the stretch",
@@ -104,13 +106,15 @@ impl LampFaultSettings {
     }
 
     /// Indices of the lamps of which the share is drawn.
-    fn candidates<'a>(&'a self, track: &'a Track) -> impl Iterator<Item = usize> + 'a {
-        let lamps = track.lamps.iter().enumerate();
-        lamps.filter_map(|(k, lamp)| {
+    fn candidates<'a>(&'a self, tunnel: &'a Tunnel) -> impl Iterator<Item = usize> + 'a {
+        let tracks = tunnel.network.tracks.iter();
+        let lamps = tracks.flat_map(|track| track.lamps.iter().map(|lamp| (&track.name, lamp)));
+        lamps.enumerate().filter_map(|(k, (track, lamp))| {
             let listed = (self.numbers.as_ref()).is_none_or(|list| list.contains(&lamp.uid.lamp));
             let after = self.from_m.is_none_or(|m| lamp.chainage_m >= m);
             let before = self.to_m.is_none_or(|m| lamp.chainage_m <= m);
-            (listed && after && before).then_some(k)
+            let here = self.track.as_ref().is_none_or(|name| name == track);
+            (listed && here && after && before).then_some(k)
         })
     }
 
@@ -118,12 +122,13 @@ impl LampFaultSettings {
     ///
     /// Each lamp draws a number, and those with the lowest are struck: so a share is met as nearly
     /// as whole lamps can, and whoever raises it adds lamps to those that were struck before.
-    pub fn chosen(&self, fault: usize, track: &Track, seed: u64) -> impl Iterator<Item = usize> {
+    pub fn chosen(&self, fault: usize, tunnel: &Tunnel, seed: u64) -> impl Iterator<Item = usize> {
+        let uids: Vec<_> = tunnel.lamps().map(|lamp| lamp.uid).collect();
         let draw = |k: usize| {
-            let uid = track.lamps[k].uid;
+            let uid = uids[k];
             Stream::new(seed, 0, &format!("lamp fault/{fault}/{uid}")).uniform(0)
         };
-        let mut drawn: Vec<_> = self.candidates(track).map(|k| (draw(k), k)).collect();
+        let mut drawn: Vec<_> = self.candidates(tunnel).map(|k| (draw(k), k)).collect();
         drawn.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let count = (self.share * drawn.len() as f64).round() as usize;
         drawn.into_iter().take(count).map(|(_, k)| k)
@@ -142,17 +147,17 @@ impl LampFaultSettings {
 
 /// Gives the lamps of a tunnel, in its order, their faults: as they are at time 0, and how each
 /// changes later. Faults of one lamp add up: levels multiply, and of ripples the deepest is seen.
-pub fn age(lamps: &mut [LampLight], faults: &[LampFaultSettings], track: &Track, seed: u64) {
+pub fn age(lamps: &mut [LampLight], faults: &[LampFaultSettings], tunnel: &Tunnel, seed: u64) {
     let mut struck: Vec<Vec<usize>> = vec![Vec::new(); lamps.len()];
     for (fault, settings) in faults.iter().enumerate() {
-        for k in settings.chosen(fault, track, seed) {
+        for k in settings.chosen(fault, tunnel, seed) {
             if let Some(of_lamp) = struck.get_mut(k) {
                 of_lamp.push(fault);
             }
         }
     }
-    for (k, (lamp, of_lamp)) in lamps.iter_mut().zip(struck).enumerate() {
-        let phase = Stream::new(seed, 0, &format!("mains/{}", track.lamps[k].uid)).uniform(0);
+    for ((lamp, site), of_lamp) in lamps.iter_mut().zip(tunnel.lamps()).zip(struck) {
+        let phase = Stream::new(seed, 0, &format!("mains/{}", site.uid)).uniform(0);
         let state_at = |time: SimTime| {
             let acting = (of_lamp.iter().map(|f| &faults[*f])).filter(|f| f.acts_at(time));
             acting.fold((1.0, Ripple::default()), |state, f| {
@@ -202,25 +207,20 @@ fn with((level, ripple): (f64, Ripple), fault: LampFaultKind, own_rad: f64) -> (
 mod tests {
     use super::*;
     use crate::settings::read_toml;
-    use crate::track::Tunnel;
     use crate::twin::faults::FaultSettings;
 
-    fn line() -> Track {
-        Track::clone(
-            Tunnel::from_toml(include_str!("../../../tunnels/chengdu_line1.toml"))
-                .unwrap()
-                .first_track(),
-        )
+    fn line() -> Tunnel {
+        Tunnel::from_toml(include_str!("../../../tunnels/chengdu_line1.toml")).unwrap()
     }
 
     fn faults(text: &str) -> Vec<LampFaultSettings> {
         read_toml::<FaultSettings>(text).unwrap().lamps
     }
 
-    fn lit(track: &Track, faults: &[LampFaultSettings], seed: u64) -> Vec<LampLight> {
+    fn lit(tunnel: &Tunnel, faults: &[LampFaultSettings], seed: u64) -> Vec<LampLight> {
         let new = |site| LampLight::from_site(site, 0.0);
-        let mut lamps: Vec<_> = track.lamps.iter().map(new).collect();
-        age(&mut lamps, faults, track, seed);
+        let mut lamps: Vec<_> = tunnel.lamps().map(new).collect();
+        age(&mut lamps, faults, tunnel, seed);
         lamps
     }
 
@@ -228,15 +228,15 @@ mod tests {
     /// share spares a lamp that a smaller one strikes.
     #[test]
     fn a_share_is_met_and_grows() {
-        let track = line();
-        let n = track.lamps.len() as f64;
+        let tunnel = line();
+        let n = tunnel.lamps().count() as f64;
         let dead = |share: f64, seed| {
             let text = format!("lamps = [{{ share = {share:?}, fault = {{ kind = 'dead' }} }}]");
-            let lamps = lit(&track, &faults(&text), seed);
+            let lamps = lit(&tunnel, &faults(&text), seed);
             let dead = lamps.iter().map(|l| l.level.abs() < 1e-12);
             dead.collect::<Vec<_>>()
         };
-        let mut before = vec![false; track.lamps.len()];
+        let mut before = vec![false; tunnel.lamps().count()];
         for share in [0.0, 0.055, 0.11, 0.22, 1.0] {
             let now = dead(share, 1);
             let count = now.iter().filter(|d| **d).count();
@@ -254,10 +254,10 @@ mod tests {
     /// Fails where lists and stretches are not both held to, or neighbours are struck.
     #[test]
     fn lists_and_stretches_choose() {
-        let track = line();
+        let tunnel = line();
         let text = "[[lamps]]\nnumbers = [3, 40, 41]\nfrom_m = 300.0\nfault = { kind = 'dead' }\n\
                     [[lamps]]\nfrom_m = 100.0\nto_m = 130.0\nfault = { kind = 'dim', level = 0.4 }\n";
-        for (site, lamp) in track.lamps.iter().zip(lit(&track, &faults(text), 1)) {
+        for (site, lamp) in tunnel.lamps().zip(lit(&tunnel, &faults(text), 1)) {
             let expected = match (site.uid.lamp, site.chainage_m) {
                 (40 | 41, _) => 0.0,
                 (_, 100.0..=130.0) => 0.4,
@@ -272,17 +272,14 @@ mod tests {
     /// phase is the same for all lamps.
     #[test]
     fn faults_come_and_go() {
-        let track = line();
+        let tunnel = line();
         let text = "[[lamps]]\nnumbers = [7]\nfault = { kind = 'dim', level = 0.5 }\nfrom_s = 1.0\n\
                     [[lamps]]\nnumbers = [7]\nfault = { kind = 'dead' }\nfrom_s = 2.0\nto_s = 3.0\n\
                     [[lamps]]\nnumbers = [7, 8]\nfault = { kind = 'flicker' }\nto_s = 2.5\n";
-        let lamps = lit(&track, &faults(text), 1);
+        let lamps = lit(&tunnel, &faults(text), 1);
         let of = |number| {
-            track
-                .lamps
-                .iter()
-                .position(|l| l.uid.lamp == number)
-                .unwrap()
+            let mut lamps = tunnel.lamps();
+            lamps.position(|l| l.uid.lamp == number).unwrap()
         };
         let (seven, eight) = (&lamps[of(7)], &lamps[of(8)]);
         let state = |s: f64| {
@@ -301,6 +298,6 @@ mod tests {
         assert_eq!(said, expected);
         assert!((seven.ripple.frequency_hz - 100.0).abs() < 1e-12);
         assert!((seven.ripple.phase_rad - eight.ripple.phase_rad).abs() > 1e-3);
-        assert_eq!(lamps, lit(&track, &faults(text), 1));
+        assert_eq!(lamps, lit(&tunnel, &faults(text), 1));
     }
 }

@@ -3,7 +3,7 @@
 //!
 //! ```
 //! use metrotwin::settings::read_toml;
-//! use metrotwin::track::Track;
+//! use metrotwin::track::Tunnel;
 //! use metrotwin::twin::faults::FaultSettings;
 //!
 //! let faults: FaultSettings = read_toml(r#"
@@ -42,7 +42,7 @@ pub use camera::{CameraFaultKind, CameraFaultSettings, CameraFaults, rig_cameras
 pub use lamp::{LampFaultKind, LampFaultSettings, age};
 
 use crate::settings::{Checker, settings};
-use crate::track::Track;
+use crate::track::Tunnel;
 
 settings! {
     /// All faults of a scenario.
@@ -56,9 +56,9 @@ settings! {
 
 impl FaultSettings {
     /// Adds what does not fit the tunnel.
-    pub fn check_in(&self, track: &Track, check: &mut Checker<'_>) {
+    pub fn check_in(&self, tunnel: &Tunnel, check: &mut Checker<'_>) {
         for (k, lamp) in self.lamps.iter().enumerate() {
-            lamp.check_in(track, check, &format!("lamps[{k}]"));
+            lamp.check_in(tunnel, check, &format!("lamps[{k}]"));
         }
     }
 }

@@ -8,20 +8,23 @@
 //!
 //! ```
 //! use metrotwin::bus::{Content, Message, Node, Receiver, SimTime, TrainCommand, TrainId};
-//! use metrotwin::track::BaseStation;
+//! use metrotwin::track::{Place, Tunnel};
 //! use metrotwin::twin::links::{Links, RadioSettings};
 //! use metrotwin::twin::random::Stream;
 //!
-//! let station = BaseStation { name: "b".into(), chainage_m: 1000.0, reach_m: 500.0 };
+//! // With a base station at 500 m that reaches 600 m.
+//! let tunnel = Tunnel::from_toml(include_str!("../../../tunnels/chengdu_line1.toml"))?;
 //! let radio = Stream::new(1, 0, "radio");
 //! let train = Node::Train(TrainId(0));
-//! let mut links = Links::new(&RadioSettings::default(), &[station], vec![train.clone()], radio);
-//! let head_m = |_| Some(1200.0);
+//! let nodes = vec![train.clone()];
+//! let mut links = Links::new(&RadioSettings::default(), &tunnel.network, nodes, radio);
+//! let head = |_| Some(Place::on_first_track(700.0));
 //! let content = Content::Command(TrainCommand::default());
 //! let now = SimTime::from_secs(1.0);
-//! links.send(Message::to(Receiver::Node(train), Node::Control, now, content), head_m);
-//! assert!(links.receive(now.plus(0.4), head_m).is_none());
-//! assert!(links.receive(now.plus(0.5), head_m).is_some());
+//! links.send(Message::to(Receiver::Node(train), Node::Control, now, content), head);
+//! assert!(links.receive(now.plus(0.4), head).is_none());
+//! assert!(links.receive(now.plus(0.5), head).is_some());
+//! # Ok::<(), metrotwin::settings::FileError>(())
 //! ```
 //!
 //! What it does not do: fields and antennas, handovers, bandwidth; a train is reached or it is not.
@@ -33,7 +36,8 @@ mod tests;
 pub use channel::{Outage, RadioSettings};
 
 use crate::bus::{Message, Node, Receiver, SimTime, TrainId, Via};
-use crate::track::BaseStation;
+use crate::track::network::Network;
+use crate::track::{BaseStation, Place, TrackId};
 use crate::twin::random::Stream;
 use channel::Channel;
 use std::collections::BTreeMap;
@@ -43,7 +47,9 @@ use std::collections::BTreeMap;
 pub struct Links {
     radio: Channel,
     wire: Channel,
-    stations: Vec<BaseStation>,
+    /// The tracks, and the base stations beside each.
+    network: Network,
+    stations: Vec<(TrackId, BaseStation)>,
     /// All nodes that have equipment.
     nodes: Vec<Node>,
     /// What each balise stores.
@@ -52,23 +58,19 @@ pub struct Links {
 
 impl Links {
     /// Between `nodes`; `stream` says which messages the radio loses.
-    pub fn new(
-        radio: &RadioSettings,
-        stations: &[BaseStation],
-        nodes: Vec<Node>,
-        stream: Stream,
-    ) -> Self {
+    pub fn new(radio: &RadioSettings, network: &Network, nodes: Vec<Node>, stream: Stream) -> Self {
         Self {
             radio: Channel::new(radio, stream),
             wire: Channel::new(&RadioSettings::wire(), stream),
-            stations: stations.to_vec(),
+            stations: stations(network),
+            network: network.clone(),
             nodes,
             stored: BTreeMap::new(),
         }
     }
 
-    /// Sends a message; `head_m` says where a train's head is now.
-    pub fn send(&mut self, message: Message, head_m: impl Fn(TrainId) -> Option<f64>) {
+    /// Sends a message; `head` says where a train's head is now.
+    pub fn send(&mut self, message: Message, head: impl Fn(TrainId) -> Option<Place>) {
         if let Receiver::Node(Node::Balise(name)) = &message.receiver {
             self.stored.insert(name.clone(), message);
             return;
@@ -79,7 +81,7 @@ impl Links {
                 ..message.clone()
             };
             if by_radio(&message.sender, &receiver) {
-                let heard = self.reaches(&message.sender, &head_m);
+                let heard = self.reaches(&message.sender, &head);
                 self.radio.send(copy, heard);
             } else {
                 self.wire.send(copy, true);
@@ -91,14 +93,14 @@ impl Links {
     pub fn receive(
         &mut self,
         now: SimTime,
-        head_m: impl Fn(TrainId) -> Option<f64>,
+        head: impl Fn(TrainId) -> Option<Place>,
     ) -> Option<Message> {
         if let Some(message) = self.wire.receive(now) {
             return Some(message.arrived(now, Via::Wire));
         }
         while let Some(message) = self.radio.receive(now) {
             if let Receiver::Node(node) = &message.receiver
-                && self.reaches(node, &head_m)
+                && self.reaches(node, &head)
             {
                 return Some(message.arrived(now, Via::Radio));
             }
@@ -132,16 +134,47 @@ impl Links {
     }
 
     /// Whether a node is within reach: a train where a base station is, all others always.
-    fn reaches(&self, node: &Node, head_m: impl Fn(TrainId) -> Option<f64>) -> bool {
+    fn reaches(&self, node: &Node, head: impl Fn(TrainId) -> Option<Place>) -> bool {
         let Node::Train(id) = node else {
             return true;
         };
-        let head_m = head_m(*id);
-        let covers = |station: &BaseStation| {
-            head_m.is_some_and(|s_m| (station.chainage_m - s_m).abs() <= station.reach_m)
+        let head = head(*id);
+        let covers = |(track, station): &(TrackId, BaseStation)| {
+            head.is_some_and(|head| {
+                let away_m = match head.track == *track {
+                    true => Some((station.chainage_m - head.s_m).abs()),
+                    false => self.apart_m(
+                        head,
+                        Place {
+                            track: *track,
+                            s_m: station.chainage_m,
+                        },
+                    ),
+                };
+                away_m.is_some_and(|away_m| away_m <= station.reach_m)
+            })
         };
         self.stations.iter().any(covers)
     }
+
+    /// Distance of two places in the world.
+    fn apart_m(&self, a: Place, b: Place) -> Option<f64> {
+        let at = |place: Place| {
+            let line = self.network.alignment(place.track)?;
+            Some(line.at(place.s_m).origin)
+        };
+        Some((at(a)? - at(b)?).norm())
+    }
+}
+
+/// All base stations of a network.
+fn stations(network: &Network) -> Vec<(TrackId, BaseStation)> {
+    let tracks = (0u16..).zip(&network.tracks);
+    let of = |(k, track): (u16, &std::sync::Arc<crate::track::Track>)| {
+        let stations = track.base_stations.clone().into_iter();
+        stations.map(move |station| (TrackId(k), station))
+    };
+    tracks.flat_map(of).collect()
 }
 
 fn by_radio(sender: &Node, receiver: &Node) -> bool {

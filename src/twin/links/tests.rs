@@ -3,6 +3,8 @@
 
 use super::*;
 use crate::bus::{Content, DangerLevel, ObstacleWarning};
+use crate::track::{Alignment, PlanElement, Track};
+use nalgebra::Point3;
 
 fn links(settings: RadioSettings) -> Links {
     let station = BaseStation {
@@ -11,7 +13,13 @@ fn links(settings: RadioSettings) -> Links {
         reach_m: 500.0,
     };
     let nodes = vec![train(0), train(1), Node::Post("w".into()), Node::Control];
-    Links::new(&settings, &[station], nodes, Stream::new(1, 0, "radio"))
+    let line = Alignment::new(Point3::origin(), 0.0, &[PlanElement::straight(3000.0)], &[]);
+    let track = Track {
+        base_stations: vec![station],
+        ..Track::bare("t", line)
+    };
+    let network = Network::of_one(track);
+    Links::new(&settings, &network, nodes, Stream::new(1, 0, "radio"))
 }
 
 fn train(id: u8) -> Node {
@@ -24,6 +32,7 @@ fn warning(number: u32, sent_s: f64, receiver: Receiver) -> Message {
         number,
         issued: SimTime::ZERO,
         danger: DangerLevel::High,
+        track: TrackId::default(),
         from_chainage_m: 10.0,
         to_chainage_m: 11.0,
         blind: false,
@@ -45,8 +54,9 @@ fn number(message: &Message) -> u32 {
 }
 
 /// Train 0 at 1000 m, train 1 out of reach.
-fn heads(id: TrainId) -> Option<f64> {
-    Some(if id == TrainId(0) { 1000.0 } else { 1501.0 })
+fn heads(id: TrainId) -> Option<Place> {
+    let s_m = if id == TrainId(0) { 1000.0 } else { 1501.0 };
+    Some(Place::on_first_track(s_m))
 }
 
 /// A message that arrives early, twice, at its sender, or at a train out of reach.
@@ -90,7 +100,7 @@ fn losses_and_outages() {
         loss: 0.3,
         ..RadioSettings::default()
     });
-    let here = |_: TrainId| Some(1000.0);
+    let here = |_: TrainId| Some(Place::on_first_track(1000.0));
     (0..2000).for_each(|k| l.send(warning(k, 0.0, Receiver::Trains), here));
     let mut got = [Vec::new(), Vec::new()];
     while let Some(message) = l.receive(SimTime::from_secs(1.0), here) {

@@ -39,9 +39,10 @@ pub enum RailState {
 }
 
 settings! {
-    /// A stretch of line with rail heads of its own.
-    #[derive(Copy)]
+    /// A stretch of track with rail heads of its own.
     pub struct RailZone {
+        /// Name of the track. Default: the tunnel's first.
+        track: Option<String>;
         /// Chainage where it begins, m.
         from_m: f64, in -1e6..=1e6;
         /// Chainage where it ends, m.
@@ -149,6 +150,7 @@ mod tests {
     #[test]
     fn a_zone_must_not_end_before_it_begins() {
         let zone = RailZone {
+            track: None,
             from_m: 100.0,
             to_m: 50.0,
             rail: RailState::Wet,

@@ -12,7 +12,7 @@ use super::entity::Entity;
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, SOLID_GROUP, TRAIN_GROUPS, groups};
 use super::obstacle_body::{RESTING_MPS, Rest};
 use crate::bus::SimTime;
-use crate::track::Alignment;
+use crate::track::{Alignment, TrackId};
 use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
@@ -40,7 +40,9 @@ pub(super) struct Cable {
     joints: Vec<Option<ImpulseJointHandle>>,
     /// Pull between its links, averaged over a short time.
     pulls_n: Vec<f64>,
-    /// Where it was last along the line.
+    /// The track that it is beside.
+    pub track: TrackId,
+    /// Where it was last along that.
     pub near_m: f64,
     pub rest: Rest,
     loose: bool,
@@ -57,7 +59,7 @@ impl Cable {
     /// Hangs a cable up.
     pub(super) fn insert(
         world: &mut PhysicsWorld,
-        alignment: &Alignment,
+        (track, alignment): (TrackId, &Alignment),
         settings: &CableSettings,
         entity: Entity,
     ) -> Self {
@@ -68,7 +70,10 @@ impl Cable {
         let curve: Vec<Point3<f64>> = Catenary::new(from, to, settings.length_m)
             .points(count)
             .collect();
-        Self::along(world, settings, &curve, entity)
+        Self {
+            track,
+            ..Self::along(world, settings, &curve, entity)
+        }
     }
 
     /// A cable whose joints are at the points of a curve.
@@ -113,6 +118,7 @@ impl Cable {
             links,
             joints,
             pulls_n: vec![0.0; count - 1],
+            track: TrackId::default(),
             near_m: settings.from.chainage_m,
             rest: Rest::default(),
             loose: false,

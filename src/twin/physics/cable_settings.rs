@@ -9,6 +9,8 @@ settings! {
     pub struct CableSettings {
         /// Name, for the summary.
         name: String = "cable".to_owned();
+        /// Name of the track. Default: the tunnel's first.
+        track: Option<String> = None;
         /// Its first end.
         from: CableEnd = CableEnd { lateral_m: 2.0, height_m: 3.0, ..CableEnd::default() },
             nested;

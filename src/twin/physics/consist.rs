@@ -3,13 +3,13 @@
 mod forces;
 
 use super::PhysicsError;
-use super::directed_track::DirectedTrack;
 use super::driver::Instruments;
 use super::energy::{EnergyBook, Ledger};
 use super::entity::{Entity, train_name};
 use super::groups::{self, train_group};
 use super::history::VehicleMotion;
 use super::placement::{BODIES, body_name, is_wheelset, place_train, wheelset_of};
+use super::route_track::RouteTrack;
 use super::settings::TrainSettings;
 use super::slide_protection::ReferenceSpeed;
 use super::suspension::{BodyState, Wrench};
@@ -58,7 +58,7 @@ impl Consist {
     /// Puts the train on the track with its head at a chainage, running.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        track: &DirectedTrack,
+        track: &RouteTrack,
         settings: &TrainSettings,
         head_m: f64,
         id: TrainId,
@@ -180,7 +180,7 @@ impl Consist {
     }
 
     /// What the driver goes by.
-    pub(super) fn instruments(&self, time: SimTime, track: &DirectedTrack) -> Instruments {
+    pub(super) fn instruments(&self, time: SimTime, track: &RouteTrack) -> Instruments {
         let v = &self.vehicle;
         let slope = track.alignment().at(self.middle_m()).slope;
         let share = v.total_kg() / v.effective_kg();
@@ -200,11 +200,12 @@ impl Consist {
 
     /// Running resistance as a deceleration, without gradients and curves: those take theirs by
     /// weight and by creep.
-    fn davis_mps2(&self, track: &DirectedTrack) -> f64 {
+    fn davis_mps2(&self, track: &RouteTrack) -> f64 {
         let (s, v) = (&self.settings, self.speed_mps().abs());
-        let confined = match track.tunnel.section_at(self.middle_m()) {
-            Some(_) => s.tunnel_factor,
-            None => 1.0,
+        let section = track.track.section_at(self.middle_m());
+        let confined = match section.is_some_and(|section| section.closed) {
+            true => s.tunnel_factor,
+            false => 1.0,
         };
         s.davis_a_mps2 + s.davis_b_per_s * v + confined * s.davis_c_per_m * v * v
     }

@@ -78,10 +78,11 @@ settings! {
 
 settings! {
     /// A defect at a place, or one that comes back every so many metres.
-    #[derive(Copy)]
     pub struct DefectSettings {
         /// Its shape.
         shape: DefectShape, nested;
+        /// Name of the track. Default: the tunnel's first.
+        track: Option<String>;
         /// Chainage of the (first) defect, metres: its bottom, or where it begins.
         chainage_m: f64, in -1e6..=1e6;
         /// The rail.
@@ -279,6 +280,7 @@ mod tests {
 
     fn one_at(shape: DefectShape, chainage_m: f64, side: RailSide) -> DefectSettings {
         DefectSettings {
+            track: None,
             shape,
             chainage_m,
             side,
@@ -350,6 +352,7 @@ mod tests {
     #[test]
     fn defects_come_back_and_add_up() {
         let joints = DefectSettings {
+            track: None,
             every_m: Some(25.0),
             count: 4,
             ..one_at(SHAPES[0], 50.0, RailSide::Both)

@@ -22,6 +22,20 @@ pub(super) struct Deviation {
 }
 
 impl Deviation {
+    /// A share of it, which grows along the track.
+    pub(super) fn shared(self, share: f64, share_per_m: f64) -> Self {
+        Self {
+            up_m: share * self.up_m,
+            left_m: share * self.left_m,
+            roll_rad: share * self.roll_rad,
+            gauge_m: share * self.gauge_m,
+            up_per_m: share * self.up_per_m + share_per_m * self.up_m,
+            left_per_m: share * self.left_per_m + share_per_m * self.left_m,
+            roll_rad_per_m: share * self.roll_rad_per_m + share_per_m * self.roll_rad,
+            gauge_per_m: share * self.gauge_per_m + share_per_m * self.gauge_m,
+        }
+    }
+
     /// The same place as met by who runs the other way: left is right, and what rises falls.
     pub(super) fn reversed(self) -> Self {
         Self {

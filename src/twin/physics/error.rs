@@ -1,5 +1,6 @@
 //! Why the world could not be made, or could not go on.
 
+use super::NoRoute;
 use crate::bus::{SimTime, TrainId};
 use crate::settings::Problem;
 
@@ -9,6 +10,9 @@ pub enum PhysicsError {
     /// Settings that no world can be made from.
     #[error("the physics settings are wrong: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
     Settings(Vec<Problem>),
+    /// A train has no way.
+    #[error(transparent)]
+    NoRoute(#[from] NoRoute),
     /// A wheelset has left the rails.
     #[error("{body} left the rails at {time}")]
     Derailed {

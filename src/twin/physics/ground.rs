@@ -2,8 +2,10 @@
 //! the line in short lengths, and only where there is something to fall.
 
 use super::groups::{GROUND_GROUP, OBSTACLE_GROUP, groups};
+use crate::track::network::Network;
 use crate::track::{
-    BED_M, CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, Track, rail_outline,
+    BED_M, CrossSection, Edge, Material, OutlinePoint, Place, RAIL_OFFSET_M, Track, TrackId,
+    rail_outline,
 };
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::{ColliderBuilder, PhysicsWorld};
@@ -18,29 +20,43 @@ const FRICTION: f64 = 0.6;
 const BEHIND_M: f64 = 12.0;
 const AHEAD_M: f64 = 60.0;
 
-/// The slabs laid so far.
+/// The slabs laid so far, by track and number along it.
 #[derive(Clone, Default)]
 pub(super) struct Ground {
-    laid: BTreeSet<i64>,
+    laid: BTreeSet<(TrackId, i64)>,
 }
 
 impl Ground {
-    /// Lays what is missing around a chainage.
-    pub(super) fn lay(&mut self, world: &mut PhysicsWorld, tunnel: &Track, s_m: f64) {
-        let first = ((s_m - BEHIND_M) / SLAB_M).floor() as i64;
-        let last = ((s_m + AHEAD_M) / SLAB_M).ceil() as i64;
+    /// Lays what is missing around a place; where that track shares the section of another one, around that too.
+    pub(super) fn lay(&mut self, world: &mut PhysicsWorld, network: &Network, place: Place) {
+        let Some(track) = network.track(place.track) else {
+            return;
+        };
+        let first = ((place.s_m - BEHIND_M) / SLAB_M).floor() as i64;
+        let last = ((place.s_m + AHEAD_M) / SLAB_M).ceil() as i64;
         for k in first..last {
-            if self.laid.insert(k) {
-                lay_slabs(world, tunnel, (k as f64 + 0.5) * SLAB_M);
+            let s_m = (k as f64 + 0.5) * SLAB_M;
+            if !self.laid.insert((place.track, k)) {
+                continue;
+            }
+            lay_slabs(world, track, s_m);
+            let host = network.host(Place { s_m, ..place });
+            let host = host.filter(|host| {
+                let k = (host.s_m / SLAB_M).floor() as i64;
+                self.laid.insert((host.track, k))
+            });
+            if let Some((track, s_m)) = host.and_then(|h| Some((network.track(h.track)?, h.s_m))) {
+                let middle_m = ((s_m / SLAB_M).floor() + 0.5) * SLAB_M;
+                lay_slabs(world, track, middle_m);
             }
         }
     }
 }
 
-fn lay_slabs(world: &mut PhysicsWorld, tunnel: &Track, s_m: f64) {
-    let frame = tunnel.alignment.at(s_m);
+fn lay_slabs(world: &mut PhysicsWorld, track: &Track, s_m: f64) {
+    let frame = track.alignment.at(s_m);
     let level = frame.world_from_line();
-    match tunnel.section_at(s_m) {
+    match track.section_at(s_m) {
         Some(section) => lay_section(world, section, &level),
         None => {
             let edge = Edge {

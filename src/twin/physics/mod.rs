@@ -13,7 +13,7 @@
 //! use metrotwin::track::TunnelFile;
 //! use metrotwin::twin::physics::{PhysicsSettings, World};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! # let tunnel = metrotwin::track::Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?.first_track().clone();
+//! # let tunnel = std::sync::Arc::new(metrotwin::track::Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?);
 //! let mut world = World::new(tunnel, &PhysicsSettings::default(), 1, 0)?;
 //! let go = TrainCommand { permitted_speed_mps: 20.0, ..TrainCommand::default() };
 //! for _ in 0..5000 {
@@ -26,7 +26,7 @@
 //!
 //! | | |
 //! |---|---|
-//! | track | `irregularity`, `defect` and `deviation` (where the rails lie), `adhesion` (how slippery they are), `directed_track` (all of it, as a wheelset asks) |
+//! | track | `irregularity`, `defect` and `deviation` (where the rails lie), `adhesion` (how slippery they are), `route_track` (all of it, as a wheelset asks) |
 //! | train | `vehicle_file` and `vehicle` (figures of a car), `placement`, `consist` (its bodies, a step of them), `suspension`, `wheelset` (rails, creep, brakes), `driver`, `energy`, `history`, `train`; `carrier` in place of one on a bench |
 //! | obstacles | `obstacle`, `shape`, `obstacle_body`, `cable`, `cable_settings` and `catenary`, `worker` and `walker`, `ground`, `groups`, `impact` and `damage`, `entity`, `surroundings` |
 //! | world | `settings`, `train_truth` and `truth` (what a session asks), `saved` (a copy goes on exactly), `validation` (against theory and published figures) |
@@ -51,7 +51,6 @@ mod consist;
 mod damage;
 mod defect;
 mod deviation;
-mod directed_track;
 mod driver;
 mod energy;
 mod entity;
@@ -64,6 +63,7 @@ mod irregularity;
 mod obstacle;
 mod obstacle_body;
 mod placement;
+mod route_track;
 mod saved;
 mod settings;
 mod shape;
@@ -76,6 +76,7 @@ mod testing;
 #[cfg(test)]
 mod tests;
 mod train;
+mod train_route;
 mod train_truth;
 mod truth;
 #[cfg(test)]
@@ -99,6 +100,7 @@ pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
 pub use settings::{HISTORY_S, PhysicsSettings, STEP_S, TrackSettings, TrainSettings, train_key};
+pub use train_route::NoRoute;
 pub use train_truth::TrainState;
 pub use truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth};
 pub use vehicle_file::{
@@ -109,23 +111,23 @@ pub use worker::{Waypoint, WorkerSettings};
 
 use crate::bus::{SimTime, TrainCommand, TrainId};
 use crate::settings::Settings;
-use crate::track::{Direction, Track};
-use directed_track::DirectedTrack;
-use irregularity::Irregularity;
+use crate::track::Tunnel;
+use crate::track::network::Network;
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
+use route_track::{Rails, RouteTrack};
 use std::sync::Arc;
 use surroundings::Surroundings;
 use train::{RUN_IN_S, Train};
 
 /// Everything that moves.
 pub struct World {
-    tunnel: Arc<Track>,
+    tunnel: Arc<Tunnel>,
     rapier: PhysicsWorld,
     /// By number.
     trains: Vec<Train>,
     /// What carries a rig at rest where there is no train.
-    carrier: Option<TrainState>,
+    carrier: Option<carrier::Carrier>,
     surroundings: Surroundings,
     time: SimTime,
     step: SimTime,
@@ -135,7 +137,7 @@ pub struct World {
 impl World {
     /// A world at time zero. Everything random in it depends on `seed` and run `index` only.
     pub fn new(
-        tunnel: Arc<Track>,
+        tunnel: Arc<Tunnel>,
         settings: &PhysicsSettings,
         seed: u64,
         index: u64,
@@ -152,11 +154,9 @@ impl World {
         rapier.integration_parameters.dt = step_s;
         // Substeps would move bodies with forces that belong to the step's start.
         rapier.integration_parameters.num_solver_iterations = 1;
-        let length_m = tunnel.alignment.length_m();
-        let irregularity = Irregularity::new(&settings.track.irregularity, length_m, seed, index);
-        let track = DirectedTrack::new(tunnel.clone(), irregularity, &settings.track);
+        let rails = Rails::new(&tunnel.network, &settings.track, [seed, index]);
         let mut world = Self {
-            trains: trains(&mut rapier, track, settings, step_s),
+            trains: trains(&mut rapier, &tunnel, rails, settings, step_s)?,
             tunnel,
             rapier,
             carrier: None,
@@ -167,7 +167,8 @@ impl World {
         };
         world.run_in()?;
         let (rapier, run) = (&mut world.rapier, [seed, index]);
-        world.surroundings = Surroundings::new(rapier, &world.tunnel, settings, run, &world.trains);
+        world.surroundings =
+            Surroundings::new(rapier, &world.tunnel.network, settings, run, &world.trains);
         Ok(world)
     }
 
@@ -213,7 +214,12 @@ impl World {
             train.read(&self.rapier, self.time)?;
         }
         self.surroundings
-            .after_step(&mut self.rapier, &self.tunnel, self.time)
+            .after_step(&mut self.rapier, &self.tunnel.network, self.time)
+    }
+
+    /// The tracks.
+    pub fn network(&self) -> &Network {
+        &self.tunnel.network
     }
 
     /// Now.
@@ -231,21 +237,21 @@ impl World {
     }
 }
 
-/// Puts the trains on the track, each on that of its direction.
+/// Puts the trains on the tracks, each on its route.
 fn trains(
     rapier: &mut PhysicsWorld,
-    track: DirectedTrack,
+    tunnel: &Tunnel,
+    rails: Rails,
     settings: &PhysicsSettings,
     step_s: f64,
-) -> Vec<Train> {
+) -> Result<Vec<Train>, PhysicsError> {
     let history = (settings.history_s / step_s).ceil() as usize + 1;
-    let runs_down = |train: &TrainSettings| train.direction == Direction::Down;
-    let down = (settings.trains.iter().any(runs_down)).then(|| Arc::new(track.reversed()));
-    let up = Arc::new(track);
+    let (network, rails) = (&tunnel.network, Arc::new(rails));
     let make = |(k, train): (usize, &TrainSettings)| {
-        let down = down.as_ref().filter(|_| runs_down(train));
-        let track = down.unwrap_or(&up).clone();
-        Train::new(rapier, track, train, TrainId::from_index(k), history)
+        let way = train.itinerary(network)?;
+        let track = RouteTrack::new(network, way.route.clone(), rails.clone());
+        let id = TrainId::from_index(k);
+        Ok(Train::new(rapier, track, train, &way, id, history))
     };
     settings.trains.iter().enumerate().map(make).collect()
 }

@@ -31,6 +31,8 @@ settings! {
         albedo: f64 = 0.3, in 0.0..=1.0;
         /// Temperature of its surface, degrees Celsius.
         temperature_c: f64 = 20.0, in -50.0..=1500.0;
+        /// Name of the track. Default: the tunnel's first.
+        track: Option<String> = None;
         /// Chainage of its centre, metres.
         chainage_m: f64 = 0.0, in -1e6..=1e6;
         /// Left of the centreline, metres.

@@ -5,7 +5,7 @@ use super::groups::{fixed, loose};
 use super::impact::Motion;
 use super::obstacle::{HingeEdge, HingeSettings, SingleObstacle};
 use crate::bus::SimTime;
-use crate::track::{Alignment, TrackPoint};
+use crate::track::{Alignment, TrackId, TrackPoint};
 use crate::twin::geometry::{Body, Shape};
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Vector;
@@ -53,7 +53,9 @@ pub(super) struct ObstacleBody {
     pub body: RigidBodyHandle,
     pub collider: ColliderHandle,
     hold: Hold,
-    /// Where it was last along the line.
+    /// The track that it is on, or beside.
+    pub track: TrackId,
+    /// Where it was last along that.
     pub near_m: f64,
     pub rest: Rest,
 }
@@ -62,7 +64,7 @@ impl ObstacleBody {
     /// Puts an obstacle where its settings say: its lowest point at their height.
     pub(super) fn insert(
         world: &mut PhysicsWorld,
-        alignment: &Alignment,
+        (track, alignment): (TrackId, &Alignment),
         piece: &SingleObstacle,
         entity: Entity,
     ) -> Self {
@@ -105,6 +107,7 @@ impl ObstacleBody {
             collider: world.insert_collider(collider, Some(body)),
             piece: piece.clone(),
             hold,
+            track,
             near_m: settings.chainage_m,
             rest: Rest::default(),
         }

@@ -1,6 +1,6 @@
 //! Where the bodies of a train are at the start: cars over the track as it lies, couplers closed.
 
-use super::directed_track::{DirectedTrack, rail_axes};
+use super::route_track::{RouteTrack, rail_axes};
 use super::suspension::BodyState;
 use super::vehicle::{AXLES, Vehicle};
 use rapier3d_f64::math::{Rotation, Vector};
@@ -32,7 +32,7 @@ pub(super) fn body_name(k: usize) -> String {
 /// One car after the other, the head of the train at a chainage, running.
 pub(super) fn place_train(
     vehicle: &Vehicle,
-    track: &DirectedTrack,
+    track: &RouteTrack,
     cars: u32,
     head_m: f64,
     speed_mps: f64,
@@ -60,12 +60,7 @@ pub(super) fn place_train(
 /// A car on the track, its front bogie at a chainage. Bogies point along the line and wheelsets stand on the
 /// middle of the track as it lies, so on rough track a wheelset is pressed aside by up to some 13 kN until the
 /// train has rolled two metres.
-fn car(
-    vehicle: &Vehicle,
-    track: &DirectedTrack,
-    front_m: f64,
-    speed_mps: f64,
-) -> [BodyState; BODIES] {
+fn car(vehicle: &Vehicle, track: &RouteTrack, front_m: f64, speed_mps: f64) -> [BodyState; BODIES] {
     let distance = 2.0 * vehicle.semi_bogie_distance_m;
     let at = |s_m: f64, height_m: f64| on_rails(track, s_m, height_m, speed_mps);
     let front = at(front_m, vehicle.bogie_cg_m);
@@ -99,7 +94,7 @@ fn car(
 }
 
 /// A body over the rails that runs along them.
-fn on_rails(track: &DirectedTrack, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
+fn on_rails(track: &RouteTrack, s_m: f64, height_m: f64, speed_mps: f64) -> BodyState {
     let frame = track.alignment().at(s_m);
     let (origin, axes) = rail_axes(&frame);
     let d = track.deviation_at(s_m);

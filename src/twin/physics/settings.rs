@@ -125,6 +125,8 @@ settings! {
         cars: u32 = 6, in 1.0..=8.0;
         /// Which way along the line it runs.
         direction: Direction = Direction::Up;
+        /// Name of the track on which it starts. Default: the tunnel's first.
+        start_track: Option<String> = None;
         /// Chainage of the train head at the start, metres.
         start_chainage_m: f64 = 150.0, in -1e6..=1e6;
         /// Speed at the start, km/h.
@@ -136,6 +138,10 @@ settings! {
         restart_after_s: f64 = 60.0, in 0.0..=1e6;
         /// Speed that the automatic driver aims at, km/h.
         cruise_speed_kmh: f64 = 60.0, in 0.0..=160.0;
+        /// Names of tracks that it runs over on its way; from each to the next it takes the shortest way.
+        via: Vec<String> = Vec::new();
+        /// Name of the track on which it stops. Default: the last of `via`, or that on which it starts.
+        stop_track: Option<String> = None;
         /// Chainage where the train head shall stop, metres.
         stop_at_m: Option<f64> = None, in -1e6..=1e6;
         /// Acceleration that the driver takes, m/s^2.
@@ -200,15 +206,6 @@ impl TrainSettings {
         [vehicle.width_m, vehicle.height_m]
     }
 
-    /// Chainages of its ends at the start, the lower one first.
-    pub fn stands_m(&self) -> [f64; 2] {
-        let head_m = self.start_chainage_m;
-        match self.direction {
-            Direction::Up => [head_m - self.length_m(), head_m],
-            Direction::Down => [head_m, head_m + self.length_m()],
-        }
-    }
-
     fn check_together(&self, check: &mut Checker<'_>) {
         if self.car().is_none() {
             check.problem(
@@ -221,7 +218,9 @@ impl TrainSettings {
             );
         }
         let (start_m, way) = (self.start_chainage_m, self.direction);
-        let is_behind = |stop_m: &f64| way.ahead_m(start_m, *stop_m) < 0.0;
+        let one_track = self.via.is_empty()
+            && (self.stop_track.is_none() || self.stop_track == self.start_track);
+        let is_behind = |stop_m: &f64| one_track && way.ahead_m(start_m, *stop_m) < 0.0;
         if let Some(stop_m) = self.stop_at_m.filter(is_behind) {
             check.problem(
                 "stop_at_m",

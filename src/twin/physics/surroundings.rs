@@ -16,7 +16,8 @@ use super::train::Train;
 use super::truth::{BodyLabel, BodyOwner};
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
-use crate::track::{Alignment, Track};
+use crate::track::network::Network;
+use crate::track::{Alignment, Place, TrackId};
 use crate::twin::geometry::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
 
@@ -54,7 +55,7 @@ impl Surroundings {
     /// it depends on `seed` and run `index`.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        tunnel: &Track,
+        network: &Network,
         settings: &PhysicsSettings,
         [seed, index]: [u64; 2],
         trains: &[Train],
@@ -73,7 +74,12 @@ impl Surroundings {
         let walkers = settings.workers.iter().enumerate().map(|(k, worker)| {
             let load = worker.carries.as_ref();
             let load = load.map(|load| load.pieces(&format!("load {k}"), seed, index));
-            Walker::new(worker, load.and_then(|pieces| pieces.into_iter().next()))
+            let track = track_of(network, worker.track.as_ref());
+            Walker::new(
+                worker,
+                track,
+                load.and_then(|pieces| pieces.into_iter().next()),
+            )
         });
         let mut surroundings = Self {
             walkers: walkers.collect(),
@@ -87,15 +93,18 @@ impl Surroundings {
             ..Self::default()
         };
         for (k, cable) in settings.cables.iter().enumerate() {
-            surroundings
-                .ground
-                .lay(world, tunnel, cable.from.chainage_m);
-            surroundings.ground.lay(world, tunnel, cable.to.chainage_m);
+            let track = track_of(network, cable.track.as_ref());
+            for end in [&cable.from, &cable.to] {
+                let s_m = end.chainage_m;
+                let place = Place { track, s_m };
+                surroundings.ground.lay(world, network, place);
+            }
             let entity = Entity::Cable(k);
-            let cable = Cable::insert(world, &tunnel.alignment, cable, entity);
+            let beside = (track, line(network, track));
+            let cable = Cable::insert(world, beside, cable, entity);
             surroundings.cables.push(cable);
         }
-        surroundings.go_on(world, tunnel, 0.0);
+        surroundings.go_on(world, network, 0.0);
         surroundings
     }
 
@@ -122,13 +131,13 @@ impl Surroundings {
     pub(super) fn after_step(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Track,
+        network: &Network,
         now: SimTime,
     ) -> Result<(), PhysicsError> {
         self.steps += 1;
-        self.watch_awake(world, tunnel, now)?;
+        self.watch_awake(world, network, now)?;
         self.watch_trains(world, now);
-        self.go_on(world, tunnel, now.secs());
+        self.go_on(world, network, now.secs());
         Ok(())
     }
 
@@ -136,7 +145,7 @@ impl Surroundings {
     fn watch_awake(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Track,
+        network: &Network,
         now: SimTime,
     ) -> Result<(), PhysicsError> {
         let look = self.steps.is_multiple_of(LOOK_STEPS);
@@ -154,7 +163,7 @@ impl Surroundings {
                 });
             }
             if look {
-                self.lay_ground(world, tunnel, body, entity);
+                self.lay_ground(world, network, body, entity);
             }
             match entity {
                 Entity::Obstacle(k) => {
@@ -179,26 +188,34 @@ impl Surroundings {
     fn lay_ground(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Track,
+        network: &Network,
         body: RigidBodyHandle,
         entity: Entity,
     ) {
         let Some(at) = world.bodies.get(body).map(|body| body.translation()) else {
             return;
         };
-        let near_m = match entity {
+        let near = match entity {
             Entity::Obstacle(k) => self.obstacles[k]
                 .as_mut()
-                .map(|obstacle| &mut obstacle.near_m),
-            Entity::Cable(k) => Some(&mut self.cables[k].near_m),
-            Entity::Worker(k) => Some(&mut self.walkers[k].near_m),
+                .map(|obstacle| (obstacle.track, &mut obstacle.near_m)),
+            Entity::Cable(k) => {
+                let cable = &mut self.cables[k];
+                Some((cable.track, &mut cable.near_m))
+            }
+            Entity::Worker(k) => {
+                let walker = &mut self.walkers[k];
+                Some((walker.track, &mut walker.near_m))
+            }
             Entity::Train(_) => None,
         };
-        let Some(near_m) = near_m else {
+        let Some((track, near_m)) = near else {
             return;
         };
-        *near_m = tunnel.alignment.track_from_world(&at.into(), *near_m).s_m;
-        self.ground.lay(world, tunnel, *near_m);
+        let line = line(network, track);
+        *near_m = line.track_from_world(&at.into(), *near_m).s_m;
+        let s_m = *near_m;
+        self.ground.lay(world, network, Place { track, s_m });
     }
 
     /// Hits of the trains, and what they tear off and knock down.
@@ -227,9 +244,10 @@ impl Surroundings {
     }
 
     /// Lets appear, let go, walk, put down and pick up what is due.
-    fn go_on(&mut self, world: &mut PhysicsWorld, tunnel: &Track, now_s: f64) {
+    fn go_on(&mut self, world: &mut PhysicsWorld, network: &Network, now_s: f64) {
         while let Some(next) = self.to_come.pop_if(|next| next.settings.appears_s <= now_s) {
-            self.insert(world, tunnel, &next);
+            let track = track_of(network, next.settings.track.as_ref());
+            self.insert(world, network, track, &next);
         }
         while self.releases_s.pop_if(|at_s| *at_s <= now_s).is_some() {
             for obstacle in self.obstacles.iter_mut().flatten() {
@@ -240,14 +258,16 @@ impl Surroundings {
             }
         }
         for k in 0..self.walkers.len() {
-            self.walkers[k].lead(world, &tunnel.alignment, now_s, Entity::Worker(k));
+            let track = self.walkers[k].track;
+            let line = line(network, track);
+            self.walkers[k].lead(world, line, now_s, Entity::Worker(k));
             match self.walkers[k].act(now_s) {
                 Some(Act::PutDown(load)) => {
-                    let number = self.insert(world, tunnel, &load);
+                    let number = self.insert(world, network, track, &load);
                     self.walkers[k].has_put_down(number);
                 }
                 Some(Act::PickUp(number, place)) => {
-                    let taken = self.take_away(world, &tunnel.alignment, number, place);
+                    let taken = self.take_away(world, line, number, place);
                     self.walkers[k].has_picked_up(taken);
                 }
                 None => {}
@@ -258,13 +278,16 @@ impl Surroundings {
     fn insert(
         &mut self,
         world: &mut PhysicsWorld,
-        tunnel: &Track,
+        network: &Network,
+        track: TrackId,
         piece: &SingleObstacle,
     ) -> usize {
         let number = self.obstacles.len();
-        self.ground.lay(world, tunnel, piece.settings.chainage_m);
+        let s_m = piece.settings.chainage_m;
+        self.ground.lay(world, network, Place { track, s_m });
         let entity = Entity::Obstacle(number);
-        let obstacle = ObstacleBody::insert(world, &tunnel.alignment, piece, entity);
+        let beside = (track, line(network, track));
+        let obstacle = ObstacleBody::insert(world, beside, piece, entity);
         self.obstacles.push(Some(obstacle));
         number
     }
@@ -306,7 +329,7 @@ impl Surroundings {
     pub(super) fn draw(
         &self,
         world: &PhysicsWorld,
-        line: &Alignment,
+        network: &Network,
         now_s: f64,
     ) -> Vec<(Body, BodyLabel<'_>)> {
         let mut drawn = Vec::new();
@@ -322,6 +345,7 @@ impl Surroundings {
             drawn.extend(labelled(cable.draw(world), owner, name));
         }
         for (k, walker) in self.walkers.iter().enumerate() {
+            let line = line(network, walker.track);
             let (owner, name) = (BodyOwner::Worker(k), &walker.settings.name);
             drawn.extend(labelled(walker.draw(world, line, now_s), owner, name));
             if let Some((body, name)) = walker.draw_load(world, line, now_s) {
@@ -335,6 +359,18 @@ impl Surroundings {
     pub(super) fn train_name(&self, id: TrainId) -> &str {
         self.name(Entity::Train(id))
     }
+}
+
+/// The track of a name; the first one without.
+fn track_of(network: &Network, name: Option<&String>) -> TrackId {
+    // A world is not made with a name that is none.
+    name.and_then(|name| network.named(name))
+        .unwrap_or_default()
+}
+
+/// The centreline of a track of a network.
+fn line(network: &Network, track: TrackId) -> &Alignment {
+    &network.tracks[usize::from(track.0)].alignment
 }
 
 /// Bodies with the label that they share.

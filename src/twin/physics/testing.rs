@@ -1,7 +1,7 @@
 //! What tests of the physics share.
 
 use crate::bus::TrainId;
-use crate::track::{Alignment, Grade, PlanElement, Track};
+use crate::track::{Alignment, Grade, PlanElement, Track, Tunnel};
 use nalgebra::Point3;
 use std::sync::Arc;
 
@@ -9,21 +9,12 @@ use std::sync::Arc;
 pub(super) const TRAIN: TrainId = TrainId(0);
 
 /// A line of one slope without walls, 5 m over zero.
-pub(super) fn line(elements: &[PlanElement], slope: f64) -> Arc<Track> {
+pub(super) fn line(elements: &[PlanElement], slope: f64) -> Arc<Tunnel> {
     let grade = Grade {
         from_m: 0.0,
         slope,
         radius_m: 0.0,
     };
-    Arc::new(Track {
-        name: "test".to_owned(),
-        alignment: Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, elements, &[grade]),
-        sections: Vec::new(),
-        lamps: Vec::new(),
-        wayside: Vec::new(),
-        balises: Vec::new(),
-        base_stations: Vec::new(),
-        stations: Vec::new(),
-        ambient_lx: 0.0,
-    })
+    let alignment = Alignment::new(Point3::new(1000.0, 2000.0, 5.0), 0.4, elements, &[grade]);
+    Arc::new(Tunnel::of_one(Track::bare("test", alignment)))
 }

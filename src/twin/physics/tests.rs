@@ -14,7 +14,7 @@ use super::history::MotionHistory;
 use super::*;
 use crate::bus::{BrakeDemand, TrainEnd};
 use crate::settings::Settings;
-use crate::track::PlanElement;
+use crate::track::{Direction, PlanElement};
 use testing::{TRAIN, line};
 use vehicle::{GRAVITY_MPS2, Vehicle};
 
@@ -22,7 +22,7 @@ fn car(name: &str) -> Vehicle {
     Vehicle::new(VehicleFile::shipped(name).unwrap())
 }
 
-fn straight() -> Arc<Track> {
+fn straight() -> Arc<Tunnel> {
     line(&[PlanElement::straight(3000.0)], 0.0)
 }
 
@@ -67,7 +67,7 @@ fn stands_in_equilibrium() {
     let mut world = World::new(tunnel.clone(), &settings(TrainSettings::default()), 1, 0).unwrap();
     run(&mut world, 2.0, &command(BrakeDemand::None, 0.0));
     let train = world.train(TRAIN).unwrap();
-    let want = tunnel.alignment.at(150.0).world_from_rails();
+    let want = tunnel.first_track().alignment.at(150.0).world_from_rails();
     let off = want.inverse() * train.world_from_vehicle;
     assert!(off.translation.vector.norm() < 1e-6, "{off}");
     assert!(off.rotation.angle() < 1e-8);
@@ -129,6 +129,7 @@ fn no_false_slide_on_rough_rails() {
     let mut settings = settings(train);
     settings.track.irregularity.class = IrregularityClass::GermanHigh;
     settings.track.defects = vec![DefectSettings {
+        track: None,
         shape: DefectShape::Joint {
             depth_m: 0.001,
             half_length_m: 0.5,
@@ -539,7 +540,11 @@ fn follows_a_crooked_track() {
         let consist = &world.trains[0].consist;
         let place = |k: usize| {
             let p = consist.states[k].position.into();
-            world.tunnel.alignment.track_from_world(&p, 300.0)
+            world
+                .tunnel
+                .first_track()
+                .alignment
+                .track_from_world(&p, 300.0)
         };
         let axle = place(3);
         aside.push((
@@ -598,7 +603,7 @@ fn runs_steadily_at_design_speed() {
             ..TrainSettings::default()
         };
         let mut world = World::new(straight(), &settings(train), 1, 0).unwrap();
-        let across = world.tunnel.alignment.at(0.0).left();
+        let across = world.tunnel.first_track().alignment.at(0.0).left();
         let across = Vector::new(across.x, across.y, across.z);
         for handle in world.trains[0].consist.handles.clone() {
             let body = &mut world.rapier.bodies[handle];
@@ -609,7 +614,7 @@ fn runs_steadily_at_design_speed() {
             for _ in 0..(1000.0 * seconds) as usize {
                 world.step(&[command(BrakeDemand::None, GO)]).unwrap();
                 let axle = world.trains[0].consist.states[3].position;
-                let line = &world.tunnel.alignment;
+                let line = &world.tunnel.first_track().alignment;
                 let place = line.track_from_world(&axle.into(), 300.0);
                 most_m = most_m.max(place.l_m.abs());
             }

@@ -1,19 +1,18 @@
 //! A train under way: its bodies, its driver, its recent past, and what it looks like.
 
 use super::consist::Consist;
-use super::directed_track::DirectedTrack;
 use super::driver::{AutomaticDriver, Effort, STANDING_MPS};
 use super::history::{MotionHistory, VehicleMotion};
+use super::route_track::RouteTrack;
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
 use crate::bus::{SimTime, TrainCommand, TrainEnd, TrainId};
-use crate::track::Alignment;
+use crate::track::network::Itinerary;
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rapier3d_f64::prelude::PhysicsWorld;
-use std::sync::Arc;
 
 /// So long a train runs, or stands, before its start: springs and dampers come to rest.
 pub(super) const RUN_IN_S: f64 = 5.0;
@@ -31,7 +30,7 @@ const CAR_ALBEDO: f64 = 0.5;
 /// A train under way.
 #[derive(Clone)]
 pub(super) struct Train {
-    pub track: Arc<DirectedTrack>,
+    pub track: RouteTrack,
     pub consist: Consist,
     /// Of its front and rear end.
     histories: [MotionHistory; 2],
@@ -43,15 +42,16 @@ impl Train {
     /// A train that has yet to run in over the last metres before its starting place.
     pub(super) fn new(
         world: &mut PhysicsWorld,
-        track: Arc<DirectedTrack>,
+        track: RouteTrack,
         settings: &TrainSettings,
+        way: &Itinerary,
         id: TrainId,
         history_steps: usize,
     ) -> Self {
         // From here on, places are those of the train's run.
         let settings = TrainSettings {
-            start_chainage_m: track.turned_m(settings.start_chainage_m),
-            stop_at_m: settings.stop_at_m.map(|line_m| track.turned_m(line_m)),
+            start_chainage_m: way.start_m,
+            stop_at_m: way.stop_m,
             ..settings.clone()
         };
         let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
@@ -133,22 +133,26 @@ impl Train {
         self.history(TrainEnd::Front).latest()
     }
 
-    /// Chainage on the line of the origin of its vehicle frame at a pose.
-    pub(super) fn chainage_m(&self, line: &Alignment, world_from_vehicle: &Isometry3<f64>) -> f64 {
-        let near_m = self.track.turned_m(self.consist.head_chainage_m());
+    /// Distance along its route of the origin of its vehicle frame at a pose.
+    pub(super) fn run_m(&self, world_from_vehicle: &Isometry3<f64>) -> f64 {
         let origin = world_from_vehicle.translation.vector.into();
-        line.track_from_world(&origin, near_m).s_m
+        let near_m = self.consist.head_chainage_m();
+        self.track.alignment().track_from_world(&origin, near_m).s_m
     }
 
-    /// As it really is, seen along the line.
-    pub(super) fn state(&self, line: &Alignment, dt_s: f64) -> Option<TrainState> {
+    /// As it really is.
+    pub(super) fn state(&self, dt_s: f64) -> Option<TrainState> {
         let (consist, motion) = (&self.consist, self.motion()?);
-        let chainage_m = self.chainage_m(line, &motion.world_from_vehicle);
-        let along = line.at(chainage_m).world_from_line().rotation * Vector3::x();
+        let run_m = self.run_m(&motion.world_from_vehicle);
+        let (place, direction) = self.track.route.place(run_m);
+        let ahead = self.track.alignment().at(run_m).world_from_line().rotation * Vector3::x();
+        let along = ahead * direction.sign();
         Some(TrainState {
             time: motion.time,
-            direction: self.track.direction,
-            chainage_m,
+            track: place.track,
+            direction,
+            chainage_m: place.s_m,
+            run_m,
             speed_mps: motion.velocity_mps.dot(&along),
             accel_mps2: consist.accel_mps2(along, dt_s),
             world_from_vehicle: motion.world_from_vehicle,

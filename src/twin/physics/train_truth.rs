@@ -4,22 +4,28 @@ use super::history::VehicleMotion;
 use super::wheelset::{WheelExtremes, WheelForces};
 use super::{EnergyBook, World};
 use crate::bus::{SimTime, TrainEnd, TrainId};
-use crate::track::Direction;
+use crate::track::network::Route;
+use crate::track::{Direction, Place, Track, TrackId};
 use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, Vector3};
+use std::sync::Arc;
 
 /// A train as it really is.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainState {
     /// When.
     pub time: SimTime,
-    /// Which way it runs.
+    /// The track that its head is on.
+    pub track: TrackId,
+    /// Which way it runs along that.
     pub direction: Direction,
     /// Chainage of the train head.
     pub chainage_m: f64,
-    /// Speed along the line, positive up the line.
+    /// Distance of the train head along its route.
+    pub run_m: f64,
+    /// Speed along the track, positive up the track.
     pub speed_mps: f64,
-    /// Acceleration along the line, positive up the line.
+    /// Acceleration along the track, positive up the track.
     pub accel_mps2: f64,
     /// Pose of the leading vehicle frame, fixed to the leading car's body, with its x axis ahead.
     pub world_from_vehicle: Isometry3<f64>,
@@ -50,7 +56,7 @@ impl World {
         let Some(train) = self.get(id) else {
             return self.carrier_state(id);
         };
-        train.state(&self.tunnel.alignment, self.step_s)
+        train.state(self.step_s)
     }
 
     /// Pose of the vehicle frame of one of its ends at a time of the recent past; `None` after now, and
@@ -58,7 +64,7 @@ impl World {
     pub fn vehicle_at(&self, id: TrainId, end: TrainEnd, time: SimTime) -> Option<Isometry3<f64>> {
         match self.get(id) {
             Some(train) => train.history(end).at(time),
-            None => Some(self.carrier(id)?.world_from_vehicle),
+            None => Some(self.carrier(id)?.state.world_from_vehicle),
         }
     }
 
@@ -67,25 +73,52 @@ impl World {
         self.get(id)?.history(end).latest()
     }
 
-    /// Chainage of its head now.
-    pub fn head_m(&self, id: TrainId) -> Option<f64> {
-        self.chainage_of(
-            id,
-            &self.vehicle_motion(id, TrainEnd::Front)?.world_from_vehicle,
-        )
-    }
-
-    /// Chainage of its head at a time of the recent past.
-    pub fn chainage_at(&self, id: TrainId, time: SimTime) -> Option<f64> {
-        match self.carrier(id) {
-            Some(carrier) => Some(carrier.chainage_m),
-            None => self.chainage_of(id, &self.vehicle_at(id, TrainEnd::Front, time)?),
+    /// The route that it runs.
+    pub fn route(&self, id: TrainId) -> Option<&Route> {
+        match self.get(id) {
+            Some(train) => Some(&train.track.route),
+            None => self.carrier(id).map(|carrier| &carrier.route),
         }
     }
 
-    fn chainage_of(&self, id: TrainId, world_from_vehicle: &Isometry3<f64>) -> Option<f64> {
-        let line = &self.tunnel.alignment;
-        Some(self.get(id)?.chainage_m(line, world_from_vehicle))
+    /// The track along its route: distances along the route are its chainages.
+    pub fn along_route(&self, id: TrainId) -> Option<&Arc<Track>> {
+        match self.get(id) {
+            Some(train) => Some(&train.track.track),
+            None => self.carrier(id).map(|carrier| &carrier.track),
+        }
+    }
+
+    /// Distance of its head along its route now.
+    pub fn run_m(&self, id: TrainId) -> Option<f64> {
+        let motion = self.vehicle_motion(id, TrainEnd::Front)?;
+        Some(self.get(id)?.run_m(&motion.world_from_vehicle))
+    }
+
+    /// Place of its head now.
+    pub fn head(&self, id: TrainId) -> Option<Place> {
+        Some(self.route(id)?.place(self.run_m(id)?).0)
+    }
+
+    /// Distance along its route at which its head is to stop.
+    pub fn stop_m(&self, id: TrainId) -> Option<f64> {
+        self.get(id)?.consist.settings.stop_at_m
+    }
+
+    /// Distance of its head along its route at a time of the recent past.
+    pub fn run_at(&self, id: TrainId, time: SimTime) -> Option<f64> {
+        match self.carrier(id) {
+            Some(carrier) => Some(carrier.state.run_m),
+            None => {
+                let pose = self.vehicle_at(id, TrainEnd::Front, time)?;
+                Some(self.get(id)?.run_m(&pose))
+            }
+        }
+    }
+
+    /// Place of its head at a time of the recent past.
+    pub fn place_at(&self, id: TrainId, time: SimTime) -> Option<Place> {
+        Some(self.route(id)?.place(self.run_at(id, time)?).0)
     }
 
     /// Its length over couplers.

@@ -5,6 +5,7 @@ use super::obstacle::SingleObstacle;
 use super::obstacle_body::{ObstacleBody, Rest};
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
+use crate::track::TrackId;
 use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -15,6 +16,8 @@ pub struct ObstacleTruth<'a> {
     pub name: &'a str,
     /// Length, width and height of its own box.
     pub size_m: Vector3<f64>,
+    /// The track that it is on, or beside.
+    pub track: TrackId,
     /// Chainage of its centre.
     pub chainage_m: f64,
     /// Its centre, left of the centreline.
@@ -40,7 +43,9 @@ pub struct WorkerTruth<'a> {
     pub name: &'a str,
     /// Height of the body.
     pub stature_m: f64,
-    /// Where he is along the line.
+    /// The track that he is on, or beside.
+    pub track: TrackId,
+    /// Where he is along it.
     pub chainage_m: f64,
     /// Left of the centreline.
     pub lateral_m: f64,
@@ -82,8 +87,8 @@ impl World {
 
     /// [`World::bodies`], each with its label.
     pub fn owned_bodies(&self, without: Option<TrainId>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
-        let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
-        let mut owned = self.surroundings.draw(&self.rapier, line, now_s);
+        let (network, now_s) = (&self.tunnel.network, self.time.secs());
+        let mut owned = self.surroundings.draw(&self.rapier, network, now_s);
         // The order may decide pixels: the first train comes last.
         let trains = self.trains.iter().skip(1).chain(self.trains.first());
         for train in trains.filter(|train| Some(train.consist.id) != without) {
@@ -112,12 +117,14 @@ impl World {
 
     /// Workers who are on the line now.
     pub fn workers(&self) -> impl Iterator<Item = WorkerTruth<'_>> {
-        let (line, now_s) = (&self.tunnel.alignment, self.time.secs());
+        let now_s = self.time.secs();
         self.surroundings.walkers.iter().filter_map(move |walker| {
+            let line = self.tunnel.network.alignment(walker.track)?;
             let (chainage_m, lateral_m) = walker.place_m(&self.rapier, line, now_s)?;
             Some(WorkerTruth {
                 name: &walker.settings.name,
                 stature_m: walker.settings.stature_m,
+                track: walker.track,
                 chainage_m,
                 lateral_m,
             })
@@ -137,7 +144,7 @@ impl World {
 
     /// An obstacle as it lies, flies or swings.
     fn obstacle_truth<'a>(&self, obstacle: &'a ObstacleBody) -> Option<ObstacleTruth<'a>> {
-        let line = &self.tunnel.alignment;
+        let line = self.tunnel.network.alignment(obstacle.track)?;
         let (world_from_body, velocity_mps) = obstacle.state(&self.rapier)?;
         let SingleObstacle { settings, body } = &obstacle.piece;
         let centre = world_from_body.translation.vector.into();
@@ -151,6 +158,7 @@ impl World {
         Some(ObstacleTruth {
             name: &settings.name,
             size_m: 2.0 * body.half_extents_m(),
+            track: obstacle.track,
             chainage_m: place.s_m,
             lateral_m: place.l_m,
             height_m: place.h_m,
@@ -164,7 +172,8 @@ impl World {
 
     /// A cable as the box around it.
     fn cable_truth<'a>(&self, cable: &'a Cable) -> Option<ObstacleTruth<'a>> {
-        let (world, line) = (&self.rapier, &self.tunnel.alignment);
+        let line = self.tunnel.network.alignment(cable.track)?;
+        let world = &self.rapier;
         let settings = &cable.settings;
         let middle = cable.ends(world).flatten().map(|p| p.coords);
         let middle = middle.sum::<Vector3<f64>>() / (2.0 * cable.links.len() as f64);
@@ -179,6 +188,7 @@ impl World {
         Some(ObstacleTruth {
             name: &settings.name,
             size_m: 2.0 * half_extents_m,
+            track: cable.track,
             chainage_m: place.s_m,
             lateral_m: place.l_m,
             height_m: place.h_m,

@@ -9,7 +9,7 @@ use super::groups::{OBSTACLE_GROUP, TRAIN_GROUPS, groups, loose};
 use super::obstacle::SingleObstacle;
 use super::obstacle_body::EXTRA_PASSES;
 use super::worker::{Feet, Stance, WorkerSettings};
-use crate::track::Alignment;
+use crate::track::{Alignment, TrackId};
 use crate::twin::geometry::Body;
 use nalgebra::Isometry3;
 use rapier3d_f64::math::Vector;
@@ -29,7 +29,9 @@ pub(super) struct Walker {
     load_is: Load,
     /// While he is on the line.
     pub body: Option<RigidBodyHandle>,
-    /// Where he was last along the line.
+    /// The track that he walks on, or beside.
+    pub track: TrackId,
+    /// Where he was last along that.
     pub near_m: f64,
     /// How he stood when the train hit him.
     hit: Option<Stance>,
@@ -54,8 +56,13 @@ pub(super) enum Act {
 
 impl Walker {
     /// A worker, with what he carries.
-    pub(super) fn new(settings: &WorkerSettings, load: Option<SingleObstacle>) -> Self {
+    pub(super) fn new(
+        settings: &WorkerSettings,
+        track: TrackId,
+        load: Option<SingleObstacle>,
+    ) -> Self {
         Self {
+            track,
             settings: settings.clone(),
             load,
             load_is: Load::InHand,

@@ -27,8 +27,8 @@
 
 use super::adhesion::{KALKER_ACROSS_N, KALKER_ALONG_N};
 use super::deviation::Deviation;
-use super::directed_track::{DirectedTrack, rail_axes};
 use super::energy::Ledger;
+use super::route_track::{RouteTrack, rail_axes};
 use super::slide_protection::{EffortShare, ReferenceSpeed};
 use super::suspension::{Axes, BodyState, Wrench};
 use super::vehicle::{FLANGE_STIFFNESS_N_M, GRAVITY_MPS2, HALF_CONTACT_M, Vehicle};
@@ -147,7 +147,7 @@ impl Wheelset {
     pub(super) fn apply(
         &mut self,
         vehicle: &Vehicle,
-        track: &DirectedTrack,
+        track: &RouteTrack,
         drive: Drive,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
@@ -189,7 +189,7 @@ impl Wheelset {
     }
 
     /// The rails under the axle, a step on.
-    fn follow(&mut self, track: &DirectedTrack, state: &BodyState, dt_s: f64) -> Rails {
+    fn follow(&mut self, track: &RouteTrack, state: &BodyState, dt_s: f64) -> Rails {
         // Predicted to some micrometres; the rest is a step along the tangent.
         let guess = self.s_m + state.velocity.length() * dt_s;
         let frame = track.alignment().at(guess);
@@ -222,7 +222,7 @@ impl Wheelset {
     fn carry(
         &mut self,
         vehicle: &Vehicle,
-        track: &DirectedTrack,
+        track: &RouteTrack,
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
@@ -289,7 +289,7 @@ impl Wheelset {
     fn creep(
         &mut self,
         vehicle: &Vehicle,
-        track: &DirectedTrack,
+        track: &RouteTrack,
         rails: &Rails,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,

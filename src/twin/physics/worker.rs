@@ -34,6 +34,8 @@ settings! {
         ground_m: f64 = BED_M, in -2.0..=2.0;
         /// Share of light that his clothes reflect, 0 to 1.
         albedo: f64 = 0.4, in 0.0..=1.0;
+        /// Name of the track. Default: the tunnel's first.
+        track: Option<String> = None;
         /// Where he is when.
         path: Vec<Waypoint> = Vec::new(), nested;
         /// What he carries, a single thing; place, motion, hold and `appears_s` of it are ignored.

@@ -2,36 +2,36 @@
 
 use super::{Output, Sensor, SensorError};
 use crate::bus::{Content, TrainId};
-use crate::track::Track;
 use crate::twin::physics::World;
-use std::sync::Arc;
 
 /// Says the name of each balise that the head passes, in the step in which it does.
 pub struct BaliseAntenna {
     train: TrainId,
-    track: Arc<Track>,
+    /// Along the train's route when it was last looked where the head is.
     last_m: Option<f64>,
 }
 
 impl BaliseAntenna {
     /// Under the head of a train.
-    pub fn new(train: TrainId, track: Arc<Track>, world: &World) -> Self {
+    pub fn new(train: TrainId, world: &World) -> Self {
         Self {
             train,
-            track,
-            last_m: world.head_m(train),
+            last_m: world.run_m(train),
         }
     }
 }
 
 impl Sensor for BaliseAntenna {
     fn sample(&mut self, world: &World) -> Result<Vec<Output>, SensorError> {
-        let head_m = world.head_m(self.train);
-        let (Some(from_m), Some(to_m)) = (std::mem::replace(&mut self.last_m, head_m), head_m)
-        else {
+        let head_m = world.run_m(self.train);
+        let (Some(from_m), Some(to_m), Some(track)) = (
+            std::mem::replace(&mut self.last_m, head_m),
+            head_m,
+            world.along_route(self.train),
+        ) else {
             return Ok(Vec::new());
         };
-        let passed = self.track.balises_passed(from_m, to_m);
+        let passed = track.balises_passed(from_m, to_m);
         let sample =
             |name: &str| Output::at_once(world.time(), Content::BalisePassed(name.to_owned()));
         Ok(passed.map(sample).collect())
@@ -52,7 +52,7 @@ mod tests {
     fn each_balise_is_read_once_either_way() {
         let text = "name = 'line'\nplan = [{ kind = 'straight', length_m = 400.0 }]\n\
                     balises = [{ name = 'B1', chainage_m = 200.0 }, { name = 'B2', chainage_m = 206.0 }]";
-        let track = Tunnel::from_toml(text).unwrap().first_track().clone();
+        let tunnel = std::sync::Arc::new(Tunnel::from_toml(text).unwrap());
         for (direction, start_chainage_m, expected) in [
             (Direction::Up, 195.0, ["B1", "B2"]),
             (Direction::Down, 211.0, ["B2", "B1"]),
@@ -68,8 +68,8 @@ mod tests {
                 trains: vec![train],
                 ..PhysicsSettings::default()
             };
-            let mut world = World::new(track.clone(), &settings, 1, 0).unwrap();
-            let mut antenna = BaliseAntenna::new(TrainId(0), track.clone(), &world);
+            let mut world = World::new(tunnel.clone(), &settings, 1, 0).unwrap();
+            let mut antenna = BaliseAntenna::new(TrainId(0), &world);
             let mut read = Vec::new();
             while world.time().secs() < 1.5 {
                 world.step(&[]).unwrap();

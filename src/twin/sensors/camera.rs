@@ -7,7 +7,7 @@
 use super::{ClockSettings, ExposureSettings};
 use crate::bus::{CameraModel, DistortionCoefficients, Intrinsics, Shutter, WaysideCalibration};
 use crate::settings::{Checker, settings};
-use crate::track::{Track, TrackPoint, WaysideSite};
+use crate::track::{Track, TrackId, TrackPoint, WaysideSite};
 use crate::twin::render::{LensSettings, SensorSettings};
 use nalgebra::{Isometry3, Matrix3, Point2, Rotation3, Translation3, UnitQuaternion, Vector3};
 use schemars::JsonSchema;
@@ -377,21 +377,21 @@ impl CameraSettings {
     pub fn calibration(
         &self,
         site: &WaysideSite,
-        track: &Track,
+        (id, track): (TrackId, &Track),
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
         let sheet = Self {
             calibration_error: WaysideError::default(),
             ..*self
         };
-        sheet.actual(site, track, with_lidar)
+        sheet.actual(site, (id, track), with_lidar)
     }
 
     /// The device as it really hangs and looks, through which the world is drawn.
     pub fn actual(
         &self,
         site: &WaysideSite,
-        track: &Track,
+        (id, track): (TrackId, &Track),
         with_lidar: bool,
     ) -> Option<WaysideCalibration> {
         let balise = track.balise(&site.balise)?;
@@ -414,6 +414,7 @@ impl CameraSettings {
             camera: self.actual_camera().camera(),
             world_from_camera: world_from_housing * forward_from_camera(),
             world_from_lidar: with_lidar.then(|| world_from_housing * forward_from_lidar()),
+            track: id,
             chainage_m: place.s_m,
             balise_chainage_m: balise.chainage_m,
         })
@@ -524,12 +525,20 @@ mod tests {
         let track = Track::clone(Tunnel::from_toml(text).unwrap().first_track());
         let site = &track.wayside[0];
         let mut camera = CameraSettings::default();
-        let exact = camera.calibration(site, &track, true).unwrap();
-        assert_eq!(camera.actual(site, &track, true), Some(exact.clone()));
+        let exact = camera
+            .calibration(site, (TrackId(0), &track), true)
+            .unwrap();
+        assert_eq!(
+            camera.actual(site, (TrackId(0), &track), true),
+            Some(exact.clone())
+        );
         camera.calibration_error.pitch_deg = 0.5;
         camera.calibration_error.height_m = 0.02;
-        assert_eq!(camera.calibration(site, &track, true), Some(exact.clone()));
-        let actual = camera.actual(site, &track, true).unwrap();
+        assert_eq!(
+            camera.calibration(site, (TrackId(0), &track), true),
+            Some(exact.clone())
+        );
+        let actual = camera.actual(site, (TrackId(0), &track), true).unwrap();
         let turned = |a: &Isometry3<f64>, b: &Isometry3<f64>| a.rotation.angle_to(&b.rotation);
         let half_deg = 0.5f64.to_radians();
         let by = turned(&actual.world_from_camera, &exact.world_from_camera);
@@ -599,7 +608,7 @@ mod tests {
         let track = Track::clone(Tunnel::from_toml(text).unwrap().first_track());
         let site = &track.wayside[0];
         let device = CameraSettings::default()
-            .calibration(site, &track, true)
+            .calibration(site, (TrackId(0), &track), true)
             .unwrap();
         let axis = device.world_from_camera * Vector3::z();
         let lidar = device.world_from_lidar.unwrap();

@@ -1,9 +1,9 @@
 //! What acts on the train's bodies in a step: suspension, rails, couplers, resistance, traction and brakes.
 
-use super::super::directed_track::DirectedTrack;
 use super::super::driver::Effort;
 use super::super::energy::Ledger;
 use super::super::placement::BODIES;
+use super::super::route_track::RouteTrack;
 use super::super::suspension::{Axes, Wrench, coupler, primary, secondary};
 use super::super::vehicle::AXLES;
 use super::super::wheelset::{Drive, Wheelset};
@@ -19,7 +19,7 @@ impl Consist {
     pub(in super::super) fn apply_forces(
         &mut self,
         world: &mut PhysicsWorld,
-        track: &DirectedTrack,
+        track: &RouteTrack,
         effort: Effort,
         dt_s: f64,
     ) {
@@ -64,7 +64,7 @@ impl Consist {
     }
 
     /// Suspension, rails, traction and brakes of car `k`.
-    fn car_forces(&mut self, k: usize, track: &DirectedTrack, drive: Drive, dt_s: f64) {
+    fn car_forces(&mut self, k: usize, track: &RouteTrack, drive: Drive, dt_s: f64) {
         let v = &self.vehicle;
         let ledger = &mut self.ledger;
         let bodies = BODIES * k..BODIES * (k + 1);

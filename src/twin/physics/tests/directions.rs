@@ -28,7 +28,7 @@ fn down_the_line_is_up_the_reversed_line() {
         PlanElement::straight(300.0),
     ];
     let tunnel = line(&bends, 0.01);
-    let length_m = tunnel.alignment.length_m();
+    let length_m = tunnel.first_track().alignment.length_m();
     let down = TrainSettings {
         direction: Direction::Down,
         start_chainage_m: 650.0,
@@ -44,7 +44,7 @@ fn down_the_line_is_up_the_reversed_line() {
         stop_at_m: Some(length_m - 250.0),
         ..down.clone()
     };
-    let reversed = Arc::new(tunnel.reversed());
+    let reversed = Arc::new(Tunnel::of_one(tunnel.first_track().reversed()));
     let mut a = World::new(tunnel, &on_even_track(vec![down]), 1, 0).unwrap();
     let mut b = World::new(reversed, &on_even_track(vec![up]), 1, 0).unwrap();
     for _ in 0..90 {
@@ -63,8 +63,10 @@ fn down_the_line_is_up_the_reversed_line() {
     eprintln!("stopped at {:.3} m of 250", train.chainage_m);
     assert!(train.standing && (train.chainage_m - 250.0).abs() < 0.3);
     assert!((wheels - 400.0).abs() < 2.0, "{wheels}");
-    assert_eq!(a.head_m(TRAIN), Some(train.chainage_m));
-    assert_eq!(a.chainage_at(TRAIN, a.time()), Some(train.chainage_m));
+    assert_eq!(a.head(TRAIN).unwrap().s_m, train.chainage_m);
+    assert_eq!(a.place_at(TRAIN, a.time()), a.head(TRAIN));
+    let run_m = length_m - train.chainage_m;
+    assert!((a.run_m(TRAIN).unwrap() - run_m).abs() < 1e-9);
 }
 
 /// A train that coasts down a grade gains what gravity gives, and loses it uphill, whichever way along
@@ -144,6 +146,6 @@ fn trains_are_asked_by_number() {
     assert_eq!(world.headlights().len(), 16);
     assert_eq!(world.bodies(None).len(), 24);
     assert_eq!(world.bodies(Some(TrainId(3))).len(), 21);
-    assert!(world.train(TrainId(8)).is_none() && world.head_m(TrainId(8)).is_none());
+    assert!(world.train(TrainId(8)).is_none() && world.run_m(TrainId(8)).is_none());
     assert!(world.impacts().is_empty());
 }

@@ -185,7 +185,7 @@ fn val_two_body_collision() {
         let lost = 0.5 * reduced_kg * closing * closing * (1.0 - e * e);
         assert!((hit.energy_lost_j / lost - 1.0).abs() < 0.03, "{lost}");
         // The ball has what the train gave.
-        let along = line.alignment.at(160.0).ahead();
+        let along = line.first_track().alignment.at(160.0).ahead();
         let ball = world.obstacles().next().unwrap();
         let gained = mass_kg * ball.velocity_mps.dot(&along);
         assert!((gained / hit.momentum_n_s - 1.0).abs() < 0.02, "{gained}");
@@ -222,7 +222,7 @@ fn the_train_loses_what_the_crate_gains() {
         (hit.with.as_str(), hit.damage),
         ("crate", Damage::Repairable)
     );
-    let along = line.alignment.at(160.0).ahead();
+    let along = line.first_track().alignment.at(160.0).ahead();
     let gained = 500.0 * world.obstacles().next().unwrap().velocity_mps.dot(&along);
     // 0.6 m g for 60 ms are 177 N s.
     assert!((hit.momentum_n_s - gained - 90.0).abs() < 150.0, "{gained}");

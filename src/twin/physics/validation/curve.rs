@@ -87,6 +87,7 @@ fn felt(world: &World) -> (f64, f64) {
     let bogie_m = 0.5 * (consist.wheelsets[0].s_m + consist.wheelsets[1].s_m);
     let rails = world
         .tunnel
+        .first_track()
         .alignment
         .at(bogie_m)
         .world_from_rails()

@@ -44,7 +44,7 @@ fn shipped(name: &str) -> VehicleFile {
     VehicleFile::shipped(name).unwrap().clone()
 }
 
-fn straight(length_m: f64) -> Arc<Track> {
+fn straight(length_m: f64) -> Arc<Tunnel> {
     line(&[PlanElement::straight(length_m)], 0.0)
 }
 

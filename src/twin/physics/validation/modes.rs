@@ -35,7 +35,13 @@ fn fit(samples: &[f64], dt_s: f64) -> (f64, f64) {
 
 /// Coordinates of the simulated car against a car that runs on undisturbed.
 fn coordinates(now: &World, calm: &World) -> Vec<f64> {
-    let frame = calm.tunnel.alignment.at(0.0).world_from_rails().rotation;
+    let frame = calm
+        .tunnel
+        .first_track()
+        .alignment
+        .at(0.0)
+        .world_from_rails()
+        .rotation;
     let pairs = consist(now).states.iter().zip(&consist(calm).states);
     let both = pairs.flat_map(|(a, b)| {
         let moved = frame.inverse() * Vector3::from(a.position - b.position);
@@ -48,7 +54,13 @@ fn coordinates(now: &World, calm: &World) -> Vec<f64> {
 
 /// Puts the bodies into a mode's shape.
 fn excite(world: &mut World, model: &LinearModel, mode: &Mode) {
-    let frame = world.tunnel.alignment.at(0.0).world_from_rails().rotation;
+    let frame = world
+        .tunnel
+        .first_track()
+        .alignment
+        .at(0.0)
+        .world_from_rails()
+        .rotation;
     let handles = consist(world).handles.clone();
     for (body, handle) in handles.iter().enumerate() {
         let part = |scale: Complex<f64>, first: usize| {

@@ -122,6 +122,7 @@ fn val_p2_of_a_joint() {
         let mut settings = on_track(free_car(file.clone(), kmh), IrregularityClass::None);
         settings.step_s = 0.5e-3;
         settings.track.defects = vec![DefectSettings {
+            track: None,
             shape: DefectShape::Joint {
                 depth_m,
                 half_length_m,

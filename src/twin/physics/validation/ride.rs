@@ -7,6 +7,7 @@
 //! band is 0.3 to 30 Hz, wavelengths are 1 to 80 m (the settings' default), and accelerations are
 //! those of the harmonics, omega^2 z.
 
+use super::super::irregularity::Irregularity;
 use super::model::{CAR, LinearModel, PITCH, Under, WHEELSETS, Z, dof};
 use super::*;
 use nalgebra::{Complex, DVector};

@@ -8,19 +8,19 @@
 //! curves take is creep, and not in it. Then adhesion, the mark and the energy book.
 
 use super::*;
-use crate::track::Tunnel;
+use crate::track::{Track, Tunnel};
 
 const G_MPS2: f64 = model::G_MPS2;
 
 /// Numbers of the equation of motion.
 struct Motion<'a> {
-    tunnel: &'a Track,
+    tunnel: &'a Tunnel,
     train: &'a TrainSettings,
     file: VehicleFile,
 }
 
 impl<'a> Motion<'a> {
-    fn new(tunnel: &'a Track, train: &'a TrainSettings) -> Self {
+    fn new(tunnel: &'a Tunnel, train: &'a TrainSettings) -> Self {
         Self {
             tunnel,
             train,
@@ -31,7 +31,7 @@ impl<'a> Motion<'a> {
     /// Deceleration by gradient, and by what hinders either way: air and bearings.
     fn resistance_mps2(&self, head_m: f64, v: f64) -> (f64, f64) {
         let (t, b, g) = (self.train, &self.file.body, &self.file.bogie);
-        let confined = match self.tunnel.sections.is_empty() {
+        let confined = match self.tunnel.first_track().sections.is_empty() {
             true => 1.0,
             false => t.tunnel_factor,
         };
@@ -39,7 +39,11 @@ impl<'a> Motion<'a> {
         for car in 0..t.cars {
             let middle_m = head_m - (f64::from(car) + 0.5) * b.length_m;
             for end in [0.5, -0.5] {
-                let frame = self.tunnel.alignment.at(middle_m + end * g.distance_m);
+                let frame = self
+                    .tunnel
+                    .first_track()
+                    .alignment
+                    .at(middle_m + end * g.distance_m);
                 rise += frame.slope.atan().sin() / f64::from(2 * t.cars);
             }
         }
@@ -59,7 +63,7 @@ impl<'a> Motion<'a> {
             self.train.start_speed_kmh / 3.6,
         );
         let rate = |t: f64, s: f64, v: f64| {
-            let slope = self.tunnel.alignment.at(s).slope;
+            let slope = self.tunnel.first_track().alignment.at(s).slope;
             let (traction, brake) = effort(t);
             let (gradient, friction) = self.resistance_mps2(s, v);
             let friction = (friction + brake) * (v / standing).clamp(-1.0, 1.0);
@@ -86,18 +90,18 @@ impl<'a> Motion<'a> {
 }
 
 /// A line with tunnel walls: the real one's first cross-section all along.
-fn in_tunnel(plain: Arc<Track>) -> Arc<Track> {
-    let mut sections = chengdu().sections.clone();
+fn in_tunnel(plain: Arc<Tunnel>) -> Arc<Tunnel> {
+    let mut sections = chengdu().first_track().sections.clone();
     sections.truncate(1);
-    Arc::new(Track {
+    Arc::new(Tunnel::of_one(Track {
         sections,
-        ..Track::clone(&plain)
-    })
+        ..Track::clone(plain.first_track())
+    }))
 }
 
-fn chengdu() -> Arc<Track> {
+fn chengdu() -> Arc<Tunnel> {
     let text = include_str!("../../../../tunnels/chengdu_line1.toml");
-    Tunnel::from_toml(text).unwrap().first_track().clone()
+    Arc::new(Tunnel::from_toml(text).unwrap())
 }
 
 fn train(cars: u32, speed_kmh: f64) -> TrainSettings {
@@ -124,7 +128,7 @@ fn compare(what: &str, got: f64, want: f64, share: f64) {
 }
 
 /// Grades that a long train covers two of.
-fn hills() -> Arc<Track> {
+fn hills() -> Arc<Tunnel> {
     let grade = |from_m, permille: f64, radius_m| Grade {
         from_m,
         slope: 1e-3 * permille,
@@ -138,10 +142,7 @@ fn hills() -> Arc<Track> {
     ];
     let plan = [PlanElement::straight(4000.0)];
     let alignment = Alignment::new(Point3::origin(), 0.4, &plan, &grades);
-    Arc::new(Track {
-        alignment,
-        ..Track::clone(&straight(4000.0))
-    })
+    Arc::new(Tunnel::of_one(Track::bare("hills", alignment)))
 }
 
 /// Fails where running resistance, the tunnel's air, gradients or rotating parts are wrong

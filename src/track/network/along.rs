@@ -1,0 +1,174 @@
+//! What a train meets on its route: the tracks of the route one after the other, as one track.
+
+use super::{Network, Route};
+use crate::track::{
+    Balise, BaseStation, Direction, LampSite, SectionRange, StoppingPlace, Track, TrackId,
+    TrackPoint, WaysideSite,
+};
+use std::sync::Arc;
+
+/// Lamps of other tracks are on the route's map up to this far beside it, in plan.
+const BESIDE_M: f64 = 12.0;
+/// And so far above or below.
+const LEVEL_M: f64 = 6.0;
+
+impl Network {
+    /// The tracks of a route as one: chainages count along the route, left is left of who runs on it. Lamps of
+    /// tracks beside it, which a camera may see there, are among its lamps.
+    ///
+    /// # Panics
+    ///
+    /// On a route of another network.
+    pub fn along(&self, route: &Route) -> Arc<Track> {
+        if let Some(track) = self.whole_track(route) {
+            return track;
+        }
+        let parts = route.legs().iter().map(|leg| {
+            let (low_m, high_m) = leg.stretch_m();
+            let part = self.tracks[usize::from(leg.track.0)].stretch(low_m, high_m);
+            match leg.direction {
+                Direction::Up => part,
+                Direction::Down => part.reversed(),
+            }
+        });
+        let whole = parts.reduce(Track::then);
+        let mut whole = whole.unwrap_or_else(|| Track::clone(&self.tracks[0]));
+        self.add_lamps_beside(route, &mut whole);
+        Arc::new(whole)
+    }
+
+    /// The track of a network of one, where the route is all of it.
+    fn whole_track(&self, route: &Route) -> Option<Arc<Track>> {
+        let ([track], [leg]) = (&self.tracks[..], route.legs()) else {
+            return None;
+        };
+        let whole = leg.stretch_m() == (0.0, track.alignment.length_m());
+        whole.then(|| match leg.direction {
+            Direction::Up => track.clone(),
+            Direction::Down => Arc::new(track.reversed()),
+        })
+    }
+
+    fn add_lamps_beside(&self, route: &Route, whole: &mut Track) {
+        let on_route = |k: usize| route.legs().iter().any(|leg| usize::from(leg.track.0) == k);
+        let others = self
+            .tracks
+            .iter()
+            .enumerate()
+            .filter(|(k, _)| !on_route(*k));
+        for (_, track) in others {
+            for lamp in &track.lamps {
+                let point = whole.alignment.nearest(&lamp.centre);
+                if let Some(TrackPoint { s_m, l_m, h_m }) = point
+                    && l_m.abs() <= BESIDE_M
+                    && h_m.abs() <= LEVEL_M
+                {
+                    whole.lamps.push(LampSite {
+                        chainage_m: s_m,
+                        lateral_m: l_m,
+                        height_m: h_m,
+                        ..lamp.clone()
+                    });
+                }
+            }
+        }
+        (whole.lamps).sort_by(|a, b| a.chainage_m.total_cmp(&b.chainage_m));
+    }
+
+    /// The whole of the only track of a network, run in a direction.
+    pub fn only_track(&self, direction: Direction) -> Option<Route> {
+        let track = TrackId::default();
+        let length_m = self.alignment(track)?.length_m();
+        let end_m = [(0.0, length_m), (length_m, 0.0)];
+        let (from_m, to_m) = end_m[usize::from(direction == Direction::Down)];
+        Some(Route::of(vec![super::Leg {
+            track,
+            direction,
+            from_m,
+            to_m,
+        }]))
+    }
+}
+
+impl Track {
+    /// The track between two of its chainages, the first of which becomes 0.
+    #[must_use]
+    pub fn stretch(&self, from_m: f64, to_m: f64) -> Self {
+        let is_on = |s_m: f64| (from_m..=to_m).contains(&s_m);
+        let mut part = self.shifted(-from_m);
+        part.alignment = self.alignment.stretch(from_m, to_m);
+        part.lamps = kept(part.lamps, |lamp| is_on(lamp.chainage_m + from_m));
+        part.wayside = kept(part.wayside, |site| is_on(site.chainage_m + from_m));
+        part.balises = kept(part.balises, |balise| is_on(balise.chainage_m + from_m));
+        part.base_stations = kept(part.base_stations, |base| is_on(base.chainage_m + from_m));
+        part.stations = kept(part.stations, |stop| is_on(stop.chainage_m + from_m));
+        let length_m = to_m - from_m;
+        part.sections = kept(part.sections, |r| r.to_m > 0.0 && r.from_m < length_m);
+        for range in &mut part.sections {
+            range.from_m = range.from_m.max(0.0);
+            range.to_m = range.to_m.min(length_m);
+        }
+        part
+    }
+
+    /// This track and then another one, which begins where this one ends.
+    #[must_use]
+    pub fn then(mut self, next: Self) -> Self {
+        let length_m = self.alignment.length_m();
+        let next = next.shifted(length_m);
+        self.name = format!("{}, {}", self.name, next.name);
+        self.alignment = self.alignment.then(&next.alignment);
+        self.sections.extend(next.sections);
+        self.lamps.extend(next.lamps);
+        self.wayside.extend(next.wayside);
+        self.balises.extend(next.balises);
+        self.base_stations.extend(next.base_stations);
+        self.stations.extend(next.stations);
+        self
+    }
+
+    /// All that stands along it, at chainages that are higher by so much. The alignment stays as it is.
+    fn shifted(&self, by_m: f64) -> Self {
+        let sections = self.sections.iter().map(|range| SectionRange {
+            from_m: range.from_m + by_m,
+            to_m: range.to_m + by_m,
+            ..range.clone()
+        });
+        let lamps = self.lamps.iter().map(|lamp| LampSite {
+            chainage_m: lamp.chainage_m + by_m,
+            ..lamp.clone()
+        });
+        let wayside = self.wayside.iter().map(|site| WaysideSite {
+            chainage_m: site.chainage_m + by_m,
+            ..site.clone()
+        });
+        let balises = self.balises.iter().map(|balise| Balise {
+            chainage_m: balise.chainage_m + by_m,
+            ..balise.clone()
+        });
+        let bases = self.base_stations.iter().map(|base| BaseStation {
+            chainage_m: base.chainage_m + by_m,
+            ..base.clone()
+        });
+        let stations = self.stations.iter().map(|stop| StoppingPlace {
+            chainage_m: stop.chainage_m + by_m,
+            ..stop.clone()
+        });
+        Self {
+            name: self.name.clone(),
+            alignment: self.alignment.clone(),
+            sections: sections.collect(),
+            lamps: lamps.collect(),
+            wayside: wayside.collect(),
+            balises: balises.collect(),
+            base_stations: bases.collect(),
+            stations: stations.collect(),
+            ambient_lx: self.ambient_lx,
+        }
+    }
+}
+
+fn kept<T>(mut list: Vec<T>, keep: impl Fn(&T) -> bool) -> Vec<T> {
+    list.retain(keep);
+    list
+}

@@ -1,0 +1,189 @@
+//! The way of a train from its start over places that it is to pass to where it stops, with the tracks behind its
+//! tail and beyond its stop.
+
+use super::{Leg, Network, Route, TrackEnd};
+use crate::track::{Direction, Place, TrackId};
+
+/// A route without a stop ends after so many tracks.
+const MOST_TRACKS: usize = 200;
+/// Beyond a stop a route goes on for so far, where there is track: a train may run past it.
+const BEYOND_M: f64 = 500.0;
+
+/// A route of whole tracks, with the places of a train on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Itinerary {
+    /// From behind the train's tail to beyond its stop.
+    pub route: Route,
+    /// Distance along the route of the train's head at the start.
+    pub start_m: f64,
+    /// Distance along the route of its stop.
+    pub stop_m: Option<f64>,
+}
+
+impl Network {
+    /// The way of a train from a start over other tracks to a stop: the shortest from each to the next. Where nothing
+    /// else is said it runs switches straight on. Behind the start there are at least `behind_m` of it, where there
+    /// is track. None where there is no such way.
+    pub fn itinerary(
+        &self,
+        (start, direction): (Place, Direction),
+        via: &[TrackId],
+        stop: Option<Place>,
+        behind_m: f64,
+    ) -> Option<Itinerary> {
+        let mut ends = vec![TrackEnd {
+            track: start.track,
+            way: direction,
+        }];
+        let mut at = (start, direction);
+        for track in via {
+            let middle_m = 0.5 * self.alignment(*track)?.length_m();
+            let middle = Place {
+                track: *track,
+                s_m: middle_m,
+            };
+            at = self.go_on(&mut ends, at, middle)?;
+        }
+        if let Some(stop) = stop {
+            self.go_on(&mut ends, at, stop)?;
+        }
+        let stop_leg = ends.len() - 1;
+        self.run_on(&mut ends, stop.is_some());
+        let behind = self.behind((start, direction), behind_m);
+        let (start_leg, stop_leg) = (behind.len(), behind.len() + stop_leg);
+        let all = behind.into_iter().chain(ends);
+        let legs: Option<Vec<Leg>> = all.map(|end| self.whole_leg(end)).collect();
+        let route = Route::of(legs?);
+        let run_m = |k: usize, s_m: f64| {
+            let leg = &route.legs()[k];
+            route.begin_m(k) + leg.direction.ahead_m(leg.from_m, s_m)
+        };
+        Some(Itinerary {
+            start_m: run_m(start_leg, start.s_m),
+            stop_m: stop.map(|stop| run_m(stop_leg, stop.s_m)),
+            route,
+        })
+    }
+
+    /// Adds the tracks of the shortest way to a place; gives where that comes to, and which way.
+    fn go_on(
+        &self,
+        ends: &mut Vec<TrackEnd>,
+        from: (Place, Direction),
+        to: Place,
+    ) -> Option<(Place, Direction)> {
+        let way = self.shortest(from, to)?;
+        let legs = way.legs().iter().skip(1);
+        ends.extend(legs.map(|leg| TrackEnd {
+            track: leg.track,
+            way: leg.direction,
+        }));
+        Some(way.place(way.length_m()))
+    }
+
+    /// Adds the tracks beyond the last one, straight on.
+    fn run_on(&self, ends: &mut Vec<TrackEnd>, stops: bool) {
+        let mut beyond_m = 0.0;
+        while let Some(next) = ends.last().and_then(|end| self.next(*end).next()) {
+            if ends.len() >= MOST_TRACKS || (stops && beyond_m >= BEYOND_M) {
+                return;
+            }
+            beyond_m += self
+                .alignment(next.track)
+                .map_or(0.0, |line| line.length_m());
+            ends.push(next.opposite());
+        }
+    }
+
+    /// The tracks behind a place, straight on, as a train runs over them that comes to it.
+    fn behind(&self, (place, direction): (Place, Direction), behind_m: f64) -> Vec<TrackEnd> {
+        let mut back = TrackEnd {
+            track: place.track,
+            way: direction.reversed(),
+        };
+        let mut length_m = self.left_m(place, back.way).unwrap_or(0.0);
+        let mut tracks = Vec::new();
+        while length_m < behind_m && tracks.len() < MOST_TRACKS {
+            let Some(next) = self.next(back).next() else {
+                break;
+            };
+            // The next track is entered at this end from its other one by a train that comes.
+            tracks.push(next);
+            back = next.opposite();
+            length_m += self
+                .alignment(next.track)
+                .map_or(0.0, |line| line.length_m());
+        }
+        tracks.reverse();
+        tracks
+    }
+
+    /// The whole of a track, run towards an end.
+    fn whole_leg(&self, end: TrackEnd) -> Option<Leg> {
+        let length_m = self.alignment(end.track)?.length_m();
+        let (from_m, to_m) = match end.way {
+            Direction::Up => (0.0, length_m),
+            Direction::Down => (length_m, 0.0),
+        };
+        Some(Leg {
+            track: end.track,
+            direction: end.way,
+            from_m,
+            to_m,
+        })
+    }
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+    use crate::track::Tunnel;
+
+    /// Provokes: a way that leaves out what it is to pass, a train whose tail is on no track, a start or stop at
+    /// another distance than its place, tracks that do not follow each other.
+    #[test]
+    fn a_train_goes_where_it_is_sent() {
+        let text = include_str!("../../../tunnels/terminus.toml");
+        let network = Tunnel::from_toml(text).unwrap().network;
+        let track = |name| network.named(name).unwrap();
+        let place = |name, s_m| Place {
+            track: track(name),
+            s_m,
+        };
+        let names = |it: &Itinerary| {
+            let legs = it.route.legs().iter();
+            let names = legs.map(|leg| &*network.tracks[usize::from(leg.track.0)].name);
+            names.collect::<Vec<_>>().join(" ")
+        };
+        let start = (place("u3", 20.0), Direction::Up);
+        let it = network
+            .itinerary(start, &[], Some(place("siding", 170.0)), 200.0)
+            .unwrap();
+        // Behind its head are 20 m of u3, 154 m of u2, and u1.
+        assert_eq!(names(&it), "u1 u2 u3 C d4 siding");
+        assert_eq!(it.route.place(it.start_m).0, start.0);
+        let (stop, way) = it.route.place(it.stop_m.unwrap());
+        assert!((stop.s_m - 170.0).abs() < 1e-9 && way == Direction::Up);
+        assert_eq!(stop.track, track("siding"));
+
+        let up = (place("u1", 200.0), Direction::Up);
+        let by = |via: &[TrackId]| network.itinerary(up, via, Some(place("siding", 100.0)), 200.0);
+        assert_eq!(names(&by(&[]).unwrap()), "u1 A d2 d3 d4 siding");
+        assert_eq!(names(&by(&[track("u3")]).unwrap()), "u1 u2 u3 C d4 siding");
+        assert_eq!(by(&[track("lead")]), None);
+
+        let down = (place("depot 3", 200.0), Direction::Down);
+        let it = network
+            .itinerary(down, &[], Some(place("d1", 50.0)), 200.0)
+            .unwrap();
+        assert_eq!(names(&it), "depot 3 ladder 2 ladder 1 lead D d4 d3 d2 d1");
+        assert!((it.start_m - (239.13 - 200.0)).abs() < 1e-9);
+
+        // Without a stop it runs on to the end.
+        let it = network.itinerary(up, &[], None, 10.0).unwrap();
+        assert_eq!(names(&it), "u1 u2 u3 u4 lead depot 1");
+        let all = [up.0, down.0].map(|place| network.has(place));
+        assert_eq!(all, [true, true]);
+    }
+}
