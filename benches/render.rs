@@ -69,7 +69,7 @@ fn table() {
     println!("\npairs a second       lamps in view   30 us   500 us   2000 us");
     for (lamps, what) in [(0, "none"), (1, "as shipped"), (3, "three times")] {
         let mut scene = sample::scene();
-        let track = scene.track.clone();
+        let track = scene.tracks[0].clone();
         let shipped = std::mem::take(&mut scene.lamps);
         for k in 0..lamps {
             let aside_m = 3.0 * f64::from(k);
@@ -117,7 +117,7 @@ fn sized(track: &Track, s_m: f64, (width_px, height_px): (u32, u32), exposure_s:
 
 fn main() {
     let scene = sample::scene();
-    let track = scene.track.clone();
+    let track = scene.tracks[0].clone();
     let mut renderer = GpuRenderer::new(scene).unwrap();
     let stereo: Vec<_> = (0..20)
         .map(|k| sample::stereo_job(&track, 100.0 + f64::from(k), 60.0 / 3.6))

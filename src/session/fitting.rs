@@ -140,12 +140,7 @@ impl Fitting {
         let node = Node::Post(name.clone());
         if let (Some(settings), Some(pose)) = (&post.lidar, post.actual.world_from_lidar) {
             let stream = Stream::new(scenario.file.seed, 0, &format!("wayside_lidar/{name}"));
-            let lidar = Lidar::new(
-                settings,
-                &scenario.tunnel.network.tracks[usize::from(post.actual.track.0)],
-                &pose,
-                stream,
-            );
+            let lidar = Lidar::new(settings, &scenario.tunnel.network.tracks, &pose, stream);
             let delay_s = 1e-3 * scenario.file.stack.latency_ms;
             let lidar = WaysideLidar::new(lidar, delay_s);
             self.add_sensor(node.clone(), lidar);

@@ -55,7 +55,7 @@ use crate::scenario::Scenario;
 use crate::twin::lamps;
 use crate::twin::physics::PhysicsError;
 use crate::twin::physics::RailState;
-use crate::twin::reflectance::Wet;
+use crate::twin::reflectance::{Wet, WetRange};
 use crate::twin::render::cpu::CpuRenderer;
 use crate::twin::render::gpu::GpuRenderer;
 use crate::twin::render::{RenderError, Renderer, Scene};
@@ -168,24 +168,33 @@ pub fn renderer(
 
 /// What stands still in a scenario.
 pub fn scene(scenario: &Scenario) -> Scene {
-    let track = scenario.tunnel.first_track().clone();
-    let lamps = lamps::shining(
-        &scenario.tunnel,
-        &scenario.file.faults.lamps,
-        scenario.file.seed,
-    );
-    let everywhere = f64::NEG_INFINITY..f64::INFINITY;
-    let zones = scenario.physics.track.rail_zones.iter();
-    let zones = zones.map(|zone| (zone.from_m..zone.to_m, zone.rail));
-    let rails = std::iter::once((everywhere, scenario.physics.track.rail)).chain(zones);
+    let network = &scenario.tunnel.network;
+    let track = &scenario.physics.track;
+    let everywhere = WetRange {
+        track: None,
+        chainage_m: f64::NEG_INFINITY..f64::INFINITY,
+        wet: track.rail == RailState::Wet,
+    };
+    let zones = track.rail_zones.iter().map(|zone| WetRange {
+        // Without a name it is of the first track.
+        track: Some(
+            zone.track
+                .as_ref()
+                .map_or(0, |name| network.named(name).unwrap_or_default().0.into()),
+        ),
+        chainage_m: zone.from_m..zone.to_m,
+        wet: zone.rail == RailState::Wet,
+    });
     Scene {
-        track,
-        lamps,
+        tracks: network.tracks.clone(),
+        lamps: lamps::shining(
+            &scenario.tunnel,
+            &scenario.file.faults.lamps,
+            scenario.file.seed,
+        ),
         air: scenario.file.air.air(),
         wet: Wet {
-            ranges: rails
-                .map(|(range, rail)| (range, rail == RailState::Wet))
-                .collect(),
+            ranges: std::iter::once(everywhere).chain(zones).collect(),
         },
     }
 }

@@ -19,27 +19,36 @@ pub const fn mean_albedo(material: Material) -> f64 {
     }
 }
 
-/// Where the line is wet.
+/// A stretch that is wet, or is not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WetRange {
+    /// The track, by number; of all tracks without.
+    pub track: Option<usize>,
+    /// Its chainages.
+    pub chainage_m: Range<f64>,
+    /// Whether it is.
+    pub wet: bool,
+}
+
+/// Where tracks are wet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Wet {
-    /// Ranges of chainage and whether they are; the last one that holds a place counts.
-    pub ranges: Vec<(Range<f64>, bool)>,
+    /// The last one that holds a place counts.
+    pub ranges: Vec<WetRange>,
 }
 
 impl Wet {
-    /// Whether it is wet at a chainage.
-    pub fn at(&self, s_m: f64) -> bool {
-        let covers = self
-            .ranges
-            .iter()
-            .rev()
-            .find(|(range, _)| range.contains(&s_m));
-        covers.is_some_and(|(_, wet)| *wet)
+    /// Whether it is wet at a chainage of a track.
+    pub fn at(&self, track: usize, s_m: f64) -> bool {
+        let covers = self.ranges.iter().rev().find(|range| {
+            range.track.is_none_or(|t| t == track) && range.chainage_m.contains(&s_m)
+        });
+        covers.is_some_and(|range| range.wet)
     }
 
     /// By how much the diffuse light of a surface is less.
-    pub fn albedo_factor(&self, material: Material, s_m: f64) -> f64 {
-        if material == Material::Bed && self.at(s_m) {
+    pub fn albedo_factor(&self, material: Material, track: usize, s_m: f64) -> f64 {
+        if material == Material::Bed && self.at(track, s_m) {
             WET_ALBEDO
         } else {
             1.0
@@ -55,12 +64,24 @@ mod tests {
     #[test]
     fn the_last_range_counts() {
         let all = f64::NEG_INFINITY..f64::INFINITY;
-        let wet = Wet {
-            ranges: vec![(all, true), (10.0..20.0, false), (15.0..18.0, true)],
+        let range = |chainage_m, wet| WetRange {
+            track: None,
+            chainage_m,
+            wet,
         };
-        assert!(wet.at(0.0) && !wet.at(12.0) && wet.at(16.0) && !wet.at(19.0) && wet.at(20.0));
-        assert!(!Wet::default().at(0.0));
-        assert!((wet.albedo_factor(Material::Bed, 0.0) - 0.6).abs() < 1e-12);
-        assert!((wet.albedo_factor(Material::Lining, 0.0) - 1.0).abs() < 1e-12);
+        let mut wet = Wet {
+            ranges: vec![
+                range(all, true),
+                range(10.0..20.0, false),
+                range(15.0..18.0, true),
+            ],
+        };
+        let at = |wet: &Wet, s_m| wet.at(0, s_m);
+        assert!(at(&wet, 0.0) && !at(&wet, 12.0) && at(&wet, 16.0) && !at(&wet, 19.0));
+        assert!(at(&wet, 20.0) && !at(&Wet::default(), 0.0));
+        assert!((wet.albedo_factor(Material::Bed, 0, 0.0) - 0.6).abs() < 1e-12);
+        assert!((wet.albedo_factor(Material::Lining, 0, 0.0) - 1.0).abs() < 1e-12);
+        wet.ranges[1].track = Some(1);
+        assert!(at(&wet, 12.0) && !wet.at(1, 12.0));
     }
 }

@@ -67,7 +67,7 @@ pub fn dark_scene(lamps: Vec<LampLight>) -> Scene {
     track.ambient_lx = 0.0;
     track.sections.clear();
     Scene {
-        track: track.into(),
+        tracks: vec![track.into()],
         lamps,
         air: Air::default(),
         wet: Wet::default(),

@@ -67,7 +67,7 @@ pub fn scene() -> Scene {
         .map(|site| LampLight::from_site(site, 1e-4 * f64::from(site.uid.lamp % 17)))
         .collect();
     Scene {
-        track: Arc::new(track),
+        tracks: vec![Arc::new(track)],
         lamps,
         air: Air::default(),
         wet: Wet::default(),

@@ -199,8 +199,8 @@ fn moving_bodies_are_where_they_belong() {
 #[test]
 fn same_job_same_bytes() {
     let scene = sample::scene();
-    let a = sample::stereo_job(&scene.track, 40.0, SPEED_MPS);
-    let b = sample::wayside_job(&scene.track, 300.0);
+    let a = sample::stereo_job(&scene.tracks[0], 40.0, SPEED_MPS);
+    let b = sample::wayside_job(&scene.tracks[0], 300.0);
     let mut one = gpu(scene.clone());
     let first = draw(&mut *one, &a);
     let other = draw(&mut *one, &b);
@@ -220,8 +220,8 @@ fn same_job_same_bytes() {
 #[test]
 fn views_do_not_touch_each_other() {
     let scene = sample::scene();
-    let mut all = sample::wayside_job(&scene.track, 300.0);
-    let pair = sample::stereo_job(&scene.track, 290.0, SPEED_MPS);
+    let mut all = sample::wayside_job(&scene.tracks[0], 300.0);
+    let pair = sample::stereo_job(&scene.tracks[0], 290.0, SPEED_MPS);
     all.views.splice(0..0, pair.views);
     let mut renderer = gpu(scene);
     let together = draw(&mut *renderer, &all);
@@ -245,7 +245,7 @@ fn views_do_not_touch_each_other() {
 #[test]
 fn a_flooded_deep_well_is_white() {
     let scene = sample::scene();
-    let mut view = sample::rig_view(&scene.track, 102.0, 0.0);
+    let mut view = sample::rig_view(&scene.tracks[0], 102.0, 0.0);
     view.sensor.full_well_e = 6e4;
     view.sensor.pattern = Pattern::Rggb;
     view.lens.transmission = 1.0;
@@ -276,7 +276,7 @@ fn another_scene_is_as_good_as_new() {
     let mut second = sample::scene();
     second.air = Air::of_visibility(60.0);
     second.lamps.truncate(second.lamps.len() / 2);
-    let track = first.track.clone();
+    let track = first.tracks[0].clone();
     let jobs = [
         sample::stereo_job(&track, 70.0, 15.0),
         sample::wayside_job(&track, 100.0),
@@ -301,7 +301,7 @@ fn another_scene_is_as_good_as_new() {
 #[test]
 fn timed_passes_are_parts_of_the_job() {
     let scene = sample::scene();
-    let job = sample::stereo_job(&scene.track, 101.0, 60.0 / 3.6);
+    let job = sample::stereo_job(&scene.tracks[0], 101.0, 60.0 / 3.6);
     let mut renderer = GpuRenderer::new(scene).unwrap();
     renderer.draw_parts(false);
     let untimed = draw(&mut renderer, &job);

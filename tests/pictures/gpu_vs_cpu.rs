@@ -26,7 +26,7 @@ use metrotwin::bus::{Distortion, DistortionCoefficients, Intrinsics, SimTime};
 use metrotwin::track::{Track, TrackPoint};
 use metrotwin::twin::geometry::{Body, Hull, Shape};
 use metrotwin::twin::lights::{Headlight, LampLight};
-use metrotwin::twin::reflectance::Wet;
+use metrotwin::twin::reflectance::{Wet, WetRange};
 use metrotwin::twin::render::{CameraMotion, Job, Renderer, Scene, View};
 use nalgebra::{Isometry3, Point2, Point3, UnitQuaternion, Vector3};
 use std::f64::consts::TAU;
@@ -78,9 +78,9 @@ fn shaken(track: &Track, s_m: f64, start: SimTime) -> CameraMotion {
 /// The sample scene, with so much light on all surfaces that every pattern shows.
 fn floodlit() -> Scene {
     let mut scene = sample::scene();
-    let mut track = (*scene.track).clone();
+    let mut track = (*scene.tracks[0]).clone();
     track.ambient_lx = 20_000.0;
-    scene.track = track.into();
+    scene.tracks = vec![track.into()];
     scene
 }
 
@@ -273,7 +273,11 @@ fn wet_ground_mirrors() {
     let track = sample::track();
     let mut scene = sample::scene();
     scene.wet = Wet {
-        ranges: vec![(0.0..130.0, true)],
+        ranges: vec![WetRange {
+            track: None,
+            chainage_m: 0.0..130.0,
+            wet: true,
+        }],
     };
     for (s_m, exposure_s, gain) in [(100.0, 16e-3, 1.0), (100.0, 1e-3, 15.0), (60.0, 2e-4, 40.0)] {
         let mut job = wayside_job(&track, s_m, gain);
@@ -325,9 +329,9 @@ fn an_edge_is_a_ramp(name: &str, make: Make) {
     let confusion_px = view.confusion_px(4.0);
     let mut scene = sample::scene();
     scene.lamps.clear();
-    let mut track = (*scene.track).clone();
+    let mut track = (*scene.tracks[0]).clone();
     (track.ambient_lx, track.sections) = (0.0, Vec::new());
-    scene.track = track.into();
+    scene.tracks = vec![track.into()];
     let job = Job {
         bodies: vec![board],
         views: vec![view],

@@ -24,7 +24,7 @@ fn scene() -> Scene {
     scene.lamps.truncate(1);
     let lamp = &mut scene.lamps[0];
     lamp.centre = Point3::from(
-        sample::on_bed(&scene.track, S_M, 0.0, LAMP_M)
+        sample::on_bed(&scene.tracks[0], S_M, 0.0, LAMP_M)
             .translation
             .vector,
     );
@@ -35,7 +35,7 @@ fn scene() -> Scene {
 fn ball(scene: &Scene) -> Body {
     Body {
         shape: Shape::Sphere(BALL_RADIUS_M),
-        world_from_body: sample::on_bed(&scene.track, S_M, 0.0, BALL_M),
+        world_from_body: sample::on_bed(&scene.tracks[0], S_M, 0.0, BALL_M),
         velocity_mps: Vector3::zeros(),
         albedo: 0.5,
         luminance_cd_m2: 0.0,
@@ -49,8 +49,8 @@ fn view(scene: &Scene) -> View {
         l_m: -0.8,
         h_m: 1.6,
     };
-    let mut view = sample::wayside_job(&scene.track, S_M).views.remove(0);
-    let pose = sample::camera_pose(&scene.track, at, 0.46, -0.78);
+    let mut view = sample::wayside_job(&scene.tracks[0], S_M).views.remove(0);
+    let pose = sample::camera_pose(&scene.tracks[0], at, 0.46, -0.78);
     view.motion = CameraMotion::still(pose);
     view.sensor.noise = false;
     view.sensor.black_level_grey = BLACK;
@@ -106,7 +106,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
     let shaded = draw(renderer, &job).remove(0);
     let [umbra_m, middle_m, penumbra_m] = [lamp.radius_m, 0.0, -lamp.radius_m].map(edge_m);
     println!("umbra {umbra_m:.3} m, middle {middle_m:.3} m, penumbra {penumbra_m:.3} m");
-    let foot = sample::on_bed(&scene.track, S_M, 0.0, 0.0);
+    let foot = sample::on_bed(&scene.tracks[0], S_M, 0.0, 0.0);
     let (mut inside, mut outside, mut between) = (0, 0, 0);
     let (mut halfway, mut halfway_sum) = (0, 0.0);
     for (u, v, pixel) in free.enumerate_pixels() {
@@ -124,7 +124,7 @@ fn a_ball_has_umbra_and_penumbra(renderer: &mut dyn Renderer) {
         }
         let p = foot * at;
         let lamp_lx = BlinkingLamp::new(lamp.clone()).irradiance_lx(&p, &Vector3::z());
-        let ambient = scene.track.ambient_lx / (scene.track.ambient_lx + lamp_lx);
+        let ambient = scene.tracks[0].ambient_lx / (scene.tracks[0].ambient_lx + lamp_lx);
         let hidden = (1.0 - left / light) / (1.0 - ambient);
         // A pixel of two millimetres, and places that do not reach the rim of the disc.
         if away_m < umbra_m - 0.004 {
@@ -168,7 +168,7 @@ fn a_ball_has_umbra_and_penumbra_on_the_gpu() {
 
 /// A worker, a box, a cylinder, a boulder, and a train that comes with its headlights on.
 fn busy_job(scene: &Scene, s_m: f64) -> Job {
-    let track = &scene.track;
+    let track = &scene.tracks[0];
     let mut job = sample::wayside_job(track, s_m);
     let body = |shape, world_from_body, velocity_mps| Body {
         shape,

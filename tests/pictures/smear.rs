@@ -96,9 +96,9 @@ enum Motion {
 /// Walls in floodlight, and a board that moves across.
 fn a_lit_tunnel_that_passes(name: &str, make: Make) {
     let mut scene = sample::scene();
-    let mut track = (*scene.track).clone();
+    let mut track = (*scene.tracks[0]).clone();
     track.ambient_lx = 20_000.0;
-    scene.track = track.into();
+    scene.tracks = vec![track.into()];
     scene.lamps.clear();
     for (exposure_s, motion) in [
         (30e-6, Motion::AlongTheLine),

@@ -309,9 +309,9 @@ fn lamps_fail_in_time_on_the_gpu() {
 fn dim_lamps_give_as_much_less() {
     let scene = |faults: &str| {
         let mut scene = lamps(faults);
-        let mut track = (*scene.track).clone();
+        let mut track = (*scene.tracks[0]).clone();
         track.ambient_lx = 0.0;
-        scene.track = track.into();
+        scene.tracks = vec![track.into()];
         scene
     };
     let whole = draw(cpu(scene("")).as_mut(), 0.0);

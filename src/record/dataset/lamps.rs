@@ -228,7 +228,13 @@ mod tests {
     /// What the table says of the lamps in a view of a job.
     fn seen(scene: &Scene, job: &Job) -> Vec<LampRow> {
         let sight = Projection::new(&job.views[0], job.time);
-        LampRow::all(7, job, &sight, &Labeller::new(scene), &scene.track.lamps)
+        LampRow::all(
+            7,
+            job,
+            &sight,
+            &Labeller::new(scene),
+            &scene.tracks[0].lamps,
+        )
     }
 
     /// Area and centroid of a polygon.

@@ -5,9 +5,11 @@ mod body;
 mod hull;
 mod section;
 mod solid;
+mod track_caster;
 mod tunnel;
 
 pub use body::{Body, Shape};
 pub use hull::{Face, Hull};
 pub use solid::Solid;
-pub use tunnel::{STATION_STEP_M, SurfacePoint, TunnelCaster, TunnelHit};
+pub use track_caster::{STATION_STEP_M, SurfacePoint};
+pub use tunnel::{Spot, TunnelCaster, TunnelHit};

@@ -137,6 +137,16 @@ impl SectionCaster {
         }
     }
 
+    /// Whether it is the section of another track, with nothing but rails.
+    pub fn is_shared(&self) -> bool {
+        self.section.is_shared()
+    }
+
+    /// Whether a point is inside, or over an open section's bed.
+    pub fn covers(&self, p: &Vector2<f64>) -> bool {
+        !self.section.is_shared() && self.section.covers(p.x, p.y)
+    }
+
     /// Whether a point is in free space, for closed outlines; open ones say yes.
     pub fn contains(&self, p: &Vector2<f64>) -> bool {
         !self.section.closed || self.section.contains(p.x, p.y)

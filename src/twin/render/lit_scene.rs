@@ -12,8 +12,8 @@ use std::sync::Arc;
 
 /// A scene with what is worked out of it once.
 pub struct LitScene {
-    /// The line with its cross-sections.
-    pub track: Arc<Track>,
+    /// The tracks with their cross-sections.
+    pub tracks: Vec<Arc<Track>>,
     /// What there is to see through.
     pub air: Air,
     /// Where bed and rails mirror.
@@ -31,13 +31,13 @@ pub struct LitScene {
 impl LitScene {
     /// At time 0.
     pub fn new(scene: Scene) -> Self {
-        let paintings = Paintings::of(&scene.track);
+        let paintings = Paintings::of(&scene.tracks);
         Self::painted(scene, paintings)
     }
 
     fn painted(scene: Scene, paintings: Paintings) -> Self {
         Self {
-            track: scene.track,
+            tracks: scene.tracks,
             air: scene.air,
             wet: scene.wet,
             paintings,
@@ -49,9 +49,12 @@ impl LitScene {
 
     /// Takes another scene; whether it had to be painted anew.
     pub fn replace(&mut self, scene: Scene) -> bool {
-        let anew = self.track.sections != scene.track.sections;
+        let sections = |tracks: &[Arc<Track>]| -> Vec<_> {
+            tracks.iter().map(|track| track.sections.clone()).collect()
+        };
+        let anew = sections(&self.tracks) != sections(&scene.tracks);
         let paintings = if anew {
-            Paintings::of(&scene.track)
+            Paintings::of(&scene.tracks)
         } else {
             std::mem::take(&mut self.paintings)
         };
@@ -73,8 +76,13 @@ impl LitScene {
         changed
     }
 
-    /// Luminance of endless air about a chainage.
-    pub fn airlight_cd_m2(&self, s_m: f64) -> f64 {
-        self.lamps.airlight_cd_m2(&self.track, s_m)
+    /// Luminance of endless air about a chainage of a track.
+    pub fn airlight_cd_m2(&self, track: usize, s_m: f64) -> f64 {
+        self.lamps.airlight_cd_m2(&self.tracks[track], s_m)
+    }
+
+    /// Ambient light where it is not that of one track: that of the first.
+    pub fn ambient_lx(&self) -> f64 {
+        self.tracks[0].ambient_lx
     }
 }

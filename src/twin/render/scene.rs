@@ -15,8 +15,8 @@ use std::sync::Arc;
 /// All that stands still for a whole run.
 #[derive(Clone, Debug)]
 pub struct Scene {
-    /// The line with its cross-sections.
-    pub track: Arc<Track>,
+    /// The tracks with their cross-sections. There is at least one.
+    pub tracks: Vec<Arc<Track>>,
     /// The lamps as they really are (the survey may be wrong about them).
     pub lamps: Vec<LampLight>,
     /// What there is to see through.

@@ -15,6 +15,7 @@ use crate::twin::random::Stream;
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Isometry3, Point3, Vector3};
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 settings! {
     /// The lidar of a wayside device. Angles count from its axis.
@@ -101,13 +102,13 @@ impl Lidar {
     /// drawn from `stream`. The tunnel does not move, so it is ranged here, once.
     pub fn new(
         settings: &LidarSettings,
-        track: &Track,
+        tracks: &[Arc<Track>],
         world_from_lidar: &Isometry3<f64>,
         stream: Stream,
     ) -> Self {
-        let caster = TunnelCaster::new(track);
+        let caster = TunnelCaster::new(tracks);
         let origin = Point3::from(world_from_lidar.translation.vector);
-        let segment = caster.segment_of(&origin, None);
+        let spot = caster.spot_of(&origin, None);
         let side = settings.side_shots();
         let mut beams = Vec::new();
         for shot in -side..=side {
@@ -120,7 +121,7 @@ impl Lidar {
                 let (sin_w, cos_w) = elevation_rad.sin_cos();
                 let direction =
                     world_from_lidar * Vector3::new(cos_w * sin_a, cos_w * cos_a, sin_w);
-                let hit = caster.cast(segment, &origin, &direction, settings.max_range_m);
+                let hit = caster.cast(spot, &origin, &direction, settings.max_range_m);
                 let wall = hit.map(|hit| {
                     let at = caster.surface_at(&origin, &direction, &hit);
                     Echo {
@@ -220,7 +221,7 @@ mod tests {
     fn lidar(settings: &LidarSettings) -> Lidar {
         let track = sample::track();
         let stream = Stream::new(1, 0, "lidar");
-        Lidar::new(settings, &track, &mount(&track), stream)
+        Lidar::new(settings, &[Arc::new(track.clone())], &mount(&track), stream)
     }
 
     /// A board across the line, `away_m` in front of the lidar at the time of its pose.

@@ -2,7 +2,7 @@
 
 use crate::bus::Intrinsics;
 use crate::track::Material;
-use crate::twin::geometry::{SurfacePoint, TunnelCaster, TunnelHit};
+use crate::twin::geometry::{Spot, SurfacePoint, TunnelCaster, TunnelHit};
 use crate::twin::render::constants::{LAMP_SIGHT_M, MIN_SINE, SIGHT_M};
 use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::lit_scene::LitScene;
@@ -62,7 +62,7 @@ impl CastScene {
     pub fn new(scene: Scene) -> Self {
         let lit = LitScene::new(scene);
         Self {
-            tunnel: TunnelCaster::new(&lit.track),
+            tunnel: TunnelCaster::new(&lit.tracks),
             lit,
         }
     }
@@ -70,7 +70,7 @@ impl CastScene {
     /// Takes another scene.
     pub fn replace(&mut self, scene: Scene) {
         self.lit.replace(scene);
-        self.tunnel = TunnelCaster::new(&self.lit.track);
+        self.tunnel = TunnelCaster::new(&self.lit.tracks);
     }
 
     /// Indices of the lamps whose light a view shows on surfaces.
@@ -106,29 +106,29 @@ impl CastScene {
 
     pub fn all_pixels(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> Vec<TunnelPixel> {
         let eye = Point3::from(pose.translation.vector);
-        let segment = self.tunnel.segment_of(&eye, None);
+        let spot = self.tunnel.spot_of(&eye, None);
         let width = camera.width_px as usize;
         (0..width * camera.height_px as usize)
             .into_par_iter()
             .with_min_len(width.max(1))
             .map(|k| {
                 let ray = RayDifferential::through(camera, pose, (k % width, k / width), 1.0);
-                self.pixel(segment, &eye, &ray)
+                self.pixel(spot, &eye, &ray)
             })
             .collect()
     }
 
     /// The tunnel along one ray.
-    pub fn pixel(&self, segment: usize, eye: &Point3<f64>, pixel: &RayDifferential) -> TunnelPixel {
+    pub fn pixel(&self, spot: Spot, eye: &Point3<f64>, pixel: &RayDifferential) -> TunnelPixel {
         let ray = &pixel.ray;
-        let Some(hit) = self.tunnel.cast(segment, eye, ray, SIGHT_M / ray.norm()) else {
+        let Some(hit) = self.tunnel.cast(spot, eye, ray, SIGHT_M / ray.norm()) else {
             return TunnelPixel::default();
         };
         let at = self.tunnel.surface_at(eye, ray, &hit);
         let albedo = self.albedo(&at, ray, hit.t, pixel.aside)
-            * self.lit.wet.albedo_factor(at.material, at.s_m);
-        let lux =
-            self.lit.track.ambient_lx + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
+            * self.lit.wet.albedo_factor(at.material, at.track, at.s_m);
+        let lux = self.lit.tracks[at.track].ambient_lx
+            + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
         TunnelPixel {
             hit: Some(hit),
             albedo,
@@ -146,7 +146,7 @@ impl CastScene {
         aside: [Vector3<f64>; 2],
     ) -> f64 {
         let paintings = &self.lit.paintings;
-        let painting = &paintings.all[paintings.of_range[at.range]];
+        let painting = &paintings.all[paintings.of_range[at.track][at.range]];
         let begin_m = match at.material {
             Material::Rail => painting.rail_q_m(),
             _ => 0.0,

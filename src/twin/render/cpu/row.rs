@@ -6,7 +6,7 @@ use super::dim::{CELL_PX, DimView};
 use super::lamps::{self, Haze, RowExposure};
 use super::shadow::{BodyShadows, RowShadows};
 use super::spread::BlurSamples;
-use crate::twin::geometry::{Solid, SurfacePoint};
+use crate::twin::geometry::{Solid, Spot, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
@@ -23,7 +23,7 @@ pub(super) struct ViewContext<'a> {
     shadows: BodyShadows<'a>,
     airlight_cd_m2: f64,
     /// Segment of the first pose.
-    segment: usize,
+    spot: Spot,
     /// Indices of the lamps whose blinking may show.
     lamps: Vec<usize>,
 }
@@ -55,7 +55,7 @@ pub(super) struct RowRays<'a> {
     row: &'a RowExposure,
     known: KnownTunnel<'a>,
     eye: Point3<f64>,
-    segment: usize,
+    spot: Spot,
     /// Of the job's bodies as they are by now.
     shadows: RowShadows<'a>,
     blinking: Blinking,
@@ -64,14 +64,16 @@ pub(super) struct RowRays<'a> {
 }
 
 impl<'a> ViewContext<'a> {
-    /// Of a view from somewhere in a segment.
-    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, segment: usize) -> Self {
+    /// Of a view from somewhere in a spot.
+    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, spot: Spot) -> Self {
         let lamps = scene.lamps_about(view);
         Self {
             job,
             shadows: BodyShadows::new(scene, job, &lamps),
-            airlight_cd_m2: scene.lit.airlight_cd_m2(scene.tunnel.chainage_m(segment)),
-            segment,
+            airlight_cd_m2: scene
+                .lit
+                .airlight_cd_m2(spot.track, scene.tunnel.chainage_m(spot)),
+            spot,
             lamps,
         }
     }
@@ -92,7 +94,7 @@ impl<'a> RowRays<'a> {
             context,
             view,
             row,
-            segment: scene.tunnel.segment_of(&eye, Some(context.segment)),
+            spot: scene.tunnel.spot_of(&eye, Some(context.spot)),
             shadows: context.shadows.at(mid.since(context.job.time)),
             blinking: Blinking::new(scene.lit.lamps.lamps(), &context.lamps, view, row),
             eye,
@@ -110,7 +112,7 @@ impl<'a> RowRays<'a> {
     /// Whether pixel `u` sees a surface that may mirror a lamp.
     fn may_mirror(&self, u: usize) -> bool {
         let (tunnel, ray) = (&self.scene.tunnel, self.ray(u));
-        let hit = tunnel.cast(self.segment, &self.eye, &ray, SIGHT_M / ray.norm());
+        let hit = tunnel.cast(self.spot, &self.eye, &ray, SIGHT_M / ray.norm());
         hit.is_some_and(|hit| tunnel.is_level(&hit))
     }
 
@@ -122,7 +124,7 @@ impl<'a> RowRays<'a> {
             _ => {
                 let pixel = (u, self.row.v);
                 let ray = RayDifferential::through(camera, &self.row.mid, pixel, self.side_px);
-                (self.scene).pixel(self.segment, &self.eye, &ray)
+                (self.scene).pixel(self.spot, &self.eye, &ray)
             }
         };
         let Some(hit) = &ground.hit else {
@@ -155,7 +157,7 @@ impl<'a> RowRays<'a> {
     /// Luminance of what the tunnel's surface mirrors.
     fn mirrored_cd_m2(&self, at: &SurfacePoint) -> f64 {
         let (scene, air) = (self.scene, &self.scene.lit.air);
-        let wet = scene.lit.wet.at(at.s_m);
+        let wet = scene.lit.wet.at(at.track, at.s_m);
         let Some(gloss) = Gloss::of(at.material, wet, &at.normal) else {
             return 0.0;
         };
@@ -181,7 +183,7 @@ impl<'a> RowRays<'a> {
     fn depth(&self, u: usize, depths: &mut [f64]) -> f64 {
         if depths[u].is_nan() {
             let ray = self.ray(u);
-            let hit = (self.scene.tunnel).cast(self.segment, &self.eye, &ray, SIGHT_M / ray.norm());
+            let hit = (self.scene.tunnel).cast(self.spot, &self.eye, &ray, SIGHT_M / ray.norm());
             depths[u] = hit.map_or(f64::INFINITY, |s| s.t);
         }
         depths[u]
@@ -222,7 +224,7 @@ impl<'a> RowRays<'a> {
                 view,
                 spread,
                 self.row,
-                (self.scene.lit.track.ambient_lx, self.haze(lamp)),
+                (self.scene.lit.ambient_lx(), self.haze(lamp)),
                 depth,
                 luminances,
             );
@@ -266,7 +268,7 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let lux = scene.lit.track.ambient_lx
+                let lux = scene.lit.ambient_lx()
                     + scene.lit.lamps.irradiance_lx(&at, &normal)
                     + self.by_job_lx(&at, &normal);
                 let body = solid.body();

@@ -61,7 +61,7 @@ fn hall() -> Track {
 
 fn renderer(lamps: Vec<LampLight>) -> CpuRenderer {
     CpuRenderer::oracle(Scene {
-        track: Arc::new(hall()),
+        tracks: vec![Arc::new(hall())],
         lamps,
         air: Air::default(),
         wet: Wet::default(),
@@ -179,7 +179,7 @@ fn a_wall_has_the_luminance_of_the_closed_form() {
 fn val_mist_keeps_koschmieders_contrast() {
     let visibility_m = 30.0;
     let scene = |air| Scene {
-        track: Arc::new(hall()),
+        tracks: vec![Arc::new(hall())],
         lamps: Vec::new(),
         air,
         wet: Wet::default(),

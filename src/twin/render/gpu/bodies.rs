@@ -24,7 +24,7 @@ impl BodyMeshes {
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
             let fineness = Fineness::of(body, &job.views);
-            mesh.add_body(body, &scene.lamps, scene.track.ambient_lx, fineness);
+            mesh.add_body(body, &scene.lamps, scene.ambient_lx(), fineness);
             ranges.push(first..mesh.indices.len() as u32);
         }
         Self {

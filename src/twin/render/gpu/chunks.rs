@@ -6,7 +6,7 @@ use super::detail::{CHUNK_M, ChunkKey, Detail};
 use super::layout::Vertex;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
-use crate::track::Track;
+use crate::track::{Track, TrackPoint};
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
@@ -63,7 +63,9 @@ pub struct Probe {
 /// What a camera may see of the tunnel.
 #[derive(Clone)]
 pub struct InSight {
-    /// The camera's chainage.
+    /// The track that the camera is nearest to.
+    pub track: usize,
+    /// The camera's chainage on it.
     pub s_m: f64,
     /// Near ones first.
     pub chunks: Vec<Arc<Chunk>>,
@@ -80,7 +82,8 @@ const GLOSSY_EVERY: usize = 4;
 pub struct Chunks {
     /// Each with the latest job in which a camera was near it.
     made: BTreeMap<ChunkKey, (Arc<Chunk>, u64)>,
-    last_seen_s_m: f64,
+    /// By track, where a camera was last.
+    last_seen_s_m: Vec<f64>,
     job: u64,
 }
 
@@ -95,69 +98,108 @@ impl Chunks {
 
     /// What is in sight of a camera.
     pub fn in_sight(&mut self, gpu: &Gpu, scene: &LitScene, framed: &Framed<'_>) -> InSight {
-        let track = &scene.track;
         let eye = framed.reference();
-        let s_m = self.locate(track, &eye);
-        let frame = track.alignment.at(s_m);
-        let ahead = framed.middle.rotation * Vector3::z();
-        let (sin, cos) = frame.heading_rad.sin_cos();
-        let (back_m, forth_m) = if ahead.x * cos + ahead.y * sin >= 0.0 {
-            (BEHIND_M, SIGHT_M)
-        } else {
-            (SIGHT_M, BEHIND_M)
-        };
-        let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
-        let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
-        let moves = !framed.rests();
-        let place = track.alignment.track_from_world(&eye, s_m);
-        let bend = Bend::of(&framed.view.camera.intrinsics, &place);
         let mut chunks = Vec::new();
-        for index in first..=last {
-            let from_m = index as f64 * CHUNK_M;
-            let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
-            let key = ChunkKey {
-                index,
-                detail: Detail::at(away_m, moves || bend.is_some()),
-                bend,
+        let mut nearest = (f64::INFINITY, 0, 0.0);
+        self.last_seen_s_m.resize(scene.tracks.len(), 0.0);
+        for (number, track) in scene.tracks.iter().enumerate() {
+            let Some(place) = self.locate(number, track, &eye) else {
+                continue;
             };
-            let make = || (Arc::new(upload(gpu, scene, key)), self.job);
-            let (chunk, near_in) = self.made.entry(key).or_insert_with(make);
-            // Kept whether it is in the picture or beside it: the next view may turn there.
-            *near_in = self.job;
-            if framed.may_see(&chunk.origin, chunk.radius_m) {
-                chunks.push(Arc::clone(chunk));
+            if place.l_m.abs() < nearest.0 {
+                nearest = (place.l_m.abs(), number, place.s_m);
+            }
+            for key in keys_in_sight(number, track, &place, framed) {
+                let make = || (Arc::new(upload(gpu, scene, key)), self.job);
+                let (chunk, near_in) = self.made.entry(key).or_insert_with(make);
+                // Kept whether it is in the picture or beside it: the next view may turn there.
+                *near_in = self.job;
+                if framed.may_see(&chunk.origin, chunk.radius_m) {
+                    let middle_m = key.start_m() + 0.5 * CHUNK_M;
+                    chunks.push(((middle_m - place.s_m).abs(), Arc::clone(chunk)));
+                }
             }
         }
-        let away_m = |chunk: &Chunk| (chunk.key.start_m() + 0.5 * CHUNK_M - s_m).abs();
-        chunks.sort_by(|a, b| f64::total_cmp(&away_m(a), &away_m(b)));
-        InSight { s_m, chunks }
+        chunks.sort_by(|a, b| f64::total_cmp(&a.0, &b.0));
+        let (_, track, s_m) = nearest;
+        InSight {
+            track,
+            s_m,
+            chunks: chunks.into_iter().map(|(_, chunk)| chunk).collect(),
+        }
     }
 
-    /// Chainage of a camera: by Newton's method from where the last one was, else by search.
-    fn locate(&mut self, track: &Track, eye: &Point3<f64>) -> f64 {
+    /// A camera as a track has it: by Newton's method from where the last one was, else by search. None where no
+    /// part of the track is in sight.
+    fn locate(&mut self, number: usize, track: &Track, eye: &Point3<f64>) -> Option<TrackPoint> {
         let on_line = |s_m: f64| {
             let t = track.alignment.track_from_world(eye, s_m);
-            (t.l_m.abs() < NEAR_LINE_M && (t.s_m - s_m).abs() < 4.0 * SEARCH_STEP_M)
-                .then_some(t.s_m)
+            let found = t.l_m.abs() < NEAR_LINE_M && (t.s_m - s_m).abs() < 4.0 * SEARCH_STEP_M;
+            found.then_some(t)
         };
-        let s_m = on_line(self.last_seen_s_m).unwrap_or_else(|| {
-            let near = nearest_station(track, eye);
-            on_line(near).unwrap_or(near)
-        });
-        self.last_seen_s_m = s_m;
-        s_m
+        // The only track is in sight wherever the camera is.
+        let is_only = self.last_seen_s_m.len() == 1;
+        let last_m = &mut self.last_seen_s_m[number];
+        let place = on_line(*last_m).or_else(|| {
+            let (near_m, away_m) = nearest_station(track, eye);
+            let in_sight = is_only || away_m < SIGHT_M + SEARCH_STEP_M;
+            in_sight.then(|| {
+                on_line(near_m).unwrap_or_else(|| {
+                    let mut place = track.alignment.track_from_world(eye, near_m);
+                    place.s_m = near_m;
+                    place
+                })
+            })
+        })?;
+        *last_m = place.s_m;
+        Some(place)
     }
 }
 
-fn nearest_station(track: &Track, eye: &Point3<f64>) -> f64 {
+/// The chunks of a track that may be in sight of a camera at a place.
+fn keys_in_sight(
+    track_number: usize,
+    track: &Track,
+    place: &TrackPoint,
+    framed: &Framed<'_>,
+) -> impl Iterator<Item = ChunkKey> {
+    let s_m = place.s_m;
+    let frame = track.alignment.at(s_m);
+    let ahead = framed.middle.rotation * Vector3::z();
+    let (sin, cos) = frame.heading_rad.sin_cos();
+    let (back_m, forth_m) = if ahead.x * cos + ahead.y * sin >= 0.0 {
+        (BEHIND_M, SIGHT_M)
+    } else {
+        (SIGHT_M, BEHIND_M)
+    };
+    let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
+    let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
+    let end = (track.alignment.length_m() / CHUNK_M).ceil() as i64;
+    let (first, last) = (first.max(0), last.min(end - 1));
+    let moves = !framed.rests();
+    let bend = Bend::of(&framed.view.camera.intrinsics, place);
+    (first..=last).map(move |index| {
+        let from_m = index as f64 * CHUNK_M;
+        let away_m = (from_m - s_m).max(s_m - from_m - CHUNK_M).max(0.0);
+        ChunkKey {
+            track: track_number,
+            index,
+            detail: Detail::at(away_m, moves || bend.is_some()),
+            bend,
+        }
+    })
+}
+
+/// Chainage of the nearest of stations a search step apart, and its distance.
+fn nearest_station(track: &Track, eye: &Point3<f64>) -> (f64, f64) {
     let from_m = track.sections.first().map_or(0.0, |r| r.from_m);
     let to_m = track.sections.last().map_or(0.0, |r| r.to_m);
     let steps = ((to_m - from_m) / SEARCH_STEP_M).ceil().clamp(1.0, 1e5) as u32;
-    (0..=steps)
-        .map(|k| from_m + (to_m - from_m) * f64::from(k) / f64::from(steps))
-        .map(|s_m| ((track.alignment.at(s_m).origin - eye).norm(), s_m))
-        .min_by(|a, b| f64::total_cmp(&a.0, &b.0))
-        .map_or(from_m, |(_, s_m)| s_m)
+    let stations = (0..=steps).map(|k| from_m + (to_m - from_m) * f64::from(k) / f64::from(steps));
+    stations
+        .map(|s_m| (s_m, (track.alignment.at(s_m).origin - eye).norm()))
+        .min_by(|a, b| f64::total_cmp(&a.1, &b.1))
+        .unwrap_or((from_m, f64::INFINITY))
 }
 
 fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
@@ -167,7 +209,7 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
         lamp,
         parts,
     } = chunk_mesh(scene, key);
-    let heading_rad = scene.track.alignment.at(key.start_m()).heading_rad;
+    let heading_rad = (scene.tracks[key.track].alignment.at(key.start_m())).heading_rad;
     let (sin, cos) = heading_rad.sin_cos();
     let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
     Chunk {
@@ -192,14 +234,17 @@ fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
             .map(place)
             .collect(),
         along: Vector3::new(cos, sin, 0.0),
-        crossed: is_crossed(scene, key.start_m()),
+        crossed: is_crossed(scene, key.track, key.start_m()),
     }
 }
 
 /// See [`Chunk::crossed`].
-fn is_crossed(scene: &LitScene, from_m: f64) -> bool {
+fn is_crossed(scene: &LitScene, track: usize, from_m: f64) -> bool {
     let to_m = from_m + CHUNK_M;
-    let borders = scene.track.sections.iter().flat_map(|r| [r.from_m, r.to_m]);
-    let ends = |m: f64| scene.wet.at(m - BESIDE_M) != scene.wet.at(m + BESIDE_M);
+    let borders = scene.tracks[track]
+        .sections
+        .iter()
+        .flat_map(|r| [r.from_m, r.to_m]);
+    let ends = |m: f64| scene.wet.at(track, m - BESIDE_M) != scene.wet.at(track, m + BESIDE_M);
     borders.into_iter().any(|m| (from_m..=to_m).contains(&m)) || ends(from_m) || ends(to_m)
 }

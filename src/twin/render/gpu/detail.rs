@@ -73,6 +73,8 @@ struct CellSizes {
 /// Which mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ChunkKey {
+    /// Of which track.
+    pub track: usize,
     /// Covers chainage from `index * CHUNK_M` over `CHUNK_M`.
     pub index: i64,
     /// How fine.

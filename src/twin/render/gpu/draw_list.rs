@@ -178,7 +178,7 @@ impl DrawList {
             }
             let lamps_grey = f64::from(part.peak_cd_m2) * grey_per_cd_m2;
             self.lit |= headlit_grey + lamps_grey > MOVES_GREY;
-            let painting = scene.paintings.of_range[part.section];
+            let painting = part.painting;
             self.calls.push(DrawCall {
                 chunk: Some(Arc::clone(chunk)),
                 part: number,

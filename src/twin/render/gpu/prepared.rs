@@ -81,7 +81,7 @@ impl PreparedView {
     ) -> Self {
         let chunks = &in_sight.chunks;
         let list = DrawList::new(framed, job, scene, (chunks, bodies));
-        let airlight_cd_m2 = scene.airlight_cd_m2(in_sight.s_m);
+        let airlight_cd_m2 = scene.airlight_cd_m2(in_sight.track, in_sight.s_m);
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         // In the picture, half the area of what lies beyond [`SIGHT_M`] is nearer than this.
         let beyond_m = SQRT_2 * SIGHT_M;

@@ -40,8 +40,8 @@ pub struct ChunkMesh {
 pub struct ChunkSide {
     /// The corners of a box around them, from the chunk's origin.
     pub around: [Vector3<f32>; 8],
-    /// Which of the tunnel's ranges of cross-sections.
-    pub section: usize,
+    /// Which of the scene's paintings.
+    pub painting: usize,
     /// Its indices in the mesh.
     pub indices: Range<u32>,
     /// More luminance by lamps than any of it has, cd/m^2.
@@ -55,6 +55,7 @@ pub struct ChunkSide {
 /// What all strips of a chunk share.
 struct Site<'a> {
     scene: &'a LitScene,
+    track: &'a Track,
     lamp: Option<&'a BlinkingLamp>,
     cutting: Cutting<'a>,
     origin: Point3<f64>,
@@ -62,7 +63,7 @@ struct Site<'a> {
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
 pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
-    let (track, field, paintings) = (&scene.track, &scene.lamps, &scene.paintings);
+    let (track, field) = (&scene.tracks[key.track], &scene.lamps);
     let (from_m, to_m) = (key.start_m(), key.start_m() + CHUNK_M);
     let middle_m = from_m + 0.5 * CHUNK_M;
     let middle = track.alignment.at(middle_m).origin;
@@ -72,6 +73,7 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         .collect();
     let site = Site {
         scene,
+        track,
         lamp: lamp.map(|k| &field.lamps()[k]),
         cutting: Cutting { key, lamps: &near },
         origin: track.alignment.at(from_m).origin,
@@ -83,7 +85,8 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         if stations.len() < 2 {
             continue;
         }
-        let painting = (paintings.of_range.get(section)).and_then(|k| paintings.all.get(*k));
+        let number = scene.paintings.of_range(key.track, section);
+        let painting = number.and_then(|k| scene.paintings.all.get(k));
         let rail_q_m = painting.map_or(0.0, Painting::rail_q_m);
         let facets = facets_of(range, rail_q_m, site.cutting);
         for side in FacetSide::ALL {
@@ -98,7 +101,13 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
             }
             if mesh.indices.len() > first {
                 let around = box_around(&mesh, first, track.alignment.at(middle_m).heading_rad);
-                parts.push(side_of(&mut mesh, first, section, around, patches));
+                parts.push(side_of(
+                    &mut mesh,
+                    first,
+                    number.unwrap_or(0),
+                    around,
+                    patches,
+                ));
             }
         }
     }
@@ -126,7 +135,7 @@ fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
 fn side_of(
     mesh: &mut Mesh,
     first: usize,
-    section: usize,
+    painting: usize,
     around: [Vector3<f32>; 8],
     patches: Vec<Patch>,
 ) -> ChunkSide {
@@ -138,7 +147,7 @@ fn side_of(
     mesh.indices.extend(glossy);
     ChunkSide {
         around,
-        section,
+        painting,
         indices: first as u32..border,
         peak_cd_m2: patches
             .iter()
@@ -201,11 +210,11 @@ impl Site<'_> {
             if to_m - from_m < PATCH_M - NEAR_STATION_M && *to_m < last_m {
                 continue;
             }
-            let at = |s_m, end| ruled(&self.scene.track, s_m, facet.ends[end], detail).coords;
+            let at = |s_m, end| ruled(self.track, s_m, facet.ends[end], detail).coords;
             let [a, b] = [0, 1].map(|end| at(from_m, end));
             let [c, d] = [0, 1].map(|end| at(*to_m, end));
             let half = [0.25 * (c + d - a - b), 0.25 * (b + d - a - c)];
-            let normal = facet_normal(&self.scene.track, facet, 0.5 * (from_m + to_m));
+            let normal = facet_normal(self.track, facet, 0.5 * (from_m + to_m));
             let stretch_m = from_m - NEAR_STATION_M..=to_m + NEAR_STATION_M;
             let inside = |v: &&Vertex| stretch_m.contains(&(start_m + f64::from(v.place_m[0])));
             let corners = vertices.iter().filter(inside);
@@ -221,18 +230,19 @@ impl Site<'_> {
     }
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
-        let normal = facet_normal(&self.scene.track, facet, s_m);
-        let p = ruled(&self.scene.track, s_m, end, self.cutting.key.detail);
+        let normal = facet_normal(self.track, facet, s_m);
+        let p = ruled(self.track, s_m, end, self.cutting.key.detail);
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
-        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.scene.track.ambient_lx;
+        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.track.ambient_lx;
         // What begins or ends with the chunk does so for all of it.
         let start_m = self.cutting.key.start_m();
         let inside_m = s_m - start_m;
+        let number = self.cutting.key.track;
         let within_m = start_m + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
-        let gloss = Gloss::of(facet.material, self.scene.wet.at(within_m), &normal);
-        let paint = self.scene.wet.albedo_factor(facet.material, within_m);
+        let gloss = Gloss::of(facet.material, self.scene.wet.at(number, within_m), &normal);
+        let paint = (self.scene.wet).albedo_factor(facet.material, number, within_m);
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
@@ -285,6 +295,7 @@ mod tests {
 
     fn chunk(scene: &LitScene, index: i64, detail: Detail) -> ChunkMesh {
         let key = ChunkKey {
+            track: 0,
             index,
             detail,
             bend: None,

@@ -280,9 +280,10 @@ mod tests {
     #[test]
     fn nothing_that_is_seen_is_left_out() {
         let scene = LitScene::new(sample::scene());
-        let track = &scene.track;
+        let track = &scene.tracks[0];
         let meshes = [8, 9, 10, 11, 12, 30, 80, 81, 82, 100].map(|index| {
             let key = ChunkKey {
+                track: 0,
                 index,
                 detail: Detail::Close,
                 bend: None,

@@ -57,6 +57,7 @@ mod unroll;
 use crate::track::{CrossSection, Material, Track, rail_outline};
 use brush::{Chance, Strip, ValueNoise, chance};
 use rayon::prelude::*;
+use std::sync::Arc;
 use unroll::{OutlinePlace, Unrolled};
 
 /// Along the line everything repeats after this.
@@ -92,26 +93,35 @@ pub struct Painting {
 pub struct Paintings {
     /// Each once.
     pub all: Vec<Painting>,
-    /// Of each of the tunnel's section ranges, its painting.
-    pub of_range: Vec<usize>,
+    /// Of each section range of each track, its painting.
+    pub of_range: Vec<Vec<usize>>,
 }
 
 impl Paintings {
-    /// Paints all cross-sections of a tunnel.
-    pub fn of(track: &Track) -> Self {
+    /// Paints all cross-sections of all tracks.
+    pub fn of(tracks: &[Arc<Track>]) -> Self {
         let mut sections: Vec<&CrossSection> = Vec::new();
         let mut of_range = Vec::new();
-        for range in &track.sections {
-            let known = sections.iter().position(|s| **s == range.section);
-            of_range.push(known.unwrap_or(sections.len()));
-            if known.is_none() {
-                sections.push(&range.section);
+        for track in tracks {
+            let mut of_track = Vec::new();
+            for range in &track.sections {
+                let known = sections.iter().position(|s| **s == range.section);
+                of_track.push(known.unwrap_or(sections.len()));
+                if known.is_none() {
+                    sections.push(&range.section);
+                }
             }
+            of_range.push(of_track);
         }
         Self {
             all: sections.into_iter().map(Painting::of).collect(),
             of_range,
         }
+    }
+
+    /// The painting of a section range of a track.
+    pub fn of_range(&self, track: usize, range: usize) -> Option<usize> {
+        self.of_range.get(track)?.get(range).copied()
     }
 
     /// Leaves the texels to an adapter that has them.

@@ -189,8 +189,8 @@ fn equal_sections_share_a_painting() {
     let (mut second, mut third) = (first.clone(), first.clone());
     (second.section, third.from_m) = (station(), 200.0);
     track.sections = vec![first, second, third];
-    let paintings = Paintings::of(&track);
-    assert_eq!(paintings.of_range, [0, 1, 0]);
+    let paintings = Paintings::of(&[track.into()]);
+    assert_eq!(paintings.of_range, [[0, 1, 0]]);
     assert_eq!(paintings.all.len(), 2);
     assert!(paintings.all[1] == Painting::of(&station()));
 }

@@ -53,13 +53,14 @@ struct Marker<'a> {
 }
 
 impl Marker<'_> {
-    fn mark_tunnel(&mut self, track: &Track, in_sight: &[Arc<Chunk>]) {
+    fn mark_tunnel(&mut self, tracks: &[Arc<Track>], in_sight: &[Arc<Chunk>]) {
         let all: Vec<usize> = (0..self.candidates.casts.len()).collect();
         for chunk in in_sight {
             let around = Region::around(chunk.origin, chunk.radius_m);
             let casts = self.candidates.falling_on(&all, &around);
             if !casts.is_empty() {
-                for cell in SurfaceCell::of(track, chunk.key.start_m(), CHUNK_M) {
+                for cell in SurfaceCell::of(&tracks[chunk.key.track], chunk.key.start_m(), CHUNK_M)
+                {
                     self.mark_cell(&cell, &casts);
                 }
             }
@@ -138,9 +139,9 @@ impl ViewShadows {
             candidates: &candidates,
             marks: Marks::new((lens.width_px, lens.height_px), numbers),
         };
-        marker.mark_tunnel(&scene.track, in_sight);
+        marker.mark_tunnel(&scene.tracks, in_sight);
         marker.mark_bodies();
-        shadows.list(&marker, job, scene.track.ambient_lx);
+        shadows.list(&marker, job, scene.ambient_lx());
         shadows.place(framed, &candidates);
         shadows
     }

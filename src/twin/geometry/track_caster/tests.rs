@@ -81,6 +81,14 @@ fn track() -> Track {
 }
 
 /// The same surface as triangles between stations.
+/// What a ray meets, if anything.
+fn hit(followed: Followed) -> Option<TrackHit> {
+    match followed {
+        Followed::Hit(hit) => Some(hit),
+        Followed::Left { .. } | Followed::Nothing => None,
+    }
+}
+
 fn mesh(track: &Track) -> TriMesh {
     let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
     let rails = [1.0, -1.0].map(|side| rail_outline(side * RAIL_OFFSET_M));
@@ -144,12 +152,12 @@ fn rays(track: &Track, count: u64) -> impl Iterator<Item = Cast> {
 #[test]
 fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
     let track = track();
-    let (caster, mesh) = (TunnelCaster::new(&track), mesh(&track));
+    let (caster, mesh) = (TrackCaster::new(&track), mesh(&track));
     let (mut hits, mut odd) = (0, 0);
     for Cast { o, d, inside } in rays(&track, 10_000) {
         let segment = caster.segment_of(&o, None);
         assert_eq!(segment, inside.s_m.floor() as usize);
-        let ours = caster.cast(segment, &o, &d, 160.0);
+        let ours = hit(caster.follow(segment, (&o, &d), 0.0, 160.0));
         let ray = Ray::new(DVec3::new(o.x, o.y, o.z), DVec3::new(d.x, d.y, d.z));
         let theirs = mesh.cast_local_ray_and_get_normal(&ray, 160.0, false);
         let (Some(ours), Some(theirs)) = (ours, theirs) else {
@@ -175,9 +183,10 @@ fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
 #[test]
 fn hits_know_where_they_are_on_the_line() {
     let track = track();
-    let caster = TunnelCaster::new(&track);
+    let caster = TrackCaster::new(&track);
     for Cast { o, d, .. } in rays(&track, 1000) {
-        let Some(hit) = caster.cast(caster.segment_of(&o, None), &o, &d, 160.0) else {
+        let Some(hit) = hit(caster.follow(caster.segment_of(&o, None), (&o, &d), 0.0, 160.0))
+        else {
             continue;
         };
         let at = caster.surface_at(&o, &d, &hit);
@@ -203,12 +212,12 @@ fn between_cross_sections_it_is_dark() {
         section,
     };
     track.sections = vec![range(0.0, 20.3, wide), range(20.3, 40.0, section())];
-    let caster = TunnelCaster::new(&track);
+    let caster = TrackCaster::new(&track);
     let frame = track.alignment.at(10.0).world_from_line();
     let cast = |l_m: f64, up_m: f64, d: Vector3<f64>| {
         let o = frame * Point3::new(0.0, l_m, up_m);
         let d = frame * d;
-        let hit = caster.cast(caster.segment_of(&o, None), &o, &d, 160.0);
+        let hit = hit(caster.follow(caster.segment_of(&o, None), (&o, &d), 0.0, 160.0));
         hit.map(|s| caster.surface_at(&o, &d, &s).s_m)
     };
     // Straight at the step, from the wide side; beside it, on into the narrow one.
@@ -223,7 +232,7 @@ fn between_cross_sections_it_is_dark() {
     assert_eq!(cast(0.0, 1.7, Vector3::repeat(f64::NAN)), None);
     let outside = frame * Point3::new(-30.0, 0.0, 1.0);
     assert_eq!(
-        caster.cast(0, &outside, &(frame * Vector3::y()), 160.0),
+        hit(caster.follow(0, (&outside, &(frame * Vector3::y())), 0.0, 160.0)),
         None
     );
 }
