@@ -53,6 +53,10 @@ impl Outcome {
             self.standing_since = None;
             return;
         }
+        if train.dwells {
+            self.standing_since = None;
+            return;
+        }
         self.standing_since.get_or_insert(train.time);
         if self.brake_commanded.is_some() && self.stopped.is_none() {
             self.stopped = Some(train.time);

@@ -127,9 +127,15 @@ impl<'a> LineCheck<'a, '_> {
     /// A key names a track that is not there.
     pub(super) fn no_track(&mut self, key: &str, name: &str) {
         let tracks = self.tunnel.network.tracks.iter();
-        let names: Vec<String> = tracks.map(|track| track.name.clone()).collect();
-        let remedy = name_advice(name, &names, "tracks of this tunnel", "leave it out");
-        let what = format!("tunnel `{}` has no track `{name}`", self.tunnel.name);
+        let mut names: Vec<String> = tracks.clone().map(|track| track.name.clone()).collect();
+        let mut what = "track";
+        if key.ends_with("via") {
+            let stations = tracks.flat_map(|track| &track.stations);
+            names.extend(stations.map(|station| station.name.clone()));
+            what = "track or station";
+        }
+        let remedy = name_advice(name, &names, "those of this tunnel are", "leave it out");
+        let what = format!("tunnel `{}` has no {what} `{name}`", self.tunnel.name);
         self.check.problem(key, what, remedy);
     }
 

@@ -9,6 +9,26 @@ const MOST_TRACKS: usize = 200;
 /// Beyond a stop a route goes on for so far, where there is track: a train may run past it.
 const BEYOND_M: f64 = 500.0;
 
+/// What a train is to pass on its way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Waypoint {
+    /// It runs over a track.
+    Track(TrackId),
+    /// It comes to a place.
+    Place(Place),
+}
+
+/// A stretch of a route where a speed is permitted that is lower than elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SpeedLimit {
+    /// Distance along the route at which it begins.
+    pub from_m: f64,
+    /// And at which it ends.
+    pub to_m: f64,
+    /// The speed.
+    pub mps: f64,
+}
+
 /// A route of whole tracks, with the places of a train on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Itinerary {
@@ -16,6 +36,8 @@ pub struct Itinerary {
     pub route: Route,
     /// Distance along the route of the train's head at the start.
     pub start_m: f64,
+    /// Distances along the route of the places that it is to come to, in order.
+    pub places_m: Vec<f64>,
     /// Distance along the route of its stop.
     pub stop_m: Option<f64>,
 }
@@ -27,7 +49,7 @@ impl Network {
     pub fn itinerary(
         &self,
         (start, direction): (Place, Direction),
-        via: &[TrackId],
+        via: &[Waypoint],
         stop: Option<Place>,
         behind_m: f64,
     ) -> Option<Itinerary> {
@@ -36,13 +58,20 @@ impl Network {
             way: direction,
         }];
         let mut at = (start, direction);
-        for track in via {
-            let middle_m = 0.5 * self.alignment(*track)?.length_m();
-            let middle = Place {
-                track: *track,
-                s_m: middle_m,
+        // Which track of the way each place is on.
+        let mut places = Vec::new();
+        for waypoint in via {
+            let place = match *waypoint {
+                Waypoint::Place(place) => place,
+                Waypoint::Track(track) => Place {
+                    track,
+                    s_m: 0.5 * self.alignment(track)?.length_m(),
+                },
             };
-            at = self.go_on(&mut ends, at, middle)?;
+            at = self.go_on(&mut ends, at, place)?;
+            if let Waypoint::Place(place) = waypoint {
+                places.push((ends.len() - 1, place.s_m));
+            }
         }
         if let Some(stop) = stop {
             self.go_on(&mut ends, at, stop)?;
@@ -58,11 +87,31 @@ impl Network {
             let leg = &route.legs()[k];
             route.begin_m(k) + leg.direction.ahead_m(leg.from_m, s_m)
         };
+        let places = places.into_iter();
         Some(Itinerary {
             start_m: run_m(start_leg, start.s_m),
+            places_m: places.map(|(k, s_m)| run_m(start_leg + k, s_m)).collect(),
             stop_m: stop.map(|stop| run_m(stop_leg, stop.s_m)),
             route,
         })
+    }
+
+    /// The speeds that switches permit on their diverging legs, which count to the ends of those.
+    pub fn speed_limits(&self, route: &Route) -> Vec<SpeedLimit> {
+        let legs = route.legs().iter().enumerate();
+        let limits = legs.flat_map(|(k, leg)| {
+            let from_m = route.begin_m(k);
+            let slow = self
+                .switches
+                .iter()
+                .filter(|s| s.diverging.track == leg.track);
+            slow.map(move |switch| SpeedLimit {
+                from_m,
+                to_m: from_m + leg.length_m(),
+                mps: switch.diverging_mps,
+            })
+        });
+        limits.collect()
     }
 
     /// Adds the tracks of the shortest way to a place; gives where that comes to, and which way.
@@ -168,10 +217,23 @@ mod tests {
         assert_eq!(stop.track, track("siding"));
 
         let up = (place("u1", 200.0), Direction::Up);
-        let by = |via: &[TrackId]| network.itinerary(up, via, Some(place("siding", 100.0)), 200.0);
+        let by = |via: &[Waypoint]| network.itinerary(up, via, Some(place("siding", 100.0)), 200.0);
         assert_eq!(names(&by(&[]).unwrap()), "u1 A d2 d3 d4 siding");
-        assert_eq!(names(&by(&[track("u3")]).unwrap()), "u1 u2 u3 C d4 siding");
-        assert_eq!(by(&[track("lead")]), None);
+        assert_eq!(
+            names(&by(&[Waypoint::Track(track("u3"))]).unwrap()),
+            "u1 u2 u3 C d4 siding"
+        );
+        assert_eq!(by(&[Waypoint::Track(track("lead"))]), None);
+
+        // With a call at the platform on the way, and slow over the crossover.
+        let platform = Waypoint::Place(place("u3", 140.0));
+        let it = by(&[platform]).unwrap();
+        assert!((it.places_m[0] - (460.0 + 154.311 + 140.0)).abs() < 1e-2);
+        let limits = network.speed_limits(&it.route);
+        // Of both its switches.
+        assert_eq!(limits.len(), 2);
+        assert!((limits[0].mps - 30.0 / 3.6).abs() < 1e-9);
+        assert!((limits[0].to_m - limits[0].from_m - 67.387).abs() < 1e-2);
 
         let down = (place("depot 3", 200.0), Direction::Down);
         let it = network

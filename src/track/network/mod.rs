@@ -57,7 +57,7 @@ mod tests;
 
 pub use envelope::RouteEnvelope;
 pub use error::NetworkError;
-pub use itinerary::Itinerary;
+pub use itinerary::{Itinerary, SpeedLimit, Waypoint};
 pub use route::{Leg, Route};
 
 use super::{

@@ -8,6 +8,7 @@
 
 use super::settings::TrainSettings;
 use crate::bus::{BrakeDemand, TrainCommand};
+use crate::track::network::SpeedLimit;
 
 /// How far the driver stays under the permitted speed.
 const MARGIN_MPS: f64 = 0.5;
@@ -17,6 +18,10 @@ pub(super) const STANDING_MPS: f64 = 0.01;
 const GAIN_PER_S: f64 = 1.5;
 /// Share of the service brake that the driver plans with to stop at the mark.
 const PLANNED_SHARE: f64 = 0.7;
+/// A train that stands this near to a station's mark has stopped at it.
+const AT_STATION_M: f64 = 5.0;
+/// A limit is kept from so far before it.
+const LIMIT_EARLY_M: f64 = 5.0;
 /// Closer than this to the mark he just holds the brake.
 const AT_MARK_M: f64 = 0.02;
 
@@ -37,10 +42,28 @@ pub(super) struct Effort {
     pub brake_mps2: f64,
 }
 
+/// Where the driver is to stop and to run slowly, along the route.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Timetable {
+    /// Stations, in order.
+    pub calls_m: Vec<f64>,
+    /// The end of the run.
+    pub stop_m: Option<f64>,
+    /// The whole train keeps to these.
+    pub limits: Vec<SpeedLimit>,
+}
+
 /// Driver and brake control.
 #[derive(Clone, Debug)]
 pub(super) struct AutomaticDriver {
     settings: TrainSettings,
+    timetable: Timetable,
+    /// Length of the train.
+    length_m: f64,
+    /// So many stations are behind it.
+    called: usize,
+    /// When it may leave the one at which it stands, seconds.
+    leaves_s: Option<f64>,
     /// Driver's lever: traction over zero, brake below.
     lever_mps2: f64,
     /// Deceleration that the protection's demand has built up.
@@ -51,10 +74,14 @@ pub(super) struct AutomaticDriver {
 }
 
 impl AutomaticDriver {
-    pub(super) fn new(settings: &TrainSettings) -> Self {
+    pub(super) fn new(settings: &TrainSettings, timetable: Timetable) -> Self {
         let standing = settings.start_speed_kmh < 3.6 * STANDING_MPS;
         Self {
             settings: settings.clone(),
+            timetable,
+            length_m: settings.length_m(),
+            called: 0,
+            leaves_s: None,
             // A standing train starts with its brake on.
             lever_mps2: if standing {
                 -settings.service_brake_mps2
@@ -78,6 +105,7 @@ impl AutomaticDriver {
             command.brake
         };
         self.build_up(demand, dt_s);
+        self.call(now, standing);
         let mut wanted = self.wanted(now, command.permitted_speed_mps);
         if demand != BrakeDemand::None {
             // Traction is cut at once, and the lever stays out of power.
@@ -90,6 +118,45 @@ impl AutomaticDriver {
             traction_mps2: self.lever_mps2.max(0.0),
             brake_mps2: self.demanded_mps2.max(-self.lever_mps2),
         }
+    }
+
+    /// It stands at a station, on its way.
+    pub(super) fn dwells(&self) -> bool {
+        self.leaves_s.is_some()
+    }
+
+    /// Where it is to stop next.
+    fn next_stop_m(&self) -> Option<f64> {
+        let call_m = self.timetable.calls_m.get(self.called).copied();
+        call_m.or(self.timetable.stop_m)
+    }
+
+    /// Stands at a station for its time.
+    fn call(&mut self, now: &Instruments, standing: bool) {
+        let Some(call_m) = self.timetable.calls_m.get(self.called) else {
+            return;
+        };
+        let at_station = standing && (call_m - now.chainage_m).abs() < AT_STATION_M;
+        if at_station && self.leaves_s.is_none() {
+            self.leaves_s = Some(now.time_s + self.settings.dwell_s);
+        }
+        if self.leaves_s.is_some_and(|leaves_s| now.time_s >= leaves_s) {
+            self.leaves_s = None;
+            self.called += 1;
+        }
+    }
+
+    /// The most that the limits here and ahead permit.
+    fn limited_mps(&self, chainage_m: f64) -> f64 {
+        let planned_mps2 = PLANNED_SHARE * self.settings.service_brake_mps2;
+        let limits = self.timetable.limits.iter();
+        // Until the tail has left it.
+        let to_come = limits.filter(|limit| chainage_m < limit.to_m + self.length_m);
+        let permitted = to_come.map(|limit| {
+            let away_m = (limit.from_m - LIMIT_EARLY_M - chainage_m).max(0.0);
+            (limit.mps.powi(2) + 2.0 * planned_mps2 * away_m).sqrt()
+        });
+        permitted.fold(f64::INFINITY, f64::min)
     }
 
     fn build_up(&mut self, demand: BrakeDemand, dt_s: f64) {
@@ -108,6 +175,7 @@ impl AutomaticDriver {
         let s = &self.settings;
         let mut target = (permitted_mps - MARGIN_MPS).max(0.0);
         target = target.min(s.cruise_speed_kmh / 3.6);
+        target = target.min(self.limited_mps(now.chainage_m));
         if now.time_s < s.start_s {
             target = target.min(s.start_speed_kmh / 3.6);
         }
@@ -118,7 +186,7 @@ impl AutomaticDriver {
         // The root keeps the approach within the jerk limit, so that the speed does not overshoot.
         let answer = (GAIN_PER_S * error.abs()).min((1.5 * s.jerk_mps3 * error.abs()).sqrt());
         let mut wanted = answer.copysign(error) + now.resistance_mps2;
-        if let Some(stop_m) = s.stop_at_m {
+        if let Some(stop_m) = self.next_stop_m() {
             let left_m = stop_m - now.chainage_m;
             let planned = PLANNED_SHARE * s.service_brake_mps2;
             let needed = now.speed_mps.powi(2) / (2.0 * left_m.max(AT_MARK_M));
@@ -149,7 +217,7 @@ mod tests {
             restart_after_s: 20.0,
             ..TrainSettings::default()
         };
-        let mut driver = AutomaticDriver::new(&settings);
+        let mut driver = AutomaticDriver::new(&settings, Timetable::default());
         let (mut speed_mps, mut started_s) = (10.0, None);
         for k in 0..60_000u32 {
             let now = Instruments {
@@ -183,7 +251,7 @@ mod tests {
     /// A train that is pushed while its driver waits must not be given power.
     #[test]
     fn a_driver_who_waits_takes_no_power_when_the_train_moves() {
-        let mut driver = AutomaticDriver::new(&TrainSettings::default());
+        let mut driver = AutomaticDriver::new(&TrainSettings::default(), Timetable::default());
         for k in 0..5000u32 {
             let now = Instruments {
                 time_s: 1e-3 * f64::from(k),

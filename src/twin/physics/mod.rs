@@ -251,7 +251,15 @@ fn trains(
         let way = train.itinerary(network)?;
         let track = RouteTrack::new(network, way.route.clone(), rails.clone());
         let id = TrainId::from_index(k);
-        Ok(Train::new(rapier, track, train, &way, id, history))
+        let limits = network.speed_limits(&way.route);
+        Ok(Train::new(
+            rapier,
+            track,
+            train,
+            (&way, limits),
+            id,
+            history,
+        ))
     };
     settings.trains.iter().enumerate().map(make).collect()
 }

@@ -138,8 +138,11 @@ settings! {
         restart_after_s: f64 = 60.0, in 0.0..=1e6;
         /// Speed that the automatic driver aims at, km/h.
         cruise_speed_kmh: f64 = 60.0, in 0.0..=160.0;
-        /// Names of tracks that it runs over on its way; from each to the next it takes the shortest way.
+        /// Names of tracks that it runs over on its way, and of stations at which it stops; from each to the
+        /// next it takes the shortest way.
         via: Vec<String> = Vec::new();
+        /// How long it stands at each station of `via`, seconds.
+        dwell_s: f64 = 20.0, in 0.0..=1e6;
         /// Name of the track on which it stops. Default: the last of `via`, or that on which it starts.
         stop_track: Option<String> = None;
         /// Chainage where the train head shall stop, metres.

@@ -1,14 +1,14 @@
 //! A train under way: its bodies, its driver, its recent past, and what it looks like.
 
 use super::consist::Consist;
-use super::driver::{AutomaticDriver, Effort, STANDING_MPS};
+use super::driver::{AutomaticDriver, Effort, STANDING_MPS, Timetable};
 use super::history::{MotionHistory, VehicleMotion};
 use super::route_track::RouteTrack;
 use super::settings::TrainSettings;
 use super::wheelset::WheelForces;
 use super::{PhysicsError, TrainState};
 use crate::bus::{SimTime, TrainCommand, TrainEnd, TrainId};
-use crate::track::network::Itinerary;
+use crate::track::network::{Itinerary, SpeedLimit};
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::lights::Headlight;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
@@ -44,7 +44,7 @@ impl Train {
         world: &mut PhysicsWorld,
         track: RouteTrack,
         settings: &TrainSettings,
-        way: &Itinerary,
+        (way, limits): (&Itinerary, Vec<SpeedLimit>),
         id: TrainId,
         history_steps: usize,
     ) -> Self {
@@ -54,6 +54,11 @@ impl Train {
             stop_at_m: way.stop_m,
             ..settings.clone()
         };
+        let timetable = Timetable {
+            calls_m: way.places_m.clone(),
+            stop_m: way.stop_m,
+            limits,
+        };
         let head_m = settings.start_chainage_m - settings.start_speed_kmh / 3.6 * RUN_IN_S;
         Self {
             consist: Consist::new(world, &track, &settings, head_m, id),
@@ -62,7 +67,7 @@ impl Train {
                 MotionHistory::new(history_steps),
                 MotionHistory::new(history_steps),
             ],
-            driver: AutomaticDriver::new(&settings),
+            driver: AutomaticDriver::new(&settings, timetable),
             effort: Effort::default(),
         }
     }
@@ -161,6 +166,7 @@ impl Train {
             primary_travel_m: consist.primary_travel_m,
             secondary_travel_m: consist.secondary_travel_m,
             standing: consist.speed_mps().abs() < STANDING_MPS,
+            dwells: self.driver.dwells(),
             traction_mps2: self.effort.traction_mps2,
             brake_mps2: self.effort.brake_mps2,
             wheels: self.wheel_forces().collect(),

@@ -2,7 +2,7 @@
 
 use super::settings::TrainSettings;
 use super::train::RUN_IN_S;
-use crate::track::network::{Itinerary, Network};
+use crate::track::network::{Itinerary, Network, Waypoint};
 use crate::track::{Place, TrackId};
 
 /// Track behind the tail at the start, over which the train rolls in.
@@ -39,14 +39,13 @@ impl TrainSettings {
     /// Its way, from behind its tail to beyond its stop.
     pub fn itinerary(&self, network: &Network) -> Result<Itinerary, NoRoute> {
         let start = self.start(network)?;
-        let via = self
-            .via
-            .iter()
-            .map(|name| named(network, "via", Some(name)));
-        let via = via.filter_map(Result::transpose);
-        let via: Vec<TrackId> = via.collect::<Result<_, _>>()?;
+        let via = self.via.iter().map(|name| waypoint(network, name));
+        let via: Vec<Waypoint> = via.collect::<Result<_, _>>()?;
         let stop_track = named(network, "stop_track", self.stop_track.as_ref())?;
-        let last = via.last().copied().unwrap_or(start.track);
+        let last = via.last().map_or(start.track, |waypoint| match waypoint {
+            Waypoint::Track(track) => *track,
+            Waypoint::Place(place) => place.track,
+        });
         let stop = self.stop_at_m.map(|s_m| Place {
             track: stop_track.unwrap_or(last),
             s_m,
@@ -54,7 +53,7 @@ impl TrainSettings {
         let run_in_m = self.start_speed_kmh / 3.6 * RUN_IN_S;
         let behind_m = self.length_m() + run_in_m + ROOM_M;
         let direction = self.direction;
-        if network.tracks.len() == 1 {
+        if network.tracks.len() == 1 && via.is_empty() {
             // A train on a line of one track may stand or stop beyond its ends.
             return alone(network, self).ok_or(NoRoute::NoWay { direction });
         }
@@ -80,12 +79,33 @@ fn named(
     }
 }
 
+/// The track or the station of a name.
+fn waypoint(network: &Network, name: &str) -> Result<Waypoint, NoRoute> {
+    if let Some(track) = network.named(name) {
+        return Ok(Waypoint::Track(track));
+    }
+    let stations = (0u16..).zip(&network.tracks).flat_map(|(k, track)| {
+        let stations = track.stations.iter();
+        stations.map(move |station| (TrackId(k), station))
+    });
+    let mut of_name = stations.filter(|(_, station)| station.name == name);
+    let (track, station) = of_name.next().ok_or_else(|| NoRoute::NoTrack {
+        key: "via",
+        name: name.to_owned(),
+    })?;
+    Ok(Waypoint::Place(Place {
+        track,
+        s_m: station.chainage_m,
+    }))
+}
+
 /// Over the only track.
 fn alone(network: &Network, train: &TrainSettings) -> Option<Itinerary> {
     let route = network.only_track(train.direction)?;
     let run_m = |s_m| route.runs_m(Place::on_first_track(s_m)).next();
     Some(Itinerary {
         start_m: run_m(train.start_chainage_m)?,
+        places_m: Vec::new(),
         stop_m: train.stop_at_m.and_then(run_m),
         route,
     })

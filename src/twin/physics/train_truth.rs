@@ -40,6 +40,8 @@ pub struct TrainState {
     pub secondary_travel_m: f64,
     /// The train stands.
     pub standing: bool,
+    /// It stands at a station on its way.
+    pub dwells: bool,
     /// Traction in effect, as acceleration.
     pub traction_mps2: f64,
     /// Brake in effect, as deceleration.
