@@ -60,6 +60,7 @@ mod tests {
     /// A run with nothing but its speed.
     fn bare() -> Summary {
         Summary {
+            incidents: Vec::new(),
             scenario: "gallery".into(),
             seed: 7,
             end: End::Complete,
@@ -134,6 +135,7 @@ mod tests {
             distance_error_m: first_detected_s,
         };
         Summary {
+            incidents: Vec::new(),
             positioning: [
                 (Method::Mono, method(None)),
                 (Method::Stereo, method(Some(0.0123))),
@@ -170,6 +172,7 @@ mod tests {
                 stop_error_m: Some(-0.256),
                 least_wheel_load_share: 0.876,
                 most_slip_mps: 0.123,
+                most_lateral_n: 12_340.0,
                 floor_accel_rms_mps2: [0.1, 0.2, 0.3456],
                 ..TrainFigures::default()
             }),

@@ -10,8 +10,8 @@ use crate::twin::air::AirSettings;
 use crate::twin::faults::FaultSettings;
 use crate::twin::links::RadioSettings;
 use crate::twin::physics::{
-    CableSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, STEP_S, TrackSettings,
-    TrainSettings, WorkerSettings, train_key,
+    CableSettings, InterlockingSettings, ObstacleSettings, ObstacleShape, PhysicsSettings, STEP_S,
+    TrackSettings, TrainSettings, WorkerSettings, train_key,
 };
 use crate::twin::sensors::{
     CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
@@ -55,6 +55,9 @@ settings! {
         /// supervises but the equipment of `onboard`. Default: none.
         #[serde(default)]
         other_trains: Vec<TrainSettings>, nested;
+        /// How switches are set. Default: for the routes of the trains, before each of them.
+        #[serde(default)]
+        interlocking: InterlockingSettings, nested;
         /// A still rig moved from point to point, in place of a train. Default: none.
         bench: Option<BenchSettings>, nested;
         /// Things that lie or fall on the line. Default: none.
@@ -264,6 +267,7 @@ impl ScenarioFile {
             obstacles: self.obstacles.clone(),
             cables: self.cables.clone(),
             workers: self.workers.clone(),
+            interlocking: self.interlocking.clone(),
             ..PhysicsSettings::default()
         }
     }

@@ -40,6 +40,7 @@ impl Ride {
             floor_accel_rms_mps2: rms.into(),
             least_wheel_load_share: worst.least_normal_n / world.wheel_load_n(id)?,
             most_slip_mps: worst.most_slip_mps,
+            most_lateral_n: worst.most_lateral_n,
             energy,
             energy_gap_share: energy.gap_share(),
         })

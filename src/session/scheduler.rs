@@ -192,12 +192,19 @@ impl<'s, 'o> Session<'s, 'o> {
 
     fn step(&mut self) -> Result<(), SessionError> {
         let (world, commands) = (&mut self.world, &self.commands);
-        let hits = world.impacts().len();
+        let (hits, told) = (world.impacts().len(), world.incidents().len());
         self.cost.physics.time(|| world.step(commands)).0?;
         let now = self.world.time();
         for hit in &self.world.impacts()[hits..] {
             let (with, kmh) = (&hit.with, 3.6 * hit.speed_mps);
             let text = format!("hit {with} at {kmh:.1} km/h");
+            self.observers.show(&Event::Note {
+                time: now,
+                text: &text,
+            })?;
+        }
+        for incident in &self.world.incidents()[told..] {
+            let text = incident.to_string();
             self.observers.show(&Event::Note {
                 time: now,
                 text: &text,

@@ -216,6 +216,7 @@ impl Session<'_, '_> {
             dark_lamps: first.dark_lamps,
             protection: first.protection,
             train: first.train,
+            incidents: world.incidents().to_vec(),
             trains,
         }
     }

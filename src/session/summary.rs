@@ -1,7 +1,7 @@
 //! What a session comes to, as `summary.json` has it.
 
 use crate::bus::{CameraFault, Method, TrainId};
-use crate::twin::physics::{EnergyBook, Impact};
+use crate::twin::physics::{EnergyBook, Impact, Incident};
 use crate::twin::render::Backend;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -44,6 +44,9 @@ pub struct Summary {
     pub protection: Option<ProtectionFigures>,
     /// How the train ran.
     pub train: Option<TrainFigures>,
+    /// What went wrong with switches, ends of tracks and trains in each other's way, in order of time.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub incidents: Vec<Incident>,
     /// Every train, where there are several; the figures over this list are the first one's.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub trains: Vec<TrainSummary>,
@@ -254,6 +257,8 @@ pub struct TrainFigures {
     pub least_wheel_load_share: f64,
     /// Most that any wheel slipped or slid in any step.
     pub most_slip_mps: f64,
+    /// Most that the rails pressed any wheelset aside, either way.
+    pub most_lateral_n: f64,
     /// Where the energy went.
     pub energy: EnergyBook,
     /// Energy that the book cannot place, over what was turned over.

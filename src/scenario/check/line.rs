@@ -19,6 +19,7 @@ pub(in crate::scenario) fn in_tunnel(
         tunnel,
         check,
     };
+    line.interlocking();
     line.trains();
     line.bench();
     line.obstacles();
@@ -47,6 +48,25 @@ impl<'a> LineCheck<'a, '_> {
         let track = self.tunnel.first_track();
         for (key, head_m) in [("first_m", bench.first_m), ("points", bench.last_m())] {
             self.is_on_line(&format!("bench.{key}"), track, "the head", head_m);
+        }
+    }
+
+    fn interlocking(&mut self) {
+        let settings = &self.file.interlocking;
+        let positions = settings.positions.iter().enumerate();
+        let positions = positions.map(|(k, p)| (format!("positions[{k}]"), &p.switch));
+        let moves = settings.moves.iter().enumerate();
+        let moves = moves.map(|(k, m)| (format!("moves[{k}]"), &m.switch));
+        let switches = &self.tunnel.network.switches;
+        let names: Vec<String> = switches.iter().map(|switch| switch.name.clone()).collect();
+        for (key, name) in positions
+            .chain(moves)
+            .filter(|(_, name)| !names.contains(name))
+        {
+            let what = format!("tunnel `{}` has no switch `{name}`", self.tunnel.name);
+            let advice = name_advice(name, &names, "its switches are", "leave it out");
+            let key = format!("interlocking.{key}.switch");
+            self.check.problem(&key, what, advice);
         }
     }
 

@@ -209,7 +209,8 @@ mod tests {
     use super::super::tests::map;
     use super::*;
     use crate::bus::{OdometerSample, TrainId};
-    use crate::track::{Stretch, Track};
+    use crate::track::network::Waypoint;
+    use crate::track::{Stretch, Track, Tunnel};
 
     /// What a train stands on that is all on one track.
     fn occupied(head_m: f64, length_m: f64, direction: Direction) -> Stretch {
@@ -296,5 +297,98 @@ mod tests {
         // One that comes: its head.
         let comes = end(Direction::Up, train(2500.0, Direction::Down));
         assert_eq!(comes, Some(2500.0 - 6.0 - 25.0));
+    }
+
+    /// Where the authority of a train ends, along its route from u1 over u2 and u3 of the terminus, that stands at
+    /// 300 m of u1 and has heard of an obstacle or a train at some metres of a track.
+    fn on_terminus(heard: impl Fn(TrackId, f64) -> Content, track: &str, s_m: f64) -> Option<f64> {
+        let text = include_str!("../../../tunnels/terminus.toml");
+        let network = Tunnel::from_toml(text).unwrap().network;
+        let place = |name, s_m| Place {
+            track: network.named(name).unwrap(),
+            s_m,
+        };
+        let start = (place("u1", 300.0), Direction::Up);
+        let via = [Waypoint::Track(network.named("u2").unwrap())];
+        let way = network.itinerary(start, &via, Some(place("u3", 100.0)), 200.0);
+        let settings = ProtectionSettings {
+            initial_track: Some("u1".to_owned()),
+            initial_chainage_m: Some(300.0),
+            ..ProtectionSettings::default()
+        };
+        let node = Node::Train(TrainId(0));
+        let route = way.unwrap().route;
+        let mut equipment = TrainProtection::new(node.clone(), &network, route.clone(), &settings);
+        let time = SimTime::from_secs(1.0);
+        let odometer = OdometerSample {
+            time,
+            distance_m: 0.0,
+            speed_mps: 0.0,
+            slides: false,
+        };
+        equipment.on(&Message::own(node, time, Content::Odometer(odometer)));
+        let content = heard(network.named(track).unwrap(), s_m);
+        let sender = match &content {
+            Content::Train(_) => Node::Train(TrainId(1)),
+            _ => Node::Post("V1".into()),
+        };
+        equipment
+            .on(&Message::to(Receiver::Trains, sender, time, content).arrived(time, Via::Radio));
+        let said = equipment.cycle(time);
+        let end = said.iter().find_map(|message| match &message.content {
+            Content::Protection(report) => report.authority_end,
+            _ => None,
+        });
+        end.and_then(|end| route.runs_m(end).next())
+    }
+
+    /// Provokes: an obstacle or a train on the other track that brakes a train, and one in the overlap of gauges at a
+    /// switch that does not; distances counted over the wrong leg.
+    #[test]
+    fn only_what_is_in_the_way_of_the_route_ends_the_authority() {
+        let obstacle = |track, s_m| {
+            Content::Warning(ObstacleWarning {
+                device: "V1".into(),
+                number: 0,
+                issued: SimTime::ZERO,
+                danger: DangerLevel::High,
+                track,
+                from_chainage_m: s_m,
+                to_chainage_m: s_m + 1.0,
+                blind: false,
+            })
+        };
+        let train = |track, s_m| {
+            Content::Train(TrainReport {
+                track,
+                chainage_m: s_m + 1.0,
+                occupied: vec![Stretch {
+                    track,
+                    from_m: s_m,
+                    to_m: s_m + 1.0,
+                }],
+                ..TrainReport::default()
+            })
+        };
+        let near = |found: Option<f64>, right: Option<f64>| match (found, right) {
+            (Some(found), Some(right)) => (found - right).abs() < 1e-6,
+            (found, right) => found.is_none() && right.is_none(),
+        };
+        // The switch W1 is at 460 m; 25 m before what is ahead the authority ends.
+        for (track, s_m, end_m) in [
+            ("u1", 400.0, Some(375.0)),
+            ("u2", 50.0, Some(485.0)),
+            ("d1", 400.0, None),
+            ("d3", 100.0, None),
+            ("A", 10.0, Some(445.0)),
+            ("A", 60.0, None),
+            ("siding", 10.0, None),
+            ("u1", 100.0, None),
+        ] {
+            let found = on_terminus(obstacle, track, s_m);
+            assert!(near(found, end_m), "{track} {s_m}: {found:?}");
+            let found = on_terminus(train, track, s_m);
+            assert!(near(found, end_m), "train at {track} {s_m}: {found:?}");
+        }
     }
 }

@@ -56,11 +56,16 @@ impl RouteEnvelope {
     /// The distances from which to which a stretch of track is in the way of the route: where it is on it, and
     /// where gauges overlap.
     pub fn runs_over(&self, stretch: Stretch) -> impl Iterator<Item = (f64, f64)> {
-        let overlaps = self
-            .fouling
+        self.route
+            .runs_over(stretch)
+            .chain(self.fouls_over(stretch))
+    }
+
+    /// The distances from which to which gauges overlap with those of a stretch of another track, at a switch.
+    pub fn fouls_over(&self, stretch: Stretch) -> impl Iterator<Item = (f64, f64)> {
+        self.fouling
             .iter()
-            .filter_map(move |f| f.runs_over(stretch));
-        self.route.runs_over(stretch).chain(overlaps)
+            .filter_map(move |f| f.runs_over(stretch))
     }
 }
 

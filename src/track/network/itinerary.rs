@@ -61,14 +61,14 @@ impl Network {
         // Which track of the way each place is on.
         let mut places = Vec::new();
         for waypoint in via {
-            let place = match *waypoint {
-                Waypoint::Place(place) => place,
-                Waypoint::Track(track) => Place {
-                    track,
-                    s_m: 0.5 * self.alignment(track)?.length_m(),
-                },
+            at = match *waypoint {
+                Waypoint::Place(place) => self.go_on(&mut ends, at, place)?,
+                Waypoint::Track(track) if at.0.track == track => at,
+                Waypoint::Track(track) => {
+                    let place = self.nearer_end(at, track)?;
+                    self.go_on(&mut ends, at, place)?
+                }
             };
-            at = self.go_on(&mut ends, at, place)?;
             if let Waypoint::Place(place) = waypoint {
                 places.push((ends.len() - 1, place.s_m));
             }
@@ -114,6 +114,17 @@ impl Network {
         limits.collect()
     }
 
+    /// The end of a track to which the way is shorter.
+    fn nearer_end(&self, from: (Place, Direction), track: TrackId) -> Option<Place> {
+        let length_m = self.alignment(track)?.length_m();
+        let ends = [0.0, length_m].map(|s_m| Place { track, s_m });
+        let ways = ends.map(|end| Some((self.shortest(from, end)?.length_m(), end)));
+        let nearer = ways.into_iter().flatten();
+        nearer
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .map(|(_, end)| end)
+    }
+
     /// Adds the tracks of the shortest way to a place; gives where that comes to, and which way.
     fn go_on(
         &self,
@@ -131,7 +142,7 @@ impl Network {
     }
 
     /// Adds the tracks beyond the last one, straight on.
-    fn run_on(&self, ends: &mut Vec<TrackEnd>, stops: bool) {
+    pub(super) fn run_on(&self, ends: &mut Vec<TrackEnd>, stops: bool) {
         let mut beyond_m = 0.0;
         while let Some(next) = ends.last().and_then(|end| self.next(*end).next()) {
             if ends.len() >= MOST_TRACKS || (stops && beyond_m >= BEYOND_M) {
@@ -168,7 +179,7 @@ impl Network {
     }
 
     /// The whole of a track, run towards an end.
-    fn whole_leg(&self, end: TrackEnd) -> Option<Leg> {
+    pub(super) fn whole_leg(&self, end: TrackEnd) -> Option<Leg> {
         let length_m = self.alignment(end.track)?.length_m();
         let (from_m, to_m) = match end.way {
             Direction::Up => (0.0, length_m),

@@ -49,6 +49,7 @@ mod clearance;
 mod envelope;
 mod error;
 mod itinerary;
+mod passings;
 mod route;
 mod search;
 #[cfg(test)]
@@ -58,6 +59,7 @@ mod tests;
 pub use envelope::RouteEnvelope;
 pub use error::NetworkError;
 pub use itinerary::{Itinerary, SpeedLimit, Waypoint};
+pub use passings::Passing;
 pub use route::{Leg, Route};
 
 use super::{

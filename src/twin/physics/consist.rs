@@ -174,6 +174,17 @@ impl Consist {
         self.wheelsets[0].s_m + overhang_m
     }
 
+    /// Distance along the route of its first wheelset.
+    pub(super) fn front_axle_m(&self) -> f64 {
+        self.wheelsets[0].s_m
+    }
+
+    /// Distances along the route of its head and of its tail.
+    pub(super) fn stands_m(&self) -> (f64, f64) {
+        let head_m = self.head_chainage_m();
+        (head_m, head_m - self.length_m())
+    }
+
     /// Chainage of the train's middle.
     fn middle_m(&self) -> f64 {
         self.head_chainage_m() - 0.5 * self.length_m()

@@ -95,7 +95,13 @@ impl AutomaticDriver {
     }
 
     /// One step of `dt_s`.
-    pub(super) fn step(&mut self, now: &Instruments, command: &TrainCommand, dt_s: f64) -> Effort {
+    pub(super) fn step(
+        &mut self,
+        now: &Instruments,
+        command: &TrainCommand,
+        signal_m: Option<f64>,
+        dt_s: f64,
+    ) -> Effort {
         let standing = now.speed_mps.abs() < STANDING_MPS;
         self.emergency = command.brake == BrakeDemand::Emergency || self.emergency && !standing;
         let demand = if self.emergency {
@@ -106,7 +112,7 @@ impl AutomaticDriver {
         };
         self.build_up(demand, dt_s);
         self.call(now, standing);
-        let mut wanted = self.wanted(now, command.permitted_speed_mps);
+        let mut wanted = self.wanted(now, command.permitted_speed_mps, signal_m);
         if demand != BrakeDemand::None {
             // Traction is cut at once, and the lever stays out of power.
             self.lever_mps2 = self.lever_mps2.min(0.0);
@@ -118,6 +124,16 @@ impl AutomaticDriver {
             traction_mps2: self.lever_mps2.max(0.0),
             brake_mps2: self.demanded_mps2.max(-self.lever_mps2),
         }
+    }
+
+    /// Another way than his own, from a distance on: he stops, and does not go on.
+    pub(super) fn diverted(&mut self, limits: Vec<SpeedLimit>, from_m: f64) {
+        self.timetable = Timetable {
+            calls_m: Vec::new(),
+            stop_m: Some(from_m),
+            limits,
+        };
+        self.leaves_s = None;
     }
 
     /// It stands at a station, on its way.
@@ -171,7 +187,7 @@ impl AutomaticDriver {
     }
 
     /// Lever position that the driver would like now.
-    fn wanted(&self, now: &Instruments, permitted_mps: f64) -> f64 {
+    fn wanted(&self, now: &Instruments, permitted_mps: f64, signal_m: Option<f64>) -> f64 {
         let s = &self.settings;
         let mut target = (permitted_mps - MARGIN_MPS).max(0.0);
         target = target.min(s.cruise_speed_kmh / 3.6);
@@ -186,7 +202,8 @@ impl AutomaticDriver {
         // The root keeps the approach within the jerk limit, so that the speed does not overshoot.
         let answer = (GAIN_PER_S * error.abs()).min((1.5 * s.jerk_mps3 * error.abs()).sqrt());
         let mut wanted = answer.copysign(error) + now.resistance_mps2;
-        if let Some(stop_m) = self.next_stop_m() {
+        let stops = [self.next_stop_m(), signal_m].into_iter().flatten();
+        if let Some(stop_m) = stops.reduce(f64::min) {
             let left_m = stop_m - now.chainage_m;
             let planned = PLANNED_SHARE * s.service_brake_mps2;
             let needed = now.speed_mps.powi(2) / (2.0 * left_m.max(AT_MARK_M));
@@ -231,7 +248,7 @@ mod tests {
             if (1000..1100).contains(&k) {
                 command.brake = BrakeDemand::Emergency;
             }
-            let effort = driver.step(&now, &command, 1e-3);
+            let effort = driver.step(&now, &command, None, 1e-3);
             let net_mps2 = effort.traction_mps2 - effort.brake_mps2;
             speed_mps = f64::max(0.0, speed_mps + 1e-3 * net_mps2);
             if k > 1100 && effort.traction_mps2 > 0.0 {
@@ -263,7 +280,7 @@ mod tests {
             if k == 0 {
                 command.brake = BrakeDemand::Emergency;
             }
-            let effort = driver.step(&now, &command, 1e-3);
+            let effort = driver.step(&now, &command, None, 1e-3);
             assert!(effort.traction_mps2 <= 0.0, "{} s", now.time_s);
         }
     }

@@ -59,6 +59,8 @@ mod ground;
 mod groups;
 mod history;
 mod impact;
+mod incident;
+mod interlocking;
 mod irregularity;
 mod obstacle;
 mod obstacle_body;
@@ -71,6 +73,7 @@ mod slide_protection;
 mod stability;
 mod surroundings;
 mod suspension;
+mod switches;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]
@@ -99,7 +102,9 @@ pub use irregularity::{IrregularityClass, IrregularitySettings};
 pub use obstacle::{HingeEdge, HingeSettings, ObstacleSettings};
 pub use shape::ObstacleShape;
 
+pub use incident::{Incident, IncidentKind};
 pub use settings::{HISTORY_S, PhysicsSettings, STEP_S, TrackSettings, TrainSettings, train_key};
+pub use switches::{InterlockingSettings, LegName, SwitchMove, SwitchPosition};
 pub use train_route::NoRoute;
 pub use train_truth::TrainState;
 pub use truth::{BodyLabel, BodyOwner, ObstacleTruth, WorkerTruth};
@@ -113,6 +118,7 @@ use crate::bus::{SimTime, TrainCommand, TrainId};
 use crate::settings::Settings;
 use crate::track::Tunnel;
 use crate::track::network::Network;
+use interlocking::{Interlocking, Verdict};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
 use route_track::{Rails, RouteTrack};
@@ -129,6 +135,8 @@ pub struct World {
     /// What carries a rig at rest where there is no train.
     carrier: Option<carrier::Carrier>,
     surroundings: Surroundings,
+    interlocking: Interlocking,
+    rails: Arc<Rails>,
     time: SimTime,
     step: SimTime,
     step_s: f64,
@@ -154,18 +162,22 @@ impl World {
         rapier.integration_parameters.dt = step_s;
         // Substeps would move bodies with forces that belong to the step's start.
         rapier.integration_parameters.num_solver_iterations = 1;
-        let rails = Rails::new(&tunnel.network, &settings.track, [seed, index]);
+        let rails = Arc::new(Rails::new(&tunnel.network, &settings.track, [seed, index]));
         let mut world = Self {
-            trains: trains(&mut rapier, &tunnel, rails, settings, step_s)?,
+            trains: trains(&mut rapier, &tunnel, &rails, settings, step_s)?,
             tunnel,
             rapier,
             carrier: None,
             surroundings: Surroundings::default(),
+            interlocking: Interlocking::default(),
+            rails: rails.clone(),
             time: SimTime::ZERO,
             step,
             step_s,
         };
         world.run_in()?;
+        let (network, switches) = (&world.tunnel.network, &settings.interlocking);
+        world.interlocking = Interlocking::new(network, switches, &world.trains);
         let (rapier, run) = (&mut world.rapier, [seed, index]);
         world.surroundings =
             Surroundings::new(rapier, &world.tunnel.network, settings, run, &world.trains);
@@ -196,8 +208,9 @@ impl World {
         let commands = commands
             .iter()
             .chain(std::iter::repeat(&TrainCommand::UNSUPERVISED));
-        for (train, command) in self.trains.iter_mut().zip(commands) {
-            train.drive(&mut self.rapier, command, (self.time, self.step_s));
+        let signals = &self.interlocking.signals_m;
+        for ((train, command), signal) in self.trains.iter_mut().zip(commands).zip(signals) {
+            train.drive(&mut self.rapier, command, *signal, (self.time, self.step_s));
         }
         self.go()
     }
@@ -213,8 +226,47 @@ impl World {
         for train in &mut self.trains {
             train.read(&self.rapier, self.time)?;
         }
+        self.pass_switches()?;
         self.surroundings
             .after_step(&mut self.rapier, &self.tunnel.network, self.time)
+    }
+
+    /// Trains go where switches lead them.
+    fn pass_switches(&mut self) -> Result<(), PhysicsError> {
+        let network = &self.tunnel.network;
+        let verdicts = (self.interlocking).after_step(network, &self.trains, self.time);
+        for (k, verdict) in verdicts {
+            let train = &mut self.trains[k];
+            match verdict {
+                Verdict::Derails => {
+                    return Err(PhysicsError::Derailed {
+                        train: train.consist.id,
+                        body: "the train at a switch".to_owned(),
+                        time: self.time,
+                    });
+                }
+                Verdict::Diverted(passing) => {
+                    let passing = network.passings(&train.track.route)[passing];
+                    if let Some(route) = network.diverted(&train.track.route, &passing) {
+                        let limits = network.speed_limits(&route);
+                        let track = RouteTrack::new(network, route, self.rails.clone());
+                        train.divert(track, limits, passing.toe_m);
+                        self.interlocking.rerouted(network, train);
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What has gone wrong with switches, ends and trains in each other's way, in order of time.
+    pub fn incidents(&self) -> &[Incident] {
+        &self.interlocking.incidents.list
+    }
+
+    /// Share of the way from the through to the diverging leg that the blades of a switch are at, 0 to 1.
+    pub fn switch_share(&self, switch: usize) -> f64 {
+        self.interlocking.switches.share(switch, self.time)
     }
 
     /// The tracks.
@@ -241,12 +293,12 @@ impl World {
 fn trains(
     rapier: &mut PhysicsWorld,
     tunnel: &Tunnel,
-    rails: Rails,
+    rails: &Arc<Rails>,
     settings: &PhysicsSettings,
     step_s: f64,
 ) -> Result<Vec<Train>, PhysicsError> {
     let history = (settings.history_s / step_s).ceil() as usize + 1;
-    let (network, rails) = (&tunnel.network, Arc::new(rails));
+    let network = &tunnel.network;
     let make = |(k, train): (usize, &TrainSettings)| {
         let way = train.itinerary(network)?;
         let track = RouteTrack::new(network, way.route.clone(), rails.clone());

@@ -27,6 +27,8 @@ impl Clone for World {
             trains: self.trains.clone(),
             carrier: self.carrier.clone(),
             surroundings: self.surroundings.clone(),
+            interlocking: self.interlocking.clone(),
+            rails: self.rails.clone(),
             time: self.time,
             step: self.step,
             step_s: self.step_s,

@@ -6,6 +6,7 @@ use super::defect::DefectSettings;
 use super::irregularity::IrregularitySettings;
 use super::obstacle::ObstacleSettings;
 use super::stability::longest_step_s;
+use super::switches::InterlockingSettings;
 use super::vehicle::{AXLES, Vehicle};
 use super::vehicle_file::VehicleFile;
 use super::worker::WorkerSettings;
@@ -36,6 +37,8 @@ settings! {
         cables: Vec<CableSettings> = Vec::new(), nested;
         /// People on the line.
         workers: Vec<WorkerSettings> = Vec::new(), nested;
+        /// How switches are set.
+        interlocking: InterlockingSettings = InterlockingSettings::default(), nested;
     }
     also check_together
 }

@@ -9,15 +9,16 @@ use super::cable::Cable;
 use super::entity::{Entity, train_name};
 use super::ground::Ground;
 use super::impact::{Impacts, Motion};
-use super::obstacle::SingleObstacle;
+use super::obstacle::{ObstacleSettings, SingleObstacle};
 use super::obstacle_body::ObstacleBody;
 use super::settings::PhysicsSettings;
+use super::shape::ObstacleShape;
 use super::train::Train;
 use super::truth::{BodyLabel, BodyOwner};
 use super::walker::{Act, Walker};
 use crate::bus::{SimTime, TrainId};
-use crate::track::network::Network;
-use crate::track::{Alignment, Place, TrackId};
+use crate::track::network::{Beyond, Network};
+use crate::track::{Alignment, BED_M, Direction, Place, TrackId};
 use crate::twin::geometry::Body;
 use rapier3d_f64::prelude::{PhysicsWorld, RigidBodyHandle};
 
@@ -68,6 +69,7 @@ impl Surroundings {
         let entries = settings.obstacles.iter().enumerate();
         let mut to_come: Vec<SingleObstacle> = entries
             .flat_map(|(k, entry)| entry.pieces(&format!("obstacle {k}"), seed, index))
+            .chain(buffers(network))
             .collect();
         to_come.sort_by(|a, b| a.settings.appears_s.total_cmp(&b.settings.appears_s));
         to_come.reverse();
@@ -360,6 +362,39 @@ impl Surroundings {
         self.name(Entity::Train(id))
     }
 }
+
+/// The buffer stops of a network: they stand until a train hits them, and then slide along.
+fn buffers(network: &Network) -> Vec<SingleObstacle> {
+    let ends = network.ends();
+    let buffers = ends.filter(|end| network.beyond(*end) == Beyond::Buffer);
+    let all = buffers.flat_map(|end| {
+        let track = &network.tracks[usize::from(end.track.0)];
+        let beyond_m = match end.way {
+            Direction::Up => track.alignment.length_m() + BUFFER_BEYOND_M,
+            Direction::Down => -BUFFER_BEYOND_M,
+        };
+        let buffer = ObstacleSettings {
+            name: format!("buffer of {}", track.name),
+            track: Some(track.name.clone()),
+            chainage_m: beyond_m,
+            height_m: BED_M,
+            body: ObstacleShape::Box {
+                size_m: BUFFER_SIZE_M,
+            },
+            mass_kg: BUFFER_KG,
+            held_until_s: Some(1e6),
+            ..ObstacleSettings::default()
+        };
+        buffer.pieces("buffer", 0, 0)
+    });
+    all.collect()
+}
+
+/// A sliding buffer stop of a metro: as heavy as holds a train of 340 t from 15 km/h on some 10 m.
+const BUFFER_KG: f64 = 20_000.0;
+const BUFFER_SIZE_M: [f64; 3] = [1.5, 2.4, 1.4];
+/// Its middle is behind the end of the track by half of its length.
+const BUFFER_BEYOND_M: f64 = 0.75;
 
 /// The track of a name; the first one without.
 fn track_of(network: &Network, name: Option<&String>) -> TrackId {

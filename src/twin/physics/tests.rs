@@ -9,6 +9,7 @@
 
 mod directions;
 mod obstacles;
+mod switches;
 
 use super::history::MotionHistory;
 use super::*;

@@ -109,12 +109,19 @@ impl Train {
         &mut self,
         world: &mut PhysicsWorld,
         command: &TrainCommand,
+        signal_m: Option<f64>,
         (now, dt_s): (SimTime, f64),
     ) {
         let instruments = self.consist.instruments(now, &self.track);
-        self.effort = self.driver.step(&instruments, command, dt_s);
+        self.effort = self.driver.step(&instruments, command, signal_m, dt_s);
         self.consist
             .apply_forces(world, &self.track, self.effort, dt_s);
+    }
+
+    /// It has been led onto another way than its own, from a distance on. Its driver stops.
+    pub(super) fn divert(&mut self, track: RouteTrack, limits: Vec<SpeedLimit>, from_m: f64) {
+        self.track = track;
+        self.driver.diverted(limits, from_m);
     }
 
     /// What a step came to.

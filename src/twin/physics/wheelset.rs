@@ -90,6 +90,8 @@ pub struct WheelExtremes {
     pub least_normal_n: f64,
     /// Most that it slipped or slid.
     pub most_slip_mps: f64,
+    /// Most that the rails pressed it aside, either way.
+    pub most_lateral_n: f64,
 }
 
 impl Default for WheelExtremes {
@@ -97,6 +99,7 @@ impl Default for WheelExtremes {
         Self {
             least_normal_n: f64::INFINITY,
             most_slip_mps: 0.0,
+            most_lateral_n: 0.0,
         }
     }
 }
@@ -107,6 +110,7 @@ impl WheelExtremes {
         Self {
             least_normal_n: self.least_normal_n.min(other.least_normal_n),
             most_slip_mps: self.most_slip_mps.max(other.most_slip_mps),
+            most_lateral_n: self.most_lateral_n.max(other.most_lateral_n),
         }
     }
 }
@@ -169,6 +173,7 @@ impl Wheelset {
         self.extremes = self.extremes.and(WheelExtremes {
             least_normal_n: self.forces.normal_n[0].min(self.forces.normal_n[1]),
             most_slip_mps: self.forces.slip_mps.abs(),
+            most_lateral_n: self.forces.lateral_n.abs(),
         });
         torque
     }
