@@ -32,6 +32,7 @@ Columns of fixes.csv:
   chainage_m, sigma_m          the estimate for the train's head, with one sigma
   true_chainage_m, error_m     the truth, and estimate less truth
   lamp_x_m, lamp_y_m, lamp_z_m the lamp in the left camera's frame: right, down, forward
+  track                        name of the track that the fix is on
 
 Examples:
   metrotwin run scenarios/line_run.toml

@@ -53,7 +53,7 @@ mod tests {
         Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, Physics, Positioning,
         ProtectionFigures, TrainFigures, WallShares, Wayside,
     };
-    use crate::twin::physics::{Damage, Impact};
+    use crate::twin::physics::{Damage, Impact, Incident, IncidentKind};
     use crate::twin::render::Backend;
     use std::collections::BTreeMap;
 
@@ -135,7 +135,6 @@ mod tests {
             distance_error_m: first_detected_s,
         };
         Summary {
-            incidents: Vec::new(),
             positioning: [
                 (Method::Mono, method(None)),
                 (Method::Stereo, method(Some(0.0123))),
@@ -167,6 +166,15 @@ mod tests {
                 collision: true,
                 impacts: vec![impact; 11],
             }),
+            incidents: vec![Incident {
+                time: SimTime::from_secs(12.5),
+                kind: IncidentKind::RunThrough,
+                train: TrainId(1),
+                other: None,
+                switch: Some("W1".to_owned()),
+                track: "u1".to_owned(),
+                chainage_m: 460.0,
+            }],
             train: Some(TrainFigures {
                 run_m: 512.34,
                 stop_error_m: Some(-0.256),
@@ -204,7 +212,8 @@ mod tests {
             "  hit toolbox at 31.50 s with 36.0 km/h: 1234 N s, 1.50 kJ of 5.00 kJ lost, beyond design damage",
             "  and 1 more hits: see summary.json",
             "train ran 512.3 m; floor 0.346 m/s^2 vertical, 0.200 lateral (RMS); wheel load down to 88 %; \
-             slip up to 0.12 m/s; stopped 0.26 m off the mark",
+             slip up to 0.12 m/s; pressed aside by up to 12 kN; stopped 0.26 m off the mark",
+            "   12.50 s: switch W1, run through, train 1, at 460.0 m of track u1",
         ] {
             assert!(text.lines().any(|l| l == line), "{line}\n{text}");
         }

@@ -244,7 +244,7 @@ impl Moving {
     pub(super) fn obstacles(&mut self, device: &str, obstacles: &[DetectedObstacle]) -> Result {
         let (mut places, mut sizes, mut turns) = (Vec::new(), Vec::new(), Vec::new());
         for o in obstacles {
-            let alignment = self.scene.alignment();
+            let alignment = self.scene.beside(device);
             let frame = alignment.at(0.5 * (o.from_chainage_m + o.to_chainage_m));
             let foot = TrackPoint {
                 s_m: frame.s_m,

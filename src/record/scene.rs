@@ -6,8 +6,9 @@ use super::stream::RowStream;
 use super::whole_files::Result;
 use crate::scenario::RecordSettings;
 use crate::session::Opening;
+use crate::track::network::Network;
 use crate::track::uid::Uid;
-use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Track};
+use crate::track::{Alignment, RAIL_OFFSET_M, SectionRange, Track, Tunnel};
 use nalgebra::{Isometry3, Point3, Vector3};
 use re_sdk_types::archetypes::{
     Boxes3D, LineStrips3D, Mesh3D, Points3D, Transform3D, ViewCoordinates,
@@ -16,6 +17,7 @@ use re_sdk_types::components::{Color, FillMode, MeshFaceRendering, RotationQuat}
 use re_sdk_types::datatypes::Quaternion;
 use rerun::AsComponents;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// The vehicle frame of the leading car.
 pub(super) const HEAD: &str = "world/train/head";
@@ -30,25 +32,27 @@ const MAX_LAMP_LABELS: usize = 12;
 /// single precision is good to a millimetre up to 10 km away.
 pub(super) struct RecordedScene {
     origin: Vector3<f64>,
-    alignment: Alignment,
+    network: Network,
     lamps: BTreeMap<Uid, Point3<f64>>,
 }
 
 impl RecordedScene {
-    /// Of a line.
-    pub(super) fn new(tunnel: &Track) -> Self {
-        let alignment = tunnel.alignment.clone();
-        let middle = alignment.at(alignment.length_m() / 2.0).origin;
+    /// Of a tunnel.
+    pub(super) fn new(tunnel: &Tunnel) -> Self {
+        let first = &tunnel.first_track().alignment;
+        let middle = first.at(first.length_m() / 2.0).origin;
         Self {
             origin: middle.coords.map(f64::round),
-            alignment,
-            lamps: tunnel.lamps.iter().map(|l| (l.uid, l.centre)).collect(),
+            network: tunnel.network.clone(),
+            lamps: tunnel.lamps().map(|l| (l.uid, l.centre)).collect(),
         }
     }
 
-    /// The line.
-    pub(super) fn alignment(&self) -> &Alignment {
-        &self.alignment
+    /// The line that a wayside device stands beside.
+    pub(super) fn beside(&self, device: &str) -> &Alignment {
+        let has = |track: &&Arc<Track>| track.wayside.iter().any(|site| site.name == device);
+        let track = self.network.tracks.iter().find(has);
+        &track.unwrap_or(&self.network.tracks[0]).alignment
     }
 
     /// Where a lamp was surveyed.
@@ -97,20 +101,27 @@ impl RecordedScene {
         Ok(())
     }
 
-    fn log_tunnel(&self, stream: &RowStream, tunnel: &Track, ring_step_m: f64) -> Result {
-        let step_m = ring_step_m.max(self.alignment.length_m() / MAX_RINGS);
+    fn log_tunnel(&self, stream: &RowStream, tunnel: &Tunnel, ring_step_m: f64) -> Result {
+        let tracks = &tunnel.network.tracks;
+        let length_m: f64 = tracks.iter().map(|t| t.alignment.length_m()).sum();
+        let step_m = ring_step_m.max(length_m / MAX_RINGS);
         let mut mesh = Sweep::default();
-        for range in &tunnel.sections {
-            mesh.sweep(self, range, step_m);
+        for track in tracks {
+            for range in &track.sections {
+                mesh.sweep(self, &track.alignment, range, step_m);
+            }
         }
         stream.log_static("world/tunnel", &mesh.finish())?;
 
-        let rails = [RAIL_OFFSET_M, -RAIL_OFFSET_M].map(|centre_m| {
-            let strip = rings(0.0, self.alignment.length_m(), step_m).map(|s_m| {
-                let rail = Point3::new(0.0, centre_m, 0.0);
-                self.local(&(self.alignment.at(s_m).world_from_rails() * rail))
-            });
-            strip.collect::<Vec<_>>()
+        let rails = tracks.iter().flat_map(|track| {
+            let line = &track.alignment;
+            [RAIL_OFFSET_M, -RAIL_OFFSET_M].map(|centre_m| {
+                let strip = rings(0.0, line.length_m(), step_m).map(|s_m| {
+                    let rail = Point3::new(0.0, centre_m, 0.0);
+                    self.local(&(line.at(s_m).world_from_rails() * rail))
+                });
+                strip.collect::<Vec<_>>()
+            })
         });
         let rails = LineStrips3D::new(rails)
             .with_radii([0.04])
@@ -118,8 +129,8 @@ impl RecordedScene {
         stream.log_static("world/rails", &rails)
     }
 
-    fn log_lamps_and_balises(&self, stream: &RowStream, tunnel: &Track) -> Result {
-        let lamps = &tunnel.lamps;
+    fn log_lamps_and_balises(&self, stream: &RowStream, tunnel: &Tunnel) -> Result {
+        let lamps: Vec<_> = tunnel.lamps().collect();
         if !lamps.is_empty() {
             let points = Points3D::new(lamps.iter().map(|l| self.local(&l.centre)))
                 .with_radii([ui(3.0)])
@@ -128,9 +139,12 @@ impl RecordedScene {
                 .with_show_labels(lamps.len() <= MAX_LAMP_LABELS);
             stream.log_static("world/lamps", &points)?;
         }
-        if !tunnel.balises.is_empty() {
-            let poses = tunnel.balises.iter().map(|balise| {
-                let frame = self.alignment.at(balise.chainage_m).world_from_rails();
+        let tracks = tunnel.network.tracks.iter();
+        let balises = tracks.flat_map(|track| track.balises.iter().map(move |b| (track, b)));
+        let balises: Vec<_> = balises.collect();
+        if !balises.is_empty() {
+            let poses = balises.iter().map(|(track, balise)| {
+                let frame = track.alignment.at(balise.chainage_m).world_from_rails();
                 (self.place(&frame), turn(&frame))
             });
             let (places, turns): (Vec<_>, Vec<_>) = poses.unzip();
@@ -139,8 +153,8 @@ impl RecordedScene {
                 .with_quaternions(turns)
                 .with_colors([palette::BALISE])
                 .with_fill_mode(FillMode::Solid)
-                .with_labels(tunnel.balises.iter().map(|b| b.name.as_str()))
-                .with_show_labels(tunnel.balises.len() <= MAX_LAMP_LABELS);
+                .with_labels(balises.iter().map(|(_, b)| b.name.as_str()))
+                .with_show_labels(balises.len() <= MAX_LAMP_LABELS);
             stream.log_static("world/balises", &boxes)?;
         }
         Ok(())
@@ -158,7 +172,8 @@ impl RecordedScene {
             (Some(head), _) => (*head, [-9.0, -13.0, 9.0], [8.0, 0.0, 1.5]),
             (None, Some(camera)) => (*camera, [-6.0, -6.0, -8.0], [0.0, 2.0, 20.0]),
             (None, None) => {
-                let middle = self.alignment.at(self.alignment.length_m() / 2.0);
+                let line = &self.network.tracks[0].alignment;
+                let middle = line.at(line.length_m() / 2.0);
                 (
                     middle.world_from_line(),
                     [-20.0, -20.0, 12.0],
@@ -194,11 +209,17 @@ struct Sweep {
 }
 
 impl Sweep {
-    fn sweep(&mut self, scene: &RecordedScene, range: &SectionRange, step_m: f64) {
+    fn sweep(
+        &mut self,
+        scene: &RecordedScene,
+        line: &Alignment,
+        range: &SectionRange,
+        step_m: f64,
+    ) {
         for edge in range.section.edges() {
             let first = self.corners.len() as u32;
             for (ring, s_m) in rings(range.from_m, range.to_m, step_m).enumerate() {
-                let frame = scene.alignment.at(s_m);
+                let frame = line.at(s_m);
                 let (nl, nh) = edge.normal();
                 let normal = (frame.left() * nl + Vector3::z() * nh).map(|x| x as f32);
                 for p in [edge.a, edge.b] {
@@ -237,10 +258,11 @@ mod tests {
     fn the_tunnel_shows_its_inner_side() {
         let tunnel = tunnel();
         let scene = RecordedScene::new(&tunnel);
+        let track = tunnel.first_track();
         let mut sweep = Sweep::default();
-        sweep.sweep(&scene, &tunnel.sections[0], 5.0);
+        sweep.sweep(&scene, &track.alignment, &track.sections[0], 5.0);
         // 120 stretches, two triangles each.
-        let edges = tunnel.sections[0].section.edges().count();
+        let edges = track.sections[0].section.edges().count();
         assert_eq!(sweep.triangles.len(), edges * 120 * 2);
         let corner = |k: u32| Vector3::from(sweep.corners[k as usize]);
         for t in &sweep.triangles {
@@ -254,13 +276,13 @@ mod tests {
             );
             let near_s_m = 200.0;
             let world = Point3::from(a.cast::<f64>() + scene.origin);
-            let s_m = scene.alignment.track_from_world(&world, near_s_m).s_m;
+            let s_m = track.alignment.track_from_world(&world, near_s_m).s_m;
             let axis = TrackPoint {
                 s_m,
                 l_m: 0.0,
                 h_m: 1.9,
             };
-            let axis = scene.local(&scene.alignment.world_from_track(axis));
+            let axis = scene.local(&track.alignment.world_from_track(axis));
             assert!(face.dot(&(Vector3::from(axis) - a)) > 0.0);
         }
     }
@@ -270,7 +292,8 @@ mod tests {
     fn coordinates_are_good_to_a_millimetre() {
         let tunnel = tunnel();
         let scene = RecordedScene::new(&tunnel);
-        for lamp in &tunnel.lamps {
+        let track = tunnel.first_track();
+        for lamp in &track.lamps {
             let back = Vector3::from(scene.local(&lamp.centre)).cast::<f64>() + scene.origin;
             assert!((back - lamp.centre.coords).norm() < 1e-3);
         }

@@ -8,15 +8,17 @@ use std::path::{Path, PathBuf};
 
 /// Columns of `fixes.csv`; `metrotwin run --help` says what they are.
 pub(crate) const FIX_COLUMNS: &str = "time_s,method,uid,identity,chainage_m,true_chainage_m,error_m,sigma_m,\
-                      lamp_x_m,lamp_y_m,lamp_z_m";
+                      lamp_x_m,lamp_y_m,lamp_z_m,track";
 
 /// One row a position fix of one train, as comma-separated values: when, by which method, on which lamp, the
-/// chainage with its sigma, the true one, their difference, and the lamp in the left camera's
-/// frame (x right, y down, z forward). Written as `<path>.part`, and named in [`Observer::close`].
+/// chainage with its sigma, the true one, their difference, the lamp in the left camera's
+/// frame (x right, y down, z forward), and the track's name. Written as `<path>.part`, and named in [`Observer::close`].
 pub struct FixTable {
     train: TrainId,
     path: PathBuf,
     rows: Option<BufWriter<PartFile>>,
+    /// Names of the tracks.
+    tracks: Vec<String>,
 }
 
 impl FixTable {
@@ -26,6 +28,7 @@ impl FixTable {
             train,
             path: folder.join(Self::file_name(train)),
             rows: None,
+            tracks: Vec::new(),
         }
     }
 
@@ -39,12 +42,14 @@ impl FixTable {
 }
 
 impl Observer for FixTable {
-    fn open(&mut self, _: &Opening<'_>) -> Result {
+    fn open(&mut self, opening: &Opening<'_>) -> Result {
         make_folder_of(&self.path)?;
         let file = PartFile::create(&self.path).map_err(broken(&self.path))?;
         let mut rows = BufWriter::new(file);
         writeln!(rows, "{FIX_COLUMNS}").map_err(broken(&self.path))?;
         self.rows = Some(rows);
+        let tracks = opening.tunnel.network.tracks.iter();
+        self.tracks = tracks.map(|track| track.name.clone()).collect();
         Ok(())
     }
 
@@ -65,7 +70,7 @@ impl Observer for FixTable {
             let lamp = fix.lamp_in_camera;
             writeln!(
                 rows,
-                "{:.9},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6}",
+                "{:.9},{},{},{},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{:.6},{}",
                 fix.time.secs(),
                 fix.method,
                 fix.uid,
@@ -77,6 +82,9 @@ impl Observer for FixTable {
                 lamp.x,
                 lamp.y,
                 lamp.z,
+                self.tracks
+                    .get(usize::from(fix.track.0))
+                    .map_or("", String::as_str),
             )
             .map_err(broken(&self.path))?;
         }

@@ -16,7 +16,7 @@ use crate::bus::{
 };
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
-use crate::track::{Track, TrackId};
+use crate::track::{TrackId, Tunnel};
 use re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use re_sdk_types::components::Name;
 use rerun::StoreKind;
@@ -211,7 +211,7 @@ fn the_layout_leaves_out_what_is_missing() {
 }
 
 /// What a run without rig, train and devices opens with.
-fn bare<'a>(scenario: &'a str, tunnel: &'a Track) -> Opening<'a> {
+fn bare<'a>(scenario: &'a str, tunnel: &'a Tunnel) -> Opening<'a> {
     Opening {
         scenario,
         seed: 0,

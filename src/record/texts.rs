@@ -34,13 +34,14 @@ impl Texts {
     /// Begins the log with what is run.
     pub(super) fn open(stream: RowStream, opening: &Opening<'_>) -> Result<Self> {
         let tunnel = opening.tunnel;
+        let tracks = tunnel.network.tracks.iter();
         let text = format!(
             "{}, seed {}: {:.0} m of line, {} lamps, {} balises",
             opening.scenario,
             opening.seed,
-            tunnel.alignment.length_m(),
-            tunnel.lamps.len(),
-            tunnel.balises.len(),
+            tracks.clone().map(|t| t.alignment.length_m()).sum::<f64>(),
+            tunnel.lamps().count(),
+            tracks.map(|t| t.balises.len()).sum::<usize>(),
         );
         let texts = Self {
             stream,

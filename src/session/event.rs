@@ -4,7 +4,7 @@ use crate::bus::{
     CameraFault, Frame, LedReport, Message, Node, RigCalibration, SimTime, StereoPair, TrainId,
     WaysideCalibration, WaysideReport,
 };
-use crate::track::Track;
+use crate::track::{TrackId, Tunnel};
 use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, TrainState};
 use crate::twin::render::Job;
@@ -17,8 +17,8 @@ pub struct Opening<'a> {
     pub scenario: &'a str,
     /// Seed of the run.
     pub seed: u64,
-    /// The line.
-    pub tunnel: &'a Track,
+    /// The tracks and what stands along them.
+    pub tunnel: &'a Tunnel,
     /// Trains with equipment, and the rig of a bench.
     pub trains: &'a [TrainOpening],
     /// Wayside devices in use.
@@ -79,9 +79,11 @@ impl Opening<'_> {
 /// Where a train is at one time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrainPoint {
+    /// The track that its head is on.
+    pub track: TrackId,
     /// Chainage of its head.
     pub chainage_m: f64,
-    /// Speed along the line.
+    /// Speed along the track.
     pub speed_mps: f64,
     /// Pose of the vehicle frame at the end that its rig is at.
     pub world_from_vehicle: Isometry3<f64>,

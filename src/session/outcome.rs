@@ -2,6 +2,7 @@
 
 use super::summary::ProtectionFigures;
 use crate::bus::{BrakeDemand, ProtectionReport, SimTime, TrainId};
+use crate::track::network::Route;
 use crate::track::{Alignment, Gauge, Place};
 use crate::twin::physics::{ObstacleTruth, TrainState, World};
 use nalgebra::Isometry3;
@@ -113,11 +114,11 @@ fn stopping_way_m(speed_mps: f64, brake_mps2: f64) -> f64 {
 /// From the head to the nearest obstacle or train that it would meet on its route. What has fallen just behind the
 /// head counts too.
 fn ahead_m(id: TrainId, train: &TrainState, world: &World) -> Option<f64> {
-    let line = &world.along_route(id)?.alignment;
+    let (route, line) = (world.route(id)?, &world.along_route(id)?.alignment);
     let obstacles = world.obstacles();
     let obstacles = obstacles.filter_map(|o| on_route(id, train, world, &o));
     let others = world.train_ids().filter(|other| *other != id);
-    let trains = others.flat_map(|other| nearest_cars_m(line, world, other));
+    let trains = others.flat_map(|other| nearest_cars_m((route, line), train.run_m, world, other));
     obstacles
         .chain(trains)
         .map(|run_m| run_m - train.run_m)
@@ -147,7 +148,12 @@ fn on_route(id: TrainId, train: &TrainState, world: &World, o: &ObstacleTruth<'_
 }
 
 /// The near ends of the cars of another train that stand in the gauge of a route, along it.
-fn nearest_cars_m(line: &Alignment, world: &World, other: TrainId) -> Vec<f64> {
+fn nearest_cars_m(
+    (route, line): (&Route, &Alignment),
+    run_m: f64,
+    world: &World,
+    other: TrainId,
+) -> Vec<f64> {
     let (Some(state), Some(length_m), Some(half_m)) = (
         world.train(other),
         world.train_length_m(other),
@@ -156,9 +162,19 @@ fn nearest_cars_m(line: &Alignment, world: &World, other: TrainId) -> Vec<f64> {
         return Vec::new();
     };
     let cars = &state.world_from_cars;
+    // Where its head is on the route, if it is: near enough for all of its cars.
+    let head = Place {
+        track: state.track,
+        s_m: state.chainage_m,
+    };
+    let near_m = route.run_near_m(head, run_m);
     let half_car_m = 0.5 * length_m / cars.len().max(1) as f64;
     let near_end = |car: &Isometry3<f64>| {
-        let point = line.nearest(&car.translation.vector.into())?;
+        let middle = car.translation.vector.into();
+        let point = match near_m {
+            Some(near_m) => line.track_from_world(&middle, near_m),
+            None => line.nearest(&middle)?,
+        };
         let gauge = Gauge::b1(line.at(point.s_m).curvature_per_m);
         let fouls = gauge.fouled_by([point.l_m, half_m.z], [half_m.y, half_m.z]);
         fouls.then_some(point.s_m - half_car_m)

@@ -295,8 +295,10 @@ impl<'s, 'o> Session<'s, 'o> {
     fn train_at(&self, id: TrainId, time: SimTime) -> Option<TrainPoint> {
         let onboard = self.scenario.onboard.iter().find(|o| o.id() == id);
         let end = onboard.map_or(TrainEnd::Front, OnboardSettings::rig_end);
+        let place = self.world.place_at(id, time)?;
         Some(TrainPoint {
-            chainage_m: self.world.place_at(id, time)?.s_m,
+            track: place.track,
+            chainage_m: place.s_m,
             speed_mps: self.world.train(id)?.speed_mps,
             world_from_vehicle: self.world.vehicle_at(id, end, time)?,
         })

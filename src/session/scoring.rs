@@ -27,7 +27,7 @@ impl Session<'_, '_> {
         let opening = Opening {
             scenario: &self.scenario.file.name,
             seed: self.scenario.file.seed,
-            tunnel: self.scenario.tunnel.first_track(),
+            tunnel: &self.scenario.tunnel,
             trains: &trains,
             wayside: &calibrations,
         };

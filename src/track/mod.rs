@@ -2,7 +2,7 @@
 //! its lamps, devices and balises are. Knows the settings room alone.
 //!
 //! ```
-//! use metrotwin::track::Track;
+//! use metrotwin::track::Tunnel;
 //!
 //! let tunnel = Tunnel::from_toml(
 //!     r#"
@@ -43,7 +43,9 @@
 //! of metro) and CJJ 96 (gauges of metros), simplified where their items say so; lamps and rig
 //! after Zhang et al., Acta Optica Sinica 2023, doi 10.3788/AOS221912.
 //!
-//! Not here: tunnel files with several tracks (what joins them is in [`network`]), rail profiles (rails are boxes), sections that lean with
+//! Tracks are joined to a [`network`] by switches.
+//!
+//! Not here: rail profiles (rails are boxes), sections that lean with
 //! the cant (only the rails' heads follow it), irregularities of the track (they are the world's,
 //! not the survey's).
 

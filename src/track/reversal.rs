@@ -10,10 +10,11 @@ impl Track {
     /// The track in the other direction.
     ///
     /// ```
-    /// # use metrotwin::track::Track;
+    /// # use metrotwin::track::Tunnel;
     /// let tunnel = Tunnel::from_toml(include_str!("../../tunnels/test_bench.toml"))?;
-    /// let reversed = tunnel.reversed();
-    /// let (lamp, same) = (&tunnel.lamps[0], &reversed.lamps[tunnel.lamps.len() - 1]);
+    /// let track = tunnel.first_track();
+    /// let reversed = track.reversed();
+    /// let (lamp, same) = (&track.lamps[0], &reversed.lamps[track.lamps.len() - 1]);
     /// assert_eq!((lamp.uid, lamp.centre), (same.uid, same.centre));
     /// # Ok::<(), metrotwin::settings::FileError>(())
     /// ```

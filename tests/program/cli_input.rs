@@ -388,7 +388,7 @@ fn what_may_surprise_is_noted() {
         let devices = "[[wayside]]\ndevice = \"W1530\"\n";
         said_of(&format!("{SCENARIO}{things}{devices}")).expect("it is right")
     };
-    let inside = |said: &str| said.contains("in or under the train, which stands from ");
+    let inside = |said: &str| said.contains("in or under the train, which stands there");
     assert!(inside(&box_at(145.0, "")));
     assert!(!inside(&box_at(160.0, "")));
     assert!(!inside(&box_at(145.0, "lateral_m = 1.7")));

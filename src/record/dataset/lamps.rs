@@ -87,7 +87,7 @@ impl LampRow {
         job: &Job,
         sight: &Projection<'_>,
         labeller: &Labeller,
-        sites: &[LampSite],
+        sites: &[&LampSite],
     ) -> Vec<Self> {
         let lamps = labeller.lamps().iter().zip(sites);
         lamps
@@ -228,13 +228,8 @@ mod tests {
     /// What the table says of the lamps in a view of a job.
     fn seen(scene: &Scene, job: &Job) -> Vec<LampRow> {
         let sight = Projection::new(&job.views[0], job.time);
-        LampRow::all(
-            7,
-            job,
-            &sight,
-            &Labeller::new(scene),
-            &scene.tracks[0].lamps,
-        )
+        let lamps: Vec<_> = scene.tracks[0].lamps.iter().collect();
+        LampRow::all(7, job, &sight, &Labeller::new(scene), &lamps)
     }
 
     /// Area and centroid of a polygon.

@@ -58,6 +58,7 @@ use crate::record::whole_files::{Result, broken, failed, write_whole};
 use crate::scenario::Scenario;
 use crate::scenario::sampling::{Inputs, complete, sha256};
 use crate::session::{self, Event, Exposure, Observer, Opening, Source, TrainPoint};
+use crate::track::Place;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::Labeller;
 use crate::twin::render::{Job, Renderer};
@@ -122,8 +123,8 @@ struct Camera {
     /// Place among the views of its source.
     view: usize,
     wanted: bool,
-    /// Chainage, of cameras that stand still.
-    chainage_m: Option<f64>,
+    /// Of a wayside device, where it stands.
+    place: Option<Place>,
     /// Frames taken that are wanted.
     taken: u32,
     /// Those of them whose images have come.
@@ -368,12 +369,12 @@ const EYES: [&str; 2] = ["left", "right"];
 impl Observer for DataSet<'_> {
     fn open(&mut self, opening: &Opening<'_>) -> Result {
         self.begin()?;
-        let camera = |name: &str, source, view, chainage_m| Camera {
+        let camera = |name: &str, source, view, place| Camera {
             name: name.to_owned(),
             source,
             view,
             wanted: self.plan.has_camera(name),
-            chainage_m,
+            place,
             taken: 0,
             written: 0,
             over: false,
@@ -383,8 +384,17 @@ impl Observer for DataSet<'_> {
         let eyes = rig.iter().flat_map(|_| EYES.iter().enumerate());
         let eyes = eyes.map(|(k, name)| camera(name, RIG, k, None));
         let devices = opening.wayside.iter().enumerate();
-        let devices =
-            devices.map(|(k, d)| camera(&d.name, Source::Wayside(k), 0, Some(d.chainage_m)));
+        let devices = devices.map(|(k, d)| {
+            camera(
+                &d.name,
+                Source::Wayside(k),
+                0,
+                Some(Place {
+                    track: d.track,
+                    s_m: d.chainage_m,
+                }),
+            )
+        });
         self.cameras = eyes.chain(devices).collect();
         for camera in self.cameras.iter().filter(|c| c.wanted) {
             for folder in FOLDERS {

@@ -9,6 +9,7 @@ use super::obstacles::{self, ObstacleRow};
 use super::{DataSet, ExposedFrame, LabelKind};
 use crate::record::whole_files::{Result, failed};
 use crate::session::Source;
+use crate::track::Place;
 use crate::twin::physics::BodyOwner;
 use crate::twin::render::labels::{Labels, Projection};
 use crate::twin::render::{Job, RawImage, View, upper_bits};
@@ -231,16 +232,20 @@ impl DataSet<'_> {
             ImageRow::all(frame_id, sight).try_for_each(|row| table.push(&row))?;
         }
         if let Some(table) = &mut tables.lamps {
-            let sites = &self.scenario.tunnel.first_track().lamps;
-            let rows = LampRow::all(frame_id, job, sight, &self.labeller, sites);
+            let sites: Vec<_> = self.scenario.tunnel.lamps().collect();
+            let rows = LampRow::all(frame_id, job, sight, &self.labeller, &sites);
             rows.iter().try_for_each(|row| table.push(row))?;
         }
         let (Some(table), Some(labels)) = (&mut tables.obstacles, &frame.labels) else {
             return Ok(());
         };
-        let train_m = frame.exposed.train.as_ref().map(|train| train.chainage_m);
-        let near_m = self.cameras[k].chainage_m.or(train_m).unwrap_or(0.0);
-        let line = (&self.scenario.tunnel.first_track().alignment, near_m);
+        let train = frame.exposed.train.as_ref().map(|train| Place {
+            track: train.track,
+            s_m: train.chainage_m,
+        });
+        let near = self.cameras[k].place.or(train).unwrap_or_default();
+        let tracks = &self.scenario.tunnel.network.tracks;
+        let line = (&tracks[usize::from(near.track.0)].alignment, near.s_m);
         for instance in obstacles::instances(job, &frame.exposed.owners, sight, labels) {
             let Some(row) = ObstacleRow::new(frame_id, job, sight, line, &instance) else {
                 continue;

@@ -5,7 +5,9 @@
 use crate::bus::*;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::uid::Uid;
-use crate::track::{Alignment, Balise, Grade, Place, PlanElement, Track, TrackId, TrackPoint};
+use crate::track::{
+    Alignment, Balise, Grade, Place, PlanElement, Track, TrackId, TrackPoint, Tunnel,
+};
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::physics::{TrainState, WheelForces};
 use crate::twin::render::sample;
@@ -31,7 +33,11 @@ const OBSTACLE_FROM_S: f64 = 1.0;
 const SIZE: (u32, u32) = (160, 90);
 
 /// A straight, a transition and a curve of 400 m radius, on a grade.
-pub(crate) fn tunnel() -> Track {
+pub(crate) fn tunnel() -> Tunnel {
+    Tunnel::of_one(track())
+}
+
+fn track() -> Track {
     let element = |length_m, start_per_m, end_per_m| PlanElement {
         length_m,
         start_per_m,
@@ -71,7 +77,7 @@ fn camera(f_px: f64) -> CameraModel {
     }
 }
 
-fn device(tunnel: &Track) -> WaysideCalibration {
+fn device(track: &Track) -> WaysideCalibration {
     let place = TrackPoint {
         s_m: 205.0,
         l_m: -2.2,
@@ -81,7 +87,7 @@ fn device(tunnel: &Track) -> WaysideCalibration {
         track: TrackId::default(),
         name: "W 205".into(),
         camera: camera(190.0),
-        world_from_camera: sample::camera_pose(tunnel, place, 0.05, -0.06),
+        world_from_camera: sample::camera_pose(track, place, 0.05, -0.06),
         world_from_lidar: None,
         chainage_m: 205.0,
         balise_chainage_m: 120.0,
@@ -101,7 +107,7 @@ pub(crate) fn play(observer: &mut dyn Observer, extent: Extent) {
     let tunnel = tunnel();
     let mount = Isometry3::translation(0.2, 0.5, 1.9);
     let rig = RigCalibration::rectified(camera(130.0), 0.12, mount);
-    let device = device(&tunnel);
+    let device = device(tunnel.first_track());
     let train = TrainOpening {
         id: TrainId(0),
         rig: Some(rig),
@@ -162,7 +168,13 @@ impl Session<'_> {
 
     /// A place on the line, in its axes.
     fn place(&self, s_m: f64, l_m: f64, h_m: f64) -> Isometry3<f64> {
-        let frame = self.opening.tunnel.alignment.at(s_m).world_from_line();
+        let frame = self
+            .opening
+            .tunnel
+            .first_track()
+            .alignment
+            .at(s_m)
+            .world_from_line();
         frame * Isometry3::translation(0.0, l_m, h_m)
     }
 
@@ -270,7 +282,13 @@ impl Session<'_> {
                 method,
                 chainage_m,
                 sigma_m,
-                position: self.opening.tunnel.alignment.at(chainage_m).origin,
+                position: self
+                    .opening
+                    .tunnel
+                    .first_track()
+                    .alignment
+                    .at(chainage_m)
+                    .origin,
                 uid,
                 identity: Identity::Decoded,
                 lamp_in_camera: Vector3::new(-1.0, -2.0, 8.0),

@@ -8,8 +8,7 @@
 //! use metrotwin::bus::*;
 //! use metrotwin::stack::led::LedSettings;
 //! use metrotwin::stack::positioning::LedPositioner;
-//! use metrotwin::track::Track;
-//! use std::sync::Arc;
+//! use metrotwin::track::Tunnel;
 //!
 //! let map = Tunnel::from_toml("
 //!     name = 'short'
@@ -22,7 +21,7 @@
 //!     blur_px: 0.5,
 //! };
 //! let rig = RigCalibration::rectified(camera, 0.12, nalgebra::Isometry3::identity());
-//! let mut positioner = LedPositioner::new(&LedSettings::default(), rig, Arc::new(map));
+//! let mut positioner = LedPositioner::new(&LedSettings::default(), rig, map.first_track().clone());
 //! let dark = Frame {
 //!     number: 0,
 //!     start: SimTime::ZERO,

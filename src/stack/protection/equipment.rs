@@ -314,6 +314,8 @@ mod tests {
         let settings = ProtectionSettings {
             initial_track: Some("u1".to_owned()),
             initial_chainage_m: Some(300.0),
+            // Its devices have been heard.
+            starts_under_way: Some(true),
             ..ProtectionSettings::default()
         };
         let node = Node::Train(TrainId(0));

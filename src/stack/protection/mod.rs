@@ -5,13 +5,11 @@
 //! ```
 //! use metrotwin::bus::{BrakeDemand, DangerLevel, ObstacleWarning, OdometerSample, SimTime};
 //! use metrotwin::stack::protection::{Protection, ProtectionSettings};
-//! # use metrotwin::track::{Alignment, PlanElement, Tunnel};
+//! # use metrotwin::track::{Alignment, PlanElement, Track, TrackId};
 //! # let straight = PlanElement { length_m: 2000.0, start_per_m: 0.0, end_per_m: 0.0,
 //! #     start_cant_m: 0.0, end_cant_m: 0.0 };
-//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(), datum: None,
-//! #     alignment: Alignment::new(nalgebra::Point3::origin(), 0.0, &[straight], &[]),
-//! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
-//! #     stations: vec![], ambient_lx: 5.0 });
+//! # let map = std::sync::Arc::new(Track::bare("t",
+//! #     Alignment::new(nalgebra::Point3::origin(), 0.0, &[straight], &[])));
 //! let settings = ProtectionSettings { initial_chainage_m: Some(500.0), ..Default::default() };
 //! let mut protection = Protection::new(&settings, map);
 //! let time = SimTime::from_secs(1.0);
@@ -19,7 +17,8 @@
 //! assert_eq!(protection.cycle(time).command.brake, BrakeDemand::None);
 //! // A device reports an obstacle 150 m ahead: too near for the service brake.
 //! let warning = ObstacleWarning { device: "W1".into(), number: 0, issued: time,
-//!     danger: DangerLevel::High, from_chainage_m: 650.0, to_chainage_m: 650.5, blind: false };
+//!     danger: DangerLevel::High, track: TrackId::default(),
+//!     from_chainage_m: 650.0, to_chainage_m: 650.5, blind: false };
 //! protection.on_warning(&warning, time);
 //! assert_eq!(protection.cycle(time.plus(0.1)).command.brake, BrakeDemand::Emergency);
 //! ```

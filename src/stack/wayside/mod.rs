@@ -4,14 +4,12 @@
 //! ```
 //! use metrotwin::bus::{CameraModel, Frame, Intrinsics, Shutter, SimTime, WaysideCalibration};
 //! use metrotwin::stack::wayside::{WaysideDetector, WaysideSettings};
-//! # use metrotwin::track::{Alignment, Grade, PlanElement, Tunnel};
+//! # use metrotwin::track::{Alignment, Grade, PlanElement, Track, TrackId};
 //! # use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion};
 //! # let straight = PlanElement { length_m: 400.0, start_per_m: 0.0, end_per_m: 0.0,
 //! #     start_cant_m: 0.0, end_cant_m: 0.0 };
-//! # let map = std::sync::Arc::new(Tunnel { name: "t".into(), datum: None,
-//! #     alignment: Alignment::new(Point3::origin(), 0.0, &[straight], &[]),
-//! #     sections: vec![], lamps: vec![], wayside: vec![], balises: vec![], base_stations: vec![],
-//! #     stations: vec![], ambient_lx: 5.0 });
+//! # let map = std::sync::Arc::new(Track::bare("t",
+//! #     Alignment::new(Point3::origin(), 0.0, &[straight], &[])));
 //! // On the left wall at chainage 200 m, 2.5 m up, looking down the line at approaching trains.
 //! let axes = Matrix3::new(0.0, 0.1, -1.0, 1.0, 0.0, 0.0, 0.0, -1.0, -0.1);
 //! let calibration = WaysideCalibration {
@@ -26,6 +24,7 @@
 //!         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix(&axes)),
 //!     ),
 //!     world_from_lidar: None,
+//!     track: TrackId::default(),
 //!     chainage_m: 200.0,
 //!     balise_chainage_m: 0.0,
 //! };

@@ -181,9 +181,9 @@ grades = [{ from_m = 0.0, grade_permille = 10.0 }]",
             "2-40 is there on track `u1` too",
         ),
         (
-            "name = \"B-u3\"",
+            "name = \"B-d3\"",
             "name = \"B-u1\"",
-            "track[2].balises[0].name",
+            "track[7].balises[0].name",
             "is there on track `u1` too",
         ),
         (

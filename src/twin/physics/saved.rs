@@ -3,7 +3,7 @@
 //!
 //! ```
 //! # use metrotwin::bus::{TrainCommand, TrainId};
-//! # use metrotwin::track::Track;
+//! # use metrotwin::track::Tunnel;
 //! # use metrotwin::twin::physics::{PhysicsSettings, World};
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! # let tunnel = std::sync::Arc::new(Tunnel::from_toml(include_str!("../../../tunnels/test_bench.toml"))?);
