@@ -246,7 +246,7 @@ mod tests {
         let said = equipment.cycle(time);
         said.iter().find_map(|message| match &message.content {
             Content::Protection(report) => {
-                assert_eq!(report.position.unwrap().s_m, 2000.0);
+                assert_eq!(report.position.map(|place| place.s_m), Some(2000.0));
                 report.authority_end.map(|end| end.s_m)
             }
             _ => None,

@@ -81,7 +81,7 @@ impl Fouling {
         let [a_m, b_m] = [stretch.from_m, stretch.to_m].map(behind_m);
         let (near_m, far_m) = (a_m.min(b_m), a_m.max(b_m));
         let (near_m, far_m) = (near_m.max(0.0), far_m.min(self.clear_m));
-        (near_m <= far_m).then(|| match self.facing {
+        (near_m <= far_m).then_some(match self.facing {
             true => (self.toe_m + near_m, self.toe_m + far_m),
             false => (self.toe_m - far_m, self.toe_m - near_m),
         })
