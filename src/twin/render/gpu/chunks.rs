@@ -4,6 +4,7 @@ use super::adapter::Gpu;
 use super::bend::Bend;
 use super::detail::{CHUNK_M, ChunkKey, Detail};
 use super::layout::Vertex;
+use super::track_search::TrackSearch;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::{Track, TrackPoint};
@@ -18,10 +19,6 @@ use std::sync::Arc;
 const BEHIND_M: f64 = 20.0;
 /// Jobs after which an unseen chunk is dropped.
 const KEEP_JOBS: u64 = 64;
-/// Steps of the search for a camera far from where one was last.
-const SEARCH_STEP_M: f64 = 20.0;
-/// Farther from the line than this the chainage found is not believed.
-const NEAR_LINE_M: f64 = 30.0;
 
 /// On one side of a border of two chunks, this far from it.
 const BESIDE_M: f64 = 1e-3;
@@ -82,8 +79,8 @@ const GLOSSY_EVERY: usize = 4;
 pub struct Chunks {
     /// Each with the latest job in which a camera was near it.
     made: BTreeMap<ChunkKey, (Arc<Chunk>, u64)>,
-    /// By track, where a camera was last.
-    last_seen_s_m: Vec<f64>,
+    /// By track.
+    searches: Vec<TrackSearch>,
     job: u64,
 }
 
@@ -101,13 +98,17 @@ impl Chunks {
         let eye = framed.reference();
         let mut chunks = Vec::new();
         let mut nearest = (f64::INFINITY, 0, 0.0);
-        self.last_seen_s_m.resize(scene.tracks.len(), 0.0);
+        if self.searches.len() != scene.tracks.len() {
+            self.searches = scene.tracks.iter().map(|t| TrackSearch::new(t)).collect();
+        }
         for (number, track) in scene.tracks.iter().enumerate() {
-            let Some(place) = self.locate(number, track, &eye) else {
+            let Some(place) = self.searches[number].place(track, &eye) else {
                 continue;
             };
-            if place.l_m.abs() < nearest.0 {
-                nearest = (place.l_m.abs(), number, place.s_m);
+            let on_track_m = place.s_m.clamp(0.0, track.alignment.length_m());
+            let away_m = (track.alignment.at(on_track_m).origin - eye).norm();
+            if away_m < nearest.0 {
+                nearest = (away_m, number, place.s_m);
             }
             for key in keys_in_sight(number, track, &place, framed) {
                 let make = || (Arc::new(upload(gpu, scene, key)), self.job);
@@ -127,32 +128,6 @@ impl Chunks {
             s_m,
             chunks: chunks.into_iter().map(|(_, chunk)| chunk).collect(),
         }
-    }
-
-    /// A camera as a track has it: by Newton's method from where the last one was, else by search. None where no
-    /// part of the track is in sight.
-    fn locate(&mut self, number: usize, track: &Track, eye: &Point3<f64>) -> Option<TrackPoint> {
-        let on_line = |s_m: f64| {
-            let t = track.alignment.track_from_world(eye, s_m);
-            let found = t.l_m.abs() < NEAR_LINE_M && (t.s_m - s_m).abs() < 4.0 * SEARCH_STEP_M;
-            found.then_some(t)
-        };
-        // The only track is in sight wherever the camera is.
-        let is_only = self.last_seen_s_m.len() == 1;
-        let last_m = &mut self.last_seen_s_m[number];
-        let place = on_line(*last_m).or_else(|| {
-            let (near_m, away_m) = nearest_station(track, eye);
-            let in_sight = is_only || away_m < SIGHT_M + SEARCH_STEP_M;
-            in_sight.then(|| {
-                on_line(near_m).unwrap_or_else(|| {
-                    let mut place = track.alignment.track_from_world(eye, near_m);
-                    place.s_m = near_m;
-                    place
-                })
-            })
-        })?;
-        *last_m = place.s_m;
-        Some(place)
     }
 }
 
@@ -188,18 +163,6 @@ fn keys_in_sight(
             bend,
         }
     })
-}
-
-/// Chainage of the nearest of stations a search step apart, and its distance.
-fn nearest_station(track: &Track, eye: &Point3<f64>) -> (f64, f64) {
-    let from_m = track.sections.first().map_or(0.0, |r| r.from_m);
-    let to_m = track.sections.last().map_or(0.0, |r| r.to_m);
-    let steps = ((to_m - from_m) / SEARCH_STEP_M).ceil().clamp(1.0, 1e5) as u32;
-    let stations = (0..=steps).map(|k| from_m + (to_m - from_m) * f64::from(k) / f64::from(steps));
-    stations
-        .map(|s_m| (s_m, (track.alignment.at(s_m).origin - eye).norm()))
-        .min_by(|a, b| f64::total_cmp(&a.1, &b.1))
-        .unwrap_or((from_m, f64::INFINITY))
 }
 
 fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {

@@ -93,6 +93,7 @@ mod target;
 mod texture;
 mod textures;
 mod tiles;
+mod track_search;
 mod tunnel;
 mod upload;
 mod view;
