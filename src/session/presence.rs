@@ -4,7 +4,7 @@ use super::image_box::ImageBox;
 use crate::bus::{SimTime, TrainId, WaysideCalibration};
 use crate::scenario::{Scenario, WaysidePost};
 use crate::track::{BED_M, TrackId, TrackPoint};
-use crate::twin::geometry::{Spot, TunnelCaster};
+use crate::twin::geometry::{RayStart, TunnelCaster};
 use crate::twin::physics::{WorkerTruth, World};
 use nalgebra::{Isometry3, Point3, Translation3, Vector3};
 use std::sync::Arc;
@@ -39,7 +39,7 @@ pub struct Presence {
 pub struct FieldOfView {
     device: WaysideCalibration,
     walls: Arc<TunnelCaster>,
-    spot: Spot,
+    ray_start: RayStart,
 }
 
 impl FieldOfView {
@@ -47,7 +47,7 @@ impl FieldOfView {
     fn new(walls: Arc<TunnelCaster>, post: &WaysidePost) -> Self {
         let device = &post.actual;
         Self {
-            spot: walls.spot_of(&device.world_from_camera.translation.vector.into(), None),
+            ray_start: walls.ray_start(&device.world_from_camera.translation.vector.into(), None),
             device: device.clone(),
             walls,
         }
@@ -72,7 +72,7 @@ impl FieldOfView {
         let eye = Point3::from(pose.translation.vector);
         let sight = place - eye;
         pixel.is_some_and(|p| camera.contains(&p))
-            && self.walls.cast(self.spot, &eye, &sight, 1.0).is_none()
+            && self.walls.cast(self.ray_start, &eye, &sight, 1.0).is_none()
     }
 
     fn image_box(

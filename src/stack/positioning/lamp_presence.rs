@@ -18,9 +18,9 @@ const SAME_PX: f64 = 100.0;
 /// Pairs in which a lamp must have been due to be called dark.
 const LEAST_PAIRS: u32 = 4;
 
-/// A lamp that is passing by.
+/// A lamp that is due in an eye's sight, or was until now.
 #[derive(Clone, Copy, Debug)]
-struct Passing {
+struct DueLamp {
     lamp: usize,
     pairs: u32,
     seen: bool,
@@ -29,7 +29,7 @@ struct Passing {
 /// Holds the lamps that are seen against those of the map.
 #[derive(Debug, Default)]
 pub struct LampPresence {
-    passing: Vec<Passing>,
+    due: Vec<DueLamp>,
 }
 
 impl LampPresence {
@@ -62,20 +62,20 @@ impl LampPresence {
                 continue;
             };
             let seen = spots.clone().any(|spot| (spot - pixel).norm() < SAME_PX);
-            let known = self.passing.iter().position(|passing| passing.lamp == lamp);
+            let known = self.due.iter().position(|known| known.lamp == lamp);
             let k = known.unwrap_or_else(|| {
-                self.passing.push(Passing {
+                self.due.push(DueLamp {
                     lamp,
                     pairs: 0,
                     seen: false,
                 });
-                self.passing.len() - 1
+                self.due.len() - 1
             });
-            self.passing[k].pairs += 1;
-            self.passing[k].seen |= seen;
+            self.due[k].pairs += 1;
+            self.due[k].seen |= seen;
         }
         let mut dark = Vec::new();
-        self.passing.retain(|call| {
+        self.due.retain(|call| {
             let site = &map.lamps[call.lamp];
             let passing =
                 (site.centre - eye).norm() < 2.0 * NEAR_M && is_ahead(world_from_eye, site);
@@ -89,7 +89,7 @@ impl LampPresence {
 
     /// Forgets who is passing: what was due cannot be told any more.
     pub fn forget(&mut self) {
-        self.passing.clear();
+        self.due.clear();
     }
 }
 

@@ -231,8 +231,19 @@ mod tests {
             initial_chainage_m: Some(2000.0),
             ..ProtectionSettings::default()
         };
-        let node = Node::Train(TrainId(0));
-        let mut equipment = TrainProtection::new(node.clone(), &network, route, &settings);
+        let equipment = TrainProtection::new(Node::Train(TrainId(0)), &network, route, &settings);
+        let report = report_after(equipment, sender, content)?;
+        assert_eq!(report.position.map(|place| place.s_m), Some(2000.0));
+        report.authority_end.map(|end| end.s_m)
+    }
+
+    /// What the equipment of train 0 reports after its odometer stood still and it has heard `content` of `sender`
+    /// by radio.
+    fn report_after(
+        mut equipment: TrainProtection,
+        sender: Node,
+        content: Content,
+    ) -> Option<ProtectionReport> {
         let time = SimTime::from_secs(1.0);
         let odometer = OdometerSample {
             time,
@@ -240,15 +251,13 @@ mod tests {
             speed_mps: 0.0,
             slides: false,
         };
-        equipment.on(&Message::own(node, time, Content::Odometer(odometer)));
-        equipment
-            .on(&Message::to(Receiver::Trains, sender, time, content).arrived(time, Via::Radio));
+        let own = Node::Train(TrainId(0));
+        equipment.on(&Message::own(own, time, Content::Odometer(odometer)));
+        let message = Message::to(Receiver::Trains, sender, time, content);
+        equipment.on(&message.arrived(time, Via::Radio));
         let said = equipment.cycle(time);
-        said.iter().find_map(|message| match &message.content {
-            Content::Protection(report) => {
-                assert_eq!(report.position.map(|place| place.s_m), Some(2000.0));
-                report.authority_end.map(|end| end.s_m)
-            }
+        said.into_iter().find_map(|message| match message.content {
+            Content::Protection(report) => Some(report),
             _ => None,
         })
     }
@@ -318,29 +327,15 @@ mod tests {
             starts_under_way: Some(true),
             ..ProtectionSettings::default()
         };
-        let node = Node::Train(TrainId(0));
         let route = way.unwrap().route;
-        let mut equipment = TrainProtection::new(node.clone(), &network, route.clone(), &settings);
-        let time = SimTime::from_secs(1.0);
-        let odometer = OdometerSample {
-            time,
-            distance_m: 0.0,
-            speed_mps: 0.0,
-            slides: false,
-        };
-        equipment.on(&Message::own(node, time, Content::Odometer(odometer)));
+        let own = Node::Train(TrainId(0));
+        let equipment = TrainProtection::new(own, &network, route.clone(), &settings);
         let content = heard(network.named(track).unwrap(), s_m);
         let sender = match &content {
             Content::Train(_) => Node::Train(TrainId(1)),
             _ => Node::Post("V1".into()),
         };
-        equipment
-            .on(&Message::to(Receiver::Trains, sender, time, content).arrived(time, Via::Radio));
-        let said = equipment.cycle(time);
-        let end = said.iter().find_map(|message| match &message.content {
-            Content::Protection(report) => report.authority_end,
-            _ => None,
-        });
+        let end = report_after(equipment, sender, content)?.authority_end;
         end.and_then(|end| route.runs_m(end).next())
     }
 

@@ -11,7 +11,7 @@
 
 use super::WaysideSettings;
 use super::cells::{CELL_PX, GaugeCells};
-use super::rails::Rails;
+use super::rails::RailHeads;
 use super::reference::Reference;
 use crate::bus::PixelBox;
 
@@ -91,7 +91,7 @@ impl Difference {
         &mut self,
         frame: &[u8],
         reference: &Reference,
-        (cells, rails): (&GaugeCells, &Rails),
+        (cells, rails): (&GaugeCells, &RailHeads),
         train_near: bool,
         headlights: &[PixelBox],
     ) {
@@ -349,7 +349,7 @@ mod tests {
                 fast.set_reference(&learnt);
                 let compensated = train_near || fast.measure_gain(&frame, &valid);
                 let headlights = if train_near { &[lamps][..] } else { &[] };
-                let places = (&cells, &Rails::default());
+                let places = (&cells, &RailHeads::default());
                 fast.run(&frame, &learnt, places, train_near, headlights);
                 let mut raw = vec![0u8; w * h];
                 for k in 0..w * h {

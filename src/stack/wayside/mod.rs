@@ -135,7 +135,7 @@ use confirm::Confirmation;
 use difference::Difference;
 use image::GrayImage;
 use place::Placer;
-use rails::Rails;
+use rails::RailHeads;
 use reference::Reference;
 use regions::regions;
 use shadows::ShadowFilter;
@@ -158,7 +158,7 @@ pub struct WaysideDetector {
     sight: Sight,
     vision: Vision,
     cells: GaugeCells,
-    rails: Rails,
+    rails: RailHeads,
     reference: Reference,
     difference: Difference,
     shadows: ShadowFilter,
@@ -199,7 +199,7 @@ impl WaysideDetector {
             settings: settings.clone(),
             vision: Vision::new(settings, (intrinsics.width_px, intrinsics.height_px)),
             cells: GaugeCells::new(&sight, width, height),
-            rails: Rails::new(&sight, width, height),
+            rails: RailHeads::new(&sight, width, height),
             bed_light: BedLight::new(&sight),
             bed_was_seen: false,
             sight,

@@ -13,11 +13,11 @@ const MARGIN_PX: f64 = 1.5;
 
 /// Pixels that see the head of a rail.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Rails {
+pub(super) struct RailHeads {
     pixels: Vec<usize>,
 }
 
-impl Rails {
+impl RailHeads {
     /// Before a device, in images of a size.
     pub fn new(sight: &Sight, width: usize, height: usize) -> Self {
         let (from_m, to_m) = sight.watched_m();
@@ -105,7 +105,7 @@ mod tests {
     /// Provokes darker pixels forgiven, or others than those of rails.
     #[test]
     fn only_brighter_pixels_of_rails_are_forgiven() {
-        let rails = Rails { pixels: vec![1, 2] };
+        let rails = RailHeads { pixels: vec![1, 2] };
         let mut changed = [1u8; 4];
         rails.forgive(&[90, 90, 20, 90], &[50; 4], &mut changed);
         assert_eq!(changed, [1, 0, 1, 1]);

@@ -41,22 +41,22 @@ pub(super) fn check_neighbours(
             check.problem(&key(of.track), what, remedy);
         }
     };
-    for spot in &grid.spots {
+    for checked in &grid.places {
         let mut lies_in_another = false;
-        for (other, point) in grid.beside(network, spot.place.track, &spot.frame.origin) {
+        for (other, point) in grid.beside(network, checked.place.track, &checked.frame.origin) {
             let s_m = point.s_m;
             let place = Place { track: other, s_m };
-            let Some(pair) = Pair::of(network, spot, place, point) else {
+            let Some(pair) = Pair::of(network, checked, place, point) else {
                 continue;
             };
             lies_in_another |= pair.holds();
-            if let Some(wrong) = pair.wrong(partings.part(spot.place, place)) {
-                say(spot.place, other, wrong, point.l_m);
+            if let Some(wrong) = pair.wrong(partings.part(checked.place, place)) {
+                say(checked.place, other, wrong, point.l_m);
             }
         }
-        let is_shared = section(network, spot.place).is_some_and(CrossSection::is_shared);
+        let is_shared = section(network, checked.place).is_some_and(CrossSection::is_shared);
         if is_shared && !lies_in_another {
-            say(spot.place, spot.place.track, Wrong::Nowhere, 0.0);
+            say(checked.place, checked.place.track, Wrong::Nowhere, 0.0);
         }
     }
     for (place, world) in standing(network) {
@@ -95,14 +95,14 @@ fn standing(network: &Network) -> impl Iterator<Item = (Place, Point3<f64>)> + '
 }
 
 /// A place of a track that is looked at.
-struct Spot {
+struct CheckedPlace {
     place: Place,
     frame: TrackFrame,
 }
 
-/// Spots of all tracks by where they are in the world.
+/// The checked places of all tracks by where they are in the world.
 struct Grid {
-    spots: Vec<Spot>,
+    places: Vec<CheckedPlace>,
     cells: BTreeMap<(i64, i64), Vec<usize>>,
 }
 
@@ -112,7 +112,7 @@ fn cell_of(p: &Point3<f64>) -> (i64, i64) {
 
 impl Grid {
     fn of(network: &Network) -> Self {
-        let mut spots = Vec::new();
+        let mut places = Vec::new();
         let mut cells: BTreeMap<_, Vec<usize>> = BTreeMap::new();
         for (k, track) in network.tracks.iter().enumerate() {
             let length_m = track.alignment.length_m();
@@ -123,15 +123,15 @@ impl Grid {
                 cells
                     .entry(cell_of(&frame.origin))
                     .or_default()
-                    .push(spots.len());
+                    .push(places.len());
                 let place = Place {
                     track: TrackId(k as u16),
                     s_m,
                 };
-                spots.push(Spot { place, frame });
+                places.push(CheckedPlace { place, frame });
             }
         }
-        Self { spots, cells }
+        Self { places, cells }
     }
 
     /// The other tracks beside a position, each with the point as that track has it.
@@ -145,7 +145,7 @@ impl Grid {
         let cells = (i - 1..=i + 1).flat_map(|i| (j - 1..=j + 1).map(move |j| (i, j)));
         let near = cells.filter_map(|cell| self.cells.get(&cell)).flatten();
         let mut nearest: BTreeMap<TrackId, (f64, f64)> = BTreeMap::new();
-        for other in near.map(|k| &self.spots[*k]) {
+        for other in near.map(|k| &self.places[*k]) {
             let away = other.frame.origin - at;
             let away_m = away.xy().norm();
             let Place { track, s_m } = other.place;
@@ -301,14 +301,19 @@ fn section(network: &Network, place: Place) -> Option<&CrossSection> {
 }
 
 impl<'a> Pair<'a> {
-    fn of(network: &'a Network, spot: &Spot, other: Place, point: TrackPoint) -> Option<Self> {
+    fn of(
+        network: &'a Network,
+        checked: &CheckedPlace,
+        other: Place,
+        point: TrackPoint,
+    ) -> Option<Self> {
         let frame = network.alignment(other.track)?.at(other.s_m);
-        let side = spot.frame.left().dot(&frame.left()).signum();
+        let side = checked.frame.left().dot(&frame.left()).signum();
         let as_other =
             |p: &OutlinePoint| OutlinePoint::new(point.l_m + side * p.l_m, point.h_m + p.h_m);
-        let gauges = [&spot.frame, &frame].map(|f| Gauge::b1(f.curvature_per_m));
+        let gauges = [&checked.frame, &frame].map(|f| Gauge::b1(f.curvature_per_m));
         let apart_m = gauges[0].widest_m() + gauges[1].widest_m();
-        let own = section(network, spot.place);
+        let own = section(network, checked.place);
         Some(Self {
             own,
             others: section(network, other),

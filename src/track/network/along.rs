@@ -1,10 +1,7 @@
 //! What a train meets on its route: the tracks of the route one after the other, as one track.
 
 use super::{Network, Route};
-use crate::track::{
-    Balise, BaseStation, Direction, LampSite, SectionRange, StoppingPlace, Track, TrackId,
-    TrackPoint, WaysideSite,
-};
+use crate::track::{Direction, LampSite, Track, TrackId, TrackPoint};
 use std::sync::Arc;
 
 /// Lamps of other tracks are on the route's map up to this far beside it, in plan.
@@ -129,42 +126,17 @@ impl Track {
 
     /// All that stands along it, at chainages that are higher by so much. The alignment stays as it is.
     fn shifted(&self, by_m: f64) -> Self {
-        let sections = self.sections.iter().map(|range| SectionRange {
-            from_m: range.from_m + by_m,
-            to_m: range.to_m + by_m,
-            ..range.clone()
-        });
-        let lamps = self.lamps.iter().map(|lamp| LampSite {
-            chainage_m: lamp.chainage_m + by_m,
-            ..lamp.clone()
-        });
-        let wayside = self.wayside.iter().map(|site| WaysideSite {
-            chainage_m: site.chainage_m + by_m,
-            ..site.clone()
-        });
-        let balises = self.balises.iter().map(|balise| Balise {
-            chainage_m: balise.chainage_m + by_m,
-            ..balise.clone()
-        });
-        let bases = self.base_stations.iter().map(|base| BaseStation {
-            chainage_m: base.chainage_m + by_m,
-            ..base.clone()
-        });
-        let stations = self.stations.iter().map(|stop| StoppingPlace {
-            chainage_m: stop.chainage_m + by_m,
-            ..stop.clone()
-        });
-        Self {
-            name: self.name.clone(),
-            alignment: self.alignment.clone(),
-            sections: sections.collect(),
-            lamps: lamps.collect(),
-            wayside: wayside.collect(),
-            balises: balises.collect(),
-            base_stations: bases.collect(),
-            stations: stations.collect(),
-            ambient_lx: self.ambient_lx,
-        }
+        let mut track = self.clone();
+        let sections = track.sections.iter_mut();
+        let places = sections.flat_map(|range| [&mut range.from_m, &mut range.to_m]);
+        let places = places
+            .chain(track.lamps.iter_mut().map(|lamp| &mut lamp.chainage_m))
+            .chain(track.wayside.iter_mut().map(|site| &mut site.chainage_m))
+            .chain(track.balises.iter_mut().map(|b| &mut b.chainage_m))
+            .chain((track.base_stations.iter_mut()).map(|base| &mut base.chainage_m))
+            .chain(track.stations.iter_mut().map(|stop| &mut stop.chainage_m));
+        places.for_each(|s_m| *s_m += by_m);
+        track
     }
 }
 

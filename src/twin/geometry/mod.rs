@@ -12,4 +12,4 @@ pub use body::{Body, Shape};
 pub use hull::{Face, Hull};
 pub use solid::Solid;
 pub use track_caster::{STATION_STEP_M, SurfacePoint};
-pub use tunnel::{Spot, TunnelCaster, TunnelHit};
+pub use tunnel::{RayStart, TunnelCaster, TunnelHit};

@@ -14,7 +14,7 @@ pub struct TunnelCaster {
 
 /// Where a ray begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Spot {
+pub struct RayStart {
     /// By number.
     pub track: usize,
     segment: usize,
@@ -50,16 +50,16 @@ impl TunnelCaster {
         self.tracks[hit.track].is_level(&hit.hit)
     }
 
-    /// Chainage at which the segment of a spot begins.
-    pub fn chainage_m(&self, spot: Spot) -> f64 {
-        self.tracks[spot.track].chainage_m(spot.segment)
+    /// Chainage at which the segment that rays begin in begins.
+    pub fn chainage_m(&self, ray_start: RayStart) -> f64 {
+        self.tracks[ray_start.track].chainage_m(ray_start.segment)
     }
 
-    /// The spot that a place is in: of the track of a spot close by if that is open there, else of the track that
-    /// is open there, or is the nearest.
-    pub fn spot_of(&self, p: &Point3<f64>, near: Option<Spot>) -> Spot {
+    /// Where rays from a place begin: on the track that others close by begin on if that is open there, else on the
+    /// one that is open there, or is the nearest.
+    pub fn ray_start(&self, p: &Point3<f64>, near: Option<RayStart>) -> RayStart {
         let near = near.unwrap_or_default();
-        let on = |track: usize, segment: Option<usize>| Spot {
+        let on = |track: usize, segment: Option<usize>| RayStart {
             track,
             segment: self.tracks[track].segment_of(p, segment),
         };
@@ -68,7 +68,9 @@ impl TunnelCaster {
         }
         let same =
             (!self.tracks[near.track].is_empty()).then(|| on(near.track, Some(near.segment)));
-        if let Some(same) = same.filter(|spot| self.tracks[spot.track].holds(spot.segment, p)) {
+        if let Some(same) =
+            same.filter(|ray_start| self.tracks[ray_start.track].holds(ray_start.segment, p))
+        {
             return same;
         }
         if let Some(other) = self.open_at(p, usize::MAX) {
@@ -81,24 +83,26 @@ impl TunnelCaster {
     }
 
     /// The track other than `without` in whose free space a place is.
-    fn open_at(&self, p: &Point3<f64>, without: usize) -> Option<Spot> {
+    fn open_at(&self, p: &Point3<f64>, without: usize) -> Option<RayStart> {
         let others = self.tracks.iter().enumerate();
         let mut others = others.filter(|(k, track)| *k != without && !track.is_empty());
         others.find_map(|(track, caster)| {
             let segment = caster.segment_of(p, None);
-            caster.holds(segment, p).then_some(Spot { track, segment })
+            caster
+                .holds(segment, p)
+                .then_some(RayStart { track, segment })
         })
     }
 
-    /// First surface that the ray o + t d meets for t up to `reach`; `spot` is that of o.
+    /// First surface that the ray o + t d meets for t up to `reach`; `ray_start` is that of o.
     pub fn cast(
         &self,
-        spot: Spot,
+        ray_start: RayStart,
         o: &Point3<f64>,
         d: &Vector3<f64>,
         reach: f64,
     ) -> Option<TunnelHit> {
-        let wall = self.first_wall(spot, (o, d), reach);
+        let wall = self.first_wall(ray_start, (o, d), reach);
         if self.tracks.len() == 1 {
             return wall;
         }
@@ -117,13 +121,13 @@ impl TunnelCaster {
     /// The first wall, bed or rail of a track's own section.
     fn first_wall(
         &self,
-        mut spot: Spot,
+        mut ray_start: RayStart,
         (o, d): (&Point3<f64>, &Vector3<f64>),
         reach: f64,
     ) -> Option<TunnelHit> {
         let mut from = 0.0;
         for _ in 0..MOST_TRACKS {
-            let Spot { track, segment } = spot;
+            let RayStart { track, segment } = ray_start;
             match self.tracks[track].follow(segment, (o, d), from, reach) {
                 Followed::Hit(hit) => {
                     let t = hit.t;
@@ -132,7 +136,7 @@ impl TunnelCaster {
                 Followed::Nothing => return None,
                 Followed::Left { t } => {
                     from = t + BEYOND_M / d.norm();
-                    spot = self.open_at(&(o + d * from), track)?;
+                    ray_start = self.open_at(&(o + d * from), track)?;
                 }
             }
         }

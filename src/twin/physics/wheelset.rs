@@ -116,7 +116,7 @@ impl WheelExtremes {
 }
 
 /// The rails under a wheelset.
-struct Rails {
+struct RailPose {
     /// Middle of the rails at their top, as they really lie.
     origin: Vector,
     /// Along the designed track, across and up from the real one.
@@ -194,7 +194,7 @@ impl Wheelset {
     }
 
     /// The rails under the axle, a step on.
-    fn follow(&mut self, track: &RouteTrack, state: &BodyState, dt_s: f64) -> Rails {
+    fn follow(&mut self, track: &RouteTrack, state: &BodyState, dt_s: f64) -> RailPose {
         // Predicted to some micrometres; the rest is a step along the tangent.
         let guess = self.s_m + state.velocity.length() * dt_s;
         let frame = track.alignment().at(guess);
@@ -211,7 +211,7 @@ impl Wheelset {
         // The angle is some mrad at most: to 1e-12.
         let half = 0.5 * d.roll_rad * d.roll_rad;
         let (sin, cos) = (d.roll_rad * (1.0 - half / 3.0), 1.0 - half);
-        Rails {
+        RailPose {
             origin: origin + designed.x * along + designed.y * d.left_m + designed.z * d.up_m,
             axes: Axes {
                 x: designed.x,
@@ -228,7 +228,7 @@ impl Wheelset {
         &mut self,
         vehicle: &Vehicle,
         track: &RouteTrack,
-        rails: &Rails,
+        rails: &RailPose,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
     ) {
@@ -295,7 +295,7 @@ impl Wheelset {
         &mut self,
         vehicle: &Vehicle,
         track: &RouteTrack,
-        rails: &Rails,
+        rails: &RailPose,
         (state, wrench): (&BodyState, &mut Wrench),
         ledger: &mut Ledger,
         dt_s: f64,

@@ -108,7 +108,7 @@ impl Lidar {
     ) -> Self {
         let caster = TunnelCaster::new(tracks);
         let origin = Point3::from(world_from_lidar.translation.vector);
-        let spot = caster.spot_of(&origin, None);
+        let ray_start = caster.ray_start(&origin, None);
         let side = settings.side_shots();
         let mut beams = Vec::new();
         for shot in -side..=side {
@@ -121,7 +121,7 @@ impl Lidar {
                 let (sin_w, cos_w) = elevation_rad.sin_cos();
                 let direction =
                     world_from_lidar * Vector3::new(cos_w * sin_a, cos_w * cos_a, sin_w);
-                let hit = caster.cast(spot, &origin, &direction, settings.max_range_m);
+                let hit = caster.cast(ray_start, &origin, &direction, settings.max_range_m);
                 let wall = hit.map(|hit| {
                     let at = caster.surface_at(&origin, &direction, &hit);
                     Echo {

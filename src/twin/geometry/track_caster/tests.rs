@@ -64,19 +64,12 @@ fn section() -> CrossSection {
 
 fn track() -> Track {
     Track {
-        name: "test".into(),
-        alignment: alignment(),
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: LENGTH_M,
             section: section(),
         }],
-        lamps: Vec::new(),
-        wayside: Vec::new(),
-        balises: Vec::new(),
-        base_stations: Vec::new(),
-        stations: Vec::new(),
-        ambient_lx: 0.0,
+        ..Track::bare("test", alignment())
     }
 }
 

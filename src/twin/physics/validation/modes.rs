@@ -7,7 +7,7 @@
 
 use super::model::{BOGIES, CAR, LinearModel, Mode, PITCH, ROLL, Under, Y, Z, dof};
 use super::*;
-use nalgebra::{Complex, DMatrix, DVector, Vector3};
+use nalgebra::{Complex, DMatrix, DVector, UnitQuaternion, Vector3};
 use rapier3d_f64::math::Rotation;
 
 const SPEED_MPS: f64 = 20.0;
@@ -33,15 +33,15 @@ fn fit(samples: &[f64], dt_s: f64) -> (f64, f64) {
     )
 }
 
+/// Attitude of the rails of the straight track that the car runs on.
+fn world_from_rails(world: &World) -> UnitQuaternion<f64> {
+    let start = world.tunnel.first_track().alignment.at(0.0);
+    start.world_from_rails().rotation
+}
+
 /// Coordinates of the simulated car against a car that runs on undisturbed.
 fn coordinates(now: &World, calm: &World) -> Vec<f64> {
-    let frame = calm
-        .tunnel
-        .first_track()
-        .alignment
-        .at(0.0)
-        .world_from_rails()
-        .rotation;
+    let frame = world_from_rails(calm);
     let pairs = consist(now).states.iter().zip(&consist(calm).states);
     let both = pairs.flat_map(|(a, b)| {
         let moved = frame.inverse() * Vector3::from(a.position - b.position);
@@ -54,13 +54,7 @@ fn coordinates(now: &World, calm: &World) -> Vec<f64> {
 
 /// Puts the bodies into a mode's shape.
 fn excite(world: &mut World, model: &LinearModel, mode: &Mode) {
-    let frame = world
-        .tunnel
-        .first_track()
-        .alignment
-        .at(0.0)
-        .world_from_rails()
-        .rotation;
+    let frame = world_from_rails(world);
     let handles = consist(world).handles.clone();
     for (body, handle) in handles.iter().enumerate() {
         let part = |scale: Complex<f64>, first: usize| {

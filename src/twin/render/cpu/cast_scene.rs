@@ -2,7 +2,7 @@
 
 use crate::bus::Intrinsics;
 use crate::track::Material;
-use crate::twin::geometry::{Spot, SurfacePoint, TunnelCaster, TunnelHit};
+use crate::twin::geometry::{RayStart, SurfacePoint, TunnelCaster, TunnelHit};
 use crate::twin::render::constants::{LAMP_SIGHT_M, MIN_SINE, SIGHT_M};
 use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::lit_scene::LitScene;
@@ -106,22 +106,27 @@ impl CastScene {
 
     pub fn all_pixels(&self, camera: &Intrinsics, pose: &Isometry3<f64>) -> Vec<TunnelPixel> {
         let eye = Point3::from(pose.translation.vector);
-        let spot = self.tunnel.spot_of(&eye, None);
+        let ray_start = self.tunnel.ray_start(&eye, None);
         let width = camera.width_px as usize;
         (0..width * camera.height_px as usize)
             .into_par_iter()
             .with_min_len(width.max(1))
             .map(|k| {
                 let ray = RayDifferential::through(camera, pose, (k % width, k / width), 1.0);
-                self.pixel(spot, &eye, &ray)
+                self.pixel(ray_start, &eye, &ray)
             })
             .collect()
     }
 
     /// The tunnel along one ray.
-    pub fn pixel(&self, spot: Spot, eye: &Point3<f64>, pixel: &RayDifferential) -> TunnelPixel {
+    pub fn pixel(
+        &self,
+        ray_start: RayStart,
+        eye: &Point3<f64>,
+        pixel: &RayDifferential,
+    ) -> TunnelPixel {
         let ray = &pixel.ray;
-        let Some(hit) = self.tunnel.cast(spot, eye, ray, SIGHT_M / ray.norm()) else {
+        let Some(hit) = self.tunnel.cast(ray_start, eye, ray, SIGHT_M / ray.norm()) else {
             return TunnelPixel::default();
         };
         let at = self.tunnel.surface_at(eye, ray, &hit);

@@ -117,14 +117,14 @@ struct Share {
 }
 
 /// A disc through a slice of a row's exposure.
-struct Passing<'a> {
+struct DiscSweep<'a> {
     view: &'a View,
     spread: &'a BlurSamples,
     /// Each with its share of the slice's light.
     instants: Vec<(Disc, f64)>,
 }
 
-impl Passing<'_> {
+impl DiscSweep<'_> {
     fn in_pixel(&self, u: f64, v: f64) -> Share {
         let camera = &self.view.camera.intrinsics;
         let reach_px = self.spread.reach_px;
@@ -187,7 +187,7 @@ pub(super) fn draw_disc(
         let shine = row.light(view, lamp, from, to) / count;
         Some((at(0.5 * (from + to))?, shine))
     });
-    let passing = Passing {
+    let sweep = DiscSweep {
         view,
         spread,
         instants: instants.collect(),
@@ -196,7 +196,7 @@ pub(super) fn draw_disc(
     let begin = (c.x - reach_px).max(0.0) as usize;
     let end = ((c.x + reach_px).max(-1.0) + 1.0) as usize;
     for u in begin..end.min(luminances.len()) {
-        let share = passing.in_pixel(u as f64, v);
+        let share = sweep.in_pixel(u as f64, v);
         if share.covered <= 0.0 {
             continue;
         }

@@ -147,8 +147,8 @@ impl CpuRenderer {
             self.kept.get((*camera, pose), all_pixels)
         });
         let lamps = self.scene.lamps_by_distance(&pose);
-        let spot = (self.scene.tunnel).spot_of(&Point3::from(pose.translation.vector), None);
-        let context = ViewContext::new(&self.scene, job, view, spot);
+        let ray_start = (self.scene.tunnel).ray_start(&Point3::from(pose.translation.vector), None);
+        let context = ViewContext::new(&self.scene, job, view, ray_start);
         let corners = |row: &RowExposure, corners: &mut [f64]| {
             RowRays::new(&self.scene, &context, view, row, KnownTunnel::Unknown).corners(corners);
         };

@@ -6,7 +6,7 @@ use super::dim::{CELL_PX, DimView};
 use super::lamps::{self, Haze, RowExposure};
 use super::shadow::{BodyShadows, RowShadows};
 use super::spread::BlurSamples;
-use crate::twin::geometry::{Solid, Spot, SurfacePoint};
+use crate::twin::geometry::{RayStart, Solid, SurfacePoint};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
@@ -23,7 +23,7 @@ pub(super) struct ViewContext<'a> {
     shadows: BodyShadows<'a>,
     airlight_cd_m2: f64,
     /// Segment of the first pose.
-    spot: Spot,
+    ray_start: RayStart,
     /// Indices of the lamps whose blinking may show.
     lamps: Vec<usize>,
 }
@@ -55,7 +55,7 @@ pub(super) struct RowRays<'a> {
     row: &'a RowExposure,
     known: KnownTunnel<'a>,
     eye: Point3<f64>,
-    spot: Spot,
+    ray_start: RayStart,
     /// Of the job's bodies as they are by now.
     shadows: RowShadows<'a>,
     blinking: Blinking,
@@ -64,16 +64,16 @@ pub(super) struct RowRays<'a> {
 }
 
 impl<'a> ViewContext<'a> {
-    /// Of a view from somewhere in a spot.
-    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, spot: Spot) -> Self {
+    /// Of a view whose rays begin there.
+    pub fn new(scene: &'a CastScene, job: &'a Job, view: &View, ray_start: RayStart) -> Self {
         let lamps = scene.lamps_about(view);
         Self {
             job,
             shadows: BodyShadows::new(scene, job, &lamps),
             airlight_cd_m2: scene
                 .lit
-                .airlight_cd_m2(spot.track, scene.tunnel.chainage_m(spot)),
-            spot,
+                .airlight_cd_m2(ray_start.track, scene.tunnel.chainage_m(ray_start)),
+            ray_start,
             lamps,
         }
     }
@@ -94,7 +94,7 @@ impl<'a> RowRays<'a> {
             context,
             view,
             row,
-            spot: scene.tunnel.spot_of(&eye, Some(context.spot)),
+            ray_start: scene.tunnel.ray_start(&eye, Some(context.ray_start)),
             shadows: context.shadows.at(mid.since(context.job.time)),
             blinking: Blinking::new(scene.lit.lamps.lamps(), &context.lamps, view, row),
             eye,
@@ -112,7 +112,7 @@ impl<'a> RowRays<'a> {
     /// Whether pixel `u` sees a surface that may mirror a lamp.
     fn may_mirror(&self, u: usize) -> bool {
         let (tunnel, ray) = (&self.scene.tunnel, self.ray(u));
-        let hit = tunnel.cast(self.spot, &self.eye, &ray, SIGHT_M / ray.norm());
+        let hit = tunnel.cast(self.ray_start, &self.eye, &ray, SIGHT_M / ray.norm());
         hit.is_some_and(|hit| tunnel.is_level(&hit))
     }
 
@@ -124,7 +124,7 @@ impl<'a> RowRays<'a> {
             _ => {
                 let pixel = (u, self.row.v);
                 let ray = RayDifferential::through(camera, &self.row.mid, pixel, self.side_px);
-                (self.scene).pixel(self.spot, &self.eye, &ray)
+                (self.scene).pixel(self.ray_start, &self.eye, &ray)
             }
         };
         let Some(hit) = &ground.hit else {
@@ -183,7 +183,8 @@ impl<'a> RowRays<'a> {
     fn depth(&self, u: usize, depths: &mut [f64]) -> f64 {
         if depths[u].is_nan() {
             let ray = self.ray(u);
-            let hit = (self.scene.tunnel).cast(self.spot, &self.eye, &ray, SIGHT_M / ray.norm());
+            let hit =
+                (self.scene.tunnel).cast(self.ray_start, &self.eye, &ray, SIGHT_M / ray.norm());
             depths[u] = hit.map_or(f64::INFINITY, |s| s.t);
         }
         depths[u]

@@ -157,13 +157,13 @@ impl Labeller {
         let eye = Point3::from(projection.pose(v).translation.vector);
         let way = place - eye;
         let reach = 1.0 - FLUSH_M / way.norm();
-        let spot = self.tunnel.spot_of(&eye, None);
+        let ray_start = self.tunnel.ray_start(&eye, None);
         let after_s = projection.after_s(v);
         let hides = |body: &Body| {
             let hit = Solid::at(body, after_s).cast(&eye, &way);
             hit.is_some_and(|(t, _)| t < reach)
         };
-        self.tunnel.cast(spot, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
+        self.tunnel.cast(ray_start, &eye, &way, reach).is_none() && !job.bodies.iter().any(hides)
     }
 
     /// The lamps, in the order of the scene.
@@ -247,10 +247,10 @@ fn all_depths(
 
 fn cast_tunnel(tunnel: &TunnelCaster, row: &LabelRow<'_>, depth_m: &mut [f64]) {
     let eye = row.eye();
-    let spot = tunnel.spot_of(&eye, None);
+    let ray_start = tunnel.ray_start(&eye, None);
     for (u, depth_m) in depth_m.iter_mut().enumerate() {
         let ray = row.ray(u);
-        if let Some(hit) = tunnel.cast(spot, &eye, &ray, SIGHT_M / ray.norm()) {
+        if let Some(hit) = tunnel.cast(ray_start, &eye, &ray, SIGHT_M / ray.norm()) {
             *depth_m = hit.t;
         }
     }

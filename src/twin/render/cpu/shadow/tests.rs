@@ -196,7 +196,7 @@ fn every_shadow_is_found() {
     let view = &job.views[0];
     let pose = view.motion.poses[0];
     let eye = Point3::from(pose.translation.vector);
-    let spot = scene.tunnel.spot_of(&eye, None);
+    let ray_start = scene.tunnel.ray_start(&eye, None);
     let shadows = BodyShadows::new(&scene, &job, &scene.lamps_about(view));
     let all_lamps = scene.lit.lamps.lamps();
     let blinking = Blinking::steady(all_lamps);
@@ -208,7 +208,7 @@ fn every_shadow_is_found() {
     for k in 0..4000usize {
         let (u, v) = ((k * 37 % 1920) as f64, (k * 271 % 1080) as f64);
         let ray = pose * view.camera.intrinsics.ray(u, v);
-        let Some(hit) = scene.tunnel.cast(spot, &eye, &ray, SIGHT_M) else {
+        let Some(hit) = scene.tunnel.cast(ray_start, &eye, &ray, SIGHT_M) else {
             continue;
         };
         let at = scene.tunnel.surface_at(&eye, &ray, &hit);
