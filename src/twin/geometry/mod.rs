@@ -2,14 +2,20 @@
 //! ([`TunnelCaster`]). Physics, sensors and renderers share it.
 
 mod body;
+mod end_wall;
+mod free_space;
 mod hull;
 mod section;
 mod solid;
 mod track_caster;
+mod track_surface;
 mod tunnel;
 
 pub use body::{Body, Shape};
+pub use end_wall::EndWall;
+pub use free_space::Trapezoid;
 pub use hull::{Face, Hull};
 pub use solid::Solid;
-pub use track_caster::{STATION_STEP_M, SurfacePoint};
+pub use track_caster::STATION_STEP_M;
+pub use track_surface::SurfacePoint;
 pub use tunnel::{RayStart, TunnelCaster, TunnelHit};

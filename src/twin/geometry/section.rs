@@ -28,7 +28,7 @@ pub(super) struct OutlineEdge {
 pub(super) struct SectionCaster {
     pub edges: Vec<OutlineEdge>,
     /// Without the rails.
-    section: CrossSection,
+    pub section: CrossSection,
     low: Vector2<f64>,
     high: Vector2<f64>,
     columns: usize,

@@ -8,38 +8,41 @@
 //!
 //! A prism leaves out two things: the cosine of half the turn between stations (1.4e-6 of the lateral
 //! distance at a radius of 300 m), and the difference of slope times chord between inner and outer
-//! side (0.15 mm at 30 permille and that radius). Where two cross-sections meet, the step between
-//! them is not drawn and stays dark.
+//! side (0.15 mm at 30 permille and that radius). Where a cross-section ends and the next is narrower,
+//! an [`EndWall`] closes what it leaves open.
 
+use super::end_wall::{EndWall, Plane};
 use super::section::SectionCaster;
-use crate::track::{Material, Track};
+use crate::track::{CrossSection, Direction, Material, Track};
 use nalgebra::{Point2, Point3, Vector2, Vector3};
 
 /// The swept tunnel of a track with its rails, ready for rays.
 #[derive(Clone, Debug)]
 pub(super) struct TrackCaster {
-    stations: Vec<Station>,
-    segments: Vec<Segment>,
-    sections: Vec<SectionCaster>,
+    pub(super) stations: Vec<Station>,
+    pub(super) segments: Vec<Segment>,
+    pub(super) sections: Vec<SectionCaster>,
+    /// Each with its station.
+    pub(super) end_walls: Vec<(usize, EndWall)>,
     /// Middle and radius of a circle in plan around all stations.
     around: (Point2<f64>, f64),
 }
 
 #[derive(Clone, Debug)]
-struct Station {
-    s_m: f64,
-    origin: Point3<f64>,
+pub(super) struct Station {
+    pub s_m: f64,
+    pub origin: Point3<f64>,
     /// Up the line in plan: the normal of the station's plane.
-    forward: Vector2<f64>,
+    pub forward: Vector2<f64>,
 }
 
 #[derive(Clone, Debug)]
-struct Segment {
-    chord: Vector2<f64>,
-    left: Vector2<f64>,
+pub(super) struct Segment {
+    pub chord: Vector2<f64>,
+    pub left: Vector2<f64>,
     /// Rise over run from station to station.
-    slope: f64,
-    section: Option<usize>,
+    pub slope: f64,
+    pub section: Option<usize>,
 }
 
 /// What becomes of a ray that is followed down a tunnel.
@@ -63,37 +66,16 @@ pub struct TrackHit {
     pub t: f64,
     /// The segment that it is in.
     pub segment: u32,
-    edge: u16,
+    pub(super) on: Surface,
 }
 
-/// The surface at a hit.
+/// What a ray meets in a segment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SurfacePoint {
-    /// In the world.
-    pub position: Point3<f64>,
-    /// Unit normal of the facet, towards free space.
-    pub normal: Vector3<f64>,
-    /// Chainage.
-    pub s_m: f64,
-    /// Left of the centreline.
-    pub l_m: f64,
-    /// Along the outline from its first point.
-    pub q_m: f64,
-    /// What it is made of.
-    pub material: Material,
-    /// Which track it belongs to.
-    pub track: usize,
-    /// Which of that track's section ranges.
-    pub range: usize,
-    /// How s and q grow with the position, per metre.
-    pub gradients: [Vector3<f64>; 2],
-}
-
-impl SurfacePoint {
-    /// Up the line.
-    pub fn along(&self) -> Vector3<f64> {
-        self.gradients[0]
-    }
+pub(super) enum Surface {
+    /// By its number in the cross-section.
+    Edge(u16),
+    /// By its number on the track.
+    EndWall(u16),
 }
 
 /// Stations of the tunnel surface lie at multiples of this chainage; between them it is ruled.
@@ -136,6 +118,7 @@ impl TrackCaster {
             .collect();
         Self {
             around: circle_around(&stations),
+            end_walls: Vec::new(),
             stations,
             segments,
             sections: track
@@ -149,10 +132,11 @@ impl TrackCaster {
     /// Whether the surface at a hit lies level and may mirror: bed, or top of a rail.
     pub(super) fn is_level(&self, hit: &TrackHit) -> bool {
         let outline = self.segments[hit.segment as usize].section;
-        outline.is_some_and(|range| {
-            let edge = &self.sections[range].edges[hit.edge as usize];
-            edge.normal.y > 0.5 && matches!(edge.material, Material::Bed | Material::Rail)
-        })
+        let (Some(range), Surface::Edge(edge)) = (outline, hit.on) else {
+            return false;
+        };
+        let edge = &self.sections[range].edges[edge as usize];
+        edge.normal.y > 0.5 && matches!(edge.material, Material::Bed | Material::Rail)
     }
 
     /// Where a segment begins.
@@ -186,7 +170,7 @@ impl TrackCaster {
     }
 
     /// Distance of a place up the line from the plane of a station.
-    fn ahead_of(&self, station: usize, p: &Point3<f64>) -> f64 {
+    pub(super) fn ahead_of(&self, station: usize, p: &Point3<f64>) -> f64 {
         let s = &self.stations[station];
         s.forward.dot(&(p - s.origin).xy())
     }
@@ -225,17 +209,23 @@ impl TrackCaster {
                 return Followed::Hit(TrackHit {
                     t,
                     segment: k as u32,
-                    edge,
+                    on: Surface::Edge(edge),
                 });
             }
             if leave >= reach {
                 return Followed::Nothing;
             }
-            let next = if exit_up < exit_down {
-                k + 1
-            } else {
-                k.wrapping_sub(1)
+            let (next, border) = match exit_up < exit_down {
+                true => (k + 1, (k + 1, Direction::Up)),
+                false => (k.wrapping_sub(1), (k, Direction::Down)),
             };
+            if let Some(wall) = self.end_wall_at(border, &(o_across + d_across * leave)) {
+                return Followed::Hit(TrackHit {
+                    t: leave,
+                    segment: k as u32,
+                    on: Surface::EndWall(wall),
+                });
+            }
             let Some(beyond) = self.segments.get(next) else {
                 return Followed::Left { t: leave };
             };
@@ -248,6 +238,42 @@ impl TrackCaster {
             (k, entry) = (next, leave);
         }
         Followed::Nothing
+    }
+
+    /// The end wall at a station that a ray meets which runs along the line.
+    fn end_wall_at(
+        &self,
+        (station, looking): (usize, Direction),
+        across: &Vector2<f64>,
+    ) -> Option<u16> {
+        let found = self.end_walls.iter().position(|(at, wall)| {
+            *at == station && wall.seen_looking == looking && wall.contains(across)
+        });
+        found.map(|number| number as u16)
+    }
+
+    /// Stations at which one cross-section ends, the ends of the track among them.
+    pub(super) fn borders(&self) -> impl Iterator<Item = usize> + '_ {
+        let section = |k: usize| self.segments.get(k).and_then(|segment| segment.section);
+        (0..self.stations.len()).filter(move |k| {
+            let before = k.checked_sub(1).and_then(section);
+            before != section(*k)
+        })
+    }
+
+    /// The plane across the line at a station.
+    pub(super) fn plane(&self, station: usize) -> Plane {
+        let Station {
+            origin, forward, ..
+        } = self.stations[station];
+        Plane { origin, forward }
+    }
+
+    /// The track's own cross-section in a segment, with its number.
+    pub(super) fn own_section(&self, segment: usize) -> Option<(usize, &CrossSection)> {
+        let range = self.segments.get(segment)?.section?;
+        let section = &self.sections[range].section;
+        (!section.is_shared()).then_some((range, section))
     }
 
     /// The first rail that a ray meets on stretches whose section is that of another track.
@@ -278,7 +304,7 @@ impl TrackCaster {
                     return Some(TrackHit {
                         t,
                         segment: k as u32,
-                        edge,
+                        on: Surface::Edge(edge),
                     });
                 }
             }
@@ -336,7 +362,12 @@ impl TrackCaster {
     }
 
     /// A ray in the plane across a segment's chord.
-    fn across(&self, k: usize, o: &Point3<f64>, d: &Vector3<f64>) -> (Vector2<f64>, Vector2<f64>) {
+    pub(super) fn across(
+        &self,
+        k: usize,
+        o: &Point3<f64>,
+        d: &Vector3<f64>,
+    ) -> (Vector2<f64>, Vector2<f64>) {
         let segment = &self.segments[k];
         let v = o - self.stations[k].origin;
         let (v2, d2) = (v.xy(), d.xy());
@@ -350,49 +381,6 @@ impl TrackCaster {
                 d.z - segment.slope * segment.chord.dot(&d2),
             ),
         )
-    }
-
-    /// The surface where the ray o + t d hit.
-    pub(super) fn surface_at(
-        &self,
-        o: &Point3<f64>,
-        d: &Vector3<f64>,
-        hit: &TrackHit,
-    ) -> SurfacePoint {
-        let k = hit.segment as usize;
-        let segment = &self.segments[k];
-        let (o_across, d_across) = self.across(k, o, d);
-        let position = o + d * hit.t;
-        let lh = o_across + d_across * hit.t;
-        let (near_m, far_m) = (self.stations[k].s_m, self.stations[k + 1].s_m);
-        let (past, before) = (
-            self.ahead_of(k, &position),
-            -self.ahead_of(k + 1, &position),
-        );
-        let range = segment.section.unwrap_or(0);
-        let edge = &self.sections[range].edges[hit.edge as usize];
-        // Across the edge and across the ruling, which climbs with the slope.
-        let (n, along) = (edge.normal, -edge.normal.y * segment.slope);
-        let level = segment.left * n.x + segment.chord * along;
-        // How metres along the edge grow with the position: the transpose of what
-        // [`Self::across`] does to directions.
-        let climb = segment.slope * edge.along.y;
-        let up_edge = segment.left * edge.along.x - segment.chord * climb;
-        SurfacePoint {
-            position,
-            normal: Vector3::new(level.x, level.y, n.y).normalize(),
-            s_m: near_m + (far_m - near_m) * past / (past + before),
-            l_m: lh.x,
-            q_m: edge.q_m + edge.along.dot(&(lh - edge.start)),
-            material: edge.material,
-            track: 0,
-            range,
-            gradients: [
-                Vector3::new(segment.chord.x, segment.chord.y, 0.0)
-                    * ((far_m - near_m) / (past + before)),
-                Vector3::new(up_edge.x, up_edge.y, edge.along.y),
-            ],
-        }
     }
 }
 

@@ -1,7 +1,9 @@
 //! A ray in a network of tunnels: from one track's tunnel to another's where their cross-sections open into each
 //! other, and over the rails of tracks that share a cross-section.
 
-use super::track_caster::{Followed, SurfacePoint, TrackCaster, TrackHit};
+use super::end_wall::{EndWall, end_walls};
+use super::track_caster::{Followed, TrackCaster, TrackHit};
+use super::track_surface::SurfacePoint;
 use crate::track::Track;
 use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
@@ -40,9 +42,16 @@ const BEYOND_M: f64 = 1e-3;
 impl TunnelCaster {
     /// Sweeps the cross-sections of all tracks along their lines.
     pub fn new(tracks: &[Arc<Track>]) -> Self {
-        Self {
-            tracks: tracks.iter().map(|track| TrackCaster::new(track)).collect(),
+        let mut tracks: Vec<_> = tracks.iter().map(|track| TrackCaster::new(track)).collect();
+        for (track, station, wall) in end_walls(&tracks) {
+            tracks[track].end_walls.push((station, wall));
         }
+        Self { tracks }
+    }
+
+    /// The walls across the line where cross-sections of a track end.
+    pub fn end_walls(&self, track: usize) -> impl Iterator<Item = &EndWall> {
+        self.tracks[track].end_walls.iter().map(|(_, wall)| wall)
     }
 
     /// Whether the surface at a hit lies level and may mirror: bed, or top of a rail.

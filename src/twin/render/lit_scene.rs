@@ -6,6 +6,7 @@ use super::scene::Scene;
 use crate::bus::SimTime;
 use crate::track::Track;
 use crate::twin::air::Air;
+use crate::twin::geometry::{EndWall, TunnelCaster};
 use crate::twin::lights::LampLight;
 use crate::twin::reflectance::Wet;
 use std::sync::Arc;
@@ -20,6 +21,8 @@ pub struct LitScene {
     pub wet: Wet,
     /// What the tunnel's surfaces look like.
     pub paintings: Paintings,
+    /// Walls across the line, by track.
+    pub end_walls: Vec<Vec<EndWall>>,
     /// The lamps as they are now.
     pub lamps: LampField,
     /// With all that becomes of them.
@@ -36,7 +39,10 @@ impl LitScene {
     }
 
     fn painted(scene: Scene, paintings: Paintings) -> Self {
+        let tunnel = TunnelCaster::new(&scene.tracks);
+        let end_walls = (0..scene.tracks.len()).map(|k| tunnel.end_walls(k).cloned().collect());
         Self {
+            end_walls: end_walls.collect(),
             tracks: scene.tracks,
             air: scene.air,
             wet: scene.wet,

@@ -187,7 +187,7 @@ fn hits_know_where_they_are_on_the_line() {
         // Between stations the tunnel is straight, the line is not: a sagitta of 0.6 mm.
         assert!((at.s_m - truth.s_m).abs() < 2e-3, "{at:?} {truth:?}");
         assert!((at.l_m - truth.l_m).abs() < 2e-3, "{at:?} {truth:?}");
-        assert!(at.q_m >= -1e-6 && at.q_m < 25.0);
+        assert!(at.painted_m[1] >= -1e-6 && at.painted_m[1] < 25.0);
     }
 }
 

@@ -157,7 +157,8 @@ impl CastScene {
             _ => 0.0,
         };
         let across = aside.map(|step| footprint(at, ray, t, &step));
-        painting.mean_over([at.s_m, begin_m + at.q_m], across)
+        let [s_m, q_m] = at.painted_m;
+        painting.mean_over([s_m, begin_m + q_m], across)
     }
 }
 

@@ -70,6 +70,7 @@ mod bodies;
 mod chunks;
 mod detail;
 mod draw_list;
+mod end_walls;
 mod facets;
 mod kept;
 mod lamps;

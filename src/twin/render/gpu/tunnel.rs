@@ -5,7 +5,7 @@ use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
-use crate::track::{OutlinePoint, Track, TrackPoint};
+use crate::track::{Material, OutlinePoint, Track, TrackPoint};
 use crate::twin::geometry::STATION_STEP_M;
 use crate::twin::reflectance::mean_albedo;
 use crate::twin::render::gloss::Gloss;
@@ -31,11 +31,11 @@ pub struct ChunkMesh {
     pub mesh: Mesh,
     /// The lamp whose blinking shows on its walls.
     pub lamp: Option<usize>,
-    /// For every cross-section in it one a [`FacetSide`].
+    /// For every cross-section in it one a [`FacetSide`], and its end walls.
     pub parts: Vec<ChunkSide>,
 }
 
-/// The triangles of one side of one cross-section in a chunk.
+/// The triangles of one side of one cross-section in a chunk, or of an end wall.
 #[derive(Clone, Debug)]
 pub struct ChunkSide {
     /// The corners of a box around them, from the chunk's origin.
@@ -52,13 +52,13 @@ pub struct ChunkSide {
     pub glossy: Range<u32>,
 }
 
-/// What all strips of a chunk share.
-struct Site<'a> {
-    scene: &'a LitScene,
-    track: &'a Track,
+/// What all surfaces of a chunk share.
+pub(super) struct Site<'a> {
+    pub scene: &'a LitScene,
+    pub track: &'a Track,
     lamp: Option<&'a BlinkingLamp>,
-    cutting: Cutting<'a>,
-    origin: Point3<f64>,
+    pub cutting: Cutting<'a>,
+    pub origin: Point3<f64>,
 }
 
 /// Origin and mesh of a chunk; empty where there is no tunnel.
@@ -99,18 +99,10 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
                 let vertices = &mesh.vertices[vertices..];
                 site.add_patches(&mut patches, (facet, brightest), &stations, vertices);
             }
-            if mesh.indices.len() > first {
-                let around = box_around(&mesh, first, track.alignment.at(middle_m).heading_rad);
-                parts.push(side_of(
-                    &mut mesh,
-                    first,
-                    number.unwrap_or(0),
-                    around,
-                    patches,
-                ));
-            }
+            parts.extend(site.side_of(&mut mesh, first, number.unwrap_or(0), patches));
         }
     }
+    site.add_end_walls(&mut mesh, &mut parts);
     ChunkMesh {
         origin: site.origin,
         mesh,
@@ -131,32 +123,6 @@ fn strongest(field: &LampField, p: &Point3<f64>) -> Option<usize> {
         .map(|(k, _)| k)
 }
 
-/// The triangles of a mesh from index `first` on, those that mirror once more behind them.
-fn side_of(
-    mesh: &mut Mesh,
-    first: usize,
-    painting: usize,
-    around: [Vector3<f32>; 8],
-    patches: Vec<Patch>,
-) -> ChunkSide {
-    let (triangles, _) = mesh.indices[first..].as_chunks::<3>();
-    let mirrors = |k: u32| mesh.vertices[k as usize].gloss[0] > 0.0;
-    let glossy = triangles.iter().filter(|t| t.iter().all(|k| mirrors(*k)));
-    let glossy: Vec<u32> = glossy.flatten().copied().collect();
-    let border = mesh.indices.len() as u32;
-    mesh.indices.extend(glossy);
-    ChunkSide {
-        around,
-        painting,
-        indices: first as u32..border,
-        peak_cd_m2: patches
-            .iter()
-            .fold(0.0, |peak, patch| patch.peak_cd_m2.max(peak)),
-        patches,
-        glossy: border..mesh.indices.len() as u32,
-    }
-}
-
 /// Corners of the upright box along the line that holds the triangles from index `first` on.
 fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] {
     let to_line = Rotation3::from_axis_angle(&Vector3::z_axis(), -heading_rad as f32);
@@ -173,6 +139,38 @@ fn box_around(mesh: &Mesh, first: usize, heading_rad: f64) -> [Vector3<f32>; 8] 
 }
 
 impl Site<'_> {
+    /// The triangles of a mesh from index `first` on, those that mirror once more behind them; nothing where
+    /// there are none.
+    pub(super) fn side_of(
+        &self,
+        mesh: &mut Mesh,
+        first: usize,
+        painting: usize,
+        patches: Vec<Patch>,
+    ) -> Option<ChunkSide> {
+        let middle_m = self.cutting.key.start_m() + 0.5 * CHUNK_M;
+        let (triangles, _) = mesh.indices.get(first..)?.as_chunks::<3>();
+        if triangles.is_empty() {
+            return None;
+        }
+        let mirrors = |k: u32| mesh.vertices[k as usize].gloss[0] > 0.0;
+        let glossy = triangles.iter().filter(|t| t.iter().all(|k| mirrors(*k)));
+        let glossy: Vec<u32> = glossy.flatten().copied().collect();
+        let around = box_around(mesh, first, self.track.alignment.at(middle_m).heading_rad);
+        let border = mesh.indices.len() as u32;
+        mesh.indices.extend(glossy);
+        Some(ChunkSide {
+            around,
+            painting,
+            indices: first as u32..border,
+            peak_cd_m2: patches
+                .iter()
+                .fold(0.0, |peak, patch| patch.peak_cd_m2.max(peak)),
+            patches,
+            glossy: border..mesh.indices.len() as u32,
+        })
+    }
+
     fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
         let first = mesh.vertices.len() as u32;
         let sides = facet
@@ -197,13 +195,6 @@ impl Site<'_> {
     ) {
         let detail = self.cutting.key.detail;
         let start_m = self.cutting.key.start_m();
-        // Without a lamp nothing blinks.
-        let on_per_mean = self.lamp.map_or(1.0, |lamp| 1.0 / lamp.duty().max(1e-9)) as f32;
-        let reflected_per_lx = |v: &Vertex| v.paint * brightest / PI as f32;
-        let peak_cd_m2 = |v: &Vertex| {
-            let [steady, blinking] = v.light_lx;
-            reflected_per_lx(v) * (steady + on_per_mean * blinking)
-        };
         let mut from_m = stations[0];
         let last_m = stations[stations.len() - 1];
         for to_m in &stations[1..] {
@@ -218,20 +209,49 @@ impl Site<'_> {
             let stretch_m = from_m - NEAR_STATION_M..=to_m + NEAR_STATION_M;
             let inside = |v: &&Vertex| stretch_m.contains(&(start_m + f64::from(v.place_m[0])));
             let corners = vertices.iter().filter(inside);
-            let most = |of: &dyn Fn(&Vertex) -> f32| corners.clone().map(of).fold(0.0, f32::max);
-            patches.push(Patch {
-                cell: SurfaceCell::still((0.25 * (a + b + c + d)).into(), half, Some(normal)),
-                peak_cd_m2: most(&peak_cd_m2),
-                reflected_per_lx: most(&reflected_per_lx),
-                glossy: most(&|v| v.gloss[0]) > 0.0,
-            });
+            let cell = SurfaceCell::still((0.25 * (a + b + c + d)).into(), half, Some(normal));
+            patches.push(self.patch(cell, brightest, corners));
             from_m = *to_m;
+        }
+    }
+
+    /// A cell with these vertices among others, of which nothing has more albedo than `brightest`.
+    pub(super) fn patch<'v>(
+        &self,
+        cell: SurfaceCell,
+        brightest: f32,
+        vertices: impl Iterator<Item = &'v Vertex> + Clone,
+    ) -> Patch {
+        // Without a lamp nothing blinks.
+        let on_per_mean = self.lamp.map_or(1.0, |lamp| 1.0 / lamp.duty().max(1e-9)) as f32;
+        let reflected_per_lx = |v: &Vertex| v.paint * brightest / PI as f32;
+        let peak_cd_m2 = |v: &Vertex| {
+            let [steady, blinking] = v.light_lx;
+            reflected_per_lx(v) * (steady + on_per_mean * blinking)
+        };
+        let most = |of: &dyn Fn(&Vertex) -> f32| vertices.clone().map(of).fold(0.0, f32::max);
+        Patch {
+            cell,
+            peak_cd_m2: most(&peak_cd_m2),
+            reflected_per_lx: most(&reflected_per_lx),
+            glossy: most(&|v| v.gloss[0]) > 0.0,
         }
     }
 
     fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
         let normal = facet_normal(self.track, facet, s_m);
         let p = ruled(self.track, s_m, end, self.cutting.key.detail);
+        self.lit_vertex(p, normal, facet.material, [s_m, q_m])
+    }
+
+    /// A corner of a surface, painted as the painting is at a place.
+    pub(super) fn lit_vertex(
+        &self,
+        p: Point3<f64>,
+        normal: Vector3<f64>,
+        material: Material,
+        [s_m, q_m]: [f64; 2],
+    ) -> Vertex {
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
@@ -241,15 +261,15 @@ impl Site<'_> {
         let inside_m = s_m - start_m;
         let number = self.cutting.key.track;
         let within_m = start_m + inside_m.clamp(1e-3, CHUNK_M - 1e-3);
-        let gloss = Gloss::of(facet.material, self.scene.wet.at(number, within_m), &normal);
-        let paint = (self.scene.wet).albedo_factor(facet.material, number, within_m);
+        let gloss = Gloss::of(material, self.scene.wet.at(number, within_m), &normal);
+        let paint = (self.scene.wet).albedo_factor(material, number, within_m);
         Vertex {
             position_m: (p - self.origin).map(|x| x as f32).into(),
             normal: normal.map(|x| x as f32).into(),
             light_lx: [(all - blinking).max(0.0) as f32, blinking as f32],
             place_m: [inside_m as f32, q_m as f32],
             paint: paint as f32,
-            albedo: (paint * mean_albedo(facet.material)) as f32,
+            albedo: (paint * mean_albedo(material)) as f32,
             luminance_cd_m2: 0.0,
             gloss: gloss.map_or([0.0; 3], |g| {
                 [g.head_on, g.along, g.across].map(|x| x as f32)
