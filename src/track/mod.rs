@@ -95,6 +95,8 @@ pub struct Track {
     pub stations: Vec<StoppingPlace>,
     /// Light that reaches every surface after many reflections, lux.
     pub ambient_lx: f64,
+    /// Light of the sky on level ground in the open, lux.
+    pub daylight_lx: f64,
 }
 
 impl Track {
@@ -110,6 +112,7 @@ impl Track {
             base_stations: Vec::new(),
             stations: Vec::new(),
             ambient_lx: 0.0,
+            daylight_lx: 0.0,
         }
     }
 

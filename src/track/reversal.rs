@@ -58,6 +58,7 @@ impl Track {
             base_stations: sorted(&self.base_stations, turned_base, |base| base.chainage_m),
             stations: sorted(&self.stations, turned_station, |stop| stop.chainage_m),
             ambient_lx: self.ambient_lx,
+            daylight_lx: self.daylight_lx,
         }
     }
 }

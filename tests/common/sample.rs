@@ -55,6 +55,7 @@ pub fn track() -> Track {
         base_stations: Vec::new(),
         stations: Vec::new(),
         ambient_lx: 5.0,
+        daylight_lx: 0.0,
     }
 }
 

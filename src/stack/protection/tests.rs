@@ -37,6 +37,7 @@ pub(super) fn map(permille: f64) -> Arc<Track> {
         base_stations: vec![],
         stations: vec![],
         ambient_lx: 5.0,
+        daylight_lx: 0.0,
     })
 }
 

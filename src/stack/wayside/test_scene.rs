@@ -87,6 +87,7 @@ pub fn track(curvature_per_m: f64) -> Arc<Track> {
         base_stations: vec![],
         stations: vec![],
         ambient_lx: 5.0,
+        daylight_lx: 0.0,
     })
 }
 

@@ -120,6 +120,7 @@ fn track(
         base_stations: entry.base_stations.clone(),
         stations: entry.stations.clone(),
         ambient_lx: entry.ambient_lx.unwrap_or(file.ambient_lx),
+        daylight_lx: file.daylight_lx,
     };
     track.lamps = lamps::place(entry, file.line_number, &track, check);
     devices::check_wayside(&track, check);

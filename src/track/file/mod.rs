@@ -70,6 +70,10 @@ with_track! {
         /// Light that reaches every surface after many reflections, lux.
         #[serde(default = "two_lux")]
         ambient_lx: f64, in 0.0..=1e5;
+        /// Light of the sky on level ground where tracks lie in the open, lux: 0 at night, 5,000 to 20,000 under
+        /// clouds.
+        #[serde(default)]
+        daylight_lx: f64, in 0.0..=1.5e5;
         /// Where the world's origin is on the earth. Default: nowhere, and the line is on no map.
         datum: Option<DatumEntry>, nested;
         /// The tracks, if there are several; then all keys of a track stand in them.

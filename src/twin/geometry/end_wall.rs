@@ -26,6 +26,8 @@ pub struct EndWall {
     pub s_m: f64,
     /// It is seen by who looks up or down the line.
     pub seen_looking: Direction,
+    /// The section range of the track that it closes.
+    pub range: usize,
     /// All of it, left of the track's centreline and over its top of rail.
     pub pieces: Vec<Trapezoid>,
     /// Whose paint it bears.
@@ -36,7 +38,7 @@ pub struct EndWall {
 #[derive(Clone, Copy, Debug)]
 pub struct WallPaint {
     /// The section range of the track that it is of.
-    pub range: usize,
+    pub of_range: usize,
     /// Where it begins over the bed, metres along the outline.
     foot_m: f64,
     /// Whether the outline runs up (1) or down (-1) there.
@@ -88,7 +90,7 @@ impl WallPaint {
                 let rise = climb_m.signum();
                 let foot_m = q_m - rise * (edge.a.h_m - BED_M);
                 let paint = Self {
-                    range,
+                    of_range: range,
                     foot_m,
                     rise,
                 };
@@ -122,6 +124,20 @@ pub(super) fn end_walls(tracks: &[TrackCaster]) -> Vec<(usize, usize, EndWall)> 
         }
     }
     walls
+}
+
+/// Whether a track's own tunnel ends without anything beyond, at its begin and at its end.
+pub(super) fn leads_into_dark(tracks: &[TrackCaster], number: usize) -> [bool; 2] {
+    let last = tracks[number].stations.len().saturating_sub(1);
+    [(0, Direction::Down), (last, Direction::Up)].map(|(station, looking)| {
+        let border = Border {
+            tracks,
+            number,
+            station,
+            looking,
+        };
+        border.others().is_empty()
+    })
 }
 
 /// One side of a place at which a cross-section of a track ends.
@@ -161,6 +177,7 @@ impl Border<'_> {
         (!pieces.is_empty()).then(|| EndWall {
             s_m: track.stations[self.station].s_m,
             seen_looking: self.looking,
+            range,
             pieces,
             paint,
         })

@@ -13,9 +13,10 @@ mod tunnel;
 
 pub use body::{Body, Shape};
 pub use end_wall::EndWall;
-pub use free_space::Trapezoid;
+pub use free_space::{Trapezoid, free_space, without};
 pub use hull::{Face, Hull};
+pub use section::surface_of;
 pub use solid::Solid;
 pub use track_caster::STATION_STEP_M;
 pub use track_surface::SurfacePoint;
-pub use tunnel::{RayStart, TunnelCaster, TunnelHit};
+pub use tunnel::{RayStart, Sight, TunnelCaster, TunnelHit};

@@ -4,8 +4,9 @@
 //! outline lists the edges of each cell; a ray visits the cells on its way (Amanatides and Woo,
 //! "A fast voxel traversal algorithm for ray tracing", Eurographics 1987).
 
-use crate::track::{CrossSection, Material, RAIL_OFFSET_M, rail_outline};
+use crate::track::{BED_M, CrossSection, Material, OutlinePoint, RAIL_OFFSET_M, rail_outline};
 use nalgebra::Vector2;
+use std::borrow::Cow;
 
 /// A straight piece of outline, seen from its free side only.
 #[derive(Clone, Debug)]
@@ -42,9 +43,33 @@ const CELL_M: f64 = 0.4;
 /// Edges reach this far over their ends, so that no ray slips through a corner.
 const OVERHANG_M: f64 = 1e-9;
 
+/// Half the width of the strip of bed that a track brings into the section of another one.
+const STRIP_HALF_M: f64 = 1.35;
+/// The lowest strip lies so far over the bed, each further one by [`STRIP_STEP_M`] more: where they cross, one
+/// is seen.
+const STRIP_M: f64 = 0.015;
+const STRIP_STEP_M: f64 = 0.001;
+const STRIPS: usize = 16;
+
+/// What is seen of a cross-section, but for the rails: its outline. A track that lies in the section of another
+/// one brings a strip of bed with its sleepers.
+pub fn surface_of(section: &CrossSection, track: usize) -> Cow<'_, CrossSection> {
+    if !section.is_shared() {
+        return Cow::Borrowed(section);
+    }
+    let h_m = BED_M + STRIP_M + STRIP_STEP_M * (track % STRIPS) as f64;
+    let ends = [STRIP_HALF_M, -STRIP_HALF_M].map(|l_m| OutlinePoint::new(l_m, h_m));
+    Cow::Owned(CrossSection {
+        points: ends.into(),
+        materials: vec![Material::Bed; 2],
+        closed: false,
+    })
+}
+
 impl SectionCaster {
-    pub fn new(section: &CrossSection) -> Self {
-        let mut edges = edges_of(section);
+    /// Of a track by number.
+    pub fn new(section: &CrossSection, track: usize) -> Self {
+        let mut edges = edges_of(&surface_of(section, track));
         for side in [1.0, -1.0] {
             edges.extend(edges_of(&rail_outline(side * RAIL_OFFSET_M)));
         }

@@ -54,9 +54,14 @@ pub(super) enum Followed {
     Left {
         /// Along the ray, in lengths of its direction.
         t: f64,
+        /// Whether the cross-section that ends is open.
+        open: bool,
     },
     /// It meets nothing within its reach.
-    Nothing,
+    Nothing {
+        /// Whether it ends in an open cross-section.
+        open: bool,
+    },
 }
 
 /// Where a ray met the tunnel of a track.
@@ -84,8 +89,8 @@ pub const STATION_STEP_M: f64 = 1.0;
 const OVERLAP_M: f64 = 0.05;
 
 impl TrackCaster {
-    /// Sweeps the cross-sections of a tunnel along its line.
-    pub(super) fn new(track: &Track) -> Self {
+    /// Sweeps the cross-sections of a track with a number along its line.
+    pub(super) fn new(track: &Track, number: usize) -> Self {
         let stations: Vec<_> = station_chainages(track)
             .into_iter()
             .map(|s_m| {
@@ -124,7 +129,7 @@ impl TrackCaster {
             sections: track
                 .sections
                 .iter()
-                .map(|r| SectionCaster::new(&r.section))
+                .map(|r| SectionCaster::new(&r.section, number))
                 .collect(),
         }
     }
@@ -189,7 +194,7 @@ impl TrackCaster {
             || self.ahead_of(segment, &begin) < -1e-6
             || self.ahead_of(segment + 1, &begin) > 1e-6
         {
-            return Followed::Nothing;
+            return Followed::Nothing { open: false };
         }
         let (d2, overlap) = (d.xy(), OVERLAP_M / d.norm());
         let (mut k, mut entry) = (segment, from);
@@ -212,8 +217,9 @@ impl TrackCaster {
                     on: Surface::Edge(edge),
                 });
             }
+            let open = self.is_open(k);
             if leave >= reach {
-                return Followed::Nothing;
+                return Followed::Nothing { open };
             }
             let (next, border) = match exit_up < exit_down {
                 true => (k + 1, (k + 1, Direction::Up)),
@@ -227,17 +233,23 @@ impl TrackCaster {
                 });
             }
             let Some(beyond) = self.segments.get(next) else {
-                return Followed::Left { t: leave };
+                return Followed::Left { t: leave, open };
             };
             if beyond.section != self.segments[k].section
                 && let Some(i) = beyond.section
                 && !self.sections[i].contains(&(o_across + d_across * leave))
             {
-                return Followed::Left { t: leave };
+                return Followed::Left { t: leave, open };
             }
             (k, entry) = (next, leave);
         }
-        Followed::Nothing
+        Followed::Nothing { open: false }
+    }
+
+    /// Whether a segment lies in the open.
+    fn is_open(&self, segment: usize) -> bool {
+        self.own_section(segment)
+            .is_some_and(|(_, section)| !section.closed)
     }
 
     /// The end wall at a station that a ray meets which runs along the line.
@@ -276,8 +288,8 @@ impl TrackCaster {
         (!section.is_shared()).then_some((range, section))
     }
 
-    /// The first rail that a ray meets on stretches whose section is that of another track.
-    pub(super) fn first_rail(
+    /// The first rail or strip of bed that a ray meets on stretches whose section is that of another track.
+    pub(super) fn first_in_shared(
         &self,
         (o, d): (&Point3<f64>, &Vector3<f64>),
         reach: f64,

@@ -23,6 +23,8 @@ pub struct SurfacePoint {
     pub track: usize,
     /// Which of that track's section ranges.
     pub range: usize,
+    /// The one whose paint it bears.
+    pub painted_range: usize,
     /// How the place of its paint grows with the position, per metre.
     pub gradients: [Vector3<f64>; 2],
 }
@@ -75,6 +77,7 @@ impl TrackCaster {
             material: edge.material,
             track: 0,
             range,
+            painted_range: range,
             gradients: [
                 Vector3::new(segment.chord.x, segment.chord.y, 0.0)
                     * ((far_m - near_m) / (past + before)),
@@ -101,7 +104,8 @@ impl TrackCaster {
             painted_m: wall.paint.place_m(wall.s_m, l_m, h_m),
             material: Material::Lining,
             track: 0,
-            range: wall.paint.range,
+            range: wall.range,
+            painted_range: wall.paint.of_range,
             gradients: [plane.left(), Vector3::z() * wall.paint.rise],
         }
     }

@@ -1,7 +1,7 @@
 //! A ray in a network of tunnels: from one track's tunnel to another's where their cross-sections open into each
 //! other, and over the rails of tracks that share a cross-section.
 
-use super::end_wall::{EndWall, end_walls};
+use super::end_wall::{EndWall, end_walls, leads_into_dark};
 use super::track_caster::{Followed, TrackCaster, TrackHit};
 use super::track_surface::SurfacePoint;
 use crate::track::Track;
@@ -32,6 +32,26 @@ pub struct TunnelHit {
     hit: TrackHit,
 }
 
+/// What is seen along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sight {
+    /// A tunnel's surface.
+    Surface(TunnelHit),
+    /// No surface within reach, over a track in the open.
+    Open,
+    /// No surface within reach, in a tunnel.
+    Dark,
+}
+
+impl Sight {
+    fn beyond(open: bool) -> Self {
+        match open {
+            true => Self::Open,
+            false => Self::Dark,
+        }
+    }
+}
+
 /// Rails farther beside a ray's begin are not looked for.
 const RAILS_M: f64 = 250.0;
 /// A ray passes from track to track no more often.
@@ -42,7 +62,9 @@ const BEYOND_M: f64 = 1e-3;
 impl TunnelCaster {
     /// Sweeps the cross-sections of all tracks along their lines.
     pub fn new(tracks: &[Arc<Track>]) -> Self {
-        let mut tracks: Vec<_> = tracks.iter().map(|track| TrackCaster::new(track)).collect();
+        let mut tracks: Vec<_> = (tracks.iter().enumerate())
+            .map(|(number, track)| TrackCaster::new(track, number))
+            .collect();
         for (track, station, wall) in end_walls(&tracks) {
             tracks[track].end_walls.push((station, wall));
         }
@@ -52,6 +74,11 @@ impl TunnelCaster {
     /// The walls across the line where cross-sections of a track end.
     pub fn end_walls(&self, track: usize) -> impl Iterator<Item = &EndWall> {
         self.tracks[track].end_walls.iter().map(|(_, wall)| wall)
+    }
+
+    /// Whether the tunnel of a track ends without another beyond, at its begin and at its end.
+    pub fn leads_into_dark(&self, track: usize) -> [bool; 2] {
+        leads_into_dark(&self.tracks, track)
     }
 
     /// Whether the surface at a hit lies level and may mirror: bed, or top of a rail.
@@ -111,20 +138,38 @@ impl TunnelCaster {
         d: &Vector3<f64>,
         reach: f64,
     ) -> Option<TunnelHit> {
+        match self.look(ray_start, o, d, reach) {
+            Sight::Surface(hit) => Some(hit),
+            Sight::Open | Sight::Dark => None,
+        }
+    }
+
+    /// The same; without a surface, whether that is in the open.
+    pub fn look(
+        &self,
+        ray_start: RayStart,
+        o: &Point3<f64>,
+        d: &Vector3<f64>,
+        reach: f64,
+    ) -> Sight {
         let wall = self.first_wall(ray_start, (o, d), reach);
         if self.tracks.len() == 1 {
             return wall;
         }
-        let reach = wall.map_or(reach, |wall| wall.t);
+        let reach = match wall {
+            Sight::Surface(wall) => wall.t,
+            Sight::Open | Sight::Dark => reach,
+        };
         let others = self.tracks.iter().enumerate();
         let others = others.filter(|(_, track)| track.shares() && track.away_m(o) < RAILS_M);
         let rails = others.filter_map(|(track, caster)| {
-            let hit = caster.first_rail((o, d), reach)?;
+            let hit = caster.first_in_shared((o, d), reach)?;
             let t = hit.t;
             Some(TunnelHit { t, track, hit })
         });
         let rail = rails.min_by(|a, b| a.t.total_cmp(&b.t));
-        rail.filter(|rail| rail.t < reach).or(wall)
+        rail.filter(|rail| rail.t < reach)
+            .map_or(wall, Sight::Surface)
     }
 
     /// The first wall, bed or rail of a track's own section.
@@ -133,23 +178,26 @@ impl TunnelCaster {
         mut ray_start: RayStart,
         (o, d): (&Point3<f64>, &Vector3<f64>),
         reach: f64,
-    ) -> Option<TunnelHit> {
-        let mut from = 0.0;
+    ) -> Sight {
+        let (mut from, mut in_open) = (0.0, false);
         for _ in 0..MOST_TRACKS {
             let RayStart { track, segment } = ray_start;
             match self.tracks[track].follow(segment, (o, d), from, reach) {
                 Followed::Hit(hit) => {
                     let t = hit.t;
-                    return Some(TunnelHit { t, track, hit });
+                    return Sight::Surface(TunnelHit { t, track, hit });
                 }
-                Followed::Nothing => return None,
-                Followed::Left { t } => {
-                    from = t + BEYOND_M / d.norm();
-                    ray_start = self.open_at(&(o + d * from), track)?;
+                Followed::Nothing { open } => return Sight::beyond(open),
+                Followed::Left { t, open } => {
+                    (from, in_open) = (t + BEYOND_M / d.norm(), open);
+                    match self.open_at(&(o + d * from), track) {
+                        Some(next) => ray_start = next,
+                        None => break,
+                    }
                 }
             }
         }
-        None
+        Sight::beyond(in_open)
     }
 
     /// The surface where the ray o + t d hit.

@@ -108,9 +108,9 @@ impl LampField {
 
     /// Luminance of endless lit air about a chainage: the mean, over places a metre apart along
     /// the line to [`AIRLIGHT_REACH_M`] on both sides and 2 m above top of rail, of what it
-    /// scatters. Ambient light of E lux on every surface is a luminance of E / pi from all sides,
+    /// scatters. Ambient light of `ambient_lx`, E, on every surface is a luminance of E / pi from all sides,
     /// so 4 E pass any place.
-    pub fn airlight_cd_m2(&self, track: &Track, s_m: f64) -> f64 {
+    pub fn airlight_cd_m2(&self, track: &Track, s_m: f64, ambient_lx: f64) -> f64 {
         if self.air.is_clear() {
             return 0.0;
         }
@@ -125,7 +125,7 @@ impl LampField {
                 self.scalar_lx(&track.alignment.world_from_track(place))
             })
             .sum();
-        let mean_lx = lamps_lx / f64::from(2 * places + 1) + 4.0 * track.ambient_lx;
+        let mean_lx = lamps_lx / f64::from(2 * places + 1) + 4.0 * ambient_lx;
         self.air.scattered_share * mean_lx / (4.0 * PI)
     }
 }
@@ -185,14 +185,14 @@ mod tests {
         track.ambient_lx = 12.0 * PI;
         let mut air = Air::of_visibility(80.0);
         let dark = LampField::new(&[], air);
-        assert!((dark.airlight_cd_m2(&track, 100.0) - 12.0).abs() < 1e-9);
+        assert!((dark.airlight_cd_m2(&track, 100.0, track.ambient_lx) - 12.0).abs() < 1e-9);
         air.scattered_share = 0.7;
         let dust = LampField::new(&[], air);
-        assert!((dust.airlight_cd_m2(&track, 100.0) - 8.4).abs() < 1e-9);
+        assert!((dust.airlight_cd_m2(&track, 100.0, track.ambient_lx) - 8.4).abs() < 1e-9);
         // Lamps add to it, clear air has none.
         let lamps = sample::scene().lamps;
         let clear = LampField::new(&lamps, Air::default());
-        assert!(clear.airlight_cd_m2(&track, 100.0).abs() < 1e-300);
-        assert!(LampField::new(&lamps, air).airlight_cd_m2(&track, 100.0) > 8.5);
+        assert!(clear.airlight_cd_m2(&track, 100.0, track.ambient_lx).abs() < 1e-300);
+        assert!(LampField::new(&lamps, air).airlight_cd_m2(&track, 100.0, track.ambient_lx) > 8.5);
     }
 }

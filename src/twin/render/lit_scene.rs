@@ -1,14 +1,16 @@
 //! A scene as renderers draw it: painted, and with its lamps as they are at a time.
 
+use super::daylight::{Daylight, is_open};
 use super::lamp_field::LampField;
 use super::paint::Paintings;
 use super::scene::Scene;
 use crate::bus::SimTime;
-use crate::track::Track;
+use crate::track::{CrossSection, Track};
 use crate::twin::air::Air;
 use crate::twin::geometry::{EndWall, TunnelCaster};
 use crate::twin::lights::LampLight;
 use crate::twin::reflectance::Wet;
+use nalgebra::{Point3, Vector3};
 use std::sync::Arc;
 
 /// A scene with what is worked out of it once.
@@ -21,8 +23,12 @@ pub struct LitScene {
     pub wet: Wet,
     /// What the tunnel's surfaces look like.
     pub paintings: Paintings,
+    /// In the open, by day.
+    pub daylight: Option<Daylight>,
     /// Walls across the line, by track.
     pub end_walls: Vec<Vec<EndWall>>,
+    /// Whether a track's tunnel leads into the dark at its begin and at its end.
+    pub dark_ends: Vec<[bool; 2]>,
     /// The lamps as they are now.
     pub lamps: LampField,
     /// With all that becomes of them.
@@ -43,6 +49,10 @@ impl LitScene {
         let end_walls = (0..scene.tracks.len()).map(|k| tunnel.end_walls(k).cloned().collect());
         Self {
             end_walls: end_walls.collect(),
+            dark_ends: (0..scene.tracks.len())
+                .map(|k| tunnel.leads_into_dark(k))
+                .collect(),
+            daylight: Daylight::of(&scene.tracks),
             tracks: scene.tracks,
             air: scene.air,
             wet: scene.wet,
@@ -84,11 +94,40 @@ impl LitScene {
 
     /// Luminance of endless air about a chainage of a track.
     pub fn airlight_cd_m2(&self, track: usize, s_m: f64) -> f64 {
-        self.lamps.airlight_cd_m2(&self.tracks[track], s_m)
+        let track = &self.tracks[track];
+        let place = track.alignment.at(s_m).origin;
+        let ambient_lx = match self.daylight_at(&place) {
+            Some(daylight) => daylight.mean_lx(),
+            None => track.ambient_lx,
+        };
+        self.lamps.airlight_cd_m2(track, s_m, ambient_lx)
     }
 
-    /// Ambient light where it is not that of one track: that of the first.
-    pub fn ambient_lx(&self) -> f64 {
-        self.tracks[0].ambient_lx
+    /// Ambient light on what does not belong to a track, whichever way it faces: in the open that of the day,
+    /// else that of the first track.
+    pub fn ambient_lx(&self, p: &Point3<f64>) -> f64 {
+        let daylight = self.daylight_at(p);
+        daylight.map_or(self.tracks[0].ambient_lx, Daylight::mean_lx)
+    }
+
+    /// Ambient light on a surface of a cross-section of a track.
+    pub fn surface_ambient_lx(
+        &self,
+        (track, section): (usize, &CrossSection),
+        p: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> f64 {
+        let daylight = match section.is_shared() {
+            true => self.daylight_at(p),
+            false => self.daylight.as_ref().filter(|_| is_open(section)),
+        };
+        let ambient_lx = self.tracks[track].ambient_lx;
+        daylight.map_or(ambient_lx, |daylight| daylight.surface_lx(normal))
+    }
+
+    fn daylight_at(&self, p: &Point3<f64>) -> Option<&Daylight> {
+        self.daylight
+            .as_ref()
+            .filter(|daylight| daylight.reaches(p))
     }
 }

@@ -4,6 +4,7 @@
 mod cache;
 pub mod constants;
 pub mod cpu;
+mod daylight;
 pub mod develop;
 pub mod disc;
 pub mod gaussian;
@@ -19,6 +20,7 @@ mod lit_scene;
 pub mod paint;
 pub mod photometry;
 pub mod pixel_map;
+mod portal;
 mod rounding;
 #[cfg(test)]
 #[path = "../../../tests/common/sample.rs"]

@@ -78,7 +78,7 @@ fn track() -> Track {
 fn hit(followed: Followed) -> Option<TrackHit> {
     match followed {
         Followed::Hit(hit) => Some(hit),
-        Followed::Left { .. } | Followed::Nothing => None,
+        Followed::Left { .. } | Followed::Nothing { .. } => None,
     }
 }
 
@@ -145,7 +145,7 @@ fn rays(track: &Track, count: u64) -> impl Iterator<Item = Cast> {
 #[test]
 fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
     let track = track();
-    let (caster, mesh) = (TrackCaster::new(&track), mesh(&track));
+    let (caster, mesh) = (TrackCaster::new(&track, 0), mesh(&track));
     let (mut hits, mut odd) = (0, 0);
     for Cast { o, d, inside } in rays(&track, 10_000) {
         let segment = caster.segment_of(&o, None);
@@ -176,7 +176,7 @@ fn rays_meet_the_tunnel_where_they_meet_its_triangles() {
 #[test]
 fn hits_know_where_they_are_on_the_line() {
     let track = track();
-    let caster = TrackCaster::new(&track);
+    let caster = TrackCaster::new(&track, 0);
     for Cast { o, d, .. } in rays(&track, 1000) {
         let Some(hit) = hit(caster.follow(caster.segment_of(&o, None), (&o, &d), 0.0, 160.0))
         else {
@@ -205,7 +205,7 @@ fn between_cross_sections_it_is_dark() {
         section,
     };
     track.sections = vec![range(0.0, 20.3, wide), range(20.3, 40.0, section())];
-    let caster = TrackCaster::new(&track);
+    let caster = TrackCaster::new(&track, 0);
     let frame = track.alignment.at(10.0).world_from_line();
     let cast = |l_m: f64, up_m: f64, d: Vector3<f64>| {
         let o = frame * Point3::new(0.0, l_m, up_m);

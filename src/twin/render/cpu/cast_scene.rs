@@ -2,8 +2,9 @@
 
 use crate::bus::Intrinsics;
 use crate::track::Material;
-use crate::twin::geometry::{RayStart, SurfacePoint, TunnelCaster, TunnelHit};
+use crate::twin::geometry::{RayStart, Sight, SurfacePoint, TunnelCaster, TunnelHit};
 use crate::twin::render::constants::{LAMP_SIGHT_M, MIN_SINE, SIGHT_M};
+use crate::twin::render::daylight::Daylight;
 use crate::twin::render::gloss::MIRROR_REACH_M;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::photometry::BlinkingLamp;
@@ -28,6 +29,16 @@ pub(super) struct TunnelPixel {
     pub albedo: f64,
     /// By ambient light and lamps.
     pub luminance: f64,
+}
+
+impl TunnelPixel {
+    /// Of sky, or of ground far away.
+    fn beyond(daylight: Option<&Daylight>, ray: &Vector3<f64>) -> Self {
+        Self {
+            luminance: daylight.map_or(0.0, |daylight| daylight.beyond_cd_m2(ray)),
+            ..Self::default()
+        }
+    }
 }
 
 /// The ray through the centre of a pixel, scaled to z = 1 in the camera's frame, and by how much it
@@ -126,13 +137,16 @@ impl CastScene {
         pixel: &RayDifferential,
     ) -> TunnelPixel {
         let ray = &pixel.ray;
-        let Some(hit) = self.tunnel.cast(ray_start, eye, ray, SIGHT_M / ray.norm()) else {
-            return TunnelPixel::default();
+        let hit = match self.tunnel.look(ray_start, eye, ray, SIGHT_M / ray.norm()) {
+            Sight::Surface(hit) => hit,
+            Sight::Open => return TunnelPixel::beyond(self.lit.daylight.as_ref(), ray),
+            Sight::Dark => return TunnelPixel::default(),
         };
         let at = self.tunnel.surface_at(eye, ray, &hit);
         let albedo = self.albedo(&at, ray, hit.t, pixel.aside)
             * self.lit.wet.albedo_factor(at.material, at.track, at.s_m);
-        let lux = self.lit.tracks[at.track].ambient_lx
+        let section = &self.lit.tracks[at.track].sections[at.range].section;
+        let lux = (self.lit).surface_ambient_lx((at.track, section), &at.position, &at.normal)
             + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
         TunnelPixel {
             hit: Some(hit),
@@ -151,7 +165,7 @@ impl CastScene {
         aside: [Vector3<f64>; 2],
     ) -> f64 {
         let paintings = &self.lit.paintings;
-        let painting = &paintings.all[paintings.of_range[at.track][at.range]];
+        let painting = &paintings.all[paintings.of_range[at.track][at.painted_range]];
         let begin_m = match at.material {
             Material::Rail => painting.rail_q_m(),
             _ => 0.0,

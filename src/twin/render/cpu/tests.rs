@@ -56,6 +56,7 @@ fn hall() -> Track {
         base_stations: Vec::new(),
         stations: Vec::new(),
         ambient_lx: AMBIENT_LX,
+        daylight_lx: 0.0,
     }
 }
 

@@ -24,7 +24,8 @@ impl BodyMeshes {
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
             let fineness = Fineness::of(body, &job.views);
-            mesh.add_body(body, &scene.lamps, scene.ambient_lx(), fineness);
+            let place = body.world_from_body.translation.vector.into();
+            mesh.add_body(body, &scene.lamps, scene.ambient_lx(&place), fineness);
             ranges.push(first..mesh.indices.len() as u32);
         }
         Self {

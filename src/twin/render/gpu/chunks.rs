@@ -4,11 +4,13 @@ use super::adapter::Gpu;
 use super::bend::Bend;
 use super::detail::{CHUNK_M, ChunkKey, Detail};
 use super::layout::Vertex;
+use super::sky;
 use super::track_search::TrackSearch;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
-use crate::track::{Track, TrackPoint};
+use crate::track::{SectionRange, TrackPoint};
 use crate::twin::render::constants::SIGHT_M;
+use crate::twin::render::daylight::is_open;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -47,6 +49,8 @@ pub struct Chunk {
     pub along: Vector3<f64>,
     /// Whether there are edges across the line in it: where one cross-section ends, or wet ground.
     pub crossed: bool,
+    /// Whether any of it lies in the open.
+    pub open: bool,
 }
 
 /// A place of a chunk's surface, in the world.
@@ -66,6 +70,8 @@ pub struct InSight {
     pub s_m: f64,
     /// Near ones first.
     pub chunks: Vec<Arc<Chunk>>,
+    /// Behind them, where any lies in the open by day.
+    pub sky: Option<Arc<Chunk>>,
 }
 
 /// One corner in so many is a probe.
@@ -79,6 +85,7 @@ const GLOSSY_EVERY: usize = 4;
 pub struct Chunks {
     /// Each with the latest job in which a camera was near it.
     made: BTreeMap<ChunkKey, (Arc<Chunk>, u64)>,
+    sky: Option<Arc<Chunk>>,
     /// By track.
     searches: Vec<TrackSearch>,
     job: u64,
@@ -110,8 +117,8 @@ impl Chunks {
             if away_m < nearest.0 {
                 nearest = (away_m, number, place.s_m);
             }
-            for key in keys_in_sight(number, track, &place, framed) {
-                let make = || (Arc::new(upload(gpu, scene, key)), self.job);
+            for key in keys_in_sight(scene, number, &place, framed) {
+                let make = || (Arc::new(Chunk::of_track(gpu, scene, key)), self.job);
                 let (chunk, near_in) = self.made.entry(key).or_insert_with(make);
                 // Kept whether it is in the picture or beside it: the next view may turn there.
                 *near_in = self.job;
@@ -123,22 +130,32 @@ impl Chunks {
         }
         chunks.sort_by(|a, b| f64::total_cmp(&a.0, &b.0));
         let (_, track, s_m) = nearest;
+        let chunks: Vec<Arc<Chunk>> = chunks.into_iter().map(|(_, chunk)| chunk).collect();
         InSight {
             track,
             s_m,
-            chunks: chunks.into_iter().map(|(_, chunk)| chunk).collect(),
+            sky: self.sky(gpu, scene, &chunks),
+            chunks,
         }
+    }
+
+    /// The sky, if any of some chunks lies in the open by day.
+    fn sky(&mut self, gpu: &Gpu, scene: &LitScene, chunks: &[Arc<Chunk>]) -> Option<Arc<Chunk>> {
+        let daylight = scene.daylight.as_ref()?;
+        chunks.iter().find(|chunk| chunk.open)?;
+        let make = || Arc::new(Chunk::new(gpu, sky::KEY, sky::sky_mesh(daylight)));
+        Some(Arc::clone(self.sky.get_or_insert_with(make)))
     }
 }
 
 /// The chunks of a track that may be in sight of a camera at a place.
 fn keys_in_sight(
+    scene: &LitScene,
     track_number: usize,
-    track: &Track,
     place: &TrackPoint,
     framed: &Framed<'_>,
 ) -> impl Iterator<Item = ChunkKey> {
-    let s_m = place.s_m;
+    let (track, s_m) = (&scene.tracks[track_number], place.s_m);
     let frame = track.alignment.at(s_m);
     let ahead = framed.middle.rotation * Vector3::z();
     let (sin, cos) = frame.heading_rad.sin_cos();
@@ -151,6 +168,8 @@ fn keys_in_sight(
     let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
     let end = (track.alignment.length_m() / CHUNK_M).ceil() as i64;
     let (first, last) = (first.max(0), last.min(end - 1));
+    let by_day = scene.daylight.is_some();
+    let [begin_dark, end_dark] = scene.dark_ends[track_number];
     let moves = !framed.rests();
     let bend = Bend::of(&framed.view.camera.intrinsics, place);
     (first..=last).map(move |index| {
@@ -161,43 +180,64 @@ fn keys_in_sight(
             index,
             detail: Detail::at(away_m, moves || bend.is_some()),
             bend,
+            dark: [
+                by_day && index == first && (first > 0 || begin_dark),
+                by_day && index == last && (last < end - 1 || end_dark),
+            ],
         }
     })
 }
 
-fn upload(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Chunk {
-    let ChunkMesh {
-        origin,
-        mesh,
-        lamp,
-        parts,
-    } = chunk_mesh(scene, key);
-    let heading_rad = (scene.tracks[key.track].alignment.at(key.start_m())).heading_rad;
-    let (sin, cos) = heading_rad.sin_cos();
-    let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
-    Chunk {
-        key,
-        origin,
-        radius_m: mesh.radius_m(),
-        vertices: gpu.upload(wgpu::BufferUsages::VERTEX, &mesh.vertices, 1),
-        indices: gpu.upload(wgpu::BufferUsages::INDEX, &mesh.indices, 1),
-        lamp,
-        parts,
-        probes: (mesh.vertices.iter().step_by(PROBE_EVERY))
-            .map(|v| Probe {
-                at: place(v),
-                normal: Vector3::from(v.normal).cast(),
-                // As of white.
-                reflected_per_lx: v.paint / PI,
-            })
-            .collect(),
-        glossy: (mesh.vertices.iter())
-            .filter(|v| v.gloss[0] > 0.0)
-            .step_by(GLOSSY_EVERY)
-            .map(place)
-            .collect(),
-        along: Vector3::new(cos, sin, 0.0),
-        crossed: is_crossed(scene, key.track, key.start_m()),
+impl Chunk {
+    /// Of a mesh, which may be anywhere.
+    fn new(gpu: &Gpu, key: ChunkKey, made: ChunkMesh) -> Self {
+        let ChunkMesh {
+            origin,
+            mesh,
+            lamp,
+            parts,
+        } = made;
+        let place = |v: &Vertex| origin + Vector3::from(v.position_m).cast();
+        Self {
+            key,
+            origin,
+            radius_m: mesh.radius_m(),
+            vertices: gpu.upload(wgpu::BufferUsages::VERTEX, &mesh.vertices, 1),
+            indices: gpu.upload(wgpu::BufferUsages::INDEX, &mesh.indices, 1),
+            lamp,
+            parts,
+            probes: (mesh.vertices.iter().step_by(PROBE_EVERY))
+                .map(|v| Probe {
+                    at: place(v),
+                    normal: Vector3::from(v.normal).cast(),
+                    // As of white.
+                    reflected_per_lx: v.paint / PI,
+                })
+                .collect(),
+            glossy: (mesh.vertices.iter())
+                .filter(|v| v.gloss[0] > 0.0)
+                .step_by(GLOSSY_EVERY)
+                .map(place)
+                .collect(),
+            along: Vector3::zeros(),
+            crossed: false,
+            open: false,
+        }
+    }
+
+    /// A part of a track.
+    fn of_track(gpu: &Gpu, scene: &LitScene, key: ChunkKey) -> Self {
+        let track = &scene.tracks[key.track];
+        let (sin, cos) = track.alignment.at(key.start_m()).heading_rad.sin_cos();
+        let to_m = key.start_m() + CHUNK_M;
+        let within = |range: &&SectionRange| range.from_m < to_m && range.to_m > key.start_m();
+        let mut sections = track.sections.iter().filter(within);
+        Self {
+            along: Vector3::new(cos, sin, 0.0),
+            crossed: is_crossed(scene, key.track, key.start_m()),
+            open: sections.any(|range| is_open(&range.section)),
+            ..Self::new(gpu, key, chunk_mesh(scene, key))
+        }
     }
 }
 

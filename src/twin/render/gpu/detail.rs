@@ -81,6 +81,8 @@ pub struct ChunkKey {
     pub detail: Detail,
     /// Finer still before a lens that bends lines.
     pub bend: Option<Bend>,
+    /// Whether what is beyond its begin and its end is dark: it is out of sight, or not on the map.
+    pub dark: [bool; 2],
 }
 
 impl ChunkKey {

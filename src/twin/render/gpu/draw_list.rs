@@ -1,7 +1,7 @@
 //! What a view draws: which triangles, at which instants of the exposure, under which lamps' blinking.
 
 use super::bodies::BodyMeshes;
-use super::chunks::Chunk;
+use super::chunks::{Chunk, InSight};
 use super::layout::{Mirrored, Placement};
 use super::rectangle::Rectangle;
 use super::smear::Smear;
@@ -123,16 +123,19 @@ impl DrawList {
         framed: &Framed<'_>,
         job: &Job,
         scene: &LitScene,
-        (chunks, bodies): (&[Arc<Chunk>], &BodyMeshes),
+        (in_sight, bodies): (&InSight, &BodyMeshes),
     ) -> Self {
         let rows = framed.view.camera.intrinsics.height_px;
         let mut list = Self {
             shares: vec![1.0; rows as usize],
             ..Self::default()
         };
-        let reference = framed.reference();
+        let (reference, chunks) = (framed.reference(), &in_sight.chunks);
         for chunk in chunks {
             list.add_chunk(framed, job, scene, chunk);
+        }
+        if let Some(sky) = &in_sight.sky {
+            list.add_sky(framed, sky);
         }
         for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
             list.calls.push(DrawCall {
@@ -201,6 +204,24 @@ impl DrawList {
                 along: single(&chunk.along),
                 ..Placement::default()
             });
+        }
+    }
+
+    /// Adds what is the same from everywhere.
+    fn add_sky(&mut self, framed: &Framed<'_>, sky: &Arc<Chunk>) {
+        for (number, part) in sky.parts.iter().enumerate() {
+            let grey = f64::from(part.peak_cd_m2) * framed.view.grey_per_cd_m2();
+            self.lit |= grey > MOVES_GREY;
+            self.calls.push(DrawCall {
+                chunk: Some(Arc::clone(sky)),
+                part: number,
+                texture: textures::BLANK,
+                mesh: self.placements.len() as u32,
+                headlit: false,
+                indices: part.indices.clone(),
+                glossy: 0..0,
+            });
+            self.placements.push(Placement::default());
         }
     }
 

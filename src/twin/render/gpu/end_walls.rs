@@ -1,12 +1,16 @@
 //! Walls across the line as meshes: each a part of the chunk on its side.
 
 use super::detail::{CHUNK_M, halve};
+use super::layout::Vertex;
 use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
 use super::tunnel::{ChunkSide, Site};
 use crate::track::{Direction, Material, TrackPoint};
-use crate::twin::geometry::{EndWall, Trapezoid};
+use crate::twin::geometry::{EndWall, Trapezoid, free_space, without};
 use crate::twin::render::paint::Painting;
+
+/// A chunk's own cross-section is looked up so far from its ends.
+const INSIDE_M: f64 = 1e-3;
 
 impl Site<'_> {
     /// Adds the end walls that are seen from within the chunk.
@@ -19,11 +23,43 @@ impl Site<'_> {
         };
         for wall in self.scene.end_walls[key.track].iter().filter(within) {
             let (first, mut patches) = (mesh.indices.len(), Vec::new());
-            let painting = self.scene.paintings.of_range(key.track, wall.paint.range);
+            let painting = self
+                .scene
+                .paintings
+                .of_range(key.track, wall.paint.of_range);
             for piece in &wall.pieces {
                 self.add_piece(mesh, &mut patches, (wall, piece), painting.unwrap_or(0));
             }
             parts.extend(self.side_of(mesh, first, painting.unwrap_or(0), patches));
+        }
+    }
+
+    /// Adds dark walls across a tunnel where what is beyond the chunk is dark, so that no sky is seen there.
+    pub(super) fn add_darkness(&self, mesh: &mut Mesh, parts: &mut Vec<ChunkSide>) {
+        let key = self.cutting.key;
+        let length_m = self.track.alignment.length_m();
+        let ends_m = [key.start_m(), (key.start_m() + CHUNK_M).min(length_m)];
+        let dark = ends_m.into_iter().zip(key.dark).filter(|(_, dark)| *dark);
+        for (s_m, _) in dark {
+            let within_m = s_m.clamp(key.start_m() + INSIDE_M, ends_m[1] - INSIDE_M);
+            let Some(section) = self.track.section_at(within_m).filter(|s| s.closed) else {
+                continue;
+            };
+            let (frame, first) = (self.track.alignment.at(s_m), mesh.indices.len());
+            for piece in without(&free_space(section, 0.0), &[]) {
+                let corner = mesh.vertices.len() as u32;
+                for (row, h_m) in piece.h_m.into_iter().enumerate() {
+                    for l_m in [piece.right_m[row], piece.left_m[row]] {
+                        let p = frame.world_from_section(l_m, h_m) - self.origin;
+                        mesh.vertices.push(Vertex {
+                            position_m: p.map(|x| x as f32).into(),
+                            ..Vertex::default()
+                        });
+                    }
+                }
+                mesh.add_quads(corner, 2, 2);
+            }
+            parts.extend(self.side_of(mesh, first, 0, Vec::new()));
         }
     }
 
@@ -36,6 +72,7 @@ impl Site<'_> {
     ) {
         let frame = self.track.alignment.at(wall.s_m);
         let normal = frame.ahead().xy().push(0.0).normalize() * -wall.seen_looking.sign();
+        let section = &self.track.sections[wall.range].section;
         let [low_m, high_m] = piece.h_m;
         let [right_m, left_m] = [
             piece.right_m[0].min(piece.right_m[1]),
@@ -54,7 +91,7 @@ impl Site<'_> {
                 );
                 let p = frame.world_from_section(l_m, h_m);
                 let place = wall.paint.place_m(wall.s_m, l_m, h_m);
-                let vertex = self.lit_vertex(p, normal, Material::Lining, place);
+                let vertex = self.lit_vertex((p, normal), Material::Lining, place, section);
                 mesh.vertices.push(vertex);
             }
         }

@@ -5,6 +5,7 @@ use crate::track::{
     CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint,
     rail_outline,
 };
+use crate::twin::geometry::surface_of;
 use nalgebra::Vector2;
 
 /// A strip along the line between two corners of an outline.
@@ -50,7 +51,8 @@ impl FacetSide {
 /// Of a cross-section and its rails, whose paint begins at `rail_q_m`, as fine as they must be near lamps.
 pub fn facets_of(range: &SectionRange, rail_q_m: f64, cutting: Cutting<'_>) -> Vec<Facet> {
     let mut facets = Vec::new();
-    add_outline(&mut facets, &range.section, 0.0, cutting);
+    let surface = surface_of(&range.section, cutting.key.track);
+    add_outline(&mut facets, &surface, 0.0, cutting);
     for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
         add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, cutting);
     }

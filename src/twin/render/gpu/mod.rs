@@ -87,6 +87,7 @@ mod region;
 mod shaders;
 mod shadows;
 mod signal_back;
+mod sky;
 mod smear;
 mod spread;
 mod surface;

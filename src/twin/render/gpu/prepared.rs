@@ -80,7 +80,7 @@ impl PreparedView {
         extent: Extent,
     ) -> Self {
         let chunks = &in_sight.chunks;
-        let list = DrawList::new(framed, job, scene, (chunks, bodies));
+        let list = DrawList::new(framed, job, scene, (in_sight, bodies));
         let airlight_cd_m2 = scene.airlight_cd_m2(in_sight.track, in_sight.s_m);
         let air_e = airlight_cd_m2 * framed.view.electrons_per_cd_m2();
         // In the picture, half the area of what lies beyond [`SIGHT_M`] is nearer than this.

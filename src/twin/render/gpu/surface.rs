@@ -2,7 +2,7 @@
 
 use super::region::Region;
 use crate::track::{CrossSection, RAIL_OFFSET_M, Track, TrackFrame};
-use crate::twin::geometry::Body;
+use crate::twin::geometry::{Body, surface_of};
 use nalgebra::{Point3, Vector3};
 
 /// Cells of a tunnel's surface are no longer and wider than this.
@@ -81,7 +81,7 @@ impl SurfaceCell {
     }
 
     /// All of a stretch of the tunnel, rails too.
-    pub fn of(track: &Track, from_m: f64, length_m: f64) -> Vec<Self> {
+    pub fn of((number, track): (usize, &Track), from_m: f64, length_m: f64) -> Vec<Self> {
         let mut cells = Vec::new();
         let steps = (length_m / CELL_M).ceil().max(1.0);
         let half_m = 0.5 * length_m / steps;
@@ -91,7 +91,7 @@ impl SurfaceCell {
                 continue;
             };
             let frame = track.alignment.at(s_m);
-            Self::of_walls(section, &frame, half_m, &mut cells);
+            Self::of_walls(&surface_of(section, number), &frame, half_m, &mut cells);
             for l_m in [-RAIL_OFFSET_M, RAIL_OFFSET_M] {
                 let [foot, head] = [-0.2, 0.1].map(|h_m| frame.world_from_section(l_m, h_m));
                 let half = [frame.ahead() * half_m, 0.5 * (head - foot)];

@@ -5,7 +5,7 @@ use super::facets::{Facet, FacetSide, facets_of};
 use super::layout::Vertex;
 use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
-use crate::track::{Material, OutlinePoint, Track, TrackPoint};
+use crate::track::{CrossSection, Material, OutlinePoint, Track, TrackPoint};
 use crate::twin::geometry::STATION_STEP_M;
 use crate::twin::reflectance::mean_albedo;
 use crate::twin::render::gloss::Gloss;
@@ -94,7 +94,7 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
             let mut patches = Vec::new();
             for facet in facets.iter().filter(|f| FacetSide::of(f, range) == side) {
                 let vertices = mesh.vertices.len();
-                site.add_strip(&mut mesh, facet, &stations);
+                site.add_strip(&mut mesh, (facet, &range.section), &stations);
                 let brightest = painting.map_or(1.0, |p| p.most_albedo(facet.q_m)) as f32;
                 let vertices = &mesh.vertices[vertices..];
                 site.add_patches(&mut patches, (facet, brightest), &stations, vertices);
@@ -103,6 +103,7 @@ pub fn chunk_mesh(scene: &LitScene, key: ChunkKey) -> ChunkMesh {
         }
     }
     site.add_end_walls(&mut mesh, &mut parts);
+    site.add_darkness(&mut mesh, &mut parts);
     ChunkMesh {
         origin: site.origin,
         mesh,
@@ -171,14 +172,20 @@ impl Site<'_> {
         })
     }
 
-    fn add_strip(&self, mesh: &mut Mesh, facet: &Facet, stations: &[f64]) {
+    fn add_strip(
+        &self,
+        mesh: &mut Mesh,
+        (facet, section): (&Facet, &CrossSection),
+        stations: &[f64],
+    ) {
         let first = mesh.vertices.len() as u32;
         let sides = facet
             .ends
             .map(|end| finer_stations(stations, end, self.cutting));
         for ((end, q_m), side) in facet.ends.iter().zip(facet.q_m).zip(&sides) {
             for &s_m in side {
-                mesh.vertices.push(self.vertex(facet, *end, q_m, s_m));
+                mesh.vertices
+                    .push(self.vertex((facet, section), *end, q_m, s_m));
             }
         }
         mesh.add_ribbon(first, [&sides[0], &sides[1]]);
@@ -238,24 +245,32 @@ impl Site<'_> {
         }
     }
 
-    fn vertex(&self, facet: &Facet, end: OutlinePoint, q_m: f64, s_m: f64) -> Vertex {
+    fn vertex(
+        &self,
+        (facet, section): (&Facet, &CrossSection),
+        end: OutlinePoint,
+        q_m: f64,
+        s_m: f64,
+    ) -> Vertex {
         let normal = facet_normal(self.track, facet, s_m);
         let p = ruled(self.track, s_m, end, self.cutting.key.detail);
-        self.lit_vertex(p, normal, facet.material, [s_m, q_m])
+        self.lit_vertex((p, normal), facet.material, [s_m, q_m], section)
     }
 
     /// A corner of a surface, painted as the painting is at a place.
     pub(super) fn lit_vertex(
         &self,
-        p: Point3<f64>,
-        normal: Vector3<f64>,
+        (p, normal): (Point3<f64>, Vector3<f64>),
         material: Material,
         [s_m, q_m]: [f64; 2],
+        section: &CrossSection,
     ) -> Vertex {
         let blinking = self
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
-        let all = self.scene.lamps.irradiance_lx(&p, &normal) + self.track.ambient_lx;
+        let place = (self.cutting.key.track, section);
+        let ambient_lx = self.scene.surface_ambient_lx(place, &p, &normal);
+        let all = self.scene.lamps.irradiance_lx(&p, &normal) + ambient_lx;
         // What begins or ends with the chunk does so for all of it.
         let start_m = self.cutting.key.start_m();
         let inside_m = s_m - start_m;
@@ -319,6 +334,7 @@ mod tests {
             index,
             detail,
             bend: None,
+            dark: [false; 2],
         };
         chunk_mesh(scene, key)
     }

@@ -287,6 +287,7 @@ mod tests {
                 index,
                 detail: Detail::Close,
                 bend: None,
+                dark: [false; 2],
             };
             chunk_mesh(&scene, key)
         });

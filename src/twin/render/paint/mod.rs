@@ -55,6 +55,7 @@ mod lining;
 mod unroll;
 
 use crate::track::{CrossSection, Material, Track, rail_outline};
+use crate::twin::geometry::surface_of;
 use brush::{Chance, Strip, ValueNoise, chance};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -135,7 +136,7 @@ impl Paintings {
 impl Painting {
     /// Paints a cross-section.
     pub fn of(section: &CrossSection) -> Self {
-        let outline = Unrolled::of(section);
+        let outline = Unrolled::of(&surface_of(section, 0));
         let rail = Unrolled::of(&rail_outline(0.0));
         let rows = |u: &Unrolled| (u.length_m * f64::from(TEXELS_PER_M)).ceil() as usize;
         let rail_row = rows(&outline) + GAP_ROWS;

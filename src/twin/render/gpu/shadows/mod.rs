@@ -59,8 +59,11 @@ impl Marker<'_> {
             let around = Region::around(chunk.origin, chunk.radius_m);
             let casts = self.candidates.falling_on(&all, &around);
             if !casts.is_empty() {
-                for cell in SurfaceCell::of(&tracks[chunk.key.track], chunk.key.start_m(), CHUNK_M)
-                {
+                for cell in SurfaceCell::of(
+                    (chunk.key.track, &tracks[chunk.key.track]),
+                    chunk.key.start_m(),
+                    CHUNK_M,
+                ) {
                     self.mark_cell(&cell, &casts);
                 }
             }
@@ -141,7 +144,7 @@ impl ViewShadows {
         };
         marker.mark_tunnel(&scene.tracks, in_sight);
         marker.mark_bodies();
-        shadows.list(&marker, job, scene.ambient_lx());
+        shadows.list(&marker, job, scene.ambient_lx(&framed.reference()));
         shadows.place(framed, &candidates);
         shadows
     }

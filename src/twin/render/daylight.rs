@@ -1,0 +1,177 @@
+//! Light of the sky where tracks lie in the open.
+//!
+//! Sky and ground are even: under a sky of luminance L level ground has E = pi L. A surface whose upward part
+//! of the normal is n sees (1 + n) / 2 of the sky, and of the ground, which reflects a share r of E, the rest:
+//!
+//! E(n) = E ((1 + n) + r (1 - n)) / 2
+//!
+//! This is the overcast day of the CIE without its gradient towards the zenith. Walls beside the track hide
+//! nothing of the sky, and no daylight goes into a tunnel.
+
+use crate::track::{CrossSection, Material, Track};
+use crate::twin::reflectance::mean_albedo;
+use nalgebra::{Point3, Vector3};
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+/// From point to point of a stretch in the open.
+const STEP_M: f64 = 5.0;
+/// What is farther from all of a stretch is not in the open there.
+const ASIDE_M: f64 = 100.0;
+/// The same in height.
+const ABOVE_M: f64 = 10.0;
+
+/// Daylight on a network of tracks.
+#[derive(Clone, Debug, Default)]
+pub struct Daylight {
+    /// On level ground.
+    level_lx: f64,
+    /// Centrelines of stretches in the open.
+    open: Vec<Vec<Point3<f64>>>,
+}
+
+impl Daylight {
+    /// Of tracks; none at night, or where all of them lie in tunnels.
+    pub fn of(tracks: &[Arc<Track>]) -> Option<Self> {
+        let level_lx = tracks.iter().map(|t| t.daylight_lx).fold(0.0, f64::max);
+        let open: Vec<_> = tracks
+            .iter()
+            .flat_map(|track| open_stretches(track))
+            .collect();
+        (level_lx > 0.0 && !open.is_empty()).then_some(Self { level_lx, open })
+    }
+
+    /// Luminance of the sky.
+    pub fn sky_cd_m2(&self) -> f64 {
+        self.level_lx / PI
+    }
+
+    /// Luminance of the ground far away.
+    pub fn ground_cd_m2(&self) -> f64 {
+        mean_albedo(Material::Bed) * self.level_lx / PI
+    }
+
+    /// Luminance of what is seen in a direction where no surface is.
+    pub fn beyond_cd_m2(&self, direction: &Vector3<f64>) -> f64 {
+        match direction.z > 0.0 {
+            true => self.sky_cd_m2(),
+            false => self.ground_cd_m2(),
+        }
+    }
+
+    /// On a surface in the open with a normal.
+    pub fn surface_lx(&self, normal: &Vector3<f64>) -> f64 {
+        let ground = mean_albedo(Material::Bed);
+        0.5 * self.level_lx * ((1.0 + normal.z) + ground * (1.0 - normal.z))
+    }
+
+    /// On surfaces in the open, in the mean over all directions that they may face.
+    pub fn mean_lx(&self) -> f64 {
+        0.5 * self.level_lx * (1.0 + mean_albedo(Material::Bed))
+    }
+
+    /// Whether a place is in the open.
+    pub fn reaches(&self, p: &Point3<f64>) -> bool {
+        self.open.iter().any(|line| is_beside(line, p))
+    }
+}
+
+/// Whether a cross-section is open to the sky.
+pub fn is_open(section: &CrossSection) -> bool {
+    !section.closed && !section.is_shared()
+}
+
+/// Points along the centreline of each open section.
+fn open_stretches(track: &Track) -> impl Iterator<Item = Vec<Point3<f64>>> + '_ {
+    let open = track
+        .sections
+        .iter()
+        .filter(|range| is_open(&range.section));
+    open.map(|range| {
+        let length_m = range.to_m - range.from_m;
+        let steps = (length_m / STEP_M).ceil().max(1.0);
+        let at = |k: u32| range.from_m + length_m * f64::from(k) / steps;
+        (0..=steps as u32)
+            .map(|k| track.alignment.at(at(k)).origin)
+            .collect()
+    })
+}
+
+/// Whether a place is beside a line, neither before its begin nor beyond its end.
+fn is_beside(line: &[Point3<f64>], p: &Point3<f64>) -> bool {
+    let near = |pair: &[Point3<f64>]| {
+        let (along, to) = ((pair[1] - pair[0]).xy(), (p - pair[0]).xy());
+        let share = along.dot(&to) / along.norm_squared();
+        let aside = to - along * share;
+        (0.0..=1.0).contains(&share) && aside.norm() < ASIDE_M && (p.z - pair[0].z).abs() < ABOVE_M
+    };
+    line.windows(2).any(near)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Alignment, PlanElement, SectionRange};
+
+    fn daylight() -> Option<Daylight> {
+        let plan = [PlanElement::straight(200.0)];
+        let mut track = Track::bare("yard", Alignment::new(Point3::origin(), 0.0, &plan, &[]));
+        let range = |from_m, to_m, section| SectionRange {
+            from_m,
+            to_m,
+            section,
+        };
+        track.sections = vec![
+            range(
+                0.0,
+                80.0,
+                CrossSection::rectangular(2.9, 2.9, 4.6, None, None),
+            ),
+            range(80.0, 200.0, CrossSection::open(20.0)),
+        ];
+        track.daylight_lx = 5000.0;
+        Daylight::of(&[Arc::new(track)])
+    }
+
+    /// Against the integral over the hemisphere that a surface faces, by sums over small parts of it.
+    #[test]
+    fn light_on_a_surface_is_that_of_sky_and_ground() {
+        let daylight = daylight().unwrap_or_default();
+        for tilt in [0.0_f64, 0.4, 1.1, 1.5707963, 2.3, 3.1415926] {
+            let normal = Vector3::new(tilt.sin(), 0.0, tilt.cos());
+            let (steps, mut sum) = (400, 0.0);
+            for i in 0..steps {
+                let z: f64 = -1.0 + (2.0 * f64::from(i) + 1.0) / f64::from(steps);
+                for j in 0..steps {
+                    let turn = 2.0 * PI * (f64::from(j) + 0.5) / f64::from(steps);
+                    let level = (1.0 - z * z).sqrt();
+                    let way = Vector3::new(level * turn.cos(), level * turn.sin(), z);
+                    sum += daylight.beyond_cd_m2(&way) * way.dot(&normal).max(0.0);
+                }
+            }
+            let expected = sum * 4.0 * PI / f64::from(steps * steps);
+            let lux = daylight.surface_lx(&normal);
+            assert!(
+                (lux / expected - 1.0).abs() < 1e-3,
+                "{tilt}: {lux} {expected}"
+            );
+        }
+        assert!((daylight.surface_lx(&Vector3::z()) - 5000.0).abs() < 1e-9);
+    }
+
+    /// Fails where daylight goes into a tunnel, or ends before the open does.
+    #[test]
+    fn daylight_is_in_the_open_only() {
+        let daylight = daylight().unwrap_or_default();
+        for (x, y, z, open) in [
+            (79.0, 0.0, 1.0, false),
+            (81.0, 0.0, 1.0, true),
+            (199.0, 19.0, 3.0, true),
+            (201.0, 0.0, 1.0, false),
+            (150.0, 150.0, 1.0, false),
+            (150.0, 0.0, -15.0, false),
+        ] {
+            assert_eq!(daylight.reaches(&Point3::new(x, y, z)), open, "{x} {y} {z}");
+        }
+    }
+}
