@@ -52,6 +52,7 @@ pub use summary::{
 };
 
 use crate::scenario::Scenario;
+use crate::twin::blades;
 use crate::twin::lamps;
 use crate::twin::physics::PhysicsError;
 use crate::twin::physics::RailState;
@@ -186,7 +187,7 @@ pub fn scene(scenario: &Scenario) -> Scene {
         wet: zone.rail == RailState::Wet,
     });
     Scene {
-        tracks: network.tracks.clone(),
+        tracks: blades::tracks_without_blades(network),
         lamps: lamps::shining(
             &scenario.tunnel,
             &scenario.file.faults.lamps,

@@ -2,8 +2,8 @@
 //! stands in it stays where it is in the world.
 
 use super::{
-    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, StoppingPlace, Track,
-    WaysideSite,
+    Balise, BaseStation, CrossSection, LampSite, OutlinePoint, SectionRange, Side, StoppingPlace,
+    Track, WaysideSite,
 };
 
 impl Track {
@@ -46,6 +46,7 @@ impl Track {
             sections: backwards(&self.sections, |range| SectionRange {
                 from_m: from_end(range.to_m),
                 to_m: from_end(range.from_m),
+                missing_rail: range.missing_rail.map(Side::opposite),
                 section: range.section.mirrored(),
             }),
             lamps: backwards(&self.lamps, |lamp| LampSite {

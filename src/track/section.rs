@@ -1,5 +1,6 @@
 //! Cross-sections: the outline of a tunnel as seen along the line.
 
+use super::gauge::RAIL_OFFSET_M;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -29,6 +30,15 @@ pub enum Side {
 }
 
 impl Side {
+    /// The other one.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Left => Self::Right,
+            Self::Right => Self::Left,
+        }
+    }
+
     /// Of l: 1 on the left, -1 on the right.
     pub fn sign(self) -> f64 {
         match self {
@@ -73,8 +83,20 @@ pub struct SectionRange {
     pub from_m: f64,
     /// To this chainage.
     pub to_m: f64,
+    /// On this side there is no fixed rail, but a switch's blade.
+    pub missing_rail: Option<Side>,
     /// The outline.
     pub section: CrossSection,
+}
+
+impl SectionRange {
+    /// Centres of the rails that lie in it, left of the centreline.
+    pub fn rails_m(&self) -> impl Iterator<Item = f64> + use<> {
+        let missing = self.missing_rail;
+        let sides = [Side::Left, Side::Right].into_iter();
+        let fixed = sides.filter(move |side| missing != Some(*side));
+        fixed.map(|side| side.sign() * RAIL_OFFSET_M)
+    }
 }
 
 /// One straight piece of an outline.

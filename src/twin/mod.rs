@@ -10,6 +10,7 @@
 //! said in each of these.
 
 pub mod air;
+pub mod blades;
 pub mod faults;
 pub mod geometry;
 pub mod lamps;

@@ -47,6 +47,7 @@ pub fn track() -> Track {
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: LENGTH_M,
+            missing_rail: None,
             section: CrossSection::circular(RADIUS_M, CENTRE_M, None),
         }],
         lamps,

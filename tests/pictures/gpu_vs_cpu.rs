@@ -41,7 +41,7 @@ fn quiet(job: &Job) -> Job {
     job
 }
 
-fn scaled(view: &mut View, gain: f64, divisor: u32) {
+pub fn scaled(view: &mut View, gain: f64, divisor: u32) {
     // Less gain than none would show a full well instead of white.
     view.lens.transmission *= gain.min(1.0);
     view.sensor.gain_db += 20.0 * gain.max(1.0).log10();
@@ -169,7 +169,7 @@ const PAINT_OVER_2: f64 = 0.2;
 const PAINT_OVER_20: f64 = 0.02;
 const OVER_20: f64 = 0.003;
 
-fn compare(name: &str, scene: &Scene, job: &Job) {
+pub fn compare(name: &str, scene: &Scene, job: &Job) {
     let job = quiet(job);
     let gpu = draw(&mut *gpu(scene.clone()), &job).remove(0);
     let cpu = draw(&mut *cpu(scene.clone()), &job).remove(0);

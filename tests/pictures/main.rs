@@ -14,6 +14,7 @@ mod common;
 mod gpu;
 mod gpu_vs_cpu;
 mod lamps;
+mod network;
 mod parts;
 mod sensor;
 mod shaders;

@@ -111,16 +111,17 @@ const TRAINS: usize = 50_001;
 /// Most cars of a train.
 const CARS: usize = 100;
 
-/// The owner's number in masks and tables, and its category.
-fn identity(owner: BodyOwner) -> (u32, usize) {
+/// The owner's number in masks and tables, and its category; none for a part of the track.
+fn identity(owner: BodyOwner) -> Option<(u32, usize)> {
     let (id, category) = match owner {
         BodyOwner::Obstacle(k) => (1 + k, 0),
         BodyOwner::Cable(k) => (CABLES + k, 1),
         BodyOwner::Worker(k) => (WORKERS + k, 2),
         BodyOwner::Load(k) => (LOADS + k, 0),
         BodyOwner::Car(train, car) => (TRAINS + CARS * train.index() + car, 3),
+        BodyOwner::Blade(_) => return None,
     };
-    (id.min(usize::from(u16::MAX)) as u32, category)
+    Some((id.min(usize::from(u16::MAX)) as u32, category))
 }
 
 /// What is within sight, with the pixels of each.
@@ -153,17 +154,17 @@ pub(super) fn instances<'a>(
             let surface = labels.surface[v * size[1] + u];
             matches!(surface, Surface::Body(k) if bodies.contains(&usize::from(k)))
         });
-        let (id, category) = identity(owner);
-        Instance {
+        let (id, category) = identity(owner)?;
+        Some(Instance {
             id,
             name,
             category,
             owner,
             bodies,
             mask,
-        }
+        })
     };
-    groups.into_iter().map(make).collect()
+    groups.into_iter().filter_map(make).collect()
 }
 
 /// First column in which each body shows, and one after the last.
@@ -186,7 +187,8 @@ pub(super) fn picture(
     labels: &Labels,
 ) -> ImageBuffer<Luma<u16>, Vec<u16>> {
     let camera = &sight.view.camera.intrinsics;
-    let ids: Vec<u16> = owners.iter().map(|(o, _)| identity(*o).0 as u16).collect();
+    let id = |owner: BodyOwner| identity(owner).map_or(0, |(id, _)| id as u16);
+    let ids: Vec<u16> = owners.iter().map(|(owner, _)| id(*owner)).collect();
     let mut image = ImageBuffer::new(camera.width_px, camera.height_px);
     for (pixel, surface) in image.iter_mut().zip(&labels.surface) {
         if let Surface::Body(k) = surface {

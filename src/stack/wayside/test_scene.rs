@@ -79,6 +79,7 @@ pub fn track(curvature_per_m: f64) -> Arc<Track> {
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: 600.0,
+            missing_rail: None,
             section: section(),
         }],
         lamps: vec![],

@@ -19,6 +19,7 @@ pub(super) fn sections(
         return vec![SectionRange {
             from_m: 0.0,
             to_m: length_m,
+            missing_rail: None,
             section: CrossSection::circular(3.0, 3.0 - TRACK_STRUCTURE_M, None),
         }];
     }
@@ -35,6 +36,7 @@ pub(super) fn sections(
         ranges.push(SectionRange {
             from_m: entry.from_m,
             to_m,
+            missing_rail: None,
             section,
         });
     }

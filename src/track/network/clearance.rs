@@ -59,7 +59,7 @@ impl Network {
     }
 
     /// Chainage so far behind an end, into its track; none where the track is shorter.
-    fn chainage_behind(&self, end: TrackEnd, behind_m: f64) -> Option<f64> {
+    pub fn chainage_behind(&self, end: TrackEnd, behind_m: f64) -> Option<f64> {
         let length_m = self.alignment(end.track)?.length_m();
         let s_m = match end.way {
             Direction::Up => length_m - behind_m,

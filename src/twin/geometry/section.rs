@@ -4,7 +4,7 @@
 //! outline lists the edges of each cell; a ray visits the cells on its way (Amanatides and Woo,
 //! "A fast voxel traversal algorithm for ray tracing", Eurographics 1987).
 
-use crate::track::{BED_M, CrossSection, Material, OutlinePoint, RAIL_OFFSET_M, rail_outline};
+use crate::track::{BED_M, CrossSection, Material, OutlinePoint, SectionRange, rail_outline};
 use nalgebra::Vector2;
 use std::borrow::Cow;
 
@@ -67,11 +67,12 @@ pub fn surface_of(section: &CrossSection, track: usize) -> Cow<'_, CrossSection>
 }
 
 impl SectionCaster {
-    /// Of a track by number.
-    pub fn new(section: &CrossSection, track: usize) -> Self {
+    /// Of a range of a track by number.
+    pub fn new(range: &SectionRange, track: usize) -> Self {
+        let section = &range.section;
         let mut edges = edges_of(&surface_of(section, track));
-        for side in [1.0, -1.0] {
-            edges.extend(edges_of(&rail_outline(side * RAIL_OFFSET_M)));
+        for centre_m in range.rails_m() {
+            edges.extend(edges_of(&rail_outline(centre_m)));
         }
         let corners = || {
             edges

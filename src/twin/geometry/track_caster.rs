@@ -129,7 +129,7 @@ impl TrackCaster {
             sections: track
                 .sections
                 .iter()
-                .map(|r| SectionCaster::new(&r.section, number))
+                .map(|r| SectionCaster::new(r, number))
                 .collect(),
         }
     }

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// All tracks with their tunnels, ready for rays.
 #[derive(Clone, Debug)]
 pub struct TunnelCaster {
-    tracks: Vec<TrackCaster>,
+    pub(super) tracks: Vec<TrackCaster>,
 }
 
 /// Where a ray begins.

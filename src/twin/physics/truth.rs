@@ -6,6 +6,7 @@ use super::obstacle_body::{ObstacleBody, Rest};
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::TrackId;
+use crate::twin::blades;
 use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -64,6 +65,8 @@ pub enum BodyOwner {
     Load(usize),
     /// A car of a train, from its front.
     Car(TrainId, usize),
+    /// A blade of a switch.
+    Blade(usize),
 }
 
 /// A body's owner and the name that the scenario gives it.
@@ -89,6 +92,11 @@ impl World {
     pub fn owned_bodies(&self, without: Option<TrainId>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
         let (network, now_s) = (&self.tunnel.network, self.time.secs());
         let mut owned = self.surroundings.draw(&self.rapier, network, now_s);
+        for (k, switch) in network.switches.iter().enumerate() {
+            let (owner, name) = (BodyOwner::Blade(k), switch.name.as_str());
+            let blades = blades::bodies(network, switch, self.switch_share(k)).into_iter();
+            owned.extend(blades.map(|body| (body, BodyLabel { owner, name })));
+        }
         // The order may decide pixels: the first train comes last.
         let trains = self.trains.iter().skip(1).chain(self.trains.first());
         for train in trains.filter(|train| Some(train.consist.id) != without) {

@@ -6,8 +6,9 @@
 //! E(n) = E ((1 + n) + r (1 - n)) / 2
 //!
 //! This is the overcast day of the CIE without its gradient towards the zenith. Walls beside the track hide
-//! nothing of the sky, and no daylight goes into a tunnel.
+//! nothing of the sky. What comes into a tunnel is in [`portal`](super::portal).
 
+use super::portal::Portal;
 use crate::track::{CrossSection, Material, Track};
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Point3, Vector3};
@@ -16,6 +17,8 @@ use std::sync::Arc;
 
 /// From point to point of a stretch in the open.
 const STEP_M: f64 = 5.0;
+/// Buffer stops and the like stand so far beyond the end of a track.
+const BEYOND_M: f64 = 20.0;
 /// What is farther from all of a stretch is not in the open there.
 const ASIDE_M: f64 = 100.0;
 /// The same in height.
@@ -28,17 +31,24 @@ pub struct Daylight {
     level_lx: f64,
     /// Centrelines of stretches in the open.
     open: Vec<Vec<Point3<f64>>>,
+    /// Mouths of tunnels, by track.
+    portals: Vec<Vec<Portal>>,
 }
 
 impl Daylight {
-    /// Of tracks; none at night, or where all of them lie in tunnels.
-    pub fn of(tracks: &[Arc<Track>]) -> Option<Self> {
+    /// Of tracks, of which nothing may be beyond the begin or the end; none at night, or where all of them lie
+    /// in tunnels.
+    pub fn of(tracks: &[Arc<Track>], nothing_beyond: &[[bool; 2]]) -> Option<Self> {
         let level_lx = tracks.iter().map(|t| t.daylight_lx).fold(0.0, f64::max);
-        let open: Vec<_> = tracks
-            .iter()
-            .flat_map(|track| open_stretches(track))
+        let ends = tracks.iter().zip(nothing_beyond);
+        let open: Vec<_> = ends
+            .flat_map(|(track, ends)| open_stretches(track, *ends))
             .collect();
-        (level_lx > 0.0 && !open.is_empty()).then_some(Self { level_lx, open })
+        (level_lx > 0.0 && !open.is_empty()).then(|| Self {
+            level_lx,
+            open,
+            portals: tracks.iter().map(|track| Portal::all_of(track)).collect(),
+        })
     }
 
     /// Luminance of the sky.
@@ -70,6 +80,15 @@ impl Daylight {
         0.5 * self.level_lx * (1.0 + mean_albedo(Material::Bed))
     }
 
+    /// On a surface of a track's tunnel, through its mouths.
+    pub fn through_portals_lx(&self, track: usize, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        let portals = self.portals.get(track).into_iter().flatten();
+        let outside_cd_m2 = 0.5 * (self.sky_cd_m2() + self.ground_cd_m2());
+        portals
+            .map(|portal| portal.lux_per_cd_m2(p, normal) * outside_cd_m2)
+            .sum()
+    }
+
     /// Whether a place is in the open.
     pub fn reaches(&self, p: &Point3<f64>) -> bool {
         self.open.iter().any(|line| is_beside(line, p))
@@ -81,16 +100,23 @@ pub fn is_open(section: &CrossSection) -> bool {
     !section.closed && !section.is_shared()
 }
 
-/// Points along the centreline of each open section.
-fn open_stretches(track: &Track) -> impl Iterator<Item = Vec<Point3<f64>>> + '_ {
+/// Points along the centreline of each open section, and a little more of it where nothing is beyond.
+fn open_stretches(
+    track: &Track,
+    nothing_beyond: [bool; 2],
+) -> impl Iterator<Item = Vec<Point3<f64>>> + '_ {
     let open = track
         .sections
         .iter()
         .filter(|range| is_open(&range.section));
-    open.map(|range| {
-        let length_m = range.to_m - range.from_m;
+    let [begins, ends] = nothing_beyond;
+    let end_m = track.alignment.length_m();
+    open.map(move |range| {
+        let beyond_m = |at_end: bool| if at_end { BEYOND_M } else { 0.0 };
+        let from_m = range.from_m - beyond_m(begins && range.from_m <= 0.0);
+        let length_m = range.to_m + beyond_m(ends && range.to_m >= end_m) - from_m;
         let steps = (length_m / STEP_M).ceil().max(1.0);
-        let at = |k: u32| range.from_m + length_m * f64::from(k) / steps;
+        let at = |k: u32| from_m + length_m * f64::from(k) / steps;
         (0..=steps as u32)
             .map(|k| track.alignment.at(at(k)).origin)
             .collect()
@@ -119,6 +145,7 @@ mod tests {
         let range = |from_m, to_m, section| SectionRange {
             from_m,
             to_m,
+            missing_rail: None,
             section,
         };
         track.sections = vec![
@@ -130,7 +157,7 @@ mod tests {
             range(80.0, 200.0, CrossSection::open(20.0)),
         ];
         track.daylight_lx = 5000.0;
-        Daylight::of(&[Arc::new(track)])
+        Daylight::of(&[Arc::new(track)], &[[false; 2]])
     }
 
     /// Against the integral over the hemisphere that a surface faces, by sums over small parts of it.

@@ -46,13 +46,15 @@ impl LitScene {
 
     fn painted(scene: Scene, paintings: Paintings) -> Self {
         let tunnel = TunnelCaster::new(&scene.tracks);
-        let end_walls = (0..scene.tracks.len()).map(|k| tunnel.end_walls(k).cloned().collect());
+        let numbers = 0..scene.tracks.len();
+        let end_walls = numbers
+            .clone()
+            .map(|k| tunnel.end_walls(k).cloned().collect());
+        let dark_ends: Vec<_> = numbers.map(|k| tunnel.leads_into_dark(k)).collect();
         Self {
             end_walls: end_walls.collect(),
-            dark_ends: (0..scene.tracks.len())
-                .map(|k| tunnel.leads_into_dark(k))
-                .collect(),
-            daylight: Daylight::of(&scene.tracks),
+            daylight: Daylight::of(&scene.tracks, &dark_ends),
+            dark_ends,
             tracks: scene.tracks,
             air: scene.air,
             wet: scene.wet,
@@ -117,12 +119,14 @@ impl LitScene {
         p: &Point3<f64>,
         normal: &Vector3<f64>,
     ) -> f64 {
-        let daylight = match section.is_shared() {
-            true => self.daylight_at(p),
-            false => self.daylight.as_ref().filter(|_| is_open(section)),
-        };
         let ambient_lx = self.tracks[track].ambient_lx;
-        daylight.map_or(ambient_lx, |daylight| daylight.surface_lx(normal))
+        let Some(daylight) = &self.daylight else {
+            return ambient_lx;
+        };
+        match is_open(section) || (section.is_shared() && daylight.reaches(p)) {
+            true => daylight.surface_lx(normal),
+            false => ambient_lx + daylight.through_portals_lx(track, p, normal),
+        }
     }
 
     fn daylight_at(&self, p: &Point3<f64>) -> Option<&Daylight> {

@@ -96,6 +96,7 @@ mod tests {
             .map(|(section, from_m)| SectionRange {
                 from_m,
                 to_m: from_m + 60.0,
+                missing_rail: None,
                 section,
             })
             .collect();

@@ -39,6 +39,7 @@ fn hall() -> Track {
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: 100.0,
+            missing_rail: None,
             section: CrossSection {
                 points: vec![
                     corner(4.0, -5.0),

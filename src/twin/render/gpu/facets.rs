@@ -2,8 +2,7 @@
 
 use super::detail::{CHUNK_M, Cutting, halve};
 use crate::track::{
-    CrossSection, Edge, Material, OutlinePoint, RAIL_OFFSET_M, SectionRange, TrackPoint,
-    rail_outline,
+    CrossSection, Edge, Material, OutlinePoint, SectionRange, TrackPoint, rail_outline,
 };
 use crate::twin::geometry::surface_of;
 use nalgebra::Vector2;
@@ -53,7 +52,7 @@ pub fn facets_of(range: &SectionRange, rail_q_m: f64, cutting: Cutting<'_>) -> V
     let mut facets = Vec::new();
     let surface = surface_of(&range.section, cutting.key.track);
     add_outline(&mut facets, &surface, 0.0, cutting);
-    for centre_m in [RAIL_OFFSET_M, -RAIL_OFFSET_M] {
+    for centre_m in range.rails_m() {
         add_outline(&mut facets, &rail_outline(centre_m), rail_q_m, cutting);
     }
     facets
