@@ -167,7 +167,13 @@ fn keys_in_sight(
     let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
     let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
     let end = (track.alignment.length_m() / CHUNK_M).ceil() as i64;
+    // A place on a track that ends before the camera is its end.
+    let eye = framed.reference();
+    let beyond_m = |index: i64| (track.alignment.at(index as f64 * CHUNK_M).origin - eye).norm();
+    let near = |index: &i64| beyond_m(*index).min(beyond_m(index + 1)) <= SIGHT_M;
     let (first, last) = (first.max(0), last.min(end - 1));
+    let first = (first..=last).find(near).unwrap_or(end);
+    let last = (first..=last).rev().find(near).unwrap_or(first - 1);
     let by_day = scene.daylight.is_some();
     let [begin_dark, end_dark] = scene.dark_ends[track_number];
     let moves = !framed.rests();
