@@ -57,9 +57,11 @@ fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
     let tracks = network.tracks.iter();
     let of_tracks = tracks.flat_map(|track| of_track(track, datum));
     let switches = network.switches.iter().filter_map(|switch| {
-        let toe = network.leaving(switch.toe)?.origin;
-        let properties = json!({ "kind": "switch", "name": switch.name });
-        Some(feature("Point", position(datum, &toe), properties))
+        let toe = network.leaving(switch.toe)?;
+        let track = network.track(switch.toe.track)?;
+        let mut properties = json!({ "kind": "switch", "name": switch.name });
+        add_stated(&mut properties, track, [("stated_chainage", toe.s_m)]);
+        Some(feature("Point", position(datum, &toe.origin), properties))
     });
     of_tracks.chain(switches).collect()
 }
@@ -70,6 +72,15 @@ fn feature(shape: &str, coordinates: Value, properties: Value) -> Value {
         "geometry": { "type": shape, "coordinates": coordinates },
         "properties": properties,
     })
+}
+
+/// Chainages as the track states them, if it does, to the millimetre.
+fn add_stated<const N: usize>(properties: &mut Value, track: &Track, places: [(&str, f64); N]) {
+    if let Some(stated) = &track.stated_chainage {
+        for (key, s_m) in places {
+            properties[key] = json!(stated.text(s_m, 3));
+        }
+    }
 }
 
 fn position(datum: &Datum, world: &Point3<f64>) -> Value {
@@ -83,12 +94,16 @@ fn of_track(track: &Track, datum: &Datum) -> Vec<Value> {
     let chainages = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
     let course = chainages.map(|s_m| position(datum, &line.at(s_m).origin));
     let course: Vec<_> = course.collect();
-    let properties = json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let mut properties =
+        json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let ends = [("stated_begin", 0.0), ("stated_end", line.length_m())];
+    add_stated(&mut properties, track, ends);
     let course = feature("LineString", json!(course), properties);
     let point = |kind: &str, name: &str, [s_m, l_m, h_m]: [f64; 3]| {
         let world = line.world_from_track(TrackPoint { s_m, l_m, h_m });
-        let properties =
+        let mut properties =
             json!({ "kind": kind, "name": name, "track": track.name, "chainage_m": s_m });
+        add_stated(&mut properties, track, [("stated_chainage", s_m)]);
         feature("Point", position(datum, &world), properties)
     };
     let lamps = track.lamps.iter().map(|lamp| {

@@ -174,6 +174,7 @@ mod tests {
                 switch: Some("W1".to_owned()),
                 track: "u1".to_owned(),
                 chainage_m: 460.0,
+                stated_chainage: None,
             }],
             train: Some(TrainFigures {
                 run_m: 512.34,
