@@ -169,4 +169,26 @@ mod tests {
         assert!((length_m / 3000.0 - 1.0).abs() < 3e-3, "{length_m}");
         assert!((degrees[0][0] - 104.066).abs() < 1e-6 && (degrees[0][1] - 30.657).abs() < 1e-6);
     }
+
+    /// Provokes: a chainage of another track, or one that no plan states, for instance on either side of a jump.
+    #[test]
+    fn places_have_the_chainages_that_plans_state() {
+        let text = include_str!("../../tunnels/terminus.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let features = features(&tunnel, &tunnel.datum.unwrap());
+        let stated = |name: &str, key: &str| {
+            let of_name = |f: &&Value| f["properties"]["name"] == name;
+            let feature = features.iter().find(of_name).unwrap();
+            feature["properties"][key].as_str().map(str::to_owned)
+        };
+        let is = |name, key, text: Option<&str>| assert_eq!(stated(name, key).as_deref(), text);
+        is("d1", "stated_begin", Some("ZDK12+000.000"));
+        is("d1", "stated_end", Some("ZDK12+527.155"));
+        is("2-468", "stated_chainage", Some("ZDK12+390.000"));
+        is("V-hall", "stated_chainage", Some("YDK12+452.000"));
+        is("W1", "stated_chainage", Some("YDK12+460.000"));
+        // Of a track that states none.
+        is("W3", "stated_chainage", None);
+        is("B-u2", "stated_chainage", None);
+    }
 }

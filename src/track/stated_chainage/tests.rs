@@ -292,3 +292,27 @@ fn faults_of_files_are_reported_with_their_keys() {
         assert_eq!(keys, [format!("stated_chainage.{key}")], "{stated}");
     }
 }
+
+/// The chainages of the two lines of the terminus agree where they lie side by side: behind the bends of the left one
+/// a long chain takes back by how much it is longer.
+#[test]
+fn val_what_is_abreast_has_one_number() {
+    let text = include_str!("../../../tunnels/terminus.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let named = |name| &tunnel.network.tracks[usize::from(tunnel.network.named(name).unwrap().0)];
+    let (right, left) = (named("u1"), named("d1"));
+    let [right_stated, left_stated] =
+        [right, left].map(|track| track.stated_chainage.as_ref().unwrap());
+    for (s_m, agree) in [
+        (100.0, true),
+        (300.0, true),
+        (489.0, false),
+        (490.0, true),
+        (520.0, true),
+    ] {
+        let east_m = left.alignment.at(s_m).origin.x;
+        let abreast_m = right_stated.stated_m(east_m);
+        let off_m = (left_stated.stated_m(s_m) - abreast_m).abs();
+        assert_eq!(off_m < 1e-3, agree, "{s_m} m: {off_m}");
+    }
+}
