@@ -171,7 +171,7 @@ fn lamp_inside_the_rock() {
 fn chainages_of_plans_are_found() {
     let check = |chainage: &str| {
         let args = ["check", "tunnels/terminus.toml", "--chainage", chainage];
-        let output = program(&args).current_dir(REPOSITORY).output();
+        let output = program(args).current_dir(REPOSITORY).output();
         let output = output.expect("the program starts");
         let said = [&output.stdout[..], &output.stderr[..]].concat();
         (

@@ -54,7 +54,9 @@ use std::ops::RangeInclusive;
 /// Texts are written to the millimetre, and so lie so far off at most.
 const ROUNDING_M: f64 = 0.5e-3 + 1e-9;
 
-/// What a track states, and where.
+/// What a track states, and where: chainages with a prefix and an offset that grow or fall along the track and jump
+/// at chainage equations, in the terms of LandXML 1.2 (`staStart`, `staIncrement`, `StaEquation`). Regions between
+/// equations are counted R1, R2 and so on, and tell the places apart that a long chain states alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StatedChainage {
     prefix: String,

@@ -131,8 +131,15 @@ fn jumps_say_by_how_much_the_track_is_longer() {
 fn a_place_keeps_what_it_states_when_the_track_is_reversed() {
     for track in tracks() {
         let reversed = track.reversed(LENGTH_M);
-        assert_eq!(reversed.jumps().count(), track.jumps().count());
-        let at_jump = |s_m: f64| track.jumps().any(|jump| jump.at_m == s_m);
+        let mut there: Vec<ChainageJump> = reversed.jumps().collect();
+        there.reverse();
+        assert_eq!(there.len(), track.jumps().count());
+        for (jump, there) in track.jumps().zip(there) {
+            assert!((there.at_m + jump.at_m - LENGTH_M).abs() < 1e-9);
+            assert!((there.back_m - jump.ahead_m).abs() < 1e-9);
+            assert!((there.longer_m - jump.longer_m).abs() < 1e-9);
+        }
+        let at_jump = |s_m: f64| track.jumps().any(|jump| (jump.at_m - s_m).abs() < 1e-9);
         for s_m in places_m().filter(|s_m| !at_jump(*s_m)) {
             let there_m = reversed.stated_m(LENGTH_M - s_m);
             assert!((there_m - track.stated_m(s_m)).abs() < 1e-9, "{s_m}");
