@@ -4,7 +4,7 @@
 use super::check_scenario;
 use super::fault::Failure;
 use super::file_kind::FileKind;
-use super::{print, tunnel};
+use super::{chainage, print, tunnel};
 #[cfg(feature = "twin")]
 use crate::scenario::Override;
 use crate::settings::{FileError, ReadLimit, read_text};
@@ -20,6 +20,7 @@ vehicle, any other a scenario; of a scenario the files that it names are checked
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
   metrotwin check scenarios/*.toml tunnels/*.toml
+  metrotwin check tunnels/terminus.toml --chainage YDK12+150
   metrotwin check scenarios/line_run.toml --set train.cruise_speed_kmh=80
 
 Exit code 0 where all files are right, 2 where any is wrong.";
@@ -35,6 +36,9 @@ pub(super) struct CheckArgs {
     #[cfg(feature = "twin")]
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
+    /// Say where a tunnel states a chainage, e.g. DK12+340.5; may be given again
+    #[arg(long = "chainage", value_name = "TEXT")]
+    chainages: Vec<String>,
 }
 
 /// Checks every file, however many before it are wrong.
@@ -72,9 +76,16 @@ fn report_of(path: &Path, text: &str, args: &CheckArgs) -> Result<String, Failur
             #[cfg(feature = "twin")]
             check_scenario::refuse_overrides(path, &args.overrides)?;
             let tunnel = Tunnel::from_toml(text).map_err(|e| Failure::file(path, text, e))?;
-            Ok(tunnel::report(&tunnel))
+            let mut said = tunnel::report(&tunnel);
+            for text in &args.chainages {
+                said += &chainage::report(path, &tunnel, text)?;
+            }
+            Ok(said)
         }
-        kind => other(path, text, kind, args),
+        kind => {
+            chainage::refuse(path, &args.chainages)?;
+            other(path, text, kind, args)
+        }
     }
 }
 

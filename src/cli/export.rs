@@ -57,9 +57,11 @@ fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
     let tracks = network.tracks.iter();
     let of_tracks = tracks.flat_map(|track| of_track(track, datum));
     let switches = network.switches.iter().filter_map(|switch| {
-        let toe = network.leaving(switch.toe)?.origin;
-        let properties = json!({ "kind": "switch", "name": switch.name });
-        Some(feature("Point", position(datum, &toe), properties))
+        let toe = network.leaving(switch.toe)?;
+        let track = network.track(switch.toe.track)?;
+        let mut properties = json!({ "kind": "switch", "name": switch.name });
+        add_stated(&mut properties, track, [("stated_chainage", toe.s_m)]);
+        Some(feature("Point", position(datum, &toe.origin), properties))
     });
     of_tracks.chain(switches).collect()
 }
@@ -70,6 +72,15 @@ fn feature(shape: &str, coordinates: Value, properties: Value) -> Value {
         "geometry": { "type": shape, "coordinates": coordinates },
         "properties": properties,
     })
+}
+
+/// Chainages as the track states them, if it does, to the millimetre.
+fn add_stated<const N: usize>(properties: &mut Value, track: &Track, places: [(&str, f64); N]) {
+    if let Some(stated) = &track.stated_chainage {
+        for (key, s_m) in places {
+            properties[key] = json!(stated.text(s_m, 3));
+        }
+    }
 }
 
 fn position(datum: &Datum, world: &Point3<f64>) -> Value {
@@ -83,12 +94,16 @@ fn of_track(track: &Track, datum: &Datum) -> Vec<Value> {
     let chainages = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
     let course = chainages.map(|s_m| position(datum, &line.at(s_m).origin));
     let course: Vec<_> = course.collect();
-    let properties = json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let mut properties =
+        json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let ends = [("stated_begin", 0.0), ("stated_end", line.length_m())];
+    add_stated(&mut properties, track, ends);
     let course = feature("LineString", json!(course), properties);
     let point = |kind: &str, name: &str, [s_m, l_m, h_m]: [f64; 3]| {
         let world = line.world_from_track(TrackPoint { s_m, l_m, h_m });
-        let properties =
+        let mut properties =
             json!({ "kind": kind, "name": name, "track": track.name, "chainage_m": s_m });
+        add_stated(&mut properties, track, [("stated_chainage", s_m)]);
         feature("Point", position(datum, &world), properties)
     };
     let lamps = track.lamps.iter().map(|lamp| {
@@ -153,5 +168,27 @@ mod tests {
             .sum();
         assert!((length_m / 3000.0 - 1.0).abs() < 3e-3, "{length_m}");
         assert!((degrees[0][0] - 104.066).abs() < 1e-6 && (degrees[0][1] - 30.657).abs() < 1e-6);
+    }
+
+    /// Provokes: a chainage of another track, or one that no plan states, for instance on either side of a jump.
+    #[test]
+    fn places_have_the_chainages_that_plans_state() {
+        let text = include_str!("../../tunnels/terminus.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let features = features(&tunnel, &tunnel.datum.unwrap());
+        let stated = |name: &str, key: &str| {
+            let of_name = |f: &&Value| f["properties"]["name"] == name;
+            let feature = features.iter().find(of_name).unwrap();
+            feature["properties"][key].as_str().map(str::to_owned)
+        };
+        let is = |name, key, text: Option<&str>| assert_eq!(stated(name, key).as_deref(), text);
+        is("d1", "stated_begin", Some("ZDK12+000.000"));
+        is("d1", "stated_end", Some("ZDK12+527.155"));
+        is("2-468", "stated_chainage", Some("ZDK12+390.000"));
+        is("V-hall", "stated_chainage", Some("YDK12+452.000"));
+        is("W1", "stated_chainage", Some("YDK12+460.000"));
+        // Of a track that states none.
+        is("W3", "stated_chainage", None);
+        is("B-u2", "stated_chainage", None);
     }
 }

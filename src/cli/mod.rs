@@ -13,6 +13,7 @@
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
 
+mod chainage;
 mod check;
 mod excerpt;
 mod fault;

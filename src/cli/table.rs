@@ -134,6 +134,16 @@ mod tests {
             placed_latency_s: None,
             distance_error_m: first_detected_s,
         };
+        let incident = |stated_chainage, track: &str| Incident {
+            time: SimTime::from_secs(12.5),
+            kind: IncidentKind::RunThrough,
+            train: TrainId(1),
+            other: None,
+            switch: Some("W1".to_owned()),
+            track: track.to_owned(),
+            chainage_m: 460.0,
+            stated_chainage,
+        };
         Summary {
             positioning: [
                 (Method::Mono, method(None)),
@@ -166,15 +176,10 @@ mod tests {
                 collision: true,
                 impacts: vec![impact; 11],
             }),
-            incidents: vec![Incident {
-                time: SimTime::from_secs(12.5),
-                kind: IncidentKind::RunThrough,
-                train: TrainId(1),
-                other: None,
-                switch: Some("W1".to_owned()),
-                track: "u1".to_owned(),
-                chainage_m: 460.0,
-            }],
+            incidents: vec![
+                incident(None, "u4"),
+                incident(Some("YDK12+460.0".to_owned()), "u1"),
+            ],
             train: Some(TrainFigures {
                 run_m: 512.34,
                 stop_error_m: Some(-0.256),
@@ -213,7 +218,8 @@ mod tests {
             "  and 1 more hits: see summary.json",
             "train ran 512.3 m; floor 0.346 m/s^2 vertical, 0.200 lateral (RMS); wheel load down to 88 %; \
              slip up to 0.12 m/s; pressed aside by up to 12 kN; stopped 0.26 m off the mark",
-            "   12.50 s: switch W1, run through, train 1, at 460.0 m of track u1",
+            "   12.50 s: switch W1, run through, train 1, at 460.0 m of track u4",
+            "   12.50 s: switch W1, run through, train 1, at YDK12+460.0 of track u1",
         ] {
             assert!(text.lines().any(|l| l == line), "{line}\n{text}");
         }

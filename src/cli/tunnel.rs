@@ -36,9 +36,13 @@ fn of_one_of_many(track: &Track) -> String {
     ];
     let counts = counts.iter().filter(|(count, _)| *count > 0);
     let counts = counts.map(|(count, what)| format!(", {count} {what}"));
-    let stations = track.stations.iter().map(|s| place(&s.name, s.chainage_m));
+    let stations = track.stations.iter();
+    let stations = stations.map(|s| place(track, &s.name, s.chainage_m));
     let stations = stations.map(|station| format!(", {station}"));
-    let rest: String = counts.chain(stations).collect();
+    let stated = stated(track)
+        .into_iter()
+        .map(|stated| format!(", {stated}"));
+    let rest: String = stated.chain(counts).chain(stations).collect();
     format!("track `{name}`: {length}{rest}")
 }
 
@@ -74,12 +78,14 @@ fn of_track(track: &Track) -> (String, Vec<String>) {
         false => format!("tightest radius {:.0} m", 1.0 / tightest),
     };
     let devices = track.wayside.iter().map(|d| {
-        let at = place(&d.name, d.chainage_m);
+        let at = place(track, &d.name, d.chainage_m);
         format!("{at}, writes to balise {}", d.balise)
     });
-    let balises = track.balises.iter().map(|b| place(&b.name, b.chainage_m));
-    let stations = track.stations.iter().map(|s| place(&s.name, s.chainage_m));
-    let lines = vec![
+    let balises = track.balises.iter();
+    let balises = balises.map(|b| place(track, &b.name, b.chainage_m));
+    let stations = track.stations.iter();
+    let stations = stations.map(|s| place(track, &s.name, s.chainage_m));
+    let rest = [
         format!("grades from {lowest:.1} to {steepest:.1} permille"),
         format!("{} stretches of cross-section", track.sections.len()),
         lamps(track),
@@ -87,11 +93,33 @@ fn of_track(track: &Track) -> (String, Vec<String>) {
         named("balises", balises.collect()),
         named("stations", stations.collect()),
     ];
+    let lines = stated(track).into_iter().chain(rest).collect();
     (format!("{length_m:.1} m, {plan}"), lines)
 }
 
-fn place(name: &str, chainage_m: f64) -> String {
-    format!("{} at {chainage_m} m", shortened(name, LONGEST_KEY))
+/// Where something is, with what the track states there.
+fn place(track: &Track, name: &str, chainage_m: f64) -> String {
+    let stated = track.stated_chainage.as_ref();
+    let stated = stated.map(|stated| format!(" ({})", stated.text(chainage_m, 3)));
+    let stated = stated.unwrap_or_default();
+    format!("{} at {chainage_m} m{stated}", shortened(name, LONGEST_KEY))
+}
+
+/// What a track states at its ends, and its chainage equations.
+fn stated(track: &Track) -> Option<String> {
+    let stated = track.stated_chainage.as_ref()?;
+    let [begin, end] = [0.0, track.alignment.length_m()].map(|s_m| stated.text(s_m, 3));
+    let jumps = stated.jumps().map(|jump| {
+        let [back, ahead] = [jump.back_m, jump.ahead_m].map(|m| stated.number(m, 3));
+        let (chain, by_m) = match jump.longer_m > 0.0 {
+            true => ("long", jump.longer_m),
+            false => ("short", -jump.longer_m),
+        };
+        let at_m = jump.at_m;
+        format!(", {back} = {ahead} at {at_m} m (a {chain} chain of {by_m:.3} m)")
+    });
+    let jumps: String = jumps.collect();
+    Some(format!("chainage from {begin} to {end}{jumps}"))
 }
 
 /// Of a long list the first.

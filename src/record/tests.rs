@@ -17,6 +17,7 @@ use crate::bus::{
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use crate::track::{TrackId, Tunnel};
+use re_sdk_types::archetypes::TextLog;
 use re_sdk_types::blueprint::archetypes::ViewBlueprint;
 use re_sdk_types::components::Name;
 use rerun::StoreKind;
@@ -271,6 +272,32 @@ fn regress_the_log_has_a_repeated_warning_once() {
         .filter(|c| c.entity_path().to_string() == "/events");
     // What is run, the warning, the all clear.
     assert_eq!(events.map(Chunk::num_rows).sum::<usize>(), 3);
+}
+
+/// Fails where the log tells chainages that no plan of the line has.
+#[test]
+fn the_log_tells_chainages_as_the_line_states_them() {
+    let folder = Folder::new("stated");
+    let path = folder.file("run.rrd");
+    let mut recording = Recording::to_file(&path, &RecordSettings::default());
+    let text = include_str!("../../tunnels/terminus.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    recording.open(&bare("stated", &tunnel)).unwrap();
+    let high = warning("V-hall", 1.0, DangerLevel::High);
+    message(&mut recording, SimTime::from_secs(1.0), high);
+    recording.close().unwrap();
+    let rows = chunks(&path, StoreKind::Recording);
+    let events = rows
+        .iter()
+        .filter(|c| c.entity_path().to_string() == "/events");
+    let text = TextLog::descriptor_text().component;
+    let lines: Vec<String> = events
+        .flat_map(|c| c.iter_slices::<String>(text))
+        .flatten()
+        .map(|line| line.to_string())
+        .collect();
+    let line = "V-hall #1 by wire (0.00 s): danger high, YDK12+100.0 to YDK12+101.0";
+    assert!(lines.iter().any(|l| l == line), "{lines:#?}");
 }
 
 /// Speeds of odometer and radar become series; where the radar says nothing the line breaks, and

@@ -8,6 +8,8 @@ use crate::bus::{
     ObstacleWarning, ProtectionReport, SimTime, TrainId, Via, WaysideReport,
 };
 use crate::session::Opening;
+use crate::track::network::Network;
+use crate::track::{Place, Stretch, TrackId};
 use re_sdk_types::archetypes::{TextDocument, TextLog};
 use re_sdk_types::components::{Color, TextLogLevel};
 use std::collections::BTreeMap;
@@ -20,6 +22,10 @@ pub(super) const DISPLAY: &str = "display";
 /// Turns what happens into words; says again only what changed.
 pub(super) struct Texts {
     stream: RowStream,
+    /// Chainages are told as its tracks state them.
+    network: Network,
+    /// The track that each wayside device watches.
+    watched: Vec<TrackId>,
     /// Of each train.
     brake: BTreeMap<TrainId, BrakeDemand>,
     /// Of each wayside device, with the number of its obstacles.
@@ -45,6 +51,8 @@ impl Texts {
         );
         let texts = Self {
             stream,
+            network: tunnel.network.clone(),
+            watched: opening.wayside.iter().map(|d| d.track).collect(),
             brake: BTreeMap::new(),
             danger: vec![(DangerLevel::None, 0); opening.wayside.len()],
             heard: BTreeMap::new(),
@@ -108,11 +116,7 @@ impl Texts {
             return Ok(());
         }
         let delay_s = message.received_at.since(warning.issued);
-        let stretch = format!(
-            "km {:.4} to {:.4}",
-            warning.from_chainage_m / 1000.0,
-            warning.to_chainage_m / 1000.0
-        );
+        let stretch = self.stretch(&warning.stretch());
         let what = match warning.danger {
             DangerLevel::None => "all clear".to_owned(),
             _ if warning.blind => format!("track not watched, {stretch}"),
@@ -126,7 +130,8 @@ impl Texts {
 
     /// The danger that a wayside device sees, or the number of things there, has changed.
     pub(super) fn wayside(&mut self, device: (usize, &str), report: &WaysideReport) -> Result {
-        let Some(danger) = self.danger.get_mut(device.0) else {
+        let watched = self.watched.get(device.0).copied();
+        let (Some(track), Some(danger)) = (watched, self.danger.get_mut(device.0)) else {
             return Ok(());
         };
         let now = (report.danger, report.obstacles.len());
@@ -135,8 +140,9 @@ impl Texts {
         }
         let mut text = format!("{}: danger {}", device.1, danger_name(report.danger));
         for o in &report.obstacles {
-            let km = o.from_chainage_m / 1000.0;
-            text += &format!("; {:.2} x {:.2} m at km {km:.4}", o.width_m, o.height_m);
+            let s_m = o.from_chainage_m;
+            let place = self.place(Place { track, s_m });
+            text += &format!("; {:.2} x {:.2} m at {place}", o.width_m, o.height_m);
         }
         self.log(report.time, level(report.danger), &text)
     }
@@ -165,7 +171,7 @@ impl Texts {
         time: SimTime,
         display: &DriverDisplay,
     ) -> Result {
-        let text = markdown(display);
+        let text = self.markdown(display);
         if self.shown.get(&id) == Some(&text) {
             return Ok(());
         }
@@ -178,6 +184,41 @@ impl Texts {
         Ok(())
     }
 
+    /// A stretch, as `km 0.1000 to 0.1010` or `DK12+340.0 to DK12+341.0`.
+    fn stretch(&self, stretch: &Stretch) -> String {
+        let track = stretch.track;
+        let ends = [stretch.from_m, stretch.to_m];
+        let [from, to] = ends.map(|s_m| self.place(Place { track, s_m }));
+        format!("{from} to {}", to.trim_start_matches("km "))
+    }
+
+    fn place(&self, at: Place) -> String {
+        let stated = self.network.stated_chainage(at);
+        stated.unwrap_or_else(|| format!("km {:.4}", at.s_m / 1000.0))
+    }
+
+    fn markdown(&self, display: &DriverDisplay) -> String {
+        let (lamp, meaning) = palette::driver_lamp(display.lamp);
+        let unknown = || "-".to_owned();
+        let power = if display.power { "on" } else { "off" };
+        let position = display
+            .position
+            .map_or_else(unknown, |at| self.position(at));
+        let distance = display.distance_to_obstacle_m;
+        let distance = distance.map_or_else(unknown, |m| format!("{m:.1} m"));
+        let text = &display.text;
+        format!(
+            "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\
+             | Position | {position} |\n| Distance to obstacle | {distance} |\n"
+        )
+    }
+
+    /// In metres, where the track states nothing else.
+    fn position(&self, at: Place) -> String {
+        let stated = self.network.stated_chainage(at);
+        stated.unwrap_or_else(|| format!("{:.1} m", at.s_m))
+    }
+
     fn log(&self, time: SimTime, level: &'static str, text: &str) -> Result {
         let colour = match level {
             TextLogLevel::ERROR => palette::danger(DangerLevel::High),
@@ -188,19 +229,6 @@ impl Texts {
         self.stream.at(time);
         self.stream.log(EVENTS, &line)
     }
-}
-
-fn markdown(display: &DriverDisplay) -> String {
-    let (lamp, meaning) = palette::driver_lamp(display.lamp);
-    let metres = |m: Option<f64>| m.map_or_else(|| "-".to_owned(), |m| format!("{m:.1} m"));
-    let power = if display.power { "on" } else { "off" };
-    let position = metres(display.position.map(|place| place.s_m));
-    let distance = metres(display.distance_to_obstacle_m);
-    let text = &display.text;
-    format!(
-        "## {lamp}: {meaning}\n\n{text}\n\n| Power | {power} |\n|---|---|\n\
-         | Position | {position} |\n| Distance to obstacle | {distance} |\n"
-    )
 }
 
 /// Whose a line of the log is, where it is not the first train's.

@@ -59,6 +59,7 @@ pub mod network;
 mod place;
 mod reversal;
 mod section;
+mod stated_chainage;
 mod tunnel;
 pub mod uid;
 pub mod waveform;
@@ -72,6 +73,7 @@ pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
+pub use stated_chainage::{ChainageError, ChainageJump, StatedChainage};
 pub use tunnel::Tunnel;
 
 /// One track: where it runs, what it lies in, and what stands along it.
@@ -81,6 +83,9 @@ pub struct Track {
     pub name: String,
     /// Its centreline.
     pub alignment: Alignment,
+    /// Chainages as people state them, if they do not count from where it begins. None of a route, which may be of
+    /// several tracks.
+    pub stated_chainage: Option<StatedChainage>,
     /// What stands around it, in order of chainage, without gaps.
     pub sections: Vec<SectionRange>,
     /// Lamps in order of chainage.
@@ -105,6 +110,7 @@ impl Track {
         Self {
             name: name.to_owned(),
             alignment,
+            stated_chainage: None,
             sections: Vec::new(),
             lamps: Vec::new(),
             wayside: Vec::new(),

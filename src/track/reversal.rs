@@ -43,6 +43,8 @@ impl Track {
         Self {
             name: self.name.clone(),
             alignment: self.alignment.reversed(),
+            stated_chainage: (self.stated_chainage.as_ref())
+                .map(|stated| stated.reversed(length_m)),
             sections: backwards(&self.sections, |range| SectionRange {
                 from_m: from_end(range.to_m),
                 to_m: from_end(range.from_m),

@@ -44,6 +44,7 @@ pub fn track() -> Track {
     Track {
         name: "sample".into(),
         alignment,
+        stated_chainage: None,
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: LENGTH_M,

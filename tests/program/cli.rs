@@ -166,6 +166,61 @@ fn lamp_inside_the_rock() {
     assert_eq!(output.status.code(), Some(2), "{output:?}");
 }
 
+/// Fails where a chainage of a plan is found elsewhere, or one that names no place is taken.
+#[test]
+fn chainages_of_plans_are_found() {
+    let check = |chainage: &str| {
+        let args = ["check", "tunnels/terminus.toml", "--chainage", chainage];
+        let output = program(args).current_dir(REPOSITORY).output();
+        let output = output.expect("the program starts");
+        let said = [&output.stdout[..], &output.stderr[..]].concat();
+        (
+            output.status.code(),
+            String::from_utf8_lossy(&said).into_owned(),
+        )
+    };
+    for (chainage, code, words) in [
+        (
+            "YDK12+150.5",
+            0,
+            "YDK12+150.5 is 150.500 m from the begin of track `u1`",
+        ),
+        (
+            "ZDK12+489.9 R2",
+            0,
+            "is 490.188 m from the begin of track `d1`",
+        ),
+        (
+            "ZDK12+489.9",
+            0,
+            "write one of `ZDK12+489.900 R1`, `ZDK12+489.900 R2`",
+        ),
+        (
+            "YDK12+470",
+            2,
+            "is not stated on this track; the nearest: `YDK12+460.000`",
+        ),
+        (
+            "km twelve",
+            2,
+            "is no chainage; write it like `YDK12+000.000`",
+        ),
+    ] {
+        let (exit, said) = check(chainage);
+        assert_eq!(exit, Some(code), "{said}");
+        assert!(said.contains(words), "{chainage} said: {said}");
+    }
+    let folder = folder("chainage");
+    let (from, to) = ("ahead_m = 12489.712", "ahead_m = 12490.0");
+    let (_, file) = on_tunnel(&folder, "terminus.toml", from, to);
+    let words = [
+        "stated_chainage.equations[0].ahead_m",
+        "nothing jumps",
+        "help:",
+    ];
+    refused(&folder, &file, &words);
+}
+
 #[test]
 fn negative_radius() {
     let folder = folder("negative_radius");

@@ -27,6 +27,7 @@ pub(super) fn map(permille: f64) -> Arc<Track> {
     Arc::new(Track {
         name: "test".into(),
         alignment: Alignment::new(Point3::origin(), 0.3, &[straight], &[grade]),
+        stated_chainage: None,
         sections: vec![],
         lamps: vec![],
         wayside: vec![],

@@ -76,6 +76,7 @@ pub fn track(curvature_per_m: f64) -> Arc<Track> {
     Arc::new(Track {
         name: "test".into(),
         alignment: Alignment::new(Point3::new(3.0, -7.0, 11.0), 0.4, &[element], &[]),
+        stated_chainage: None,
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: 600.0,

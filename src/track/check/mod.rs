@@ -1,5 +1,6 @@
 //! From the file as written to a [`Track`]: every number checked, every problem collected.
 
+mod chainage;
 mod devices;
 mod joints;
 mod lamps;
@@ -110,9 +111,11 @@ fn track(
     check: &mut Checker<'_>,
 ) -> Track {
     let sections = sections::sections(&entry.sections, alignment.length_m(), check);
+    let stated_chainage = chainage::stated(entry, alignment.length_m(), check);
     let mut track = Track {
         name: entry.name.clone(),
         alignment,
+        stated_chainage,
         sections,
         lamps: Vec::new(),
         wayside: entry.wayside.clone(),

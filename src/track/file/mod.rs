@@ -3,10 +3,12 @@
 //! A file has one track, whose keys stand at its top, or several under `[[track]]`, joined at their ends and by
 //! `[[switches]]`.
 
+mod chainage;
 mod lamps;
 mod line;
 mod sections;
 
+pub use chainage::{ChainageEquationEntry, Increment, StatedChainageEntry};
 pub use lamps::{LAST_LAMP, LampEntry, LampRowEntry};
 pub use line::{GradeEntry, PlanEntry, PlanShape, StartEntry};
 pub use sections::{SectionEntry, SectionShape};
@@ -24,6 +26,8 @@ macro_rules! with_track {
                 $($own)*
                 /// Where chainage 0 is in the world. Default: where `from` says, or the world's origin.
                 start: Option<StartEntry>, nested;
+                /// Chainages as plans and people state them. Default: none but the length from where the track begins.
+                stated_chainage: Option<StatedChainageEntry>, nested;
                 /// Plan elements in order up the line.
                 #[serde(default)]
                 plan: Vec<PlanEntry>, nested;
@@ -147,6 +151,7 @@ impl TunnelFile {
         }
         let track_keys = [
             ("start", self.start.is_some()),
+            ("stated_chainage", self.stated_chainage.is_some()),
             ("plan", !self.plan.is_empty()),
             ("grades", !self.grades.is_empty()),
             ("sections", !self.sections.is_empty()),
@@ -175,6 +180,7 @@ impl TunnelFile {
             from: None,
             to: None,
             start: self.start.clone(),
+            stated_chainage: self.stated_chainage.clone(),
             plan: self.plan.clone(),
             grades: self.grades.clone(),
             sections: self.sections.clone(),

@@ -88,12 +88,13 @@ impl Network {
 }
 
 impl Track {
-    /// The track between two of its chainages, the first of which becomes 0.
+    /// The track between two of its chainages, the first of which becomes 0. It states no other ones.
     #[must_use]
     pub fn stretch(&self, from_m: f64, to_m: f64) -> Self {
         let is_on = |s_m: f64| (from_m..=to_m).contains(&s_m);
         let mut part = self.shifted(-from_m);
         part.alignment = self.alignment.stretch(from_m, to_m);
+        part.stated_chainage = None;
         part.lamps = kept(part.lamps, |lamp| is_on(lamp.chainage_m + from_m));
         part.wayside = kept(part.wayside, |site| is_on(site.chainage_m + from_m));
         part.balises = kept(part.balises, |balise| is_on(balise.chainage_m + from_m));
@@ -108,13 +109,15 @@ impl Track {
         part
     }
 
-    /// This track and then another one, which begins where this one ends.
+    /// This track and then another one, which begins where this one ends. It states no chainages but those from its
+    /// begin: each of the two may have others.
     #[must_use]
     pub fn then(mut self, next: Self) -> Self {
         let length_m = self.alignment.length_m();
         let next = next.shifted(length_m);
         self.name = format!("{}, {}", self.name, next.name);
         self.alignment = self.alignment.then(&next.alignment);
+        self.stated_chainage = None;
         self.sections.extend(next.sections);
         self.lamps.extend(next.lamps);
         self.wayside.extend(next.wayside);

@@ -267,6 +267,12 @@ impl Network {
         self.tracks.get(usize::from(id.0))
     }
 
+    /// What the track of a place states there, if it states chainages, to 0.1 m.
+    pub fn stated_chainage(&self, place: Place) -> Option<String> {
+        let stated = self.track(place.track)?.stated_chainage.as_ref()?;
+        Some(stated.text(place.s_m, 1))
+    }
+
     /// The track of a name.
     pub fn named(&self, name: &str) -> Option<TrackId> {
         let found = self.tracks.iter().position(|track| track.name == name);

@@ -60,6 +60,9 @@ pub struct Incident {
     pub track: String,
     /// Chainage of that.
     pub chainage_m: f64,
+    /// The same as the track states it, if it does: `DK12+340.0`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub stated_chainage: Option<String>,
 }
 
 fn seconds<S: Serializer>(time: &SimTime, serializer: S) -> Result<S::Ok, S::Error> {
@@ -77,7 +80,10 @@ impl fmt::Display for Incident {
         if let Some(other) = self.other {
             write!(f, " ({other})")?;
         }
-        write!(f, ", at {:.1} m of track {}", self.chainage_m, self.track)
+        match &self.stated_chainage {
+            Some(stated) => write!(f, ", at {stated} of track {}", self.track),
+            None => write!(f, ", at {:.1} m of track {}", self.chainage_m, self.track),
+        }
     }
 }
 
@@ -115,6 +121,7 @@ impl Incidents {
             switch,
             track: track.map_or_else(String::new, |track| track.name.clone()),
             chainage_m: place.s_m,
+            stated_chainage: network.stated_chainage(place),
         });
     }
 }

@@ -36,6 +36,7 @@ fn hall() -> Track {
             }],
             &[],
         ),
+        stated_chainage: None,
         sections: vec![SectionRange {
             from_m: 0.0,
             to_m: 100.0,
