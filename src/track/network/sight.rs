@@ -135,6 +135,6 @@ mod tests {
                 .count()
         };
         // Those of d3, and those of d1 in the hall.
-        assert_eq!((has(481..=494), has(440..=455)), (0, 16));
+        assert_eq!((has(690..=713), has(740..=765)), (0, 26));
     }
 }
