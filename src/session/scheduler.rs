@@ -100,7 +100,7 @@ impl<'s, 'o> Session<'s, 'o> {
         let ids = world
             .train_ids()
             .chain(scenario.onboard.iter().map(|o| o.id()));
-        let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id), &world)));
+        let trains = ids.map(|id| (id, TrainScore::new(scenario, id, onboard(id))));
         Ok(Self {
             trains: trains.collect(),
             posts: Posts::new(scenario),

@@ -14,7 +14,7 @@ use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::uid::Uid;
 use crate::track::{LampSite, Track};
 use crate::twin::physics::{TrainState, World};
-use crate::twin::sensors::{RigSettings, SensorError};
+use crate::twin::sensors::{RigSettings, SensorError, ever_sees};
 use nalgebra::Isometry3;
 
 /// Lamps farther beside the route stand on another track.
@@ -38,19 +38,14 @@ pub struct TrainScore {
 
 impl TrainScore {
     /// Before the first step.
-    pub fn new(
-        scenario: &Scenario,
-        id: TrainId,
-        onboard: Option<&OnboardSettings>,
-        world: &World,
-    ) -> Self {
+    pub fn new(scenario: &Scenario, id: TrainId, onboard: Option<&OnboardSettings>) -> Self {
         let train = scenario.physics.trains.get(id.index());
         let rig = onboard.and_then(|onboard| onboard.rig.as_ref());
         let positioning = onboard.filter(|o| o.positions()).zip(rig);
         let positioning = positioning.map(|(onboard, rig)| {
-            let first = scenario.tunnel.first_track();
-            let way = world.along_route(id).unwrap_or(first);
-            let lamps = passed_by(rig, way);
+            let seen = scenario.seen_from_rig(onboard);
+            let way = seen.unwrap_or_else(|| scenario.tunnel.first_track().clone());
+            let lamps = passed_by(rig, &way);
             PositioningScore::new(&scenario.tunnel, lamps, &onboard.led.methods)
         });
         let eyes = EYES.into_iter().filter(|_| positioning.is_some());
@@ -146,17 +141,17 @@ impl TrainScore {
     }
 }
 
-/// Lamps that a rig passes on a way with their luminous side to it, with their chainages on the way. Those across a
-/// neighbouring track are not its own.
+/// The lamps of its own track that a rig comes to see on its way, with their distances along the train's route.
+/// `way` is the track as its cab looks along it.
 fn passed_by(rig: &RigSettings, way: &Track) -> Vec<(Uid, f64)> {
-    // It looks the way that its cab looks, or back.
-    let looks = rig.end.sign() * rig.yaw_deg.to_radians().cos();
-    let shows = |lamp: &&LampSite| {
-        let ahead = way.alignment.at(lamp.chainage_m).ahead();
-        looks * lamp.facing.dot(&ahead) < 0.0 && lamp.lateral_m.abs() <= OWN_LAMPS_M
+    let calibration = rig.calibration();
+    let along_m = |lamp: &LampSite| match rig.end {
+        TrainEnd::Front => lamp.chainage_m,
+        TrainEnd::Rear => way.alignment.length_m() - lamp.chainage_m,
     };
-    let lamps = way.lamps.iter().filter(shows);
-    lamps.map(|lamp| (lamp.uid, lamp.chainage_m)).collect()
+    let own = (way.lamps.iter()).filter(|lamp| lamp.lateral_m.abs() <= OWN_LAMPS_M);
+    let seen = own.filter(|lamp| ever_sees(&calibration, way, lamp));
+    seen.map(|lamp| (lamp.uid, along_m(lamp))).collect()
 }
 
 /// Where the head of a train really was at the time of a fix, as a chainage of the track that the fix is on.

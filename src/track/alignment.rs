@@ -315,15 +315,25 @@ impl Alignment {
 
     /// The point of the line that is square to a world position; none where that lies beyond the line's ends.
     pub fn nearest(&self, world: &Point3<f64>) -> Option<TrackPoint> {
-        let count = (self.length_m / STATION_M).ceil().max(1.0);
-        let station = |k: u32| self.length_m * f64::from(k) / count;
-        let away_m = |s_m: f64| (self.at(s_m).origin - world).xy().norm();
-        let near_s_m = (0..=count as u32)
-            .map(station)
-            .min_by(|a, b| f64::total_cmp(&away_m(*a), &away_m(*b)))?;
+        self.point_near(world, self.near_m(world))
+    }
+
+    /// The same, looked for from a chainage near it.
+    pub fn point_near(&self, world: &Point3<f64>, near_s_m: f64) -> Option<TrackPoint> {
         let point = self.track_from_world(world, near_s_m);
         (-1e-9..=self.length_m + 1e-9)
             .contains(&point.s_m)
             .then_some(point)
+    }
+
+    /// Chainage of the line's station nearest to a world position.
+    pub fn near_m(&self, world: &Point3<f64>) -> f64 {
+        let count = (self.length_m / STATION_M).ceil().max(1.0);
+        let station = |k: u32| self.length_m * f64::from(k) / count;
+        let away_m = |s_m: f64| (self.at(s_m).origin - world).xy().norm();
+        (0..=count as u32)
+            .map(station)
+            .min_by(|a, b| f64::total_cmp(&away_m(*a), &away_m(*b)))
+            .unwrap_or(0.0)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::sighting::{Measurement, PairLamps, Sighting};
 use crate::bus::{CameraModel, Method, PositionFix};
+use crate::stack::led::LampImage;
 use crate::track::TrackId;
 use nalgebra::{Point3, UnitQuaternion, Vector3};
 
@@ -14,9 +15,31 @@ struct LampAccuracy {
     image_px: f64,
 }
 
+/// By one eye's image of a lamp.
+fn mono_accuracy(lamp: &LampImage) -> Option<LampAccuracy> {
+    Some(LampAccuracy {
+        distance: lamp.axis_sigma_px / lamp.own_outline?.semi_major_px,
+        image_px: lamp.sigma_px,
+    })
+}
+
 impl Measurement<'_> {
     /// By both eyes.
     pub fn stereo_fix(&self, sighting: &Sighting, lamps: &PairLamps) -> Option<PositionFix> {
+        let accuracy = self.stereo_accuracy(sighting, lamps)?;
+        self.fix(Method::Stereo, sighting, sighting.stereo?.lamp, accuracy)
+    }
+
+    /// Standard deviation of a lamp's place along the line of sight.
+    pub fn place_sigma_m(&self, sighting: &Sighting, lamps: &PairLamps) -> Option<f64> {
+        let accuracy = match sighting.stereo {
+            Some(_) => self.stereo_accuracy(sighting, lamps),
+            None => mono_accuracy(&lamps.left[sighting.left]),
+        };
+        Some(sighting.lamp_in_camera()?.norm() * accuracy?.distance)
+    }
+
+    fn stereo_accuracy(&self, sighting: &Sighting, lamps: &PairLamps) -> Option<LampAccuracy> {
         let stereo = sighting.stereo?;
         let (l, r) = (&lamps.left[sighting.left], &lamps.right[sighting.right?]);
         let baseline_mm = 1e3 * self.rig.baseline_m();
@@ -24,12 +47,11 @@ impl Measurement<'_> {
         let sigma = (l.sigma_px / focal_px(&self.rig.left))
             .hypot(r.sigma_px / focal_px(&self.rig.right))
             .hypot(self.vergence_sigma(stereo.right_x));
-        let accuracy = LampAccuracy {
+        Some(LampAccuracy {
             distance: (sigma / stereo.disparity)
                 .hypot(self.settings.baseline_sigma_mm / baseline_mm),
             image_px: l.sigma_px,
-        };
-        self.fix(Method::Stereo, sighting, stereo.lamp, accuracy)
+        })
     }
 
     /// What the right eye's yaw against the left makes of its x at depth 1: x = tan(angle), so
@@ -40,11 +62,7 @@ impl Measurement<'_> {
 
     /// By the left eye alone.
     pub fn mono_fix(&self, sighting: &Sighting, lamps: &PairLamps) -> Option<PositionFix> {
-        let lamp = &lamps.left[sighting.left];
-        let accuracy = LampAccuracy {
-            distance: lamp.axis_sigma_px / lamp.own_outline?.semi_major_px,
-            image_px: lamp.sigma_px,
-        };
+        let accuracy = mono_accuracy(&lamps.left[sighting.left])?;
         self.fix(Method::Mono, sighting, sighting.mono?, accuracy)
     }
 

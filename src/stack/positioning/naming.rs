@@ -4,22 +4,29 @@
 //! what the odometer ran. What was read of its code is collected as long as it is followed. A name
 //! counts when it is on the map, and
 //! - with a position to expect: when the lamp then is where the map has it, within a gate of under
-//!   half the spacing; a name that contradicts is not used, until it has been read so often that
-//!   the expectation must be wrong;
+//!   half the distance to the next lamp that faces the rig; a name that contradicts is not used,
+//!   until it has been read so often that the expectation must be wrong;
 //! - without one: when the same name has been read often enough.
+//!
+//! Places are compared in space: beside two tracks lamps of several rows stand at one chainage.
 //!
 //! A name is read from one image, or from several joined; it is read again by as many new chips as a name
 //! is read from. A few chips, of which each agrees by chance in one case of two, are no reading.
 //!
 //! A lamp keeps a name once believed for as long as it is followed, whether its stripes can be read
-//! again or not. One of which nothing is read yet takes the name of the map's lamp that is expected there.
+//! again or not. One of which nothing is read yet takes the name of the map's lamp that is expected there,
+//! where its own place is measured well enough to tell that lamp from the next.
 
 use crate::bus::Identity;
 use crate::stack::led::ChipVotes;
-use crate::track::Track;
 use crate::track::uid::Uid;
-use nalgebra::Vector3;
+use crate::track::{LampSite, Track};
+use nalgebra::{Point3, Vector3};
 
+/// No lamp is taken for one that is farther than this from its place by so many sigmas of it.
+const SIGMAS: f64 = 3.0;
+/// Distance that a lamp alone on the map is taken to have to the next, metres.
+const ALONE_M: f64 = 10.0;
 /// A followed lamp may be this far from where it is expected, along and across the train.
 const FOLLOW_ALONG_M: f64 = 3.0;
 const FOLLOW_ACROSS_M: f64 = 1.5;
@@ -108,8 +115,12 @@ pub enum PairReading {
 /// What is expected at the time of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct Expected {
-    /// Chainage at which the lamp must stand if the train is where it takes itself to be.
-    pub lamp_chainage_m: f64,
+    /// Where the lamp must be in the world if the train is where it takes itself to be.
+    pub lamp: Point3<f64>,
+    /// Standard deviation of that place by what the pair measures, along the line of sight.
+    pub sigma_m: f64,
+    /// Where the eye then is.
+    pub eye: Point3<f64>,
 }
 
 /// What to make of a lamp.
@@ -157,10 +168,13 @@ impl Naming {
         };
         let proven = followed.note(uid, reading) >= self.agreeing_reads;
         let verdict = match expected {
-            Some(e) if self.stands_there(uid, e, map) => Verdict::Named(uid, identity),
-            Some(_) if proven => Verdict::Moved(uid, identity),
+            Some(e) => match self.is_there(uid, &e, map) {
+                Some(true) => Verdict::Named(uid, identity),
+                Some(false) if proven => Verdict::Moved(uid, identity),
+                _ => Verdict::Unknown,
+            },
             None if proven => Verdict::Named(uid, identity),
-            _ => Verdict::Unknown,
+            None => Verdict::Unknown,
         };
         followed.believed = (verdict != Verdict::Unknown).then_some(uid);
         verdict
@@ -175,40 +189,51 @@ impl Naming {
         if let Some(uid) = followed.believed {
             return Verdict::Named(uid, Identity::Followed);
         }
-        let nearest = expected.and_then(|e| nearest_lamp(map, e.lamp_chainage_m).map(|k| (e, k)));
-        match nearest {
-            Some((e, k)) if self.stands_there(map.lamps[k].uid, e, map) => {
-                Verdict::Named(map.lamps[k].uid, Identity::Predicted)
-            }
-            _ => Verdict::Unknown,
-        }
+        let predicted = expected.and_then(|e| {
+            let site = e.nearest(map)?;
+            let gate_m = self.gate_m(site, &e, map);
+            let is_near = e.misses_m(site) < gate_m && SIGMAS * e.sigma_m < gate_m;
+            is_near.then_some(site.uid)
+        });
+        predicted.map_or(Verdict::Unknown, |uid| {
+            Verdict::Named(uid, Identity::Predicted)
+        })
     }
 
-    fn stands_there(&self, uid: Uid, expected: Expected, map: &Track) -> bool {
-        let Some(k) = map.lamps.iter().position(|l| l.uid == uid) else {
-            return false;
-        };
-        let off = (map.lamps[k].chainage_m - expected.lamp_chainage_m).abs();
-        off < self.gate_share * spacing_m(map, k)
+    /// Whether a lamp is where it is expected; `None` where its place is measured too badly to tell.
+    fn is_there(&self, uid: Uid, expected: &Expected, map: &Track) -> Option<bool> {
+        let site = map.lamp(uid)?;
+        let (miss_m, gate_m) = (expected.misses_m(site), self.gate_m(site, expected, map));
+        let is_there = miss_m < gate_m;
+        (is_there || miss_m > gate_m + SIGMAS * expected.sigma_m).then_some(is_there)
+    }
+
+    /// A lamp nearer to its place than this is no other one.
+    fn gate_m(&self, site: &LampSite, expected: &Expected, map: &Track) -> f64 {
+        let others = expected.facing(map).filter(|other| other.uid != site.uid);
+        let next_m = others.map(|other| (other.centre - site.centre).norm());
+        let next_m = next_m.min_by(f64::total_cmp).unwrap_or(ALONE_M);
+        self.gate_share * next_m
     }
 }
 
-fn nearest_lamp(map: &Track, chainage_m: f64) -> Option<usize> {
-    let off = |k: &usize| (map.lamps[*k].chainage_m - chainage_m).abs();
-    (0..map.lamps.len()).min_by(|a, b| off(a).total_cmp(&off(b)))
-}
+impl Expected {
+    /// How far from where it is expected a lamp of the map stands.
+    fn misses_m(&self, site: &LampSite) -> f64 {
+        (site.centre - self.lamp).norm()
+    }
 
-/// Distance to the nearer neighbour, 10 m for a lamp alone.
-fn spacing_m(map: &Track, k: usize) -> f64 {
-    let to = |other: Option<usize>| {
-        let neighbour = other.and_then(|o| map.lamps.get(o))?;
-        Some((neighbour.chainage_m - map.lamps[k].chainage_m).abs())
-    };
-    let nearer = [to(k.checked_sub(1)), to(Some(k + 1))]
-        .into_iter()
-        .flatten();
-    let nearest = nearer.fold(f64::INFINITY, f64::min);
-    if nearest.is_finite() { nearest } else { 10.0 }
+    /// The lamps of the map whose discs the eye can see.
+    fn facing<'a>(&self, map: &'a Track) -> impl Iterator<Item = &'a LampSite> {
+        let eye = self.eye;
+        (map.lamps.iter()).filter(move |site| site.facing.dot(&(eye - site.centre)) > 0.0)
+    }
+
+    /// The one of them that stands nearest to the place.
+    fn nearest<'a>(&self, map: &'a Track) -> Option<&'a LampSite> {
+        let off = |site: &&LampSite| self.misses_m(site);
+        (self.facing(map)).min_by(|a, b| off(a).total_cmp(&off(b)))
+    }
 }
 
 #[cfg(test)]
@@ -217,6 +242,7 @@ mod tests {
     use super::*;
     use crate::stack::led::StripeReading;
     use crate::stack::led::testing::track;
+    use crate::track::TrackPoint;
     use crate::track::uid::LineCode;
 
     const NAMING: Naming = Naming {
@@ -229,8 +255,18 @@ mod tests {
         Followed::new(Vector3::new(6.0, 2.7, 3.2), 0.0, 0.0, votes)
     }
 
-    fn at(lamp_chainage_m: f64) -> Option<Expected> {
-        Some(Expected { lamp_chainage_m })
+    /// A place on a line of lamps on the left, seen from 6 m before it.
+    fn at(s_m: f64) -> Option<Expected> {
+        let map = track("manchester");
+        let place = |s_m, l_m| {
+            let h_m = map.lamps[0].height_m;
+            (map.alignment).world_from_track(TrackPoint { s_m, l_m, h_m })
+        };
+        Some(Expected {
+            lamp: place(s_m, map.lamps[0].lateral_m),
+            sigma_m: 0.1,
+            eye: place(s_m - 6.0, 1.0),
+        })
     }
 
     /// A wrong name that passes the check sum once must not move the train.
@@ -337,5 +373,58 @@ mod tests {
             NAMING.judge(&mut followed(), PairReading::Nothing, None, &map),
             Verdict::Unknown
         );
+    }
+
+    /// Two rows that face the rig, 9.4 m apart, their lamps at the same chainages but for half a metre. Fails where the
+    /// chainage alone tells lamps apart: then a lamp of the other row is taken, or none.
+    #[test]
+    fn lamps_of_two_rows_are_told_apart_by_their_places() {
+        let mut map = track("manchester");
+        let near = map.lamps[20].clone();
+        let mut far = LampSite {
+            uid: Uid { line: 1, lamp: 999 },
+            chainage_m: near.chainage_m + 0.5,
+            lateral_m: near.lateral_m + 9.4,
+            ..near.clone()
+        };
+        far.centre = map.alignment.world_from_track(TrackPoint {
+            s_m: far.chainage_m,
+            l_m: far.lateral_m,
+            h_m: far.height_m,
+        });
+        let mut expected = at(near.chainage_m - 0.7).unwrap();
+        let judged = |expected, map: &Track| {
+            NAMING.judge(&mut followed(), PairReading::Nothing, Some(expected), map)
+        };
+        let predicted = |uid| Verdict::Named(uid, Identity::Predicted);
+        let across = Expected {
+            lamp: far.centre,
+            ..expected
+        };
+        // Across the hall stands a lamp that is not on the map.
+        assert_eq!(judged(across, &map), Verdict::Unknown);
+        map.lamps.insert(21, far.clone());
+        assert_eq!(judged(across, &map), predicted(far.uid));
+        assert_eq!(judged(expected, &map), predicted(near.uid));
+        // So far off along the sight line that it may be a lamp of the other row.
+        expected.sigma_m = 1.5;
+        assert_eq!(judged(expected, &map), Verdict::Unknown);
+    }
+
+    /// A lamp of which a sliver is seen has no place: it contradicts nothing.
+    #[test]
+    fn a_place_that_is_not_known_moves_no_train() {
+        let map = track("manchester");
+        let uid = map.lamps[20].uid;
+        let mut lamp = followed();
+        let mut expected = at(map.lamps[20].chainage_m + 9.0);
+        for _ in 0..2 {
+            NAMING.judge(&mut lamp, PairReading::Name(uid), None, &map);
+        }
+        let mut judge = |expected| NAMING.judge(&mut lamp, PairReading::Name(uid), expected, &map);
+        let moved = Verdict::Moved(uid, Identity::Decoded);
+        assert_eq!(judge(expected), moved);
+        expected = expected.map(|e| Expected { sigma_m: 3.0, ..e });
+        assert_eq!(judge(expected), Verdict::Unknown);
     }
 }

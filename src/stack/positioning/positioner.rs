@@ -285,7 +285,8 @@ impl LedPositioner {
         let distance_m = self.reckoning.distance_m(sighting.time);
         let k = self.follow(lamp_m, distance_m, seconds);
         let reading = self.read(views, sighting, seconds, k, lamps);
-        let expected = self.expect(sighting.time, &lamp_m);
+        let sigma_m = self.measurement().place_sigma_m(sighting, lamps)?;
+        let expected = self.expect(sighting.time, &lamp_m, sigma_m);
         let followed = &mut self.followed[k];
         match (self.naming).judge(followed, reading, expected, &self.map) {
             Verdict::Named(uid, identity) => Some((uid, identity)),
@@ -343,14 +344,14 @@ impl LedPositioner {
         (self.alone.decode()).map_or(PairReading::Chips(chips), PairReading::Name)
     }
 
-    /// Chainage where this lamp must stand, from where the train takes itself to be.
-    fn expect(&self, time: SimTime, lamp_m: &Vector3<f64>) -> Option<Expected> {
+    /// Where this lamp must be, from where the train takes itself to be.
+    fn expect(&self, time: SimTime, lamp_m: &Vector3<f64>, sigma_m: f64) -> Option<Expected> {
         let chainage_m = self.reckoning.chainage_m(time)?;
-        let line = &self.map.alignment;
-        let turn = self.reckoning.attitude(time, chainage_m);
-        let lamp = line.at(chainage_m).origin + turn * lamp_m;
+        let vehicle = self.reckoning.vehicle(time, chainage_m);
         Some(Expected {
-            lamp_chainage_m: line.track_from_world(&lamp, chainage_m).s_m,
+            lamp: vehicle * Point3::from(*lamp_m),
+            sigma_m,
+            eye: vehicle * Point3::from(self.rig.vehicle_from_left.translation.vector),
         })
     }
 }

@@ -52,6 +52,7 @@ mod itinerary;
 mod passings;
 mod route;
 mod search;
+mod sight;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
