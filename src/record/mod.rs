@@ -273,6 +273,12 @@ impl Open {
                 message,
             } => self.message(*id, message)?,
             Event::Message { .. } | Event::Cost { .. } => return Ok(()),
+            Event::Blades { time, bodies } => {
+                if let Some(view) = self.view(TrainId::default()) {
+                    view.moving.blades(time, bodies)?;
+                }
+                time
+            }
             Event::Bodies { time, bodies } => {
                 if let Some(view) = self.view(TrainId::default()) {
                     view.moving.bodies(time, bodies)?;

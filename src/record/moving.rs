@@ -162,6 +162,22 @@ impl Moving {
         Ok(())
     }
 
+    /// Shows the blades of switches.
+    pub(super) fn blades(&mut self, time: SimTime, bodies: &[Body]) -> Result {
+        self.stream.at(time);
+        self.boxes("world/blades", bodies)
+    }
+
+    fn boxes(&mut self, path: &str, bodies: &[Body]) -> Result {
+        let s = Solids::of(&self.scene, bodies, |shape| matches!(shape, Shape::Box(_)));
+        let any = !s.sizes.is_empty();
+        let boxes = Boxes3D::from_centers_and_half_sizes(s.places, s.sizes)
+            .with_quaternions(s.turns)
+            .with_colors(s.colours)
+            .with_fill_mode(FillMode::Solid);
+        self.log(path, any, &boxes)
+    }
+
     /// Shows obstacles, workers and whatever else is solid.
     pub(super) fn bodies(&mut self, time: SimTime, bodies: &[Body]) -> Result {
         self.stream.at(time);
@@ -171,13 +187,7 @@ impl Moving {
         self.log(path, any, &hulls.mesh())?;
 
         let solids = |is_kind: fn(&Shape) -> bool| Solids::of(&scene, bodies, is_kind);
-        let s = solids(|shape| matches!(shape, Shape::Box(_)));
-        let any = !s.sizes.is_empty();
-        let boxes = Boxes3D::from_centers_and_half_sizes(s.places, s.sizes)
-            .with_quaternions(s.turns)
-            .with_colors(s.colours)
-            .with_fill_mode(FillMode::Solid);
-        self.log("world/bodies/boxes", any, &boxes)?;
+        self.boxes("world/bodies/boxes", bodies)?;
 
         let s = solids(|shape| matches!(shape, Shape::Cylinder(..)));
         let (any, [radii, lengths]) = (!s.sizes.is_empty(), s.radii_and_lengths());

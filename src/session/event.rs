@@ -116,6 +116,13 @@ pub enum Event<'a> {
         /// In world coordinates.
         bodies: &'a [Body],
     },
+    /// The blades of all switches: at first, and while any of them moves.
+    Blades {
+        /// When.
+        time: SimTime,
+        /// In world coordinates.
+        bodies: &'a [Body],
+    },
     /// A frame has been taken.
     Exposure(&'a Exposure<'a>),
     /// A pair of images that reached the equipment of a train.

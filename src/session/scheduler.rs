@@ -17,8 +17,10 @@ use crate::scenario::{OnboardSettings, Scenario};
 use crate::twin::links::Links;
 use crate::twin::physics::{PhysicsError, World};
 use crate::twin::random::Stream;
+use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::{Job, Renderer};
 use crate::twin::sensors::{Capture, Output};
+use nalgebra::Point3;
 use std::collections::BTreeMap;
 
 /// Samples of the truth shown to observers a second.
@@ -49,6 +51,8 @@ pub struct Session<'s, 'o> {
     pub(super) bench: Option<Bench>,
     pub(super) truth_ticker: Ticker,
     pub(super) bodies_ticker: Ticker,
+    /// As last shown.
+    pub(super) blade_shares: Vec<f64>,
     pub(super) cost: Costs,
     pub(super) observers: Observers<'s, 'o>,
 }
@@ -118,6 +122,7 @@ impl<'s, 'o> Session<'s, 'o> {
             images: Vec::new(),
             truth_ticker: Ticker::new(TRUTH_HZ),
             bodies_ticker: Ticker::new(BODIES_HZ),
+            blade_shares: Vec::new(),
             cost: Costs::default(),
             observers: Observers::new(observers),
         })
@@ -261,7 +266,12 @@ impl<'s, 'o> Session<'s, 'o> {
             Node::Train(id) => (Source::Rig(*id), Some(*id)),
             node => (Source::Wayside(self.posts.index(node)), None),
         };
-        let (bodies, owners) = self.world.owned_bodies(own);
+        let (mut bodies, mut owners) = self.world.owned_bodies(own);
+        let poses = views.iter().filter_map(|view| view.motion.poses.first());
+        let eyes: Vec<Point3<f64>> = poses.map(|p| p.translation.vector.into()).collect();
+        let (blades, switches) = self.world.blades(Some((&eyes, SIGHT_M)));
+        bodies.extend(blades);
+        owners.extend(switches);
         let train = views.first().and_then(|view| {
             let id = own.or(self.world.train_ids().next())?;
             self.train_at(id, view.mid())

@@ -157,6 +157,16 @@ impl Session<'_, '_> {
                 time: now,
                 bodies: &bodies,
             })?;
+            let switches = 0..self.world.network().switches.len();
+            let shares: Vec<f64> = switches.map(|k| self.world.switch_share(k)).collect();
+            if shares != self.blade_shares {
+                self.blade_shares = shares;
+                let (bodies, _) = self.world.blades(None);
+                self.observers.show(&Event::Blades {
+                    time: now,
+                    bodies: &bodies,
+                })?;
+            }
         }
         Ok(())
     }

@@ -4,11 +4,11 @@
 //! leg that is set lies close to its stock rail, and the other one [`OPEN_M`] away from it at the tip; both turn
 //! about their heels, where the rails are far enough apart to go on by themselves.
 
-use crate::track::network::{Network, Switch, TrackEnd};
+use crate::track::network::{Network, Switch, SwitchLeg, TrackEnd};
 use crate::track::{BED_M, Direction, Material, RAIL_OFFSET_M, SectionRange, Side, Track};
 use crate::twin::geometry::{Body, Shape};
 use crate::twin::reflectance::mean_albedo;
-use nalgebra::{Isometry3, Rotation3, UnitQuaternion, Vector3, center};
+use nalgebra::{Isometry3, Point3, Rotation3, UnitQuaternion, Vector3, center};
 use std::sync::Arc;
 
 /// Opening at the tip, as usual for point machines (their stroke is 140 to 220 mm).
@@ -94,45 +94,71 @@ fn split(range: SectionRange, [from_m, to_m]: [f64; 2], side: Side) -> Vec<Secti
     parts.map(part).collect()
 }
 
-/// The blades of a switch as bodies, so far on the way (0 to 1) from the through to the diverging leg.
-pub fn bodies(network: &Network, switch: &Switch, share: f64) -> Vec<Body> {
-    let Some(length_m) = length_m(network, switch) else {
-        return Vec::new();
-    };
-    let open = [share, 1.0 - share];
-    let blades = blades(network, switch).into_iter().zip(open);
-    let parts = (length_m / PART_M).ceil().max(1.0);
-    let drawn = blades.flat_map(|(blade, open)| {
-        (0..parts as u32).filter_map(move |k| {
-            let behind_m = [k, k + 1].map(|k| length_m * f64::from(k) / parts);
-            blade.part(network, behind_m, length_m, OPEN_M * open)
-        })
-    });
-    drawn.collect()
+/// Both blades of a switch in straight parts.
+#[derive(Clone, Debug)]
+pub struct SwitchBlades {
+    /// The tip of one of them.
+    pub tip: Point3<f64>,
+    parts: Vec<Part>,
 }
 
-impl Blade {
-    /// Between two distances behind the toe, if its tip is so far from the stock rail.
-    fn part(
-        &self,
-        network: &Network,
-        behind_m: [f64; 2],
-        length_m: f64,
-        open_m: f64,
-    ) -> Option<Body> {
-        let track = network.track(self.leg.track)?;
-        let end = |behind_m: f64| {
-            let s_m = network.chainage_behind(self.leg, behind_m)?;
-            let l_m = RAIL_OFFSET_M - open_m * (1.0 - behind_m / length_m);
-            let h_m = 0.5 * (BED_M - LOWER_M);
-            Some((track.alignment.at(s_m)).world_from_section(self.side.sign() * l_m, h_m))
+/// A straight part of a blade.
+#[derive(Clone, Copy, Debug)]
+struct Part {
+    leg: SwitchLeg,
+    /// Its ends where it is closed, and where it is open.
+    closed: [Point3<f64>; 2],
+    open: [Point3<f64>; 2],
+}
+
+impl SwitchBlades {
+    /// Of a switch; none of one whose legs part too late.
+    pub fn of(network: &Network, switch: &Switch) -> Option<Self> {
+        let length_m = length_m(network, switch)?;
+        let legs = [SwitchLeg::Through, SwitchLeg::Diverging];
+        let count = (length_m / PART_M).ceil().max(1.0);
+        let of_blade = |(blade, leg): (Blade, SwitchLeg)| {
+            (0..count as u32).filter_map(move |k| {
+                let behind_m = [k, k + 1].map(|k| length_m * f64::from(k) / count);
+                let place = |open_m: f64, behind_m: f64| {
+                    blade.place(network, behind_m, open_m * (1.0 - behind_m / length_m))
+                };
+                let ends =
+                    |open_m| Some([place(open_m, behind_m[0])?, place(open_m, behind_m[1])?]);
+                Some(Part {
+                    leg,
+                    closed: ends(0.0)?,
+                    open: ends(OPEN_M)?,
+                })
+            })
         };
-        let (a, b) = (end(behind_m[0])?, end(behind_m[1])?);
+        let blades = blades(network, switch).into_iter().zip(legs);
+        let parts: Vec<Part> = blades.flat_map(of_blade).collect();
+        let tip = parts.first()?.closed[0];
+        Some(Self { tip, parts })
+    }
+
+    /// So far on the way (0 to 1) from the through to the diverging leg.
+    pub fn bodies(&self, share: f64) -> impl Iterator<Item = Body> + '_ {
+        self.parts.iter().map(move |part| {
+            let open = match part.leg {
+                SwitchLeg::Through => share,
+                SwitchLeg::Diverging => 1.0 - share,
+            };
+            part.body(open)
+        })
+    }
+}
+
+impl Part {
+    /// A share of the way open.
+    fn body(&self, open: f64) -> Body {
+        let [a, b] = [0, 1].map(|k| self.closed[k] + (self.open[k] - self.closed[k]) * open);
         let along = b - a;
-        let level = along.xy().norm();
-        let turn = Rotation3::from_euler_angles(0.0, -along.z.atan2(level), along.y.atan2(along.x));
+        let rise = along.z.atan2(along.xy().norm());
+        let turn = Rotation3::from_euler_angles(0.0, -rise, along.y.atan2(along.x));
         let half = Vector3::new(0.5 * along.norm(), HALF_WIDTH_M, -0.5 * (BED_M + LOWER_M));
-        Some(Body {
+        Body {
             shape: Shape::Box(half),
             world_from_body: Isometry3::from_parts(
                 center(&a, &b).into(),
@@ -141,7 +167,17 @@ impl Blade {
             velocity_mps: Vector3::zeros(),
             albedo: mean_albedo(Material::Rail),
             luminance_cd_m2: 0.0,
-        })
+        }
+    }
+}
+
+impl Blade {
+    /// The middle of its web so far behind the toe and so far from where it is closed.
+    fn place(&self, network: &Network, behind_m: f64, open_m: f64) -> Option<Point3<f64>> {
+        let track = network.track(self.leg.track)?;
+        let s_m = network.chainage_behind(self.leg, behind_m)?;
+        let (l_m, h_m) = (RAIL_OFFSET_M - open_m, 0.5 * (BED_M - LOWER_M));
+        Some((track.alignment.at(s_m)).world_from_section(self.side.sign() * l_m, h_m))
     }
 }
 
@@ -150,7 +186,6 @@ impl Blade {
 mod tests {
     use super::*;
     use crate::track::{Alignment, CrossSection, PlanElement, TrackId};
-    use nalgebra::Point3;
 
     /// 100 m, then a switch to the left of a radius of 200 m.
     fn network() -> Network {
@@ -216,7 +251,8 @@ mod tests {
                 -RAIL_OFFSET_M + 0.5 * OPEN_M,
             ),
         ] {
-            let bodies = bodies(&network, switch, share);
+            let blades = SwitchBlades::of(&network, switch).unwrap();
+            let bodies: Vec<Body> = blades.bodies(share).collect();
             let first = |k: usize| tip(&bodies[k * bodies.len() / 2]);
             for (tip, l_m) in [(first(0), through_m), (first(1), diverging_m)] {
                 assert!(

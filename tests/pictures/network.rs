@@ -4,8 +4,9 @@
 use crate::common::sample;
 use crate::gpu_vs_cpu::{compare, scaled};
 use metrotwin::track::{Track, TrackPoint, Tunnel};
+use metrotwin::twin::blades::{SwitchBlades, tracks_without_blades};
+use metrotwin::twin::lamps;
 use metrotwin::twin::render::{CameraMotion, Job, Scene};
-use metrotwin::twin::{blades, lamps};
 use std::sync::Arc;
 
 fn terminus() -> Tunnel {
@@ -15,7 +16,7 @@ fn terminus() -> Tunnel {
 
 fn scene(tunnel: &Tunnel) -> Scene {
     Scene {
-        tracks: blades::tracks_without_blades(&tunnel.network),
+        tracks: tracks_without_blades(&tunnel.network),
         lamps: lamps::shining(tunnel, &[], 1),
         ..sample::scene()
     }
@@ -46,7 +47,11 @@ fn seen_from(tunnel: &Tunnel, device: &str, gain: f64) -> Job {
     scaled(&mut job.views[0], gain, 2);
     let switches = tunnel.network.switches.iter().enumerate();
     job.bodies = switches
-        .flat_map(|(k, switch)| blades::bodies(&tunnel.network, switch, 0.25 * (k % 5) as f64))
+        .flat_map(|(k, switch)| {
+            let blades = SwitchBlades::of(&tunnel.network, switch).unwrap();
+            let bodies: Vec<_> = blades.bodies(0.25 * (k % 5) as f64).collect();
+            bodies
+        })
         .collect();
     job
 }

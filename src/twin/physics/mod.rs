@@ -118,6 +118,7 @@ use crate::bus::{SimTime, TrainCommand, TrainId};
 use crate::settings::Settings;
 use crate::track::Tunnel;
 use crate::track::network::Network;
+use crate::twin::blades::SwitchBlades;
 use interlocking::{Interlocking, Verdict};
 use rapier3d_f64::math::Vector;
 use rapier3d_f64::prelude::PhysicsWorld;
@@ -136,6 +137,8 @@ pub struct World {
     carrier: Option<carrier::Carrier>,
     surroundings: Surroundings,
     interlocking: Interlocking,
+    /// Of each switch.
+    blades: Vec<Option<SwitchBlades>>,
     rails: Arc<Rails>,
     time: SimTime,
     step: SimTime,
@@ -165,6 +168,9 @@ impl World {
         let rails = Arc::new(Rails::new(&tunnel.network, &settings.track, [seed, index]));
         let mut world = Self {
             trains: trains(&mut rapier, &tunnel, &rails, settings, step_s)?,
+            blades: (tunnel.network.switches.iter())
+                .map(|switch| SwitchBlades::of(&tunnel.network, switch))
+                .collect(),
             tunnel,
             rapier,
             carrier: None,

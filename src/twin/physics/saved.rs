@@ -28,6 +28,7 @@ impl Clone for World {
             carrier: self.carrier.clone(),
             surroundings: self.surroundings.clone(),
             interlocking: self.interlocking.clone(),
+            blades: self.blades.clone(),
             rails: self.rails.clone(),
             time: self.time,
             step: self.step,

@@ -6,7 +6,6 @@ use super::obstacle_body::{ObstacleBody, Rest};
 use super::{Impact, World};
 use crate::bus::{SimTime, TrainId};
 use crate::track::TrackId;
-use crate::twin::blades;
 use crate::twin::geometry::Body;
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -92,11 +91,6 @@ impl World {
     pub fn owned_bodies(&self, without: Option<TrainId>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
         let (network, now_s) = (&self.tunnel.network, self.time.secs());
         let mut owned = self.surroundings.draw(&self.rapier, network, now_s);
-        for (k, switch) in network.switches.iter().enumerate() {
-            let (owner, name) = (BodyOwner::Blade(k), switch.name.as_str());
-            let blades = blades::bodies(network, switch, self.switch_share(k)).into_iter();
-            owned.extend(blades.map(|body| (body, BodyLabel { owner, name })));
-        }
         // The order may decide pixels: the first train comes last.
         let trains = self.trains.iter().skip(1).chain(self.trains.first());
         for train in trains.filter(|train| Some(train.consist.id) != without) {
@@ -111,6 +105,21 @@ impl World {
             }
         }
         owned.into_iter().unzip()
+    }
+
+    /// The blades of all switches, or of those within a distance of a place, each with its label.
+    pub fn blades(&self, near: Option<(&[Point3<f64>], f64)>) -> (Vec<Body>, Vec<BodyLabel<'_>>) {
+        let is_near = |tip: &Point3<f64>| {
+            near.is_none_or(|(places, away_m)| places.iter().any(|p| (tip - p).norm() < away_m))
+        };
+        let switches = self.tunnel.network.switches.iter().zip(&self.blades);
+        let drawn = switches.enumerate().filter_map(|(k, (switch, blades))| {
+            let blades = blades.as_ref().filter(|blades| is_near(&blades.tip))?;
+            let (owner, name) = (BodyOwner::Blade(k), switch.name.as_str());
+            let bodies = blades.bodies(self.switch_share(k));
+            Some(bodies.map(move |body| (body, BodyLabel { owner, name })))
+        });
+        drawn.flatten().unzip()
     }
 
     /// Obstacles that are there now: what lies, falls or swings. What is still fixed to the lining
