@@ -8,7 +8,7 @@ use super::images::WaysidePaths;
 use super::recording_file::SIM_TIME;
 use super::stream::RowStream;
 use super::whole_files::{Result, failed};
-use super::{Contents, images, path_of, plots, scene, texts};
+use super::{Contents, images, map, path_of, plots, scene, texts};
 use crate::bus::TrainId;
 use re_sdk_types::blueprint::archetypes::{
     Background, ContainerBlueprint, EyeControls3D, LineGrid3D, PanelBlueprint, PlotLegend,
@@ -66,7 +66,12 @@ impl Pane {
 }
 
 /// Sends the layout for what this run has.
-pub(super) fn send(stream: &RowStream, contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Result {
+pub(super) fn send(
+    stream: &RowStream,
+    contents: &[Contents],
+    eye: ([f32; 3], [f32; 3]),
+    has_map: bool,
+) -> Result {
     let id = StoreId::new(StoreKind::Blueprint, stream.application().clone(), "layout");
     let (rerun, messages) = RecordingStreamBuilder::from_store_id(&id)
         .enabled(true)
@@ -76,14 +81,14 @@ pub(super) fn send(stream: &RowStream, contents: &[Contents], eye: ([f32; 3], [f
     rerun.set_log_time_enabled(false);
     rerun.set_log_tick_enabled(false);
     rerun.set_time_sequence("blueprint", 0);
-    write(&rerun, &layout(contents, eye)).map_err(failed("writing the layout"))?;
+    write(&rerun, &layout(contents, eye, has_map)).map_err(failed("writing the layout"))?;
     stream.blueprint(messages.take(), id);
     Ok(())
 }
 
 /// The panes for a window of 1600 x 1000: where the first train is on the left, what the cameras see
 /// and the stack says on the right. What there is of each train is in tabs.
-fn layout(contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Node {
+fn layout(contents: &[Contents], eye: ([f32; 3], [f32; 3]), has_map: bool) -> Node {
     let mut right = Vec::new();
     let rigs = contents.iter().filter(|train| train.rig);
     let rigs: Vec<_> = rigs.map(|train| named(train.id, eyes(train.id))).collect();
@@ -104,7 +109,11 @@ fn layout(contents: &[Contents], eye: ([f32; 3], [f32; 3])) -> Node {
     }
     right.push((2.6, row(words)));
 
-    let mut left = vec![(4.4, Node::Pane(world(first, eye)))];
+    let mut places = vec![Node::Pane(world(first, eye))];
+    if has_map {
+        places.push(Node::Pane(Pane::new("Map", "Map", map::ROOT)));
+    }
+    let mut left = vec![(4.4, tabbed(places))];
     if let [only] = contents {
         left.extend(plots(only));
     } else {

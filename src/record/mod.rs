@@ -34,6 +34,7 @@ pub mod dataset;
 mod image_encoder;
 mod images;
 mod listing;
+mod map;
 mod moving;
 mod palette;
 pub mod parquet;
@@ -58,6 +59,7 @@ use crate::bus::{Content, Message, Node, SimTime, TrainId};
 use crate::scenario::RecordSettings;
 use crate::session::{Event, Observer, Opening, TrainOpening};
 use images::Images;
+use map::Map;
 use moving::Moving;
 use nalgebra::Isometry3;
 use plots::{Plots, RIG_CAMERA};
@@ -223,6 +225,7 @@ struct Open {
     /// With the first train goes what belongs to none.
     views: BTreeMap<TrainId, TrainView>,
     texts: Texts,
+    map: Option<Map>,
 }
 
 impl Open {
@@ -246,6 +249,7 @@ impl Open {
             laid_out: false,
             flush_at: SimTime::ZERO.plus(FLUSH_S),
             texts: Texts::open(stream.clone(), opening)?,
+            map: Map::open(&stream, opening.tunnel)?,
             stream,
             contents,
             scene,
@@ -262,6 +266,9 @@ impl Open {
                 if let Some(view) = self.view(train) {
                     view.moving.train(truth, left_eye);
                     view.plots.train(truth);
+                }
+                if let Some(map) = &mut self.map {
+                    map.train(train, truth)?;
                 }
                 if train == TrainId::default() {
                     self.lay_out(Some(&truth.world_from_vehicle))?;
@@ -376,7 +383,7 @@ impl Open {
         }
         self.laid_out = true;
         let eye = self.scene.eye(self.first_camera.as_ref(), head);
-        blueprint::send(&self.stream, &self.contents, eye)
+        blueprint::send(&self.stream, &self.contents, eye, self.map.is_some())
     }
 
     /// Rows first, then columns: each batch is cut before the next begins, so that the order in

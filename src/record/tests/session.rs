@@ -4,6 +4,7 @@
 
 use crate::bus::*;
 use crate::session::{Event, Observer, Opening, TrainOpening};
+use crate::track::geodesy::{Datum, Geodetic};
 use crate::track::uid::Uid;
 use crate::track::{
     Alignment, Balise, Grade, Place, PlanElement, Track, TrackId, TrackPoint, Tunnel,
@@ -34,7 +35,18 @@ const SIZE: (u32, u32) = (160, 90);
 
 /// A straight, a transition and a curve of 400 m radius, on a grade.
 pub(crate) fn tunnel() -> Tunnel {
-    Tunnel::of_one(track())
+    let place = Geodetic {
+        latitude_deg: 30.6,
+        longitude_deg: 104.1,
+        height_m: 500.0,
+    };
+    Tunnel {
+        datum: Some(Datum {
+            place,
+            heading_deg: 0.0,
+        }),
+        ..Tunnel::of_one(track())
+    }
 }
 
 fn track() -> Track {
@@ -230,6 +242,12 @@ impl Session<'_> {
         self.event(&Event::Bodies {
             time: SimTime::from_secs(t_s),
             bodies: &bodies,
+        });
+        let blade = Shape::Box(Vector3::new(1.2, 0.02, 0.08));
+        let blade = body(blade, self.place(OBSTACLE_M, 0.7, -0.08));
+        self.event(&Event::Blades {
+            time: SimTime::from_secs(t_s),
+            bodies: &[blade],
         });
     }
 
