@@ -2,6 +2,7 @@
 
 use super::adapter::Gpu;
 use super::mesh::{Fineness, Mesh};
+use super::view::Framed;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use std::ops::Range;
@@ -12,7 +13,7 @@ pub struct BodyMeshes {
     pub vertices: wgpu::Buffer,
     /// Triangles.
     pub indices: wgpu::Buffer,
-    /// Range of indices of each body.
+    /// Range of indices of each body; empty for those that no view may see.
     pub ranges: Vec<Range<u32>>,
 }
 
@@ -21,8 +22,17 @@ impl BodyMeshes {
     pub fn new(gpu: &Gpu, job: &Job, scene: &LitScene) -> Self {
         let mut mesh = Mesh::default();
         let mut ranges = Vec::new();
+        let views = job.views.iter().filter(|_| !job.bodies.is_empty());
+        let views: Vec<_> = views.map(Framed::new).collect();
         for body in &job.bodies {
             let first = mesh.indices.len() as u32;
+            if !views
+                .iter()
+                .any(|framed| framed.may_see_body(body, job.time))
+            {
+                ranges.push(first..first);
+                continue;
+            }
             let fineness = Fineness::of(body, &job.views);
             let place = body.world_from_body.translation.vector.into();
             mesh.add_body(body, &scene.lamps, scene.ambient_lx(&place), fineness);

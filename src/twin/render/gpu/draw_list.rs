@@ -137,7 +137,8 @@ impl DrawList {
         if let Some(sky) = &in_sight.sky {
             list.add_sky(framed, sky);
         }
-        for (body, range) in job.bodies.iter().zip(&bodies.ranges) {
+        let seen = job.bodies.iter().zip(&bodies.ranges);
+        for (body, range) in seen.filter(|(_, range)| !range.is_empty()) {
             list.calls.push(DrawCall {
                 chunk: None,
                 part: 0,

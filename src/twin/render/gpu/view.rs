@@ -3,7 +3,8 @@
 
 use super::layout::{self, MAX_HEADLIGHTS, Pose};
 use super::rectangle::Rectangle;
-use crate::bus::Intrinsics;
+use crate::bus::{Intrinsics, SimTime};
+use crate::twin::geometry::Body;
 use crate::twin::lights::Headlight;
 use crate::twin::render::pixel_map::Dark;
 use crate::twin::render::scene::{Job, View};
@@ -177,6 +178,17 @@ impl<'a> Framed<'a> {
         let c = self.middle.inverse_transform_point(centre).coords;
         let reach_m = radius_m + self.slack_m(&c);
         c.z > -reach_m && self.borders.iter().all(|n| n.dot(&c) > -reach_m)
+    }
+
+    /// Whether any row may see a body that is where it is at a time.
+    pub fn may_see_body(&self, body: &Body, time: SimTime) -> bool {
+        let centre = Point3::from(body.world_from_body.translation.vector);
+        let rows = self.view.camera.intrinsics.height_px;
+        let shutter = &self.view.camera.shutter;
+        let end = self.view.start.plus(shutter.frame_span_s(rows));
+        let longest_s = [self.view.start, end].map(|at| at.since(time).abs());
+        let way_m = body.velocity_mps.norm() * longest_s[0].max(longest_s[1]);
+        self.may_see(&centre, body.shape.half_extents_m().norm() + way_m)
     }
 
     /// Whether any row may see what lies between some places.
