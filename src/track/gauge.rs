@@ -5,7 +5,7 @@
 //! here eight keep their governing widths (platform edge at 1.5 m below floor level, equipment at
 //! 1.6 m above it, 0.2 m over the roof). In curves it widens by what a car's ends swing out.
 
-use super::section::{BED_M, CrossSection, Material, OutlinePoint};
+use super::section::{BED_M, CrossSection, Material, OutlinePoint, SectionRange, Side};
 
 /// Distance of a rail's centre from the centreline (1435 mm gauge and a 70 mm head).
 pub const RAIL_OFFSET_M: f64 = 0.7525;
@@ -108,6 +108,16 @@ impl Gauge {
         right
             .chain(HALF_WIDTHS.iter().rev().map(corner(1.0)))
             .collect()
+    }
+}
+
+impl SectionRange {
+    /// Centres of the rails that lie in it, left of the centreline.
+    pub fn rails_m(&self) -> impl Iterator<Item = f64> + use<> {
+        let missing = self.missing_rail;
+        let sides = [Side::Left, Side::Right].into_iter();
+        let fixed = sides.filter(move |side| missing != Some(*side));
+        fixed.map(|side| side.sign() * RAIL_OFFSET_M)
     }
 }
 

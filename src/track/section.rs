@@ -1,6 +1,5 @@
 //! Cross-sections: the outline of a tunnel as seen along the line.
 
-use super::gauge::RAIL_OFFSET_M;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
@@ -87,16 +86,6 @@ pub struct SectionRange {
     pub missing_rail: Option<Side>,
     /// The outline.
     pub section: CrossSection,
-}
-
-impl SectionRange {
-    /// Centres of the rails that lie in it, left of the centreline.
-    pub fn rails_m(&self) -> impl Iterator<Item = f64> + use<> {
-        let missing = self.missing_rail;
-        let sides = [Side::Left, Side::Right].into_iter();
-        let fixed = sides.filter(move |side| missing != Some(*side));
-        fixed.map(|side| side.sign() * RAIL_OFFSET_M)
-    }
 }
 
 /// One straight piece of an outline.

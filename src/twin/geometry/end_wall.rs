@@ -1,23 +1,8 @@
-//! Walls across the line: what closes a cross-section where it ends and what follows is narrower.
-//!
-//! Such a wall is the free space on its side of a station's plane without that beyond it, whichever track
-//! that is of. Where nothing goes on, as at the ends of a line, there is none: the tunnel leads into the
-//! dark. An open section is taken to end [`PARAPET_M`] over the highest tunnel that it meets, so that a portal has
-//! a headwall.
+//! A wall across the line, which closes a cross-section where it ends and what follows is narrower.
 
-use super::free_space::{Trapezoid, free_space, without};
-use super::track_caster::{Segment, TrackCaster};
+use super::free_space::Trapezoid;
 use crate::track::{BED_M, CrossSection, Direction, Material};
 use nalgebra::{Point3, Vector2, Vector3};
-
-/// A headwall rises this far over the tunnel.
-const PARAPET_M: f64 = 1.0;
-/// What begins within this distance beyond a plane begins at it.
-const BEGINS_M: f64 = 0.05;
-/// Tracks at an angle of a smaller cosine to the line have no part in a wall.
-const LEAST_COSINE: f64 = 0.5;
-/// Tracks whose stations are all farther away are not looked at.
-const ASIDE_M: f64 = 60.0;
 
 /// A wall across a track.
 #[derive(Clone, Debug)]
@@ -80,7 +65,7 @@ impl EndWall {
 
 impl WallPaint {
     /// That of the highest upright wall of a section, if it has any.
-    fn of(range: usize, section: &CrossSection) -> Option<Self> {
+    pub(super) fn of(range: usize, section: &CrossSection) -> Option<Self> {
         let mut q_m = 0.0;
         let mut best: Option<(f64, Self)> = None;
         for edge in section.edges() {
@@ -104,144 +89,5 @@ impl WallPaint {
     /// Where the paint of a place of a wall is on the painting: along the line and along the outline.
     pub fn place_m(&self, s_m: f64, l_m: f64, h_m: f64) -> [f64; 2] {
         [s_m + l_m, self.foot_m + self.rise * (h_m - BED_M)]
-    }
-}
-
-/// All end walls, each with its track and station.
-pub(super) fn end_walls(tracks: &[TrackCaster]) -> Vec<(usize, usize, EndWall)> {
-    let mut walls = Vec::new();
-    for (number, track) in tracks.iter().enumerate() {
-        for station in track.borders() {
-            for looking in [Direction::Up, Direction::Down] {
-                let border = Border {
-                    tracks,
-                    number,
-                    station,
-                    looking,
-                };
-                walls.extend(border.wall().map(|wall| (number, station, wall)));
-            }
-        }
-    }
-    walls
-}
-
-/// Whether a track's own tunnel ends without anything beyond, at its begin and at its end.
-pub(super) fn leads_into_dark(tracks: &[TrackCaster], number: usize) -> [bool; 2] {
-    let last = tracks[number].stations.len().saturating_sub(1);
-    [(0, Direction::Down), (last, Direction::Up)].map(|(station, looking)| {
-        let border = Border {
-            tracks,
-            number,
-            station,
-            looking,
-        };
-        border.others().is_empty()
-    })
-}
-
-/// One side of a place at which a cross-section of a track ends.
-struct Border<'a> {
-    tracks: &'a [TrackCaster],
-    number: usize,
-    station: usize,
-    looking: Direction,
-}
-
-impl Border<'_> {
-    fn wall(&self) -> Option<EndWall> {
-        let track = &self.tracks[self.number];
-        let before = self.station.checked_sub(1);
-        let (here, beyond) = match self.looking {
-            Direction::Up => (before, Some(self.station)),
-            Direction::Down => (Some(self.station), before),
-        };
-        let (range, section) = track.own_section(here?)?;
-        let next = beyond.and_then(|segment| track.own_section(segment));
-        let others = self.others();
-        let sections = || {
-            let others = others.iter().filter_map(|(track, k)| track.own_section(*k));
-            next.into_iter().chain(others).map(|(_, section)| section)
-        };
-        sections().next()?;
-        let top_m = top_m(section, sections());
-        let own = next.map(|(_, section)| free_space(section, top_m));
-        let plane = track.plane(self.station);
-        let others = others
-            .iter()
-            .filter_map(|(track, k)| track.free_space_in(*k, &plane, top_m));
-        let beyond: Vec<_> = own.into_iter().chain(others).collect();
-        let pieces = without(&free_space(section, top_m), &beyond);
-        let paint = WallPaint::of(range, section)
-            .or_else(|| next.and_then(|(range, section)| WallPaint::of(range, section)))?;
-        (!pieces.is_empty()).then(|| EndWall {
-            s_m: track.stations[self.station].s_m,
-            seen_looking: self.looking,
-            range,
-            pieces,
-            paint,
-        })
-    }
-
-    /// Other tracks that go on just beyond the plane, each with its segment there.
-    fn others(&self) -> Vec<(&TrackCaster, usize)> {
-        let plane = self.tracks[self.number].plane(self.station);
-        let ahead = Vector3::new(plane.forward.x, plane.forward.y, 0.0);
-        let place = plane.origin + ahead * (BEGINS_M * self.looking.sign());
-        let others = self.tracks.iter().enumerate();
-        let near = others.filter(|(k, track)| {
-            *k != self.number && !track.is_empty() && track.away_m(&place) < ASIDE_M
-        });
-        let at = near.map(|(_, track)| (track, track.segment_of(&place, None)));
-        let goes_on = |track: &TrackCaster, segment: usize| {
-            let chord = &track.segments[segment].chord;
-            track.ahead_of(segment, &place) >= 0.0
-                && track.ahead_of(segment + 1, &place) <= 0.0
-                && chord.dot(&plane.forward).abs() > LEAST_COSINE
-        };
-        at.filter(|(track, segment)| goes_on(track, *segment))
-            .collect()
-    }
-}
-
-/// Where the free space of open sections ends that meet others.
-fn top_m<'a>(section: &'a CrossSection, others: impl Iterator<Item = &'a CrossSection>) -> f64 {
-    let highest = |section: &CrossSection| {
-        let heights = section.points.iter().map(|p| p.h_m);
-        let parapet_m = if section.closed { PARAPET_M } else { 0.0 };
-        heights.fold(BED_M, f64::max) + parapet_m
-    };
-    others.map(highest).fold(highest(section), f64::max)
-}
-
-impl TrackCaster {
-    /// The free space of a segment, carried along it into a plane: left and up of the plane's origin.
-    fn free_space_in(
-        &self,
-        segment: usize,
-        plane: &Plane,
-        top_m: f64,
-    ) -> Option<Vec<Vector2<f64>>> {
-        let (_, section) = self.own_section(segment)?;
-        let (
-            origin,
-            Segment {
-                chord, left, slope, ..
-            },
-        ) = (self.stations[segment].origin, &self.segments[segment]);
-        let along = Vector3::new(chord.x, chord.y, *slope);
-        let carried = |lh: Vector2<f64>| {
-            let from = origin + Vector3::new(left.x * lh.x, left.y * lh.x, lh.y);
-            let past_m = plane.forward.dot(&(from - plane.origin).xy());
-            let at = from - along * (past_m / plane.forward.dot(chord));
-            let (l_m, h_m) = plane.across(&at);
-            Vector2::new(l_m, h_m)
-        };
-        Some(
-            free_space(section, top_m)
-                .into_iter()
-                .map(carried)
-                .collect(),
-        )
     }
 }

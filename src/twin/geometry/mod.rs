@@ -2,6 +2,7 @@
 //! ([`TunnelCaster`]). Physics, sensors and renderers share it.
 
 mod body;
+mod borders;
 mod end_wall;
 mod free_space;
 mod hull;

@@ -1,7 +1,8 @@
 //! A ray in a network of tunnels: from one track's tunnel to another's where their cross-sections open into each
 //! other, and over the rails of tracks that share a cross-section.
 
-use super::end_wall::{EndWall, end_walls, leads_into_dark};
+use super::borders::{end_walls, leads_into_dark};
+use super::end_wall::EndWall;
 use super::track_caster::{Followed, TrackCaster, TrackHit};
 use super::track_surface::SurfacePoint;
 use crate::track::Track;
