@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn light_on_a_surface_is_that_of_sky_and_ground() {
         let daylight = daylight().unwrap_or_default();
-        for tilt in [0.0_f64, 0.4, 1.1, 1.5707963, 2.3, 3.1415926] {
+        for tilt in [0.0_f64, 0.4, 1.1, 0.5 * PI, 2.3, PI] {
             let normal = Vector3::new(tilt.sin(), 0.0, tilt.cos());
             let (steps, mut sum) = (400, 0.0);
             for i in 0..steps {
