@@ -230,7 +230,7 @@ mod tests {
         assert!(crossings.next().is_none());
         let properties = &crossing["properties"];
         assert_eq!(properties["tracks"], json!(["A", "B"]));
-        assert_eq!(properties["stated_chainages"], json!(["A1+033.695", null]));
+        assert_eq!(properties["stated_chainages"], json!(["A1+033.694", null]));
         for k in [0, 1] {
             let name = properties["tracks"][k].as_str().unwrap();
             let s_m = properties["chainages_m"][k].as_f64().unwrap();

@@ -25,6 +25,7 @@ fn two_tracks(start: &str, plan: &str, crossings: &str) -> Vec<Problem> {
 {crossings}
 [[track]]
 name = \"a\"
+start = {{}}
 plan = [{{ kind = \"straight\", length_m = 400.0 }}]
 sections = [{{ kind = \"open\", from_m = 0.0, width_m = 20.0 }}]
 [[track]]
@@ -86,7 +87,7 @@ fn tracks_that_cross_twice_say_where() {
         told(
             &found,
             "crossings[0].tracks",
-            "cross at 70.6 m, 229.4 m of `a`"
+            "cross at 69.8 m, 230.2 m of `a`"
         ),
         "{found:#?}"
     );
@@ -146,12 +147,8 @@ plan = [{ kind = \"straight\", length_m = 100.0 }]
 sections = [{ kind = \"open\", from_m = 0.0, width_m = 40.0 }]
 start = { east_m = 124.0, north_m = -50.0, heading_deg = 90.0 }\n";
     let found = problems(&format!("{SCISSORS}\n{square}"));
-    let said = "its rails begin 3.2 m behind the toe of switch `W1`, whose blades reach to 7.25 m";
-    assert!(
-        told(&found, "crossings[1].tracks", &said.replace("7.25", "7.2"))
-            || told(&found, "crossings[1].tracks", said),
-        "{found:#?}"
-    );
+    let said = "its rails begin 3.2 m behind the toe of switch `W1`, whose blades reach to 7.";
+    assert!(told(&found, "crossings[1].tracks", said), "{found:#?}");
 }
 
 /// Provokes: a fault of an entry that passes, or is told of another key.
@@ -201,6 +198,9 @@ fn every_fault_of_a_crossing_is_reported_with_its_key() {
         told(&twice, "crossings[1].name", "name of `crossings[0]` too"),
         "{twice:#?}"
     );
-    let three = SCISSORS.replacen("[\"A\", \"B\"]", "[\"A\", \"B\", \"u2\"]", 1);
-    assert!(Tunnel::from_toml(&three).is_err());
+    let three = problems(&SCISSORS.replacen("[\"A\", \"B\"]", "[\"A\", \"B\", \"u2\"]", 1));
+    assert!(
+        told(&three, "crossings[0].tracks", "names 3 tracks"),
+        "{three:#?}"
+    );
 }

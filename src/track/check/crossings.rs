@@ -42,9 +42,12 @@ pub(super) fn crossings(
 
 /// Where the tracks of an entry cross; a problem where they do not, or where it does not say which place it is.
 fn crossing(entry: &CrossingEntry, network: &Network, check: &mut Checker<'_>) -> Option<Crossing> {
-    let tracks = tracks(entry, network, check)?;
+    // Another count of names has its problem already.
+    let [first, second] = &entry.tracks[..] else {
+        return None;
+    };
+    let tracks = tracks([first, second], network, check)?;
     let found = network.crossed_at_m(tracks);
-    let [first, second] = &entry.tracks;
     let at_m = match (&found[..], entry.near_m) {
         ([], _) => {
             let what = format!("tracks `{first}` and `{second}` do not cross each other in plan");
@@ -79,39 +82,21 @@ fn crossing(entry: &CrossingEntry, network: &Network, check: &mut Checker<'_>) -
 }
 
 /// The two tracks that an entry names.
-fn tracks(
-    entry: &CrossingEntry,
-    network: &Network,
-    check: &mut Checker<'_>,
-) -> Option<[TrackId; 2]> {
-    let found = [0, 1].map(|k| network.named(&entry.tracks[k]));
-    for (k, _) in found
-        .iter()
-        .enumerate()
-        .filter(|(_, track)| track.is_none())
-    {
-        let name = &entry.tracks[k];
-        let names = network.tracks.iter().map(|track| track.name.clone());
-        let remedy = name_advice(
-            name,
-            &names.collect::<Vec<_>>(),
-            "the tracks are",
-            "name a track",
-        );
-        check.problem(
-            &format!("tracks[{k}]"),
-            format!("there is no track `{name}`"),
-            remedy,
-        );
+fn tracks(names: [&String; 2], network: &Network, check: &mut Checker<'_>) -> Option<[TrackId; 2]> {
+    let found = names.map(|name| network.named(name));
+    let unknown = names.iter().zip(found).enumerate();
+    for (k, (name, _)) in unknown.filter(|(_, (_, track))| track.is_none()) {
+        let known = network.tracks.iter().map(|track| track.name.clone());
+        let known: Vec<String> = known.collect();
+        let remedy = name_advice(name, &known, "the tracks are", "name a track");
+        let what = format!("there is no track `{name}`");
+        check.problem(&format!("tracks[{k}]"), what, remedy);
     }
     let [Some(first), Some(second)] = found else {
         return None;
     };
     if first == second {
-        let what = format!(
-            "both are `{}`, and no track crosses itself",
-            entry.tracks[0]
-        );
+        let what = format!("both are `{}`, and no track crosses itself", names[0]);
         check.problem("tracks", what, "name two tracks");
         return None;
     }
@@ -171,10 +156,11 @@ fn check_room(crossing: &Crossing, network: &Network, check: &mut Checker<'_>) {
         if from_m < 0.0 || to_m > length_m {
             let name = &track.name;
             let what = format!(
-                "trains are in each other's way from {from_m:.1} to {to_m:.1} m of track `{name}`, which goes from 0 to \
-                 {length_m:.1} m"
+                "trains are in each other's way from {from_m:.1} to {to_m:.1} m of track `{name}`, which goes from 0 \
+                 to {length_m:.1} m"
             );
-            let remedy = "let both tracks go on until trains on them are clear of each other, or cross at a greater angle";
+            let remedy = "let both tracks go on until trains on them are clear of each other, or cross at a greater \
+                          angle";
             check.problem("tracks", what, remedy);
         }
     }

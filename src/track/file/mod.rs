@@ -131,7 +131,8 @@ settings! {
         /// Its name.
         name: String;
         /// Names of the two tracks.
-        tracks: [String; 2];
+        #[schemars(length(equal = 2))]
+        tracks: Vec<String>;
         /// Chainage of the first of them near which they cross, metres. To be given where they cross more than once.
         near_m: Option<f64>, in 0.0..=1e6;
     }
@@ -141,6 +142,10 @@ settings! {
 impl CrossingEntry {
     fn check_names(&self, check: &mut Checker<'_>) {
         check_name(&self.name, check);
+        if self.tracks.len() != 2 {
+            let what = format!("names {} tracks, and two cross", self.tracks.len());
+            check.problem("tracks", what, "name the two tracks");
+        }
     }
 }
 

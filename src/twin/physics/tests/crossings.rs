@@ -5,14 +5,17 @@ use super::*;
 
 const SECOND: TrainId = TrainId(1);
 
-/// Two trains over both crossovers of a scissors crossover, whose switches are at 120 m; the first one's head is at
-/// 100 m of its track.
-fn over_the_crossing(second_m: f64, interlocking: InterlockingSettings) -> World {
+/// Two trains over both crossovers of a scissors crossover, whose switches are at 120 m: where their heads start, and
+/// their speeds in km/h.
+fn over_the_crossing(
+    [first, second]: [(f64, f64); 2],
+    interlocking: InterlockingSettings,
+) -> World {
     let text = include_str!("../../../../tests/tunnels/scissors.toml");
     let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
     let trains = vec![
-        train(("u1", 100.0), &["A"], ("d3", 150.0), 30.0),
-        train(("d1", second_m), &["B"], ("u3", 150.0), 30.0),
+        train(("u1", first.0), &["A"], ("d3", 80.0), first.1),
+        train(("d1", second.0), &["B"], ("u3", 80.0), second.1),
     ];
     let settings = PhysicsSettings {
         interlocking,
@@ -24,7 +27,10 @@ fn over_the_crossing(second_m: f64, interlocking: InterlockingSettings) -> World
 /// Provokes: two trains on a crossing, one that waits in the gauge of the other, or for ever.
 #[test]
 fn a_train_waits_before_a_crossing_that_is_not_its_own() {
-    let mut world = over_the_crossing(70.0, InterlockingSettings::default());
+    let mut world = over_the_crossing(
+        [(100.0, 15.0), (70.0, 30.0)],
+        InterlockingSettings::default(),
+    );
     let crossing = world.network().crossings[0].clone();
     let length_m = train(("u1", 0.0), &[], ("u1", 0.0), 0.0).length_m();
     let mut waited_at_m = None;
@@ -44,7 +50,7 @@ fn a_train_waits_before_a_crossing_that_is_not_its_own() {
     assert!((14.0..20.0).contains(&before_m), "{before_m}");
     for (id, stop) in [(TRAIN, "d3"), (SECOND, "u3")] {
         let (track, s_m) = at(&world, id);
-        assert!(track == stop && (s_m - 150.0).abs() < 0.3, "{track} {s_m}");
+        assert!(track == stop && (s_m - 80.0).abs() < 0.3, "{track} {s_m}");
     }
     assert_eq!(kinds(&world), []);
     assert!(world.impacts().is_empty());
@@ -56,7 +62,7 @@ fn a_train_waits_before_a_crossing_that_is_not_its_own() {
 #[test]
 fn val_trains_collide_on_a_crossing_without_interlocking() {
     let diverging = ["W1", "W2", "W3", "W4"].map(|name| (name, LegName::Diverging));
-    let mut world = over_the_crossing(100.0, by_hand(&diverging, Vec::new()));
+    let mut world = over_the_crossing([(100.0, 30.0); 2], by_hand(&diverging, Vec::new()));
     let crossing = world.network().crossings[0].clone();
     // They may leave the rails.
     go(&mut world, 8.0);
