@@ -84,6 +84,7 @@ impl Interlocking {
             ..Self::default()
         };
         if settings.automatic {
+            interlocking.keep_occupied(trains);
             interlocking.keep(network, trains, None);
         }
         interlocking
@@ -200,6 +201,17 @@ impl Interlocking {
             return Some(Verdict::Diverted(k));
         }
         None
+    }
+
+    /// Keeps what trains stand on at the start for them, whichever come to it.
+    fn keep_occupied(&mut self, trains: &[Train]) {
+        for (train, way) in trains.iter().zip(&self.ways) {
+            let (head_m, tail_m) = train.consist.stands_m();
+            let claims = way.claims.iter();
+            for claim in claims.filter(|claim| head_m > claim.from_m && tail_m < claim.to_m) {
+                self.kept_for[claim.number].get_or_insert(train.consist.id);
+            }
+        }
     }
 
     /// Keeps switches and crossings for the trains that come to them, in the order of their numbers, sets the
