@@ -1,7 +1,7 @@
 //! The blades of switches: the two rails that move.
 //!
 //! From the toe on, the outer rails of both legs, the stock rails, lie fixed. Of the two others the blade of the
-//! leg that is set lies close to its stock rail, and the other one [`OPEN_M`] away from it at the tip; both turn
+//! leg that is set lies close to its stock rail, and the other one `OPEN_M` away from it at the tip; both turn
 //! about their heels, where the rails are far enough apart to go on by themselves.
 
 use crate::track::network::{Network, Switch, TrackEnd};

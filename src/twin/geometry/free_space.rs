@@ -46,6 +46,7 @@ impl Trapezoid {
             let middle = whole[0] + share * (whole[1] - whole[0]);
             (middle - here[1]).abs() < 1e-9 && (middle - next[0]).abs() < 1e-9
         };
+        #[allow(clippy::float_cmp, reason = "both are of one list of levels")]
         let meet = self.h_m[1] == above.h_m[0];
         let straight = straight(both.right_m, self.right_m, above.right_m)
             && straight(both.left_m, self.left_m, above.left_m);

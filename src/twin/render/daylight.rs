@@ -138,6 +138,7 @@ fn is_beside(line: &[Point3<f64>], p: &Point3<f64>) -> bool {
 mod tests {
     use super::*;
     use crate::track::{Alignment, PlanElement, SectionRange};
+    use std::f64::consts::FRAC_PI_2;
 
     fn daylight() -> Option<Daylight> {
         let plan = [PlanElement::straight(200.0)];
@@ -164,7 +165,7 @@ mod tests {
     #[test]
     fn light_on_a_surface_is_that_of_sky_and_ground() {
         let daylight = daylight().unwrap_or_default();
-        for tilt in [0.0_f64, 0.4, 1.1, 1.5707963, 2.3, 3.1415926] {
+        for tilt in [0.0, 0.4, 1.1, FRAC_PI_2, 2.3, PI] {
             let normal = Vector3::new(tilt.sin(), 0.0, tilt.cos());
             let (steps, mut sum) = (400, 0.0);
             for i in 0..steps {
