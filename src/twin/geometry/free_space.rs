@@ -212,7 +212,8 @@ mod tests {
             }
             // Slivers are left out.
             assert!(wrong <= 4, "{wrong} of 4000");
-            assert!(held > 20, "{a} without {b}: {held}");
+            // Of the bore 0.1 m^2 are beside the trough.
+            assert!(held > 1, "{a} without {b}: {held}");
         }
     }
 }
