@@ -15,6 +15,7 @@ mod tests;
 use super::Network;
 use crate::track::{Alignment, Gauge, Place, RAIL_OFFSET_M, Stretch, TrackFrame, TrackId};
 use nalgebra::{Matrix2, Vector2};
+use std::collections::BTreeMap;
 
 /// Tracks are looked at in chords of this length: 8 cm off a curve of 150 m, which hides no crossing.
 const CHORD_M: f64 = 10.0;
@@ -140,11 +141,17 @@ impl Network {
             return Vec::new();
         };
         let lines = [a, b];
-        let chords = lines.map(chords);
-        let pairs = chords[0]
-            .iter()
-            .flat_map(|a| chords[1].iter().map(move |b| (a, b)));
-        let near = pairs.filter_map(|(a, b)| a.crosses(b));
+        let [chords, others] = lines.map(chords);
+        let mut cells: BTreeMap<(i64, i64), Vec<&Chord>> = BTreeMap::new();
+        for other in &others {
+            cells.entry(other.cell()).or_default().push(other);
+        }
+        let near = chords.iter().flat_map(|chord| {
+            let (i, j) = chord.cell();
+            let around = (i - 1..=i + 1).flat_map(move |i| (j - 1..=j + 1).map(move |j| (i, j)));
+            let others = around.filter_map(|cell| cells.get(&cell)).flatten();
+            others.filter_map(|other| chord.crosses(other))
+        });
         let inside = |at_m: &[f64; 2]| {
             let both = lines.iter().zip(at_m);
             let mut inside =
@@ -264,6 +271,12 @@ fn chords(line: &Alignment) -> Vec<Chord> {
 }
 
 impl Chord {
+    /// Where it begins, on a grid on which chords that cross begin in one cell or in neighbours.
+    fn cell(&self) -> (i64, i64) {
+        let along = |m: f64| (m / (2.0 * CHORD_M)).floor() as i64;
+        (along(self.begin.x), along(self.begin.y))
+    }
+
     /// The chainages at which it crosses another one, about; none where it does not, or lies along it.
     fn crosses(&self, other: &Self) -> Option<[f64; 2]> {
         let to = other.begin - self.begin;

@@ -130,6 +130,21 @@ fn tracks_that_do_not_cross() {
     );
 }
 
+/// Provokes: a search that compares all of a long line with all of another, for minutes.
+#[test]
+fn long_lines_are_searched_in_little_time() {
+    let long = line(-5e5, 0.0, 0.0, PlanElement::straight(1e6));
+    let other = line(-5e5, 50.0, -2e-4, PlanElement::straight(1e6));
+    let network = network([long, other]);
+    let began = std::time::Instant::now();
+    let found = network.crossed_at_m(TRACKS);
+    assert!(began.elapsed().as_secs_f64() < 20.0);
+    assert!(
+        (found[0][0] - 50.0 / 2e-4_f64.tan()).abs() < 1e-3,
+        "{found:?}"
+    );
+}
+
 /// Provokes: a step of rails that is not seen: of a track that climbs, one that leans, one that lies higher.
 #[test]
 fn val_rails_that_cross_at_different_heights() {
