@@ -132,6 +132,7 @@ fn tracks_that_do_not_cross() {
 
 /// Provokes: a search that compares all of a long line with all of another, for minutes.
 #[test]
+#[allow(clippy::disallowed_methods, reason = "it bounds the time of a search")]
 fn long_lines_are_searched_in_little_time() {
     let long = line(-5e5, 0.0, 0.0, PlanElement::straight(1e6));
     let other = line(-5e5, 50.0, -2e-4, PlanElement::straight(1e6));
