@@ -4,6 +4,7 @@ use super::check::read;
 use super::fault::Failure;
 use super::print;
 use crate::track::geodesy::Datum;
+use crate::track::network::{Crossing, Network};
 use crate::track::{Track, TrackPoint, Tunnel};
 use nalgebra::Point3;
 use serde_json::{Value, json};
@@ -26,7 +27,7 @@ pub(super) struct ExportArgs {
 
 #[derive(clap::Subcommand)]
 enum Format {
-    /// GeoJSON (RFC 7946): tracks, switches, lamps, devices, balises, base stations and stations, for maps
+    /// GeoJSON (RFC 7946): tracks, switches, crossings, lamps, devices, balises, base stations and stations, for maps
     Geojson {
         /// Tunnel file with a [datum]
         #[arg(value_name = "TUNNEL")]
@@ -51,7 +52,7 @@ pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
     print(&serde_json::to_string(&collection).map_err(Failure::run)?)
 }
 
-/// What stands on the map: of every track its centreline first; then the switches.
+/// What stands on the map: of every track its centreline first; then the switches and crossings.
 fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
     let network = &tunnel.network;
     let tracks = network.tracks.iter();
@@ -63,7 +64,30 @@ fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
         add_stated(&mut properties, track, [("stated_chainage", toe.s_m)]);
         Some(feature("Point", position(datum, &toe.origin), properties))
     });
-    of_tracks.chain(switches).collect()
+    let crossings = network.crossings.iter();
+    let crossings = crossings.filter_map(|crossing| of_crossing(network, crossing, datum));
+    of_tracks.chain(switches).chain(crossings).collect()
+}
+
+fn of_crossing(network: &Network, crossing: &Crossing, datum: &Datum) -> Option<Value> {
+    let places = crossing.places;
+    let at = network.alignment(places[0].track)?.at(places[0].s_m);
+    let names = places.map(|place| network.track(place.track).map(|track| &*track.name));
+    let mut properties = json!({
+        "kind": "crossing",
+        "name": crossing.name,
+        "tracks": names,
+        "chainages_m": places.map(|place| place.s_m),
+        "angle_deg": crossing.angle_rad.to_degrees(),
+    });
+    let stated = places.map(|place| {
+        let stated = network.track(place.track)?.stated_chainage.as_ref()?;
+        Some(stated.text(place.s_m, 3))
+    });
+    if stated.iter().any(Option::is_some) {
+        properties["stated_chainages"] = json!(stated);
+    }
+    Some(feature("Point", position(datum, &at.origin), properties))
 }
 
 fn feature(shape: &str, coordinates: Value, properties: Value) -> Value {
@@ -190,5 +214,36 @@ mod tests {
         // Of a track that states none.
         is("W3", "stated_chainage", None);
         is("B-u2", "stated_chainage", None);
+    }
+
+    /// Provokes: a crossing that is not on the map, or beside one of its tracks.
+    #[test]
+    fn crossings_lie_on_both_tracks() {
+        let text = include_str!("../../tests/tunnels/scissors.toml");
+        let tunnel = Tunnel::from_toml(text).unwrap();
+        let datum = tunnel.datum.unwrap();
+        let features = features(&tunnel, &datum);
+        let mut crossings = features
+            .iter()
+            .filter(|f| f["properties"]["kind"] == "crossing");
+        let crossing = crossings.next().unwrap();
+        assert!(crossings.next().is_none());
+        let properties = &crossing["properties"];
+        assert_eq!(properties["tracks"], json!(["A", "B"]));
+        assert_eq!(properties["stated_chainages"], json!(["A1+033.694", null]));
+        for k in [0, 1] {
+            let name = properties["tracks"][k].as_str().unwrap();
+            let s_m = properties["chainages_m"][k].as_f64().unwrap();
+            let line = tunnel
+                .network
+                .alignment(tunnel.network.named(name).unwrap())
+                .unwrap();
+            let there = position(&datum, &line.at(s_m).origin);
+            for axis in [0, 1] {
+                let [a, b] = [&there, &crossing["geometry"]["coordinates"]]
+                    .map(|p| p[axis].as_f64().unwrap());
+                assert!((a - b).abs() < 1e-10, "{name}");
+            }
+        }
     }
 }

@@ -33,8 +33,16 @@ impl FileKind {
 }
 
 /// Keys that only tunnels have.
-const TUNNEL_KEYS: [&str; 8] = [
-    "plan", "datum", "grades", "sections", "lamps", "lamp", "balises", "switches",
+const TUNNEL_KEYS: [&str; 9] = [
+    "plan",
+    "datum",
+    "grades",
+    "sections",
+    "lamps",
+    "lamp",
+    "balises",
+    "switches",
+    "crossings",
 ];
 /// Keys that only vehicles have.
 const VEHICLE_KEYS: [&str; 3] = ["body", "bogie", "wheelset"];

@@ -1,14 +1,17 @@
 //! What a tunnel file says, in a few lines.
 
 use crate::settings::{LONGEST_KEY, shortened};
-use crate::track::network::{Network, Switch};
+use crate::track::network::{Crossing, Network, Switch};
 use crate::track::{Side, Track, Tunnel};
 
 /// Of a tunnel with one track, its length, radii, grades, sections, lamps, devices; of a network, that of each
 /// track.
 pub(super) fn report(tunnel: &Tunnel) -> String {
     let Network {
-        tracks, switches, ..
+        tracks,
+        switches,
+        crossings,
+        ..
     } = &tunnel.network;
     let head = format!("tunnel `{}`, line {}", tunnel.name, tunnel.line_number);
     if let [track] = &tracks[..] {
@@ -17,11 +20,17 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
     }
     let length_m: f64 = tracks.iter().map(|t| t.alignment.length_m()).sum();
     let (tracks_count, switches_count) = (tracks.len(), switches.len());
+    let crossings_count = match crossings.len() {
+        0 => String::new(),
+        1 => ", 1 crossing".to_owned(),
+        count => format!(", {count} crossings"),
+    };
     let mut lines = vec![format!(
-        "{head}: {tracks_count} tracks, {length_m:.1} m, {switches_count} switches"
+        "{head}: {tracks_count} tracks, {length_m:.1} m, {switches_count} switches{crossings_count}"
     )];
     lines.extend(tracks.iter().map(|track| of_one_of_many(track)));
     lines.extend(switches.iter().map(|s| of_switch(&tunnel.network, s)));
+    lines.extend(crossings.iter().map(|c| of_crossing(&tunnel.network, c)));
     indented(&lines)
 }
 
@@ -59,6 +68,32 @@ fn of_switch(network: &Network, switch: &Switch) -> String {
         3.6 * switch.diverging_mps,
         metres(network.frog_m(switch)),
         metres(network.clear_from_m(switch)),
+    )
+}
+
+/// A crossing in one line.
+fn of_crossing(network: &Network, crossing: &Crossing) -> String {
+    let sides = [0, 1].map(|side| {
+        let place = crossing.places[side];
+        let zone = crossing.zone(side);
+        let stated = network.stated_chainage(place);
+        let stated = stated.map(|stated| format!(" ({stated})"));
+        let name = &network.tracks[usize::from(place.track.0)].name;
+        format!(
+            "track `{}` at {:.1} m{} (not clear from {:.1} to {:.1} m)",
+            shortened(name, LONGEST_KEY),
+            place.s_m,
+            stated.unwrap_or_default(),
+            zone.from_m,
+            zone.to_m,
+        )
+    });
+    format!(
+        "crossing `{}`: {}, {:.1} deg, 1 in {:.1}",
+        shortened(&crossing.name, LONGEST_KEY),
+        sides.join(" and "),
+        crossing.angle_rad.to_degrees(),
+        1.0 / crossing.angle_rad.tan(),
     )
 }
 
@@ -160,4 +195,29 @@ fn lamps(track: &Track) -> String {
 
 pub(super) fn indented(lines: &[String]) -> String {
     lines.iter().map(|line| format!("  {line}\n")).collect()
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// Provokes: a crossing that is left out, or told of with the wrong track, place or angle.
+    #[test]
+    fn crossings_are_listed() {
+        let text = include_str!("../../tests/tunnels/scissors.toml");
+        let said = report(&Tunnel::from_toml(text).unwrap());
+        assert!(
+            said.contains("8 tracks") && said.contains("4 switches, 1 crossing\n"),
+            "{said}"
+        );
+        let line = said
+            .lines()
+            .find(|line| line.contains("crossing `X`"))
+            .unwrap();
+        assert!(line.contains("track `A` at 33.7 m (A1+033.7)"), "{line}");
+        assert!(line.contains("and track `B` at 33.7 m (not"), "{line}");
+        // Twice 1 in 9.
+        assert!(line.ends_with("12.7 deg, 1 in 4.4"), "{line}");
+    }
 }

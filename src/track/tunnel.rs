@@ -5,7 +5,8 @@ use super::network::Network;
 use super::{LampSite, Track};
 use std::sync::Arc;
 
-/// A tunnel, checked and ready to use: tracks, the switches that join them, and what stands along them.
+/// A tunnel, checked and ready to use: tracks, the switches that join them, where they cross, and what stands along
+/// them.
 #[derive(Clone, Debug)]
 pub struct Tunnel {
     /// Short name, as in the file.
@@ -14,7 +15,7 @@ pub struct Tunnel {
     pub datum: Option<Datum>,
     /// Line number, the first part of every lamp's UID.
     pub line_number: u8,
-    /// Its tracks and switches. There is at least one track.
+    /// Its tracks, switches and crossings. There is at least one track.
     pub network: Network,
 }
 

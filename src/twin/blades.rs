@@ -13,8 +13,6 @@ use std::sync::Arc;
 
 /// Opening at the tip, as usual for point machines (their stroke is 140 to 220 mm).
 const OPEN_M: f64 = 0.16;
-/// At the heel the stock rail and the blade are so far apart: a rail's head, and the way of a wheel's flange.
-const HEEL_M: f64 = 0.13;
 /// A blade is planed to this width, and is lower than its stock rail.
 const HALF_WIDTH_M: f64 = 0.02;
 const LOWER_M: f64 = 0.004;
@@ -46,16 +44,11 @@ fn blades(network: &Network, switch: &Switch) -> [Blade; 2] {
     ]
 }
 
-/// From the toe to the heels of a switch's blades; none on legs that part too late.
-fn length_m(network: &Network, switch: &Switch) -> Option<f64> {
-    network.clearance_m(switch, HEEL_M)
-}
-
 /// The tracks of a network with fixed rails only.
 pub fn tracks_without_blades(network: &Network) -> Vec<Arc<Track>> {
     let mut tracks = network.tracks.clone();
     for switch in &network.switches {
-        let Some(length_m) = length_m(network, switch) else {
+        let Some(length_m) = network.heel_m(switch) else {
             continue;
         };
         for blade in blades(network, switch) {
@@ -114,7 +107,7 @@ struct Part {
 impl SwitchBlades {
     /// Of a switch; none of one whose legs part too late.
     pub fn of(network: &Network, switch: &Switch) -> Option<Self> {
-        let length_m = length_m(network, switch)?;
+        let length_m = network.heel_m(switch)?;
         let legs = [SwitchLeg::Through, SwitchLeg::Diverging];
         let count = (length_m / PART_M).ceil().max(1.0);
         let of_blade = |(blade, leg): (Blade, SwitchLeg)| {
@@ -239,9 +232,7 @@ mod tests {
         let network = network();
         let switch = &network.switches[0];
         // By the circle: 130 mm aside of the straight at 7.2 m.
-        assert!(
-            (length_m(&network, switch).unwrap() - (2.0 * 200.0 * 0.13_f64).sqrt()).abs() < 0.3
-        );
+        assert!((network.heel_m(switch).unwrap() - (2.0 * 200.0 * 0.13_f64).sqrt()).abs() < 0.3);
         for (share, through_m, diverging_m) in [
             (0.0, RAIL_OFFSET_M, -RAIL_OFFSET_M + OPEN_M),
             (1.0, RAIL_OFFSET_M - OPEN_M, -RAIL_OFFSET_M),
@@ -267,7 +258,7 @@ mod tests {
     #[test]
     fn the_rails_of_blades_are_missing_along_them_only() {
         let network = network();
-        let length_m = length_m(&network, &network.switches[0]).unwrap();
+        let length_m = network.heel_m(&network.switches[0]).unwrap();
         let tracks = tracks_without_blades(&network);
         let missing = |track: usize| -> Vec<_> {
             let sections = tracks[track].sections.iter();

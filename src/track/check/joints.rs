@@ -1,7 +1,7 @@
 //! What meets at the ends of tracks, as the `from` and `to` of a tunnel file name it.
 
 use crate::settings::{Checker, name_advice};
-use crate::track::file::{SwitchEntry, TrackEntry};
+use crate::track::file::{CrossingEntry, SwitchEntry, TrackEntry};
 use crate::track::network::{Ends, Switch, TrackEnd};
 use crate::track::{Direction, TrackId};
 use std::collections::BTreeMap;
@@ -76,7 +76,6 @@ pub(super) fn joints(
     switches: &[SwitchEntry],
     check: &mut Checker<'_>,
 ) -> Joints {
-    check_names(tracks, switches, check);
     let words = Words::of(tracks, switches);
     let mut named = BTreeMap::new();
     for (k, track) in tracks.iter().enumerate() {
@@ -111,17 +110,24 @@ pub(super) fn joints(
     joints
 }
 
-/// Names of tracks and switches, which ends are named by, are there once each.
-fn check_names(tracks: &[TrackEntry], switches: &[SwitchEntry], check: &mut Checker<'_>) {
+/// Names of tracks and switches, which ends are named by, and of crossings are there once each.
+pub(super) fn check_names(
+    tracks: &[TrackEntry],
+    switches: &[SwitchEntry],
+    crossings: &[CrossingEntry],
+    check: &mut Checker<'_>,
+) {
     let mut seen = BTreeMap::new();
     let tracks = tracks.iter().enumerate();
     let tracks = tracks.map(|(k, track)| (&track.name, format!("track[{k}]")));
     let switches = switches.iter().enumerate();
     let switches = switches.map(|(k, switch)| (&switch.name, format!("switches[{k}]")));
-    for (name, key) in tracks.chain(switches) {
+    let crossings = crossings.iter().enumerate();
+    let crossings = crossings.map(|(k, crossing)| (&crossing.name, format!("crossings[{k}]")));
+    for (name, key) in tracks.chain(switches).chain(crossings) {
         if let Some(first) = seen.insert(name, key.clone()) {
             let what = format!("\"{name}\" is the name of `{first}` too");
-            let remedy = "give each track and switch a name of its own";
+            let remedy = "give each track, switch and crossing a name of its own";
             check.problem(&format!("{key}.name"), what, remedy);
         }
     }

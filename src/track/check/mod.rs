@@ -1,6 +1,7 @@
 //! From the file as written to a [`Track`]: every number checked, every problem collected.
 
 mod chainage;
+mod crossings;
 mod devices;
 mod joints;
 mod lamps;
@@ -43,6 +44,7 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     file.check("", problems);
     let check = &mut Checker::new("", problems);
     let entries = file.tracks();
+    joints::check_names(&entries, &file.switches, &file.crossings, check);
     let joints = joints::joints(&entries, &file.switches, check);
     let lines = lines(file, &entries, &joints, check);
     let tracks = entries.iter().zip(lines).enumerate();
@@ -52,7 +54,7 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     });
     let tracks: Vec<Arc<Track>> = tracks.collect();
     let named = tracks.clone();
-    let network = Network::new(tracks, joints.switches, joints.ends).unwrap_or_else(|error| {
+    let mut network = Network::new(tracks, joints.switches, joints.ends).unwrap_or_else(|error| {
         // What is wrong has been said in full, where the file says it.
         if check.is_right("") {
             check.problem("track", error.to_string(), "join the tracks in another way");
@@ -62,7 +64,12 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
     // Where tracks are not where they should be, all else follows from that.
     if check.is_right("") {
         switches::check_switches(&network, check);
-        neighbours::check_neighbours(&network, |track| key_of(file, track.0.into()), check);
+        let crossings = crossings::crossings(&file.crossings, &network, check);
+        network = network.with_crossings(crossings);
+        // What is said of a crossing that is not as it should be says also why trains would touch there.
+        if check.is_right("crossings") {
+            neighbours::check_neighbours(&network, |track| key_of(file, track.0.into()), check);
+        }
         whole::check_names(&network, check);
         whole::check_reach(&network, check);
     }
@@ -180,6 +187,10 @@ fn free_standing(
         );
     }
 }
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]
+mod crossing_tests;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::panic, reason = "a test may panic")]

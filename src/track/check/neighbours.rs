@@ -3,12 +3,13 @@
 use crate::settings::Checker;
 use crate::track::network::{Network, SwitchLeg, TrackEnd};
 use crate::track::section::{CrossSection, OutlinePoint};
-use crate::track::{Direction, Gauge, Place, TrackFrame, TrackId, TrackPoint};
+use crate::track::{Direction, Gauge, Place, Stretch, TrackFrame, TrackId, TrackPoint};
 use nalgebra::Point3;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Tracks are looked at so often. Borders of cross-sections, which are round numbers in most files, are missed.
-const STEP_M: f64 = 4.0;
+/// Tracks are looked at so often: less than the gauge of a track that crosses square is wide, twice 1.6 m. Borders of
+/// cross-sections, which are round numbers in most files, are missed.
+const STEP_M: f64 = 3.0;
 const FIRST_M: f64 = 1.37;
 /// Nothing on another track that is farther away is in the way; as wide as a cross-section may be.
 const NEAR_M: f64 = 60.0;
@@ -18,6 +19,8 @@ const LEVEL_M: f64 = 10.0;
 const PARTING_M: f64 = 150.0;
 /// So much may the ways from the toe differ of places that are beside each other.
 const ABREAST_M: f64 = 5.0;
+/// Gauges overlap no farther than this beyond the zone of a crossing: its corners are those of its widest gauges.
+const BESIDE_ZONE_M: f64 = 0.1;
 /// Walls may reach into each other by so much: chords of arcs, rounding.
 const OVERLAP_M: f64 = 0.02;
 
@@ -50,7 +53,9 @@ pub(super) fn check_neighbours(
                 continue;
             };
             lies_in_another |= pair.holds();
-            if let Some(wrong) = pair.wrong(partings.part(checked.place, place)) {
+            let may_touch =
+                partings.part(checked.place, place) || cross(network, checked.place, place);
+            if let Some(wrong) = pair.wrong(may_touch) {
                 say(checked.place, other, wrong, point.l_m);
             }
         }
@@ -68,6 +73,18 @@ pub(super) fn check_neighbours(
             }
         }
     }
+}
+
+/// Whether two places that are beside each other lie where their tracks cross.
+fn cross(network: &Network, a: Place, b: Place) -> bool {
+    let is_in = |place: Place, zone: Stretch| {
+        let zone = zone.widened(BESIDE_ZONE_M);
+        zone.track == place.track && (zone.from_m..=zone.to_m).contains(&place.s_m)
+    };
+    network.crossings.iter().any(|crossing| {
+        let [first, second] = [0, 1].map(|side| crossing.zone(side));
+        (is_in(a, first) && is_in(b, second)) || (is_in(b, first) && is_in(a, second))
+    })
 }
 
 /// Lamps and wayside devices, by the place on their track and in the world.
@@ -259,7 +276,7 @@ impl Wrong {
         match self {
             Self::Gauges => (
                 format!("it is {away_m:.2} m from track `{other}`: trains on both would touch"),
-                "lay them farther apart, or join them by a switch",
+                "lay them farther apart, join them by a switch, or name them under `[[crossings]]` where they cross",
             ),
             Self::Wall => (
                 format!("a wall of the section of track `{other}` stands in its structure gauge"),
@@ -308,11 +325,12 @@ impl<'a> Pair<'a> {
         point: TrackPoint,
     ) -> Option<Self> {
         let frame = network.alignment(other.track)?.at(other.s_m);
-        let side = checked.frame.left().dot(&frame.left()).signum();
+        // Square to its own track is at an angle to square to the other one.
+        let across = checked.frame.left().dot(&frame.left());
         let as_other =
-            |p: &OutlinePoint| OutlinePoint::new(point.l_m + side * p.l_m, point.h_m + p.h_m);
+            |p: &OutlinePoint| OutlinePoint::new(point.l_m + across * p.l_m, point.h_m + p.h_m);
         let gauges = [&checked.frame, &frame].map(|f| Gauge::b1(f.curvature_per_m));
-        let apart_m = gauges[0].widest_m() + gauges[1].widest_m();
+        let apart_m = across.abs() * gauges[0].widest_m() + gauges[1].widest_m();
         let own = section(network, checked.place);
         Some(Self {
             own,
@@ -331,9 +349,9 @@ impl<'a> Pair<'a> {
             .is_some_and(|section| !section.is_shared() && inside(section))
     }
 
-    /// What is wrong, where `parts` says that a switch is near.
-    fn wrong(&self, parts: bool) -> Option<Wrong> {
-        if self.touch && !parts {
+    /// What is wrong, where the tracks may touch: near a switch, on a crossing.
+    fn wrong(&self, may_touch: bool) -> Option<Wrong> {
+        if self.touch && !may_touch {
             return Some(Wrong::Gauges);
         }
         let others = self.others.filter(|section| section.closed)?;

@@ -1,7 +1,7 @@
 //! Tunnel files as a user writes them: TOML, every key with its unit and default.
 //!
 //! A file has one track, whose keys stand at its top, or several under `[[track]]`, joined at their ends and by
-//! `[[switches]]`.
+//! `[[switches]]`, and crossing each other at `[[crossings]]`.
 
 mod chainage;
 mod lamps;
@@ -86,6 +86,9 @@ with_track! {
         /// Switches between them.
         #[serde(default)]
         switches: Vec<SwitchEntry>, nested;
+        /// Places where tracks cross each other at one level.
+        #[serde(default)]
+        crossings: Vec<CrossingEntry>, nested;
     }
     also check_keys
 }
@@ -119,6 +122,31 @@ settings! {
         throw_s: f64, in 0.1..=60.0;
     }
     also check_names
+}
+
+settings! {
+    /// A place where two tracks cross each other at one level, with fixed points. No train changes from one to the
+    /// other there. The place follows from where the tracks lie.
+    pub struct CrossingEntry {
+        /// Its name.
+        name: String;
+        /// Names of the two tracks.
+        #[schemars(length(equal = 2))]
+        tracks: Vec<String>;
+        /// Chainage of the first of them near which they cross, metres. To be given where they cross more than once.
+        near_m: Option<f64>, in 0.0..=1e6;
+    }
+    also check_names
+}
+
+impl CrossingEntry {
+    fn check_names(&self, check: &mut Checker<'_>) {
+        check_name(&self.name, check);
+        if self.tracks.len() != 2 {
+            let what = format!("names {} tracks, and two cross", self.tracks.len());
+            check.problem("tracks", what, "name the two tracks");
+        }
+    }
 }
 
 impl SwitchEntry {

@@ -8,8 +8,21 @@ const STEP_M: f64 = 0.25;
 /// No clearance point is looked for farther from the toe.
 const FARTHEST_M: f64 = 200.0;
 
+/// At the heels of a switch's blades, a stock rail and the blade are so far apart: a rail's head, and the way of a
+/// wheel's flange.
+const HEEL_M: f64 = 0.13;
+
 /// Just inside a leg.
 const INSIDE_M: f64 = 1e-6;
+
+/// Where routes are in each other's way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Conflict {
+    /// At a switch, by its number.
+    Switch(usize),
+    /// At a crossing, by its number.
+    Crossing(usize),
+}
 
 impl Network {
     /// How far behind the toe the rails of its legs cross: the point of the frog, about.
@@ -68,22 +81,31 @@ impl Network {
         (0.0..=length_m).contains(&s_m).then_some(s_m)
     }
 
-    /// Switches at which two routes are in each other's way: both run over one of its tracks nearer to the toe
-    /// than where trains on its legs clear each other. A switch whose legs never clear each other counts all
-    /// along.
-    pub fn conflicts(&self, a: &Route, b: &Route, apart_m: f64) -> Vec<usize> {
+    /// How far behind the toe of a switch its blades end, at their heels; none where its legs part too late.
+    pub fn heel_m(&self, switch: &Switch) -> Option<f64> {
+        self.clearance_m(switch, HEEL_M)
+    }
+
+    /// Where two routes are in each other's way. At a switch: both run over one of its tracks nearer to the toe than
+    /// where its legs are so far apart, and all along where they never are. At a crossing: each runs over one of its
+    /// tracks where gauges overlap.
+    pub fn conflicts(&self, a: &Route, b: &Route, apart_m: f64) -> Vec<Conflict> {
         let fouls = |route: &Route, switch: &Switch, within_m: f64| {
-            route
-                .legs()
-                .iter()
-                .any(|leg| self.is_near(leg, switch, within_m))
+            let mut legs = route.legs().iter();
+            legs.any(|leg| self.is_near(leg, switch, within_m))
         };
-        let switches = self.switches.iter().enumerate();
-        let conflict = switches.filter(|(_, switch)| {
+        let switches = self.switches.iter().enumerate().filter(|(_, switch)| {
             let within_m = self.clearance_m(switch, apart_m).unwrap_or(f64::INFINITY);
             fouls(a, switch, within_m) && fouls(b, switch, within_m)
         });
-        conflict.map(|(number, _)| number).collect()
+        let crossings = self.crossings.iter().enumerate().filter(|(_, crossing)| {
+            let runs = |route: &Route, side| route.covers(crossing.zone(side));
+            (runs(a, 0) && runs(b, 1)) || (runs(a, 1) && runs(b, 0))
+        });
+        let switches = switches.map(|(number, _)| Conflict::Switch(number));
+        switches
+            .chain(crossings.map(|(number, _)| Conflict::Crossing(number)))
+            .collect()
     }
 
     /// Whether a leg of a route comes nearer to a switch's toe than so far, on one of the switch's legs.

@@ -1,6 +1,6 @@
-//! What is in the way of a train on a route: what stands on its tracks, and what fouls them at a switch.
+//! What is in the way of a train on a route: what stands on its tracks, and what fouls them at a switch or a crossing.
 
-use super::{Network, Route, SwitchLeg, TrackEnd};
+use super::{Crossing, Network, Route, SwitchLeg, TrackEnd};
 use crate::track::{Direction, Stretch};
 
 /// The room that a train on a route needs.
@@ -25,6 +25,7 @@ use crate::track::{Direction, Stretch};
 pub struct RouteEnvelope {
     route: Route,
     fouling: Vec<Fouling>,
+    crossings: Vec<Crossing>,
 }
 
 /// A switch on the route, run over one of its legs: trains on the other leg foul the route.
@@ -45,7 +46,16 @@ impl RouteEnvelope {
     /// Of a route over a network.
     pub fn new(network: &Network, route: Route) -> Self {
         let fouling = fouling(network, &route);
-        Self { route, fouling }
+        let runs_over = |crossing: &&Crossing| {
+            let mut zones = [0, 1].map(|side| crossing.zone(side)).into_iter();
+            zones.any(|zone| route.runs_over(zone).next().is_some())
+        };
+        let crossings = network.crossings.iter().filter(runs_over);
+        Self {
+            crossings: crossings.cloned().collect(),
+            fouling,
+            route,
+        }
     }
 
     /// The route.
@@ -61,11 +71,14 @@ impl RouteEnvelope {
             .chain(self.fouls_over(stretch))
     }
 
-    /// The distances from which to which gauges overlap with those of a stretch of another track, at a switch.
+    /// The distances from which to which gauges overlap with those of a stretch of another track, at a switch or a
+    /// crossing.
     pub fn fouls_over(&self, stretch: Stretch) -> impl Iterator<Item = (f64, f64)> {
-        self.fouling
-            .iter()
-            .filter_map(move |f| f.runs_over(stretch))
+        let switches = self.fouling.iter();
+        let at_switches = switches.filter_map(move |f| f.runs_over(stretch));
+        let crossings = self.crossings.iter();
+        let in_way = crossings.filter_map(move |crossing| crossing.in_way_of(stretch));
+        at_switches.chain(in_way.flat_map(|own| self.route.runs_over(own)))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Tracks joined at their ends: lines that go on, switches, buffers, open ends.
+//! Tracks joined at their ends: lines that go on, switches, buffers, open ends; and tracks that cross.
 //!
 //! A track has no branches: it ends where a switch begins. A switch joins three ends of tracks in one place,
 //! its toe, where all three have one pose: the track before the toe, and the two legs, of which the through one
@@ -42,10 +42,14 @@
 //! # Ok::<(), metrotwin::track::network::NetworkError>(())
 //! ```
 //!
-//! Not here: the blades of a switch and how they move (they are the world's), what stands along the tracks.
+//! Tracks that cross each other at one level have a [`Crossing`] there: no train changes from one to the other.
+//!
+//! Not here: the blades of a switch and how they move (they are the world's), what stands along the tracks; slips,
+//! crossings with points that move.
 
 mod along;
 mod clearance;
+mod crossing;
 mod envelope;
 mod error;
 mod itinerary;
@@ -57,6 +61,8 @@ mod sight;
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
+pub use clearance::Conflict;
+pub use crossing::Crossing;
 pub use envelope::RouteEnvelope;
 pub use error::NetworkError;
 pub use itinerary::{Itinerary, SpeedLimit, Waypoint};
@@ -154,13 +160,15 @@ pub enum Beyond {
     Open,
 }
 
-/// Tracks and switches.
+/// Tracks, switches and crossings.
 #[derive(Clone, Debug)]
 pub struct Network {
     /// The tracks, by number.
     pub tracks: Vec<Arc<Track>>,
     /// The switches.
     pub switches: Vec<Switch>,
+    /// Where tracks cross each other at one level.
+    pub crossings: Vec<Crossing>,
     beyond: BTreeMap<TrackEnd, Beyond>,
 }
 
@@ -185,6 +193,7 @@ impl Network {
         let mut network = Self {
             tracks,
             switches: Vec::new(),
+            crossings: Vec::new(),
             beyond: BTreeMap::new(),
         };
         for (number, switch) in switches.iter().enumerate() {
@@ -223,6 +232,7 @@ impl Network {
         Self {
             tracks,
             switches: Vec::new(),
+            crossings: Vec::new(),
             beyond: BTreeMap::new(),
         }
     }

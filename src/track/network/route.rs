@@ -143,6 +143,14 @@ impl Route {
         })
     }
 
+    /// Whether it runs over a place of a stretch of track, between its ends.
+    pub fn covers(&self, stretch: Stretch) -> bool {
+        self.legs.iter().any(|leg| {
+            let (low_m, high_m) = leg.stretch_m();
+            leg.track == stretch.track && low_m < stretch.to_m && stretch.from_m < high_m
+        })
+    }
+
     /// The stretches of track between two distances along the route, in order.
     pub fn stretches(&self, from_m: f64, to_m: f64) -> impl Iterator<Item = Stretch> {
         let last = self.legs.len() - 1;

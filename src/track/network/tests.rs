@@ -403,7 +403,7 @@ fn routes_conflict_where_they_foul_a_switch() {
     let fouls = on(1, 60.0, network.tracks[1].alignment.length_m() - 5.0);
     assert_eq!(
         network.conflicts(out.as_ref().unwrap(), &fouls, APART_M),
-        [1]
+        [Conflict::Switch(1)]
     );
     assert!(
         network

@@ -23,7 +23,7 @@ pub enum IncidentKind {
     AgainstRoute,
     /// A train ran over an open end, beyond what is modelled.
     OffEnd,
-    /// Trains stand or run so that one is in the other's gauge at a switch.
+    /// Trains stand or run so that one is in the other's gauge at a switch or a crossing.
     Fouled,
 }
 

@@ -1,18 +1,18 @@
-//! Trains over switches: which switch comes next on a train's way, who may run over it, and what becomes of a train
-//! that runs over one that is not set for it.
+//! Trains over switches and crossings: which comes next on a train's way, who may run over it, and what becomes of a
+//! train that runs over a switch that is not set for it.
 
 use super::incident::{IncidentKind, Incidents};
 use super::switches::{InterlockingSettings, Switches};
 use super::train::Train;
 use crate::bus::{SimTime, TrainId};
-use crate::track::network::{Network, Passing, RouteEnvelope, SwitchLeg};
+use crate::track::network::{Network, Passing, Route, RouteEnvelope, SwitchLeg};
 use crate::track::{Direction, Place};
 
 /// A train decides at the blades' tips which way they lead it.
 const TIPS_M: f64 = 0.5;
-/// Trains wait this far before a switch that is not theirs.
+/// Trains wait this far before a switch or a crossing that is not theirs.
 const SIGNAL_M: f64 = 15.0;
-/// Steps between looks at whose switches are.
+/// Steps between looks at whose switches and crossings are.
 const LOOK_STEPS: u64 = 50;
 
 /// What a train has to do about a switch.
@@ -24,17 +24,30 @@ pub(super) enum Verdict {
     Derails,
 }
 
-/// A train's way over switches.
+/// A switch or a crossing that a train must have to itself between two distances along its way.
+#[derive(Clone, Copy, Debug)]
+struct Claim {
+    /// Number of the switch, or that of the crossing after all switches.
+    number: usize,
+    /// For which leg a switch is to be set.
+    leg: Option<SwitchLeg>,
+    from_m: f64,
+    to_m: f64,
+}
+
+/// A train's way over switches and crossings.
 #[derive(Clone, Debug)]
 struct Way {
     passings: Vec<Passing>,
+    /// In the order in which they begin.
+    claims: Vec<Claim>,
     envelope: RouteEnvelope,
     /// So many tips its front has passed.
     passed: usize,
     off_end: bool,
 }
 
-/// Switches, and whose they are.
+/// Switches and crossings, and whose they are.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Interlocking {
     pub switches: Switches,
@@ -43,9 +56,9 @@ pub(super) struct Interlocking {
     ways: Vec<Way>,
     /// Clearance of each switch behind its toe.
     clear_m: Vec<f64>,
-    /// The train that each switch is kept for.
+    /// The train that each switch, and then each crossing, is kept for.
     kept_for: Vec<Option<TrainId>>,
-    /// Where each train must stop before a switch that is not its own.
+    /// Where each train must stop before a switch or a crossing that is not its own.
     pub signals_m: Vec<Option<f64>>,
     steps: u64,
 }
@@ -57,19 +70,21 @@ impl Interlocking {
         trains: &[Train],
     ) -> Self {
         let clear = |s| network.clear_from_m(s).unwrap_or(f64::INFINITY);
+        let clear_m: Vec<f64> = network.switches.iter().map(clear).collect();
+        let ways = trains
+            .iter()
+            .map(|train| Way::new(network, train, &clear_m));
         let mut interlocking = Self {
             switches: Switches::new(network, settings),
             settings: settings.clone(),
-            ways: trains
-                .iter()
-                .map(|train| Way::new(network, train))
-                .collect(),
-            clear_m: network.switches.iter().map(clear).collect(),
-            kept_for: vec![None; network.switches.len()],
+            ways: ways.collect(),
+            clear_m,
+            kept_for: vec![None; network.switches.len() + network.crossings.len()],
             signals_m: vec![None; trains.len()],
             ..Self::default()
         };
         if settings.automatic {
+            interlocking.keep_occupied(trains);
             interlocking.keep(network, trains, None);
         }
         interlocking
@@ -81,7 +96,7 @@ impl Interlocking {
         let passed = way.passed;
         *way = Way {
             passed,
-            ..Way::new(network, train)
+            ..Way::new(network, train, &self.clear_m)
         };
     }
 
@@ -188,47 +203,51 @@ impl Interlocking {
         None
     }
 
-    /// Keeps switches for the trains that come to them, in the order of their numbers, sets them, and lets go of
-    /// those that trains have left. At the start (no time) they stand at once.
+    /// Keeps what trains stand on at the start for them, whichever come to it.
+    fn keep_occupied(&mut self, trains: &[Train]) {
+        for (train, way) in trains.iter().zip(&self.ways) {
+            let (head_m, tail_m) = train.consist.stands_m();
+            let claims = way.claims.iter();
+            for claim in claims.filter(|claim| head_m > claim.from_m && tail_m < claim.to_m) {
+                self.kept_for[claim.number].get_or_insert(train.consist.id);
+            }
+        }
+    }
+
+    /// Keeps switches and crossings for the trains that come to them, in the order of their numbers, sets the
+    /// switches, and lets go of those that trains have left. At the start (no time) switches stand at once.
     fn keep(&mut self, network: &Network, trains: &[Train], now: Option<SimTime>) {
         for (train, way) in trains.iter().zip(&self.ways) {
             let id = train.consist.id;
             let (head_m, tail_m) = train.consist.stands_m();
             let mut signal_m = None;
-            for passing in &way.passings {
-                let clear_m = self.clear_m[passing.switch];
-                let kept_for = &mut self.kept_for[passing.switch];
-                let (from_m, to_m) = passing.zone_m(clear_m);
-                if tail_m > to_m {
-                    let comes_again = way
-                        .passings
-                        .iter()
-                        .any(|other| other.switch == passing.switch && other.toe_m > passing.toe_m);
-                    if *kept_for == Some(id) && !comes_again {
+            for claim in &way.claims {
+                let kept_for = &mut self.kept_for[claim.number];
+                if tail_m > claim.to_m {
+                    if *kept_for == Some(id) && !way.comes_again_to(claim) {
                         *kept_for = None;
                     }
                     continue;
                 }
-                if from_m - head_m > self.settings.ahead_m {
+                if claim.from_m - head_m > self.settings.ahead_m {
                     break;
                 }
                 if kept_for.is_some_and(|other| other != id) {
-                    signal_m.get_or_insert(from_m - SIGNAL_M);
+                    signal_m.get_or_insert(claim.from_m - SIGNAL_M);
                     break;
                 }
                 *kept_for = Some(id);
-                let blades = &mut self.switches.all[passing.switch];
-                match now {
-                    None => blades.set = passing.leg,
-                    Some(now) => {
-                        let throw_s = network.switches[passing.switch].throw_s;
-                        let is_set = blades.set == passing.leg && blades.moving.is_none();
-                        if !is_set && head_m < from_m {
-                            self.switches
-                                .begin(passing.switch, passing.leg, now, throw_s);
+                let to_set = |leg: &SwitchLeg| !self.switches.leads_to(claim.number, *leg);
+                if let Some(leg) = claim.leg.filter(to_set) {
+                    match now {
+                        None => self.switches.all[claim.number].set = leg,
+                        Some(now) if head_m < claim.from_m => {
+                            let throw_s = network.switches[claim.number].throw_s;
+                            self.switches.begin(claim.number, leg, now, throw_s);
                             // Until it stands, the signal before it shows danger.
-                            signal_m.get_or_insert(from_m - SIGNAL_M);
+                            signal_m.get_or_insert(claim.from_m - SIGNAL_M);
                         }
+                        Some(_) => {}
                     }
                 }
             }
@@ -248,7 +267,7 @@ impl Interlocking {
         })
     }
 
-    /// Trains in each other's gauge at a switch.
+    /// Trains in each other's gauge at a switch or a crossing.
     fn find_fouled(&mut self, network: &Network, trains: &[Train], now: SimTime) {
         for (k, train) in trains.iter().enumerate() {
             let (head_m, tail_m) = train.consist.stands_m();
@@ -297,15 +316,50 @@ impl Interlocking {
 }
 
 impl Way {
-    fn new(network: &Network, train: &Train) -> Self {
+    fn new(network: &Network, train: &Train, clear_m: &[f64]) -> Self {
         let route = &train.track.route;
         let passings = network.passings(route);
         let front_m = train.consist.front_axle_m();
         Self {
             passed: passings.partition_point(|passing| passing.toe_m - TIPS_M <= front_m),
+            claims: claims(network, route, &passings, clear_m),
             passings,
             envelope: RouteEnvelope::new(network, route.clone()),
             off_end: false,
         }
     }
+
+    /// It runs once more over the switch or crossing of a claim.
+    fn comes_again_to(&self, claim: &Claim) -> bool {
+        let mut later = self.claims.iter().filter(|c| c.from_m > claim.from_m);
+        later.any(|other| other.number == claim.number)
+    }
+}
+
+/// What a train on a route must have to itself, in the order in which it begins.
+fn claims(network: &Network, route: &Route, passings: &[Passing], clear_m: &[f64]) -> Vec<Claim> {
+    let switches = passings.iter().map(|passing| {
+        let (from_m, to_m) = passing.zone_m(clear_m[passing.switch]);
+        Claim {
+            number: passing.switch,
+            leg: Some(passing.leg),
+            from_m,
+            to_m,
+        }
+    });
+    let first = network.switches.len();
+    let crossings = network.crossings.iter().enumerate();
+    let crossings = crossings.flat_map(|(k, crossing)| {
+        let zones = [0, 1].map(|side| crossing.zone(side));
+        let runs = zones.into_iter().flat_map(|zone| route.runs_over(zone));
+        runs.map(move |(from_m, to_m)| Claim {
+            number: first + k,
+            leg: None,
+            from_m,
+            to_m,
+        })
+    });
+    let mut claims: Vec<Claim> = switches.chain(crossings).collect();
+    claims.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
+    claims
 }

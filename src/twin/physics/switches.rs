@@ -29,8 +29,9 @@ impl From<LegName> for SwitchLeg {
 settings! {
     /// How switches are set.
     pub struct InterlockingSettings {
-        /// Routes of trains are set before them, and trains wait before a switch that is not theirs yet. Without
-        /// it switches stand and move as `positions` and `moves` say, and trains go where they lead.
+        /// Routes of trains are set before them, and trains wait before a switch or a crossing that is not theirs
+        /// yet. Without it switches stand and move as `positions` and `moves` say, trains go where they lead, and
+        /// none waits.
         automatic: bool = true;
         /// A route is set so far before a train's head, metres.
         ahead_m: f64 = 300.0, in 20.0..=5000.0;
@@ -124,6 +125,11 @@ impl Switches {
             blades.moving = Some((to, now.plus(throw_s)));
             blades.since = now;
         }
+    }
+
+    /// Its blades lead to a leg, and do not move.
+    pub(super) fn leads_to(&self, k: usize, leg: SwitchLeg) -> bool {
+        self.all[k].set == leg && self.all[k].moving.is_none()
     }
 
     /// Blades that have arrived stand.

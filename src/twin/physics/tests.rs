@@ -7,6 +7,7 @@
     reason = "tests may panic, compare bytes, and say what they measured"
 )]
 
+mod crossings;
 mod directions;
 mod obstacles;
 mod switches;

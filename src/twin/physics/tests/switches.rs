@@ -4,7 +4,12 @@ use super::*;
 use crate::track::Place;
 
 /// A train on the terminus that starts on a track, is to run over others, and is left to itself.
-fn train(start: (&str, f64), via: &[&str], stop: (&str, f64), kmh: f64) -> TrainSettings {
+pub(super) fn train(
+    start: (&str, f64),
+    via: &[&str],
+    stop: (&str, f64),
+    kmh: f64,
+) -> TrainSettings {
     TrainSettings {
         cars: 2,
         start_track: Some(start.0.to_owned()),
@@ -19,7 +24,7 @@ fn train(start: (&str, f64), via: &[&str], stop: (&str, f64), kmh: f64) -> Train
     }
 }
 
-fn down(train: TrainSettings) -> TrainSettings {
+pub(super) fn down(train: TrainSettings) -> TrainSettings {
     TrainSettings {
         direction: Direction::Down,
         ..train
@@ -36,7 +41,10 @@ fn terminus(trains: Vec<TrainSettings>, interlocking: InterlockingSettings) -> W
     World::new(tunnel, &settings, 1, 0).unwrap()
 }
 
-fn by_hand(positions: &[(&str, LegName)], moves: Vec<SwitchMove>) -> InterlockingSettings {
+pub(super) fn by_hand(
+    positions: &[(&str, LegName)],
+    moves: Vec<SwitchMove>,
+) -> InterlockingSettings {
     let position = |(name, leg): &(&str, LegName)| SwitchPosition {
         switch: (*name).to_owned(),
         leg: *leg,
@@ -59,7 +67,7 @@ fn moved(switch: &str, leg: LegName, at_s: f64, lock_fails: bool) -> SwitchMove 
 }
 
 /// Steps on for a time or until it fails; gives the failure.
-fn go(world: &mut World, for_s: f64) -> Option<PhysicsError> {
+pub(super) fn go(world: &mut World, for_s: f64) -> Option<PhysicsError> {
     let until_s = world.time().secs() + for_s;
     while world.time().secs() < until_s {
         if let Err(error) = world.step(&[]) {
@@ -69,12 +77,12 @@ fn go(world: &mut World, for_s: f64) -> Option<PhysicsError> {
     None
 }
 
-fn kinds(world: &World) -> Vec<(IncidentKind, Option<&str>)> {
+pub(super) fn kinds(world: &World) -> Vec<(IncidentKind, Option<&str>)> {
     let list = world.incidents().iter();
     list.map(|i| (i.kind, i.switch.as_deref())).collect()
 }
 
-fn at(world: &World, id: TrainId) -> (String, f64) {
+pub(super) fn at(world: &World, id: TrainId) -> (String, f64) {
     let Place { track, s_m } = world.head(id).unwrap();
     let track = &world.network().tracks[usize::from(track.0)];
     (track.name.clone(), s_m)
