@@ -23,7 +23,7 @@ Examples:
   metrotwin check tunnels/terminus.toml --chainage YDK12+150
   metrotwin check scenarios/line_run.toml --set train.cruise_speed_kmh=80
 
-Exit code 0 where all files are right, 2 where any is wrong.";
+Exit code 0 where all files are right, 2 where any is wrong or a --chainage is on no track.";
 
 /// Check tunnels, vehicles, scenarios and studies: errors and a short report
 #[derive(Default, clap::Args)]

@@ -11,7 +11,8 @@ use nalgebra::Point3;
 use re_sdk_types::archetypes::{GeoLineStrings, GeoPoints};
 use std::collections::BTreeMap;
 
-/// Where everything on the map is in the recording.
+/// Where everything on the map is in the recording. Radii below zero are pixels, so that lines and dots are seen from
+/// any height.
 pub(super) const ROOT: &str = "map";
 /// From point to point of a track.
 const STEP_M: f64 = 10.0;

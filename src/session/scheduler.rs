@@ -51,7 +51,7 @@ pub struct Session<'s, 'o> {
     pub(super) bench: Option<Bench>,
     pub(super) truth_ticker: Ticker,
     pub(super) bodies_ticker: Ticker,
-    /// As last shown.
+    /// Of each switch the share (0 to 1) of its blades' way, as last shown.
     pub(super) blade_shares: Vec<f64>,
     pub(super) cost: Costs,
     pub(super) observers: Observers<'s, 'o>,

@@ -112,7 +112,7 @@ impl Gauge {
 }
 
 impl SectionRange {
-    /// Centres of the rails that lie in it, left of the centreline.
+    /// Lateral offsets of its rails' centres, metres, positive to the left.
     pub fn rails_m(&self) -> impl Iterator<Item = f64> + use<> {
         let missing = self.missing_rail;
         let sides = [Side::Left, Side::Right].into_iter();

@@ -98,7 +98,7 @@ pub struct Track {
     pub base_stations: Vec<BaseStation>,
     /// Where trains stop.
     pub stations: Vec<StoppingPlace>,
-    /// Light that reaches every surface after many reflections, lux.
+    /// Light that reaches every surface after many reflections, lux. In the open by day `daylight_lx` takes its place.
     pub ambient_lx: f64,
     /// Light of the sky on level ground in the open, lux.
     pub daylight_lx: f64,

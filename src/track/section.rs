@@ -246,6 +246,11 @@ impl CrossSection {
         self.points.is_empty()
     }
 
+    /// Whether it is open to the sky.
+    pub fn is_open(&self) -> bool {
+        !self.closed && !self.is_shared()
+    }
+
     /// Whether (l, h) is inside the tunnel or, for an open section, over its bed or on a level with it.
     pub fn covers(&self, l_m: f64, h_m: f64) -> bool {
         match self.closed {

@@ -105,7 +105,7 @@ struct Part {
 }
 
 impl SwitchBlades {
-    /// Of a switch; none of one whose legs part too late.
+    /// Of a switch; `None` where its legs part too late for blades.
     pub fn of(network: &Network, switch: &Switch) -> Option<Self> {
         let length_m = network.heel_m(switch)?;
         let legs = [SwitchLeg::Through, SwitchLeg::Diverging];
@@ -131,7 +131,7 @@ impl SwitchBlades {
         Some(Self { tip, parts })
     }
 
-    /// So far on the way (0 to 1) from the through to the diverging leg.
+    /// Both, where they are `share` (0 to 1) of the way from the through to the diverging leg.
     pub fn bodies(&self, share: f64) -> impl Iterator<Item = Body> + '_ {
         self.parts.iter().map(move |part| {
             let open = match part.leg {

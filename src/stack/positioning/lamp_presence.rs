@@ -2,8 +2,8 @@
 //!
 //! The train knows where it is, so it knows which lamps an eye must have in its picture. One that
 //! was due in several pairs, well inside the picture and near, and was seen in none of them, is
-//! dark. It says nothing of lamps while the position is unknown or the eye has a fault. It takes nothing
-//! to stand in front of the map's lamps: no train on the next track, no end of a wall.
+//! dark. It says nothing of lamps while the position is unknown or the eye has a fault. It assumes
+//! that nothing hides the map's lamps: one behind a train on the next track, or behind a wall's end, is told dark.
 
 use crate::bus::Intrinsics;
 use crate::track::Track;

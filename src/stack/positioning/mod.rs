@@ -60,7 +60,7 @@
 //! a vergence only: errors of distortion, of a roll or pitch between the eyes, of the line time and
 //! of the trigger times are not in it.
 //! A lamp that a wall's end or a train hides in part is taken for a whole one: its centre is off, by more in one
-//! eye than in the other (63 cm along the track, once, from 13 m), and sigma does not know.
+//! eye than in the other (63 cm along the track, once, from 13 m), and sigma does not include it.
 //! It takes its cab to look up the line, the train's rails to be where the map has them, and roll and
 //! pitch swings slower than the gyro's fading to be nothing.
 

@@ -23,7 +23,7 @@ use crate::track::uid::Uid;
 use crate::track::{LampSite, Track};
 use nalgebra::{Point3, Vector3};
 
-/// No lamp is taken for one that is farther than this from its place by so many sigmas of it.
+/// Standard deviations of a measured place that are allowed for before it counts as that of another lamp.
 const SIGMAS: f64 = 3.0;
 /// Distance that a lamp alone on the map is taken to have to the next, metres.
 const ALONE_M: f64 = 10.0;
@@ -117,7 +117,7 @@ pub enum PairReading {
 pub struct Expected {
     /// Where the lamp must be in the world if the train is where it takes itself to be.
     pub lamp: Point3<f64>,
-    /// Standard deviation of that place by what the pair measures, along the line of sight.
+    /// Standard deviation of that place along the line of sight, as the pair measures it, metres.
     pub sigma_m: f64,
     /// Where the eye then is.
     pub eye: Point3<f64>,
@@ -208,7 +208,7 @@ impl Naming {
         (is_there || miss_m > gate_m + SIGMAS * expected.sigma_m).then_some(is_there)
     }
 
-    /// A lamp nearer to its place than this is no other one.
+    /// Within this distance of a lamp's place on the map, metres, no other lamp can be meant.
     fn gate_m(&self, site: &LampSite, expected: &Expected, map: &Track) -> f64 {
         let others = expected.facing(map).filter(|other| other.uid != site.uid);
         let next_m = others.map(|other| (other.centre - site.centre).norm());

@@ -71,7 +71,8 @@ with_track! {
         /// Line number, the first part of every lamp's UID.
         #[serde(default = "crate::settings::one::<u8>")]
         line_number: u8, in 0.0..=15.0;
-        /// Light that reaches every surface after many reflections, lux.
+        /// Light that reaches every surface after many reflections, lux. In the open by day `daylight_lx` takes its
+        /// place.
         #[serde(default = "two_lux")]
         ambient_lx: f64, in 0.0..=1e5;
         /// Light of the sky on level ground where tracks lie in the open, lux: 0 at night, 5,000 to 20,000 under

@@ -13,7 +13,7 @@ use nalgebra::{Vector2, Vector3};
 
 /// A headwall rises this far over the tunnel.
 const PARAPET_M: f64 = 1.0;
-/// What begins within this distance beyond a plane begins at it.
+/// So far beyond a plane other tracks are looked for that go on there.
 const BEGINS_M: f64 = 0.05;
 /// Tracks at an angle of a smaller cosine to the line have no part in a wall.
 const LEAST_COSINE: f64 = 0.5;

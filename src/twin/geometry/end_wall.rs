@@ -57,9 +57,9 @@ impl EndWall {
         pieces.any(|piece| piece.contains(across.x, across.y))
     }
 
-    /// Towards who sees it.
-    pub(super) fn normal(&self, plane: &Plane) -> Vector3<f64> {
-        Vector3::new(plane.forward.x, plane.forward.y, 0.0) * -self.seen_looking.sign()
+    /// Towards who sees it, where the line runs this way in plan.
+    pub fn normal(&self, forward: &Vector2<f64>) -> Vector3<f64> {
+        forward.push(0.0) * -self.seen_looking.sign()
     }
 }
 

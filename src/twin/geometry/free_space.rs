@@ -6,11 +6,11 @@ use nalgebra::Vector2;
 /// A piece of a plane across the line: level below and above, straight on both sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trapezoid {
-    /// Its bottom and its top.
+    /// Heights of its bottom and of its top over top of rail.
     pub h_m: [f64; 2],
-    /// Its right side there, left of the centreline.
+    /// l of its right side at the bottom and at the top, metres left of the centreline.
     pub right_m: [f64; 2],
-    /// Its left side there.
+    /// The same of its left side.
     pub left_m: [f64; 2],
 }
 

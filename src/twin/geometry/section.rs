@@ -163,7 +163,7 @@ impl SectionCaster {
         }
     }
 
-    /// Whether it is the section of another track, with nothing but rails.
+    /// Whether it lies in the section of another track, with only rails and a strip of bed.
     pub fn is_shared(&self) -> bool {
         self.section.is_shared()
     }

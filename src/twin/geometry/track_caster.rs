@@ -249,7 +249,7 @@ impl TrackCaster {
     /// Whether a segment lies in the open.
     fn is_open(&self, segment: usize) -> bool {
         self.own_section(segment)
-            .is_some_and(|(_, section)| !section.closed)
+            .is_some_and(|(_, section)| section.is_open())
     }
 
     /// The end wall at a station that a ray meets which runs along the line.

@@ -98,7 +98,7 @@ impl TrackCaster {
         let (l_m, h_m) = plane.across(&position);
         SurfacePoint {
             position,
-            normal: wall.normal(&plane),
+            normal: wall.normal(&plane.forward),
             s_m: wall.s_m,
             l_m,
             painted_m: wall.paint.place_m(wall.s_m, l_m, h_m),

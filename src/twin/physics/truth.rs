@@ -64,7 +64,7 @@ pub enum BodyOwner {
     Load(usize),
     /// A car of a train, from its front.
     Car(TrainId, usize),
-    /// A blade of a switch.
+    /// The blades of a switch, by its number.
     Blade(usize),
 }
 

@@ -9,7 +9,7 @@
 //! nothing of the sky. What comes into a tunnel is in [`portal`](super::portal).
 
 use super::portal::Portal;
-use crate::track::{CrossSection, Material, Track};
+use crate::track::{Material, Track};
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
@@ -95,11 +95,6 @@ impl Daylight {
     }
 }
 
-/// Whether a cross-section is open to the sky.
-pub fn is_open(section: &CrossSection) -> bool {
-    !section.closed && !section.is_shared()
-}
-
 /// Points along the centreline of each open section, and a little more of it where nothing is beyond.
 fn open_stretches(
     track: &Track,
@@ -108,7 +103,7 @@ fn open_stretches(
     let open = track
         .sections
         .iter()
-        .filter(|range| is_open(&range.section));
+        .filter(|range| range.section.is_open());
     let [begins, ends] = nothing_beyond;
     let end_m = track.alignment.length_m();
     open.map(move |range| {
@@ -137,7 +132,7 @@ fn is_beside(line: &[Point3<f64>], p: &Point3<f64>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Alignment, PlanElement, SectionRange};
+    use crate::track::{Alignment, CrossSection, PlanElement, SectionRange};
 
     fn daylight() -> Option<Daylight> {
         let plan = [PlanElement::straight(200.0)];

@@ -1,6 +1,6 @@
 //! A scene as renderers draw it: painted, and with its lamps as they are at a time.
 
-use super::daylight::{Daylight, is_open};
+use super::daylight::Daylight;
 use super::lamp_field::LampField;
 use super::paint::Paintings;
 use super::scene::Scene;
@@ -23,7 +23,7 @@ pub struct LitScene {
     pub wet: Wet,
     /// What the tunnel's surfaces look like.
     pub paintings: Paintings,
-    /// In the open, by day.
+    /// Light in the open; `None` at night.
     pub daylight: Option<Daylight>,
     /// Walls across the line, by track.
     pub end_walls: Vec<Vec<EndWall>>,
@@ -123,7 +123,7 @@ impl LitScene {
         let Some(daylight) = &self.daylight else {
             return ambient_lx;
         };
-        match is_open(section) || (section.is_shared() && daylight.reaches(p)) {
+        match section.is_open() || (section.is_shared() && daylight.reaches(p)) {
             true => daylight.surface_lx(normal),
             false => ambient_lx + daylight.through_portals_lx(track, p, normal),
         }

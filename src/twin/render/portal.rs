@@ -1,6 +1,6 @@
-//! Daylight that comes into a tunnel through its mouth.
+//! Daylight that comes into a tunnel through its portal.
 //!
-//! From inside, the mouth is an even light of the outline's shape. The light that a polygon of luminance L
+//! From inside, the portal is an even light of the outline's shape. The light that a polygon of luminance L
 //! throws on a surface of normal n is Lambert's (Photometria, 1760): L / 2 times the sum over its sides of the
 //! angle that a side subtends, times n on the normal of the plane through the side and the place. What of the
 //! polygon is under the surface's horizon is cut off first. Walls do not pass the light on to each other.
@@ -8,10 +8,11 @@
 use crate::track::{Direction, Track};
 use nalgebra::{Point3, Vector3};
 
-/// Farther in there is no more than a lux of a bright day.
+/// Daylight is cut off at this distance from the portal. With 20,000 lx outside the floor there would get about 1 lx, a
+/// wall that faces the portal about 30 lx.
 const REACH_M: f64 = 60.0;
 
-/// The mouth of a tunnel.
+/// An end of a tunnel in the open.
 #[derive(Clone, Debug)]
 pub struct Portal {
     corners: Vec<Point3<f64>>,
@@ -20,7 +21,7 @@ pub struct Portal {
 }
 
 impl Portal {
-    /// All mouths of a track's own tunnels: where a closed cross-section meets an open one.
+    /// All portals of a track's own tunnels: where a closed cross-section meets an open one.
     pub fn all_of(track: &Track) -> Vec<Self> {
         let mouth = |inside: usize, s_m: f64, way: Direction| {
             let frame = track.alignment.at(s_m);

@@ -10,7 +10,6 @@ use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::{SectionRange, TrackPoint};
 use crate::twin::render::constants::SIGHT_M;
-use crate::twin::render::daylight::is_open;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
@@ -167,7 +166,7 @@ fn keys_in_sight(
     let first = ((s_m - back_m) / CHUNK_M).floor() as i64;
     let last = ((s_m + forth_m) / CHUNK_M).floor() as i64;
     let end = (track.alignment.length_m() / CHUNK_M).ceil() as i64;
-    // A place on a track that ends before the camera is its end.
+    // Where a track ends before the camera, `place` is its end; chunks out of sight are left out.
     let eye = framed.reference();
     let beyond_m = |index: i64| (track.alignment.at(index as f64 * CHUNK_M).origin - eye).norm();
     let near = |index: &i64| beyond_m(*index).min(beyond_m(index + 1)) <= SIGHT_M;
@@ -241,7 +240,7 @@ impl Chunk {
         Self {
             along: Vector3::new(cos, sin, 0.0),
             crossed: is_crossed(scene, key.track, key.start_m()),
-            open: sections.any(|range| is_open(&range.section)),
+            open: sections.any(|range| range.section.is_open()),
             ..Self::new(gpu, key, chunk_mesh(scene, key))
         }
     }

@@ -71,7 +71,7 @@ impl Site<'_> {
         painting: usize,
     ) {
         let frame = self.track.alignment.at(wall.s_m);
-        let normal = frame.ahead().xy().push(0.0).normalize() * -wall.seen_looking.sign();
+        let normal = wall.normal(&frame.ahead().xy().normalize());
         let section = &self.track.sections[wall.range].section;
         let [low_m, high_m] = piece.h_m;
         let [right_m, left_m] = [

@@ -16,7 +16,7 @@ const AROUND: u32 = 144;
 /// Where cells end above the horizon and under it, shares of a right angle.
 const HEIGHTS: [f64; 7] = [0.0, 0.03, 0.1, 0.25, 0.5, 0.75, 1.0];
 
-/// It is of no track.
+/// Not that of any chunk: nothing of the sky is looked up by it.
 pub const KEY: ChunkKey = ChunkKey {
     track: 0,
     index: 0,
