@@ -128,6 +128,8 @@ impl Edge {
 /// Height of the track bed's surface, over top of rail: rails of 60 kg/m, 176 mm high, stand on it
 /// (rounded; fastenings are not modelled).
 pub const BED_M: f64 = -0.17;
+/// What is no lower than this under the bed of an open section is on a level with it.
+const LEVEL_M: f64 = 0.5;
 /// Largest distance between an arc of the outline and its chords.
 pub const CHORD_ERROR_M: f64 = 0.005;
 
@@ -260,7 +262,7 @@ impl CrossSection {
                 let (low_m, high_m) = sides.fold((f64::MAX, f64::MIN), |(low, high), l_m| {
                     (low.min(l_m), high.max(l_m))
                 });
-                (low_m..=high_m).contains(&l_m)
+                (low_m..=high_m).contains(&l_m) && h_m >= BED_M - LEVEL_M
             }
         }
     }

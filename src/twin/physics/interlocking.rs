@@ -94,10 +94,21 @@ impl Interlocking {
     pub(super) fn rerouted(&mut self, network: &Network, train: &Train) {
         let way = &mut self.ways[train.consist.id.index()];
         let passed = way.passed;
-        *way = Way {
-            passed,
-            ..Way::new(network, train, &self.clear_m)
-        };
+        let before = std::mem::replace(
+            way,
+            Way {
+                passed,
+                ..Way::new(network, train, &self.clear_m)
+            },
+        );
+        // What lies on its old route alone is kept for it no longer.
+        for claim in &before.claims {
+            let kept_for = &mut self.kept_for[claim.number];
+            let goes_there = way.claims.iter().any(|c| c.number == claim.number);
+            if *kept_for == Some(train.consist.id) && !goes_there {
+                *kept_for = None;
+            }
+        }
     }
 
     /// To be called after each step; what trains have to do.
@@ -269,6 +280,7 @@ impl Interlocking {
 
     /// Trains in each other's gauge at a switch or a crossing.
     fn find_fouled(&mut self, network: &Network, trains: &[Train], now: SimTime) {
+        let mut fouled = Vec::new();
         for (k, train) in trains.iter().enumerate() {
             let (head_m, tail_m) = train.consist.stands_m();
             for other in trains.iter().take(k) {
@@ -279,11 +291,18 @@ impl Interlocking {
                 let fouls = runs.any(|(from_m, to_m)| from_m < head_m && to_m > tail_m);
                 drop(runs);
                 if fouls {
-                    let other = Some(other.consist.id);
-                    self.tell(network, (now, IncidentKind::Fouled), train, None, other);
-                    return;
+                    fouled.push((train, other.consist.id));
                 }
             }
+        }
+        for (train, other) in fouled {
+            self.tell(
+                network,
+                (now, IncidentKind::Fouled),
+                train,
+                None,
+                Some(other),
+            );
         }
     }
 

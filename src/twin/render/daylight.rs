@@ -13,26 +13,33 @@ use crate::track::{Material, Track};
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
+use std::ops::RangeInclusive;
 use std::sync::Arc;
 
 /// From point to point of a stretch in the open.
 const STEP_M: f64 = 5.0;
 /// Buffer stops and the like stand so far beyond the end of a track.
 const BEYOND_M: f64 = 20.0;
-/// What is farther from all of a stretch is not in the open there.
-const ASIDE_M: f64 = 100.0;
-/// The same in height.
-const ABOVE_M: f64 = 10.0;
+/// What is so far beside the bed of a stretch, and between these heights over its top of rail, is in the open there.
+const ASIDE_M: f64 = 5.0;
+const HEIGHTS_M: RangeInclusive<f64> = -2.0..=20.0;
 
 /// Daylight on a network of tracks.
 #[derive(Clone, Debug, Default)]
 pub struct Daylight {
     /// On level ground.
     level_lx: f64,
-    /// Centrelines of stretches in the open.
-    open: Vec<Vec<Point3<f64>>>,
-    /// Mouths of tunnels, by track.
+    open: Vec<OpenStretch>,
+    /// Portals of tunnels, by track.
     portals: Vec<Vec<Portal>>,
+}
+
+/// A stretch of a track in the open.
+#[derive(Clone, Debug)]
+struct OpenStretch {
+    /// Along its centreline.
+    points: Vec<Point3<f64>>,
+    aside_m: f64,
 }
 
 impl Daylight {
@@ -91,7 +98,7 @@ impl Daylight {
 
     /// Whether a place is in the open.
     pub fn reaches(&self, p: &Point3<f64>) -> bool {
-        self.open.iter().any(|line| is_beside(line, p))
+        self.open.iter().any(|stretch| stretch.holds(p))
     }
 }
 
@@ -99,7 +106,7 @@ impl Daylight {
 fn open_stretches(
     track: &Track,
     nothing_beyond: [bool; 2],
-) -> impl Iterator<Item = Vec<Point3<f64>>> + '_ {
+) -> impl Iterator<Item = OpenStretch> + '_ {
     let open = track
         .sections
         .iter()
@@ -112,21 +119,34 @@ fn open_stretches(
         let length_m = range.to_m + beyond_m(ends && range.to_m >= end_m) - from_m;
         let steps = (length_m / STEP_M).ceil().max(1.0);
         let at = |k: u32| from_m + length_m * f64::from(k) / steps;
-        (0..=steps as u32)
-            .map(|k| track.alignment.at(at(k)).origin)
-            .collect()
+        let sides = range.section.points.iter().map(|p| p.l_m.abs());
+        let points = (0..=steps as u32).map(|k| track.alignment.at(at(k)).origin);
+        OpenStretch {
+            points: points.collect(),
+            aside_m: sides.fold(0.0, f64::max) + ASIDE_M,
+        }
     })
 }
 
-/// Whether a place is beside a line, neither before its begin nor beyond its end.
-fn is_beside(line: &[Point3<f64>], p: &Point3<f64>) -> bool {
-    let near = |pair: &[Point3<f64>]| {
-        let (along, to) = ((pair[1] - pair[0]).xy(), (p - pair[0]).xy());
-        let share = along.dot(&to) / along.norm_squared();
-        let aside = to - along * share;
-        (0.0..=1.0).contains(&share) && aside.norm() < ASIDE_M && (p.z - pair[0].z).abs() < ABOVE_M
-    };
-    line.windows(2).any(near)
+impl OpenStretch {
+    /// Whether a place is beside or over it, neither before its begin nor beyond its end.
+    fn holds(&self, p: &Point3<f64>) -> bool {
+        let last = self.points.len().saturating_sub(2);
+        let near = |(k, pair): (usize, &[Point3<f64>])| {
+            let (along, to) = ((pair[1] - pair[0]).xy(), (p - pair[0]).xy());
+            let share = along.dot(&to) / along.norm_squared();
+            // On the outside of a bend a place may be between two pieces.
+            let on_line = share.clamp(0.0, 1.0);
+            let aside = to - along * on_line;
+            let is_before = k == 0 && share < 0.0;
+            let is_beyond = k == last && share > 1.0;
+            !is_before
+                && !is_beyond
+                && aside.norm() < self.aside_m
+                && HEIGHTS_M.contains(&(p.z - pair[0].z))
+        };
+        self.points.windows(2).enumerate().any(near)
+    }
 }
 
 #[cfg(test)]
@@ -189,6 +209,7 @@ mod tests {
             (79.0, 0.0, 1.0, false),
             (81.0, 0.0, 1.0, true),
             (199.0, 19.0, 3.0, true),
+            (150.0, 26.0, 1.0, false),
             (201.0, 0.0, 1.0, false),
             (150.0, 150.0, 1.0, false),
             (150.0, 0.0, -15.0, false),

@@ -173,7 +173,8 @@ fn keys_in_sight(
     let (first, last) = (first.max(0), last.min(end - 1));
     let first = (first..=last).find(near).unwrap_or(end);
     let last = (first..=last).rev().find(near).unwrap_or(first - 1);
-    let by_day = scene.daylight.is_some();
+    let closed_at = |m: f64| track.section_at(m).is_some_and(|section| section.closed);
+    let dark_at = move |m: f64| scene.daylight.is_some() && closed_at(m);
     let [begin_dark, end_dark] = scene.dark_ends[track_number];
     let moves = !framed.rests();
     let bend = Bend::of(&framed.view.camera.intrinsics, place);
@@ -186,8 +187,8 @@ fn keys_in_sight(
             detail: Detail::at(away_m, moves || bend.is_some()),
             bend,
             dark: [
-                by_day && index == first && (first > 0 || begin_dark),
-                by_day && index == last && (last < end - 1 || end_dark),
+                index == first && (first > 0 || begin_dark) && dark_at(from_m),
+                index == last && (last < end - 1 || end_dark) && dark_at(from_m + CHUNK_M),
             ],
         }
     })

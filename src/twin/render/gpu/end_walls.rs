@@ -41,7 +41,8 @@ impl Site<'_> {
         let ends_m = [key.start_m(), (key.start_m() + CHUNK_M).min(length_m)];
         let dark = ends_m.into_iter().zip(key.dark).filter(|(_, dark)| *dark);
         for (s_m, _) in dark {
-            let within_m = s_m.clamp(key.start_m() + INSIDE_M, ends_m[1] - INSIDE_M);
+            let middle_m = 0.5 * (ends_m[0] + ends_m[1]);
+            let within_m = s_m + (middle_m - s_m).clamp(-INSIDE_M, INSIDE_M);
             let Some(section) = self.track.section_at(within_m).filter(|s| s.closed) else {
                 continue;
             };
