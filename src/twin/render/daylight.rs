@@ -132,20 +132,18 @@ impl OpenStretch {
     /// Whether a place is beside or over it, neither before its begin nor beyond its end.
     fn holds(&self, p: &Point3<f64>) -> bool {
         let last = self.points.len().saturating_sub(2);
-        let near = |(k, pair): (usize, &[Point3<f64>])| {
+        let pieces = self.points.windows(2).enumerate().map(|(k, pair)| {
             let (along, to) = ((pair[1] - pair[0]).xy(), (p - pair[0]).xy());
             let share = along.dot(&to) / along.norm_squared();
             // On the outside of a bend a place may be between two pieces.
-            let on_line = share.clamp(0.0, 1.0);
-            let aside = to - along * on_line;
-            let is_before = k == 0 && share < 0.0;
-            let is_beyond = k == last && share > 1.0;
-            !is_before
-                && !is_beyond
-                && aside.norm() < self.aside_m
-                && HEIGHTS_M.contains(&(p.z - pair[0].z))
-        };
-        self.points.windows(2).enumerate().any(near)
+            let away_m = (to - along * share.clamp(0.0, 1.0)).norm();
+            let is_outside = (k == 0 && share < 0.0) || (k == last && share > 1.0);
+            (away_m, is_outside, p.z - pair[0].z)
+        });
+        let nearest = pieces.min_by(|a, b| a.0.total_cmp(&b.0));
+        nearest.is_some_and(|(away_m, is_outside, height_m)| {
+            !is_outside && away_m < self.aside_m && HEIGHTS_M.contains(&height_m)
+        })
     }
 }
 
