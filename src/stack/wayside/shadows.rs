@@ -117,15 +117,15 @@ impl Sums {
 /// square.
 type Part = (usize, (u32, u32));
 
-/// A region as a whole.
+/// A region that may be a shadow, as a whole.
 #[derive(Clone, Copy, Debug)]
-struct Region {
+struct CandidateRegion {
     /// Bounds, in squares.
     squares: PixelBox,
     sums: Sums,
 }
 
-impl Region {
+impl CandidateRegion {
     /// Whether another one is as dark, and beside it, so that their squares meet.
     fn is_piece_of(&self, other: &Self) -> bool {
         (self.sums.left() - other.sums.left()).abs() < ALIKE
@@ -237,7 +237,7 @@ fn parts(
 fn shadows(parts: &BTreeMap<Part, Sums>, noise: &Noise) -> BTreeSet<Part> {
     let mut regions = regions(parts);
     let sure = regions.values().filter(|r| r.sums.is_shadow(noise));
-    let sure: Vec<Region> = sure.copied().collect();
+    let sure: Vec<CandidateRegion> = sure.copied().collect();
     regions.retain(|_, region| sure.iter().any(|shadow| region.is_piece_of(shadow)));
     let is_shadow = |(part, sums): &(&Part, &Sums)| {
         let region = regions.get(&part.0);
@@ -250,12 +250,14 @@ fn shadows(parts: &BTreeMap<Part, Sums>, noise: &Noise) -> BTreeSet<Part> {
         .collect()
 }
 
-fn regions(parts: &BTreeMap<Part, Sums>) -> BTreeMap<usize, Region> {
-    let mut regions: BTreeMap<usize, Region> = BTreeMap::new();
+fn regions(parts: &BTreeMap<Part, Sums>) -> BTreeMap<usize, CandidateRegion> {
+    let mut regions: BTreeMap<usize, CandidateRegion> = BTreeMap::new();
     for (&(number, (u, v)), part) in parts {
         let squares = PixelBox::of_row(v, (u, u));
         let sums = Sums::default();
-        let region = regions.entry(number).or_insert(Region { squares, sums });
+        let region = regions
+            .entry(number)
+            .or_insert(CandidateRegion { squares, sums });
         region.squares = region.squares.joined(&squares);
         region.sums.add(part);
     }

@@ -63,12 +63,12 @@ pub struct StatedChainage {
     /// 1 where it grows along the track, -1 where it falls.
     sign: f64,
     /// In order along the track; at least one.
-    regions: Vec<Region>,
+    regions: Vec<ChainageRegion>,
 }
 
 /// A stretch of a track without a jump.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Region {
+struct ChainageRegion {
     /// Where it begins and ends, from the begin of the track.
     from_m: f64,
     to_m: f64,
@@ -77,7 +77,7 @@ struct Region {
     sign: f64,
 }
 
-impl Region {
+impl ChainageRegion {
     fn stated_m(&self, s_m: f64) -> f64 {
         self.start_m + self.sign * (s_m - self.from_m)
     }
@@ -126,12 +126,14 @@ impl StatedChainage {
         let ends = equations.clone().map(|e| e.chainage_m).chain([length_m]);
         let begins = equations.map(|e| (e.chainage_m, e.ahead_m));
         let begins = [(0.0, entry.start_m)].into_iter().chain(begins);
-        let regions = begins.zip(ends).map(|((from_m, start_m), to_m)| Region {
-            from_m,
-            to_m,
-            start_m,
-            sign,
-        });
+        let regions = begins
+            .zip(ends)
+            .map(|((from_m, start_m), to_m)| ChainageRegion {
+                from_m,
+                to_m,
+                start_m,
+                sign,
+            });
         Self {
             prefix: entry.prefix.clone(),
             sign,
@@ -170,7 +172,7 @@ impl StatedChainage {
 
     /// As met by who runs down the track, of that length: what a place states stays.
     pub(super) fn reversed(&self, length_m: f64) -> Self {
-        let regions = self.regions.iter().rev().map(|region| Region {
+        let regions = self.regions.iter().rev().map(|region| ChainageRegion {
             from_m: length_m - region.to_m,
             to_m: length_m - region.from_m,
             start_m: region.stated_m(region.to_m),

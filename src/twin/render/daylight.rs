@@ -215,4 +215,28 @@ mod tests {
             assert_eq!(daylight.reaches(&Point3::new(x, y, z)), open, "{x} {y} {z}");
         }
     }
+
+    /// Fails where a bend leaves gaps between the straight pieces of its outside.
+    #[test]
+    fn a_bend_is_in_the_open_on_both_sides() {
+        let plan = [PlanElement::arc(200.0, 1.0 / 300.0, 0.0)];
+        let mut track = Track::bare("bend", Alignment::new(Point3::origin(), 0.0, &plan, &[]));
+        track.sections.push(SectionRange {
+            from_m: 0.0,
+            to_m: 200.0,
+            missing_rail: None,
+            section: CrossSection::open(25.0),
+        });
+        track.daylight_lx = 5000.0;
+        let track = Arc::new(track);
+        let daylight = Daylight::of(&[track.clone()], &[[false; 2]]).unwrap_or_default();
+        // A place at the very begin may be before the plane across its first piece.
+        for k in 0..2000 {
+            let frame = track.alignment.at(1.0 + 0.099 * f64::from(k));
+            for l_m in [-25.0, -5.0, 0.0, 5.0, 25.0] {
+                let place = frame.world_from_section(l_m, 1.0);
+                assert!(daylight.reaches(&place), "{l_m} {:?}", frame.s_m);
+            }
+        }
+    }
 }

@@ -67,10 +67,8 @@ impl LitScene {
 
     /// Takes another scene; whether it had to be painted anew.
     pub fn replace(&mut self, scene: Scene) -> bool {
-        let sections = |tracks: &[Arc<Track>]| -> Vec<_> {
-            tracks.iter().map(|track| track.sections.clone()).collect()
-        };
-        let anew = sections(&self.tracks) != sections(&scene.tracks);
+        let now = self.tracks.iter().map(|track| &track.sections);
+        let anew = !now.eq(scene.tracks.iter().map(|track| &track.sections));
         let paintings = if anew {
             Paintings::of(&scene.tracks)
         } else {
