@@ -229,7 +229,8 @@ mod tests {
         });
         track.daylight_lx = 5000.0;
         let track = Arc::new(track);
-        let daylight = Daylight::of(&[track.clone()], &[[false; 2]]).unwrap_or_default();
+        let daylight =
+            Daylight::of(std::slice::from_ref(&track), &[[false; 2]]).unwrap_or_default();
         // A place at the very begin may be before the plane across its first piece.
         for k in 0..2000 {
             let frame = track.alignment.at(1.0 + 0.099 * f64::from(k));
