@@ -20,7 +20,8 @@ struct Tile {
     // From here the numbers of other sources, and their end.
     plain: u32,
     end: u32,
-    ambient_lx: f32,
+    // In the mean over all directions that a surface may face; added to it, times the upward part of the normal.
+    ambient_lx: vec2f,
     // Upper left, upper right, lower left, lower right.
     corners: array<Corner, 4>,
 }
@@ -77,7 +78,7 @@ struct Varying {
     @location(2) time_s: f32,
     // Shaded lights, other lights and their end in the lists.
     @location(3) @interpolate(flat, either) lights: vec3u,
-    @location(4) @interpolate(flat, either) ambient_lx: f32,
+    @location(4) @interpolate(flat, either) ambient_lx: vec2f,
 }
 
 @vertex
@@ -262,7 +263,7 @@ fn shade(in: Varying) -> @location(0) vec4f {
     let across = cross(right, down);
     let n = normalize(select(across, -across, dot(across, in.ray) > 0.0));
     let start = p + n * OFFSET_M;
-    var total_lx = in.ambient_lx;
+    var total_lx = in.ambient_lx.x + n.z * in.ambient_lx.y;
     var hidden_lx = 0.0;
     let hidden = word(in.lights.x);
     for (var k = in.lights.x + 1u; k < hidden; k = word(k + 2u)) {

@@ -33,7 +33,7 @@ use std::f64::consts::TAU;
 
 const SPEED_MPS: f64 = 100.0 / 3.6;
 
-fn quiet(job: &Job) -> Job {
+pub fn quiet(job: &Job) -> Job {
     let mut job = job.clone();
     for view in &mut job.views {
         view.sensor.noise = false;

@@ -34,12 +34,35 @@ pub struct Daylight {
     portals: Vec<Vec<Portal>>,
 }
 
+/// Light from all sides about a place: on a surface whose upward part of the normal is n, `mean_lx` + n `upward_lx`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AmbientLight {
+    /// In the mean over all directions that a surface may face.
+    pub mean_lx: f64,
+    pub upward_lx: f64,
+}
+
 /// A stretch of a track in the open.
 #[derive(Clone, Debug)]
 struct OpenStretch {
     /// Along its centreline.
     points: Vec<Point3<f64>>,
     aside_m: f64,
+}
+
+impl AmbientLight {
+    /// The same whichever way a surface faces.
+    pub fn even(lx: f64) -> Self {
+        Self {
+            mean_lx: lx,
+            upward_lx: 0.0,
+        }
+    }
+
+    /// On a surface with a normal.
+    pub fn on_surface_lx(&self, normal: &Vector3<f64>) -> f64 {
+        self.mean_lx + normal.z * self.upward_lx
+    }
 }
 
 impl Daylight {
@@ -76,15 +99,13 @@ impl Daylight {
         }
     }
 
-    /// On a surface in the open with a normal.
-    pub fn surface_lx(&self, normal: &Vector3<f64>) -> f64 {
+    /// In the open.
+    pub fn outside(&self) -> AmbientLight {
         let ground = mean_albedo(Material::Bed);
-        0.5 * self.level_lx * ((1.0 + normal.z) + ground * (1.0 - normal.z))
-    }
-
-    /// On surfaces in the open, in the mean over all directions that they may face.
-    pub fn mean_lx(&self) -> f64 {
-        0.5 * self.level_lx * (1.0 + mean_albedo(Material::Bed))
+        AmbientLight {
+            mean_lx: 0.5 * self.level_lx * (1.0 + ground),
+            upward_lx: 0.5 * self.level_lx * (1.0 - ground),
+        }
     }
 
     /// On a surface of a track's tunnel, through its mouths.
@@ -94,6 +115,16 @@ impl Daylight {
         portals
             .map(|portal| portal.lux_per_cd_m2(p, normal) * outside_cd_m2)
             .sum()
+    }
+
+    /// The middle of what lies in the open.
+    pub fn middle(&self) -> Point3<f64> {
+        let points = self.open.iter().flat_map(|stretch| &stretch.points);
+        let corners = points.fold(None, |corners, p| {
+            let (low, high) = corners.unwrap_or((*p, *p));
+            Some((p.inf(&low), p.sup(&high)))
+        });
+        corners.map_or_else(Point3::origin, |(low, high)| nalgebra::center(&low, &high))
     }
 
     /// Whether a place is in the open.
@@ -190,13 +221,14 @@ mod tests {
                 }
             }
             let expected = sum * 4.0 * PI / f64::from(steps * steps);
-            let lux = daylight.surface_lx(&normal);
+            let lux = daylight.outside().on_surface_lx(&normal);
             assert!(
                 (lux / expected - 1.0).abs() < 1e-3,
                 "{tilt}: {lux} {expected}"
             );
         }
-        assert!((daylight.surface_lx(&Vector3::z()) - 5000.0).abs() < 1e-9);
+        let level_lx = daylight.outside().on_surface_lx(&Vector3::z());
+        assert!((level_lx - 5000.0).abs() < 1e-9);
     }
 
     /// Fails where daylight goes into a tunnel, or ends before the open does.

@@ -1,6 +1,6 @@
 //! A scene as renderers draw it: painted, and with its lamps as they are at a time.
 
-use super::daylight::Daylight;
+use super::daylight::{AmbientLight, Daylight};
 use super::lamp_field::LampField;
 use super::paint::Paintings;
 use super::scene::Scene;
@@ -97,34 +97,49 @@ impl LitScene {
         let track = &self.tracks[track];
         let place = track.alignment.at(s_m).origin;
         let ambient_lx = match self.daylight_at(&place) {
-            Some(daylight) => daylight.mean_lx(),
+            Some(daylight) => daylight.outside().mean_lx,
             None => track.ambient_lx,
         };
         self.lamps.airlight_cd_m2(track, s_m, ambient_lx)
     }
 
-    /// Ambient light on what does not belong to a track, whichever way it faces: in the open that of the day,
-    /// else that of the first track.
-    pub fn ambient_lx(&self, p: &Point3<f64>) -> f64 {
+    /// Ambient light on what does not belong to a track: in the open that of the day, else that of the first track.
+    pub fn ambient(&self, p: &Point3<f64>) -> AmbientLight {
         let daylight = self.daylight_at(p);
-        daylight.map_or(self.tracks[0].ambient_lx, Daylight::mean_lx)
+        let inside = || AmbientLight::even(self.tracks[0].ambient_lx);
+        daylight.map_or_else(inside, Daylight::outside)
     }
 
     /// Ambient light on a surface of a cross-section of a track.
-    pub fn surface_ambient_lx(
+    pub fn surface_ambient(
         &self,
         (track, section): (usize, &CrossSection),
         p: &Point3<f64>,
         normal: &Vector3<f64>,
-    ) -> f64 {
-        let ambient_lx = self.tracks[track].ambient_lx;
-        let Some(daylight) = &self.daylight else {
-            return ambient_lx;
-        };
-        match section.is_open() || (section.is_shared() && daylight.reaches(p)) {
-            true => daylight.surface_lx(normal),
-            false => ambient_lx + daylight.through_portals_lx(track, p, normal),
-        }
+    ) -> AmbientLight {
+        let daylight = self
+            .daylight
+            .as_ref()
+            .filter(|daylight| section.is_open() || (section.is_shared() && daylight.reaches(p)));
+        let inside = || self.inside_ambient(track, p, normal);
+        daylight.map_or_else(inside, Daylight::outside)
+    }
+
+    /// The same where the cross-section is not at hand.
+    pub fn ambient_on_track(
+        &self,
+        track: usize,
+        p: &Point3<f64>,
+        normal: &Vector3<f64>,
+    ) -> AmbientLight {
+        let inside = || self.inside_ambient(track, p, normal);
+        self.daylight_at(p).map_or_else(inside, Daylight::outside)
+    }
+
+    fn inside_ambient(&self, track: usize, p: &Point3<f64>, normal: &Vector3<f64>) -> AmbientLight {
+        let daylight = self.daylight.as_ref();
+        let through_portals_lx = daylight.map_or(0.0, |d| d.through_portals_lx(track, p, normal));
+        AmbientLight::even(self.tracks[track].ambient_lx + through_portals_lx)
     }
 
     fn daylight_at(&self, p: &Point3<f64>) -> Option<&Daylight> {

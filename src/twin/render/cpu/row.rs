@@ -225,7 +225,13 @@ impl<'a> RowRays<'a> {
                 view,
                 spread,
                 self.row,
-                (self.scene.lit.ambient_lx(&lamp.centre), self.haze(lamp)),
+                (
+                    self.scene
+                        .lit
+                        .ambient(&lamp.centre)
+                        .on_surface_lx(&lamp.facing),
+                    self.haze(lamp),
+                ),
                 depth,
                 luminances,
             );
@@ -262,8 +268,7 @@ impl<'a> RowRays<'a> {
     fn draw_solid(&self, solid: &Solid<'_>, buffers: &mut RowBuffers) {
         let (scene, camera) = (self.scene, &self.view.camera.intrinsics);
         let bounds = ImageBounds::of(solid.corners(), camera, &self.row.mid);
-        let ambient_lx =
-            (scene.lit).ambient_lx(&solid.body().world_from_body.translation.vector.into());
+        let ambient = (scene.lit).ambient(&solid.body().world_from_body.translation.vector.into());
         for u in bounds.columns(self.row.v, camera.width_px as usize) {
             let ray = self.ray(u);
             let Some((t, normal)) = solid.cast(&self.eye, &ray) else {
@@ -271,7 +276,7 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let lux = ambient_lx
+                let lux = ambient.on_surface_lx(&normal)
                     + scene.lit.lamps.irradiance_lx(&at, &normal)
                     + self.by_job_lx(&at, &normal);
                 let body = solid.body();

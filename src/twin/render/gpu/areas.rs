@@ -11,7 +11,7 @@ use super::layout::NEAR_M;
 use super::rectangle::Rectangle;
 use super::shadows::ViewShadows;
 use super::surface::SurfaceCell;
-use super::tiles::{Eyes, Marks, TILE_PX, TileBounds};
+use super::tiles::{Eyes, Marks, TILE_PX, TileBounds, TileGrid};
 use super::view::Framed;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::photometry::headlights_lx;
@@ -77,7 +77,7 @@ impl PartSearch<'_> {
     /// The parts with more light than so much, by headlights or by lamps too.
     fn parts(&self, grey: f64, by_lamps: bool) -> Parts {
         let size_px = self.framed.size_px();
-        let mut marks = Marks::new(size_px.into(), 1);
+        let mut marks = Marks::new(TileGrid::new(size_px), 1);
         let luminance_cd_m2 = grey / self.framed.view.grey_per_cd_m2();
         self.mark_tunnel(&mut marks, luminance_cd_m2, by_lamps);
         self.mark_bodies(&mut marks);

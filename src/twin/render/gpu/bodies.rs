@@ -35,7 +35,7 @@ impl BodyMeshes {
             }
             let fineness = Fineness::of(body, &job.views);
             let place = body.world_from_body.translation.vector.into();
-            mesh.add_body(body, &scene.lamps, scene.ambient_lx(&place), fineness);
+            mesh.add_body(body, &scene.lamps, &scene.ambient(&place), fineness);
             ranges.push(first..mesh.indices.len() as u32);
         }
         Self {

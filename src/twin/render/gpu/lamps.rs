@@ -249,7 +249,8 @@ impl LampTable {
                 knots: seen.collect(),
             };
             if passing.knots.iter().any(Option::is_some) {
-                table.add_disc(&passing, scene.ambient_lx(&lamp.centre), airlight_cd_m2);
+                let ambient_lx = scene.ambient(&lamp.centre).on_surface_lx(&lamp.facing);
+                table.add_disc(&passing, ambient_lx, airlight_cd_m2);
                 table.add_glare(&passing);
             }
         }

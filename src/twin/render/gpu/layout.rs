@@ -284,8 +284,12 @@ shared_with_shaders! {
         pub plain: u32,
         /// After the last one.
         pub end: u32,
-        /// Ambient light.
-        pub ambient_lx: f32,
+        /// Fills the stride.
+        pub unused: u32,
+        /// Ambient light: in the mean, and what is added for a normal upward.
+        pub ambient_lx: [f32; 2],
+        /// Fills the stride.
+        pub unused_too: [f32; 2],
         /// Upper left, upper right, lower left, lower right.
         pub corners: [Corner; 4],
     }

@@ -3,6 +3,7 @@
 use super::bend;
 use super::layout::Vertex;
 use crate::twin::geometry::{Body, Hull, Shape};
+use crate::twin::render::daylight::AmbientLight;
 use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::scene::View;
 use nalgebra::{Point3, Vector3};
@@ -112,7 +113,7 @@ impl Mesh {
         &mut self,
         body: &Body,
         lamps: &LampField,
-        ambient_lx: f64,
+        ambient: &AmbientLight,
         fineness: Fineness,
     ) {
         let from = self.vertices.len() as u32;
@@ -120,9 +121,10 @@ impl Mesh {
             let at = body.world_from_body * Point3::from(p);
             let normal = body.world_from_body * n;
             let out = body.world_from_body.rotation * p;
+            let light_lx = lamps.irradiance_lx(&at, &normal) + ambient.on_surface_lx(&normal);
             self.vertices.push(Vertex {
                 position_m: out.map(|x| x as f32).into(),
-                light_lx: [(lamps.irradiance_lx(&at, &normal) + ambient_lx) as f32, 0.0],
+                light_lx: [light_lx as f32, 0.0],
                 normal: normal.map(|x| x as f32).into(),
                 paint: body.albedo as f32,
                 albedo: body.albedo as f32,
@@ -324,7 +326,8 @@ mod tests {
             px_per_m: 1e4,
             cell_m: CELL_M,
         };
-        mesh.add_body(&body, &LampField::new(&[], Air::default()), 1.0, fineness);
+        let lamps = LampField::new(&[], Air::default());
+        mesh.add_body(&body, &lamps, &AmbientLight::even(1.0), fineness);
         mesh
     }
 

@@ -1,4 +1,4 @@
-//! Sky, and ground far away, where a track lies in the open by day: two half spheres around the camera.
+//! Sky, and ground far away, where a track lies in the open by day: two half spheres around the tracks.
 
 use super::detail::{ChunkKey, Detail};
 use super::layout::Vertex;
@@ -6,10 +6,10 @@ use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
 use super::tunnel::{ChunkMesh, ChunkSide};
 use crate::twin::render::daylight::Daylight;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Vector3;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// So far away that it is the same from wherever a camera is on a line.
+/// So far from the middle of the tracks that it is the same from wherever a camera is on them.
 const RADIUS_M: f64 = 2e5;
 /// Cells around the horizon, as fine as a bent lens needs.
 const AROUND: u32 = 144;
@@ -25,13 +25,13 @@ pub const KEY: ChunkKey = ChunkKey {
     dark: [false; 2],
 };
 
-/// The mesh of both, around the origin.
+/// The mesh of both.
 pub fn sky_mesh(daylight: &Daylight) -> ChunkMesh {
     let mut mesh = Mesh::default();
     let halves = [(1.0, daylight.sky_cd_m2()), (-1.0, daylight.ground_cd_m2())];
     let parts = halves.map(|(up, luminance_cd_m2)| half_sphere(&mut mesh, up, luminance_cd_m2));
     ChunkMesh {
-        origin: Point3::origin(),
+        origin: daylight.middle(),
         mesh,
         lamp: None,
         parts: parts.into(),

@@ -6,7 +6,6 @@ use crate::twin::geometry::{Body, Solid};
 use crate::twin::render::gpu::layout::NEAR_M;
 use crate::twin::render::gpu::view::Framed;
 use nalgebra::{Isometry3, Point2, Point3, Vector2};
-use std::ops::Range;
 
 /// Side of a tile: over so few pixels a lens's distortion is even.
 pub const TILE_PX: u32 = 32;
@@ -26,10 +25,16 @@ pub struct TileBounds {
 /// Where the camera is while a view is exposed: `camera_from_world`, and when after the job's time.
 pub struct Eyes([(Isometry3<f64>, f64); 3]);
 
-/// Sets of numbers, one a tile.
-pub struct Marks {
+/// The tiles of a picture, row by row.
+#[derive(Clone, Copy)]
+pub struct TileGrid {
     columns: u32,
     rows: u32,
+}
+
+/// Sets of numbers, one a tile.
+pub struct Marks {
+    grid: TileGrid,
     words: usize,
     sets: Vec<u64>,
 }
@@ -150,16 +155,40 @@ impl TileBounds {
     }
 }
 
+impl TileGrid {
+    pub fn new(size_px: [u32; 2]) -> Self {
+        let [columns, rows] = size_px.map(|px| px.div_ceil(TILE_PX));
+        Self { columns, rows }
+    }
+
+    pub fn count(self) -> usize {
+        (self.columns * self.rows) as usize
+    }
+
+    /// The numbers of all tiles that have pixels of a part of the picture.
+    pub fn tiles_of(self, part: &Rectangle) -> impl Iterator<Item = usize> {
+        let counts = [self.columns, self.rows];
+        let ends = part.ends();
+        let [columns, rows] = [0, 1].map(|k| {
+            let end = ends[k].div_ceil(TILE_PX);
+            part.at[k] / TILE_PX..end.min(counts[k])
+        });
+        let rows = rows.filter(|_| !part.is_empty());
+        rows.flat_map(move |row| {
+            let columns = columns.clone();
+            columns.map(move |column| (row * self.columns + column) as usize)
+        })
+    }
+}
+
 impl Marks {
     /// Empty sets of so many numbers for a picture.
-    pub fn new((width_px, height_px): (u32, u32), numbers: usize) -> Self {
-        let (columns, rows) = (width_px.div_ceil(TILE_PX), height_px.div_ceil(TILE_PX));
+    pub fn new(grid: TileGrid, numbers: usize) -> Self {
         let words = numbers.div_ceil(64);
         Self {
-            columns,
-            rows,
+            grid,
             words,
-            sets: vec![0; (columns * rows) as usize * words],
+            sets: vec![0; grid.count() * words],
         }
     }
 
@@ -167,30 +196,15 @@ impl Marks {
     pub fn tiles(&self) -> impl Iterator<Item = (u32, u32, &[u64])> {
         let sets = self.sets.chunks_exact(self.words.max(1));
         sets.zip(0u32..)
-            .map(|(set, k)| (k % self.columns, k / self.columns, set))
+            .map(|(set, k)| (k % self.grid.columns, k / self.grid.columns, set))
     }
 
     /// Adds numbers to all tiles that have pixels of a part of the picture.
     pub fn add_part(&mut self, part: &Rectangle, numbers: &[u64]) {
-        if part.is_empty() {
-            return;
-        }
-        let counts = [self.columns, self.rows];
-        let ends = part.ends();
-        let tiles = [0, 1].map(|k| {
-            let end = ends[k].div_ceil(TILE_PX);
-            part.at[k] / TILE_PX..end.min(counts[k])
-        });
-        self.add_tiles(tiles, numbers);
-    }
-
-    fn add_tiles(&mut self, [columns, rows]: [Range<u32>; 2], numbers: &[u64]) {
-        for row in rows {
-            for column in columns.clone() {
-                let at = (row * self.columns + column) as usize * self.words;
-                for (word, new) in self.sets[at..].iter_mut().zip(numbers) {
-                    *word |= new;
-                }
+        for tile in self.grid.tiles_of(part) {
+            let set = &mut self.sets[tile * self.words..];
+            for (word, new) in set.iter_mut().zip(numbers) {
+                *word |= new;
             }
         }
     }

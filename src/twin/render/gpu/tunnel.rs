@@ -269,8 +269,8 @@ impl Site<'_> {
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
         let place = (self.cutting.key.track, section);
-        let ambient_lx = self.scene.surface_ambient_lx(place, &p, &normal);
-        let all = self.scene.lamps.irradiance_lx(&p, &normal) + ambient_lx;
+        let ambient = self.scene.surface_ambient(place, &p, &normal);
+        let all = self.scene.lamps.irradiance_lx(&p, &normal) + ambient.on_surface_lx(&normal);
         // What begins or ends with the chunk does so for all of it.
         let start_m = self.cutting.key.start_m();
         let inside_m = s_m - start_m;

@@ -17,15 +17,18 @@ mod shader_data;
 use super::chunks::Chunk;
 use super::detail::CHUNK_M;
 use super::layout::{Blocker, MAX_SLABS, MAX_WORDS, ShadowSource, Slab, Tile};
+use super::rectangle::Rectangle;
 use super::region::Region;
 use super::surface::SurfaceCell;
-use super::tiles::{Marks, TILE_PX, TileBounds};
+use super::tiles::{Marks, TILE_PX, TileBounds, TileGrid};
 use super::view::Framed;
 use crate::track::Track;
 use crate::twin::geometry::Shape;
+use crate::twin::render::daylight::AmbientLight;
 use crate::twin::render::lit_scene::LitScene;
 use crate::twin::render::scene::Job;
 use candidates::{Candidates, TileLists, has};
+use nalgebra::{Point3, Vector3};
 use shader_data::{blocker, source, tile};
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -50,6 +53,41 @@ struct Marker<'a> {
     framed: &'a Framed<'a>,
     candidates: &'a Candidates<'a>,
     marks: Marks,
+    ambient: NearestAmbient<'a>,
+}
+
+/// Ambient light on what is nearest of all that a tile may show.
+struct NearestAmbient<'a> {
+    scene: &'a LitScene,
+    grid: TileGrid,
+    /// With the distance from the camera, by tile.
+    nearest: Vec<(f64, AmbientLight)>,
+}
+
+impl<'a> NearestAmbient<'a> {
+    fn new(scene: &'a LitScene, grid: TileGrid) -> Self {
+        Self {
+            scene,
+            grid,
+            nearest: vec![(f64::INFINITY, AmbientLight::default()); grid.count()],
+        }
+    }
+
+    /// Takes a surface of a track, or a body, into account that tiles may show so far from the camera.
+    fn add_part(
+        &mut self,
+        part: &Rectangle,
+        away_m: f64,
+        light: impl Fn(&LitScene) -> AmbientLight,
+    ) {
+        let mut found = None;
+        for tile in self.grid.tiles_of(part) {
+            if away_m < self.nearest[tile].0 {
+                let found = *found.get_or_insert_with(|| light(self.scene));
+                self.nearest[tile] = (away_m, found);
+            }
+        }
+    }
 }
 
 impl Marker<'_> {
@@ -64,14 +102,14 @@ impl Marker<'_> {
                     chunk.key.start_m(),
                     CHUNK_M,
                 ) {
-                    self.mark_cell(&cell, &casts);
+                    self.mark_cell(&cell, &casts, Some(chunk.key.track));
                 }
             }
         }
     }
 
-    /// Marks a cell on which some of these casts may fall.
-    fn mark_cell(&mut self, cell: &SurfaceCell, casts: &[usize]) {
+    /// Marks a cell, of a track or of a body, on which some of these casts may fall.
+    fn mark_cell(&mut self, cell: &SurfaceCell, casts: &[usize], track: Option<usize>) {
         let (framed, candidates) = (self.framed, self.candidates);
         let region = cell.region();
         if !framed.may_see(&cell.centre, region.radius_m)
@@ -90,12 +128,19 @@ impl Marker<'_> {
         if size_px > f64::from(TILE_PX) {
             // What is large in the picture is looked at in quarters.
             for quarter in cell.quarters() {
-                self.mark_cell(&quarter, &casts);
+                self.mark_cell(&quarter, &casts, track);
             }
         } else {
             let bounds = TileBounds::of_cell(framed, &candidates.eyes, cell);
             let part = bounds.rectangle(framed.size_px());
             (self.marks).add_part(&part, &candidates.collect(&casts, &region));
+            self.ambient.add_part(&part, away_m, |scene| match track {
+                Some(track) => {
+                    let normal = cell.normal.unwrap_or(Vector3::z());
+                    scene.ambient_on_track(track, &cell.centre, &normal)
+                }
+                None => scene.ambient(&cell.centre),
+            });
         }
     }
 
@@ -114,7 +159,7 @@ impl Marker<'_> {
             }
             if let Shape::Box(half) = &body.shape {
                 for cell in SurfaceCell::of_box(body, half, candidates.bodies.exposed_s) {
-                    self.mark_cell(&cell, &casts);
+                    self.mark_cell(&cell, &casts, None);
                 }
             } else {
                 let bounds = TileBounds::of_body(framed, &candidates.eyes, body);
@@ -123,6 +168,10 @@ impl Marker<'_> {
                     self.marks
                         .add_part(&part, &candidates.collect(&casts, ball));
                 }
+                let place = Point3::from(body.world_from_body.translation.vector);
+                let away_m = (place - framed.reference()).norm();
+                self.ambient
+                    .add_part(&part, away_m, |scene| scene.ambient(&place));
             }
         }
     }
@@ -135,27 +184,29 @@ impl ViewShadows {
         let Some(candidates) = Candidates::of(framed, job, &scene.lamps) else {
             return shadows;
         };
-        let lens = &framed.view.camera.intrinsics;
+        let grid = TileGrid::new(framed.size_px());
         let numbers = 2 * candidates.lights.len() + candidates.casts.len();
         let mut marker = Marker {
             framed,
             candidates: &candidates,
-            marks: Marks::new((lens.width_px, lens.height_px), numbers),
+            marks: Marks::new(grid, numbers),
+            ambient: NearestAmbient::new(scene, grid),
         };
         marker.mark_tunnel(&scene.tracks, in_sight);
         marker.mark_bodies();
-        shadows.list(&marker, job, scene.ambient_lx(&framed.reference()));
+        shadows.list(&marker, job);
         shadows.place(framed, &candidates);
         shadows
     }
 
     /// Makes the tiles and their lists. What does not fit the lists is not shaded.
-    fn list(&mut self, marker: &Marker<'_>, job: &Job, ambient_lx: f64) {
+    fn list(&mut self, marker: &Marker<'_>, job: &Job) {
         let candidates = marker.candidates;
         let mut known: BTreeMap<&[u64], TileLists> = BTreeMap::new();
         let mut with_others = Vec::new();
         let lights = candidates.lights.len();
-        for (column, row, set) in marker.marks.tiles() {
+        let lit = marker.ambient.nearest.iter().map(|(_, light)| light);
+        for ((column, row, set), ambient) in marker.marks.tiles().zip(lit) {
             if !(lights..lights + candidates.casts.len()).any(|k| has(set, k)) {
                 continue;
             }
@@ -173,7 +224,7 @@ impl ViewShadows {
                 shaded: list.shaded,
                 plain: list.plain,
                 end: list.end,
-                ambient_lx: ambient_lx as f32,
+                ambient_lx: [ambient.mean_lx, ambient.upward_lx].map(|lx| lx as f32),
                 ..tile(marker.framed, job, column, row)
             });
         }
