@@ -253,16 +253,24 @@ impl CrossSection {
         !self.closed && !self.is_shared()
     }
 
+    /// How far it reaches to the right, below zero, and to the left; of a shared one nowhere.
+    pub fn lateral_m(&self) -> [f64; 2] {
+        let sides = self.points.iter().map(|p| p.l_m);
+        sides
+            .fold(None, |reach, l_m| {
+                let [right_m, left_m] = reach.unwrap_or([l_m; 2]);
+                Some([l_m.min(right_m), l_m.max(left_m)])
+            })
+            .unwrap_or_default()
+    }
+
     /// Whether (l, h) is inside the tunnel or, for an open section, over its bed or on a level with it.
     pub fn covers(&self, l_m: f64, h_m: f64) -> bool {
         match self.closed {
             true => self.contains(l_m, h_m),
             false => {
-                let sides = self.points.iter().map(|p| p.l_m);
-                let (low_m, high_m) = sides.fold((f64::MAX, f64::MIN), |(low, high), l_m| {
-                    (low.min(l_m), high.max(l_m))
-                });
-                (low_m..=high_m).contains(&l_m) && h_m >= BED_M - LEVEL_M
+                let [right_m, left_m] = self.lateral_m();
+                (right_m..=left_m).contains(&l_m) && h_m >= BED_M - LEVEL_M
             }
         }
     }

@@ -17,6 +17,8 @@ const PARAPET_M: f64 = 1.0;
 const BEGINS_M: f64 = 0.05;
 /// Tracks at an angle of a smaller cosine to the line have no part in a wall.
 const LEAST_COSINE: f64 = 0.5;
+/// Spaces that overlap by less are apart.
+const MEETS_M: f64 = 0.1;
 /// Tracks whose stations are all farther away are not looked at.
 const ASIDE_M: f64 = 60.0;
 
@@ -39,8 +41,8 @@ pub(super) fn end_walls(tracks: &[TrackCaster]) -> Vec<(usize, usize, EndWall)> 
     walls
 }
 
-/// Whether a track's own tunnel ends without anything beyond, at its begin and at its end.
-pub(super) fn leads_into_dark(tracks: &[TrackCaster], number: usize) -> [bool; 2] {
+/// What is beyond the begin and the end of a track.
+pub(super) fn ends(tracks: &[TrackCaster], number: usize) -> [TunnelEnd; 2] {
     let last = tracks[number].stations.len().saturating_sub(1);
     [(0, Direction::Down), (last, Direction::Up)].map(|(station, looking)| {
         let border = Border {
@@ -49,8 +51,26 @@ pub(super) fn leads_into_dark(tracks: &[TrackCaster], number: usize) -> [bool; 2
             station,
             looking,
         };
-        border.others().is_empty()
+        let others = border.others();
+        let sections = others.iter().filter_map(|(track, k)| track.own_section(*k));
+        let are_open: Vec<bool> = sections.map(|(_, section)| section.is_open()).collect();
+        match (others.is_empty(), are_open.is_empty()) {
+            (true, _) => TunnelEnd::Nothing,
+            (false, false) if are_open.iter().all(|open| *open) => TunnelEnd::Open,
+            (false, _) => TunnelEnd::Tunnel,
+        }
     })
+}
+
+/// What is beyond an end of a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TunnelEnd {
+    /// Nothing is known of it: a tunnel leads into the dark.
+    Nothing,
+    /// Other tracks in the open only.
+    Open,
+    /// Other tracks, one of them at least in a tunnel.
+    Tunnel,
 }
 
 /// One side of a place at which a cross-section of a track ends.
@@ -64,11 +84,7 @@ struct Border<'a> {
 impl Border<'_> {
     fn wall(&self) -> Option<EndWall> {
         let track = &self.tracks[self.number];
-        let before = self.station.checked_sub(1);
-        let (here, beyond) = match self.looking {
-            Direction::Up => (before, Some(self.station)),
-            Direction::Down => (Some(self.station), before),
-        };
+        let [here, beyond] = self.segments();
         let (range, section) = track.own_section(here?)?;
         let next = beyond.and_then(|segment| track.own_section(segment));
         let others = self.others();
@@ -96,7 +112,17 @@ impl Border<'_> {
         })
     }
 
-    /// Other tracks that go on just beyond the plane, each with its segment there.
+    /// The track's segments on its side of the plane and beyond it.
+    fn segments(&self) -> [Option<usize>; 2] {
+        let before = self.station.checked_sub(1);
+        match self.looking {
+            Direction::Up => [before, Some(self.station)],
+            Direction::Down => [Some(self.station), before],
+        }
+    }
+
+    /// Other tracks that go on just beyond the plane with space that meets that of this one, each with its segment
+    /// there.
     fn others(&self) -> Vec<(&TrackCaster, usize)> {
         let plane = self.tracks[self.number].plane(self.station);
         let ahead = Vector3::new(plane.forward.x, plane.forward.y, 0.0);
@@ -112,9 +138,34 @@ impl Border<'_> {
                 && track.ahead_of(segment + 1, &place) <= 0.0
                 && chord.dot(&plane.forward).abs() > LEAST_COSINE
         };
-        at.filter(|(track, segment)| goes_on(track, *segment))
+        at.filter(|(track, segment)| goes_on(track, *segment) && self.meets(track, *segment))
             .collect()
     }
+
+    /// Whether the space of another track overlaps with that of this one in the plane; where either has none of its
+    /// own it does.
+    fn meets(&self, other: &TrackCaster, segment: usize) -> bool {
+        let track = &self.tracks[self.number];
+        let own = self.segments()[0].and_then(|segment| track.own_section(segment));
+        let (Some((_, own)), Some((_, section))) = (own, other.own_section(segment)) else {
+            return true;
+        };
+        let top_m = top_m(own, std::iter::once(section));
+        let Some(carried) = other.free_space_in(segment, &track.plane(self.station), top_m) else {
+            return true;
+        };
+        let [(low, high), (other_low, other_high)] = [free_space(own, top_m), carried].map(extent);
+        let overlap = high.inf(&other_high) - low.sup(&other_low);
+        overlap.min() > MEETS_M
+    }
+}
+
+/// The least and the largest coordinates of a polygon.
+fn extent(polygon: Vec<Vector2<f64>>) -> (Vector2<f64>, Vector2<f64>) {
+    let first = Vector2::repeat(f64::INFINITY);
+    polygon.iter().fold((first, -first), |(low, high), corner| {
+        (low.inf(corner), high.sup(corner))
+    })
 }
 
 /// Where the free space of open sections ends that meet others.

@@ -13,6 +13,7 @@ mod track_surface;
 mod tunnel;
 
 pub use body::{Body, Shape};
+pub use borders::TunnelEnd;
 pub use end_wall::EndWall;
 pub use free_space::{Trapezoid, free_space, without};
 pub use hull::{Face, Hull};

@@ -1,7 +1,7 @@
 //! A ray in a network of tunnels: from one track's tunnel to another's where their cross-sections open into each
 //! other, and over the rails of tracks that share a cross-section.
 
-use super::borders::{end_walls, leads_into_dark};
+use super::borders::{TunnelEnd, end_walls, ends};
 use super::end_wall::EndWall;
 use super::track_caster::{Followed, TrackCaster, TrackHit};
 use super::track_surface::SurfacePoint;
@@ -77,9 +77,9 @@ impl TunnelCaster {
         self.tracks[track].end_walls.iter().map(|(_, wall)| wall)
     }
 
-    /// Whether the tunnel of a track ends without another beyond, at its begin and at its end.
-    pub fn leads_into_dark(&self, track: usize) -> [bool; 2] {
-        leads_into_dark(&self.tracks, track)
+    /// What is beyond the begin and the end of a track.
+    pub fn ends(&self, track: usize) -> [TunnelEnd; 2] {
+        ends(&self.tracks, track)
     }
 
     /// Whether the surface at a hit lies level and may mirror: bed, or top of a rail.

@@ -8,16 +8,16 @@
 //! This is the overcast day of the CIE without its gradient towards the zenith. Walls beside the track hide
 //! nothing of the sky. What comes into a tunnel is in [`portal`](super::portal).
 
+use super::corridor::Corridor;
 use super::portal::Portal;
 use crate::track::{Material, Track};
+use crate::twin::geometry::TunnelEnd;
 use crate::twin::reflectance::mean_albedo;
 use nalgebra::{Point3, Vector3};
 use std::f64::consts::PI;
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-/// From point to point of a stretch in the open.
-const STEP_M: f64 = 5.0;
 /// Buffer stops and the like stand so far beyond the end of a track.
 const BEYOND_M: f64 = 20.0;
 /// What is so far beside the bed of a stretch, and between these heights over its top of rail, is in the open there.
@@ -29,9 +29,10 @@ const HEIGHTS_M: RangeInclusive<f64> = -2.0..=20.0;
 pub struct Daylight {
     /// On level ground.
     level_lx: f64,
-    open: Vec<OpenStretch>,
-    /// Portals of tunnels, by track.
-    portals: Vec<Vec<Portal>>,
+    /// The stretches in the open.
+    open: Vec<Corridor>,
+    /// Portals of all tunnels.
+    portals: Vec<Portal>,
 }
 
 /// Light from all sides about a place: on a surface whose upward part of the normal is n, `mean_lx` + n `upward_lx`.
@@ -42,23 +43,43 @@ pub struct AmbientLight {
     pub upward_lx: f64,
 }
 
-/// A stretch of a track in the open.
-#[derive(Clone, Debug)]
-struct OpenStretch {
-    /// Along its centreline.
-    points: Vec<Point3<f64>>,
-    aside_m: f64,
+/// Where ambient light comes from.
+#[derive(Clone, Copy, Debug)]
+pub enum Surroundings<'a> {
+    /// By day.
+    Open(&'a Daylight),
+    /// A tunnel with light of its own, into which that of the day comes through portals, or the open at night.
+    Tunnel {
+        ambient_lx: f64,
+        daylight: Option<&'a Daylight>,
+    },
 }
 
-impl AmbientLight {
-    /// The same whichever way a surface faces.
-    pub fn even(lx: f64) -> Self {
-        Self {
-            mean_lx: lx,
-            upward_lx: 0.0,
+impl Surroundings<'_> {
+    /// Ambient light at a place; that through portals is what falls on a surface with this normal.
+    pub fn ambient(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> AmbientLight {
+        match self {
+            Self::Open(daylight) => daylight.outside(),
+            Self::Tunnel {
+                ambient_lx,
+                daylight,
+            } => {
+                let portals_lx = daylight.map_or(0.0, |d| d.through_portals_lx(p, normal));
+                AmbientLight {
+                    mean_lx: ambient_lx + portals_lx,
+                    upward_lx: 0.0,
+                }
+            }
         }
     }
 
+    /// On a surface.
+    pub fn on_surface_lx(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        self.ambient(p, normal).on_surface_lx(normal)
+    }
+}
+
+impl AmbientLight {
     /// On a surface with a normal.
     pub fn on_surface_lx(&self, normal: &Vector3<f64>) -> f64 {
         self.mean_lx + normal.z * self.upward_lx
@@ -66,18 +87,20 @@ impl AmbientLight {
 }
 
 impl Daylight {
-    /// Of tracks, of which nothing may be beyond the begin or the end; none at night, or where all of them lie
-    /// in tunnels.
-    pub fn of(tracks: &[Arc<Track>], nothing_beyond: &[[bool; 2]]) -> Option<Self> {
+    /// Of tracks, with what is beyond the begin and the end of each; none at night, or where all of them lie in
+    /// tunnels.
+    pub fn of(tracks: &[Arc<Track>], ends: &[[TunnelEnd; 2]]) -> Option<Self> {
         let level_lx = tracks.iter().map(|t| t.daylight_lx).fold(0.0, f64::max);
-        let ends = tracks.iter().zip(nothing_beyond);
-        let open: Vec<_> = ends
+        let tracks = || tracks.iter().zip(ends);
+        let open: Vec<_> = tracks()
             .flat_map(|(track, ends)| open_stretches(track, *ends))
             .collect();
         (level_lx > 0.0 && !open.is_empty()).then(|| Self {
             level_lx,
             open,
-            portals: tracks.iter().map(|track| Portal::all_of(track)).collect(),
+            portals: tracks()
+                .flat_map(|(track, ends)| Portal::all_of(track, *ends))
+                .collect(),
         })
     }
 
@@ -108,9 +131,9 @@ impl Daylight {
         }
     }
 
-    /// On a surface of a track's tunnel, through its mouths.
-    pub fn through_portals_lx(&self, track: usize, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
-        let portals = self.portals.get(track).into_iter().flatten();
+    /// On a surface in a tunnel, through its portals.
+    pub fn through_portals_lx(&self, p: &Point3<f64>, normal: &Vector3<f64>) -> f64 {
+        let portals = self.portals.iter();
         let outside_cd_m2 = 0.5 * (self.sky_cd_m2() + self.ground_cd_m2());
         portals
             .map(|portal| portal.lux_per_cd_m2(p, normal) * outside_cd_m2)
@@ -119,7 +142,7 @@ impl Daylight {
 
     /// The middle of what lies in the open.
     pub fn middle(&self) -> Point3<f64> {
-        let points = self.open.iter().flat_map(|stretch| &stretch.points);
+        let points = self.open.iter().flat_map(Corridor::points);
         let corners = points.fold(None, |corners, p| {
             let (low, high) = corners.unwrap_or((*p, *p));
             Some((p.inf(&low), p.sup(&high)))
@@ -133,49 +156,22 @@ impl Daylight {
     }
 }
 
-/// Points along the centreline of each open section, and a little more of it where nothing is beyond.
-fn open_stretches(
-    track: &Track,
-    nothing_beyond: [bool; 2],
-) -> impl Iterator<Item = OpenStretch> + '_ {
+/// What is about each open section, and a little more of it where nothing is beyond.
+fn open_stretches(track: &Track, ends: [TunnelEnd; 2]) -> impl Iterator<Item = Corridor> + '_ {
     let open = track
         .sections
         .iter()
         .filter(|range| range.section.is_open());
-    let [begins, ends] = nothing_beyond;
+    let [begin, end] = ends.map(|end| end == TunnelEnd::Nothing);
     let end_m = track.alignment.length_m();
     open.map(move |range| {
         let beyond_m = |at_end: bool| if at_end { BEYOND_M } else { 0.0 };
-        let from_m = range.from_m - beyond_m(begins && range.from_m <= 0.0);
-        let length_m = range.to_m + beyond_m(ends && range.to_m >= end_m) - from_m;
-        let steps = (length_m / STEP_M).ceil().max(1.0);
-        let at = |k: u32| from_m + length_m * f64::from(k) / steps;
-        let sides = range.section.points.iter().map(|p| p.l_m.abs());
-        let points = (0..=steps as u32).map(|k| track.alignment.at(at(k)).origin);
-        OpenStretch {
-            points: points.collect(),
-            aside_m: sides.fold(0.0, f64::max) + ASIDE_M,
-        }
+        let from_m = range.from_m - beyond_m(begin && range.from_m <= 0.0);
+        let to_m = range.to_m + beyond_m(end && range.to_m >= end_m);
+        let [right_m, left_m] = range.section.lateral_m();
+        let lateral_m = right_m - ASIDE_M..=left_m + ASIDE_M;
+        Corridor::along(track, [from_m, to_m], lateral_m, HEIGHTS_M)
     })
-}
-
-impl OpenStretch {
-    /// Whether a place is beside or over it, neither before its begin nor beyond its end.
-    fn holds(&self, p: &Point3<f64>) -> bool {
-        let last = self.points.len().saturating_sub(2);
-        let pieces = self.points.windows(2).enumerate().map(|(k, pair)| {
-            let (along, to) = ((pair[1] - pair[0]).xy(), (p - pair[0]).xy());
-            let share = along.dot(&to) / along.norm_squared();
-            // On the outside of a bend a place may be between two pieces.
-            let away_m = (to - along * share.clamp(0.0, 1.0)).norm();
-            let is_outside = (k == 0 && share < 0.0) || (k == last && share > 1.0);
-            (away_m, is_outside, p.z - pair[0].z)
-        });
-        let nearest = pieces.min_by(|a, b| a.0.total_cmp(&b.0));
-        nearest.is_some_and(|(away_m, is_outside, height_m)| {
-            !is_outside && away_m < self.aside_m && HEIGHTS_M.contains(&height_m)
-        })
-    }
 }
 
 #[cfg(test)]
@@ -201,7 +197,7 @@ mod tests {
             range(80.0, 200.0, CrossSection::open(20.0)),
         ];
         track.daylight_lx = 5000.0;
-        Daylight::of(&[Arc::new(track)], &[[false; 2]])
+        Daylight::of(&[Arc::new(track)], &[[TunnelEnd::Tunnel; 2]])
     }
 
     /// Against the integral over the hemisphere that a surface faces, by sums over small parts of it.
@@ -261,8 +257,8 @@ mod tests {
         });
         track.daylight_lx = 5000.0;
         let track = Arc::new(track);
-        let daylight =
-            Daylight::of(std::slice::from_ref(&track), &[[false; 2]]).unwrap_or_default();
+        let daylight = Daylight::of(std::slice::from_ref(&track), &[[TunnelEnd::Tunnel; 2]])
+            .unwrap_or_default();
         // A place at the very begin may be before the plane across its first piece.
         for k in 0..2000 {
             let frame = track.alignment.at(1.0 + 0.099 * f64::from(k));

@@ -1,17 +1,20 @@
 //! A scene as renderers draw it: painted, and with its lamps as they are at a time.
 
-use super::daylight::{AmbientLight, Daylight};
+use super::daylight::{Daylight, Surroundings};
 use super::lamp_field::LampField;
 use super::paint::Paintings;
 use super::scene::Scene;
 use crate::bus::SimTime;
 use crate::track::{CrossSection, Track};
 use crate::twin::air::Air;
-use crate::twin::geometry::{EndWall, TunnelCaster};
+use crate::twin::geometry::{EndWall, TunnelCaster, TunnelEnd};
 use crate::twin::lights::LampLight;
 use crate::twin::reflectance::Wet;
-use nalgebra::{Point3, Vector3};
+use nalgebra::Point3;
 use std::sync::Arc;
+
+/// In tunnels the ambient light on bodies and lamps is that of this track.
+pub const BODIES_TRACK: usize = 0;
 
 /// A scene with what is worked out of it once.
 pub struct LitScene {
@@ -27,8 +30,8 @@ pub struct LitScene {
     pub daylight: Option<Daylight>,
     /// Walls across the line, by track.
     pub end_walls: Vec<Vec<EndWall>>,
-    /// Whether a track's tunnel leads into the dark at its begin and at its end.
-    pub dark_ends: Vec<[bool; 2]>,
+    /// What is beyond the begin and the end of each track.
+    pub ends: Vec<[TunnelEnd; 2]>,
     /// The lamps as they are now.
     pub lamps: LampField,
     /// With all that becomes of them.
@@ -50,11 +53,11 @@ impl LitScene {
         let end_walls = numbers
             .clone()
             .map(|k| tunnel.end_walls(k).cloned().collect());
-        let dark_ends: Vec<_> = numbers.map(|k| tunnel.leads_into_dark(k)).collect();
+        let ends: Vec<_> = numbers.map(|k| tunnel.ends(k)).collect();
         Self {
             end_walls: end_walls.collect(),
-            daylight: Daylight::of(&scene.tracks, &dark_ends),
-            dark_ends,
+            daylight: Daylight::of(&scene.tracks, &ends),
+            ends,
             tracks: scene.tracks,
             air: scene.air,
             wet: scene.wet,
@@ -103,43 +106,30 @@ impl LitScene {
         self.lamps.airlight_cd_m2(track, s_m, ambient_lx)
     }
 
-    /// Ambient light on what does not belong to a track: in the open that of the day, else that of the first track.
-    pub fn ambient(&self, p: &Point3<f64>) -> AmbientLight {
+    /// What is about a place on a track.
+    pub fn surroundings_on(&self, track: usize, p: &Point3<f64>) -> Surroundings<'_> {
         let daylight = self.daylight_at(p);
-        let inside = || AmbientLight::even(self.tracks[0].ambient_lx);
-        daylight.map_or_else(inside, Daylight::outside)
+        daylight.map_or_else(|| self.inside(track), Surroundings::Open)
     }
 
-    /// Ambient light on a surface of a cross-section of a track.
-    pub fn surface_ambient(
+    /// What is about a surface of a cross-section of a track.
+    pub fn surroundings_in(
         &self,
         (track, section): (usize, &CrossSection),
         p: &Point3<f64>,
-        normal: &Vector3<f64>,
-    ) -> AmbientLight {
-        let daylight = self
-            .daylight
-            .as_ref()
-            .filter(|daylight| section.is_open() || (section.is_shared() && daylight.reaches(p)));
-        let inside = || self.inside_ambient(track, p, normal);
-        daylight.map_or_else(inside, Daylight::outside)
+    ) -> Surroundings<'_> {
+        match &self.daylight {
+            Some(daylight) if section.is_open() => Surroundings::Open(daylight),
+            Some(_) if section.is_shared() => self.surroundings_on(track, p),
+            _ => self.inside(track),
+        }
     }
 
-    /// The same where the cross-section is not at hand.
-    pub fn ambient_on_track(
-        &self,
-        track: usize,
-        p: &Point3<f64>,
-        normal: &Vector3<f64>,
-    ) -> AmbientLight {
-        let inside = || self.inside_ambient(track, p, normal);
-        self.daylight_at(p).map_or_else(inside, Daylight::outside)
-    }
-
-    fn inside_ambient(&self, track: usize, p: &Point3<f64>, normal: &Vector3<f64>) -> AmbientLight {
-        let daylight = self.daylight.as_ref();
-        let through_portals_lx = daylight.map_or(0.0, |d| d.through_portals_lx(track, p, normal));
-        AmbientLight::even(self.tracks[track].ambient_lx + through_portals_lx)
+    fn inside(&self, track: usize) -> Surroundings<'_> {
+        Surroundings::Tunnel {
+            ambient_lx: self.tracks[track].ambient_lx,
+            daylight: self.daylight.as_ref(),
+        }
     }
 
     fn daylight_at(&self, p: &Point3<f64>) -> Option<&Daylight> {

@@ -3,6 +3,7 @@
 
 mod cache;
 pub mod constants;
+mod corridor;
 pub mod cpu;
 mod daylight;
 pub mod develop;

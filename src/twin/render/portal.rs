@@ -5,43 +5,73 @@
 //! angle that a side subtends, times n on the normal of the plane through the side and the place. What of the
 //! polygon is under the surface's horizon is cut off first. Walls do not pass the light on to each other.
 
-use crate::track::{Direction, Track};
+use super::corridor::Corridor;
+use crate::track::{Direction, SectionRange, Track};
+use crate::twin::geometry::TunnelEnd;
 use nalgebra::{Point3, Vector3};
 
-/// Daylight is cut off at this distance from the portal. With 20,000 lx outside the floor there would get about 1 lx, a
+/// Daylight is followed so far into the tunnel. With 20,000 lx outside the floor there would get about 1 lx, a
 /// wall that faces the portal about 30 lx.
 const REACH_M: f64 = 60.0;
+/// Over the last of these metres it is taken away evenly, so that no edge shows.
+const FADE_M: f64 = 20.0;
+/// Surfaces of the tunnel lie within its outline but for rounding, and what its bed is cut down by.
+const SLACK_M: f64 = 0.01;
+const CUT_M: f64 = 0.5;
 
 /// An end of a tunnel in the open.
 #[derive(Clone, Debug)]
 pub struct Portal {
     corners: Vec<Point3<f64>>,
-    /// Into the tunnel.
-    inwards: Vector3<f64>,
+    /// The tunnel behind it, on the track that it is of.
+    inside: Corridor,
 }
 
 impl Portal {
-    /// All portals of a track's own tunnels: where a closed cross-section meets an open one.
-    pub fn all_of(track: &Track) -> Vec<Self> {
-        let mouth = |inside: usize, s_m: f64, way: Direction| {
-            let frame = track.alignment.at(s_m);
-            let points = track.sections[inside].section.points.iter();
-            Self {
-                corners: (points.map(|p| frame.world_from_section(p.l_m, p.h_m))).collect(),
-                inwards: frame.ahead() * way.sign(),
-            }
+    /// All portals of a track's own tunnels: where a closed cross-section meets an open one, of this track or of
+    /// those beyond its ends.
+    pub fn all_of(track: &Track, [begin, end]: [TunnelEnd; 2]) -> Vec<Self> {
+        let sections = || track.sections.iter().map(|range| &range.section);
+        let starts = std::iter::once(begin == TunnelEnd::Open)
+            .chain(sections().map(|section| section.is_open()));
+        let is_open_after = sections()
+            .skip(1)
+            .map(|section| section.is_open())
+            .chain([end == TunnelEnd::Open]);
+        let ranges = track.sections.iter().zip(starts).zip(is_open_after);
+        let mouths = ranges.filter(|((range, _), _)| range.section.closed);
+        mouths
+            .flat_map(|((range, before), after)| {
+                let at_begin = before.then(|| Self::of(track, range, Direction::Up));
+                let at_end = after.then(|| Self::of(track, range, Direction::Down));
+                at_begin.into_iter().chain(at_end)
+            })
+            .collect()
+    }
+
+    /// At the end of a section, into which one looks in a direction.
+    fn of(track: &Track, range: &SectionRange, inwards: Direction) -> Self {
+        let (at_m, far_m) = match inwards {
+            Direction::Up => (range.from_m, range.from_m + REACH_M),
+            Direction::Down => (range.to_m, range.to_m - REACH_M),
         };
-        let borders = track.sections.windows(2).enumerate();
-        let mouths = borders.filter_map(|(k, pair)| {
-            let [before, after] = [&pair[0].section, &pair[1].section];
-            let is_tunnel = [before.closed, after.closed];
-            match (before.is_shared() || after.is_shared(), is_tunnel) {
-                (false, [true, false]) => Some(mouth(k, pair[1].from_m, Direction::Down)),
-                (false, [false, true]) => Some(mouth(k + 1, pair[1].from_m, Direction::Up)),
-                _ => None,
-            }
+        let far_m = far_m.clamp(0.0, track.alignment.length_m());
+        let frame = track.alignment.at(at_m);
+        let points = range.section.points.iter();
+        let [right_m, left_m] = range.section.lateral_m();
+        let heights = points.clone().map(|p| p.h_m);
+        let (low_m, high_m) = heights.fold((f64::MAX, f64::MIN), |(low, high), h_m| {
+            (h_m.min(low), h_m.max(high))
         });
-        mouths.collect()
+        Self {
+            corners: (points.map(|p| frame.world_from_section(p.l_m, p.h_m))).collect(),
+            inside: Corridor::along(
+                track,
+                [at_m.min(far_m), at_m.max(far_m)],
+                right_m - SLACK_M..=left_m + SLACK_M,
+                low_m - CUT_M..=high_m + SLACK_M,
+            ),
+        }
     }
 
     /// Light on a surface inside, for a luminance of 1 cd/m^2 outside.
@@ -49,8 +79,8 @@ impl Portal {
         let Some(first) = self.corners.first() else {
             return 0.0;
         };
-        let to_mouth = first - p;
-        if to_mouth.norm() > REACH_M || self.inwards.dot(&to_mouth) > 0.0 {
+        let away_m = (first - p).norm();
+        if away_m > REACH_M || !self.inside.holds(p) {
             return 0.0;
         }
         let above = self.above_horizon(p, normal);
@@ -62,8 +92,9 @@ impl Portal {
                 .try_normalize(1e-12)
                 .map_or(0.0, |n| angle * n.dot(normal))
         });
+        let left = ((REACH_M - away_m) / FADE_M).min(1.0);
         // Whichever way round the corners run.
-        0.5 * sides.sum::<f64>().abs()
+        left * 0.5 * sides.sum::<f64>().abs()
     }
 
     /// Its corners from a place, without what is under the horizon of a surface there.
@@ -84,7 +115,7 @@ impl Portal {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::track::{Alignment, CrossSection, PlanElement, SectionRange};
+    use crate::track::{Alignment, CrossSection, PlanElement};
 
     fn portal() -> Portal {
         let plan = [PlanElement::straight(100.0)];
@@ -101,7 +132,7 @@ mod tests {
                 section,
             })
             .collect();
-        let mut all = Portal::all_of(&track);
+        let mut all = Portal::all_of(&track, [TunnelEnd::Nothing; 2]);
         assert_eq!(all.len(), 1);
         all.remove(0)
     }
@@ -112,13 +143,13 @@ mod tests {
         let portal = portal();
         let plan = [PlanElement::straight(100.0)];
         let line = Alignment::new(Point3::origin(), 0.4, &plan, &[]);
-        let outwards = -portal.inwards;
+        let outwards = line.at(60.0).ahead();
         let (parts, mut compared) = (300, 0);
         for (s_m, l_m, h_m) in [
             (59.0, 2.9, 1.0),
             (55.0, -2.9, 3.0),
             (40.0, 0.5, -0.17),
-            (20.0, 0.0, 4.6),
+            (21.0, 0.0, 4.6),
         ] {
             let p = line.at(s_m).world_from_section(l_m, h_m);
             for normal in [

@@ -146,8 +146,8 @@ impl CastScene {
         let albedo = self.albedo(&at, ray, hit.t, pixel.aside)
             * self.lit.wet.albedo_factor(at.material, at.track, at.s_m);
         let section = &self.lit.tracks[at.track].sections[at.range].section;
-        let ambient = (self.lit).surface_ambient((at.track, section), &at.position, &at.normal);
-        let lux = ambient.on_surface_lx(&at.normal)
+        let surroundings = self.lit.surroundings_in((at.track, section), &at.position);
+        let lux = surroundings.on_surface_lx(&at.position, &at.normal)
             + self.lit.lamps.irradiance_lx(&at.position, &at.normal);
         TunnelPixel {
             hit: Some(hit),

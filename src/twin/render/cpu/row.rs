@@ -12,6 +12,7 @@ use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::gloss::{Facing, Gloss, MIRROR_REACH_M, MirroredLight};
 use crate::twin::render::image_bounds::ImageBounds;
 use crate::twin::render::light_source::LightSource;
+use crate::twin::render::lit_scene::BODIES_TRACK;
 use crate::twin::render::photometry::{BlinkingLamp, headlights_lx};
 use crate::twin::render::{Job, View};
 use nalgebra::{Point3, Vector3};
@@ -226,10 +227,8 @@ impl<'a> RowRays<'a> {
                 spread,
                 self.row,
                 (
-                    self.scene
-                        .lit
-                        .ambient(&lamp.centre)
-                        .on_surface_lx(&lamp.facing),
+                    (self.scene.lit.surroundings_on(BODIES_TRACK, &lamp.centre))
+                        .on_surface_lx(&lamp.centre, &lamp.facing),
                     self.haze(lamp),
                 ),
                 depth,
@@ -268,7 +267,10 @@ impl<'a> RowRays<'a> {
     fn draw_solid(&self, solid: &Solid<'_>, buffers: &mut RowBuffers) {
         let (scene, camera) = (self.scene, &self.view.camera.intrinsics);
         let bounds = ImageBounds::of(solid.corners(), camera, &self.row.mid);
-        let ambient = (scene.lit).ambient(&solid.body().world_from_body.translation.vector.into());
+        let surroundings = (scene.lit).surroundings_on(
+            BODIES_TRACK,
+            &solid.body().world_from_body.translation.vector.into(),
+        );
         for u in bounds.columns(self.row.v, camera.width_px as usize) {
             let ray = self.ray(u);
             let Some((t, normal)) = solid.cast(&self.eye, &ray) else {
@@ -276,7 +278,7 @@ impl<'a> RowRays<'a> {
             };
             if t < self.depth(u, &mut buffers.depths) && t * ray.norm() < SIGHT_M {
                 let at = self.eye + ray * t;
-                let lux = ambient.on_surface_lx(&normal)
+                let lux = surroundings.on_surface_lx(&at, &normal)
                     + scene.lit.lamps.irradiance_lx(&at, &normal)
                     + self.by_job_lx(&at, &normal);
                 let body = solid.body();

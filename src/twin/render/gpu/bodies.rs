@@ -3,7 +3,7 @@
 use super::adapter::Gpu;
 use super::mesh::{Fineness, Mesh};
 use super::view::Framed;
-use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::lit_scene::{BODIES_TRACK, LitScene};
 use crate::twin::render::scene::Job;
 use std::ops::Range;
 
@@ -35,7 +35,12 @@ impl BodyMeshes {
             }
             let fineness = Fineness::of(body, &job.views);
             let place = body.world_from_body.translation.vector.into();
-            mesh.add_body(body, &scene.lamps, &scene.ambient(&place), fineness);
+            mesh.add_body(
+                body,
+                &scene.lamps,
+                scene.surroundings_on(BODIES_TRACK, &place),
+                fineness,
+            );
             ranges.push(first..mesh.indices.len() as u32);
         }
         Self {

@@ -9,6 +9,7 @@ use super::track_search::TrackSearch;
 use super::tunnel::{ChunkMesh, ChunkSide, chunk_mesh};
 use super::view::Framed;
 use crate::track::{SectionRange, TrackPoint};
+use crate::twin::geometry::TunnelEnd;
 use crate::twin::render::constants::SIGHT_M;
 use crate::twin::render::lit_scene::LitScene;
 use nalgebra::{Point3, Vector3};
@@ -175,7 +176,7 @@ fn keys_in_sight(
     let last = (first..=last).rev().find(near).unwrap_or(first - 1);
     let closed_at = |m: f64| track.section_at(m).is_some_and(|section| section.closed);
     let dark_at = move |m: f64| scene.daylight.is_some() && closed_at(m);
-    let [begin_dark, end_dark] = scene.dark_ends[track_number];
+    let [begin_dark, end_dark] = scene.ends[track_number].map(|end| end == TunnelEnd::Nothing);
     let moves = !framed.rests();
     let bend = Bend::of(&framed.view.camera.intrinsics, place);
     (first..=last).map(move |index| {

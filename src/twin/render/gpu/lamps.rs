@@ -9,7 +9,7 @@ use super::spread::PointSpread;
 use super::view::{Framed, single};
 use crate::twin::lights::LampLight;
 use crate::twin::render::constants::{DARK_DISC_ALBEDO, FAINT_E, LAMP_SIGHT_M};
-use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::lit_scene::{BODIES_TRACK, LitScene};
 use crate::twin::render::photometry::BlinkingLamp;
 use crate::twin::render::scene::View;
 use nalgebra::{Isometry3, Point2, Point3, Vector2, Vector3};
@@ -249,7 +249,8 @@ impl LampTable {
                 knots: seen.collect(),
             };
             if passing.knots.iter().any(Option::is_some) {
-                let ambient_lx = scene.ambient(&lamp.centre).on_surface_lx(&lamp.facing);
+                let ambient_lx = (scene.surroundings_on(BODIES_TRACK, &lamp.centre))
+                    .on_surface_lx(&lamp.centre, &lamp.facing);
                 table.add_disc(&passing, ambient_lx, airlight_cd_m2);
                 table.add_glare(&passing);
             }

@@ -3,7 +3,7 @@
 use super::bend;
 use super::layout::Vertex;
 use crate::twin::geometry::{Body, Hull, Shape};
-use crate::twin::render::daylight::AmbientLight;
+use crate::twin::render::daylight::Surroundings;
 use crate::twin::render::lamp_field::LampField;
 use crate::twin::render::scene::View;
 use nalgebra::{Point3, Vector3};
@@ -113,7 +113,7 @@ impl Mesh {
         &mut self,
         body: &Body,
         lamps: &LampField,
-        ambient: &AmbientLight,
+        surroundings: Surroundings<'_>,
         fineness: Fineness,
     ) {
         let from = self.vertices.len() as u32;
@@ -121,7 +121,8 @@ impl Mesh {
             let at = body.world_from_body * Point3::from(p);
             let normal = body.world_from_body * n;
             let out = body.world_from_body.rotation * p;
-            let light_lx = lamps.irradiance_lx(&at, &normal) + ambient.on_surface_lx(&normal);
+            let light_lx =
+                lamps.irradiance_lx(&at, &normal) + surroundings.on_surface_lx(&at, &normal);
             self.vertices.push(Vertex {
                 position_m: out.map(|x| x as f32).into(),
                 light_lx: [light_lx as f32, 0.0],
@@ -327,7 +328,11 @@ mod tests {
             cell_m: CELL_M,
         };
         let lamps = LampField::new(&[], Air::default());
-        mesh.add_body(&body, &lamps, &AmbientLight::even(1.0), fineness);
+        let surroundings = Surroundings::Tunnel {
+            ambient_lx: 1.0,
+            daylight: None,
+        };
+        mesh.add_body(&body, &lamps, surroundings, fineness);
         mesh
     }
 

@@ -269,8 +269,9 @@ impl Site<'_> {
             .lamp
             .map_or(0.0, |lamp| lamp.irradiance_lx(&p, &normal));
         let place = (self.cutting.key.track, section);
-        let ambient = self.scene.surface_ambient(place, &p, &normal);
-        let all = self.scene.lamps.irradiance_lx(&p, &normal) + ambient.on_surface_lx(&normal);
+        let surroundings = self.scene.surroundings_in(place, &p);
+        let all =
+            self.scene.lamps.irradiance_lx(&p, &normal) + surroundings.on_surface_lx(&p, &normal);
         // What begins or ends with the chunk does so for all of it.
         let start_m = self.cutting.key.start_m();
         let inside_m = s_m - start_m;

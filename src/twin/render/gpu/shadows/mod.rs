@@ -25,7 +25,7 @@ use super::view::Framed;
 use crate::track::Track;
 use crate::twin::geometry::Shape;
 use crate::twin::render::daylight::AmbientLight;
-use crate::twin::render::lit_scene::LitScene;
+use crate::twin::render::lit_scene::{BODIES_TRACK, LitScene};
 use crate::twin::render::scene::Job;
 use candidates::{Candidates, TileLists, has};
 use nalgebra::{Point3, Vector3};
@@ -53,40 +53,43 @@ struct Marker<'a> {
     framed: &'a Framed<'a>,
     candidates: &'a Candidates<'a>,
     marks: Marks,
-    ambient: NearestAmbient<'a>,
+    ambient: TileAmbient<'a>,
 }
 
-/// Ambient light on what is nearest of all that a tile may show.
-struct NearestAmbient<'a> {
+/// Ambient light in the mean over the cells that a tile may show.
+struct TileAmbient<'a> {
     scene: &'a LitScene,
     grid: TileGrid,
-    /// With the distance from the camera, by tile.
-    nearest: Vec<(f64, AmbientLight)>,
+    /// Sum and number, by tile.
+    sums: Vec<(AmbientLight, u32)>,
 }
 
-impl<'a> NearestAmbient<'a> {
+impl<'a> TileAmbient<'a> {
     fn new(scene: &'a LitScene, grid: TileGrid) -> Self {
         Self {
             scene,
             grid,
-            nearest: vec![(f64::INFINITY, AmbientLight::default()); grid.count()],
+            sums: vec![Default::default(); grid.count()],
         }
     }
 
-    /// Takes a surface of a track, or a body, into account that tiles may show so far from the camera.
-    fn add_part(
-        &mut self,
-        part: &Rectangle,
-        away_m: f64,
-        light: impl Fn(&LitScene) -> AmbientLight,
-    ) {
-        let mut found = None;
+    /// Takes a surface of a track into account that tiles may show: a place on it, and its normal.
+    fn add_part(&mut self, part: &Rectangle, track: usize, p: &Point3<f64>, normal: &Vector3<f64>) {
+        let light = self.scene.surroundings_on(track, p).ambient(p, normal);
         for tile in self.grid.tiles_of(part) {
-            if away_m < self.nearest[tile].0 {
-                let found = *found.get_or_insert_with(|| light(self.scene));
-                self.nearest[tile] = (away_m, found);
-            }
+            let (sum, count) = &mut self.sums[tile];
+            sum.mean_lx += light.mean_lx;
+            sum.upward_lx += light.upward_lx;
+            *count += 1;
         }
+    }
+
+    /// By tile: in the mean over all directions, and what a normal upward adds.
+    fn lx(&self) -> impl Iterator<Item = [f32; 2]> {
+        self.sums.iter().map(|(sum, count)| {
+            let mean = |sum_lx: f64| (sum_lx / f64::from((*count).max(1))) as f32;
+            [mean(sum.mean_lx), mean(sum.upward_lx)]
+        })
     }
 }
 
@@ -102,14 +105,14 @@ impl Marker<'_> {
                     chunk.key.start_m(),
                     CHUNK_M,
                 ) {
-                    self.mark_cell(&cell, &casts, Some(chunk.key.track));
+                    self.mark_cell(&cell, &casts, chunk.key.track);
                 }
             }
         }
     }
 
     /// Marks a cell, of a track or of a body, on which some of these casts may fall.
-    fn mark_cell(&mut self, cell: &SurfaceCell, casts: &[usize], track: Option<usize>) {
+    fn mark_cell(&mut self, cell: &SurfaceCell, casts: &[usize], track: usize) {
         let (framed, candidates) = (self.framed, self.candidates);
         let region = cell.region();
         if !framed.may_see(&cell.centre, region.radius_m)
@@ -134,13 +137,8 @@ impl Marker<'_> {
             let bounds = TileBounds::of_cell(framed, &candidates.eyes, cell);
             let part = bounds.rectangle(framed.size_px());
             (self.marks).add_part(&part, &candidates.collect(&casts, &region));
-            self.ambient.add_part(&part, away_m, |scene| match track {
-                Some(track) => {
-                    let normal = cell.normal.unwrap_or(Vector3::z());
-                    scene.ambient_on_track(track, &cell.centre, &normal)
-                }
-                None => scene.ambient(&cell.centre),
-            });
+            let normal = cell.normal.unwrap_or(Vector3::z());
+            self.ambient.add_part(&part, track, &cell.centre, &normal);
         }
     }
 
@@ -159,7 +157,7 @@ impl Marker<'_> {
             }
             if let Shape::Box(half) = &body.shape {
                 for cell in SurfaceCell::of_box(body, half, candidates.bodies.exposed_s) {
-                    self.mark_cell(&cell, &casts, None);
+                    self.mark_cell(&cell, &casts, BODIES_TRACK);
                 }
             } else {
                 let bounds = TileBounds::of_body(framed, &candidates.eyes, body);
@@ -169,9 +167,8 @@ impl Marker<'_> {
                         .add_part(&part, &candidates.collect(&casts, ball));
                 }
                 let place = Point3::from(body.world_from_body.translation.vector);
-                let away_m = (place - framed.reference()).norm();
-                self.ambient
-                    .add_part(&part, away_m, |scene| scene.ambient(&place));
+                let towards = (framed.reference() - place).normalize();
+                self.ambient.add_part(&part, BODIES_TRACK, &place, &towards);
             }
         }
     }
@@ -190,7 +187,7 @@ impl ViewShadows {
             framed,
             candidates: &candidates,
             marks: Marks::new(grid, numbers),
-            ambient: NearestAmbient::new(scene, grid),
+            ambient: TileAmbient::new(scene, grid),
         };
         marker.mark_tunnel(&scene.tracks, in_sight);
         marker.mark_bodies();
@@ -205,8 +202,8 @@ impl ViewShadows {
         let mut known: BTreeMap<&[u64], TileLists> = BTreeMap::new();
         let mut with_others = Vec::new();
         let lights = candidates.lights.len();
-        let lit = marker.ambient.nearest.iter().map(|(_, light)| light);
-        for ((column, row, set), ambient) in marker.marks.tiles().zip(lit) {
+        let tiles = marker.marks.tiles().zip(marker.ambient.lx());
+        for ((column, row, set), ambient_lx) in tiles {
             if !(lights..lights + candidates.casts.len()).any(|k| has(set, k)) {
                 continue;
             }
@@ -224,7 +221,7 @@ impl ViewShadows {
                 shaded: list.shaded,
                 plain: list.plain,
                 end: list.end,
-                ambient_lx: [ambient.mean_lx, ambient.upward_lx].map(|lx| lx as f32),
+                ambient_lx,
                 ..tile(marker.framed, job, column, row)
             });
         }
