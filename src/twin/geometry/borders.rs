@@ -209,3 +209,51 @@ impl TrackCaster {
         )
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::track::{Alignment, PlanElement, SectionRange, Track};
+    use crate::twin::geometry::TunnelCaster;
+    use nalgebra::Point3;
+    use std::sync::Arc;
+
+    /// A straight track eastwards, so far to the north, in one cross-section.
+    fn track([from_m, length_m]: [f64; 2], north_m: f64, section: CrossSection) -> Arc<Track> {
+        let start = Point3::new(from_m, north_m, 0.0);
+        let plan = [PlanElement::straight(length_m)];
+        let mut track = Track::bare("t", Alignment::new(start, 0.0, &plan, &[]));
+        track.sections.push(SectionRange {
+            from_m: 0.0,
+            to_m: length_m,
+            missing_rail: None,
+            section,
+        });
+        track.into()
+    }
+
+    fn bored() -> CrossSection {
+        CrossSection::rectangular(2.5, 2.5, 4.6, None, None)
+    }
+
+    /// Fails where a tunnel beside a dead end passes for its continuation, and where a portal at a joint of tracks
+    /// is none.
+    #[test]
+    fn what_is_beyond_an_end() {
+        let own = track([0.0, 50.0], 0.0, bored());
+        for (beside, expected, walls) in [
+            (track([0.0, 100.0], 6.0, bored()), TunnelEnd::Nothing, 0),
+            (track([0.0, 100.0], 4.5, bored()), TunnelEnd::Tunnel, 1),
+            (track([50.0, 50.0], 0.0, bored()), TunnelEnd::Tunnel, 0),
+            (
+                track([50.0, 50.0], 0.0, CrossSection::open(20.0)),
+                TunnelEnd::Open,
+                0,
+            ),
+        ] {
+            let tunnel = TunnelCaster::new(&[Arc::clone(&own), beside]);
+            assert_eq!(tunnel.ends(0), [TunnelEnd::Nothing, expected]);
+            assert_eq!(tunnel.end_walls(0).count(), walls, "{expected:?}");
+        }
+    }
+}
