@@ -144,7 +144,7 @@ fn place(track: &Track, name: &str, chainage_m: f64) -> String {
 fn stated(track: &Track) -> Option<String> {
     let stated = track.stated_chainage.as_ref()?;
     let [begin, end] = [0.0, track.alignment.length_m()].map(|s_m| stated.text(s_m, 3));
-    let jumps = stated.jumps().map(|jump| {
+    let jumps = stated.equations().map(|jump| {
         let [back, ahead] = [jump.back_m, jump.ahead_m].map(|m| stated.number(m, 3));
         let (chain, by_m) = match jump.longer_m > 0.0 {
             true => ("long", jump.longer_m),

@@ -73,7 +73,7 @@ pub use section::{
     BED_M, CHORD_ERROR_M, CrossSection, Edge, Material, OutlinePoint, PlatformShape, SectionRange,
     Side, WALKWAY_EDGE_M, WALKWAY_HEIGHT_M,
 };
-pub use stated_chainage::{ChainageError, ChainageJump, StatedChainage};
+pub use stated_chainage::{ChainageEquation, ChainageError, StatedChainage};
 pub use tunnel::Tunnel;
 
 /// One track: where it runs, what it lies in, and what stands along it.

@@ -2,7 +2,7 @@
 
 use crate::settings::Checker;
 use crate::track::file::{ChainageEquationEntry, StatedChainageEntry, TrackEntry};
-use crate::track::{ChainageJump, StatedChainage};
+use crate::track::{ChainageEquation, StatedChainage};
 
 /// Texts are written to the millimetre: smaller jumps could not be told.
 const LEAST_M: f64 = 1e-3;
@@ -23,7 +23,7 @@ pub(super) fn stated(
     let stated = StatedChainage::of(entry, length_m);
     let in_order = check_order(entry, length_m, check);
     if in_order {
-        for (k, (equation, jump)) in entry.equations.iter().zip(stated.jumps()).enumerate() {
+        for (k, (equation, jump)) in entry.equations.iter().zip(stated.equations()).enumerate() {
             check_jump(
                 equation,
                 &jump,
@@ -69,7 +69,7 @@ fn check_order(entry: &StatedChainageEntry, length_m: f64, check: &mut Checker<'
 }
 
 /// An equation goes on from what is stated before it, and jumps.
-fn check_jump(equation: &ChainageEquationEntry, jump: &ChainageJump, check: &mut Checker<'_>) {
+fn check_jump(equation: &ChainageEquationEntry, jump: &ChainageEquation, check: &mut Checker<'_>) {
     let back_m = equation.back_m.unwrap_or(jump.back_m);
     if (back_m - jump.back_m).abs() > BACK_ERROR_M {
         check.problem(

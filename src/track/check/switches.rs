@@ -19,7 +19,7 @@ pub(super) fn check_switches(network: &Network, check: &mut Checker<'_>) {
         check_parting(network, switch, &key, check);
         check_speed(network, switch, &key, check);
         if network
-            .clearance_m(switch, network.clear_m(switch))
+            .clearance_m(switch, network.clear_apart_m(switch))
             .is_none()
         {
             let name = &switch.name;
@@ -27,7 +27,7 @@ pub(super) fn check_switches(network: &Network, check: &mut Checker<'_>) {
                 &format!("{key}.name"),
                 format!(
                     "the legs of `{name}` are nowhere {:.2} m apart, so that no train on one is clear of the other",
-                    network.clear_m(switch)
+                    network.clear_apart_m(switch)
                 ),
                 "make the legs longer, or let them part more",
             );

@@ -32,12 +32,12 @@ impl Network {
 
     /// How far behind the toe trains on both legs clear each other.
     pub fn clear_from_m(&self, switch: &Switch) -> Option<f64> {
-        self.clearance_m(switch, self.clear_m(switch))
+        self.clearance_m(switch, self.clear_apart_m(switch))
     }
 
     /// Distance of the centrelines of legs at which trains on them clear each other: their gauges, with what cars
     /// swing out in the curve of the diverging leg.
-    pub fn clear_m(&self, switch: &Switch) -> f64 {
+    pub fn clear_apart_m(&self, switch: &Switch) -> f64 {
         let legs = [switch.through, switch.diverging].map(|end| self.entered(end));
         let curvatures = legs.map(|leg| leg.map_or(0.0, |frame| frame.curvature_per_m));
         curvatures.map(|k| Gauge::b1(k).widest_m()).iter().sum()

@@ -102,9 +102,9 @@ impl ChainageRegion {
     }
 }
 
-/// A jump of what is stated.
+/// A jump of what is stated, as surveyors call it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ChainageJump {
+pub struct ChainageEquation {
     /// Where, metres from the begin of the track.
     pub at_m: f64,
     /// Stated up to there, metres.
@@ -157,11 +157,11 @@ impl StatedChainage {
     }
 
     /// Its jumps, in order along the track.
-    pub fn jumps(&self) -> impl Iterator<Item = ChainageJump> + '_ {
+    pub fn equations(&self) -> impl Iterator<Item = ChainageEquation> + '_ {
         self.regions.windows(2).map(|pair| {
             let (at_m, ahead_m) = (pair[1].from_m, pair[1].start_m);
             let back_m = pair[0].stated_m(at_m);
-            ChainageJump {
+            ChainageEquation {
                 at_m,
                 back_m,
                 ahead_m,

@@ -112,10 +112,10 @@ fn jumps_say_by_how_much_the_track_is_longer() {
     for increment in [Increment::Increasing, Increment::Decreasing] {
         for jumps_m in JUMPS_M {
             let track = StatedChainage::of(&entry(increment, 12_340.0, jumps_m), LENGTH_M);
-            let longer_m: Vec<f64> = track.jumps().map(|jump| jump.longer_m).collect();
+            let longer_m: Vec<f64> = track.equations().map(|jump| jump.longer_m).collect();
             let is_m = jumps_m.into_iter().filter(|m| *m != 0.0);
             assert!(is_m.zip(&longer_m).all(|(is_m, m)| (is_m + m).abs() < 1e-9));
-            for jump in track.jumps() {
+            for jump in track.equations() {
                 assert!((track.stated_m(jump.at_m) - jump.ahead_m).abs() < 1e-9);
                 assert!((track.stated_m(jump.at_m - 1e-7) - jump.back_m).abs() < 1e-6);
             }
@@ -131,15 +131,15 @@ fn jumps_say_by_how_much_the_track_is_longer() {
 fn a_place_keeps_what_it_states_when_the_track_is_reversed() {
     for track in tracks() {
         let reversed = track.reversed(LENGTH_M);
-        let mut there: Vec<ChainageJump> = reversed.jumps().collect();
+        let mut there: Vec<ChainageEquation> = reversed.equations().collect();
         there.reverse();
-        assert_eq!(there.len(), track.jumps().count());
-        for (jump, there) in track.jumps().zip(there) {
+        assert_eq!(there.len(), track.equations().count());
+        for (jump, there) in track.equations().zip(there) {
             assert!((there.at_m + jump.at_m - LENGTH_M).abs() < 1e-9);
             assert!((there.back_m - jump.ahead_m).abs() < 1e-9);
             assert!((there.longer_m - jump.longer_m).abs() < 1e-9);
         }
-        let at_jump = |s_m: f64| track.jumps().any(|jump| (jump.at_m - s_m).abs() < 1e-9);
+        let at_jump = |s_m: f64| track.equations().any(|jump| (jump.at_m - s_m).abs() < 1e-9);
         for s_m in places_m().filter(|s_m| !at_jump(*s_m)) {
             let there_m = reversed.stated_m(LENGTH_M - s_m);
             assert!((there_m - track.stated_m(s_m)).abs() < 1e-9, "{s_m}");

@@ -6,7 +6,7 @@
 //! a headwall.
 
 use super::end_wall::{EndWall, Plane, WallPaint};
-use super::free_space::{free_space, without};
+use super::free_space::{difference, free_space};
 use super::track_caster::{Segment, TrackCaster};
 use crate::track::{BED_M, CrossSection, Direction};
 use nalgebra::{Vector2, Vector3};
@@ -100,7 +100,7 @@ impl Border<'_> {
             .iter()
             .filter_map(|(track, k)| track.free_space_in(*k, &plane, top_m));
         let beyond: Vec<_> = own.into_iter().chain(others).collect();
-        let pieces = without(&free_space(section, top_m), &beyond);
+        let pieces = difference(&free_space(section, top_m), &beyond);
         let paint = WallPaint::of(range, section)
             .or_else(|| next.and_then(|(range, section)| WallPaint::of(range, section)))?;
         (!pieces.is_empty()).then(|| EndWall {

@@ -65,7 +65,7 @@ pub fn free_space(section: &CrossSection, top_m: f64) -> Vec<Vector2<f64>> {
 }
 
 /// A polygon without others, in pieces.
-pub fn without(polygon: &[Vector2<f64>], others: &[Vec<Vector2<f64>>]) -> Vec<Trapezoid> {
+pub fn difference(polygon: &[Vector2<f64>], others: &[Vec<Vector2<f64>>]) -> Vec<Trapezoid> {
     let mut pieces: Vec<Trapezoid> = Vec::new();
     for pair in levels(polygon, others).windows(2) {
         let slab = [pair[0], pair[1]];
@@ -174,12 +174,12 @@ mod tests {
             rectangle([-2.0, 2.0], [0.0, 3.0]),
             rectangle([5.0, 9.0], [-1.0, 5.0]),
         ];
-        let pieces = without(&hall, &tunnels);
+        let pieces = difference(&hall, &tunnels);
         assert!((area(&pieces) - (40.0 - 12.0 - 8.0)).abs() < 1e-9);
         let inside = |l, h| pieces.iter().any(|p| p.contains(l, h));
         assert!(inside(-2.5, 1.0) && inside(0.0, 3.5) && inside(4.9, 2.0));
         assert!(!inside(0.0, 2.9) && !inside(5.1, 2.0) && !inside(0.0, 4.1));
-        assert!(without(&tunnels[0], &[hall]).is_empty());
+        assert!(difference(&tunnels[0], &[hall]).is_empty());
     }
 
     /// Fails where a piece is lost, doubled or in the wrong place: against the definition, point by point.
@@ -192,7 +192,7 @@ mod tests {
         let stream = Stream::new(7, 0, "free space");
         for (a, b) in [(0, 1), (1, 0), (2, 0), (2, 1), (0, 2)] {
             let [free, other] = [all[a], all[b]].map(|section| free_space(section, 6.0));
-            let pieces = without(&free, std::slice::from_ref(&other));
+            let pieces = difference(&free, std::slice::from_ref(&other));
             let within = |polygon: &[Vector2<f64>], l: f64, h: f64| {
                 sides(polygon).fold(false, |inside, [p, q]| {
                     let crosses =

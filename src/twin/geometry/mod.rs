@@ -15,7 +15,7 @@ mod tunnel;
 pub use body::{Body, Shape};
 pub use borders::TunnelEnd;
 pub use end_wall::EndWall;
-pub use free_space::{Trapezoid, free_space, without};
+pub use free_space::{Trapezoid, difference, free_space};
 pub use hull::{Face, Hull};
 pub use section::surface_of;
 pub use solid::Solid;

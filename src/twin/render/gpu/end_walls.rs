@@ -6,7 +6,7 @@ use super::mesh::Mesh;
 use super::surface::{Patch, SurfaceCell};
 use super::tunnel::{ChunkSide, Site};
 use crate::track::{Direction, Material, TrackPoint};
-use crate::twin::geometry::{EndWall, Trapezoid, free_space, without};
+use crate::twin::geometry::{EndWall, Trapezoid, difference, free_space};
 use crate::twin::render::paint::Painting;
 
 /// A chunk's own cross-section is looked up so far from its ends.
@@ -47,7 +47,7 @@ impl Site<'_> {
                 continue;
             };
             let (frame, first) = (self.track.alignment.at(s_m), mesh.indices.len());
-            for piece in without(&free_space(section, 0.0), &[]) {
+            for piece in difference(&free_space(section, 0.0), &[]) {
                 let corner = mesh.vertices.len() as u32;
                 for (row, h_m) in piece.h_m.into_iter().enumerate() {
                     for l_m in [piece.right_m[row], piece.left_m[row]] {
