@@ -8,6 +8,7 @@ pub mod camera_watch;
 mod equipment;
 mod history;
 pub mod led;
+pub mod occupancy;
 mod odometry;
 pub mod positioning;
 pub mod protection;

@@ -57,6 +57,7 @@ mod gauge;
 pub mod geodesy;
 pub mod network;
 mod place;
+pub mod plan;
 mod reversal;
 mod section;
 mod stated_chainage;

@@ -1,0 +1,131 @@
+//! One way that the train may have come and go, and where it then is.
+
+use super::course::Course;
+use super::settings::OccupancySettings;
+use crate::track::Direction;
+use crate::track::plan::PlanNetwork;
+use nalgebra::{SMatrix, SVector};
+
+/// What is estimated: place along the course, error of the speed's scale, heading that the yaw rates' sum lacks,
+/// offset of the yaw rate, error of fixes to the east and to the north.
+pub const STATES: usize = 6;
+pub const PLACE: usize = 0;
+pub const SCALE: usize = 1;
+pub const HEADING: usize = 2;
+pub const YAW_OFFSET: usize = 3;
+pub const EAST: usize = 4;
+pub const NORTH: usize = 5;
+
+pub type State = SVector<f64, STATES>;
+pub type StateCovariance = SMatrix<f64, STATES, STATES>;
+
+/// Beyond so many standard deviations of the place nothing is looked for.
+const FAR_SIGMAS: f64 = 4.0;
+/// And not within this, metres.
+const NEAR_M: f64 = 1.0;
+/// Hypotheses whose places are farther apart stay two.
+const MERGED_SIGMAS: f64 = 3.0;
+
+/// A course, its probability and the place along it.
+#[derive(Clone, Debug)]
+pub struct Hypothesis {
+    pub course: Course,
+    /// Natural logarithm.
+    pub log_probability: f64,
+    pub mean: State,
+    pub covariance: StateCovariance,
+    /// Kind and size of the last fix's error, to tell when it becomes another.
+    pub fix_variance_m2: f64,
+}
+
+impl Hypothesis {
+    /// Where the train is along the course, metres.
+    pub fn place_m(&self) -> f64 {
+        self.mean[PLACE]
+    }
+
+    /// Standard deviation of that, metres.
+    pub fn sigma_m(&self) -> f64 {
+        self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
+    }
+
+    /// The element that it is on, the way that it runs along it, and how far along it is.
+    pub fn on(&self) -> (usize, Direction, f64) {
+        let leg = self.course.leg_at(self.place_m());
+        let along_m = leg.along_m(self.place_m()).clamp(0.0, leg.length_m);
+        (leg.towards.element, leg.towards.way, along_m)
+    }
+
+    /// What may be needed of the course: chords between bogies, where the train may be, and it itself.
+    fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
+        let reach_m = 0.5 * settings.bogie_distance_m + NEAR_M + FAR_SIGMAS * self.sigma_m();
+        let place_m = self.place_m();
+        [place_m - reach_m, place_m + reach_m]
+    }
+
+    /// The same with the course as long as it has to be, for each way that there is; the probability is shared
+    /// evenly.
+    pub fn grown(self, network: &PlanNetwork, settings: &OccupancySettings) -> Vec<Self> {
+        let (mut grown, mut left) = (Vec::new(), vec![self]);
+        while let Some(mut hypothesis) = left.pop() {
+            let needed = hypothesis.needed_m(settings);
+            let train = needed[0] - settings.train_length_m;
+            hypothesis.course.trim([train, needed[1]]);
+            let [begin_m, end_m] = hypothesis.course.stretch_m();
+            let longer = match (needed[1] > end_m, needed[0] < begin_m) {
+                (true, _) => hypothesis.course.onwards(network),
+                (false, true) => hypothesis.course.backwards(network),
+                (false, false) => Vec::new(),
+            };
+            let longer = match longer.is_empty() && needed[0] < begin_m {
+                // The network ends ahead, but not behind.
+                true => hypothesis.course.backwards(network),
+                false => longer,
+            };
+            if longer.is_empty() || grown.len() + left.len() > settings.most_hypotheses {
+                grown.push(hypothesis);
+                continue;
+            }
+            let share = (longer.len() as f64).ln();
+            left.extend(longer.into_iter().map(|course| Self {
+                course,
+                log_probability: hypothesis.log_probability - share,
+                ..hypothesis.clone()
+            }));
+        }
+        grown
+    }
+
+    /// Takes in another one that says the same of all that is to come; whether it does.
+    pub fn merge(&mut self, other: &Self, settings: &OccupancySettings) -> bool {
+        let [leg, of_other] = [&*self, other].map(|h| *h.course.leg_at(h.place_m()));
+        let mut mean = other.mean;
+        mean[PLACE] += leg.begin_m - of_other.begin_m;
+        let apart = mean - self.mean;
+        let spread_m = self.sigma_m().hypot(other.sigma_m()).max(NEAR_M);
+        let is_near = apart[PLACE].abs() < MERGED_SIGMAS * spread_m && apart[HEADING].abs() < 0.5;
+        let have_left = [&*self, other]
+            .iter()
+            .all(|h| h.needed_m(settings)[0] > h.course.leg_at(h.place_m()).begin_m);
+        let same_course = self
+            .course
+            .is_shifted(&other.course, of_other.begin_m - leg.begin_m);
+        if leg.towards != of_other.towards || !is_near || !(same_course || have_left) {
+            return false;
+        }
+        let [own, others] = [self.log_probability, other.log_probability];
+        let most = own.max(others);
+        let sum = most + ((own - most).exp() + (others - most).exp()).ln();
+        let (own, others) = ((own - sum).exp(), (others - sum).exp());
+        self.log_probability = sum;
+        self.mean += apart * others;
+        self.covariance = self.covariance * own
+            + other.covariance * others
+            + apart * apart.transpose() * (own * others);
+        if !same_course {
+            // They came by different ways: where it would go back to is open.
+            self.course.trim([leg.begin_m + NEAR_M, f64::INFINITY]);
+        }
+        true
+    }
+}

@@ -1,0 +1,313 @@
+//! Which track the train is on, where on it, and how probable that is.
+//!
+//! Fixes of a satellite receiver, speed and, if there is one, a yaw rate are held against a network in plan. What is
+//! believed is a set of hypotheses: a course over the network, the place on it, a probability. Where a course comes
+//! to a switch it becomes two; where two courses meet for good they become one; a hypothesis under
+//! [`OccupancySettings::least_probability`] is dropped. When all that are left are on one track, that is identified.
+//!
+//! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
+//! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with
+//! correlated errors.
+//!
+//! ```
+//! use metrotwin::bus::SimTime;
+//! use metrotwin::stack::occupancy::{Fix, Occupancy, OccupancySettings};
+//! use metrotwin::track::plan::{PlanNetwork, TrackElement};
+//! use nalgebra::{Matrix2, Point2};
+//!
+//! let track = |id: &str, y| TrackElement::new(id, vec![Point2::new(0.0, y), Point2::new(500.0, y)]);
+//! let elements = [track("one", 0.0), track("other", 12.0)].into_iter().flatten().collect();
+//! let network = PlanNetwork::new(None, elements, &[]);
+//! let mut occupancy = Occupancy::new(network.into(), OccupancySettings::default());
+//! for k in 0..20 {
+//!     let time = SimTime::from_secs(f64::from(k));
+//!     occupancy.on_speed(time, 10.0);
+//!     let place = Point2::new(50.0 + 10.0 * f64::from(k), 0.3);
+//!     occupancy.on_fix(&Fix { time, place, covariance_m2: Matrix2::identity() });
+//! }
+//! let decision = occupancy.decision();
+//! assert_eq!(decision.tracks[0].element, 0);
+//! assert!((decision.tracks[0].along_m - 240.0).abs() < 2.0);
+//! ```
+
+mod course;
+mod decision;
+mod fused;
+mod hypothesis;
+mod matching;
+mod pedal;
+mod settings;
+
+pub use decision::{Decision, TrackDecision};
+pub use matching::{Match, by_pedal_curve, by_perpendicular};
+pub use settings::{Method, OccupancySettings};
+
+use crate::bus::SimTime;
+use crate::track::Direction;
+use crate::track::plan::{ElementEnd, PlanNetwork};
+use course::Course;
+use hypothesis::{Hypothesis, State, StateCovariance};
+use nalgebra::{Matrix2, Point2};
+use std::sync::Arc;
+
+/// A new start looks for tracks within so many standard deviations of a fix, and within so many metres.
+const START_SIGMAS: f64 = 6.0;
+const START_M: f64 = 20.0;
+/// Hypotheses from which a fix is farther away are lost.
+const LOST_SIGMAS: f64 = 6.0;
+const LOST_M: f64 = 100.0;
+/// So many fixes in a row, and it starts anew.
+const LOST_FIXES: u32 = 5;
+/// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
+const HEADING_EVERY_M: f64 = 2.0;
+/// Sums of speed and yaw rate over a longer silence are worth nothing, seconds.
+const SILENCE_S: f64 = 2.0;
+
+/// A fix in the plane of the network.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fix {
+    /// When it was valid.
+    pub time: SimTime,
+    /// World x and y.
+    pub place: Point2<f64>,
+    /// Of x and y.
+    pub covariance_m2: Matrix2<f64>,
+}
+
+/// The filter.
+#[derive(Clone, Debug)]
+pub struct Occupancy {
+    network: Arc<PlanNetwork>,
+    settings: OccupancySettings,
+    hypotheses: Vec<Hypothesis>,
+    time: Option<SimTime>,
+    speed: Option<(SimTime, f64)>,
+    yaw_rate: Option<(SimTime, f64)>,
+    speed_filter: pedal::SpeedFilter,
+    /// Run, and seconds, since the hypotheses were carried on.
+    since: (f64, f64),
+    /// Run since headings were compared.
+    since_heading_m: f64,
+    turned_rad: f64,
+    lost: u32,
+}
+
+impl Occupancy {
+    /// That knows nothing yet.
+    pub fn new(network: Arc<PlanNetwork>, settings: OccupancySettings) -> Self {
+        Self {
+            network,
+            settings,
+            hypotheses: Vec::new(),
+            time: None,
+            speed: None,
+            yaw_rate: None,
+            speed_filter: pedal::SpeedFilter::default(),
+            since: (0.0, 0.0),
+            since_heading_m: 0.0,
+            turned_rad: 0.0,
+            lost: 0,
+        }
+    }
+
+    /// The network that it was given.
+    pub fn network(&self) -> &Arc<PlanNetwork> {
+        &self.network
+    }
+
+    /// How many hypotheses are alive.
+    pub fn alive(&self) -> usize {
+        self.hypotheses.len()
+    }
+
+    /// Takes the speed, forwards positive. What is older than the last input is dropped.
+    pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
+        if speed_mps.is_finite() && self.run_to(time) {
+            self.speed = Some((time, speed_mps));
+            self.speed_filter
+                .update(time, speed_mps, self.settings.speed_sigma_mps);
+        }
+    }
+
+    /// Takes the yaw rate, to the left positive.
+    pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
+        if yaw_rate_radps.is_finite() && self.run_to(time) {
+            self.yaw_rate = Some((time, yaw_rate_radps));
+        }
+    }
+
+    /// Takes a fix.
+    pub fn on_fix(&mut self, fix: &Fix) {
+        let is_number = fix
+            .place
+            .iter()
+            .chain(fix.covariance_m2.iter())
+            .all(|x| x.is_finite());
+        if !is_number || fix.covariance_m2.cholesky().is_none() || !self.run_to(fix.time) {
+            return;
+        }
+        self.advance();
+        self.lost = if self.is_lost(fix) { self.lost + 1 } else { 0 };
+        if self.hypotheses.is_empty() || self.lost >= LOST_FIXES {
+            self.start(fix);
+        }
+        let (network, settings) = (&self.network, &self.settings);
+        for hypothesis in &mut self.hypotheses {
+            match settings.method {
+                Method::Fused => {
+                    let fix = (&fix.place, &fix.covariance_m2);
+                    hypothesis.update_fused(network, fix, settings);
+                }
+                Method::Pedal => hypothesis.update_matched(network, fix, by_pedal_curve),
+                Method::Perpendicular => hypothesis.update_matched(network, fix, by_perpendicular),
+            }
+        }
+        self.tidy();
+    }
+
+    /// What is believed now.
+    pub fn decision(&self) -> Decision {
+        Decision::of(&self.hypotheses)
+    }
+
+    /// Sums speed and yaw rate up to a time; whether it is no older than the last input.
+    fn run_to(&mut self, time: SimTime) -> bool {
+        let seconds = self.time.map_or(0.0, |last| time.since(last));
+        if seconds < 0.0 {
+            return false;
+        }
+        self.time = Some(time);
+        let held = |reading: Option<(SimTime, f64)>| {
+            reading
+                .filter(|(at, _)| time.since(*at) <= SILENCE_S)
+                .map_or(0.0, |(_, value)| value)
+        };
+        let run_m = held(self.speed) * seconds;
+        self.turned_rad += held(self.yaw_rate) * seconds;
+        self.since.0 += run_m;
+        self.since.1 += seconds;
+        self.since_heading_m += run_m.abs();
+        if self.since_heading_m >= HEADING_EVERY_M {
+            self.compare_headings();
+        }
+        true
+    }
+
+    fn compare_headings(&mut self) {
+        self.since_heading_m = 0.0;
+        self.advance();
+        if self.yaw_rate.is_some() && self.settings.method == Method::Fused {
+            let (network, settings) = (&self.network, &self.settings);
+            for hypothesis in &mut self.hypotheses {
+                hypothesis.update_heading(network, self.turned_rad, settings);
+            }
+        }
+        self.tidy();
+    }
+
+    fn advance(&mut self) {
+        let (run_m, seconds) = std::mem::take(&mut self.since);
+        for hypothesis in &mut self.hypotheses {
+            match self.settings.method {
+                Method::Fused => hypothesis.advance_fused((seconds, run_m), &self.settings),
+                _ => hypothesis.advance_by_speed(run_m, self.speed_filter.sigma_mps() * seconds),
+            }
+        }
+    }
+
+    /// Whether a fix is far from all hypotheses.
+    fn is_lost(&self, fix: &Fix) -> bool {
+        let sigma_m = fix.covariance_m2.trace().sqrt();
+        self.hypotheses.iter().all(|hypothesis| {
+            let (place, _) = hypothesis.course.at(&self.network, hypothesis.place_m());
+            let spread_m = sigma_m.hypot(hypothesis.sigma_m());
+            (fix.place - place).norm() > LOST_SIGMAS * spread_m + LOST_M
+        })
+    }
+
+    /// Every track near a fix, both ways.
+    fn start(&mut self, fix: &Fix) {
+        self.lost = 0;
+        let within_m = START_M + START_SIGMAS * fix.covariance_m2.trace().sqrt();
+        let near = self.network.near(&fix.place, within_m);
+        let mut hypotheses = Vec::new();
+        for element in near {
+            let all = [0.0, self.network.elements[element].length_m()];
+            let covariance = &fix.covariance_m2;
+            let Some(found) =
+                by_pedal_curve(&self.network.elements[element], all, &fix.place, covariance)
+            else {
+                continue;
+            };
+            for way in [Direction::Up, Direction::Down] {
+                hypotheses.push(self.new_hypothesis(ElementEnd { element, way }, &found, fix));
+            }
+        }
+        self.hypotheses = hypotheses;
+        self.grow();
+    }
+
+    fn new_hypothesis(&self, towards: ElementEnd, found: &Match, fix: &Fix) -> Hypothesis {
+        let mut hypothesis = Hypothesis {
+            course: Course::at_place(&self.network, towards, found.along_m),
+            log_probability: 0.0,
+            mean: State::zeros(),
+            covariance: StateCovariance::zeros(),
+            fix_variance_m2: 1.0,
+        };
+        match self.settings.method {
+            Method::Fused => {
+                let (_, forward) = hypothesis.course.at(&self.network, 0.0);
+                let offset_rad = self.turned_rad - forward.y.atan2(forward.x);
+                hypothesis.start_fused(&fix.covariance_m2, &self.settings, offset_rad);
+            }
+            _ => hypothesis.start_matched(found),
+        }
+        hypothesis
+    }
+
+    fn grow(&mut self) {
+        let (network, settings) = (&self.network, &self.settings);
+        let grown = self
+            .hypotheses
+            .drain(..)
+            .flat_map(|h| h.grown(network, settings));
+        self.hypotheses = grown.collect();
+    }
+
+    /// Normalises, drops, merges and branches.
+    fn tidy(&mut self) {
+        let Some(most) = self
+            .hypotheses
+            .iter()
+            .map(|h| h.log_probability)
+            .reduce(f64::max)
+        else {
+            return;
+        };
+        let sum: f64 = self
+            .hypotheses
+            .iter()
+            .map(|h| (h.log_probability - most).exp())
+            .sum();
+        let log_sum = most + sum.ln();
+        let least = self.settings.least_probability.ln();
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.log_probability -= log_sum;
+        }
+        self.hypotheses.retain(|h| h.log_probability >= least);
+        (self.hypotheses).sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability));
+        self.hypotheses.truncate(self.settings.most_hypotheses);
+        self.grow();
+        let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.hypotheses.len());
+        for hypothesis in self.hypotheses.drain(..) {
+            if !kept
+                .iter_mut()
+                .any(|other| other.merge(&hypothesis, &self.settings))
+            {
+                kept.push(hypothesis);
+            }
+        }
+        self.hypotheses = kept;
+    }
+}

@@ -1,0 +1,84 @@
+//! Place and probability of a hypothesis by matches and speed (Guo et al. 2020, sections 2.2 and 2.3).
+//!
+//! The place by the last one and the speed, l + v T, and that of the match are weighted by their inverse variances.
+//! A hypothesis is as probable as it was times the normal density of the distance r to its match, with the standard
+//! deviation of the fix in that direction. The variance of a match along the track is that of the pedal curve there.
+
+use super::Fix;
+use super::hypothesis::{Hypothesis, PLACE, StateCovariance};
+use super::matching::Match;
+use crate::bus::SimTime;
+use crate::track::plan::{PlanNetwork, TrackElement};
+use nalgebra::{Matrix2, Point2};
+
+/// A match is looked for so many standard deviations from the place, and so far.
+const AROUND_SIGMAS: f64 = 6.0;
+const AROUND_M: f64 = 30.0;
+/// By how much a train's speed changes in a second, m/s: the acceleration of metros.
+const SPEED_CHANGE_MPS2: f64 = 1.0;
+
+/// A Kalman filter of the speed.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SpeedFilter(Option<(SimTime, f64, f64)>);
+
+impl SpeedFilter {
+    /// Takes a measured speed.
+    pub fn update(&mut self, time: SimTime, speed_mps: f64, sigma_mps: f64) {
+        let measured_m2 = sigma_mps.powi(2);
+        let Some((last, mean, variance)) = self.0 else {
+            self.0 = Some((time, speed_mps, measured_m2));
+            return;
+        };
+        let prior = variance + (SPEED_CHANGE_MPS2 * time.since(last)).powi(2);
+        let gain = prior / (prior + measured_m2);
+        self.0 = Some((time, mean + gain * (speed_mps - mean), (1.0 - gain) * prior));
+    }
+
+    /// Standard deviation of the speed.
+    pub fn sigma_mps(&self) -> f64 {
+        self.0.map_or(0.0, |(_, _, variance)| variance.sqrt())
+    }
+}
+
+impl Hypothesis {
+    /// At its match.
+    pub fn start_matched(&mut self, found: &Match) {
+        self.covariance = StateCovariance::zeros();
+        self.covariance[(PLACE, PLACE)] = found.sigma_m.powi(2);
+    }
+
+    /// Carries it on by what was run.
+    pub fn advance_by_speed(&mut self, run_m: f64, sigma_m: f64) {
+        self.mean[PLACE] += run_m;
+        self.covariance[(PLACE, PLACE)] += sigma_m.powi(2);
+    }
+
+    /// Takes a fix in by its match.
+    pub fn update_matched(
+        &mut self,
+        network: &PlanNetwork,
+        fix: &Fix,
+        matched: fn(&TrackElement, [f64; 2], &Point2<f64>, &Matrix2<f64>) -> Option<Match>,
+    ) {
+        let reach_m = AROUND_M + AROUND_SIGMAS * self.sigma_m();
+        let [from_m, to_m] = [self.place_m() - reach_m, self.place_m() + reach_m];
+        let matches = self.course.legs().iter().filter_map(|leg| {
+            let ends = [from_m, to_m].map(|m| leg.along_m(m).clamp(0.0, leg.length_m));
+            let stretch_m = [ends[0].min(ends[1]), ends[0].max(ends[1])];
+            let element = &network.elements[leg.towards.element];
+            let found = matched(element, stretch_m, &fix.place, &fix.covariance_m2)?;
+            Some((leg.course_m(found.along_m), found))
+        });
+        let nearest = matches.min_by(|a, b| a.1.deviations().total_cmp(&b.1.deviations()));
+        let Some((match_m, found)) = nearest else {
+            return;
+        };
+        self.log_probability -= 0.5 * found.deviations().powi(2) + found.sigma_m.ln();
+        let (_, forward) = self.course.at(network, match_m);
+        let along_m2 = forward.dot(&(fix.covariance_m2 * forward));
+        let own_m2 = self.covariance[(PLACE, PLACE)];
+        let weight = own_m2 / (own_m2 + along_m2).max(f64::MIN_POSITIVE);
+        self.mean[PLACE] += weight * (match_m - self.place_m());
+        self.covariance[(PLACE, PLACE)] = (1.0 - weight) * own_m2;
+    }
+}
