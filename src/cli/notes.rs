@@ -4,7 +4,7 @@ use super::report::train_name;
 use crate::bus::TrainId;
 use crate::scenario::{OnboardSettings, Scenario, WaysidePost};
 use crate::session::FieldOfView;
-use crate::track::network::{Itinerary, Network};
+use crate::track::network::{Itinerary, Network, SwitchLeg};
 use crate::track::{BED_M, TrackId, TrackPoint};
 use crate::twin::physics::{ObstacleSettings, TrainSettings};
 
@@ -24,7 +24,42 @@ pub(super) fn of(scenario: &Scenario) -> Vec<String> {
         devices.in_the_reference(),
     ];
     let notes = of_each.flatten().chain(of_obstacles);
-    notes.flatten().collect()
+    notes.flatten().chain(switches_against(scenario)).collect()
+}
+
+/// Switches that stand against a train at the start, and that nothing sets for it.
+fn switches_against(scenario: &Scenario) -> Vec<String> {
+    let interlocking = &scenario.physics.interlocking;
+    let network = &scenario.tunnel.network;
+    let is_moved = |name: &str| interlocking.moves.iter().any(|m| m.switch == name);
+    let stands = |name: &str| {
+        let mut positions = interlocking.positions.iter();
+        let position = positions.find(|position| position.switch == name);
+        position.map_or(SwitchLeg::Through, |position| position.leg.into())
+    };
+    let name_of = |leg: SwitchLeg| match leg {
+        SwitchLeg::Through => "through",
+        SwitchLeg::Diverging => "diverging",
+    };
+    let ways = scenario.itineraries.iter().enumerate();
+    let ways = ways.filter(|_| !interlocking.automatic);
+    ways.flat_map(|(k, way)| {
+        let passings = network.passings(&way.route);
+        let ahead = passings.into_iter().filter(|p| p.toe_m > way.start_m);
+        ahead.filter_map(move |passing| {
+            let name = &network.switches[passing.switch].name;
+            (stands(name) != passing.leg && !is_moved(name)).then(|| {
+                format!(
+                    "switch `{name}` leads to its {} leg, and the route of {} runs over the {} leg: \
+                     `interlocking.positions` or `moves` would set it",
+                    name_of(stands(name)),
+                    train_name(scenario, TrainId::from_index(k)),
+                    name_of(passing.leg),
+                )
+            })
+        })
+    })
+    .collect()
 }
 
 /// An obstacle that appears where a train stands.

@@ -217,7 +217,7 @@ mod tests {
             "  hit toolbox at 31.50 s with 36.0 km/h: 1234 N s, 1.50 kJ of 5.00 kJ lost, beyond design damage",
             "  and 1 more hits: see summary.json",
             "train ran 512.3 m; floor 0.346 m/s^2 vertical, 0.200 lateral (RMS); wheel load down to 88 %; \
-             slip up to 0.12 m/s; pressed aside by up to 12 kN; stopped 0.26 m off the mark",
+             slip up to 0.12 m/s; pressed aside by up to 12 kN; stopped 0.26 m short of the mark",
             "   12.50 s: switch W1, run through, train 1, at 460.0 m of track u4",
             "   12.50 s: switch W1, run through, train 1, at YDK12+460.0 of track u1",
         ] {

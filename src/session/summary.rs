@@ -246,7 +246,8 @@ pub struct ObstacleScore {
 pub struct TrainFigures {
     /// Distance of its head, along the line.
     pub run_m: f64,
-    /// Where its head stood at the end less the stop mark; `null` where there is none, or it runs.
+    /// Where its head stood at the end less the stop mark; `null` where there is none, or it runs, or a switch led it
+    /// off its route.
     pub stop_error_m: Option<f64>,
     /// A wheelset left the rails, and the run ended there.
     pub derailed: bool,

@@ -354,6 +354,25 @@ fn empty_names_are_refused() {
     );
 }
 
+/// Provokes: a switch that will lead a train off its route, without a word about it.
+#[test]
+fn switches_against_a_train_are_noted() {
+    let said = |more: &str| {
+        let args =
+            format!("check scenarios/terminus_meet.toml --set interlocking.automatic=false {more}");
+        let output = metrotwin(&args.split_whitespace().collect::<Vec<_>>());
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8_lossy(&output.stdout).into_owned()
+            + &String::from_utf8_lossy(&output.stderr)
+    };
+    let against = |said: &str| said.contains("switch `W5` leads to its through leg");
+    assert!(against(&said("")), "{}", said(""));
+    let set = r#"--set interlocking.positions=[{switch="W5",leg="diverging"}]"#;
+    assert!(!against(&said(set)), "{}", said(set));
+    let automatic = said("--set interlocking.automatic=true");
+    assert!(!automatic.contains("switch `W"), "{automatic}");
+}
+
 /// Provokes: a train that crawls, or a rig that sees nothing, without a word about it.
 #[test]
 fn what_may_surprise_is_noted() {

@@ -11,7 +11,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum IncidentKind {
-    /// A switch was asked to move under a train, and stayed as it was: it is locked.
+    /// A switch was asked to move under a train, or on a route that is set for one, and stayed as it was: it is locked.
     SwitchLocked,
     /// A switch moved under a train, which derails.
     SwitchMovedUnderTrain,
@@ -19,7 +19,7 @@ pub enum IncidentKind {
     SwitchNotClosed,
     /// A train ran trailing through a switch that was set for the other leg: it forced the blades over.
     RunThrough,
-    /// A switch led a train onto another leg than that of its route.
+    /// A switch led a train onto another leg than that of its route; its driver brakes to a stop.
     AgainstRoute,
     /// A train ran over an open end, beyond what is modelled.
     OffEnd,
@@ -30,7 +30,7 @@ pub enum IncidentKind {
 impl fmt::Display for IncidentKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::SwitchLocked => "locked, and asked to move under",
+            Self::SwitchLocked => "asked to move while locked by",
             Self::SwitchMovedUnderTrain => "moved under",
             Self::SwitchNotClosed => "not closed before",
             Self::RunThrough => "run through by",

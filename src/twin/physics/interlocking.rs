@@ -125,10 +125,11 @@ impl Interlocking {
         let mut verdicts = Vec::new();
         while let Some((k, leg, lock_fails)) = self.switches.asked(now) {
             let on_it = self.occupied_by(k, trains);
+            let locks = on_it.or_else(|| self.set_for(k, leg));
             self.ask(
                 network,
                 (k, leg),
-                on_it.filter(|_| !lock_fails),
+                locks.filter(|_| !lock_fails),
                 now,
                 trains,
             );
@@ -276,6 +277,14 @@ impl Interlocking {
                 head_m > from_m && tail_m < to_m
             })
         })
+    }
+
+    /// The train whose route a switch is kept for, if that is over the other leg.
+    fn set_for(&self, k: usize, leg: SwitchLeg) -> Option<usize> {
+        let train = self.kept_for[k]?.index();
+        let mut claims = self.ways[train].claims.iter();
+        let is_other = |claim: &Claim| claim.number == k && claim.leg.is_some_and(|set| set != leg);
+        claims.any(is_other).then_some(train)
     }
 
     /// Trains in each other's gauge at a switch or a crossing.

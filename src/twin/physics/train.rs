@@ -121,6 +121,8 @@ impl Train {
     /// It has been led onto another way than its own, from a distance on. Its driver stops.
     pub(super) fn divert(&mut self, track: RouteTrack, limits: Vec<SpeedLimit>, from_m: f64) {
         self.track = track;
+        // Its mark is on the way that it was to go.
+        self.consist.settings.stop_at_m = None;
         self.driver.diverted(limits, from_m);
     }
 

@@ -187,6 +187,21 @@ fn a_switch_is_locked_under_a_train() {
     assert!((world.time().secs() - 5.0).abs() < 0.01);
 }
 
+/// Provokes: a call that moves a switch of a route that is set, before the train is on it.
+#[test]
+fn a_set_route_locks_its_switches() {
+    let way = train(("u1", 420.0), &["u2"], ("u3", 100.0), 40.0);
+    let calls = InterlockingSettings {
+        moves: vec![moved("W1", LegName::Diverging, 1.0, false)],
+        ..InterlockingSettings::default()
+    };
+    let mut world = terminus(vec![way], calls);
+    assert!(go(&mut world, 10.0).is_none());
+    assert_eq!(kinds(&world), [(IncidentKind::SwitchLocked, Some("W1"))]);
+    assert!(world.switch_share(0).abs() < 1e-12);
+    assert_eq!(at(&world, TRAIN).0, "u2");
+}
+
 /// Provokes: blades that are over at once, or a train that passes between two ways.
 #[test]
 fn blades_between_their_ends_derail_a_train() {
