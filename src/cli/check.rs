@@ -109,7 +109,12 @@ fn other(path: &Path, text: &str, _: FileKind, _: &CheckArgs) -> Result<String, 
 
 /// The text of a file.
 pub(super) fn read(path: &Path) -> Result<String, Failure> {
-    read_text(path, ReadLimit::TOML).map_err(|source| {
+    read_as(path, ReadLimit::TOML)
+}
+
+/// The text of a file of some kind.
+pub(super) fn read_as(path: &Path, kind: ReadLimit) -> Result<String, Failure> {
+    read_text(path, kind).map_err(|source| {
         let path = path.to_owned();
         Failure::file(&path.clone(), "", FileError::Read { path, source })
     })

@@ -9,6 +9,7 @@
 //! metrotwin generate SCENARIO concrete scenarios drawn from a template
 //! metrotwin study run STUDY   many runs, and what they come to
 //! metrotwin check FILE...     tunnels and scenarios: errors and a short report
+//! metrotwin locate            on which track a train was, from recorded fixes
 //! metrotwin export geojson    a tunnel on a map
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
@@ -18,6 +19,7 @@ mod check;
 mod excerpt;
 mod fault;
 mod file_kind;
+mod locate;
 mod tunnel;
 
 /// What needs the simulated world.
@@ -95,6 +97,7 @@ enum Command {
     #[cfg(feature = "twin")]
     Study(study::StudyArgs),
     Check(check::CheckArgs),
+    Locate(locate::LocateArgs),
     #[cfg(feature = "twin")]
     Export(export::ExportArgs),
     #[cfg(feature = "twin")]
@@ -108,7 +111,7 @@ pub fn main() -> ExitCode {
     #[cfg(feature = "twin")]
     if !matches!(
         cli.command,
-        Command::Check(_) | Command::Export(_) | Command::Generate(_)
+        Command::Check(_) | Command::Export(_) | Command::Generate(_) | Command::Locate(_)
     ) {
         driver_noise::silence();
     }
@@ -122,6 +125,7 @@ pub fn main() -> ExitCode {
         #[cfg(feature = "twin")]
         Command::Study(args) => study::study(&args),
         Command::Check(args) => check::check(&args),
+        Command::Locate(args) => locate::locate(&args),
         #[cfg(feature = "twin")]
         Command::Export(args) => export::export(&args),
         #[cfg(feature = "twin")]

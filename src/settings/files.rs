@@ -29,6 +29,16 @@ impl ReadLimit {
         ending: "csv",
         most_bytes: 8 << 20,
     };
+    /// Recorded sensor data: a day of fixes at 10 Hz.
+    pub const RECORDED: Self = Self {
+        ending: "csv",
+        most_bytes: 256 << 20,
+    };
+    /// Maps: the tracks of a country.
+    pub const GEOJSON: Self = Self {
+        ending: "geojson",
+        most_bytes: 256 << 20,
+    };
     /// Meshes: 200,000 triangles with normals and texture.
     pub const OBJ: Self = Self {
         ending: "obj",

@@ -1,0 +1,326 @@
+//! Recorded fixes and speeds: comma-separated tables with named columns.
+
+use crate::bus::SimTime;
+use crate::stack::occupancy::Fix;
+use crate::track::geodesy::{Datum, Geodetic};
+use nalgebra::Matrix2;
+use serde::Deserialize;
+
+/// Standard deviation of a fix to the north and to the east by its kind of solution, metres, for tables that do not
+/// state one: of the receivers' makers for open sky, rounded up. `PROPAGATED` is carried on by an inertial unit
+/// through a gap of reception.
+const SIGMAS_M: [(&str, f64); 8] = [
+    ("NARROW_INT", 0.05),
+    ("WIDE_INT", 0.2),
+    ("L1_INT", 0.1),
+    ("FLOAT", 0.6),
+    ("PSRDIFF", 1.0),
+    ("SBAS", 1.5),
+    ("SINGLE", 2.5),
+    ("PROPAGATED", 1.5),
+];
+/// Of any other kind, or where none is stated.
+const UNKNOWN_SIGMA_M: f64 = 5.0;
+/// A status, where there is one, of fixes that may be used.
+const COMPUTED: &str = "SOL_COMPUTED";
+
+/// A row of a table of fixes. Times are seconds, or dates and times after ISO 8601.
+#[derive(Debug, Deserialize)]
+struct FixRow {
+    #[serde(alias = "time", alias = "time_s")]
+    timestamp: String,
+    #[serde(alias = "latitude_deg", alias = "lat")]
+    latitude: f64,
+    #[serde(alias = "longitude_deg", alias = "lon")]
+    longitude: f64,
+    #[serde(default, alias = "solution", alias = "kind")]
+    position_type: String,
+    #[serde(default)]
+    solution_status: String,
+    #[serde(default)]
+    sigma_north_m: Option<f64>,
+    #[serde(default)]
+    sigma_east_m: Option<f64>,
+    /// Covariance of both.
+    #[serde(default)]
+    covariance_m2: Option<f64>,
+}
+
+/// A row of a table of speeds.
+#[derive(Debug, Deserialize)]
+struct SpeedRow {
+    #[serde(alias = "time", alias = "time_s")]
+    timestamp: String,
+    /// Forwards positive.
+    speed_mps: f64,
+}
+
+/// A table of fixes.
+#[derive(Debug, Default)]
+pub struct RecordedFixes {
+    /// In order of time, which runs from the first one on.
+    pub fixes: Vec<(Fix, Geodetic)>,
+    /// Of the first fix, as the table's own clock has it, seconds.
+    pub start_s: f64,
+    /// Fixes that the receiver itself calls none.
+    pub refused: usize,
+    /// Rows that are not newer than the one before.
+    pub out_of_order: usize,
+}
+
+/// What is wrong with a table, with its line.
+#[derive(Debug, thiserror::Error)]
+#[error("line {line}: {what}")]
+pub struct TableError {
+    line: u64,
+    what: String,
+}
+
+impl RecordedFixes {
+    /// Of a text, in the plane of a datum.
+    pub fn read(text: &str, datum: &Datum) -> Result<Self, TableError> {
+        let mut read = Self::default();
+        let mut last_s = f64::NEG_INFINITY;
+        for row in rows::<FixRow>(text) {
+            let (line, row) = row?;
+            let fault = |what: String| TableError { line, what };
+            let time_s = seconds(&row.timestamp).map_err(fault)?;
+            let place = row.place().map_err(fault)?;
+            let covariance_m2 = row.covariance(datum).map_err(fault)?;
+            if !row.solution_status.is_empty() && row.solution_status != COMPUTED {
+                read.refused += 1;
+                continue;
+            }
+            if time_s <= last_s {
+                read.out_of_order += 1;
+                continue;
+            }
+            last_s = time_s;
+            if read.fixes.is_empty() {
+                read.start_s = time_s;
+            }
+            let fix = Fix {
+                time: SimTime::from_secs(time_s - read.start_s),
+                place: datum.world(&place).xy(),
+                covariance_m2,
+            };
+            read.fixes.push((fix, place));
+        }
+        match read.fixes.is_empty() {
+            true => Err(TableError {
+                line: 1,
+                what: "holds no fix: columns timestamp, latitude, longitude are needed".to_owned(),
+            }),
+            false => Ok(read),
+        }
+    }
+}
+
+/// Speeds of a table, with times since a start.
+pub fn read_speeds(text: &str, start_s: f64) -> Result<Vec<(SimTime, f64)>, TableError> {
+    rows::<SpeedRow>(text)
+        .map(|row| {
+            let (line, row) = row?;
+            let time_s = seconds(&row.timestamp).map_err(|what| TableError { line, what })?;
+            if !row.speed_mps.is_finite() {
+                let what = format!("speed_mps is {}", row.speed_mps);
+                return Err(TableError { line, what });
+            }
+            Ok((SimTime::from_secs(time_s - start_s), row.speed_mps))
+        })
+        .collect()
+}
+
+/// Rows with their lines.
+fn rows<T: for<'de> Deserialize<'de>>(
+    text: &str,
+) -> impl Iterator<Item = Result<(u64, T), TableError>> {
+    let mut reader = csv::ReaderBuilder::new()
+        .trim(csv::Trim::All)
+        .from_reader(text.as_bytes());
+    let headers = reader.headers().cloned();
+    let mut record = csv::StringRecord::new();
+    std::iter::from_fn(move || {
+        let line = reader.position().line();
+        let fault = |error: &csv::Error| TableError {
+            line,
+            what: error.to_string(),
+        };
+        let headers = match &headers {
+            Ok(headers) => headers,
+            Err(error) => return Some(Err(fault(error))),
+        };
+        match reader.read_record(&mut record) {
+            Ok(false) => None,
+            Ok(true) => {
+                let line = record.position().map_or(line, csv::Position::line);
+                let row = record.deserialize(Some(headers));
+                Some(row.map(|row| (line, row)).map_err(|e| TableError {
+                    line,
+                    what: e.to_string(),
+                }))
+            }
+            Err(error) => Some(Err(fault(&error))),
+        }
+    })
+}
+
+impl FixRow {
+    fn place(&self) -> Result<Geodetic, String> {
+        let (latitude_deg, longitude_deg) = (self.latitude, self.longitude);
+        if !(latitude_deg.abs() <= 85.0 && longitude_deg.abs() <= 180.0) {
+            return Err(format!(
+                "latitude {latitude_deg}, longitude {longitude_deg}: not on any railway; both are in degrees"
+            ));
+        }
+        Ok(Geodetic {
+            latitude_deg,
+            longitude_deg,
+            height_m: 0.0,
+        })
+    }
+
+    /// Of world x and y.
+    fn covariance(&self, datum: &Datum) -> Result<Matrix2<f64>, String> {
+        let kind = SIGMAS_M
+            .iter()
+            .find(|(kind, _)| self.position_type.contains(kind));
+        let sigma_m = kind.map_or(UNKNOWN_SIGMA_M, |(_, sigma_m)| *sigma_m);
+        let north_m = self.sigma_north_m.unwrap_or(sigma_m);
+        let east_m = self.sigma_east_m.unwrap_or(sigma_m);
+        let both_m2 = self.covariance_m2.unwrap_or(0.0);
+        let of_plane = Matrix2::new(east_m * east_m, both_m2, both_m2, north_m * north_m);
+        if !(north_m > 0.0 && east_m > 0.0) || of_plane.cholesky().is_none() {
+            return Err(format!(
+                "sigma_north_m {north_m}, sigma_east_m {east_m}, covariance_m2 {both_m2}: not positive definite"
+            ));
+        }
+        let turn = nalgebra::Rotation2::new(-datum.heading_deg.to_radians());
+        Ok(turn.matrix() * of_plane * turn.matrix().transpose())
+    }
+}
+
+/// Seconds of a text: a number, or a date and time after ISO 8601, in UTC where it says nothing else.
+fn seconds(text: &str) -> Result<f64, String> {
+    if let Some(seconds) = text.parse::<f64>().ok().filter(|s| s.is_finite()) {
+        return Ok(seconds);
+    }
+    date_time(text).ok_or_else(|| {
+        format!("\"{text}\" is no time: seconds, or a date and time like 2022-02-25T09:32:54.400, is needed")
+    })
+}
+
+/// Since 1970, of YYYY-MM-DDThh:mm:ss, with or without decimals, Z or an offset.
+fn date_time(text: &str) -> Option<f64> {
+    let (date, time) = text.split_once(['T', ' '])?;
+    let mut date = date.splitn(3, '-').map(str::parse::<i64>);
+    let [year, month, day] = [date.next()?.ok()?, date.next()?.ok()?, date.next()?.ok()?];
+    let (time, offset_s) = match time.rfind(['+', '-']) {
+        Some(at) => {
+            let (hours, minutes) = time[at + 1..].split_once(':')?;
+            let seconds =
+                60.0 * (60.0 * hours.parse::<f64>().ok()? + minutes.parse::<f64>().ok()?);
+            (
+                &time[..at],
+                if time[at..].starts_with('-') {
+                    -seconds
+                } else {
+                    seconds
+                },
+            )
+        }
+        None => (time.trim_end_matches('Z'), 0.0),
+    };
+    let mut time = time.splitn(3, ':').map(str::parse::<f64>);
+    let [hours, minutes, seconds] = [time.next()?.ok()?, time.next()?.ok()?, time.next()?.ok()?];
+    let in_year =
+        (1..=12).contains(&month) && (1..=31).contains(&day) && (1..=9999).contains(&year);
+    let in_day = (0.0..24.0).contains(&hours) && (0.0..60.0).contains(&minutes);
+    if !in_year || !in_day || !(0.0..61.0).contains(&seconds) {
+        return None;
+    }
+    // Days from 1970 of the proleptic Gregorian calendar, in years that begin in March.
+    let march = year - i64::from(month <= 2);
+    let (era, of_era) = (march.div_euclid(400), march.rem_euclid(400));
+    let of_year = (153 * ((month + 9) % 12) + 2) / 5 + day - 1;
+    let days = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
+    Some(86_400.0 * days as f64 + 3600.0 * hours + 60.0 * minutes + seconds - offset_s)
+}
+
+#[cfg(test)]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests {
+    use super::*;
+
+    /// By `date -u -d ... +%s`.
+    #[test]
+    fn val_dates_are_seconds_since_1970() {
+        for (text, expected) in [
+            ("1970-01-01T00:00:00", 0.0),
+            ("2000-02-29T12:34:56", 951_827_696.0),
+            ("2022-02-25T09:32:54.400", 1_645_781_574.4),
+            ("2022-02-25 10:32:54.4+01:00", 1_645_781_574.4),
+            ("2100-03-01T00:00:00Z", 4_107_542_400.0),
+            ("12.5", 12.5),
+        ] {
+            assert!((seconds(text).unwrap() - expected).abs() < 1e-6, "{text}");
+        }
+        for wrong in [
+            "",
+            "yesterday",
+            "2022-13-01T00:00:00",
+            "2022-01-01T25:00:00",
+            "NaN",
+            "2022-01-01",
+        ] {
+            assert!(seconds(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    fn datum() -> Datum {
+        Datum {
+            place: Geodetic {
+                latitude_deg: 50.9,
+                longitude_deg: 4.5,
+                height_m: 0.0,
+            },
+            heading_deg: 0.0,
+        }
+    }
+
+    #[test]
+    fn fixes_have_the_covariance_of_their_kind_or_their_own() {
+        let text = "timestamp,latitude,longitude,position_type,solution_status,sigma_north_m,sigma_east_m\n\
+            10,50.9,4.5,NARROW_INT3,SOL_COMPUTED,,\n\
+            10,50.9,4.5,NARROW_INT3,SOL_COMPUTED,,\n\
+            11,50.9,4.5001,SINGLE,INTEGRITY_WARNING,,\n\
+            12,50.9,4.5001,SINGLE,SOL_COMPUTED,2,1\n";
+        let read = RecordedFixes::read(text, &datum()).unwrap();
+        assert_eq!(
+            (read.fixes.len(), read.refused, read.out_of_order),
+            (2, 1, 1)
+        );
+        let [(first, _), (second, _)] = [read.fixes[0], read.fixes[1]];
+        let is = |fix: &Fix, m2: Matrix2<f64>| (fix.covariance_m2 - m2).norm() < 1e-12;
+        assert!(is(&first, Matrix2::identity() * 0.0025));
+        assert!(is(&second, Matrix2::new(1.0, 0.0, 0.0, 4.0)));
+        assert!((second.place.x - 7.03).abs() < 0.01 && (second.time.secs() - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn wrong_rows_are_named_by_their_line() {
+        for (row, told) in [
+            ("now,50.9,4.5", "line 3: \"now\" is no time"),
+            ("1,4.5,250.9", "line 3: latitude 4.5"),
+            ("1,north,4.5", "line 3: "),
+            ("1,50.9", "line 3: "),
+        ] {
+            let text = format!("time,latitude,longitude\n0,50.9,4.5\n{row}\n");
+            let said = RecordedFixes::read(&text, &datum())
+                .unwrap_err()
+                .to_string();
+            assert!(said.starts_with(told), "{row}: {said}");
+        }
+        assert!(RecordedFixes::read("time,latitude,longitude\n", &datum()).is_err());
+    }
+}
