@@ -15,7 +15,7 @@ use crate::track::Tunnel;
 use crate::track::geodesy::Datum;
 use crate::track::plan::PlanNetwork;
 use output::{Located, Report};
-use recorded::RecordedFixes;
+use recorded::{RecordedFix, RecordedFixes};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -92,7 +92,7 @@ fn run(
     let mut occupancy = Occupancy::new(Arc::clone(network), settings);
     let mut speeds = speeds.iter().peekable();
     let mut located = Vec::with_capacity(recorded.fixes.len());
-    for (fix, _) in &recorded.fixes {
+    for RecordedFix { fix, .. } in &recorded.fixes {
         let begun = Instant::now();
         while let Some((time, speed_mps)) = speeds.next_if(|(time, _)| *time <= fix.time) {
             occupancy.on_speed(*time, *speed_mps);
@@ -152,7 +152,7 @@ fn refuse_elsewhere(
     let near = recorded
         .fixes
         .iter()
-        .any(|(fix, _)| !network.near(&fix.place, FAR_M).is_empty());
+        .any(|r| !network.near(&r.fix.place, FAR_M).is_empty());
     if near {
         return Ok(());
     }

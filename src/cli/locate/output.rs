@@ -1,6 +1,6 @@
 //! What `metrotwin locate` writes.
 
-use super::recorded::RecordedFixes;
+use super::recorded::{RecordedFix, RecordedFixes};
 use crate::stack::occupancy::Decision;
 use crate::track::Direction;
 use crate::track::geodesy::Datum;
@@ -62,7 +62,7 @@ impl Report<'_> {
         let mut table = String::from(
             "time_s,latitude,longitude,element,probability,identified,facing,facing_probability,along_m,sigma_m,second,second_probability,hypotheses\n",
         );
-        for ((fix, place), at) in self.recorded.fixes.iter().zip(self.located) {
+        for (RecordedFix { fix, place, .. }, at) in self.recorded.fixes.iter().zip(self.located) {
             let _ = write!(
                 table,
                 "{:.3},{:.8},{:.8},",
@@ -104,7 +104,7 @@ impl Report<'_> {
     /// A point on the track for each fix.
     fn geojson(&self) -> Value {
         let fixes = self.recorded.fixes.iter().zip(self.located);
-        let features = fixes.filter_map(|((fix, _), at)| {
+        let features = fixes.filter_map(|(RecordedFix { fix, .. }, at)| {
             let best = at.decision.tracks.first()?;
             let element = &self.network.elements[best.element];
             let (world, _) = element.at(best.along_m);
@@ -197,7 +197,7 @@ impl Report<'_> {
 
     fn visits(&self) -> Vec<Visit<'_>> {
         let mut visits: Vec<Visit<'_>> = Vec::new();
-        for ((fix, _), at) in self.recorded.fixes.iter().zip(self.located) {
+        for (RecordedFix { fix, .. }, at) in self.recorded.fixes.iter().zip(self.located) {
             let Some(best) = at.decision.tracks.first() else {
                 continue;
             };

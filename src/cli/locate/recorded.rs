@@ -59,13 +59,22 @@ struct SpeedRow {
 #[derive(Debug, Default)]
 pub struct RecordedFixes {
     /// In order of time, which runs from the first one on.
-    pub fixes: Vec<(Fix, Geodetic)>,
+    pub fixes: Vec<RecordedFix>,
     /// Of the first fix, as the table's own clock has it, seconds.
     pub start_s: f64,
     /// Fixes that the receiver itself calls none.
     pub refused: usize,
     /// Rows that are not newer than the one before.
     pub out_of_order: usize,
+}
+
+/// One of them.
+#[derive(Clone, Debug)]
+pub struct RecordedFix {
+    pub fix: Fix,
+    pub place: Geodetic,
+    /// Of its solution, as the receiver says.
+    pub kind: String,
 }
 
 /// What is wrong with a table, with its line.
@@ -104,7 +113,11 @@ impl RecordedFixes {
                 place: datum.world(&place).xy(),
                 covariance_m2,
             };
-            read.fixes.push((fix, place));
+            read.fixes.push(RecordedFix {
+                fix,
+                place,
+                kind: row.position_type,
+            });
         }
         match read.fixes.is_empty() {
             true => Err(TableError {
@@ -300,7 +313,7 @@ mod tests {
             (read.fixes.len(), read.refused, read.out_of_order),
             (2, 1, 1)
         );
-        let [(first, _), (second, _)] = [read.fixes[0], read.fixes[1]];
+        let [first, second] = [0, 1].map(|k| read.fixes[k].fix);
         let is = |fix: &Fix, m2: Matrix2<f64>| (fix.covariance_m2 - m2).norm() < 1e-12;
         assert!(is(&first, Matrix2::identity() * 0.0025));
         assert!(is(&second, Matrix2::new(1.0, 0.0, 0.0, 4.0)));

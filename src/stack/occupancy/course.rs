@@ -135,6 +135,12 @@ impl Course {
         self.0.len() == other.0.len() && pairs().all(same)
     }
 
+    /// From the leg at a place on.
+    pub fn from(&self, course_m: f64) -> Self {
+        let after = self.0.partition_point(|leg| leg.begin_m <= course_m);
+        Self(self.0[after.saturating_sub(1)..].to_vec())
+    }
+
     /// Without the elements that do not touch a stretch: what a train has left behind, or not reached yet, may be
     /// set another way when it comes there again.
     pub fn trim(&mut self, [from_m, to_m]: [f64; 2]) {

@@ -9,19 +9,18 @@
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
 use super::hypothesis::{
-    EAST, HEADING, Hypothesis, NORTH, PLACE, SCALE, STATES, StateCovariance, YAW_OFFSET,
+    EAST, HEADING, Hypothesis, KindError, NORTH, PLACE, SCALE, STATES, StateCovariance, YAW_OFFSET,
 };
+use super::receiver::Judged;
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
-use nalgebra::{Matrix2, Point2, RowSVector, SMatrix, Vector2};
+use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
 use std::f64::consts::{PI, TAU};
 
 /// Of the place of a new hypothesis, before its first fix is taken in.
 const NEW_PLACE_SIGMA_M: f64 = 100.0;
 /// A fix has an error that is not white, even if it is said to be exact.
 const LEAST_FIX_SIGMA_M: f64 = 0.05;
-/// A variance of fixes that is so many times another one is that of another kind of solution.
-const OTHER_KIND: f64 = 4.0;
 /// Over so long a time errors of the measured speed stay the same, seconds.
 const SPEED_CORRELATION_S: f64 = 1.0;
 /// Slower is standing, metres a second.
@@ -39,19 +38,13 @@ fn slow_m2(covariance: &Matrix2<f64>, settings: &OccupancySettings) -> Matrix2<f
 
 impl Hypothesis {
     /// Variances of a hypothesis about whose place nothing is known but the course.
-    pub fn start_fused(
-        &mut self,
-        covariance: &Matrix2<f64>,
-        settings: &OccupancySettings,
-        heading_offset_rad: f64,
-    ) {
+    pub fn start_fused(&mut self, settings: &OccupancySettings, heading_offset_rad: f64) {
         self.covariance = StateCovariance::zeros();
         self.covariance[(PLACE, PLACE)] = NEW_PLACE_SIGMA_M.powi(2);
         self.covariance[(SCALE, SCALE)] = settings.speed_scale_sigma.powi(2);
         self.covariance[(HEADING, HEADING)] = (2.0 * settings.heading_sigma_rad).powi(2);
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] = settings.yaw_offset_sigma_radps.powi(2);
         self.mean[HEADING] = heading_offset_rad;
-        self.forget_fix_error(covariance, settings);
     }
 
     /// Carries it on over a time in which so much was run, by the measured speed.
@@ -80,16 +73,15 @@ impl Hypothesis {
     pub fn update_fused(
         &mut self,
         network: &PlanNetwork,
-        (fix, covariance): (&Point2<f64>, &Matrix2<f64>),
+        judged: &Judged,
         settings: &OccupancySettings,
     ) {
-        let slow_m2 = slow_m2(covariance, settings);
-        let variance_m2 = 0.5 * slow_m2.trace();
-        let ratio = variance_m2 / self.fix_variance_m2;
-        if !(1.0 / OTHER_KIND..=OTHER_KIND).contains(&ratio) {
-            self.forget_fix_error(covariance, settings);
+        let (fix, covariance) = (&judged.fix.place, &judged.fix.covariance_m2);
+        if judged.is_worse || self.kind != Some(judged.kind) {
+            self.change_kind(judged, settings);
         }
-        self.fix_variance_m2 = variance_m2;
+        self.fix_variance_m2 = 0.5 * slow_m2(covariance, settings).trace();
+        self.fix_time = judged.fix.time;
         let (place, forward) = self.course.at(network, self.place_m());
         let mut measured = SMatrix::<f64, 2, STATES>::zeros();
         measured.set_column(PLACE, &forward);
@@ -154,18 +146,43 @@ impl Hypothesis {
         }
     }
 
-    /// Nothing of the last fixes' error is left in the next.
-    fn forget_fix_error(&mut self, covariance: &Matrix2<f64>, settings: &OccupancySettings) {
-        let slow_m2 = slow_m2(covariance, settings);
+    /// The error of the fixes to come is that of fixes of their kind before, as far as it lasts. Without this a
+    /// receiver that flips between two solutions would give news of one old error each time.
+    fn change_kind(&mut self, judged: &Judged, settings: &OccupancySettings) {
+        let now = judged.fix.time;
+        if let Some(kind) = self.kind {
+            let error_m = self.mean.fixed_rows::<2>(EAST).into_owned();
+            let covariance_m2 = self.covariance.fixed_view::<2, 2>(EAST, EAST).into_owned();
+            self.kinds.retain(|known| known.kind != kind);
+            self.kinds.push(KindError {
+                kind,
+                time: self.fix_time,
+                error_m,
+                covariance_m2,
+            });
+        }
+        let fresh_m2 = slow_m2(&judged.fix.covariance_m2, settings);
+        let known = self.kinds.iter().find(|known| known.kind == judged.kind);
+        let (error_m, covariance_m2) = match known.filter(|_| !judged.is_worse) {
+            Some(known) => {
+                let keep = (-now.since(known.time) / settings.correlation_s).exp();
+                let kept_m2 = known.covariance_m2 * keep.powi(2);
+                (
+                    known.error_m * keep,
+                    kept_m2 + fresh_m2 * (1.0 - keep.powi(2)),
+                )
+            }
+            None => (Vector2::zeros(), fresh_m2),
+        };
         for k in [EAST, NORTH] {
-            self.mean[k] = 0.0;
             self.covariance.row_mut(k).fill(0.0);
             self.covariance.column_mut(k).fill(0.0);
         }
+        self.mean.fixed_rows_mut::<2>(EAST).copy_from(&error_m);
         self.covariance
             .fixed_view_mut::<2, 2>(EAST, EAST)
-            .copy_from(&slow_m2);
-        self.fix_variance_m2 = 0.5 * slow_m2.trace();
+            .copy_from(&covariance_m2);
+        self.kind = Some(judged.kind);
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::course::Course;
 use super::settings::OccupancySettings;
+use crate::bus::SimTime;
 use crate::track::Direction;
 use crate::track::plan::PlanNetwork;
-use nalgebra::{SMatrix, SVector};
+use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// What is estimated: place along the course, error of the speed's scale, heading that the yaw rates' sum lacks,
 /// offset of the yaw rate, error of fixes to the east and to the north.
@@ -34,8 +35,22 @@ pub struct Hypothesis {
     pub log_probability: f64,
     pub mean: State,
     pub covariance: StateCovariance,
-    /// Kind and size of the last fix's error, to tell when it becomes another.
+    /// Of the last fix, that part which changes slowly.
     pub fix_variance_m2: f64,
+    /// When that was, and of which kind.
+    pub fix_time: SimTime,
+    pub kind: Option<i32>,
+    /// Of the other kinds of fixes, as it was at the last one of each.
+    pub kinds: Vec<KindError>,
+}
+
+/// Error of fixes of a kind.
+#[derive(Clone, Debug)]
+pub struct KindError {
+    pub kind: i32,
+    pub time: SimTime,
+    pub error_m: Vector2<f64>,
+    pub covariance_m2: Matrix2<f64>,
 }
 
 impl Hypothesis {
@@ -107,10 +122,11 @@ impl Hypothesis {
         let have_left = [&*self, other]
             .iter()
             .all(|h| h.needed_m(settings)[0] > h.course.leg_at(h.place_m()).begin_m);
-        let same_course = self
-            .course
-            .is_shifted(&other.course, of_other.begin_m - leg.begin_m);
-        if leg.towards != of_other.towards || !is_near || !(same_course || have_left) {
+        let by_m = of_other.begin_m - leg.begin_m;
+        let same_course = self.course.is_shifted(&other.course, by_m);
+        let [ahead, of_other] = [&*self, other].map(|h| h.course.from(h.place_m()));
+        let same_ahead = ahead.is_shifted(&of_other, by_m);
+        if !is_near || !(same_course || (same_ahead && have_left)) {
             return false;
         }
         let [own, others] = [self.log_probability, other.log_probability];

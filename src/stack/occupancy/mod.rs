@@ -36,7 +36,11 @@ mod fused;
 mod hypothesis;
 mod matching;
 mod pedal;
+mod receiver;
 mod settings;
+#[cfg(all(test, feature = "twin"))]
+#[allow(clippy::unwrap_used, reason = "a test may panic")]
+mod tests;
 
 pub use decision::{Decision, TrackDecision};
 pub use matching::{Match, by_pedal_curve, by_perpendicular};
@@ -48,6 +52,7 @@ use crate::track::plan::{ElementEnd, PlanNetwork};
 use course::Course;
 use hypothesis::{Hypothesis, State, StateCovariance};
 use nalgebra::{Matrix2, Point2};
+use receiver::Receiver;
 use std::sync::Arc;
 
 /// A new start looks for tracks within so many standard deviations of a fix, and within so many metres.
@@ -58,6 +63,8 @@ const LOST_SIGMAS: f64 = 6.0;
 const LOST_M: f64 = 100.0;
 /// So many fixes in a row, and it starts anew.
 const LOST_FIXES: u32 = 5;
+/// No track is looked for farther away, metres.
+const OFF_TRACK_M: f64 = 2000.0;
 /// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
 const HEADING_EVERY_M: f64 = 2.0;
 /// Sums of speed and yaw rate over a longer silence are worth nothing, seconds.
@@ -90,6 +97,7 @@ pub struct Occupancy {
     since_heading_m: f64,
     turned_rad: f64,
     lost: u32,
+    receiver: Receiver,
 }
 
 impl Occupancy {
@@ -107,6 +115,7 @@ impl Occupancy {
             since_heading_m: 0.0,
             turned_rad: 0.0,
             lost: 0,
+            receiver: Receiver::default(),
         }
     }
 
@@ -147,6 +156,9 @@ impl Occupancy {
             return;
         }
         self.advance();
+        let away_m = self.network.distance_m(&fix.place, OFF_TRACK_M);
+        let judged = self.receiver.judge(fix, away_m, &self.settings);
+        let fix = &judged.fix;
         self.lost = if self.is_lost(fix) { self.lost + 1 } else { 0 };
         if self.hypotheses.is_empty() || self.lost >= LOST_FIXES {
             self.start(fix);
@@ -155,8 +167,7 @@ impl Occupancy {
         for hypothesis in &mut self.hypotheses {
             match settings.method {
                 Method::Fused => {
-                    let fix = (&fix.place, &fix.covariance_m2);
-                    hypothesis.update_fused(network, fix, settings);
+                    hypothesis.update_fused(network, &judged, settings);
                 }
                 Method::Pedal => hypothesis.update_matched(network, fix, by_pedal_curve),
                 Method::Perpendicular => hypothesis.update_matched(network, fix, by_perpendicular),
@@ -253,13 +264,16 @@ impl Occupancy {
             log_probability: 0.0,
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
-            fix_variance_m2: 1.0,
+            fix_variance_m2: 0.0,
+            fix_time: fix.time,
+            kind: None,
+            kinds: Vec::new(),
         };
         match self.settings.method {
             Method::Fused => {
                 let (_, forward) = hypothesis.course.at(&self.network, 0.0);
                 let offset_rad = self.turned_rad - forward.y.atan2(forward.x);
-                hypothesis.start_fused(&fix.covariance_m2, &self.settings, offset_rad);
+                hypothesis.start_fused(&self.settings, offset_rad);
             }
             _ => hypothesis.start_matched(found),
         }

@@ -36,6 +36,9 @@ use super::geodesy::Datum;
 use grid::Grid;
 use nalgebra::{Point2, Vector2};
 
+/// The nearest element is looked for within this first, metres.
+const FIRST_LOOK_M: f64 = 30.0;
+
 /// A stretch of track between two joints.
 #[derive(Clone, Debug)]
 pub struct TrackElement {
@@ -176,6 +179,21 @@ impl PlanNetwork {
         let mut near = self.grid.near(place, within_m);
         near.retain(|k| self.elements[*k].distance_m(place) <= within_m);
         near
+    }
+
+    /// From a place to the nearest element, at most so far.
+    pub fn distance_m(&self, place: &Point2<f64>, most_m: f64) -> f64 {
+        let mut within_m = FIRST_LOOK_M;
+        loop {
+            let near = self.grid.near(place, within_m).into_iter();
+            let away_m = near
+                .map(|k| self.elements[k].distance_m(place))
+                .fold(most_m, f64::min);
+            if away_m <= within_m || within_m >= most_m {
+                return away_m;
+            }
+            within_m *= 4.0;
+        }
     }
 
     /// How many of its ends are run facing a switch.
