@@ -25,8 +25,12 @@ pub(super) fn report(path: &Path, tunnel: &Tunnel, text: &str) -> Result<String,
     }
     match (found.is_empty(), why_not.is_empty()) {
         (false, _) => Ok(found),
+        (true, false) if text.trim().is_empty() => Err(Failure::input(
+            format!("--chainage of {} is empty", path.display()),
+            "write what a track states, for instance at its begin as `check` tells it without --chainage",
+        )),
         (true, false) => Err(Failure::input(
-            format!("{text} is on no track of {}", path.display()),
+            format!("`{text}` is on no track of {}", path.display()),
             why_not.join("\n"),
         )),
         (true, true) => Err(Failure::input(

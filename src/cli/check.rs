@@ -13,9 +13,9 @@ use std::path::{Path, PathBuf};
 
 const AFTER: &str = "\
 Every wrong key of a file is shown at once, with its place, what is wrong and what would be right.
-A file with any of [[plan]], [[sections]], [lamps] is a tunnel, one with [body] and [bogie] a
-vehicle, any other a scenario; of a scenario the files that it names are checked too, and of one with a
-[study] what it draws.
+A file with any of [[track]], [[switches]], [[plan]], [[sections]], [lamps] is a tunnel, one with [body]
+and [bogie] a vehicle, any other a scenario; of a scenario the files that it names are checked too, and of
+one with a [study] what it draws.
 
 Examples:
   metrotwin check tunnels/chengdu_line1.toml
@@ -36,7 +36,7 @@ pub(super) struct CheckArgs {
     #[cfg(feature = "twin")]
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<Override>,
-    /// Say where a tunnel states a chainage, e.g. DK12+340.5; may be given again
+    /// Say where a tunnel states a chainage, e.g. DK12+340.5, and nothing else; may be given again
     #[arg(long = "chainage", value_name = "TEXT")]
     chainages: Vec<String>,
 }
@@ -76,11 +76,12 @@ fn report_of(path: &Path, text: &str, args: &CheckArgs) -> Result<String, Failur
             #[cfg(feature = "twin")]
             check_scenario::refuse_overrides(path, &args.overrides)?;
             let tunnel = Tunnel::from_toml(text).map_err(|e| Failure::file(path, text, e))?;
-            let mut said = tunnel::report(&tunnel);
-            for text in &args.chainages {
-                said += &chainage::report(path, &tunnel, text)?;
+            if args.chainages.is_empty() {
+                return Ok(tunnel::report(&tunnel));
             }
-            Ok(said)
+            let answers = args.chainages.iter();
+            let answers = answers.map(|text| chainage::report(path, &tunnel, text));
+            answers.collect()
         }
         kind => {
             chainage::refuse(path, &args.chainages)?;

@@ -2,6 +2,7 @@
 
 use super::check::read;
 use super::fault::Failure;
+use super::file_kind::FileKind;
 use super::print;
 use crate::track::geodesy::Datum;
 use crate::track::network::{Crossing, Network};
@@ -38,6 +39,7 @@ enum Format {
 pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
     let Format::Geojson { tunnel: path } = &args.format;
     let text = read(path)?;
+    FileKind::refuse_other_than_tunnel(path, &text)?;
     let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
     let datum = tunnel.datum.ok_or_else(|| {
         Failure::input(

@@ -1,7 +1,7 @@
 //! What went wrong, as the user sees it: wrong files with pointers into their text.
 
 use super::excerpt::Excerpt;
-use crate::settings::{FileError, LONGEST_KEY, Problem, locate, shortened, shown};
+use crate::settings::{FileError, LONGEST_KEY, Problem, locate, name_around, shortened, shown};
 use miette::{Diagnostic, LabeledSpan, MietteHandlerOpts, Report};
 use std::fmt;
 use std::ops::Range;
@@ -68,6 +68,11 @@ pub(super) fn set_style() {
     if let Err(error) = set {
         tracing::debug!("error reports keep their default style: {error}");
     }
+}
+
+/// Of a key of a track its name, by which people know it better than by its number.
+fn track_name(text: &str, key: &str) -> Option<String> {
+    key.starts_with("track[").then(|| name_around(text, key))?
 }
 
 /// One thing that is wrong, with its place, or a heading over several.
@@ -149,7 +154,11 @@ impl Fault {
         problem: &Problem,
         changed: &dyn Fn(&str) -> Option<String>,
     ) -> Self {
-        let (key, said) = (problem.key.as_str(), problem.said());
+        let key = problem.key.as_str();
+        let said = match track_name(text, key) {
+            Some(name) => problem.said_of(&name),
+            None => problem.said(),
+        };
         // A changed value is not in the file: pointing there would mislead.
         let fault = match changed(key) {
             Some(change) => Self::new(format!("{said} ({change})")),

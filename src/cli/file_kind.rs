@@ -1,5 +1,12 @@
 //! Which kind of file a text is, by its keys.
 
+#[cfg(feature = "twin")]
+use super::fault::Failure;
+#[cfg(feature = "twin")]
+use crate::settings::{LONGEST_KEY, shortened};
+#[cfg(feature = "twin")]
+use std::path::Path;
+
 /// A kind of file of a user.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileKind {
@@ -14,13 +21,37 @@ pub(super) enum FileKind {
 }
 
 impl FileKind {
+    /// Refuses what is for certain no tunnel: what it is says more than that all its keys are unknown in one.
+    #[cfg(feature = "twin")]
+    pub(super) fn refuse_other_than_tunnel(path: &Path, text: &str) -> Result<(), Failure> {
+        let table = text.parse::<toml::Table>().unwrap_or_default();
+        let named = table.get("tunnel").and_then(toml::Value::as_str);
+        let (what, remedy) = match (Self::of(text), named) {
+            (Self::Vehicle, _) => ("vehicle", "give a tunnel file".to_owned()),
+            (Self::Study | Self::Scenario, Some(tunnel)) => {
+                let tunnel = shortened(tunnel, LONGEST_KEY);
+                (
+                    "scenario",
+                    format!("give the tunnel file that it names: `{tunnel}`"),
+                )
+            }
+            _ => return Ok(()),
+        };
+        Err(Failure::input(
+            format!("{} is a {what}, not a tunnel", path.display()),
+            remedy,
+        ))
+    }
+
     /// Of a text.
     pub(super) fn of(text: &str) -> Self {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let has_any = |keys: &[&str]| keys.iter().any(|key| table.contains_key(*key));
         // A scenario names its tunnel, whatever else is wrong with it.
         let is_scenario = has_any(&["tunnel"]);
-        if !is_scenario && has_any(&TUNNEL_KEYS) {
+        // A scenario has a table of this name.
+        let has_tracks = table.get("track").is_some_and(toml::Value::is_array);
+        if !is_scenario && (has_tracks || has_any(&TUNNEL_KEYS)) {
             Self::Tunnel
         } else if !is_scenario && has_any(&VEHICLE_KEYS) {
             Self::Vehicle

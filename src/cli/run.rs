@@ -36,6 +36,7 @@ Columns of fixes.csv:
 
 Examples:
   metrotwin run scenarios/line_run.toml
+  metrotwin run scenarios/line_run.toml --set duration_s=5
   metrotwin run scenarios/line_run.toml --set train.cruise_speed_kmh=80 --out out/at_80
   metrotwin run scenarios/line_run.toml --set track.irregularity.class=german_high --seed 7
   metrotwin run scenarios/forgotten_toolbox.toml --view

@@ -1,8 +1,8 @@
 //! What a tunnel file says, in a few lines.
 
 use crate::settings::{LONGEST_KEY, shortened};
-use crate::track::network::{Crossing, Network, Switch};
-use crate::track::{Side, Track, Tunnel};
+use crate::track::network::{Beyond, Crossing, Network, Switch, SwitchLeg, TrackEnd};
+use crate::track::{Direction, Side, Track, TrackId, Tunnel};
 
 /// Of a tunnel with one track, its length, radii, grades, sections, lamps, devices; of a network, that of each
 /// track.
@@ -28,14 +28,42 @@ pub(super) fn report(tunnel: &Tunnel) -> String {
     let mut lines = vec![format!(
         "{head}: {tracks_count} tracks, {length_m:.1} m, {switches_count} switches{crossings_count}"
     )];
-    lines.extend(tracks.iter().map(|track| of_one_of_many(track)));
+    let ends = (0..tracks.len()).map(|k| ends(&tunnel.network, TrackId(k as u16)));
+    let of_tracks = tracks.iter().zip(ends);
+    lines.extend(of_tracks.map(|(track, ends)| of_one_of_many(track, &ends)));
     lines.extend(switches.iter().map(|s| of_switch(&tunnel.network, s)));
     lines.extend(crossings.iter().map(|c| of_crossing(&tunnel.network, c)));
     indented(&lines)
 }
 
+/// What is before the begin of a track and beyond its end, as `from` and `to` name it.
+fn ends(network: &Network, track: TrackId) -> String {
+    let ends = [Direction::Down, Direction::Up].map(|way| TrackEnd { track, way });
+    ends.map(|end| beyond(network, end)).join(" -> ")
+}
+
+fn beyond(network: &Network, end: TrackEnd) -> String {
+    let (name, part) = match network.beyond(end) {
+        Beyond::Track(next) => {
+            let part = match next.way {
+                Direction::Down => "begin",
+                Direction::Up => "end",
+            };
+            (&network.tracks[usize::from(next.track.0)].name, part)
+        }
+        Beyond::Facing(switch) => (&network.switches[switch].name, "toe"),
+        Beyond::Trailing(switch, SwitchLeg::Through) => (&network.switches[switch].name, "through"),
+        Beyond::Trailing(switch, SwitchLeg::Diverging) => {
+            (&network.switches[switch].name, "diverging")
+        }
+        Beyond::Buffer => return "buffer".to_owned(),
+        Beyond::Open => return "open end".to_owned(),
+    };
+    format!("{}.{part}", shortened(name, LONGEST_KEY))
+}
+
 /// A track in one line.
-fn of_one_of_many(track: &Track) -> String {
+fn of_one_of_many(track: &Track, ends: &str) -> String {
     let (length, _) = of_track(track);
     let name = shortened(&track.name, LONGEST_KEY);
     let counts = [
@@ -52,7 +80,7 @@ fn of_one_of_many(track: &Track) -> String {
         .into_iter()
         .map(|stated| format!(", {stated}"));
     let rest: String = stated.chain(counts).chain(stations).collect();
-    format!("track `{name}`: {length}{rest}")
+    format!("track `{name}`: {length}, {ends}{rest}")
 }
 
 /// A switch in one line.
@@ -201,6 +229,22 @@ pub(super) fn indented(lines: &[String]) -> String {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+
+    /// Provokes: an end of a track that is told as that of another one, or as another kind of end.
+    #[test]
+    fn tracks_say_what_is_at_their_ends() {
+        let text = include_str!("../../tunnels/terminus.toml");
+        let said = report(&Tunnel::from_toml(text).unwrap());
+        for (track, ends) in [
+            ("u1", "open end -> W1.toe"),
+            ("u2", "W1.through -> W4.through"),
+            ("siding", "W7.through -> buffer"),
+        ] {
+            let begin = format!("track `{track}`: ");
+            let line = said.lines().find(|line| line.contains(&begin)).unwrap();
+            assert!(line.contains(&format!(", {ends}")), "{line}");
+        }
+    }
 
     /// Provokes: a crossing that is left out, or told of with the wrong track, place or angle.
     #[test]

@@ -45,6 +45,14 @@ impl<'a> Checker<'a> {
         }
     }
 
+    /// Adds problems that were found apart, with their whole keys.
+    pub fn add(&mut self, found: Vec<Problem>) {
+        let mut whole = Checker::new("", self.problems);
+        for Problem { key, what, remedy } in found {
+            whole.problem(&key, what, remedy);
+        }
+    }
+
     /// Adds a problem unless all numbers under a key lie in a range (one that is no number never
     /// does).
     pub fn within(&mut self, key: &str, numbers: impl Numbers, range: RangeInclusive<f64>) {

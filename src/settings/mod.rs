@@ -15,7 +15,7 @@ mod unit;
 pub use checker::Checker;
 pub use declaration::Settings;
 pub(crate) use declaration::settings;
-pub use document::{locate, read_settings, read_toml};
+pub use document::{locate, name_around, read_settings, read_toml};
 pub use files::{ReadLimit, open_regular, read_bytes, read_text};
 pub(crate) use numbers::one;
 pub use numbers::{Numbers, put_range};

@@ -32,6 +32,11 @@ impl Problem {
         self.what.ends_with(OUT_OF_RANGE)
     }
 
+    /// Its key is not there.
+    pub fn is_missing(&self) -> bool {
+        self.what == MISSING
+    }
+
     /// Key and what is wrong with it, for people.
     pub fn said(&self) -> String {
         match self.key.as_str() {
@@ -39,8 +44,15 @@ impl Problem {
             key => format!("{}: {}", shortened(key, LONGEST_KEY), self.what),
         }
     }
+
+    /// As [`said`](Self::said), with the name of what the key belongs to.
+    pub fn said_of(&self, name: &str) -> String {
+        let [key, name] = [&self.key, name].map(|text| shortened(text, LONGEST_KEY));
+        format!("{key} (`{name}`): {}", self.what)
+    }
 }
 
+pub(super) const MISSING: &str = "is missing";
 pub(super) const OUT_OF_RANGE: &str = "is out of range";
 /// Letters that are shown of what is wrong, and of what would be right.
 const LONGEST_TEXT: usize = 1000;

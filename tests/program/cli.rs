@@ -205,10 +205,13 @@ fn chainages_of_plans_are_found() {
             2,
             "is no chainage; write it like `YDK12+000.000`",
         ),
+        ("ydk12+150.5", 0, "150.500 m from the begin of track `u1`"),
+        ("", 2, "--chainage of tunnels/terminus.toml is empty"),
     ] {
         let (exit, said) = check(chainage);
         assert_eq!(exit, Some(code), "{said}");
         assert!(said.contains(words), "{chainage} said: {said}");
+        assert!(!said.contains("tightest radius"), "{chainage} said: {said}");
     }
     let folder = folder("chainage");
     let (from, to) = ("ahead_m = 12489.712", "ahead_m = 12490.0");
@@ -219,6 +222,34 @@ fn chainages_of_plans_are_found() {
         "help:",
     ];
     refused(&folder, &file, &words);
+}
+
+/// Fails where a wrong track is told by its number alone, or what is no tunnel by each of its keys.
+#[test]
+fn tracks_have_names_and_other_files_are_no_tunnels() {
+    let folder = folder("names");
+    let (from, to) = ("to = \"W4.through\"", "to = \"W4.trough\"");
+    let (_, file) = on_tunnel(&folder, "terminus.toml", from, to);
+    refused(&folder, &file, &["track[1].to (`u2`)", "W4.through"]);
+    for (file, words) in [
+        (
+            "scenarios/line_run.toml",
+            ["is a scenario, not a tunnel", "chengdu_line1.toml"],
+        ),
+        (
+            "scenarios/vehicles/metro_b1_empty.toml",
+            ["is a vehicle, not a tunnel", "give a tunnel file"],
+        ),
+    ] {
+        let output = metrotwin(&["export", "geojson", file]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{file} said: {said}");
+        assert!(
+            words.iter().all(|w| said.contains(w)),
+            "{file} said: {said}"
+        );
+        assert!(!said.contains("there is no key"), "{file} said: {said}");
+    }
 }
 
 #[test]

@@ -13,6 +13,24 @@ pub fn locate(text: &str, dotted_key: &str) -> Option<Range<usize>> {
     Some(found.unwrap_or(document.span()))
 }
 
+/// The `name` of the outermost element of a list that a dotted key leads to: for `track[2].plan[0]` that of
+/// `track[2]`.
+pub fn name_around(text: &str, dotted_key: &str) -> Option<String> {
+    let (list, rest) = dotted_key.split_once('[')?;
+    let index: usize = rest.split_once(']')?.0.parse().ok()?;
+    let document = DeTable::parse(text).ok()?;
+    let DeValue::Array(elements) = document.get_ref().get(list)?.get_ref() else {
+        return None;
+    };
+    let DeValue::Table(element) = elements.get(index)?.get_ref() else {
+        return None;
+    };
+    match element.get("name")?.get_ref() {
+        DeValue::String(name) => Some(name.to_string()),
+        _ => None,
+    }
+}
+
 fn find_in_table(table: &DeTable<'_>, dotted_key: &str) -> Option<Range<usize>> {
     let leading = table
         .iter()

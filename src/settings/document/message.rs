@@ -1,5 +1,6 @@
 //! What serde finds wrong with a document, in the words of this program.
 
+use crate::settings::problem::MISSING;
 use crate::settings::{Problem, did_you_mean, name_advice};
 
 /// What serde found wrong, read from its message (it gives no other form).
@@ -64,7 +65,7 @@ impl SerdeMessage {
                 format!("there is no key `{name}` here"),
                 name_advice(name, known, "keys that may stand here", "take it out"),
             ),
-            Self::MissingKey { .. } => Problem::new(key, "is missing", "give it a value"),
+            Self::MissingKey { .. } => Problem::new(key, MISSING, "give it a value"),
             Self::Value { what, expected } if is_too_large(what) => {
                 Problem::new(key, what_is_there(what), "give a smaller whole number")
             }

@@ -5,7 +5,7 @@ mod entries;
 mod message;
 mod problems;
 
-pub use entries::locate;
+pub use entries::{locate, name_around};
 
 use crate::settings::{FileError, Problem, Settings};
 use problems::ProblemSearch;

@@ -6,7 +6,9 @@
 use super::edit::{insert, insert_below, remove, replace};
 use super::entries::Entries;
 use super::message::SerdeMessage;
-use crate::settings::problem::{FileError, MOST_PROBLEMS, Problem, is_within, key_below};
+use crate::settings::problem::{
+    FileError, MOST_PROBLEMS, Problem, did_you_mean, is_within, key_below,
+};
 use serde::de::DeserializeOwned;
 use std::borrow::Cow;
 use std::collections::BTreeSet;
@@ -209,11 +211,18 @@ impl<'t> ProblemSearch<'t> {
             (true, Some(culprit)) => self.names_at::<T>(culprit),
             _ => Vec::new(),
         };
-        self.note(message.problem(path.clone(), names));
+        let mut problem = message.problem(path.clone(), names);
         let Some(culprit) = culprit else {
+            self.note(problem);
             return false;
         };
         let parent = self.entries.path(self.entries.parent(culprit));
+        if let Some(meant) = self.missing_that_is_meant(message, &parent) {
+            problem.remedy = format!("did you mean `{meant}`?");
+            let missing = key_below(&parent, &meant);
+            self.problems.retain(|listed| listed.key != missing);
+        }
+        self.note(problem);
         if let Some(meant) = message.meant() {
             self.taken.insert(key_below(&parent, meant));
         }
@@ -223,6 +232,22 @@ impl<'t> ProblemSearch<'t> {
             self.unsure.push(parent);
         }
         remove(self.document.get_mut(), entry.key.as_ref(), &entry.value)
+    }
+
+    /// The key that is missing in a table and that stands there by a wrong name, where serde does not list it.
+    fn missing_that_is_meant(&self, message: &SerdeMessage, table: &str) -> Option<String> {
+        let SerdeMessage::UnknownKey { key, .. } = message else {
+            return None;
+        };
+        if message.meant().is_some() {
+            return None;
+        }
+        let below = |path: &String| match table {
+            "" => Some(path.clone()),
+            _ => Some(path.strip_prefix(table)?.strip_prefix('.')?.to_owned()),
+        };
+        let missing: Vec<String> = self.put_in.iter().filter_map(below).collect();
+        did_you_mean(key, &missing).map(str::to_owned)
     }
 
     /// The entry that an error with a span is about.

@@ -1,10 +1,10 @@
 //! What meets at the ends of tracks, as the `from` and `to` of a tunnel file name it.
 
 use crate::settings::{Checker, name_advice};
-use crate::track::file::{CrossingEntry, SwitchEntry, TrackEntry};
+use crate::track::file::{SwitchEntry, TrackEntry, TunnelFile};
 use crate::track::network::{Ends, Switch, TrackEnd};
 use crate::track::{Direction, TrackId};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a word after `from` or `to` names.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,15 +63,36 @@ pub(super) fn key_of(end: TrackEnd) -> String {
 
 /// An end of a track, as `from` and `to` name it.
 pub(super) fn word_of(end: TrackEnd, tracks: &[TrackEntry]) -> String {
+    end_word(end, &tracks[usize::from(end.track.0)].name)
+}
+
+/// As [`word_of`], of a track with this name.
+pub(super) fn end_word(end: TrackEnd, name: &str) -> String {
     let word = match end.way {
         Direction::Down => "begin",
         Direction::Up => "end",
     };
-    format!("{}.{word}", tracks[usize::from(end.track.0)].name)
+    format!("{name}.{word}")
 }
 
-/// Joins the tracks of a file.
+/// Joins the tracks of a file; none where names or joints are wrong: what else would be told follows from that.
 pub(super) fn joints(
+    file: &TunnelFile,
+    tracks: &[TrackEntry],
+    check: &mut Checker<'_>,
+) -> Option<Joints> {
+    let mut found = Vec::new();
+    check_names(file, tracks, &mut Checker::new("", &mut found));
+    let mut joints = Joints::default();
+    if found.is_empty() {
+        joints = named_joints(tracks, &file.switches, &mut Checker::new("", &mut found));
+    }
+    let are_right = found.is_empty();
+    check.add(found);
+    are_right.then_some(joints)
+}
+
+fn named_joints(
     tracks: &[TrackEntry],
     switches: &[SwitchEntry],
     check: &mut Checker<'_>,
@@ -92,37 +113,40 @@ pub(super) fn joints(
             }
         }
     }
+    // An end with an unknown name may be that of any switch.
+    let all_are_known = check.is_right("");
     let mut parts = vec![[None; 3]; switches.len()];
+    let mut named_twice = BTreeSet::new();
     for (end, what) in &named {
         if let Named::Part(switch, part) = what {
             let slot = &mut parts[*switch][*part as usize];
             if let Some(first) = slot.replace(*end) {
-                let what = format!("`{}` has this part already", key_of(first));
+                let what = format!("`{}` has this part already", word_of(first, tracks));
                 check.problem(&key_of(*end), what, "give each end a part of its own");
+                named_twice.insert(*switch);
             }
         }
     }
     let mut joints = Joints {
-        switches: whole_switches(switches, &parts, check),
+        switches: whole_switches(switches, &parts),
         ends: Vec::new(),
     };
+    if all_are_known {
+        let once = |k: &usize| !named_twice.contains(k);
+        check_whole(switches, &parts, once, check);
+    }
     add_ends(&mut joints, tracks, &named, check);
     joints
 }
 
 /// Names of tracks and switches, which ends are named by, and of crossings are there once each.
-pub(super) fn check_names(
-    tracks: &[TrackEntry],
-    switches: &[SwitchEntry],
-    crossings: &[CrossingEntry],
-    check: &mut Checker<'_>,
-) {
+fn check_names(file: &TunnelFile, tracks: &[TrackEntry], check: &mut Checker<'_>) {
     let mut seen = BTreeMap::new();
     let tracks = tracks.iter().enumerate();
     let tracks = tracks.map(|(k, track)| (&track.name, format!("track[{k}]")));
-    let switches = switches.iter().enumerate();
+    let switches = file.switches.iter().enumerate();
     let switches = switches.map(|(k, switch)| (&switch.name, format!("switches[{k}]")));
-    let crossings = crossings.iter().enumerate();
+    let crossings = file.crossings.iter().enumerate();
     let crossings = crossings.map(|(k, crossing)| (&crossing.name, format!("crossings[{k}]")));
     for (name, key) in tracks.chain(switches).chain(crossings) {
         if let Some(first) = seen.insert(name, key.clone()) {
@@ -168,14 +192,10 @@ impl Words {
     }
 }
 
-/// The switches of which all parts are named; a problem for each other one.
-fn whole_switches(
-    switches: &[SwitchEntry],
-    parts: &[[Option<TrackEnd>; 3]],
-    check: &mut Checker<'_>,
-) -> Vec<Switch> {
+/// The switches of which all parts are named.
+fn whole_switches(switches: &[SwitchEntry], parts: &[[Option<TrackEnd>; 3]]) -> Vec<Switch> {
     let mut whole = Vec::new();
-    for (k, (entry, ends)) in switches.iter().zip(parts).enumerate() {
+    for (entry, ends) in switches.iter().zip(parts) {
         if let [Some(toe), Some(through), Some(diverging)] = *ends {
             whole.push(Switch {
                 name: entry.name.clone(),
@@ -186,6 +206,19 @@ fn whole_switches(
                 throw_s: entry.throw_s,
             });
         }
+    }
+    whole
+}
+
+/// A problem for each part of some of the switches that no end has.
+fn check_whole(
+    switches: &[SwitchEntry],
+    parts: &[[Option<TrackEnd>; 3]],
+    which: impl Fn(&usize) -> bool,
+    check: &mut Checker<'_>,
+) {
+    let switches = switches.iter().zip(parts).enumerate();
+    for (k, (entry, ends)) in switches.filter(|(k, _)| which(k)) {
         for ((_, word), _) in PARTS.iter().zip(ends).filter(|(_, end)| end.is_none()) {
             let part = format!("{}.{word}", entry.name);
             check.problem(
@@ -195,7 +228,6 @@ fn whole_switches(
             );
         }
     }
-    whole
 }
 
 /// All ends that no switch has: joined, where either names the other; else what their own word says.

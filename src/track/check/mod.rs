@@ -3,10 +3,13 @@
 mod chainage;
 mod crossings;
 mod devices;
+mod findings;
 mod joints;
 mod lamps;
 mod line;
+
 mod neighbours;
+mod places;
 mod placing;
 mod sections;
 mod switches;
@@ -18,9 +21,6 @@ use super::network::Network;
 use super::section::OutlinePoint;
 use super::{Alignment, Track, Tunnel};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
-use joints::Joints;
-use line::Course;
-use placing::Order;
 use std::sync::Arc;
 
 /// Chainages closer than this are the same place.
@@ -31,22 +31,33 @@ impl Tunnel {
     /// keys of the problems in the text again.
     pub fn from_toml(text: &str) -> Result<Self, FileError> {
         let mut problems = Vec::new();
-        let tunnel = check(&read_settings(text)?, &mut problems);
-        if problems.is_empty() {
-            Ok(tunnel)
-        } else {
-            Err(FileError::Problems(problems))
+        let file = read_settings(text).map_err(of_tunnel)?;
+        match check(&file, &mut problems) {
+            Some(tunnel) if problems.is_empty() => Ok(tunnel),
+            _ => Err(FileError::Problems(problems)),
         }
     }
 }
 
-fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
+/// Whose `name` is missing, which tracks and switches have too.
+fn of_tunnel(mut error: FileError) -> FileError {
+    if let FileError::Problems(problems) | FileError::FirstProblems(problems) = &mut error {
+        let missing = (problems.iter_mut()).find(|p| p.key == "name" && p.is_missing());
+        if let Some(problem) = missing {
+            let remedy = "give the tunnel one at the top of the file, before the first table: `name = \"a line\"`";
+            *problem = Problem::new("name", "that of the tunnel is missing", remedy);
+        }
+    }
+    error
+}
+
+/// None where it is not known where its tracks are, which is a problem.
+fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Option<Tunnel> {
     file.check("", problems);
     let check = &mut Checker::new("", problems);
     let entries = file.tracks();
-    joints::check_names(&entries, &file.switches, &file.crossings, check);
-    let joints = joints::joints(&entries, &file.switches, check);
-    let lines = lines(file, &entries, &joints, check);
+    let joints = joints::joints(file, &entries, check)?;
+    let lines = places::lines(file, &entries, &joints, check)?;
     let tracks = entries.iter().zip(lines).enumerate();
     let tracks = tracks.map(|(k, (entry, line))| {
         let check = &mut check.below(&key_of(file, k));
@@ -73,12 +84,12 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Tunnel {
         whole::check_names(&network, check);
         whole::check_reach(&network, check);
     }
-    Tunnel {
+    Some(Tunnel {
         name: file.name.clone(),
         datum: file.datum.as_ref().map(DatumEntry::datum),
         line_number: file.line_number,
         network,
-    }
+    })
 }
 
 /// Key of a track in the file; none for the only one, whose keys are the file's.
@@ -87,27 +98,6 @@ fn key_of(file: &TunnelFile, track: usize) -> String {
         true => String::new(),
         false => format!("track[{track}]"),
     }
-}
-
-/// The centrelines.
-fn lines(
-    file: &TunnelFile,
-    entries: &[TrackEntry],
-    joints: &Joints,
-    check: &mut Checker<'_>,
-) -> Vec<Alignment> {
-    let courses = entries.iter().enumerate();
-    let courses = courses.map(|(k, entry)| Course::of(entry, &mut check.below(&key_of(file, k))));
-    let mut courses: Vec<Course> = courses.collect();
-    let order = Order::of(entries, joints, check);
-    placing::close(entries, joints, &order, &mut courses, check);
-    for (k, (entry, course)) in entries.iter().zip(&mut courses).enumerate() {
-        let check = &mut check.below(&key_of(file, k));
-        course.grades = line::grades(entry, course.length_m(), check);
-    }
-    let lines = order.place(entries, &courses);
-    placing::check_joints(entries, joints, &lines, check);
-    lines
 }
 
 /// A track with what stands along it.
@@ -342,6 +332,25 @@ mod tests {
             assert!(crate::settings::locate(&text, &p.key).is_some());
         }
         assert!(found.iter().any(|p| p.remedy == "did you mean \"B1110\"?"));
+    }
+
+    /// Provokes: a missing name of the tunnel that is taken for that of a switch.
+    #[test]
+    fn the_tunnel_needs_a_name_at_the_top() {
+        let found = problems("[[switches]]\nname = 'W1'\n");
+        assert_eq!(found.len(), 1, "{found:#?}");
+        let said = found[0].to_string();
+        assert!(said.contains("that of the tunnel") && said.contains("before the first table"));
+    }
+
+    /// Provokes: a key by a wrong name that is told twice, or without the right one.
+    #[test]
+    fn wrong_units_of_lengths_are_told_once() {
+        let text = CHENGDU.replacen("length_m", "length_km", 1);
+        let found = problems(&text);
+        assert_eq!(found.len(), 1, "{found:#?}");
+        assert_eq!(found[0].key, "plan[0].length_km");
+        assert_eq!(found[0].remedy, "did you mean `length_m`?");
     }
 
     #[test]

@@ -1,11 +1,12 @@
 //! Tracks beside each other: trains must pass, and no wall may stand where they run.
 
+use super::findings::{Findings, Room, Wrong};
 use crate::settings::Checker;
 use crate::track::network::{Network, SwitchLeg, TrackEnd};
 use crate::track::section::{CrossSection, OutlinePoint};
-use crate::track::{Direction, Gauge, Place, Stretch, TrackFrame, TrackId, TrackPoint};
+use crate::track::{Direction, Gauge, Place, Side, Stretch, TrackFrame, TrackId, TrackPoint};
 use nalgebra::Point3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Tracks are looked at so often: less than the gauge of a track that crosses square is wide, twice 1.6 m. Borders of
 /// cross-sections, which are round numbers in most files, are missed.
@@ -35,17 +36,10 @@ pub(super) fn check_neighbours(
     }
     let grid = Grid::of(network);
     let partings = Partings::of(network);
-    let mut said = BTreeSet::new();
-    let mut say = |of: Place, other: TrackId, wrong: Wrong, l_m: f64| {
-        if said.insert((of.track.min(other), of.track.max(other), wrong)) {
-            let name = &network.tracks[usize::from(other.0)].name;
-            let (what, remedy) = wrong.words(name, l_m);
-            let what = format!("at chainage {:.1} m {what}", of.s_m);
-            check.problem(&key(of.track), what, remedy);
-        }
-    };
+    let mut findings = Findings::default();
     for checked in &grid.places {
         let mut lies_in_another = false;
+        let mut nearest_room: Option<Room> = None;
         for (other, point) in grid.beside(network, checked.place.track, &checked.frame.origin) {
             let s_m = point.s_m;
             let place = Place { track: other, s_m };
@@ -53,15 +47,18 @@ pub(super) fn check_neighbours(
                 continue;
             };
             lies_in_another |= pair.holds();
+            let room = pair.room(other, point.l_m);
+            nearest_room = nearest_room.into_iter().chain(room).min_by(Room::by_lack);
             let may_touch =
                 partings.part(checked.place, place) || cross(network, checked.place, place);
             if let Some(wrong) = pair.wrong(may_touch) {
-                say(checked.place, other, wrong, point.l_m);
+                findings.note(wrong.at(checked.place, other, point.l_m).with(room));
             }
         }
         let is_shared = section(network, checked.place).is_some_and(CrossSection::is_shared);
         if is_shared && !lies_in_another {
-            say(checked.place, checked.place.track, Wrong::Nowhere, 0.0);
+            let nowhere = Wrong::Nowhere.at(checked.place, checked.place.track, 0.0);
+            findings.note(nowhere.with(nearest_room));
         }
     }
     for (place, world) in standing(network) {
@@ -69,10 +66,11 @@ pub(super) fn check_neighbours(
             let frame = network.alignment(other).map(|line| line.at(point.s_m));
             let gauge = frame.map(|frame| Gauge::b1(frame.curvature_per_m));
             if gauge.is_some_and(|gauge| gauge.contains(point.l_m, point.h_m)) {
-                say(place, other, Wrong::Furniture, point.l_m);
+                findings.note(Wrong::Furniture.at(place, other, point.l_m));
             }
         }
     }
+    findings.tell(network, key, check);
 }
 
 /// Whether two places that are beside each other lie where their tracks cross.
@@ -253,55 +251,6 @@ impl Partings {
     }
 }
 
-/// What is wrong with two tracks beside each other.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Wrong {
-    /// Their gauges overlap.
-    Gauges,
-    /// A wall of the other one stands in this one's gauge.
-    Wall,
-    /// It lies within the other's section and has walls of its own.
-    Walls,
-    /// Their walls reach into each other.
-    Rock,
-    /// It shares a section with none.
-    Nowhere,
-    /// A lamp or device of it stands in the other one's gauge.
-    Furniture,
-}
-
-impl Wrong {
-    fn words(self, other: &str, l_m: f64) -> (String, &'static str) {
-        let away_m = l_m.abs();
-        match self {
-            Self::Gauges => (
-                format!("it is {away_m:.2} m from track `{other}`: trains on both would touch"),
-                "lay them farther apart, join them by a switch, or name them under `[[crossings]]` where they cross",
-            ),
-            Self::Wall => (
-                format!("a wall of the section of track `{other}` stands in its structure gauge"),
-                "make that section so wide that it holds both tracks, or so narrow that it holds one",
-            ),
-            Self::Walls => (
-                format!("it lies within the section of track `{other}`, and has walls of its own"),
-                "give it a section of `kind = \"shared\"` there",
-            ),
-            Self::Rock => (
-                format!("its section and that of track `{other}` overlap"),
-                "move the tracks apart, or let one share the section of the other",
-            ),
-            Self::Nowhere => (
-                "its section is `shared`, and no other track's section has room for it".to_owned(),
-                "make the section of the track beside it wider, or give it one of its own",
-            ),
-            Self::Furniture => (
-                format!("a lamp or device stands in the structure gauge of track `{other}`"),
-                "move it, or leave it out there",
-            ),
-        }
-    }
-}
-
 /// A place of a track, and the other track beside it.
 struct Pair<'a> {
     own: Option<&'a CrossSection>,
@@ -347,6 +296,22 @@ impl<'a> Pair<'a> {
             |section: &CrossSection| self.gauge.iter().all(|p| section.covers(p.l_m, p.h_m));
         self.others
             .is_some_and(|section| !section.is_shared() && inside(section))
+    }
+
+    /// Room in the other's section, to this side of the other track, where it is not wide enough for this place's
+    /// gauge.
+    fn room(&self, of: TrackId, l_m: f64) -> Option<Room> {
+        let section = self.others.filter(|section| !section.is_shared())?;
+        let side = if l_m < 0.0 { Side::Right } else { Side::Left };
+        let reach_m = section.lateral_m().map(|m| side.sign() * m);
+        let needed_m = self.gauge.iter().map(|p| side.sign() * p.l_m);
+        let room = Room {
+            of,
+            side,
+            has_m: reach_m.into_iter().fold(0.0, f64::max),
+            needs_m: needed_m.fold(0.0, f64::max),
+        };
+        (room.needs_m > room.has_m).then_some(room)
     }
 
     /// What is wrong, where the tracks may touch: near a switch, on a crossing.

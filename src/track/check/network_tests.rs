@@ -160,7 +160,7 @@ grades = [{ from_m = 0.0, grade_permille = 10.0 }]",
             "left_m = 15.9",
             "left_m = 2.9",
             "track[5]",
-            "is `shared`, and no other",
+            "has room for it: that of `u1` reaches 2.90 m to its left",
         ),
         (
             "    { kind = \"shared\", from_m = 300.0 },",
@@ -209,6 +209,120 @@ grades = [{ from_m = 0.0, grade_permille = 10.0 }]",
         }
     }
     assert!(wrongly_told.is_empty(), "{wrongly_told:#?}");
+}
+
+/// Provokes: one slip of the pen that is told as several, which follow from it.
+#[test]
+fn one_wrong_word_is_one_problem() {
+    for (right, wrong, key) in [
+        ("to = \"W4.through\"", "to = \"W4.trough\"", "track[1].to"),
+        ("from = \"W8.toe\"\n", "", "switches[7].name"),
+        ("name = \"W2\"", "name = \"W1\"", "switches[1].name"),
+        (
+            "from = \"W3.through\"",
+            "from = \"W3.diverging\"",
+            "track[11].from",
+        ),
+    ] {
+        assert!(TERMINUS.contains(right), "{right}");
+        let found = problems(&TERMINUS.replacen(right, wrong, 1));
+        let keys: Vec<&str> = found.iter().map(|p| &*p.key).collect();
+        assert_eq!(keys, [key], "{wrong}: {found:#?}");
+    }
+    let no_such = JUNCTION.replacen("from = \"W1.diverging\"", "from = \"W2.diverging\"", 1);
+    let found = problems(&no_such);
+    assert_eq!(found.len(), 1, "{found:#?}");
+    assert_eq!(found[0].remedy, "did you mean `W1.diverging`?");
+    let found = problems(&JUNCTION.replacen("start = { up_m = -14.0 }", "", 1));
+    assert_eq!(found.len(), 1, "{found:#?}");
+    assert!(found[0].key == "track[0].from" && found[0].what.contains("nothing says where"));
+}
+
+/// A switch to the left with legs of 300 and 82 m.
+const JUNCTION: &str = r#"
+    name = "junction"
+    switches = [{ name = "W1" }]
+    [[track]]
+    name = "up"
+    start = { up_m = -14.0 }
+    to = "W1.toe"
+    plan = [{ kind = "straight", length_m = 460.0 }]
+    [[track]]
+    name = "on"
+    from = "W1.through"
+    plan = [{ kind = "straight", length_m = 300.0 }]
+    sections = [{ kind = "rectangular", from_m = 0.0, left_m = 10.0 }]
+    [[track]]
+    name = "aside"
+    from = "W1.diverging"
+    plan = [{ kind = "arc", length_m = 22.13, radius_m = 200.0, turn = "left" }, { kind = "straight", length_m = 60.0 }]
+    sections = [{ kind = "shared", from_m = 0.0 }]
+"#;
+
+/// Provokes: a `start` too many that is told as a gap or a length somewhere else, or one that fits and is refused.
+#[test]
+fn a_track_with_two_places_is_told() {
+    let with = |start: &str| {
+        let from = "from = \"W1.through\"";
+        let found = problems(&JUNCTION.replacen(from, &format!("{from}\nstart = {start}"), 1));
+        found.into_iter().map(|p| (p.key, p.remedy))
+    };
+    for start in ["{}", "{ up_m = -14.0 }"] {
+        let [(key, remedy)] = &with(start).collect::<Vec<_>>()[..] else {
+            panic!("{start}: {:?}", with(start).collect::<Vec<_>>());
+        };
+        assert!(key == "track[1].start" && remedy.contains("take `start` out"));
+    }
+    assert_eq!(with("{ east_m = 460.0, up_m = -14.0 }").count(), 0);
+    let found = problems(&TERMINUS.replacen(
+        "to = \"W4.through\"\n",
+        "to = \"W4.through\"\nstart = {}\n",
+        1,
+    ));
+    let keys: Vec<&str> = found.iter().map(|p| &*p.key).collect();
+    assert_eq!(keys, ["track[1].start"], "{found:#?}");
+}
+
+/// Provokes: a section too narrow for two tracks that does not say how wide it is, or a width that will not do.
+#[test]
+fn narrow_sections_say_how_wide_they_must_be() {
+    let wide = |left_m: &str| problems(&JUNCTION.replacen("10.0", left_m, 1));
+    let found = wide("7.4");
+    let said = found.iter().find(|p| p.key == "track[2]").unwrap();
+    assert!(
+        said.what
+            .contains("that of `on` reaches 7.40 m to its left")
+    );
+    let (_, needs) = said.what.split_once("at least ").unwrap();
+    let needs = needs.trim_end_matches(" m to hold both");
+    assert!(wide(needs).is_empty(), "{said}: {:#?}", wide(needs));
+}
+
+/// Provokes: an example of a tunnel file in README that a reader copies, and that is not right.
+#[test]
+fn examples_of_readme_are_right() {
+    let readme = include_str!("../../../README.md");
+    let blocks = readme.split("```toml\n").skip(1);
+    let blocks = blocks.map(|block| block.split("```").next().unwrap());
+    let (mut tunnels, mut keys) = (0, 0);
+    for block in blocks {
+        // Keys of a track, to which the rest is added.
+        let rest = "name = 'x'\nplan = [{ kind = 'straight', length_m = 1000.0 }]\n";
+        let text = match block {
+            _ if block.contains("[[track]]") => {
+                tunnels += 1;
+                block.to_owned()
+            }
+            _ if block.starts_with("stated_chainage") => {
+                keys += 1;
+                format!("{rest}{block}")
+            }
+            _ => continue,
+        };
+        let found = problems(&text);
+        assert!(found.is_empty(), "{block}: {found:#?}");
+    }
+    assert_eq!((tunnels, keys), (1, 1));
 }
 
 /// Provokes: a track that touches another one, runs through the rock of its tunnel, or that no train comes to.

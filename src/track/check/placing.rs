@@ -43,8 +43,13 @@ enum Side {
 pub(super) struct Order(Vec<(TrackId, Anchor)>);
 
 impl Order {
-    /// From the tracks with a `start` over the joints to all others; a problem for those that are not come to.
-    pub(super) fn of(tracks: &[TrackEntry], joints: &Joints, check: &mut Checker<'_>) -> Self {
+    /// From the tracks with a `start` over the joints to all others. None where some are not come to, with a problem
+    /// for one of those that are joined together.
+    pub(super) fn of(
+        tracks: &[TrackEntry],
+        joints: &Joints,
+        check: &mut Checker<'_>,
+    ) -> Option<Self> {
         let meet = meeting(joints);
         let mut order: Vec<(TrackId, Anchor)> = Vec::new();
         let mut anchored = vec![false; tracks.len()];
@@ -72,14 +77,18 @@ impl Order {
                 }
             }
         }
-        for (k, _) in anchored.iter().enumerate().filter(|(_, is)| !**is) {
-            check.problem(
-                &format!("track[{k}].from"),
-                "nothing says where this track is: it has no `start`, and is joined to no track that has a place",
-                "give it a `from` or a `to`, or a `start`",
-            );
+        let are_placed = order.len() == tracks.len();
+        for k in 0..tracks.len() {
+            if !anchored[k] {
+                check.problem(
+                    &format!("track[{k}].from"),
+                    "nothing says where this track is: it has no `start`, and is joined to no track that has a place",
+                    "give it a `start`, or join it by `from` or `to` to a track that has a place",
+                );
+                mark_joined(TrackId(k as u16), &meet, &mut anchored);
+            }
         }
-        Self(order)
+        are_placed.then_some(Self(order))
     }
 
     /// The tracks at their places; those that have none lie at the world's origin.
@@ -125,8 +134,48 @@ fn ending_at(course: &Course, pose: &TrackFrame) -> Alignment {
 }
 
 /// All ends that meet each end.
-fn meeting(joints: &Joints) -> BTreeMap<TrackEnd, Vec<(TrackEnd, Side)>> {
-    let mut meet: BTreeMap<TrackEnd, Vec<(TrackEnd, Side)>> = BTreeMap::new();
+type Meeting = BTreeMap<TrackEnd, Vec<(TrackEnd, Side)>>;
+
+/// The tracks with a `start` that begin at a joint, and so where another track with a `start` has them.
+pub(super) fn placed_twice(tracks: &[TrackEntry], joints: &Joints) -> Vec<usize> {
+    let meet = meeting(joints);
+    let with_start = (0..tracks.len()).filter(|k| tracks[*k].start.is_some());
+    let begins_at_joint = |k: &usize| {
+        let begin = TrackEnd {
+            track: TrackId(*k as u16),
+            way: Direction::Down,
+        };
+        tracks[*k].from.is_some() && meet.contains_key(&begin)
+    };
+    let (joined, first): (Vec<usize>, Vec<usize>) = with_start.partition(begins_at_joint);
+    let mut placed = vec![false; tracks.len()];
+    for k in first {
+        mark_joined(TrackId(k as u16), &meet, &mut placed);
+    }
+    let mut twice = Vec::new();
+    for k in joined {
+        match placed[k] {
+            true => twice.push(k),
+            false => mark_joined(TrackId(k as u16), &meet, &mut placed),
+        }
+    }
+    twice
+}
+
+/// Marks a track and all that are joined to it.
+fn mark_joined(track: TrackId, meet: &Meeting, marked: &mut [bool]) {
+    let mut open = vec![track];
+    while let Some(track) = open.pop() {
+        if !std::mem::replace(&mut marked[usize::from(track.0)], true) {
+            let ends = [Direction::Down, Direction::Up].map(|way| TrackEnd { track, way });
+            let others = ends.iter().filter_map(|end| meet.get(end)).flatten();
+            open.extend(others.map(|(other, _)| other.track));
+        }
+    }
+}
+
+fn meeting(joints: &Joints) -> Meeting {
+    let mut meet = Meeting::new();
     let mut add = |a: TrackEnd, b: TrackEnd, side| {
         meet.entry(a).or_default().push((b, side));
         meet.entry(b).or_default().push((a, side));

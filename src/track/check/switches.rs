@@ -1,9 +1,9 @@
 //! Turn-outs: how their legs part, and how fast the diverging one may be run.
 
-use super::joints::key_of;
+use super::joints::end_word;
 use crate::settings::Checker;
 use crate::track::CANT_BASE_M;
-use crate::track::network::{Network, Switch};
+use crate::track::network::{Network, Switch, TrackEnd};
 
 /// Legs that part by less curvature than this do not part: a radius of 20 km.
 const LEAST_PARTING_PER_M: f64 = 5e-5;
@@ -51,10 +51,11 @@ fn check_parting(network: &Network, switch: &Switch, key: &str, check: &mut Chec
         None
     };
     if let Some(what) = problem {
+        let word = |end: TrackEnd| end_word(end, &network.tracks[usize::from(end.track.0)].name);
         let remedy = format!(
             "let the leg of `{}` begin with an arc, and that of `{}` go on as the track before the toe",
-            key_of(switch.diverging),
-            key_of(switch.through)
+            word(switch.diverging),
+            word(switch.through)
         );
         check.problem(&format!("{key}.name"), what, remedy);
     }

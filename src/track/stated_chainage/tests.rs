@@ -188,6 +188,9 @@ fn texts_are_read_as_people_write_them() {
         "km 12.350",
         "km12+350",
         "DK12+350 R1",
+        "dk12+350",
+        "Km 12.350",
+        "dk12+350 r1",
     ] {
         assert!((track.place(text).unwrap() - 10.0).abs() < 1e-9, "{text}");
     }

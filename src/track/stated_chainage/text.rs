@@ -108,7 +108,8 @@ impl StatedChainage {
             example: example(),
         })?;
         let word = written.word;
-        if word.is_empty() || word == "km" || word == self.prefix {
+        let is_prefix = word.to_lowercase() == self.prefix.to_lowercase();
+        if word.is_empty() || is_km(word) || is_prefix {
             return Ok(written);
         }
         Err(ChainageError::Prefix {
@@ -176,7 +177,7 @@ impl StatedChainage {
     }
 }
 
-/// Word, number and region of a text: `DK12+340.0 R2`, `12+340`, `km 12.340`.
+/// Word, number and region of a text: `DK12+340.0 R2`, `12+340`, `km 12.340`; small and capital letters are the same.
 fn read(text: &str) -> Option<Written<'_>> {
     let (rest, region) = without_region(text.trim());
     let (word, number) = rest.split_at(rest.find(|c: char| !c.is_alphabetic())?);
@@ -190,7 +191,7 @@ fn read(text: &str) -> Option<Written<'_>> {
             let (km, metres_m) = (whole(km)?, decimal(metres)?);
             (metres_m < 1000.0).then_some(1000.0 * km + metres_m)?
         }
-        None if word == "km" => 1000.0 * decimal(number)?,
+        None if is_km(word) => 1000.0 * decimal(number)?,
         // Metres or kilometres?
         None => return None,
     };
@@ -201,10 +202,14 @@ fn read(text: &str) -> Option<Written<'_>> {
     })
 }
 
+fn is_km(word: &str) -> bool {
+    word.eq_ignore_ascii_case("km")
+}
+
 /// A text without the region after it, and that.
 fn without_region(text: &str) -> (&str, Option<usize>) {
     let parts = text.rsplit_once(char::is_whitespace);
-    let region = parts.and_then(|(_, last)| last.strip_prefix('R'));
+    let region = parts.and_then(|(_, last)| last.strip_prefix(['R', 'r']));
     match (parts, region.and_then(|number| number.parse().ok())) {
         (Some((rest, _)), Some(number)) => (rest.trim_end(), Some(number)),
         _ => (text, None),
