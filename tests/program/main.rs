@@ -23,6 +23,7 @@ mod folders;
 mod frames;
 #[cfg(unix)]
 mod kills;
+mod locate;
 #[cfg(target_os = "linux")]
 mod memory;
 mod schema;

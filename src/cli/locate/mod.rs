@@ -83,6 +83,7 @@ pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
 }
 
 /// Every fix in turn, with the speeds before it.
+#[allow(clippy::disallowed_methods, reason = "what a fix costs")]
 fn run(
     network: &Arc<PlanNetwork>,
     settings: OccupancySettings,

@@ -34,12 +34,9 @@ impl Decision {
     }
 
     pub(super) fn of(hypotheses: &[Hypothesis]) -> Self {
-        let mut on: Vec<_> = hypotheses
-            .iter()
-            .map(|h| (h.on(), h.log_probability.exp(), h.sigma_m()))
-            .collect();
-        on.sort_by_key(|((element, _, _), _, _)| *element);
-        let of_each = on.chunk_by(|a, b| a.0.0 == b.0.0);
+        let mut on: Vec<Shared> = hypotheses.iter().map(Shared::of).collect();
+        on.sort_by_key(|shared| shared.element);
+        let of_each = on.chunk_by(|a, b| a.element == b.element);
         let mut tracks: Vec<TrackDecision> = of_each.map(track).collect();
         let sum: f64 = tracks.iter().map(|track| track.probability).sum();
         for track in &mut tracks {
@@ -50,17 +47,39 @@ impl Decision {
     }
 }
 
+/// What a hypothesis says of the element that it is on.
+struct Shared {
+    element: usize,
+    facing: Direction,
+    along_m: f64,
+    sigma_m: f64,
+    probability: f64,
+}
+
+impl Shared {
+    fn of(hypothesis: &Hypothesis) -> Self {
+        let (element, facing, along_m) = hypothesis.on();
+        Self {
+            element,
+            facing,
+            along_m,
+            sigma_m: hypothesis.sigma_m(),
+            probability: hypothesis.log_probability.exp(),
+        }
+    }
+}
+
 /// Hypotheses on one element in one: mean and deviation of the mixture.
-fn track(on: &[((usize, Direction, f64), f64, f64)]) -> TrackDecision {
-    let probability: f64 = on.iter().map(|(_, p, _)| p).sum();
-    let mean = |of: &dyn Fn(&((usize, Direction, f64), f64, f64)) -> f64| {
-        on.iter().map(|h| h.1 * of(h)).sum::<f64>() / probability.max(f64::MIN_POSITIVE)
+fn track(on: &[Shared]) -> TrackDecision {
+    let probability: f64 = on.iter().map(|h| h.probability).sum();
+    let mean = |of: &dyn Fn(&Shared) -> f64| {
+        on.iter().map(|h| h.probability * of(h)).sum::<f64>() / probability.max(f64::MIN_POSITIVE)
     };
-    let up = mean(&|((_, way, _), _, _)| f64::from(u8::from(*way == Direction::Up)));
-    let along_m = mean(&|((_, _, along_m), _, _)| *along_m);
-    let variance_m2 = mean(&|((_, _, m), _, sigma_m)| sigma_m.powi(2) + (m - along_m).powi(2));
+    let up = mean(&|h| f64::from(u8::from(h.facing == Direction::Up)));
+    let along_m = mean(&|h| h.along_m);
+    let variance_m2 = mean(&|h| h.sigma_m.powi(2) + (h.along_m - along_m).powi(2));
     TrackDecision {
-        element: on[0].0.0,
+        element: on[0].element,
         probability,
         facing: if up >= 0.5 {
             Direction::Up

@@ -17,6 +17,9 @@ use nalgebra::{Matrix2, Point2, Vector2};
 /// Places nearer to a fix are it.
 const HERE_M: f64 = 1e-9;
 
+/// A way to match a fix with a covariance to a stretch of an element.
+pub type Matching = fn(&TrackElement, [f64; 2], &Point2<f64>, &Matrix2<f64>) -> Option<Match>;
+
 /// A place of an element for a fix.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Match {

@@ -43,7 +43,7 @@ mod settings;
 mod tests;
 
 pub use decision::{Decision, TrackDecision};
-pub use matching::{Match, by_pedal_curve, by_perpendicular};
+pub use matching::{Match, Matching, by_pedal_curve, by_perpendicular};
 pub use settings::{Method, OccupancySettings};
 
 use crate::bus::SimTime;

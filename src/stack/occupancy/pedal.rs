@@ -6,10 +6,9 @@
 
 use super::Fix;
 use super::hypothesis::{Hypothesis, PLACE, StateCovariance};
-use super::matching::Match;
+use super::matching::{Match, Matching};
 use crate::bus::SimTime;
-use crate::track::plan::{PlanNetwork, TrackElement};
-use nalgebra::{Matrix2, Point2};
+use crate::track::plan::PlanNetwork;
 
 /// A match is looked for so many standard deviations from the place, and so far.
 const AROUND_SIGMAS: f64 = 6.0;
@@ -54,12 +53,7 @@ impl Hypothesis {
     }
 
     /// Takes a fix in by its match.
-    pub fn update_matched(
-        &mut self,
-        network: &PlanNetwork,
-        fix: &Fix,
-        matched: fn(&TrackElement, [f64; 2], &Point2<f64>, &Matrix2<f64>) -> Option<Match>,
-    ) {
+    pub fn update_matched(&mut self, network: &PlanNetwork, fix: &Fix, matched: Matching) {
         let reach_m = AROUND_M + AROUND_SIGMAS * self.sigma_m();
         let [from_m, to_m] = [self.place_m() - reach_m, self.place_m() + reach_m];
         let matches = self.course.legs().iter().filter_map(|leg| {

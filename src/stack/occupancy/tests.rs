@@ -1,5 +1,7 @@
 //! The filter on measurements drawn by the models that it believes in: a switch, a parallel track, a way back.
 
+#![allow(clippy::print_stdout, reason = "a test prints its figures")]
+
 use super::*;
 use crate::track::plan::TrackElement;
 use crate::twin::random::Stream;
