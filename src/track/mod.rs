@@ -55,6 +55,7 @@ mod file;
 mod furniture;
 mod gauge;
 pub mod geodesy;
+pub mod import;
 pub mod network;
 mod place;
 pub mod plan;

@@ -13,6 +13,7 @@ use crate::settings::ReadLimit;
 use crate::stack::occupancy::{Occupancy, OccupancySettings};
 use crate::track::Tunnel;
 use crate::track::geodesy::Datum;
+use crate::track::import::OsmImport;
 use crate::track::plan::PlanNetwork;
 use output::{Located, Report};
 use recorded::{RecordedFix, RecordedFixes};
@@ -24,8 +25,8 @@ use std::time::Instant;
 const FAR_M: f64 = 5000.0;
 
 const AFTER: &str = "\
-NETWORK is a tunnel file with a [datum], or GeoJSON of track elements (LineString with `id`) and relations
-(netelementA, netelementB, positionOnA, positionOnB, navigability).
+NETWORK is a tunnel file with a [datum], GeoJSON of track elements (LineString with `id`) and relations
+(netelementA, netelementB, positionOnA, positionOnB, navigability), or raw JSON of OpenStreetMap with its nodes.
 FIXES is a table with the columns timestamp (seconds, or ISO 8601), latitude, longitude, and, if there are any,
 sigma_north_m, sigma_east_m, covariance_m2, position_type, solution_status. Without sigmas these come by the kind
 of solution. SPEEDS has timestamp and speed_mps, forwards positive. Without it, speed comes from the fixes.
@@ -122,13 +123,19 @@ fn network(path: &Path) -> Result<(PlanNetwork, Datum), Failure> {
             "add a table [datum] with latitude_deg and longitude_deg of the world's origin",
         )
     };
+    let refused = |error: &dyn std::fmt::Display| {
+        Failure::input(
+            format!("{} cannot be used: {error}", path.display()),
+            "see `metrotwin locate --help` for what a network in JSON holds",
+        )
+    };
     let network = match is_json {
-        true => PlanNetwork::from_geojson(&text).map_err(|error| {
-            Failure::input(
-                format!("{} cannot be used: {error}", path.display()),
-                "see `metrotwin locate --help` for what a network in GeoJSON holds",
-            )
-        })?,
+        true if is_osm(&text) => {
+            OsmImport::from_json(&text)
+                .map_err(|e| refused(&e))?
+                .network
+        }
+        true => PlanNetwork::from_geojson(&text).map_err(|e| refused(&e))?,
         false if matches!(FileKind::of(&text), FileKind::Tunnel) => {
             let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
             PlanNetwork::of_network(&tunnel.network, tunnel.datum)
@@ -142,6 +149,12 @@ fn network(path: &Path) -> Result<(PlanNetwork, Datum), Failure> {
     };
     let datum = network.datum.ok_or_else(no_datum)?;
     Ok((network, datum))
+}
+
+/// Whether a JSON text is raw data of OpenStreetMap rather than GeoJSON.
+fn is_osm(text: &str) -> bool {
+    let key = |key: &str| text.find(key).unwrap_or(usize::MAX);
+    key("\"elements\"") < key("\"features\"")
 }
 
 /// Fixes that are nowhere near the network: most often latitude and longitude are swapped.
