@@ -2,6 +2,7 @@
 
 use super::hypothesis::Hypothesis;
 use crate::track::Direction;
+use std::f64::consts::SQRT_2;
 
 /// The train is on this element.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -28,14 +29,15 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// Whether only one is left.
+    /// Whether only one is left: neither another course, nor the next element of the same one.
     pub fn is_identified(&self) -> bool {
         self.tracks.len() == 1
     }
 
-    pub(super) fn of(hypotheses: &[Hypothesis]) -> Self {
-        let mut on: Vec<Shared> = hypotheses.iter().map(Shared::of).collect();
-        on.sort_by_key(|shared| shared.element);
+    pub(super) fn of(hypotheses: &[Hypothesis], least: f64) -> Self {
+        let mut on: Vec<Shared> = hypotheses.iter().flat_map(shares).collect();
+        on.retain(|share| share.probability >= least);
+        on.sort_by_key(|share| share.element);
         let of_each = on.chunk_by(|a, b| a.element == b.element);
         let mut tracks: Vec<TrackDecision> = of_each.map(track).collect();
         let sum: f64 = tracks.iter().map(|track| track.probability).sum();
@@ -47,7 +49,7 @@ impl Decision {
     }
 }
 
-/// What a hypothesis says of the element that it is on.
+/// What a hypothesis says of an element of its course.
 struct Shared {
     element: usize,
     facing: Direction,
@@ -56,17 +58,33 @@ struct Shared {
     probability: f64,
 }
 
-impl Shared {
-    fn of(hypothesis: &Hypothesis) -> Self {
-        let (element, facing, along_m) = hypothesis.on();
-        Self {
-            element,
-            facing,
-            along_m,
-            sigma_m: hypothesis.sigma_m(),
-            probability: hypothesis.log_probability.exp(),
+/// A hypothesis, divided over the elements of its course by the normal density of its place.
+fn shares(hypothesis: &Hypothesis) -> impl Iterator<Item = Shared> + '_ {
+    let (place_m, sigma_m) = (hypothesis.place_m(), hypothesis.sigma_m());
+    let probability = hypothesis.log_probability.exp();
+    let legs = hypothesis.course.legs();
+    let below = move |m: f64| match sigma_m > 0.0 {
+        // Of the normal distribution, without loss in its lower tail.
+        true => 0.5 * libm::erfc((place_m - m) / (sigma_m * SQRT_2)),
+        false => f64::from(u8::from(m > place_m)),
+    };
+    legs.iter().enumerate().map(move |(k, leg)| {
+        // Beyond the ends of the course it is on the last of its elements.
+        let end_m = leg.begin_m + leg.length_m;
+        let from = if k == 0 { 0.0 } else { below(leg.begin_m) };
+        let over = if k + 1 == legs.len() {
+            0.0
+        } else {
+            below(2.0 * place_m - end_m)
+        };
+        Shared {
+            element: leg.towards.element,
+            facing: leg.towards.way,
+            along_m: leg.along_m(place_m).clamp(0.0, leg.length_m),
+            sigma_m,
+            probability: probability * (1.0 - from - over).max(0.0),
         }
-    }
+    })
 }
 
 /// Hypotheses on one element in one: mean and deviation of the mixture.

@@ -3,7 +3,6 @@
 use super::course::Course;
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
-use crate::track::Direction;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
@@ -62,13 +61,6 @@ impl Hypothesis {
     /// Standard deviation of that, metres.
     pub fn sigma_m(&self) -> f64 {
         self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
-    }
-
-    /// The element that it is on, the way that it runs along it, and how far along it is.
-    pub fn on(&self) -> (usize, Direction, f64) {
-        let leg = self.course.leg_at(self.place_m());
-        let along_m = leg.along_m(self.place_m()).clamp(0.0, leg.length_m);
-        (leg.towards.element, leg.towards.way, along_m)
     }
 
     /// What may be needed of the course: chords between bogies, where the train may be, and it itself.

@@ -41,6 +41,8 @@ mod settings;
 #[cfg(all(test, feature = "twin"))]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
+#[cfg(all(test, feature = "twin"))]
+mod validation;
 
 pub use decision::{Decision, TrackDecision};
 pub use matching::{Match, Matching, by_pedal_curve, by_perpendicular};
@@ -132,6 +134,8 @@ impl Occupancy {
     /// Takes the speed, forwards positive. What is older than the last input is dropped.
     pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
         if speed_mps.is_finite() && self.run_to(time) {
+            let more_m = change_since(self.speed, (time, speed_mps));
+            self.since.0 += more_m;
             self.speed = Some((time, speed_mps));
             self.speed_filter
                 .update(time, speed_mps, self.settings.speed_sigma_mps);
@@ -141,6 +145,7 @@ impl Occupancy {
     /// Takes the yaw rate, to the left positive.
     pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
         if yaw_rate_radps.is_finite() && self.run_to(time) {
+            self.turned_rad += change_since(self.yaw_rate, (time, yaw_rate_radps));
             self.yaw_rate = Some((time, yaw_rate_radps));
         }
     }
@@ -178,7 +183,7 @@ impl Occupancy {
 
     /// What is believed now.
     pub fn decision(&self) -> Decision {
-        Decision::of(&self.hypotheses)
+        Decision::of(&self.hypotheses, self.settings.least_probability)
     }
 
     /// Sums speed and yaw rate up to a time; whether it is no older than the last input.
@@ -324,4 +329,17 @@ impl Occupancy {
         }
         self.hypotheses = kept;
     }
+}
+
+/// By how much more a quantity has summed up since its last reading than if it had stayed as it was then: it changes
+/// evenly from one reading to the next.
+fn change_since(last: Option<(SimTime, f64)>, (time, value): (SimTime, f64)) -> f64 {
+    last.map_or(0.0, |(before, old)| {
+        let seconds = time.since(before);
+        if seconds <= SILENCE_S {
+            0.5 * (value - old) * seconds
+        } else {
+            0.0
+        }
+    })
 }

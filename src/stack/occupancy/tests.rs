@@ -221,6 +221,6 @@ fn a_train_may_come_back_onto_the_other_leg() {
     on(&drive(&mut occupancy, 1, 0.0, 10.0, 20), 1);
     drive(&mut occupancy, 1, 200.0, -10.0, 20);
     on(&drive(&mut occupancy, 0, STEM_M, -10.0, 10), 0);
-    on(&drive(&mut occupancy, 0, 200.0, 10.0, 10), 0);
+    on(&drive(&mut occupancy, 0, 200.0, 10.0, 9), 0);
     on(&drive(&mut occupancy, 2, 0.0, 10.0, 20), 2);
 }
