@@ -14,5 +14,6 @@ mod common;
 mod fuzz;
 
 mod check;
+mod maps;
 mod stack;
 mod study;

@@ -209,7 +209,8 @@ impl FixRow {
             ));
         }
         let turn = nalgebra::Rotation2::new(-datum.heading_deg.to_radians());
-        Ok(turn.matrix() * of_plane * turn.matrix().transpose())
+        let turned = turn.matrix() * of_plane * turn.matrix().transpose();
+        Ok(0.5 * (turned + turned.transpose()))
     }
 }
 

@@ -63,6 +63,12 @@ impl Hypothesis {
         self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
     }
 
+    /// Whether all of it is numbers: what rounding has made of it otherwise is worth nothing.
+    pub fn is_finite(&self) -> bool {
+        let all = self.mean.iter().chain(self.covariance.iter());
+        self.covariance[(PLACE, PLACE)] >= 0.0 && all.copied().all(f64::is_finite)
+    }
+
     /// What may be needed of the course: chords between bogies, where the train may be, and it itself.
     fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
         let reach_m = 0.5 * settings.bogie_distance_m + NEAR_M + FAR_SIGMAS * self.sigma_m();

@@ -57,6 +57,12 @@ use nalgebra::{Matrix2, Point2};
 use receiver::Receiver;
 use std::sync::Arc;
 
+/// Inputs beyond these are no measurements of a train: speed, yaw rate, distance from the world's origin, and the
+/// standard deviation of a fix.
+const MOST_MPS: f64 = 200.0;
+const MOST_RADPS: f64 = 10.0;
+const FARTHEST_M: f64 = 1e7;
+const LEAST_SIGMA_M: f64 = 1e-3;
 /// A new start looks for tracks within so many standard deviations of a fix, and within so many metres.
 const START_SIGMAS: f64 = 6.0;
 const START_M: f64 = 20.0;
@@ -81,6 +87,19 @@ pub struct Fix {
     pub place: Point2<f64>,
     /// Of x and y.
     pub covariance_m2: Matrix2<f64>,
+}
+
+impl Fix {
+    /// Whether it can be one of a receiver on a railway.
+    fn is_possible(&self) -> bool {
+        let variances = [(0, 0), (1, 1)].map(|at| self.covariance_m2[at]);
+        self.place.iter().all(|m| m.abs() <= FARTHEST_M)
+            && variances
+                .iter()
+                .all(|m2| LEAST_SIGMA_M.powi(2) <= *m2 && *m2 <= FARTHEST_M)
+            && self.covariance_m2 == self.covariance_m2.transpose()
+            && self.covariance_m2.cholesky().is_some()
+    }
 }
 
 /// The filter.
@@ -131,9 +150,9 @@ impl Occupancy {
         self.hypotheses.len()
     }
 
-    /// Takes the speed, forwards positive. What is older than the last input is dropped.
+    /// Takes the speed, forwards positive. What no train can have, or is older than the last input, is dropped.
     pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
-        if speed_mps.is_finite() && self.run_to(time) {
+        if speed_mps.abs() <= MOST_MPS && self.run_to(time) {
             let more_m = change_since(self.speed, (time, speed_mps));
             self.since.0 += more_m;
             self.speed = Some((time, speed_mps));
@@ -144,7 +163,7 @@ impl Occupancy {
 
     /// Takes the yaw rate, to the left positive.
     pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
-        if yaw_rate_radps.is_finite() && self.run_to(time) {
+        if yaw_rate_radps.abs() <= MOST_RADPS && self.run_to(time) {
             self.turned_rad += change_since(self.yaw_rate, (time, yaw_rate_radps));
             self.yaw_rate = Some((time, yaw_rate_radps));
         }
@@ -152,12 +171,7 @@ impl Occupancy {
 
     /// Takes a fix.
     pub fn on_fix(&mut self, fix: &Fix) {
-        let is_number = fix
-            .place
-            .iter()
-            .chain(fix.covariance_m2.iter())
-            .all(|x| x.is_finite());
-        if !is_number || fix.covariance_m2.cholesky().is_none() || !self.run_to(fix.time) {
+        if !fix.is_possible() || !self.run_to(fix.time) {
             return;
         }
         self.advance();
@@ -314,7 +328,8 @@ impl Occupancy {
         for hypothesis in &mut self.hypotheses {
             hypothesis.log_probability -= log_sum;
         }
-        self.hypotheses.retain(|h| h.log_probability >= least);
+        self.hypotheses
+            .retain(|h| h.log_probability >= least && h.is_finite());
         (self.hypotheses).sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability));
         self.hypotheses.truncate(self.settings.most_hypotheses);
         self.grow();
