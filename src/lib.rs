@@ -10,9 +10,9 @@
 //! | room | what it holds |
 //! |---|---|
 //! | [`settings`] | how files are declared, read and checked |
-//! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices |
+//! | [`track`] | the line as surveyed: alignment, cross-sections, lamps, devices; networks in plan |
 //! | [`bus`] | what travels between the world and the stack, as plain data |
-//! | [`stack`] | the real thing: lamp decoding, positioning, obstacle detection, protection |
+//! | [`stack`] | the real thing: lamp decoding, positioning, track occupancy, obstacle detection, protection |
 //! | `twin` | the world: geometry, physics, renderers, sensors, links, faults |
 //! | `scenario` | the files a user writes |
 //! | `session` | one loop over world, sensors, links and equipment, scored against the truth |
