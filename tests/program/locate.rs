@@ -138,7 +138,8 @@ fn recorded() -> std::path::PathBuf {
 
 /// Every junction of a map of a region is something, and no train turns at one.
 #[test]
-#[ignore = "needs METROTWIN_RECORDED: maps/*_osm.json"]
+#[ignore = "needs METROTWIN_RECORDED, a folder with maps/*_osm.json that may not be distributed; \
+    track::import::junction and track::import::osm test the same on drawn junctions and a small map"]
 fn recorded_maps_are_read() {
     for entry in fs::read_dir(recorded().join("maps")).unwrap() {
         let path = entry.unwrap().path();

@@ -15,5 +15,6 @@ mod determinism;
 mod fault_matrix;
 mod faults;
 mod messages;
+mod occupancy;
 mod trains;
 mod validation;

@@ -8,10 +8,11 @@
 //!
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
+use super::fix_trust::Judged;
 use super::hypothesis::{
     EAST, HEADING, Hypothesis, KindError, NORTH, PLACE, SCALE, STATES, StateCovariance, YAW_OFFSET,
+    log_sum,
 };
-use super::receiver::Judged;
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
@@ -102,8 +103,7 @@ impl Hypothesis {
             true => (self.covariance, stays),
             false => (jumped, jumps),
         };
-        let most = stays_log.max(jumps_log);
-        let both = most + ((stays_log - most).exp() + (jumps_log - most).exp()).ln();
+        let both = log_sum(stays_log, jumps_log);
         let Some(inverse) = spread.try_inverse().filter(|_| both.is_finite()) else {
             return;
         };
@@ -133,8 +133,7 @@ impl Hypothesis {
         let fits_log =
             (1.0 - WRONG_HEADING).ln() - 0.5 * (off * off / variance + (TAU * variance).ln());
         let wrong_log = (WRONG_HEADING / TAU).ln();
-        let most = fits_log.max(wrong_log);
-        let both = most + ((fits_log - most).exp() + (wrong_log - most).exp()).ln();
+        let both = log_sum(fits_log, wrong_log);
         if !both.is_finite() {
             return;
         }

@@ -26,6 +26,12 @@ const NEAR_M: f64 = 1.0;
 /// Hypotheses whose places are farther apart stay two.
 const MERGED_SIGMAS: f64 = 3.0;
 
+/// Logarithm of the sum of two numbers that are given by theirs.
+pub fn log_sum(a: f64, b: f64) -> f64 {
+    let most = a.max(b);
+    most + ((a - most).exp() + (b - most).exp()).ln()
+}
+
 /// A course, its probability and the place along it.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
@@ -112,6 +118,9 @@ impl Hypothesis {
     /// Takes in another one that says the same of all that is to come; whether it does.
     pub fn merge(&mut self, other: &Self, settings: &OccupancySettings) -> bool {
         let [leg, of_other] = [&*self, other].map(|h| *h.course.leg_at(h.place_m()));
+        if leg.towards != of_other.towards {
+            return false;
+        }
         let mut mean = other.mean;
         mean[PLACE] += leg.begin_m - of_other.begin_m;
         let apart = mean - self.mean;
@@ -128,8 +137,7 @@ impl Hypothesis {
             return false;
         }
         let [own, others] = [self.log_probability, other.log_probability];
-        let most = own.max(others);
-        let sum = most + ((own - most).exp() + (others - most).exp()).ln();
+        let sum = log_sum(own, others);
         let (own, others) = ((own - sum).exp(), (others - sum).exp());
         self.log_probability = sum;
         self.mean += apart * others;

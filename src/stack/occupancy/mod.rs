@@ -32,17 +32,15 @@
 
 mod course;
 mod decision;
+mod fix_trust;
 mod fused;
 mod hypothesis;
 mod matching;
 mod pedal;
-mod receiver;
 mod settings;
-#[cfg(all(test, feature = "twin"))]
+#[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
-#[cfg(all(test, feature = "twin"))]
-mod validation;
 
 pub use decision::{Decision, TrackDecision};
 pub use matching::{Match, Matching, by_pedal_curve, by_perpendicular};
@@ -52,9 +50,9 @@ use crate::bus::SimTime;
 use crate::track::Direction;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use course::Course;
+use fix_trust::FixTrust;
 use hypothesis::{Hypothesis, State, StateCovariance};
 use nalgebra::{Matrix2, Point2};
-use receiver::Receiver;
 use std::sync::Arc;
 
 /// Inputs beyond these are no measurements of a train: speed, yaw rate, distance from the world's origin, and the
@@ -118,7 +116,7 @@ pub struct Occupancy {
     since_heading_m: f64,
     turned_rad: f64,
     lost: u32,
-    receiver: Receiver,
+    trust: FixTrust,
 }
 
 impl Occupancy {
@@ -136,13 +134,8 @@ impl Occupancy {
             since_heading_m: 0.0,
             turned_rad: 0.0,
             lost: 0,
-            receiver: Receiver::default(),
+            trust: FixTrust::default(),
         }
-    }
-
-    /// The network that it was given.
-    pub fn network(&self) -> &Arc<PlanNetwork> {
-        &self.network
     }
 
     /// How many hypotheses are alive.
@@ -176,7 +169,7 @@ impl Occupancy {
         }
         self.advance();
         let away_m = self.network.distance_m(&fix.place, OFF_TRACK_M);
-        let judged = self.receiver.judge(fix, away_m, &self.settings);
+        let judged = self.trust.judge(fix, away_m, &self.settings);
         let fix = &judged.fix;
         self.lost = if self.is_lost(fix) { self.lost + 1 } else { 0 };
         if self.hypotheses.is_empty() || self.lost >= LOST_FIXES {

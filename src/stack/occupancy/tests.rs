@@ -1,10 +1,7 @@
-//! The filter on measurements drawn by the models that it believes in: a switch, a parallel track, a way back.
-
-#![allow(clippy::print_stdout, reason = "a test prints its figures")]
+//! The filter where a train goes back through a switch.
 
 use super::*;
 use crate::track::plan::TrackElement;
-use crate::twin::random::Stream;
 use nalgebra::Vector2;
 
 const STEM_M: f64 = 300.0;
@@ -12,7 +9,7 @@ const STEM_M: f64 = 300.0;
 const RADIUS_M: f64 = 200.0;
 const BESIDE_M: f64 = 4.0;
 
-/// A stem that parts into a straight and a track beside it; both legs come together again after 600 m.
+/// A stem that parts into a straight and a track beside it.
 fn network() -> Arc<PlanNetwork> {
     let angle = (1.0f64 / 9.0).atan();
     let arc_m = RADIUS_M * angle;
@@ -37,154 +34,6 @@ fn network() -> Arc<PlanNetwork> {
     let end = |element, way| ElementEnd { element, way };
     let joints = [1, 2].map(|leg| (end(0, Direction::Up), end(leg, Direction::Down)));
     PlanNetwork::new(None, elements.into_iter().flatten().collect(), &joints).into()
-}
-
-/// What a train is given that runs up the stem and on over a leg.
-struct Run {
-    leg: usize,
-    speed_mps: f64,
-    with_gyro: bool,
-    seed: u64,
-}
-
-impl Run {
-    /// Goes 500 m beyond the toe; calls `look` after each fix with the distance beyond the toe.
-    fn go(&self, settings: OccupancySettings, mut look: impl FnMut(f64, &Decision)) {
-        let network = network();
-        let mut occupancy = Occupancy::new(Arc::clone(&network), settings);
-        let stream = Stream::new(self.seed, self.leg as u64, "occupancy test");
-        let normal = |what: u64, k: u64| stream.normal(what * 1_000_000 + k);
-        let at = |m: f64| match m < STEM_M {
-            true => network.elements[0].at(m),
-            false => network.elements[self.leg].at(m - STEM_M),
-        };
-        // One metre an axis, as the filter believes it: four fifths of the variance change slowly.
-        let (slow, white) = (0.8f64.sqrt(), 0.2f64.sqrt());
-        let (rate_hz, mut error) = (10.0, Vector2::new(normal(0, 0), normal(1, 0)) * slow);
-        let scale = 1.0 + 0.01 * normal(2, 0);
-        let yaw_offset = 5e-4 * normal(3, 0);
-        let keep = (-1.0 / (rate_hz * settings.correlation_s)).exp();
-        let mut heading_rad = 0.0;
-        let count = ((STEM_M + 500.0 - 100.0) / self.speed_mps * rate_hz) as u64;
-        for k in 1..count {
-            let time = SimTime::from_secs(k as f64 / rate_hz);
-            let m = 100.0 + self.speed_mps * k as f64 / rate_hz;
-            let chord = at(m + 7.5).0 - at(m - 7.5).0;
-            let now_rad = chord.y.atan2(chord.x);
-            let turned_radps = (now_rad - heading_rad) * rate_hz;
-            heading_rad = now_rad;
-            occupancy.on_speed(time, self.speed_mps * scale + 0.05 * normal(4, k));
-            if self.with_gyro {
-                let noise = yaw_offset + 1e-3 * normal(5, k);
-                occupancy.on_yaw_rate(time, turned_radps + noise);
-            }
-            let step =
-                Vector2::new(normal(6, k), normal(7, k)) * (slow * (1.0 - keep * keep).sqrt());
-            error = error * keep + step;
-            let place = at(m).0 + error + Vector2::new(normal(8, k), normal(9, k)) * white;
-            occupancy.on_fix(&Fix {
-                time,
-                place,
-                covariance_m2: Matrix2::identity(),
-            });
-            look(m - STEM_M, &occupancy.decision());
-        }
-    }
-}
-
-/// Fails where a leg is told too late, or the wrong one is: 20 runs over each leg at two speeds.
-#[test]
-fn a_yaw_rate_tells_the_leg_soon() {
-    let mut distances_m = Vec::new();
-    for seed in 0..20 {
-        for (leg, speed_mps) in [(1, 8.0), (2, 8.0), (1, 22.0), (2, 22.0)] {
-            let run = Run {
-                leg,
-                speed_mps,
-                with_gyro: true,
-                seed,
-            };
-            let mut told_m = f64::INFINITY;
-            run.go(OccupancySettings::default(), |beyond_m, decision| {
-                let best = &decision.tracks[0];
-                if beyond_m > 5.0 && decision.is_identified() {
-                    assert_eq!(best.element, leg, "{seed} {leg} {speed_mps}: at {beyond_m}");
-                    told_m = told_m.min(beyond_m);
-                }
-            });
-            distances_m.push(told_m);
-        }
-    }
-    let mean_m = distances_m.iter().sum::<f64>() / distances_m.len() as f64;
-    let worst_m = distances_m.iter().copied().fold(0.0, f64::max);
-    println!("identified {mean_m:.1} m beyond the toe in the mean, {worst_m:.1} m at worst");
-    assert!(mean_m < 30.0, "{mean_m}");
-    assert!(worst_m < 60.0, "{worst_m}");
-}
-
-/// Fails where fixes that are wrong for a minute are taken for as many measurements as they are: without a yaw rate
-/// the wrong leg may be the more probable one, but is never the only one left, and is as often wrong as it says.
-#[test]
-fn correlated_errors_make_no_false_certainty() {
-    let (mut said, mut right, mut count) = (0.0, 0.0, 0);
-    for seed in 0..60 {
-        for leg in [1, 2] {
-            let run = Run {
-                leg,
-                speed_mps: 15.0,
-                with_gyro: false,
-                seed,
-            };
-            let mut last = None;
-            run.go(OccupancySettings::default(), |beyond_m, decision| {
-                let best = decision.tracks[0];
-                if beyond_m > 5.0 && decision.is_identified() {
-                    assert_eq!(best.element, leg, "{seed} {leg}: at {beyond_m}");
-                }
-                last = Some(best);
-            });
-            let best = last.unwrap();
-            said += best.probability;
-            right += f64::from(u8::from(best.element == leg));
-            count += 1;
-        }
-    }
-    let [said, right] = [said, right].map(|sum| sum / f64::from(count));
-    println!("the more probable leg: {said:.3} by its own word, {right:.3} right");
-    // Three standard deviations of the share of 120 runs.
-    let sigma = (said * (1.0 - said) / f64::from(count)).sqrt();
-    assert!(
-        (said - right).abs() < 3.0 * sigma.max(0.01),
-        "{said} {right}"
-    );
-}
-
-/// Fails where the seed's method takes its match elsewhere than on the track, or never decides.
-#[test]
-fn matches_alone_tell_legs_of_good_fixes() {
-    for method in [Method::Pedal, Method::Perpendicular] {
-        let settings = OccupancySettings {
-            method,
-            correlation_s: 1e-3,
-            ..OccupancySettings::default()
-        };
-        for leg in [1, 2] {
-            let run = Run {
-                leg,
-                speed_mps: 15.0,
-                with_gyro: false,
-                seed: 3,
-            };
-            let mut told_m = f64::INFINITY;
-            run.go(settings, |beyond_m, decision| {
-                if beyond_m > 5.0 && decision.is_identified() {
-                    assert_eq!(decision.tracks[0].element, leg, "{method:?} at {beyond_m}");
-                    told_m = told_m.min(beyond_m);
-                }
-            });
-            assert!(told_m < 150.0, "{method:?}: {told_m}");
-        }
-    }
 }
 
 /// Fails where a train that goes back through a switch is held on the leg that it came from, although the switch may

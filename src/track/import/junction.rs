@@ -152,4 +152,32 @@ mod tests {
         );
         assert_eq!(junction(&ways(&[0.0]), false).0, JunctionKind::End);
     }
+
+    /// Whatever tracks meet: no train turns by a right angle or more, and three tracks of which one leads to both
+    /// others are a switch.
+    #[test]
+    fn no_train_turns() {
+        for first in (0..360).step_by(5) {
+            for second in (first..360).step_by(5) {
+                let directions = ways(&[0.0, f64::from(first), f64::from(second)]);
+                let (kind, pairs) = junction(&directions, false);
+                let turns = pairs.iter().map(|pair| turn_rad(&directions, *pair));
+                assert!(turns.clone().all(|turn| turn < MOST_TURN_RAD));
+                let has_toe = (0..3).any(|toe| {
+                    let legs = [(toe + 1) % 3, (toe + 2) % 3];
+                    legs.iter()
+                        .all(|leg| turn_rad(&directions, (toe, *leg)) < MOST_TURN_RAD)
+                });
+                assert_eq!(kind == JunctionKind::Switch, has_toe, "{first} {second}");
+                for fourth in [0, 90, 200] {
+                    let four = [directions.clone(), ways(&[f64::from(fourth)])].concat();
+                    for slips in [false, true] {
+                        let (_, pairs) = junction(&four, slips);
+                        let mut turns = pairs.iter().map(|pair| turn_rad(&four, *pair));
+                        assert!(turns.all(|turn| turn < MOST_TURN_RAD));
+                    }
+                }
+            }
+        }
+    }
 }

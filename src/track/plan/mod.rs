@@ -195,12 +195,6 @@ impl PlanNetwork {
             within_m *= 4.0;
         }
     }
-
-    /// How many of its ends are run facing a switch.
-    pub fn facing_switches(&self) -> usize {
-        let ends = self.onward.iter().flatten();
-        ends.filter(|next| next.len() > 1).count()
-    }
 }
 
 impl TrackElement {

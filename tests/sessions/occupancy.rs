@@ -3,15 +3,16 @@
 //!
 //! A line of stages: a stem, a facing switch (1 in 9, 200 m), two tracks 4 m apart, a trailing switch. Which leg is
 //! run is drawn. The satellite receiver has an error of 1 m on each axis, of which the greater part changes slowly;
-//! speed has an error of scale and noise, the yaw rate an offset and noise, the map one of 0.3 m. `cargo test --release --lib
-//! stack::occupancy::validation -- --nocapture` prints the tables.
+//! speed has an error of scale and noise, the yaw rate an offset and noise, the map one of 0.3 m.
+//! `cargo test --release --test sessions occupancy -- --nocapture` prints the tables.
 
-#![allow(clippy::print_stdout, reason = "a validation shows its figures")]
-
-use super::*;
-use crate::track::plan::TrackElement;
-use crate::twin::random::Stream;
-use nalgebra::Vector2;
+use metrotwin::bus::SimTime;
+use metrotwin::stack::occupancy::{Decision, Fix, Method, Occupancy, OccupancySettings};
+use metrotwin::track::Direction;
+use metrotwin::track::plan::{ElementEnd, PlanNetwork, TrackElement};
+use metrotwin::twin::random::Stream;
+use nalgebra::{Matrix2, Point2, Vector2};
+use std::sync::Arc;
 
 const STEM_M: f64 = 120.0;
 /// From the toe of one switch to that of the other.
@@ -29,9 +30,9 @@ const MAP_SIGMA_M: f64 = 0.3;
 /// The next switch counts from so far before it: a place that is wrong by less is no wrong track.
 const BEFORE_END_M: f64 = 15.0;
 
-/// How the receiver errs, which is not how the filter thinks that it does.
+/// How a receiver errs.
 #[derive(Clone, Copy)]
-struct Receiver {
+struct FixErrors {
     slow_share: f64,
     correlation_s: f64,
     /// Jumps an hour, by 10 m.
@@ -39,11 +40,11 @@ struct Receiver {
 }
 
 /// Of a fix: 1 m on each axis, more along one diagonal than along the other.
-fn receiver_m2() -> Matrix2<f64> {
+fn covariance_m2() -> Matrix2<f64> {
     Matrix2::new(1.0, 0.5, 0.5, 1.0)
 }
 
-const AS_BELIEVED: Receiver = Receiver {
+const AS_BELIEVED: FixErrors = FixErrors {
     slow_share: 0.8,
     correlation_s: 60.0,
     jumps_per_h: 0.0,
@@ -181,7 +182,7 @@ impl Tally {
 fn run(
     network: &Arc<PlanNetwork>,
     settings: &OccupancySettings,
-    (receiver, speed_mps): (Receiver, f64),
+    (errors, speed_mps): (FixErrors, f64),
     (seed, with_gyro): (u64, bool),
     tally: &mut Tally,
 ) {
@@ -212,9 +213,9 @@ fn run(
         )
     };
     let mut occupancy = Occupancy::new(Arc::clone(network), *settings);
-    let slow = receiver.slow_share.sqrt();
-    let white = (1.0 - receiver.slow_share).sqrt();
-    let keep = (-1.0 / (RATE_HZ * receiver.correlation_s)).exp();
+    let slow = errors.slow_share.sqrt();
+    let white = (1.0 - errors.slow_share).sqrt();
+    let keep = (-1.0 / (RATE_HZ * errors.correlation_s)).exp();
     let mut error = Vector2::new(normal(0, 0), normal(1, 0)) * slow;
     let (scale, yaw_offset) = (1.0 + 0.01 * normal(2, 0), 5e-4 * normal(3, 0));
     let mut identified: Option<(usize, f64)> = None;
@@ -240,20 +241,20 @@ fn run(
         }
         let step = Vector2::new(normal(6, k), normal(7, k));
         error = error * keep + step * (slow * (1.0 - keep * keep).sqrt());
-        if stream.uniform(800_000_000 + k) < receiver.jumps_per_h / 3600.0 / RATE_HZ {
+        if stream.uniform(800_000_000 + k) < errors.jumps_per_h / 3600.0 / RATE_HZ {
             error += Vector2::new(normal(10, k), normal(11, k)) * 10.0;
         }
         let (element, along_m, place) = at(m);
         let stage = (element / 3) as u64;
         let map_off = Vector2::new(normal(12, stage), normal(13, stage)) * MAP_SIGMA_M;
         let noise = Vector2::new(normal(8, k), normal(9, k)) * white;
-        let error = receiver_m2()
+        let error = covariance_m2()
             .cholesky()
             .map_or(error, |root| root.l() * (error + noise));
         occupancy.on_fix(&Fix {
             time,
             place: place + map_off + error,
-            covariance_m2: receiver_m2(),
+            covariance_m2: covariance_m2(),
         });
         let decision = occupancy.decision();
         tally.add(&decision, element);
@@ -308,7 +309,7 @@ const SPEEDS_KMH: [f64; 5] = [20.0, 40.0, 60.0, 80.0, 100.0];
 
 fn tally(
     method: Method,
-    receiver: Receiver,
+    errors: FixErrors,
     speeds_kmh: &[f64],
     runs: u64,
     with_gyro: bool,
@@ -321,7 +322,7 @@ fn tally(
     let mut tally = Tally::default();
     for seed in 0..runs {
         for speed_kmh in speeds_kmh {
-            let drawn = (receiver, speed_kmh / 3.6);
+            let drawn = (errors, speed_kmh / 3.6);
             run(&network, &settings, drawn, (seed, with_gyro), &mut tally);
         }
     }
@@ -346,7 +347,7 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
             tally(method, AS_BELIEVED, &SPEEDS_KMH, 4, false),
         ));
     }
-    let white = Receiver {
+    let white = FixErrors {
         slow_share: 0.0,
         ..AS_BELIEVED
     };
@@ -380,7 +381,7 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
         all.sigmas(),
         rows[3].1.sigmas()
     );
-    let ([mean, _, _], undecided) = all.distances();
+    let ([mean, _, most], undecided) = all.distances();
     let right = all.switches.iter().filter(|s| s.right).count() as f64 / all.switches.len() as f64;
     println!(
         "fused: {} switches, {} fixes, mean {mean:.1} m, {:.3} % right",
@@ -392,6 +393,16 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
     assert!(mean < 30.0, "{mean}");
     assert!(right > 0.999 && undecided < 0.01, "{right} {undecided}");
     assert_eq!(all.classes[0], 0, "wrong with certainty");
+    assert!(most < 60.0, "{most}");
+    // Matches alone tell the legs where errors are white.
+    for (name, of) in &rows[2..4] {
+        let ([_, _, most], undecided) = of.distances();
+        let all_right = of.switches.iter().all(|switch| switch.right);
+        assert!(
+            all_right && undecided < 0.01 && most < 200.0,
+            "{name}: {most} {undecided}"
+        );
+    }
     // Without a yaw rate nothing may be certain that is wrong, either.
     assert_eq!(rows[4].1.classes[0], 0);
 }
@@ -399,40 +410,40 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
 /// Errors that are otherwise than believed, and jumps.
 #[test]
 fn val_other_errors_make_no_false_certainty() {
-    let receivers = [
+    let models = [
         (
             "over 20 s",
-            Receiver {
+            FixErrors {
                 correlation_s: 20.0,
                 ..AS_BELIEVED
             },
         ),
         (
             "over 300 s",
-            Receiver {
+            FixErrors {
                 correlation_s: 300.0,
                 ..AS_BELIEVED
             },
         ),
         (
             "all of it slow",
-            Receiver {
+            FixErrors {
                 slow_share: 0.99,
                 ..AS_BELIEVED
             },
         ),
         (
             "jumps, 20 an hour",
-            Receiver {
+            FixErrors {
                 jumps_per_h: 20.0,
                 ..AS_BELIEVED
             },
         ),
     ];
     let mut rows = Vec::new();
-    for (name, receiver) in receivers {
+    for (name, errors) in models {
         for (with_gyro, by) in [(true, ""), (false, ", no yaw rate")] {
-            let of = tally(Method::Fused, receiver, &[40.0, 80.0], 4, with_gyro);
+            let of = tally(Method::Fused, errors, &[40.0, 80.0], 4, with_gyro);
             rows.push((format!("{name}{by}"), of));
         }
     }

@@ -17,15 +17,16 @@ const OFF_TRACK_SIGMAS: f64 = 2.0;
 const TRUST_S: f64 = 30.0;
 /// Kinds whose variances differ by less than this factor are one.
 const KIND_FACTOR: f64 = 4.0;
-/// All kinds of fixes of a receiver.
+
+/// How far each kind of a receiver's fixes is believed.
 #[derive(Clone, Debug, Default)]
-pub struct Receiver {
-    kinds: BTreeMap<i32, Kind>,
+pub struct FixTrust {
+    kinds: BTreeMap<i32, KindTrust>,
 }
 
 /// Fixes of a kind.
 #[derive(Clone, Copy, Debug)]
-struct Kind {
+struct KindTrust {
     seen: SimTime,
     /// They are wrong by so much more than stated, metres.
     floor_m: f64,
@@ -41,7 +42,7 @@ pub struct Judged {
     pub is_worse: bool,
 }
 
-impl Receiver {
+impl FixTrust {
     /// Judges a fix that is so far from the nearest track.
     pub fn judge(&mut self, fix: &Fix, away_m: f64, settings: &OccupancySettings) -> Judged {
         let variance_m2 = 0.5 * fix.covariance_m2.trace();
@@ -57,7 +58,7 @@ impl Receiver {
         } else {
             left_m
         };
-        let kind = Kind {
+        let kind = KindTrust {
             seen: fix.time,
             floor_m,
         };
@@ -89,9 +90,9 @@ mod tests {
     /// Fails where a fix far off any track is believed, or where another kind suffers for it.
     #[test]
     fn a_kind_that_was_far_off_is_believed_less_for_a_while() {
-        let (mut receiver, settings) = (Receiver::default(), OccupancySettings::default());
+        let (mut trust, settings) = (FixTrust::default(), OccupancySettings::default());
         let mut sigma_m = |second, sigma_m, away_m| {
-            let judged = receiver.judge(&fix(second, sigma_m), away_m, &settings);
+            let judged = trust.judge(&fix(second, sigma_m), away_m, &settings);
             judged.fix.covariance_m2[(0, 0)].sqrt()
         };
         assert!((sigma_m(0.0, 0.1, 0.3) - 0.1).abs() < 1e-12);
