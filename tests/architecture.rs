@@ -53,3 +53,21 @@ fn the_architecture_page_gives_names_that_exist() {
     }
     assert!(checked > 40, "{checked}");
 }
+
+/// What would run on a train, and its tests, know nothing of the world: a test behind a feature would slip past a
+/// build without it.
+#[test]
+fn the_stack_and_below_do_not_name_the_rooms_above() {
+    for room in ["settings", "track", "bus", "stack"] {
+        for above in ["twin", "scenario", "session", "record", "study", "cli"] {
+            for root in ["crate", "metrotwin"] {
+                let named = format!("use {root}::{above}::");
+                assert!(
+                    !has(&Path::new("src").join(room), &named),
+                    "src/{room}: {named}"
+                );
+            }
+        }
+    }
+    assert!(has(Path::new("src/twin"), "use crate::twin::"));
+}
