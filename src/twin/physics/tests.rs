@@ -158,6 +158,31 @@ fn no_false_slide_on_rough_rails() {
     assert!(train.standing && 3.6 * fastest_mps > 60.0);
 }
 
+/// Trains that start at speed anywhere in a canted curve on level track: none is thrown off by the change of cant that
+/// its first step finds.
+#[test]
+fn a_run_may_begin_in_a_canted_curve() {
+    let text = "name = 'curve'\nplan = [\n\
+        { kind = 'straight', length_m = 200.0 },\n{ kind = 'clothoid', length_m = 60.0 },\n\
+        { kind = 'arc', length_m = 90.0, radius_m = 500.0, turn = 'left', cant_mm = 100.0 },\n\
+        { kind = 'clothoid', length_m = 60.0 },\n{ kind = 'straight', length_m = 300.0 }]";
+    let tunnel = Arc::new(Tunnel::from_toml(text).unwrap());
+    for k in 0..12 {
+        let train = TrainSettings {
+            cars: 1,
+            start_chainage_m: 280.0 + 17.0 * f64::from(k),
+            start_speed_kmh: 60.0,
+            ..TrainSettings::default()
+        };
+        let mut world = World::new(tunnel.clone(), &settings(train), 1, 0).unwrap();
+        for _ in 0..100 {
+            world.step(&[command(BrakeDemand::None, GO)]).unwrap();
+        }
+        let load = world.wheel_extremes(TRAIN).unwrap().least_normal_n;
+        assert!(load > 10_000.0, "{k}: {load} N");
+    }
+}
+
 /// Same seed, same bytes; another seed or run, another shake.
 #[test]
 fn determinism() {

@@ -68,8 +68,9 @@ pub(super) struct Wheelset {
     pub rolled_m: f64,
     /// Chainage of the axle.
     pub s_m: f64,
-    /// Roll of the rails by cant, and how it changes.
+    /// Roll of the rails by cant, where that is, and how it changes.
     roll_rad: f64,
+    roll_at_m: f64,
     roll_rad_per_m: f64,
     /// Elastic slip of its brake.
     brake_slip_m: f64,
@@ -140,6 +141,7 @@ impl Wheelset {
         Self {
             s_m,
             roll_rad,
+            roll_at_m: s_m,
             tread_mps: speed_mps,
             effort_share: EffortShare::new(speed_mps),
             ..Self::default()
@@ -201,12 +203,12 @@ impl Wheelset {
         let (origin, designed) = rail_axes(&frame);
         let along = (state.position - origin).dot(designed.x);
         let s_m = guess + along / (1.0 + frame.slope * frame.slope).sqrt();
-        let (run_m, turn) = (s_m - self.s_m, frame.roll_rad - self.roll_rad);
-        // The cant is that of the guess, micrometres away; standing, its change stays.
+        let (run_m, turn) = (guess - self.roll_at_m, frame.roll_rad - self.roll_rad);
+        // Standing, the change of cant stays.
         if run_m.abs() > 1e-7 {
             self.roll_rad_per_m = turn / run_m;
         }
-        (self.s_m, self.roll_rad) = (s_m, frame.roll_rad);
+        (self.s_m, self.roll_at_m, self.roll_rad) = (s_m, guess, frame.roll_rad);
         let d = track.deviation_at(s_m);
         // The angle is some mrad at most: to 1e-12.
         let half = 0.5 * d.roll_rad * d.roll_rad;
