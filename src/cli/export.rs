@@ -3,22 +3,27 @@
 use super::check::read;
 use super::fault::Failure;
 use super::file_kind::FileKind;
-use super::print;
+use super::{print, write_whole};
 use crate::track::geodesy::Datum;
-use crate::track::network::{Crossing, Network};
-use crate::track::{Track, TrackPoint, Tunnel};
+use crate::track::network::{Crossing, Network, TrackEnd};
+use crate::track::{Alignment, Direction, Track, TrackPoint, Tunnel};
 use nalgebra::Point3;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Points of a line are so close that a chord is under 2 cm off a curve of 150 m.
+/// Points of a line are no farther apart, and so close that a chord is so far off a curve at most.
 const STEP_M: f64 = 5.0;
+const CHORD_ERROR_M: f64 = 0.04;
 
 const AFTER: &str = "\
-Examples:
-  metrotwin export geojson tunnels/chengdu_line1.toml > chengdu_line1.geojson";
+Tracks are line strings with their name as `id`; each joint, and each leg of a switch, is a relation between two of
+them (netelementA, netelementB, positionOnA, positionOnB, navigability), as `metrotwin locate --network` reads them.
 
-/// Write a tunnel in a format of others, on standard output
+Examples:
+  metrotwin export geojson tunnels/chengdu_line1.toml > chengdu_line1.geojson
+  metrotwin export geojson tunnels/terminus.toml --out out/terminus.geojson";
+
+/// Write a tunnel in a format of others
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct ExportArgs {
@@ -33,11 +38,14 @@ enum Format {
         /// Tunnel file with a [datum]
         #[arg(value_name = "TUNNEL")]
         tunnel: PathBuf,
+        /// Write to this file instead of standard output
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
     },
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
-    let Format::Geojson { tunnel: path } = &args.format;
+    let Format::Geojson { tunnel: path, out } = &args.format;
     let text = read(path)?;
     FileKind::refuse_other_than_tunnel(path, &text)?;
     let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
@@ -51,7 +59,11 @@ pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
         "type": "FeatureCollection",
         "features": features(&tunnel, &datum),
     });
-    print(&serde_json::to_string(&collection).map_err(Failure::run)?)
+    let text = serde_json::to_string(&collection).map_err(Failure::run)?;
+    match out {
+        Some(out) => write_whole(out, &text),
+        None => print(&text),
+    }
 }
 
 /// What stands on the map: of every track its centreline first; then the switches and crossings.
@@ -68,7 +80,48 @@ fn features(tunnel: &Tunnel, datum: &Datum) -> Vec<Value> {
     });
     let crossings = network.crossings.iter();
     let crossings = crossings.filter_map(|crossing| of_crossing(network, crossing, datum));
-    of_tracks.chain(switches).chain(crossings).collect()
+    let relations = relations(network).into_iter();
+    let relations = relations.filter_map(|ends| of_relation(network, ends, datum));
+    of_tracks
+        .chain(switches)
+        .chain(crossings)
+        .chain(relations)
+        .collect()
+}
+
+/// Ends of tracks between which trains run, each two once.
+fn relations(network: &Network) -> Vec<[TrackEnd; 2]> {
+    let pairs = network
+        .ends()
+        .flat_map(|end| network.next(end).map(move |next| [end, next]));
+    let mut pairs: Vec<[TrackEnd; 2]> = pairs.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+fn of_relation(network: &Network, ends: [TrackEnd; 2], datum: &Datum) -> Option<Value> {
+    let at = network.leaving(ends[0])?;
+    let [a, b] = ends.map(|end| network.track(end.track).map(|track| &*track.name));
+    let [on_a, on_b] = ends.map(|end| u8::from(end.way == Direction::Up));
+    let properties = json!({
+        "kind": "relation",
+        "id": format!("{} {on_a} - {} {on_b}", a?, b?),
+        "netelementA": a,
+        "netelementB": b,
+        "positionOnA": on_a,
+        "positionOnB": on_b,
+        "navigability": "both",
+    });
+    Some(feature("Point", position(datum, &at.origin), properties))
+}
+
+/// From point to point of a line.
+fn step_m(line: &Alignment) -> f64 {
+    let places = (0..=line.length_m() as u32).map(f64::from);
+    let bends = places.map(|s_m| line.at(s_m).curvature_per_m.abs());
+    let tightest_per_m = bends.fold(0.0, f64::max);
+    STEP_M.min((8.0 * CHORD_ERROR_M / tightest_per_m.max(1e-12)).sqrt())
 }
 
 fn of_crossing(network: &Network, crossing: &Crossing, datum: &Datum) -> Option<Value> {
@@ -116,12 +169,11 @@ fn position(datum: &Datum, world: &Point3<f64>) -> Value {
 
 fn of_track(track: &Track, datum: &Datum) -> Vec<Value> {
     let line = &track.alignment;
-    let steps = (line.length_m() / STEP_M).ceil().max(1.0);
+    let steps = (line.length_m() / step_m(line)).ceil().max(1.0);
     let chainages = (0..=steps as u32).map(|k| line.length_m() * f64::from(k) / steps);
     let course = chainages.map(|s_m| position(datum, &line.at(s_m).origin));
     let course: Vec<_> = course.collect();
-    let mut properties =
-        json!({ "kind": "track", "name": track.name, "length_m": line.length_m() });
+    let mut properties = json!({ "kind": "track", "id": track.name, "name": track.name, "length_m": line.length_m() });
     let ends = [("stated_begin", 0.0), ("stated_end", line.length_m())];
     add_stated(&mut properties, track, ends);
     let course = feature("LineString", json!(course), properties);
@@ -157,6 +209,7 @@ fn of_track(track: &Track, datum: &Datum) -> Vec<Value> {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::track::plan::{ElementEnd, PlanNetwork};
 
     /// Provokes: latitude and longitude in the wrong order, things left out, a line whose length on the earth
     /// is not that of the tunnel.
@@ -194,6 +247,42 @@ mod tests {
             .sum();
         assert!((length_m / 3000.0 - 1.0).abs() < 3e-3, "{length_m}");
         assert!((degrees[0][0] - 104.066).abs() < 1e-6 && (degrees[0][1] - 30.657).abs() < 1e-6);
+    }
+
+    /// Provokes: tracks or joints that are lost, joined at the wrong end, or elsewhere on the earth.
+    #[test]
+    fn a_network_is_the_same_when_read_again() {
+        for text in [
+            include_str!("../../tunnels/terminus.toml"),
+            include_str!("../../tests/tunnels/scissors.toml"),
+        ] {
+            let tunnel = Tunnel::from_toml(text).unwrap();
+            let datum = tunnel.datum.unwrap();
+            let features = features(&tunnel, &datum);
+            let collection = json!({ "type": "FeatureCollection", "features": features });
+            let again = PlanNetwork::from_geojson(&collection.to_string()).unwrap();
+            let plan = PlanNetwork::of_network(&tunnel.network, tunnel.datum);
+            assert_eq!(again.elements.len(), plan.elements.len());
+            for (k, (a, b)) in plan.elements.iter().zip(&again.elements).enumerate() {
+                assert_eq!(a.id, b.id);
+                assert!((a.length_m() - b.length_m()).abs() < 0.1);
+                for way in [Direction::Down, Direction::Up] {
+                    let end = ElementEnd { element: k, way };
+                    let sorted = |network: &PlanNetwork| {
+                        let mut onward = network.onward(end).to_vec();
+                        onward.sort_unstable();
+                        onward
+                    };
+                    assert_eq!(sorted(&plan), sorted(&again), "{}", a.id);
+                }
+                for share in [0.0, 0.3, 0.5, 1.0] {
+                    let [p, q] = [a, b].map(|e| e.at(share * e.length_m()).0);
+                    let place = again.datum.unwrap().geodetic(&Point3::new(q.x, q.y, 0.0));
+                    let q = datum.world(&place).xy();
+                    assert!((p - q).norm() < 0.1, "{}: {}", a.id, (p - q).norm());
+                }
+            }
+        }
     }
 
     /// Provokes: a chainage of another track, or one that no plan states, for instance on either side of a jump.

@@ -1,10 +1,7 @@
 //! Which kind of file a text is, by its keys.
 
-#[cfg(feature = "twin")]
 use super::fault::Failure;
-#[cfg(feature = "twin")]
 use crate::settings::{LONGEST_KEY, shortened};
-#[cfg(feature = "twin")]
 use std::path::Path;
 
 /// A kind of file of a user.
@@ -22,7 +19,6 @@ pub(super) enum FileKind {
 
 impl FileKind {
     /// Refuses what is for certain no tunnel: what it is says more than that all its keys are unknown in one.
-    #[cfg(feature = "twin")]
     pub(super) fn refuse_other_than_tunnel(path: &Path, text: &str) -> Result<(), Failure> {
         let table = text.parse::<toml::Table>().unwrap_or_default();
         let named = table.get("tunnel").and_then(toml::Value::as_str);

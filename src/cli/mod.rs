@@ -10,6 +10,7 @@
 //! metrotwin study run STUDY   many runs, and what they come to
 //! metrotwin check FILE...     tunnels and scenarios: errors and a short report
 //! metrotwin locate            on which track a train was, from recorded fixes
+//! metrotwin import osm FILE   a tunnel from a map of others
 //! metrotwin export geojson    a tunnel on a map
 //! metrotwin doctor            graphics adapters, and how fast this machine is
 //! ```
@@ -17,9 +18,12 @@
 mod chainage;
 mod check;
 mod excerpt;
+mod export;
 mod fault;
 mod file_kind;
+mod import;
 mod locate;
+mod map;
 mod tunnel;
 
 /// What needs the simulated world.
@@ -29,8 +33,6 @@ mod check_scenario;
 mod doctor;
 #[cfg(feature = "twin")]
 mod driver_noise;
-#[cfg(feature = "twin")]
-mod export;
 #[cfg(feature = "twin")]
 mod frames;
 #[cfg(feature = "twin")]
@@ -56,7 +58,9 @@ pub use check::check_text;
 
 use clap::{ArgAction, Parser, Subcommand};
 use fault::Failure;
+use std::fs;
 use std::io::{IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 use tracing::level_filters::LevelFilter;
 
@@ -98,7 +102,7 @@ enum Command {
     Study(study::StudyArgs),
     Check(check::CheckArgs),
     Locate(locate::LocateArgs),
-    #[cfg(feature = "twin")]
+    Import(import::ImportArgs),
     Export(export::ExportArgs),
     #[cfg(feature = "twin")]
     Doctor(doctor::DoctorArgs),
@@ -111,7 +115,11 @@ pub fn main() -> ExitCode {
     #[cfg(feature = "twin")]
     if !matches!(
         cli.command,
-        Command::Check(_) | Command::Export(_) | Command::Generate(_) | Command::Locate(_)
+        Command::Check(_)
+            | Command::Export(_)
+            | Command::Generate(_)
+            | Command::Import(_)
+            | Command::Locate(_)
     ) {
         driver_noise::silence();
     }
@@ -126,7 +134,7 @@ pub fn main() -> ExitCode {
         Command::Study(args) => study::study(&args),
         Command::Check(args) => check::check(&args),
         Command::Locate(args) => locate::locate(&args),
-        #[cfg(feature = "twin")]
+        Command::Import(args) => import::import(&args),
         Command::Export(args) => export::export(&args),
         #[cfg(feature = "twin")]
         Command::Doctor(args) => doctor::doctor(&args),
@@ -154,6 +162,26 @@ fn start_messages(verbose: u8) {
         .without_time()
         .init();
     fault::set_style();
+}
+
+/// Writes a file: whole or not at all.
+fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    let write = || {
+        if let Some(folder) = folder {
+            fs::create_dir_all(folder)?;
+        }
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let part = path.with_file_name(format!(".{name}.part"));
+        fs::write(&part, text)?;
+        fs::rename(part, path)
+    };
+    write().map_err(|error: std::io::Error| {
+        let what = format!("cannot write {}", path.display());
+        Failure::run(anyhow::Error::new(error).context(what))
+    })
 }
 
 /// Writes a result to standard output; a closed pipe is no failure.

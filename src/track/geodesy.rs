@@ -20,7 +20,12 @@
 //! "Transverse Mercator with an accuracy of a few nanometers", J. Geodesy 85, 2011), what is left out is below
 //! a micrometre within 3000 km of the meridian.
 
+mod utm;
+
+pub use utm::UtmZone;
+
 use nalgebra::{Point2, Point3, Rotation2};
+use serde::{Deserialize, Serialize};
 
 /// An ellipsoid of revolution.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,7 +43,7 @@ pub const WGS_84: Ellipsoid = Ellipsoid {
 };
 
 /// A place on the earth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Geodetic {
     /// North of the equator, degrees.
     pub latitude_deg: f64,

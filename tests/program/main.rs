@@ -21,6 +21,7 @@ mod digest;
 #[cfg(unix)]
 mod folders;
 mod frames;
+mod import;
 #[cfg(unix)]
 mod kills;
 mod locate;

@@ -4,16 +4,13 @@ mod output;
 mod recorded;
 mod speed_of_fixes;
 
-use super::check::{read, read_as};
+use super::check::read_as;
 use super::fault::Failure;
-use super::file_kind::FileKind;
+use super::map::read_network;
 use super::print;
 use crate::bus::SimTime;
 use crate::settings::ReadLimit;
 use crate::stack::occupancy::{Occupancy, OccupancySettings};
-use crate::track::Tunnel;
-use crate::track::geodesy::Datum;
-use crate::track::import::OsmImport;
 use crate::track::plan::PlanNetwork;
 use output::{Located, Report};
 use recorded::{RecordedFix, RecordedFixes};
@@ -26,7 +23,8 @@ const FAR_M: f64 = 5000.0;
 
 const AFTER: &str = "\
 NETWORK is a tunnel file with a [datum], GeoJSON of track elements (LineString with `id`) and relations
-(netelementA, netelementB, positionOnA, positionOnB, navigability), or raw JSON of OpenStreetMap with its nodes.
+(netelementA, netelementB, positionOnA, positionOnB, navigability), OpenStreetMap (raw JSON with its nodes, or XML), or
+railML with coordinates.
 FIXES is a table with the columns timestamp (seconds, or ISO 8601), latitude, longitude, and, if there are any,
 sigma_north_m, sigma_east_m, covariance_m2, position_type, solution_status. Without sigmas these come by the kind
 of solution. SPEEDS has timestamp and speed_mps, forwards positive. Without it, speed comes from the fixes.
@@ -42,7 +40,7 @@ Examples:
 #[derive(clap::Args)]
 #[command(after_help = AFTER)]
 pub(super) struct LocateArgs {
-    /// Map: a tunnel file or GeoJSON
+    /// Map: a tunnel file, GeoJSON, OpenStreetMap or railML
     #[arg(long, value_name = "NETWORK")]
     network: PathBuf,
     /// Recorded fixes
@@ -57,7 +55,7 @@ pub(super) struct LocateArgs {
 }
 
 pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
-    let (network, datum) = network(&args.network)?;
+    let (network, datum) = read_network(&args.network)?;
     let network = Arc::new(network);
     let text = read_as(&args.gnss, ReadLimit::RECORDED)?;
     let recorded = RecordedFixes::read(&text, &datum).map_err(|e| table(&args.gnss, &e))?;
@@ -107,54 +105,6 @@ fn run(
         });
     }
     located
-}
-
-fn network(path: &Path) -> Result<(PlanNetwork, Datum), Failure> {
-    let is_json = path
-        .extension()
-        .is_some_and(|ending| ending.to_string_lossy().ends_with("json"));
-    let text = match is_json {
-        true => read_as(path, ReadLimit::GEOJSON)?,
-        false => read(path)?,
-    };
-    let no_datum = || {
-        Failure::input(
-            format!("{} does not say where on the earth it is", path.display()),
-            "add a table [datum] with latitude_deg and longitude_deg of the world's origin",
-        )
-    };
-    let refused = |error: &dyn std::fmt::Display| {
-        Failure::input(
-            format!("{} cannot be used: {error}", path.display()),
-            "see `metrotwin locate --help` for what a network in JSON holds",
-        )
-    };
-    let network = match is_json {
-        true if is_osm(&text) => {
-            OsmImport::from_json(&text)
-                .map_err(|e| refused(&e))?
-                .network
-        }
-        true => PlanNetwork::from_geojson(&text).map_err(|e| refused(&e))?,
-        false if matches!(FileKind::of(&text), FileKind::Tunnel) => {
-            let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;
-            PlanNetwork::of_network(&tunnel.network, tunnel.datum)
-        }
-        false => {
-            return Err(Failure::input(
-                format!("{} is neither a tunnel file nor GeoJSON", path.display()),
-                "see `metrotwin locate --help`",
-            ));
-        }
-    };
-    let datum = network.datum.ok_or_else(no_datum)?;
-    Ok((network, datum))
-}
-
-/// Whether a JSON text is raw data of OpenStreetMap rather than GeoJSON.
-fn is_osm(text: &str) -> bool {
-    let key = |key: &str| text.find(key).unwrap_or(usize::MAX);
-    key("\"elements\"") < key("\"features\"")
 }
 
 /// Fixes that are nowhere near the network: most often latitude and longitude are swapped.

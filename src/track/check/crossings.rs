@@ -18,6 +18,7 @@ const SAME_M: f64 = 0.1;
 pub(super) fn crossings(
     entries: &[CrossingEntry],
     network: &Network,
+    slack_m: f64,
     check: &mut Checker<'_>,
 ) -> Vec<Crossing> {
     let mut all: Vec<Crossing> = Vec::new();
@@ -32,7 +33,7 @@ pub(super) fn crossings(
             check.problem("tracks", what, remedy);
         }
         check_level(&crossing, check);
-        check_angle(&crossing, check);
+        check_angle(&crossing, slack_m, check);
         check_room(&crossing, network, check);
         check_blades(&crossing, network, check);
         all.push(crossing);
@@ -130,9 +131,12 @@ fn check_level(crossing: &Crossing, check: &mut Checker<'_>) {
     }
 }
 
-fn check_angle(crossing: &Crossing, check: &mut Checker<'_>) {
+/// An angle is known as well as places half the crossing apart.
+fn check_angle(crossing: &Crossing, slack_m: f64, check: &mut Checker<'_>) {
     let tangent = crossing.angle_rad.tan();
-    if tangent < LEAST_TANGENT {
+    let Stretch { from_m, to_m, .. } = crossing.zone(0);
+    let unknown = slack_m / (0.5 * (to_m - from_m)).max(1.0);
+    if tangent < LEAST_TANGENT - unknown {
         let what = format!(
             "the tracks cross at {:.1} deg, 1 in {:.1}: a crossing with fixed rails does not guide wheels over so flat \
              an angle",

@@ -158,6 +158,11 @@ impl Findings {
         }
     }
 
+    /// Where each was found first, and the other track.
+    pub(super) fn places(&self) -> impl Iterator<Item = (Place, TrackId)> + '_ {
+        self.all.iter().map(|finding| (finding.of, finding.other))
+    }
+
     /// As problems; `key` is that of a track in the file.
     pub(super) fn tell(
         &self,

@@ -15,11 +15,13 @@ mod sections;
 mod switches;
 mod whole;
 
+pub(super) use neighbours::in_the_way;
+
 use super::file::{DatumEntry, TrackEntry, TunnelFile};
 use super::gauge::Gauge;
 use super::network::Network;
 use super::section::OutlinePoint;
-use super::{Alignment, Track, Tunnel};
+use super::{Alignment, Track, TrackId, Tunnel};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 use std::sync::Arc;
 
@@ -52,7 +54,7 @@ fn of_tunnel(mut error: FileError) -> FileError {
 }
 
 /// None where it is not known where its tracks are, which is a problem.
-fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Option<Tunnel> {
+pub(super) fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Option<Tunnel> {
     file.check("", problems);
     let check = &mut Checker::new("", problems);
     let entries = file.tracks();
@@ -75,11 +77,12 @@ fn check(file: &TunnelFile, problems: &mut Vec<Problem>) -> Option<Tunnel> {
     // Where tracks are not where they should be, all else follows from that.
     if check.is_right("") {
         switches::check_switches(&network, check);
-        let crossings = crossings::crossings(&file.crossings, &network, check);
+        let crossings = crossings::crossings(&file.crossings, &network, file.slack_m(), check);
         network = network.with_crossings(crossings);
         // What is said of a crossing that is not as it should be says also why trains would touch there.
         if check.is_right("crossings") {
-            neighbours::check_neighbours(&network, |track| key_of(file, track.0.into()), check);
+            let key = |track: TrackId| key_of(file, track.0.into());
+            neighbours::check_neighbours(&network, file.slack_m(), key, check);
         }
         whole::check_names(&network, check);
         whole::check_reach(&network, check);

@@ -25,25 +25,37 @@ const BESIDE_ZONE_M: f64 = 0.1;
 /// Walls may reach into each other by so much: chords of arcs, rounding.
 const OVERLAP_M: f64 = 0.02;
 
-/// Problems of tracks beside each other. `key` is that of a track in the file.
+/// Problems of tracks beside each other, nearer than they should be by more than `slack_m`. `key` is that of a track in
+/// the file.
 pub(super) fn check_neighbours(
     network: &Network,
+    slack_m: f64,
     key: impl Fn(TrackId) -> String,
     check: &mut Checker<'_>,
 ) {
+    findings(network, slack_m).tell(network, key, check);
+}
+
+/// Places of tracks where trains would touch those on another track, or where walls of one are in the way of the
+/// other: the first of each two tracks.
+pub(in crate::track) fn in_the_way(network: &Network, slack_m: f64) -> Vec<(Place, TrackId)> {
+    findings(network, slack_m).places().collect()
+}
+
+fn findings(network: &Network, slack_m: f64) -> Findings {
+    let mut findings = Findings::default();
     if network.tracks.len() < 2 {
-        return;
+        return findings;
     }
     let grid = Grid::of(network);
     let partings = Partings::of(network);
-    let mut findings = Findings::default();
     for checked in &grid.places {
         let mut lies_in_another = false;
         let mut nearest_room: Option<Room> = None;
         for (other, point) in grid.beside(network, checked.place.track, &checked.frame.origin) {
             let s_m = point.s_m;
             let place = Place { track: other, s_m };
-            let Some(pair) = Pair::of(network, checked, place, point) else {
+            let Some(pair) = Pair::of(network, slack_m, checked, place, point) else {
                 continue;
             };
             lies_in_another |= pair.holds();
@@ -70,7 +82,7 @@ pub(super) fn check_neighbours(
             }
         }
     }
-    findings.tell(network, key, check);
+    findings
 }
 
 /// Whether two places that are beside each other lie where their tracks cross.
@@ -269,6 +281,7 @@ fn section(network: &Network, place: Place) -> Option<&CrossSection> {
 impl<'a> Pair<'a> {
     fn of(
         network: &'a Network,
+        slack_m: f64,
         checked: &CheckedPlace,
         other: Place,
         point: TrackPoint,
@@ -279,7 +292,7 @@ impl<'a> Pair<'a> {
         let as_other =
             |p: &OutlinePoint| OutlinePoint::new(point.l_m + across * p.l_m, point.h_m + p.h_m);
         let gauges = [&checked.frame, &frame].map(|f| Gauge::b1(f.curvature_per_m));
-        let apart_m = across.abs() * gauges[0].widest_m() + gauges[1].widest_m();
+        let apart_m = across.abs() * gauges[0].widest_m() + gauges[1].widest_m() - slack_m;
         let own = section(network, checked.place);
         Some(Self {
             own,

@@ -58,7 +58,7 @@ settings! {
         /// Constant curvature.
         Arc {
             /// Radius, metres, positive.
-            radius_m: f64, in 20.0..=1e6;
+            radius_m: f64, in 20.0..=1e8;
             /// To which side it turns, looking up the line.
             turn: Side;
             /// Height of the outer rail over the inner one, millimetres. Default 0.

@@ -7,6 +7,7 @@ mod chainage;
 mod lamps;
 mod line;
 mod sections;
+mod text;
 
 pub use chainage::{ChainageEquationEntry, Increment, StatedChainageEntry};
 pub use lamps::{LAST_LAMP, LampEntry, LampRowEntry};
@@ -79,6 +80,11 @@ with_track! {
         /// clouds.
         #[serde(default)]
         daylight_lx: f64, in 0.0..=1.5e5;
+        /// Accuracy of the plan where it comes from a map and not from a survey: standard deviation of the place of a
+        /// track, metres. What two tracks lack of their distance or angle by less than twice that of both is let
+        /// through.
+        #[serde(default)]
+        plan_sigma_m: f64, in 0.0..=5.0;
         /// Where the world's origin is on the earth. Default: nowhere, and the line is on no map.
         datum: Option<DatumEntry>, nested;
         /// The tracks, if there are several; then all keys of a track stand in them.
@@ -171,6 +177,38 @@ fn two_lux() -> f64 {
 }
 
 impl TunnelFile {
+    /// One without tracks.
+    pub(super) fn empty(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            line_number: 1,
+            ambient_lx: two_lux(),
+            daylight_lx: 0.0,
+            plan_sigma_m: 0.0,
+            datum: None,
+            track: Vec::new(),
+            switches: Vec::new(),
+            crossings: Vec::new(),
+            start: None,
+            stated_chainage: None,
+            plan: Vec::new(),
+            grades: Vec::new(),
+            sections: Vec::new(),
+            lamps: None,
+            lamp_rows: Vec::new(),
+            lamp: Vec::new(),
+            wayside: Vec::new(),
+            balises: Vec::new(),
+            base_stations: Vec::new(),
+            stations: Vec::new(),
+        }
+    }
+
+    /// By how much tracks may be nearer to each other than they should be.
+    pub(super) fn slack_m(&self) -> f64 {
+        2.0 * std::f64::consts::SQRT_2 * self.plan_sigma_m
+    }
+
     fn check_keys(&self, check: &mut Checker<'_>) {
         if self.name.trim().is_empty() {
             check.problem("name", "is empty", "give the tunnel a name");
@@ -225,6 +263,28 @@ impl TunnelFile {
 }
 
 impl TrackEntry {
+    /// One with a name and nothing else.
+    pub(super) fn empty(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ambient_lx: None,
+            from: None,
+            to: None,
+            start: None,
+            stated_chainage: None,
+            plan: Vec::new(),
+            grades: Vec::new(),
+            sections: Vec::new(),
+            lamps: None,
+            lamp_rows: Vec::new(),
+            lamp: Vec::new(),
+            wayside: Vec::new(),
+            balises: Vec::new(),
+            base_stations: Vec::new(),
+            stations: Vec::new(),
+        }
+    }
+
     fn check_names(&self, check: &mut Checker<'_>) {
         check_name(&self.name, check);
     }

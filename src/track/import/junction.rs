@@ -30,7 +30,9 @@ pub enum JunctionKind {
 pub fn junction(directions: &[Vector2<f64>], slips: bool) -> (JunctionKind, Vec<(usize, usize)>) {
     match directions.len() {
         0 | 1 => (JunctionKind::End, Vec::new()),
-        2 if turn_rad(directions, (0, 1)) < MOST_TURN_RAD => (JunctionKind::Joint, vec![(0, 1)]),
+        2 if turn_between_rad(directions, (0, 1)) < MOST_TURN_RAD => {
+            (JunctionKind::Joint, vec![(0, 1)])
+        }
         3 => switch(directions),
         4 => crossing(directions, slips),
         _ => (JunctionKind::Unclear, straightest(directions)),
@@ -38,14 +40,14 @@ pub fn junction(directions: &[Vector2<f64>], slips: bool) -> (JunctionKind, Vec<
 }
 
 /// By how much a train turns that comes by one track and leaves by another.
-fn turn_rad(directions: &[Vector2<f64>], (a, b): (usize, usize)) -> f64 {
+pub(super) fn turn_between_rad(directions: &[Vector2<f64>], (a, b): (usize, usize)) -> f64 {
     (-directions[a]).angle(&directions[b])
 }
 
 fn switch(directions: &[Vector2<f64>]) -> (JunctionKind, Vec<(usize, usize)>) {
     let legs = |toe: usize| [(toe + 1) % 3, (toe + 2) % 3];
     let worst_rad = |toe: &usize| {
-        let turns = legs(*toe).map(|leg| turn_rad(directions, (*toe, leg)));
+        let turns = legs(*toe).map(|leg| turn_between_rad(directions, (*toe, leg)));
         turns[0].max(turns[1])
     };
     let best = (0..3).min_by(|a, b| worst_rad(a).total_cmp(&worst_rad(b)));
@@ -59,7 +61,7 @@ fn crossing(directions: &[Vector2<f64>], slips: bool) -> (JunctionKind, Vec<(usi
     let partners = [1, 2, 3].map(|partner| {
         let others: Vec<usize> = (1..4).filter(|k| *k != partner).collect();
         let pairs = [(0, partner), (others[0], others[1])];
-        let worst_rad = pairs.map(|pair| turn_rad(directions, pair));
+        let worst_rad = pairs.map(|pair| turn_between_rad(directions, pair));
         (pairs, worst_rad[0].max(worst_rad[1]))
     });
     let best = partners.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
@@ -70,7 +72,7 @@ fn crossing(directions: &[Vector2<f64>], slips: bool) -> (JunctionKind, Vec<(usi
         return (JunctionKind::Crossing, pairs.into());
     }
     let all = (0..4).flat_map(|a| (a + 1..4).map(move |b| (a, b)));
-    let run_on = all.filter(|pair| turn_rad(directions, *pair) < MOST_TURN_RAD);
+    let run_on = all.filter(|pair| turn_between_rad(directions, *pair) < MOST_TURN_RAD);
     (JunctionKind::Slip, run_on.collect())
 }
 
@@ -80,8 +82,10 @@ fn straightest(directions: &[Vector2<f64>]) -> Vec<(usize, usize)> {
     let mut pairs: Vec<_> = (0..count)
         .flat_map(|a| (a + 1..count).map(move |b| (a, b)))
         .collect();
-    pairs.retain(|pair| turn_rad(directions, *pair) < MOST_TURN_RAD);
-    pairs.sort_by(|a, b| turn_rad(directions, *a).total_cmp(&turn_rad(directions, *b)));
+    pairs.retain(|pair| turn_between_rad(directions, *pair) < MOST_TURN_RAD);
+    pairs.sort_by(|a, b| {
+        turn_between_rad(directions, *a).total_cmp(&turn_between_rad(directions, *b))
+    });
     let mut taken = vec![false; count];
     pairs.retain(|(a, b)| {
         let free = !taken[*a] && !taken[*b];
@@ -161,19 +165,21 @@ mod tests {
             for second in (first..360).step_by(5) {
                 let directions = ways(&[0.0, f64::from(first), f64::from(second)]);
                 let (kind, pairs) = junction(&directions, false);
-                let turns = pairs.iter().map(|pair| turn_rad(&directions, *pair));
+                let turns = pairs
+                    .iter()
+                    .map(|pair| turn_between_rad(&directions, *pair));
                 assert!(turns.clone().all(|turn| turn < MOST_TURN_RAD));
                 let has_toe = (0..3).any(|toe| {
                     let legs = [(toe + 1) % 3, (toe + 2) % 3];
                     legs.iter()
-                        .all(|leg| turn_rad(&directions, (toe, *leg)) < MOST_TURN_RAD)
+                        .all(|leg| turn_between_rad(&directions, (toe, *leg)) < MOST_TURN_RAD)
                 });
                 assert_eq!(kind == JunctionKind::Switch, has_toe, "{first} {second}");
                 for fourth in [0, 90, 200] {
                     let four = [directions.clone(), ways(&[f64::from(fourth)])].concat();
                     for slips in [false, true] {
                         let (_, pairs) = junction(&four, slips);
-                        let mut turns = pairs.iter().map(|pair| turn_rad(&four, *pair));
+                        let mut turns = pairs.iter().map(|pair| turn_between_rad(&four, *pair));
                         assert!(turns.all(|turn| turn < MOST_TURN_RAD));
                     }
                 }

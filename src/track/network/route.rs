@@ -71,7 +71,7 @@ impl Route {
     }
 
     /// Distance along the route at which leg `k` begins.
-    pub(super) fn begin_m(&self, k: usize) -> f64 {
+    pub fn begin_m(&self, k: usize) -> f64 {
         self.at_m[k]
     }
 

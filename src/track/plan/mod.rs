@@ -168,6 +168,24 @@ impl PlanNetwork {
         }
     }
 
+    /// The same with every point moved by what a function says of its element, distance along it and place. Distances
+    /// along elements stay.
+    #[must_use]
+    pub fn displaced(&self, by: impl Fn(usize, f64, &Point2<f64>) -> Vector2<f64>) -> Self {
+        let mut elements = self.elements.clone();
+        for (number, element) in elements.iter_mut().enumerate() {
+            for (point, along_m) in element.points.iter_mut().zip(&element.along_m) {
+                *point += by(number, *along_m, point);
+            }
+        }
+        Self {
+            datum: self.datum,
+            grid: Grid::of(&elements),
+            elements,
+            onward: self.onward.clone(),
+        }
+    }
+
     /// What a train may run on that leaves an element at an end, each as the end towards which it then runs: more
     /// than one at a switch run facing.
     pub fn onward(&self, end: ElementEnd) -> &[ElementEnd] {

@@ -1,0 +1,332 @@
+//! `metrotwin import`: tunnel files from maps and tables of others.
+
+mod told;
+
+use super::check::read_as;
+use super::fault::Failure;
+use super::map::{read_map, read_osm, read_railml_map, refused};
+use super::{print, write_whole};
+use crate::settings::ReadLimit;
+use crate::track::geodesy::Geodetic;
+use crate::track::import::railml::RailMlOptions;
+use crate::track::import::{
+    AroundPlace, Crs, ImportedMap, LayingOptions, TableImport, TableOptions,
+};
+use std::path::{Path, PathBuf};
+
+const AFTER_OSM: &str = "\
+FILE is raw JSON of the Overpass API (`out body` with the nodes), or OSM XML as the map's export gives it. To get all
+tracks of an area as JSON, run this query on https://overpass-turbo.eu and export its raw data:
+
+  [out:json]; way[railway~\"^(rail|subway|light_rail|tram|narrow_gauge)$\"](48.19,15.59,48.22,15.65); (._;>;); out body;
+
+Taken over: tracks as straights, arcs and clothoids near the drawn points; switches, by the directions of their tracks;
+crossings at one level; buffer stops; tunnels; permitted speeds on diverging legs. Not taken over, for tunnel files do
+not have it: slips, speeds elsewhere, signals, heights. Every track lies level, also bridges: cut out a part of the map
+where no line passes over another one.
+
+Data are of OpenStreetMap's contributors, under the Open Database License (https://opendatacommons.org/licenses/odbl):
+who publishes what is made of them must say so. The written file does in its first lines.
+
+Examples:
+  metrotwin import osm tracks.json --out out/town.toml
+  metrotwin import osm city.osm --around 48.2085,15.6240 --radius-m 700 --out out/station.toml";
+
+const AFTER_CSV: &str = "\
+FILE has a row for each element of the alignment, in order, and one for the end of the line:
+
+  chainage_m;element;radius_m;turn;cant_mm;grade_permille
+  12000,0;straight;;;;-3,0
+  12150,0;clothoid;;;;
+  12200,0;arc;500,0;right;60;
+  12400,0;clothoid;;;;
+  12450,0;straight;;;;2,0
+  12700,0;end;;;;
+
+chainage_m         where the element begins, as the office states it
+radius_m           of an arc; empty, 0 or inf: straight
+turn               left or right, looking up the line; without this column a negative radius turns right
+element            straight, arc or clothoid; without this column what has a radius is an arc. A clothoid runs from the
+                   curvature before to that after it
+length_m           of the element; needed in the last row, if that is not the end of the line
+cant_mm            of an arc
+grade_permille     from here on, rising positive; empty: as before
+vertical_radius_m  of the curve that leads into the grade; default 3000
+
+Columns may stand in any order, with `,`, `;` or tabs between them; with `;` or tabs numbers may have a decimal comma.
+A table of lamps has the columns chainage_m, number (or uid, as 1-023), and, if there are any, lateral_m (left of the
+track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel; sections, balises, stations and so
+on are added to the written file by hand.
+
+Examples:
+  metrotwin import csv alignment.csv --out out/line.toml
+  metrotwin import csv alignment.csv --lamps lamps.csv --line-number 1 --datum 30.657,104.066 --heading-deg 90 \\
+    --out out/line.toml";
+
+const AFTER_RAILML: &str = "\
+Read are infrastructure and topology of railML 2.x and 3.x. Taken over: tracks, as curves near their coordinates;
+switches with their names, crossings at one level, balises, tunnels, permitted speeds on diverging legs. Without
+coordinates the graph and the lengths of its elements are the file's, and where tracks lie is made up. Not taken over,
+for tunnel files do not have it: slips, signals, speeds elsewhere.
+
+Examples:
+  metrotwin import railml station.railml --out out/station.toml
+  metrotwin import railml line.xml --crs EPSG:25832 --out out/line.toml --report out/line.json";
+
+/// Write a tunnel file from a map or a table of others
+#[derive(clap::Args)]
+pub(super) struct ImportArgs {
+    #[command(subcommand)]
+    format: Format,
+}
+
+#[derive(clap::Subcommand)]
+enum Format {
+    /// OpenStreetMap: raw JSON or XML
+    #[command(after_help = AFTER_OSM)]
+    Osm(OsmArgs),
+    /// Tables of an office: an alignment, and lamps
+    #[command(after_help = AFTER_CSV)]
+    Csv(CsvArgs),
+    /// railML 2.x or 3.x
+    #[command(after_help = AFTER_RAILML)]
+    Railml(RailmlArgs),
+}
+
+/// What all formats have.
+#[derive(clap::Args)]
+struct Written {
+    /// Tunnel file to be written
+    #[arg(long, value_name = "TUNNEL")]
+    out: PathBuf,
+    /// Write all that was left out, and how near each track is to the map, as JSON
+    #[arg(long, value_name = "FILE")]
+    report: Option<PathBuf>,
+}
+
+#[derive(clap::Args)]
+struct CsvArgs {
+    /// Table of the alignment
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// Tunnel file to be written
+    #[arg(long, value_name = "TUNNEL")]
+    out: PathBuf,
+    /// Table of lamps
+    #[arg(long, value_name = "LAMPS")]
+    lamps: Option<PathBuf>,
+    /// First part of the lamps' UIDs
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(0..=15))]
+    line_number: u8,
+    /// Where the line begins on the earth, degrees
+    #[arg(long, value_name = "LAT,LON", value_parser = place, allow_hyphen_values = true)]
+    datum: Option<Geodetic>,
+    /// Its direction there, degrees from east towards north
+    #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = heading, allow_hyphen_values = true)]
+    heading_deg: f64,
+}
+
+fn csv(args: &CsvArgs) -> Result<(), Failure> {
+    refuse_ending(&args.out)?;
+    let alignment = read_as(&args.file, ReadLimit::CSV)?;
+    let lamps = args
+        .lamps
+        .as_ref()
+        .map(|path| read_as(path, ReadLimit::CSV));
+    let lamps = lamps.transpose()?;
+    let options = TableOptions {
+        name: name_of(&args.out),
+        line_number: args.line_number,
+        datum: args.datum,
+        heading_deg: args.heading_deg,
+    };
+    let import = TableImport::read(&alignment, lamps.as_deref(), &options).map_err(|fault| {
+        let path = match &args.lamps {
+            Some(lamps) if fault.is_of_lamps => lamps,
+            _ => &args.file,
+        };
+        refused(
+            path,
+            &fault,
+            "see `metrotwin import csv --help` for the columns",
+        )
+    })?;
+    let names = [Some(&args.file), args.lamps.as_ref()]
+        .into_iter()
+        .flatten();
+    let names: Vec<String> = names.map(|path| told::file_name(path)).collect();
+    let comment = format!("By `metrotwin import csv` from {}.", names.join(" and "));
+    let text = import.file.to_text(&[comment]).map_err(Failure::run)?;
+    write_whole(&args.out, &text)?;
+    for header in &import.unknown {
+        eprintln!("left out: column `{header}`: it means nothing here");
+    }
+    print(&format!(
+        "{}: {:.3} m, {} elements, {} grades, {} lamps",
+        args.out.display(),
+        import.length_m,
+        import.file.plan.len(),
+        import.file.grades.len(),
+        import.file.lamp.len()
+    ))
+}
+
+fn heading(text: &str) -> Result<f64, String> {
+    number(text, -360.0, 360.0)
+}
+
+#[derive(clap::Args)]
+struct OsmArgs {
+    /// Raw JSON or XML of OpenStreetMap
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    written: Written,
+    /// Only tracks around this place, degrees, with --radius-m
+    #[arg(long, value_name = "LAT,LON", value_parser = place, requires = "radius_m", allow_hyphen_values = true)]
+    around: Option<Geodetic>,
+    /// How far around the place, metres
+    #[arg(long, value_name = "R", requires = "around", value_parser = metres)]
+    radius_m: Option<f64>,
+    /// How far points of the map lie beside the tracks, metres (standard deviation)
+    #[arg(long, value_name = "S", default_value_t = 0.3, value_parser = sigma)]
+    sigma_m: f64,
+}
+
+#[derive(clap::Args)]
+struct RailmlArgs {
+    /// railML
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    #[command(flatten)]
+    written: Written,
+    /// System of the coordinates, if the file names none: EPSG:4326, EPSG:25832 (UTM zone 32) and so on
+    #[arg(long, value_name = "EPSG:N")]
+    crs: Option<Crs>,
+    /// How far coordinates lie beside the tracks, metres (standard deviation)
+    #[arg(long, value_name = "S", default_value_t = 0.1, value_parser = sigma)]
+    sigma_m: f64,
+}
+
+fn railml(args: &RailmlArgs) -> Result<(), Failure> {
+    let text = read_map(&args.file)?;
+    let map = read_railml_map(&args.file, &text, &RailMlOptions { crs: args.crs })?;
+    let options = LayingOptions {
+        name: name_of(&args.written.out),
+        sigma_m: args.sigma_m,
+        join: false,
+    };
+    lay(&args.file, &map, &options, &args.written, &[])
+}
+
+pub(super) fn import(args: &ImportArgs) -> Result<(), Failure> {
+    match &args.format {
+        Format::Csv(args) => csv(args),
+        Format::Osm(args) => osm(args),
+        Format::Railml(args) => railml(args),
+    }
+}
+
+fn osm(args: &OsmArgs) -> Result<(), Failure> {
+    let text = read_map(&args.file)?;
+    let around = args.around.zip(args.radius_m);
+    let around = around.map(|(place, radius_m)| AroundPlace { place, radius_m });
+    let import = read_osm(&args.file, &text, around)?;
+    let options = LayingOptions {
+        name: name_of(&args.written.out),
+        sigma_m: args.sigma_m,
+        join: true,
+    };
+    let source = "Data: OpenStreetMap's contributors, Open Database License (ODbL) 1.0, https://www.openstreetmap.org/copyright";
+    lay(&args.file, &import.map, &options, &args.written, &[source])
+}
+
+/// Lays a map and writes the file.
+fn lay(
+    path: &Path,
+    map: &ImportedMap,
+    options: &LayingOptions,
+    to: &Written,
+    source: &[&str],
+) -> Result<(), Failure> {
+    refuse_ending(&to.out)?;
+    let laid = map.lay(options).map_err(|error| {
+        Failure::input(
+            format!("{} cannot be laid: {error}", path.display()),
+            "see `metrotwin import --help` for what a map must have",
+        )
+    })?;
+    let told = told::Told {
+        path,
+        map,
+        laid: &laid,
+    };
+    let comment = told.comment(source);
+    let text = laid.file.to_text(&comment).map_err(Failure::run)?;
+    write_whole(&to.out, &text)?;
+    if let Some(report) = &to.report {
+        write_whole(report, &told.json().map_err(Failure::run)?)?;
+    }
+    for line in told.left_out() {
+        eprintln!("{line}");
+    }
+    print(&told.table(&to.out))
+}
+
+/// Tunnel files are read by this ending alone.
+fn refuse_ending(out: &Path) -> Result<(), Failure> {
+    let is_toml = out
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"));
+    match is_toml {
+        true => Ok(()),
+        false => Err(Failure::input(
+            format!("{} is no name of a tunnel file", out.display()),
+            "let it end with .toml",
+        )),
+    }
+}
+
+fn name_of(out: &Path) -> String {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    match stem.trim() {
+        "" => "imported".to_owned(),
+        name => name.to_owned(),
+    }
+}
+
+fn place(text: &str) -> Result<Geodetic, String> {
+    let numbers: Vec<f64> = text
+        .split(',')
+        .filter_map(|part| part.trim().parse().ok())
+        .collect();
+    match numbers[..] {
+        [latitude_deg, longitude_deg]
+            if latitude_deg.abs() <= 85.0 && longitude_deg.abs() <= 180.0 =>
+        {
+            Ok(Geodetic {
+                latitude_deg,
+                longitude_deg,
+                height_m: 0.0,
+            })
+        }
+        _ => Err("give latitude and longitude in degrees, as in 48.2085,15.6240".to_owned()),
+    }
+}
+
+fn metres(text: &str) -> Result<f64, String> {
+    number(text, 1.0, 1e6)
+}
+
+fn sigma(text: &str) -> Result<f64, String> {
+    number(text, 0.01, 10.0)
+}
+
+fn number(text: &str, least: f64, most: f64) -> Result<f64, String> {
+    let number = text
+        .trim()
+        .parse()
+        .ok()
+        .filter(|m| (least..=most).contains(m));
+    number.ok_or_else(|| format!("give a number from {least} to {most}"))
+}

@@ -1,0 +1,272 @@
+//! `metrotwin import` and what it writes, read by `check`, `export` and `locate`.
+
+use crate::program::{content, folder, printed, program, refuses, says, succeeds};
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+use std::process::Output;
+
+/// A line of 800 m with a siding on its left, as raw JSON of OpenStreetMap: the siding leaves at 200 m on a radius of
+/// some 300 m, runs 5 m beside the line, and comes back at 600 m.
+fn siding() -> String {
+    let mut nodes = String::new();
+    let mut add = |id: u32, x_m: f64, y_m: f64| {
+        // Metres of a degree at this latitude.
+        let (lat, lon) = (48.2 + y_m / 111_200.0, 15.6 + x_m / 74_330.0);
+        write!(
+            nodes,
+            "{{\"type\":\"node\",\"id\":{id},\"lat\":{lat:.9},\"lon\":{lon:.9}}},"
+        )
+        .unwrap();
+    };
+    for k in 0..=40 {
+        add(k, 20.0 * f64::from(k), 0.0);
+    }
+    // Two arcs of opposite hands, each of 38.6 m, from the line and to 5 m beside it.
+    let radius_m = 300.0;
+    let half_m = 38.6;
+    let away = |m: f64| match m {
+        m if m < half_m => m * m / (2.0 * radius_m),
+        m if m < 2.0 * half_m => 5.0 - (2.0 * half_m - m).powi(2) / (2.0 * radius_m),
+        _ => 5.0,
+    };
+    for k in 1..40 {
+        let m = 10.0 * f64::from(k);
+        add(100 + k, 200.0 + m, away(m).min(away(400.0 - m)));
+    }
+    let line: Vec<String> = (0..=40).map(|k| k.to_string()).collect();
+    let siding: Vec<String> = (1..40).map(|k| (100 + k).to_string()).collect();
+    let ways = format!(
+        "{{\"type\":\"way\",\"id\":1,\"nodes\":[{}],\"tags\":{{\"railway\":\"rail\"}}}},\
+         {{\"type\":\"way\",\"id\":2,\"nodes\":[10,{},30],\"tags\":{{\"railway\":\"rail\",\"maxspeed\":\"40\"}}}}",
+        line.join(","),
+        siding.join(",")
+    );
+    format!("{{\"elements\":[{nodes}{ways}]}}")
+}
+
+const RAILML: &str = r#"<railml version="2.2" xmlns="http://www.railml.org/schemas/2013"><infrastructure><tracks>
+ <track id="a"><trackTopology>
+  <trackBegin id="ab" pos="0"><geoCoord coord="50.9 4.48" epsgCode="4326"/><openEnd id="o1"/></trackBegin>
+  <trackEnd id="ae" pos="281.4"><geoCoord coord="50.9 4.484" epsgCode="4326"/><openEnd id="o2"/></trackEnd>
+ </trackTopology></track>
+</tracks></infrastructure></railml>"#;
+
+const ALIGNMENT: &str = "\
+chainage_m;element;radius_m;turn;cant_mm;grade_permille
+12000,0;straight;;;;-3,0
+12150,0;clothoid;;;;
+12200,0;arc;500,0;right;60;
+12400,0;clothoid;;;;
+12450,0;straight;;;;2,0
+12700,0;end;;;;
+";
+
+fn import(folder: &Path, format: &str, file: &str, text: &str, more: &[&str]) -> Output {
+    fs::write(folder.join(file), text).unwrap();
+    let out = folder.join("out.toml").display().to_string();
+    let file = folder.join(file).display().to_string();
+    let args = ["import", format, &file, "--out", &out];
+    program(args.iter().chain(more)).output().unwrap()
+}
+
+fn checked(folder: &Path) -> String {
+    let check = program(["check", &folder.join("out.toml").display().to_string()])
+        .output()
+        .unwrap();
+    succeeds(&check);
+    printed(&check)
+}
+
+/// Provokes: a file that does not pass its checks, switches or lengths that are lost, a map that is read as another one.
+#[test]
+fn a_map_of_openstreetmap_is_a_tunnel() {
+    let folder = folder("imported_osm");
+    let report = folder.join("report.json").display().to_string();
+    let run = import(
+        &folder,
+        "osm",
+        "map.json",
+        &siding(),
+        &["--report", &report],
+    );
+    succeeds(&run);
+    says(&run, "4 tracks, 1.200 km, 2 switches, 0 crossings");
+    let said = checked(&folder);
+    assert!(said.contains("to the left, 40 km/h"), "{said}");
+    let text = fs::read_to_string(folder.join("out.toml")).unwrap();
+    assert!(text.contains("Open Database License"), "{text}");
+    let report: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    let left_out = report["left_out"].as_array().unwrap();
+    assert!(
+        left_out.len() == 1 && left_out[0]["what"] == "1 speeds",
+        "{report}"
+    );
+    for track in report["tracks"].as_array().unwrap() {
+        assert!(track["most_m"].as_f64().unwrap() < 0.75, "{track}");
+    }
+    // It is read again as GeoJSON, on the same place of the earth.
+    let [map, tunnel] =
+        ["out.geojson", "out.toml"].map(|name| folder.join(name).display().to_string());
+    succeeds(
+        &program(["export", "geojson", &tunnel, "--out", &map])
+            .output()
+            .unwrap(),
+    );
+    let gnss = folder.join("fixes.csv");
+    let fixes: String = (0..60)
+        .map(|k| {
+            format!(
+                "{k},48.2,{:.9},0.5,0.5\n",
+                15.6 + 5.0 * f64::from(k) / 74_330.0
+            )
+        })
+        .collect();
+    fs::write(
+        &gnss,
+        format!("timestamp,latitude,longitude,sigma_north_m,sigma_east_m\n{fixes}"),
+    )
+    .unwrap();
+    let gnss = gnss.display().to_string();
+    let json = folder.join("map.json").display().to_string();
+    for network in [&map, &tunnel, &json] {
+        let out = folder.join("located").display().to_string();
+        let args = [
+            "locate",
+            "--network",
+            network,
+            "--gnss",
+            &gnss,
+            "--out",
+            &out,
+        ];
+        let run = program(args).output().unwrap();
+        succeeds(&run);
+        says(&run, "60 fixes on 4 elements");
+    }
+    // A part of it.
+    let run = import(
+        &folder,
+        "osm",
+        "map.json",
+        &siding(),
+        &["--around", "48.2,15.6", "--radius-m", "150"],
+    );
+    succeeds(&run);
+    says(&run, "1 tracks, 0.140 km, 0 switches");
+}
+
+#[test]
+fn tables_are_a_tunnel() {
+    let folder = folder("imported_csv");
+    let lamps = folder.join("lamps.csv");
+    fs::write(&lamps, "chainage_m,uid\n12010,1-001\n12020,1-002\n").unwrap();
+    let lamps = lamps.display().to_string();
+    let more = [
+        "--lamps",
+        &lamps,
+        "--datum",
+        "30.657,104.066",
+        "--heading-deg",
+        "90",
+    ];
+    let run = import(&folder, "csv", "line.csv", ALIGNMENT, &more);
+    succeeds(&run);
+    says(&run, "700.000 m, 5 elements, 2 grades, 2 lamps");
+    let said = checked(&folder);
+    assert!(
+        said.contains("km 12.000") && said.contains("tightest radius 500 m"),
+        "{said}"
+    );
+}
+
+#[test]
+fn railml_is_a_tunnel() {
+    let folder = folder("imported_railml");
+    let run = import(&folder, "railml", "line.railml", RAILML, &[]);
+    succeeds(&run);
+    says(&run, "1 tracks, 0.281 km");
+    checked(&folder);
+}
+
+/// Provokes: wrong input that is taken, refused without its place and a remedy, or that leaves something behind.
+#[test]
+fn wrong_maps_are_refused() {
+    let folder = folder("not_imported");
+    let refused = |format: &str, file: &str, text: &str, more: &[&str], told: &str| {
+        let run = import(&folder, format, file, text, more);
+        refuses(&run, told);
+        let left: Vec<String> = content(&folder)
+            .into_keys()
+            .filter(|name| name.contains("out"))
+            .collect();
+        assert!(left.is_empty(), "{left:?}");
+    };
+    let map = siding();
+    refused(
+        "osm",
+        "map.json",
+        &map.replacen("48.2", "148.2", 1),
+        &[],
+        "not on any railway",
+    );
+    refused(
+        "osm",
+        "map.json",
+        &map.replace("\"rail\"", "\"abandoned\""),
+        &[],
+        "no way with `railway`",
+    );
+    refused("osm", "map.json", &map[..map.len() - 2], &[], "line 1");
+    refused(
+        "osm",
+        "map.osm",
+        "<osm><node id='1' lat='x' lon='2'/></osm>",
+        &[],
+        "line 1: `lat` of this `node`",
+    );
+    refused(
+        "osm",
+        "map.json",
+        &map,
+        &["--around", "15.6,48.2", "--radius-m", "100"],
+        "swapped",
+    );
+    refused(
+        "osm",
+        "map.json",
+        &map,
+        &["--around", "48.2", "--radius-m", "100"],
+        "latitude and longitude",
+    );
+    refused("osm", "map.txt", &map, &[], "does not end");
+    let without = RAILML.replace(" epsgCode=\"4326\"", "");
+    refused("railml", "line.railml", &without, &[], "line 3");
+    refused("railml", "line.railml", &without, &[], "--crs");
+    refused(
+        "railml",
+        "line.railml",
+        "<railml version=\"2.2\"><infrastructure/></railml>",
+        &[],
+        "no tracks",
+    );
+    refused(
+        "csv",
+        "line.csv",
+        &ALIGNMENT.replace("500,0;", "5oo;"),
+        &[],
+        "line 4, column `radius_m`",
+    );
+    refused(
+        "csv",
+        "line.csv",
+        &ALIGNMENT.replace("radius_m", "R"),
+        &["--datum", "104.066,30.657"],
+        "latitude and longitude",
+    );
+    let run = program(["import", "osm", "none.json", "--out", "out/none.txt"])
+        .output()
+        .unwrap();
+    refuses(&run, "none.json");
+}
