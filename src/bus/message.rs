@@ -9,9 +9,9 @@
 //! ```
 
 use super::{
-    CameraStatus, DopplerSample, Frame, ImuSample, LedReport, LidarScan, ObstacleWarning,
-    OdometerSample, PositionEstimate, ProtectionReport, RigCalibration, SimTime, StereoPair,
-    TrainCommand, TrainId, TrainReport, WaysideCalibration, WaysideReport,
+    CameraStatus, DopplerSample, Frame, GnssFix, ImuSample, LedReport, LidarScan, ObstacleWarning,
+    OccupancyReport, OdometerSample, PositionEstimate, ProtectionReport, RigCalibration, SimTime,
+    StereoPair, TrainCommand, TrainId, TrainReport, WaysideCalibration, WaysideReport,
 };
 use serde::{Deserialize, Serialize};
 
@@ -91,6 +91,8 @@ pub enum Content {
     Odometer(OdometerSample),
     /// A sample of the Doppler radar.
     Doppler(DopplerSample),
+    /// A fix of the satellite receiver.
+    Gnss(GnssFix),
     /// A stereo pair.
     Pair(StereoPair),
     /// A frame of a wayside camera.
@@ -107,6 +109,8 @@ pub enum Content {
     Led(LedReport),
     /// Where a train takes itself to be.
     Position(PositionEstimate),
+    /// On which track a train takes itself to be.
+    Occupancy(OccupancyReport),
     /// What was found in a wayside frame.
     Wayside(WaysideReport),
     /// State of a camera that delivers no frames.

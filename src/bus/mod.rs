@@ -20,12 +20,14 @@ mod command;
 mod distortion;
 mod estimate;
 mod fix;
+mod gnss;
 mod health;
 mod image_serde;
 #[cfg(test)]
 pub mod lenses;
 mod message;
 mod motion;
+mod occupancy;
 mod time;
 mod train_id;
 mod warning;
@@ -38,9 +40,11 @@ pub use command::{
 pub use distortion::{Distortion, DistortionCoefficients};
 pub use estimate::{PositionEstimate, PositionSource};
 pub use fix::{Ellipse, Identity, LedReport, Method, PixelBox, PositionFix, Spot};
+pub use gnss::{GnssFix, GnssSolution};
 pub use health::{CameraFault, CameraHealth, CameraStatus, EYES};
 pub use message::{Content, Message, Node, Receiver, Via};
 pub use motion::{DopplerSample, ImuSample, OdometerSample};
+pub use occupancy::{OccupancyReport, OccupiedTrack};
 pub use time::{SimTime, Ticker};
 pub use train_id::{TrainEnd, TrainId};
 pub use warning::ObstacleWarning;

@@ -27,6 +27,8 @@ const PARTS: u64 = 10;
 const HALF_M: f64 = 6.3;
 /// Of the surveyed map against the world, on each axis, drawn for each stage.
 const MAP_SIGMA_M: f64 = 0.3;
+/// From here on behind the toe both tracks are 4 m apart.
+const PARALLEL_M: f64 = 65.0;
 /// The next switch counts from so far before it: a place that is wrong by less is no wrong track.
 const BEFORE_END_M: f64 = 15.0;
 
@@ -37,17 +39,16 @@ struct FixErrors {
     correlation_s: f64,
     /// Jumps an hour, by 10 m.
     jumps_per_h: f64,
-}
-
-/// Of a fix: 1 m on each axis, more along one diagonal than along the other.
-fn covariance_m2() -> Matrix2<f64> {
-    Matrix2::new(1.0, 0.5, 0.5, 1.0)
+    /// Of a fix.
+    covariance_m2: Matrix2<f64>,
 }
 
 const AS_BELIEVED: FixErrors = FixErrors {
     slow_share: 0.8,
     correlation_s: 60.0,
     jumps_per_h: 0.0,
+    // 1 m on each axis, more along one diagonal than along the other.
+    covariance_m2: Matrix2::new(1.0, 0.5, 0.5, 1.0),
 };
 
 /// Stages in a row: element 3 k is a stem, 3 k + 1 the straight leg, 3 k + 2 the other one.
@@ -115,6 +116,17 @@ struct AtSwitch {
     right: bool,
 }
 
+/// One run over the line.
+#[derive(Clone, Copy)]
+struct Run {
+    errors: FixErrors,
+    speed_mps: f64,
+    seed: u64,
+    with_gyro: bool,
+    /// From the end of the line to its begin, as if time ran back and the train had turned.
+    reversed: bool,
+}
+
 /// Counts over many runs.
 #[derive(Default)]
 struct Tally {
@@ -124,6 +136,8 @@ struct Tally {
     /// By tenths of the probability said: fixes, sum of it, and how many were right.
     said: [(usize, f64, usize); 10],
     sigmas_m: [usize; 3],
+    /// Fixes where the tracks lie side by side, the other one as far away as it gets, and how many were right.
+    parallel: [usize; 2],
 }
 
 impl Tally {
@@ -179,13 +193,15 @@ impl Tally {
 }
 
 /// A run over all stages of a line.
-fn run(
-    network: &Arc<PlanNetwork>,
-    settings: &OccupancySettings,
-    (errors, speed_mps): (FixErrors, f64),
-    (seed, with_gyro): (u64, bool),
-    tally: &mut Tally,
-) {
+fn run(network: &Arc<PlanNetwork>, settings: &OccupancySettings, run: &Run, tally: &mut Tally) {
+    let Run {
+        errors,
+        speed_mps,
+        seed,
+        with_gyro,
+        reversed,
+    } = *run;
+    let way = if reversed { -1.0 } else { 1.0 };
     let stages = network.elements.len() / 3;
     let stream = Stream::new(seed, (speed_mps * 100.0) as u64, "occupancy validation");
     let normal = |what: u64, k: u64| stream.normal(what * 10_000_000 + k);
@@ -201,6 +217,11 @@ fn run(
         *from_m = begin_m;
         begin_m += network.elements[*element].length_m();
     }
+    // Back it goes from the last stem on: its first leg, too, is entered over a toe.
+    let whole_m = match reversed {
+        true => course.last().map_or(0.0, |(_, from_m)| *from_m),
+        false => begin_m,
+    };
     let at = |m: f64| {
         let k = course
             .partition_point(|(_, from_m)| *from_m <= m)
@@ -220,21 +241,22 @@ fn run(
     let (scale, yaw_offset) = (1.0 + 0.01 * normal(2, 0), 5e-4 * normal(3, 0));
     let mut identified: Option<(usize, f64)> = None;
     let mut before = (usize::MAX, 0.0);
-    let count = ((begin_m - 40.0) / speed_mps * RATE_HZ) as u64;
+    let count = ((whole_m - 40.0) / speed_mps * RATE_HZ) as u64;
     for k in 1..count {
         let time = SimTime::from_secs(k as f64 / RATE_HZ);
-        let m = 20.0 + speed_mps * k as f64 / RATE_HZ;
+        let run_m = 20.0 + speed_mps * k as f64 / RATE_HZ;
+        let m = if reversed { whole_m - run_m } else { run_m };
         for part in 1..=PARTS {
             let number = k * PARTS + part;
             let back_s = (PARTS - part) as f64 / (RATE_HZ * PARTS as f64);
-            let (time, m) = (time.plus(-back_s), m - speed_mps * back_s);
+            let (time, m) = (time.plus(-back_s), m - way * speed_mps * back_s);
             occupancy.on_speed(time, speed_mps * scale + 0.05 * normal(4, number));
             if with_gyro {
                 let turn = |m: f64| {
                     let chord = at(m + HALF_M).2 - at(m - HALF_M).2;
                     chord.y.atan2(chord.x)
                 };
-                let rate_radps = (turn(m + 0.1) - turn(m - 0.1)) / 0.2 * speed_mps;
+                let rate_radps = (turn(m + 0.1) - turn(m - 0.1)) / 0.2 * way * speed_mps;
                 let noise = yaw_offset + 3e-3 * normal(5, number);
                 occupancy.on_yaw_rate(time, rate_radps + noise);
             }
@@ -248,16 +270,23 @@ fn run(
         let stage = (element / 3) as u64;
         let map_off = Vector2::new(normal(12, stage), normal(13, stage)) * MAP_SIGMA_M;
         let noise = Vector2::new(normal(8, k), normal(9, k)) * white;
-        let error = covariance_m2()
+        let error = errors
+            .covariance_m2
             .cholesky()
             .map_or(error, |root| root.l() * (error + noise));
         occupancy.on_fix(&Fix {
             time,
             place: place + map_off + error,
-            covariance_m2: covariance_m2(),
+            covariance_m2: errors.covariance_m2,
         });
         let decision = occupancy.decision();
         tally.add(&decision, element);
+        let length_m = network.elements[element].length_m();
+        let from_toe_m = if reversed {
+            length_m - along_m
+        } else {
+            along_m
+        };
         let best = decision.tracks.first().map(|track| track.element);
         if before.0 != element && before.0 % 3 != 0 && before.0 != usize::MAX {
             let told = identified.filter(|(told, _)| *told == before.0);
@@ -267,14 +296,18 @@ fn run(
             });
             identified = None;
         }
-        if before.0 != element || along_m < network.elements[element].length_m() - BEFORE_END_M {
+        if element % 3 != 0 && (PARALLEL_M..length_m - PARALLEL_M).contains(&along_m) {
+            tally.parallel[0] += 1;
+            tally.parallel[1] += usize::from(best == Some(element));
+        }
+        if before.0 != element || from_toe_m < length_m - BEFORE_END_M {
             before = (element, f64::from(u8::from(best == Some(element))));
         }
         let is_told = element % 3 != 0 && decision.is_identified() && best == Some(element);
-        let near_end = along_m > network.elements[element].length_m() - BEFORE_END_M;
+        let near_end = from_toe_m > length_m - BEFORE_END_M;
         identified = match (is_told, identified) {
             (true, Some(told)) => Some(told),
-            (true, None) => Some((element, along_m)),
+            (true, None) => Some((element, from_toe_m)),
             (false, told) => told.filter(|_| near_end),
         };
     }
@@ -314,6 +347,16 @@ fn tally(
     runs: u64,
     with_gyro: bool,
 ) -> Tally {
+    tally_ways(method, errors, speeds_kmh, runs, (with_gyro, false))
+}
+
+fn tally_ways(
+    method: Method,
+    errors: FixErrors,
+    speeds_kmh: &[f64],
+    runs: u64,
+    (with_gyro, reversed): (bool, bool),
+) -> Tally {
     let network = line(42);
     let settings = OccupancySettings {
         method,
@@ -322,8 +365,14 @@ fn tally(
     let mut tally = Tally::default();
     for seed in 0..runs {
         for speed_kmh in speeds_kmh {
-            let drawn = (errors, speed_kmh / 3.6);
-            run(&network, &settings, drawn, (seed, with_gyro), &mut tally);
+            let drawn = Run {
+                errors,
+                speed_mps: speed_kmh / 3.6,
+                seed,
+                with_gyro,
+                reversed,
+            };
+            run(&network, &settings, &drawn, &mut tally);
         }
     }
     tally
@@ -359,6 +408,27 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
         rows.push((name.to_owned(), of));
     }
     rows.push((
+        "fused, reversed".to_owned(),
+        tally_ways(Method::Fused, AS_BELIEVED, &SPEEDS_KMH, 4, (true, true)),
+    ));
+    let (sin, cos) = (
+        std::f64::consts::FRAC_1_SQRT_2,
+        std::f64::consts::FRAC_1_SQRT_2,
+    );
+    let turn = Matrix2::new(cos, -sin, sin, cos);
+    let long = FixErrors {
+        // 2.5 m along one diagonal, 0.6 m along the other.
+        covariance_m2: turn * Matrix2::new(6.25, 0.0, 0.0, 0.36) * turn.transpose(),
+        ..white
+    };
+    for (method, name) in [
+        (Method::Perpendicular, "perpendicular, long"),
+        (Method::Pedal, "paper, long ellipse"),
+    ] {
+        let of = tally(method, long, &SPEEDS_KMH, 4, false);
+        rows.push((name.to_owned(), of));
+    }
+    rows.push((
         "fused, no yaw rate".to_owned(),
         tally(Method::Fused, AS_BELIEVED, &SPEEDS_KMH, 4, false),
     ));
@@ -375,6 +445,9 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
         for (sum, count) in all.sigmas_m.iter_mut().zip(of.sigmas_m) {
             *sum += count;
         }
+        for (sum, count) in all.parallel.iter_mut().zip(of.parallel) {
+            *sum += count;
+        }
     }
     println!(
         "sigma of the place under 1, 2, 3 m: fused {}, paper, white {}",
@@ -389,6 +462,15 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
         all.fixes(),
         100.0 * right
     );
+    let parallel = all.parallel[1] as f64 / all.parallel[0] as f64;
+    println!(
+        "fused: {:.4} % of {} fixes beside the other track right",
+        100.0 * parallel,
+        all.parallel[0]
+    );
+    assert!(parallel > 0.999, "{parallel}");
+    let reversed = &rows[4].1;
+    assert!(reversed.classes[0] == 0 && reversed.switches.iter().all(|s| s.right));
     assert!(all.switches.len() >= 4000 && all.fixes() >= 100_000);
     assert!(mean < 30.0, "{mean}");
     assert!(right > 0.999 && undecided < 0.01, "{right} {undecided}");
@@ -404,7 +486,7 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
         );
     }
     // Without a yaw rate nothing may be certain that is wrong, either.
-    assert_eq!(rows[4].1.classes[0], 0);
+    assert_eq!(rows[7].1.classes[0], 0);
 }
 
 /// Errors that are otherwise than believed, and jumps.
@@ -475,4 +557,66 @@ fn val_probabilities_are_calibrated() {
             "{said} {right} {sigma}"
         );
     }
+}
+
+/// Distance of the points between which the map's own errors of a track change evenly.
+const SURVEYED_M: f64 = 120.0;
+
+/// Two straight tracks of 3 km, 4 m apart, on a map that lies 0.45 m off (half of the variance both, half each by
+/// itself, with headings that are off by some milliradians over a hundred metres): more than the filter believes.
+fn map_of_two_tracks(stream: &Stream) -> Arc<PlanNetwork> {
+    let sigma_m = 0.45 * std::f64::consts::FRAC_1_SQRT_2;
+    let common = Vector2::new(stream.normal(1), stream.normal(2)) * sigma_m;
+    let track = |id: &str, number: u64, y: f64| {
+        let point = |k: u64| {
+            let own = [0, 1].map(|axis| stream.normal(1000 * (number + 1) + 2 * k + axis));
+            let m = SURVEYED_M * k as f64;
+            Point2::new(m, y) + common + Vector2::from(own) * sigma_m
+        };
+        TrackElement::new(id, (0..26).map(point).collect())
+    };
+    let tracks = [track("one", 0, 0.0), track("other", 1, BESIDE_M)];
+    PlanNetwork::new(None, tracks.into_iter().flatten().collect(), &[]).into()
+}
+
+/// A start from nothing beside a parallel track, without a switch: fixes alone hardly tell the tracks, and nothing else
+/// does; so nothing may grow certain that is wrong, however long it takes.
+#[test]
+fn val_beside_a_parallel_track_nothing_wrong_grows_certain() {
+    let mut tally = Tally::default();
+    for seed in 0..300 {
+        let stream = Stream::new(seed, 0, "parallel tracks");
+        let network = map_of_two_tracks(&stream);
+        let mut occupancy = Occupancy::new(network, OccupancySettings::default());
+        let normal = |what: u64, k: u64| stream.normal(what * 10_000_000 + k);
+        let keep = (-1.0 / (RATE_HZ * AS_BELIEVED.correlation_s)).exp();
+        let mut slow = Vector2::new(normal(1, 0), normal(2, 0));
+        let (scale, yaw_offset) = (1.0 + 0.01 * normal(3, 0), 5e-4 * normal(4, 0));
+        let speed_mps = 60.0 / 3.6;
+        for k in 1..850 {
+            for part in 1..=PARTS {
+                let number = (k - 1) * PARTS + part;
+                let time = SimTime::from_secs(number as f64 / (RATE_HZ * PARTS as f64));
+                occupancy.on_speed(time, speed_mps * scale + 0.05 * normal(5, number));
+                occupancy.on_yaw_rate(time, yaw_offset + 3e-3 * normal(6, number));
+            }
+            let step = Vector2::new(normal(7, k), normal(8, k));
+            slow = slow * keep + step * (1.0 - keep * keep).sqrt();
+            let white = Vector2::new(normal(9, k), normal(10, k));
+            let error = slow * 0.8f64.sqrt() + white * 0.2f64.sqrt();
+            let seconds = k as f64 / RATE_HZ;
+            occupancy.on_fix(&Fix {
+                time: SimTime::from_secs(seconds),
+                place: Point2::new(50.0 + speed_mps * seconds, 0.0) + error,
+                covariance_m2: Matrix2::identity(),
+            });
+            tally.add(&occupancy.decision(), 0);
+        }
+    }
+    let [wc, wf, wu, cu, cf, cc] = tally.classes;
+    assert_eq!(tally.fixes(), 300 * 849);
+    println!(
+        "\nfrom nothing beside a parallel track: wc {wc}, wf {wf}, wu {wu}, cu {cu}, cf {cf}, cc {cc}"
+    );
+    assert_eq!(wc, 0, "wrong with certainty");
 }

@@ -7,9 +7,8 @@ use nalgebra::Matrix2;
 use serde::Deserialize;
 
 /// Standard deviation of a fix to the north and to the east by its kind of solution, metres, for tables that do not
-/// state one: of the receivers' makers for open sky, rounded up. `PROPAGATED` is carried on by an inertial unit
-/// through a gap of reception.
-const SIGMAS_M: [(&str, f64); 8] = [
+/// state one: of the receivers' makers for open sky, rounded up.
+const SIGMAS_M: [(&str, f64); 7] = [
     ("NARROW_INT", 0.05),
     ("WIDE_INT", 0.2),
     ("L1_INT", 0.1),
@@ -17,10 +16,17 @@ const SIGMAS_M: [(&str, f64); 8] = [
     ("PSRDIFF", 1.0),
     ("SBAS", 1.5),
     ("SINGLE", 2.5),
-    ("PROPAGATED", 1.5),
 ];
+/// One that is carried on from the last fix by an inertial unit through a gap of reception,
+const CARRIED_ON: &str = "PROPAGATED";
+/// and how fast it drifts, metres a second: with a heading that is wrong by one degree at 60 km/h.
+const DRIFT_MPS: f64 = 0.3;
 /// Of any other kind, or where none is stated.
 const UNKNOWN_SIGMA_M: f64 = 5.0;
+/// Of the frames of fixes and map against each other, metres, where a table states no covariance and so nothing of
+/// its frame: a receiver's frame of today is 0.8 m from the continental one that national maps are tied to (2.5 cm a
+/// year since 1989), and transformations of national grids are good to 1 m.
+const FRAME_SIGMA_M: f64 = 1.3;
 /// A status, where there is one, of fixes that may be used.
 const COMPUTED: &str = "SOL_COMPUTED";
 
@@ -73,6 +79,8 @@ pub struct RecordedFixes {
 pub struct RecordedFix {
     pub fix: Fix,
     pub place: Geodetic,
+    /// Standard deviation by the kind of its solution.
+    pub sigma_m: f64,
     /// Of its solution, as the receiver says.
     pub kind: String,
 }
@@ -90,12 +98,19 @@ impl RecordedFixes {
     pub fn read(text: &str, datum: &Datum) -> Result<Self, TableError> {
         let mut read = Self::default();
         let mut last_s = f64::NEG_INFINITY;
+        let mut received: Option<(f64, f64)> = None;
         for row in rows::<FixRow>(text) {
             let (line, row) = row?;
             let fault = |what: String| TableError { line, what };
             let time_s = seconds(&row.timestamp).map_err(fault)?;
             let place = row.place().map_err(fault)?;
-            let covariance_m2 = row.covariance(datum).map_err(fault)?;
+            let sigma_m = match row.kind_sigma_m() {
+                Some(sigma_m) => sigma_m,
+                None => received.map_or(UNKNOWN_SIGMA_M, |(received_s, sigma_m)| {
+                    sigma_m.hypot(DRIFT_MPS * (time_s - received_s))
+                }),
+            };
+            let covariance_m2 = row.covariance(sigma_m, datum).map_err(fault)?;
             if !row.solution_status.is_empty() && row.solution_status != COMPUTED {
                 read.refused += 1;
                 continue;
@@ -105,6 +120,9 @@ impl RecordedFixes {
                 continue;
             }
             last_s = time_s;
+            if row.kind_sigma_m().is_some() {
+                received = Some((time_s, sigma_m));
+            }
             if read.fixes.is_empty() {
                 read.start_s = time_s;
             }
@@ -116,6 +134,7 @@ impl RecordedFixes {
             read.fixes.push(RecordedFix {
                 fix,
                 place,
+                sigma_m,
                 kind: row.position_type,
             });
         }
@@ -193,12 +212,20 @@ impl FixRow {
         })
     }
 
-    /// Of world x and y.
-    fn covariance(&self, datum: &Datum) -> Result<Matrix2<f64>, String> {
+    /// None if it is carried on.
+    fn kind_sigma_m(&self) -> Option<f64> {
+        if self.position_type.contains(CARRIED_ON) {
+            return None;
+        }
         let kind = SIGMAS_M
             .iter()
             .find(|(kind, _)| self.position_type.contains(kind));
-        let sigma_m = kind.map_or(UNKNOWN_SIGMA_M, |(_, sigma_m)| *sigma_m);
+        Some(kind.map_or(UNKNOWN_SIGMA_M, |(_, sigma_m)| *sigma_m))
+    }
+
+    /// Of world x and y.
+    fn covariance(&self, kind_sigma_m: f64, datum: &Datum) -> Result<Matrix2<f64>, String> {
+        let sigma_m = kind_sigma_m.hypot(FRAME_SIGMA_M);
         let north_m = self.sigma_north_m.unwrap_or(sigma_m);
         let east_m = self.sigma_east_m.unwrap_or(sigma_m);
         let both_m2 = self.covariance_m2.unwrap_or(0.0);
@@ -316,9 +343,32 @@ mod tests {
         );
         let [first, second] = [0, 1].map(|k| read.fixes[k].fix);
         let is = |fix: &Fix, m2: Matrix2<f64>| (fix.covariance_m2 - m2).norm() < 1e-12;
-        assert!(is(&first, Matrix2::identity() * 0.0025));
+        assert!(is(&first, Matrix2::identity() * (0.0025 + 1.69)));
         assert!(is(&second, Matrix2::new(1.0, 0.0, 0.0, 4.0)));
         assert!((second.place.x - 7.03).abs() < 0.01 && (second.time.secs() - 2.0).abs() < 1e-9);
+    }
+
+    /// Fails where a fix without reception is as good as the last received one.
+    #[test]
+    fn carried_on_fixes_grow_worse_by_the_second() {
+        let text = "timestamp,latitude,longitude,position_type\n\
+            10,50.9,4.5,SINGLE\n\
+            11,50.9,4.5,PROPAGATED\n\
+            20,50.9,4.5,PROPAGATED\n\
+            21,50.9,4.5,NARROW_INT3\n\
+            22,50.9,4.5,PROPAGATED\n";
+        let read = RecordedFixes::read(text, &datum()).unwrap();
+        let sigmas_m: Vec<f64> = read.fixes.iter().map(|fix| fix.sigma_m).collect();
+        let expected_m = [
+            2.5,
+            2.5f64.hypot(0.3),
+            2.5f64.hypot(3.0),
+            0.05,
+            0.05f64.hypot(0.3),
+        ];
+        for (sigma_m, expected_m) in sigmas_m.iter().zip(expected_m) {
+            assert!((sigma_m - expected_m).abs() < 1e-9, "{sigmas_m:?}");
+        }
     }
 
     #[test]

@@ -144,13 +144,9 @@ impl Course {
     /// Without the elements that do not touch a stretch: what a train has left behind, or not reached yet, may be
     /// set another way when it comes there again.
     pub fn trim(&mut self, [from_m, to_m]: [f64; 2]) {
-        let kept = self
-            .0
-            .iter()
-            .filter(|leg| leg.end_m() >= from_m && leg.begin_m <= to_m);
-        let kept: Vec<Leg> = kept.copied().collect();
-        if !kept.is_empty() {
-            self.0 = kept;
+        let touches = |leg: &Leg| leg.end_m() >= from_m && leg.begin_m <= to_m;
+        if self.0.iter().any(touches) {
+            self.0.retain(touches);
         }
     }
 }

@@ -1,22 +1,21 @@
 //! What a fix and the sum of yaw rates say of a hypothesis: an extended Kalman filter with the likelihood of what it
 //! finds.
 //!
-//! A fix is z = p(l) + b + w. Of its variance P a share c changes slowly: b is a Gauss-Markov process with variance
-//! c P and the map's, w is white with (1 - c) P. So a hundred fixes in a minute count for little more than one, as
-//! they have to: a filter that takes them for white grows sure of a wrong track. With a small probability b jumps
-//! by more; the likelihood is that of the mixture, and the filter follows the part that explains the fix better.
+//! A fix is z = p(l) + b + w, with the error b that changes slowly (see `fix_error`) and white w. The likelihood is
+//! that of all ways that b may have gone; the filter follows the one that explains the fix best.
 //!
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
+use super::TrainRun;
+use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
-    EAST, HEADING, Hypothesis, KindError, NORTH, PLACE, SCALE, STATES, StateCovariance, YAW_OFFSET,
-    log_sum,
+    EAST, HEADING, Hypothesis, NORTH, PLACE, SCALE, STATES, StateCovariance, YAW_OFFSET, log_sum,
 };
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// Of the place of a new hypothesis, before its first fix is taken in.
 const NEW_PLACE_SIGMA_M: f64 = 100.0;
@@ -26,16 +25,16 @@ const LEAST_FIX_SIGMA_M: f64 = 0.05;
 const SPEED_CORRELATION_S: f64 = 1.0;
 /// Slower is standing, metres a second.
 const STANDING_MPS: f64 = 0.05;
+/// Places on the map that are so far apart, metres, are wrong by themselves, and between them it has one wrong heading.
+/// Comparisons that are nearer to each other are no news of it; counted as such, they make a wrong track sure.
+const MAP_HEADING_M: f64 = 100.0;
+/// Maps are joined of pieces, and change their heading at once where these meet: that explains a change with twice the
+/// standard deviation of one that goes on evenly.
+const MAP_MARGIN: f64 = 2.0;
 /// Share of headings on which the map or the gyro is altogether wrong.
 const WRONG_HEADING: f64 = 1e-3;
 /// Drift of the yaw rate's offset, rad/s in the root of a second.
 const YAW_OFFSET_DRIFT: f64 = 1e-5;
-
-/// Part of a fix's error that changes slowly.
-fn slow_m2(covariance: &Matrix2<f64>, settings: &OccupancySettings) -> Matrix2<f64> {
-    let map_m2 = settings.map_sigma_m.powi(2);
-    covariance * settings.correlated_share + Matrix2::identity() * map_m2
-}
 
 impl Hypothesis {
     /// Variances of a hypothesis about whose place nothing is known but the course.
@@ -49,21 +48,38 @@ impl Hypothesis {
     }
 
     /// Carries it on over a time in which so much was run, by the measured speed.
-    pub fn advance_fused(&mut self, (seconds, run_m): (f64, f64), settings: &OccupancySettings) {
+    pub(super) fn advance_fused(&mut self, run: &TrainRun, settings: &OccupancySettings) {
+        let (seconds, run_m) = (run.seconds, run.length_m);
         let keep = (-seconds / settings.correlation_s).exp();
-        let mut transition = StateCovariance::identity();
-        transition[(PLACE, SCALE)] = run_m;
-        transition[(HEADING, YAW_OFFSET)] = seconds;
-        for k in [EAST, NORTH] {
-            transition[(k, k)] = keep;
+        // The transition is the unit matrix but for these; the covariance takes it from both sides.
+        for (to, from, factor) in [(PLACE, SCALE, run_m), (HEADING, YAW_OFFSET, seconds)] {
+            self.mean[to] += factor * self.mean[from];
+            for k in 0..STATES {
+                self.covariance[(to, k)] += factor * self.covariance[(from, k)];
+            }
+            for k in 0..STATES {
+                self.covariance[(k, to)] += factor * self.covariance[(k, from)];
+            }
         }
-        self.mean = transition * self.mean;
+        for error in [EAST, NORTH] {
+            self.mean[error] *= keep;
+            for k in 0..STATES {
+                self.covariance[(error, k)] *= keep;
+            }
+            for k in 0..STATES {
+                self.covariance[(k, error)] *= keep;
+            }
+        }
         self.mean[PLACE] += run_m;
-        self.covariance = transition * self.covariance * transition.transpose();
         let moves = run_m.abs() > STANDING_MPS * seconds;
         let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
         self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 };
-        self.covariance[(HEADING, HEADING)] += settings.yaw_rate_sigma_radps.powi(2) * seconds;
+        self.covariance[(PLACE, PLACE)] += run.unknown_m2;
+        // What the map has wrong of headings changes with the way run, as a process with this correlation does.
+        let map_rad = MAP_MARGIN * SQRT_2 * settings.map_sigma_m / MAP_HEADING_M;
+        let map_rad2 = 2.0 * map_rad.powi(2) * run_m.abs() / MAP_HEADING_M;
+        self.covariance[(HEADING, HEADING)] +=
+            settings.yaw_rate_sigma_radps.powi(2) * seconds + map_rad2;
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * seconds;
         for k in [EAST, NORTH] {
             self.covariance[(k, k)] += (1.0 - keep * keep) * self.fix_variance_m2;
@@ -78,40 +94,49 @@ impl Hypothesis {
         settings: &OccupancySettings,
     ) {
         let (fix, covariance) = (&judged.fix.place, &judged.fix.covariance_m2);
-        if judged.is_worse || self.kind != Some(judged.kind) {
-            self.change_kind(judged, settings);
-        }
-        self.fix_variance_m2 = 0.5 * slow_m2(covariance, settings).trace();
+        let slow_m2 = slow_m2(covariance, settings);
+        let ways = self.error_ways(judged, &slow_m2, settings);
+        self.fix_variance_m2 = 0.5 * slow_m2.trace();
         self.fix_time = judged.fix.time;
+        self.kind = Some(judged.kind);
         let (place, forward) = self.course.at(network, self.place_m());
-        let mut measured = SMatrix::<f64, 2, STATES>::zeros();
-        measured.set_column(PLACE, &forward);
-        measured.set_column(EAST, &Vector2::x());
-        measured.set_column(NORTH, &Vector2::y());
         let white = covariance * (1.0 - settings.correlated_share)
             + Matrix2::identity() * LEAST_FIX_SIGMA_M.powi(2);
-        let off = fix - place - Vector2::new(self.mean[EAST], self.mean[NORTH]);
-        let mut jumped = self.covariance;
-        for k in [EAST, NORTH] {
-            jumped[(k, k)] += settings.jump_sigma_m.powi(2);
-        }
-        let spread = |state: &StateCovariance| measured * state * measured.transpose() + white;
-        let [stays, jumps] = [&self.covariance, &jumped].map(spread);
-        let stays_log = (1.0 - settings.jump_probability).ln() + log_density(&off, &stays);
-        let jumps_log = settings.jump_probability.ln() + log_density(&off, &jumps);
-        let (prior, spread) = match stays_log >= jumps_log {
-            true => (self.covariance, stays),
-            false => (jumped, jumps),
-        };
-        let both = log_sum(stays_log, jumps_log);
-        let Some(inverse) = spread.try_inverse().filter(|_| both.is_finite()) else {
+        let of_state = spread(&self.covariance, &forward);
+        let place_m2 = forward * forward.transpose() * self.covariance[(PLACE, PLACE)];
+        let found = ways.map(|way| {
+            let spread = white + way.more_m2 + if way.is_own { place_m2 } else { of_state };
+            let log = way.probability.ln() + log_density(&(fix - place - way.error_m), &spread);
+            (log, spread)
+        });
+        let all = found.iter().map(|(log, _)| *log).reduce(log_sum);
+        let most = (0..found.len()).max_by(|a, b| found[*a].0.total_cmp(&found[*b].0));
+        let (Some(all), Some(most)) = (all.filter(|all| all.is_finite()), most) else {
             return;
         };
-        self.log_probability += both;
-        let gain = prior * measured.transpose() * inverse;
+        self.log_probability += all;
+        let (way, (_, spread)) = (&ways[most], &found[most]);
+        self.has_jumped = most >= JUMPS;
+        self.set_error(way);
+        self.correct(&forward, &(fix - place - way.error_m), spread);
+    }
+
+    /// Kalman's update with what was found of place and error together.
+    fn correct(&mut self, forward: &Vector2<f64>, off: &Vector2<f64>, spread: &Matrix2<f64>) {
+        let Some(inverse) = spread.try_inverse() else {
+            return;
+        };
+        let across = across(&self.covariance, forward);
+        let gain = across * inverse;
         self.mean += gain * off;
-        let left = prior - gain * spread * gain.transpose();
-        self.covariance = 0.5 * (left + left.transpose());
+        for i in 0..STATES {
+            for j in 0..=i {
+                let known = gain[(i, 0)] * across[(j, 0)] + gain[(i, 1)] * across[(j, 1)];
+                let left = 0.5 * (self.covariance[(i, j)] + self.covariance[(j, i)]) - known;
+                self.covariance[(i, j)] = left;
+                self.covariance[(j, i)] = left;
+            }
+        }
     }
 
     /// Takes in the sum of yaw rates since the start.
@@ -144,45 +169,19 @@ impl Hypothesis {
             self.covariance = 0.5 * (left + left.transpose());
         }
     }
+}
 
-    /// The error of the fixes to come is that of fixes of their kind before, as far as it lasts. Without this a
-    /// receiver that flips between two solutions would give news of one old error each time.
-    fn change_kind(&mut self, judged: &Judged, settings: &OccupancySettings) {
-        let now = judged.fix.time;
-        if let Some(kind) = self.kind {
-            let error_m = self.mean.fixed_rows::<2>(EAST).into_owned();
-            let covariance_m2 = self.covariance.fixed_view::<2, 2>(EAST, EAST).into_owned();
-            self.kinds.retain(|known| known.kind != kind);
-            self.kinds.push(KindError {
-                kind,
-                time: self.fix_time,
-                error_m,
-                covariance_m2,
-            });
-        }
-        let fresh_m2 = slow_m2(&judged.fix.covariance_m2, settings);
-        let known = self.kinds.iter().find(|known| known.kind == judged.kind);
-        let (error_m, covariance_m2) = match known.filter(|_| !judged.is_worse) {
-            Some(known) => {
-                let keep = (-now.since(known.time) / settings.correlation_s).exp();
-                let kept_m2 = known.covariance_m2 * keep.powi(2);
-                (
-                    known.error_m * keep,
-                    kept_m2 + fresh_m2 * (1.0 - keep.powi(2)),
-                )
-            }
-            None => (Vector2::zeros(), fresh_m2),
-        };
-        for k in [EAST, NORTH] {
-            self.covariance.row_mut(k).fill(0.0);
-            self.covariance.column_mut(k).fill(0.0);
-        }
-        self.mean.fixed_rows_mut::<2>(EAST).copy_from(&error_m);
-        self.covariance
-            .fixed_view_mut::<2, 2>(EAST, EAST)
-            .copy_from(&covariance_m2);
-        self.kind = Some(judged.kind);
-    }
+/// Covariance of the state with a fix: that of the place, forwards, and of the error.
+fn across(covariance: &StateCovariance, forward: &Vector2<f64>) -> SMatrix<f64, STATES, 2> {
+    SMatrix::from_fn(|k, axis| {
+        forward[axis] * covariance[(k, PLACE)] + covariance[(k, EAST + axis)]
+    })
+}
+
+/// Covariance of a fix, but for its white part.
+fn spread(covariance: &StateCovariance, forward: &Vector2<f64>) -> Matrix2<f64> {
+    let across = across(covariance, forward);
+    Matrix2::from_fn(|i, j| forward[i] * across[(PLACE, j)] + across[(EAST + i, j)])
 }
 
 fn log_density(off: &Vector2<f64>, spread: &Matrix2<f64>) -> f64 {

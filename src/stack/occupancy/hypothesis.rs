@@ -3,7 +3,7 @@
 use super::course::Course;
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
-use crate::track::plan::PlanNetwork;
+use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// What is estimated: place along the course, error of the speed's scale, heading that the yaw rates' sum lacks,
@@ -45,6 +45,8 @@ pub struct Hypothesis {
     /// When that was, and of which kind.
     pub fix_time: SimTime,
     pub kind: Option<i32>,
+    /// Whether its error had jumped.
+    pub has_jumped: bool,
     /// Of the other kinds of fixes, as it was at the last one of each.
     pub kinds: Vec<KindError>,
 }
@@ -64,9 +66,19 @@ impl Hypothesis {
         self.mean[PLACE]
     }
 
+    /// The element there, and the end towards which the train looks.
+    pub fn towards(&self) -> ElementEnd {
+        self.course.leg_at(self.place_m()).towards
+    }
+
     /// Standard deviation of that, metres.
     pub fn sigma_m(&self) -> f64 {
         self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
+    }
+
+    /// Error of the fixes, if it is right.
+    pub fn error_m(&self) -> Vector2<f64> {
+        Vector2::new(self.mean[EAST], self.mean[NORTH])
     }
 
     /// Whether all of it is numbers: what rounding has made of it otherwise is worth nothing.
@@ -101,7 +113,7 @@ impl Hypothesis {
                 true => hypothesis.course.backwards(network),
                 false => longer,
             };
-            if longer.is_empty() || grown.len() + left.len() > settings.most_hypotheses {
+            if longer.is_empty() || grown.len() + left.len() > settings.most_hypotheses as usize {
                 grown.push(hypothesis);
                 continue;
             }

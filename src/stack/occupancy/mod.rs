@@ -4,6 +4,10 @@
 //! believed is a set of hypotheses: a course over the network, the place on it, a probability. Where a course comes
 //! to a switch it becomes two; where two courses meet for good they become one; a hypothesis under
 //! [`OccupancySettings::least_probability`] is dropped. When all that are left are on one track, that is identified.
+//! Nothing is decided before a fix lies on the map.
+//!
+//! What it cannot do: a receiver that calls a drift of more than about a metre a second a good fix, where tracks lie
+//! side by side, makes it certain of a wrong one, until the receiver has found itself again.
 //!
 //! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
 //! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with
@@ -30,28 +34,31 @@
 //! assert!((decision.tracks[0].along_m - 240.0).abs() < 2.0);
 //! ```
 
+mod balise;
 mod course;
 mod decision;
+mod equipment;
+mod fix_error;
 mod fix_trust;
 mod fused;
 mod hypothesis;
 mod matching;
 mod pedal;
 mod settings;
+mod start;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests;
 
 pub use decision::{Decision, TrackDecision};
+pub use equipment::TrackOccupancy;
 pub use matching::{Match, Matching, by_pedal_curve, by_perpendicular};
 pub use settings::{Method, OccupancySettings};
 
 use crate::bus::SimTime;
-use crate::track::Direction;
 use crate::track::plan::{ElementEnd, PlanNetwork};
-use course::Course;
-use fix_trust::FixTrust;
-use hypothesis::{Hypothesis, State, StateCovariance};
+use fix_trust::{Circumstances, FixTrust};
+use hypothesis::Hypothesis;
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;
 
@@ -61,19 +68,11 @@ const MOST_MPS: f64 = 200.0;
 const MOST_RADPS: f64 = 10.0;
 const FARTHEST_M: f64 = 1e7;
 const LEAST_SIGMA_M: f64 = 1e-3;
-/// A new start looks for tracks within so many standard deviations of a fix, and within so many metres.
-const START_SIGMAS: f64 = 6.0;
-const START_M: f64 = 20.0;
-/// Hypotheses from which a fix is farther away are lost.
-const LOST_SIGMAS: f64 = 6.0;
-const LOST_M: f64 = 100.0;
-/// So many fixes in a row, and it starts anew.
-const LOST_FIXES: u32 = 5;
 /// No track is looked for farther away, metres.
 const OFF_TRACK_M: f64 = 2000.0;
 /// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
 const HEADING_EVERY_M: f64 = 2.0;
-/// Sums of speed and yaw rate over a longer silence are worth nothing, seconds.
+/// A speed or a yaw rate is not known any more after a longer silence, seconds.
 const SILENCE_S: f64 = 2.0;
 
 /// A fix in the plane of the network.
@@ -95,9 +94,18 @@ impl Fix {
             && variances
                 .iter()
                 .all(|m2| LEAST_SIGMA_M.powi(2) <= *m2 && *m2 <= FARTHEST_M)
-            && self.covariance_m2 == self.covariance_m2.transpose()
+            && is_symmetric(&self.covariance_m2)
             && self.covariance_m2.cholesky().is_some()
     }
+}
+
+/// What the train has run in a time, by the measured speed.
+#[derive(Clone, Copy, Debug, Default)]
+struct TrainRun {
+    length_m: f64,
+    seconds: f64,
+    /// Variance of the length for want of a speed.
+    unknown_m2: f64,
 }
 
 /// The filter.
@@ -108,14 +116,20 @@ pub struct Occupancy {
     hypotheses: Vec<Hypothesis>,
     time: Option<SimTime>,
     speed: Option<(SimTime, f64)>,
+    /// Standard deviation of what was run since the last speed, beyond [`SILENCE_S`].
+    unknown_m: f64,
     yaw_rate: Option<(SimTime, f64)>,
     speed_filter: pedal::SpeedFilter,
-    /// Run, and seconds, since the hypotheses were carried on.
-    since: (f64, f64),
+    /// Since the hypotheses were carried on.
+    since: TrainRun,
+    /// Run since the start.
+    run_m: f64,
     /// Run since headings were compared.
     since_heading_m: f64,
     turned_rad: f64,
     lost: u32,
+    /// Since when fixes lie on a track that no hypothesis is on.
+    doubted: Option<SimTime>,
     trust: FixTrust,
 }
 
@@ -128,12 +142,15 @@ impl Occupancy {
             hypotheses: Vec::new(),
             time: None,
             speed: None,
+            unknown_m: 0.0,
             yaw_rate: None,
             speed_filter: pedal::SpeedFilter::default(),
-            since: (0.0, 0.0),
+            since: TrainRun::default(),
+            run_m: 0.0,
             since_heading_m: 0.0,
             turned_rad: 0.0,
             lost: 0,
+            doubted: None,
             trust: FixTrust::default(),
         }
     }
@@ -147,8 +164,10 @@ impl Occupancy {
     pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
         if speed_mps.abs() <= MOST_MPS && self.run_to(time) {
             let more_m = change_since(self.speed, (time, speed_mps));
-            self.since.0 += more_m;
+            self.since.length_m += more_m;
+            self.run_m += more_m;
             self.speed = Some((time, speed_mps));
+            self.unknown_m = 0.0;
             self.speed_filter
                 .update(time, speed_mps, self.settings.speed_sigma_mps);
         }
@@ -168,13 +187,15 @@ impl Occupancy {
             return;
         }
         self.advance();
-        let away_m = self.network.distance_m(&fix.place, OFF_TRACK_M);
-        let judged = self.trust.judge(fix, away_m, &self.settings);
+        let at = Circumstances {
+            away_m: self.network.distance_m(&fix.place, OFF_TRACK_M),
+            run_m: self.run_m,
+        };
+        let Some(judged) = self.trust.judge(fix, at, &self.settings) else {
+            return;
+        };
         let fix = &judged.fix;
-        self.lost = if self.is_lost(fix) { self.lost + 1 } else { 0 };
-        if self.hypotheses.is_empty() || self.lost >= LOST_FIXES {
-            self.start(fix);
-        }
+        self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);
         for hypothesis in &mut self.hypotheses {
             match settings.method {
@@ -188,7 +209,15 @@ impl Occupancy {
         self.tidy();
     }
 
-    /// What is believed now.
+    /// Carries what is believed on to a time, by speed and yaw rate; not back.
+    pub fn carry_on(&mut self, time: SimTime) {
+        if self.run_to(time) {
+            self.advance();
+            self.tidy();
+        }
+    }
+
+    /// What is believed at the last fix, or since then at the time that it was carried on to.
     pub fn decision(&self) -> Decision {
         Decision::of(&self.hypotheses, self.settings.least_probability)
     }
@@ -205,10 +234,20 @@ impl Occupancy {
                 .filter(|(at, _)| time.since(*at) <= SILENCE_S)
                 .map_or(0.0, |(_, value)| value)
         };
-        let run_m = held(self.speed) * seconds;
+        let run_m = match self.speed {
+            Some((at, speed_mps)) if time.since(at) > SILENCE_S => {
+                // It may have stopped at once, or gone on.
+                let before_m2 = self.unknown_m.powi(2);
+                self.unknown_m += 0.5 * speed_mps.abs() * seconds;
+                self.since.unknown_m2 += self.unknown_m.powi(2) - before_m2;
+                0.5 * speed_mps * seconds
+            }
+            speed => held(speed) * seconds,
+        };
         self.turned_rad += held(self.yaw_rate) * seconds;
-        self.since.0 += run_m;
-        self.since.1 += seconds;
+        self.since.length_m += run_m;
+        self.since.seconds += seconds;
+        self.run_m += run_m;
         self.since_heading_m += run_m.abs();
         if self.since_heading_m >= HEADING_EVERY_M {
             self.compare_headings();
@@ -224,72 +263,25 @@ impl Occupancy {
             for hypothesis in &mut self.hypotheses {
                 hypothesis.update_heading(network, self.turned_rad, settings);
             }
+            self.tidy();
+            return;
         }
-        self.tidy();
+        let before = self.hypotheses.len();
+        self.grow();
+        if self.hypotheses.len() != before {
+            self.tidy();
+        }
     }
 
     fn advance(&mut self) {
-        let (run_m, seconds) = std::mem::take(&mut self.since);
+        let run = std::mem::take(&mut self.since);
+        let speed_sigma_mps = self.speed_filter.sigma_mps();
         for hypothesis in &mut self.hypotheses {
             match self.settings.method {
-                Method::Fused => hypothesis.advance_fused((seconds, run_m), &self.settings),
-                _ => hypothesis.advance_by_speed(run_m, self.speed_filter.sigma_mps() * seconds),
+                Method::Fused => hypothesis.advance_fused(&run, &self.settings),
+                _ => hypothesis.advance_by_speed(run.length_m, speed_sigma_mps * run.seconds),
             }
         }
-    }
-
-    /// Whether a fix is far from all hypotheses.
-    fn is_lost(&self, fix: &Fix) -> bool {
-        let sigma_m = fix.covariance_m2.trace().sqrt();
-        self.hypotheses.iter().all(|hypothesis| {
-            let (place, _) = hypothesis.course.at(&self.network, hypothesis.place_m());
-            let spread_m = sigma_m.hypot(hypothesis.sigma_m());
-            (fix.place - place).norm() > LOST_SIGMAS * spread_m + LOST_M
-        })
-    }
-
-    /// Every track near a fix, both ways.
-    fn start(&mut self, fix: &Fix) {
-        self.lost = 0;
-        let within_m = START_M + START_SIGMAS * fix.covariance_m2.trace().sqrt();
-        let near = self.network.near(&fix.place, within_m);
-        let mut hypotheses = Vec::new();
-        for element in near {
-            let all = [0.0, self.network.elements[element].length_m()];
-            let covariance = &fix.covariance_m2;
-            let Some(found) =
-                by_pedal_curve(&self.network.elements[element], all, &fix.place, covariance)
-            else {
-                continue;
-            };
-            for way in [Direction::Up, Direction::Down] {
-                hypotheses.push(self.new_hypothesis(ElementEnd { element, way }, &found, fix));
-            }
-        }
-        self.hypotheses = hypotheses;
-        self.grow();
-    }
-
-    fn new_hypothesis(&self, towards: ElementEnd, found: &Match, fix: &Fix) -> Hypothesis {
-        let mut hypothesis = Hypothesis {
-            course: Course::at_place(&self.network, towards, found.along_m),
-            log_probability: 0.0,
-            mean: State::zeros(),
-            covariance: StateCovariance::zeros(),
-            fix_variance_m2: 0.0,
-            fix_time: fix.time,
-            kind: None,
-            kinds: Vec::new(),
-        };
-        match self.settings.method {
-            Method::Fused => {
-                let (_, forward) = hypothesis.course.at(&self.network, 0.0);
-                let offset_rad = self.turned_rad - forward.y.atan2(forward.x);
-                hypothesis.start_fused(&self.settings, offset_rad);
-            }
-            _ => hypothesis.start_matched(found),
-        }
-        hypothesis
     }
 
     fn grow(&mut self) {
@@ -324,19 +316,34 @@ impl Occupancy {
         self.hypotheses
             .retain(|h| h.log_probability >= least && h.is_finite());
         (self.hypotheses).sort_by(|a, b| b.log_probability.total_cmp(&a.log_probability));
-        self.hypotheses.truncate(self.settings.most_hypotheses);
+        self.hypotheses
+            .truncate(self.settings.most_hypotheses as usize);
         self.grow();
         let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.hypotheses.len());
+        // Only what is on the same element, the same way, can be one.
+        let mut on: Vec<ElementEnd> = Vec::with_capacity(self.hypotheses.len());
         for hypothesis in self.hypotheses.drain(..) {
-            if !kept
+            let towards = hypothesis.towards();
+            let mut same = kept
                 .iter_mut()
-                .any(|other| other.merge(&hypothesis, &self.settings))
-            {
+                .zip(&mut on)
+                .filter(|(_, on)| **on == towards);
+            let merged = same.find_map(|(other, on)| {
+                let merges = other.merge(&hypothesis, &self.settings);
+                merges.then(|| *on = other.towards())
+            });
+            if merged.is_none() {
                 kept.push(hypothesis);
+                on.push(towards);
             }
         }
         self.hypotheses = kept;
     }
+}
+
+/// But for rounding, as of a covariance that was turned.
+fn is_symmetric(covariance: &Matrix2<f64>) -> bool {
+    (covariance[(0, 1)] - covariance[(1, 0)]).abs() <= 1e-9 * covariance.trace()
 }
 
 /// By how much more a quantity has summed up since its last reading than if it had stayed as it was then: it changes

@@ -1,6 +1,7 @@
 //! The filter where a train goes back through a switch.
 
 use super::*;
+use crate::track::Direction;
 use crate::track::plan::TrackElement;
 use nalgebra::Vector2;
 
@@ -72,4 +73,108 @@ fn a_train_may_come_back_onto_the_other_leg() {
     on(&drive(&mut occupancy, 0, STEM_M, -10.0, 10), 0);
     on(&drive(&mut occupancy, 0, 200.0, 10.0, 9), 0);
     on(&drive(&mut occupancy, 2, 0.0, 10.0, 20), 2);
+}
+
+/// A train at 10 m/s along the stem, with fixes that are so far beside it, to the decimetre.
+fn run_along_stem(occupancy: &mut Occupancy, seconds: std::ops::Range<u32>, beside_m: f64) {
+    for second in seconds {
+        let time = SimTime::from_secs(f64::from(second));
+        occupancy.on_speed(time, 10.0);
+        occupancy.on_fix(&Fix {
+            time,
+            place: Point2::new(10.0 * f64::from(second), beside_m),
+            covariance_m2: Matrix2::identity() * 0.01,
+        });
+    }
+}
+
+/// Fails where a track is named although no fix was on the map, or where the right ones do not help afterwards.
+#[test]
+fn nothing_is_decided_before_map_and_fixes_agree() {
+    let mut occupancy = Occupancy::new(network(), OccupancySettings::default());
+    run_along_stem(&mut occupancy, 0..12, 150.0);
+    assert_eq!(occupancy.decision(), Decision::default());
+    run_along_stem(&mut occupancy, 12..25, 0.2);
+    let decision = occupancy.decision();
+    assert_eq!(decision.tracks[0].element, 0, "{decision:?}");
+}
+
+/// Fails where reflections move a train, or cost it the identification.
+#[test]
+fn reflections_do_not_move_a_train() {
+    let mut occupancy = Occupancy::new(network(), OccupancySettings::default());
+    run_along_stem(&mut occupancy, 0..20, 0.2);
+    run_along_stem(&mut occupancy, 20..24, 60.0);
+    run_along_stem(&mut occupancy, 24..25, 0.2);
+    let decision = occupancy.decision();
+    assert!(decision.is_identified(), "{decision:?}");
+    assert!(
+        (decision.tracks[0].along_m - 240.0).abs() < 1.0,
+        "{decision:?}"
+    );
+}
+
+/// Fails where a train without a speed is held to stand: from 10 m/s it may be anywhere between a stop at once and
+/// 100 m on.
+#[test]
+fn a_place_is_uncertain_after_a_silence() {
+    let mut occupancy = Occupancy::new(network(), OccupancySettings::default());
+    run_along_stem(&mut occupancy, 0..10, 0.2);
+    let before = occupancy.decision().tracks[0];
+    // However often something else comes.
+    for k in 0..=500 {
+        occupancy.on_yaw_rate(SimTime::from_secs(12.0 + 0.02 * f64::from(k)), 0.0);
+    }
+    let after = occupancy.decision().tracks[0];
+    let gone_m = after.along_m - before.along_m;
+    assert!(gone_m - 2.0 * after.sigma_m < 50.0, "{before:?} {after:?}");
+    assert!(gone_m + 2.0 * after.sigma_m > 120.0, "{before:?} {after:?}");
+}
+
+/// Fails where a train that was put on a wrong track with certainty stays there although fixes say otherwise.
+#[test]
+fn a_wrong_certainty_is_given_up() {
+    let lines = [("one", 0.0), ("other", 20.0)]
+        .map(|(id, y)| TrackElement::new(id, vec![Point2::new(0.0, y), Point2::new(3000.0, y)]));
+    let network = PlanNetwork::new(None, lines.into_iter().flatten().collect(), &[]);
+    let mut occupancy = Occupancy::new(network.into(), OccupancySettings::default());
+    run_along_stem(&mut occupancy, 0..60, 20.0);
+    let wrong = occupancy.decision();
+    assert!(
+        wrong.is_identified() && wrong.tracks[0].element == 1,
+        "{wrong:?}"
+    );
+    run_along_stem(&mut occupancy, 60..120, 0.2);
+    let right = occupancy.decision();
+    assert_eq!(right.tracks[0].element, 0, "{right:?}");
+}
+
+/// Fails where a train that was put on a wrong track with certainty stays there although it reads two balises of the
+/// other one; one may be cross-talk.
+#[test]
+fn two_balises_refute_a_certainty() {
+    let lines = [("one", 0.0), ("other", 4.0)]
+        .map(|(id, y)| TrackElement::new(id, vec![Point2::new(0.0, y), Point2::new(3000.0, y)]));
+    let network = PlanNetwork::new(None, lines.into_iter().flatten().collect(), &[]);
+    let mut occupancy = Occupancy::new(network.into(), OccupancySettings::default());
+    run_along_stem(&mut occupancy, 0..200, 6.0);
+    let wrong = occupancy.decision();
+    assert!(
+        wrong.is_identified() && wrong.tracks[0].element == 1,
+        "{wrong:?}"
+    );
+    let head_m = wrong.tracks[0].along_m + 10.0;
+    let now = SimTime::from_secs(199.0);
+    occupancy.on_balise(now, (0, head_m));
+    let one = occupancy.decision();
+    assert!(
+        one.tracks[0].element == 1 && !one.is_identified(),
+        "{one:?}"
+    );
+    occupancy.on_balise(now, (0, head_m));
+    let two = occupancy.decision();
+    assert!(
+        two.tracks[0].element == 0 && two.tracks[0].probability > 0.99,
+        "{two:?}"
+    );
 }
