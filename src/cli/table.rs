@@ -85,6 +85,7 @@ mod tests {
             wayside: None,
             cameras: BTreeMap::new(),
             dark_lamps: Vec::new(),
+            occupancy: None,
             protection: None,
             train: None,
             trains: Vec::new(),

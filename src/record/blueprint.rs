@@ -110,8 +110,11 @@ fn layout(contents: &[Contents], eye: ([f32; 3], [f32; 3]), has_map: bool) -> No
     right.push((2.6, row(words)));
 
     let mut places = vec![Node::Pane(world(first, eye))];
-    if has_map {
-        places.push(Node::Pane(Pane::new("Map", "Map", map::ROOT)));
+    let map = has_map.then(|| Node::Pane(Pane::new("Map", "Map", map::ROOT)));
+    // On the map is what track occupancy says.
+    match map {
+        Some(map) if contents.iter().any(|train| train.occupancy) => right.insert(0, (4.4, map)),
+        map => places.extend(map),
     }
     let mut left = vec![(4.4, tabbed(places))];
     if let [only] = contents {

@@ -167,6 +167,7 @@ struct Contents {
     rig: bool,
     train: bool,
     radar: bool,
+    occupancy: bool,
     protection: bool,
     /// Names of the wayside devices.
     devices: Vec<String>,
@@ -179,6 +180,7 @@ impl Contents {
             rig: train.rig.is_some(),
             train: train.cars > 0,
             radar: train.radar,
+            occupancy: train.occupancy,
             protection: train.protection,
             devices: Vec::new(),
         }
@@ -292,6 +294,19 @@ impl Open {
                 }
                 time
             }
+            Event::Occupancy {
+                train,
+                report,
+                class,
+            } => {
+                if let Some(view) = self.view(train) {
+                    view.plots.occupancy(report, class);
+                }
+                if let Some(map) = &mut self.map {
+                    map.occupancy(train, report)?;
+                }
+                report.time
+            }
             // Its images come when they reach the stack.
             Event::Exposure(_) => return Ok(()),
             Event::Pair {
@@ -355,6 +370,9 @@ impl Open {
         let time = message.received_at;
         if let Content::Warning(warning) = &message.content {
             self.texts.warning(id, message, warning)?;
+        }
+        if let (Content::Gnss(fix), Some(map)) = (&message.content, &mut self.map) {
+            map.fix(id, fix)?;
         }
         let Some(view) = self.view(id) else {
             return Ok(time);

@@ -14,6 +14,8 @@ pub(super) const BODY: Color = rgb(205, 120, 60);
 pub(super) const LAMP: Color = rgb(255, 236, 150);
 /// Camera frusta.
 pub(super) const CAMERA: Color = rgb(120, 220, 255);
+/// Fixes of a satellite receiver.
+pub(super) const GNSS: Color = rgb(255, 190, 70);
 /// Rails.
 pub(super) const RAIL: Color = rgb(190, 195, 205);
 /// Balises.
@@ -80,6 +82,13 @@ pub(super) fn material(material: Material, ring: usize) -> Color {
     } else {
         Color::from_rgb(r - r / 4, g - g / 4, b - b / 4)
     }
+}
+
+/// Of a track that a train may be on, by how probable that is: grey to green.
+pub(super) fn probability(probability: f64) -> Color {
+    let share = probability.clamp(0.0, 1.0);
+    let mix = |from: f64, to: f64| (from + (to - from) * share) as u8;
+    Color::from_rgb(mix(120.0, 60.0), mix(120.0, 235.0), mix(130.0, 110.0))
 }
 
 /// A width on the screen, whatever the distance.

@@ -4,9 +4,10 @@ use super::stream::RowStream;
 use super::whole_files::{Result, failed};
 use super::{Contents, palette, path_of, slug};
 use crate::bus::{
-    DopplerSample, Frame, LedReport, Method, OdometerSample, ProtectionReport, SimTime, TrainId,
-    WaysideReport,
+    DopplerSample, Frame, LedReport, Method, OccupancyReport, OdometerSample, ProtectionReport,
+    SimTime, TrainId, WaysideReport,
 };
+use crate::session::OccupancyClass;
 use crate::twin::physics::TrainState;
 use palette::rgb;
 use re_sdk_types::archetypes::{Scalars, SeriesLines};
@@ -64,6 +65,8 @@ enum ValueOf {
     Odometer(fn(&OdometerSample) -> Option<f64>),
     Radar(fn(&DopplerSample) -> Option<f64>),
     Protection(fn(&ProtectionReport) -> Option<f64>),
+    Occupancy(fn(&OccupancyReport) -> Option<f64>),
+    Class(fn(OccupancyClass) -> Option<f64>),
 }
 
 /// Groups of curves, each with its path, name, colour, width and values.
@@ -123,6 +126,16 @@ groups! {
     DISTANCE: "Distance to obstacle, m", "plots/distance", LeftBottom {
         "display", "driver's display", WHITE, 2.0, Protection |r| r.display.distance_to_obstacle_m;
     }
+    TRACK: "Probability of the likeliest track", "plots/track", RightBottom {
+        "probability", "probability", GREEN, 2.0, Occupancy |r| Some(r.tracks.first()?.probability);
+        "identified", "no other track left", WHITE, 1.0, Occupancy |r| Some(f64::from(u8::from(r.identified)));
+    }
+    CLASS: "Class of fixes: -3 wrong and sure, 3 right and sure", "plots/class", RightBottom {
+        "class", "class", ORANGE, 1.5, Class |class| Some(class_value(class));
+    }
+    HYPOTHESES: "Hypotheses alive", "plots/hypotheses", RightTop {
+        "alive", "alive", CYAN, 1.5, Occupancy |r| Some(f64::from(r.hypotheses));
+    }
     ERROR: "Position error and ±2σ, m", "plots/position_error", RightTop {}
     UNSEEN: "Bed not seen, m", "plots/bed_unseen", RightTop {}
     CONTRAST: "Contrast across the track", "plots/track_contrast", RightTop {}
@@ -136,6 +149,18 @@ const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
 /// What the rig is called among cameras; both eyes are exposed alike.
 pub(super) const RIG_CAMERA: &str = "rig";
 
+/// Wrong below zero, right over it, the surer the farther.
+fn class_value(class: OccupancyClass) -> f64 {
+    match class {
+        OccupancyClass::WrongConfident => -3.0,
+        OccupancyClass::WrongFairlyConfident => -2.0,
+        OccupancyClass::WrongUndecided => -1.0,
+        OccupancyClass::CorrectUndecided => 1.0,
+        OccupancyClass::CorrectFairlyConfident => 2.0,
+        OccupancyClass::CorrectConfident => 3.0,
+    }
+}
+
 fn most_slip_mps(train: &TrainState) -> Option<f64> {
     let slips = train.wheels.iter().map(|w| w.slip_mps.abs());
     slips.reduce(f64::max)
@@ -146,6 +171,9 @@ pub(super) fn panes(contents: &Contents) -> Vec<Vec<PlotGroup>> {
     let mut panes = Vec::new();
     if contents.train {
         panes.push(vec![SPEED]);
+    }
+    if contents.occupancy {
+        panes.push(vec![TRACK, CLASS, HYPOTHESES]);
     }
     if contents.rig {
         panes.push(vec![ERROR]);
@@ -274,6 +302,15 @@ impl Plots {
     pub(super) fn protection(&mut self, report: &ProtectionReport) {
         self.push_curves(report.time, |value| match value {
             ValueOf::Protection(of) => Some(of(report)),
+            _ => None,
+        });
+    }
+
+    /// On which track the train takes itself to be.
+    pub(super) fn occupancy(&mut self, report: &OccupancyReport, class: Option<OccupancyClass>) {
+        self.push_curves(report.time, |value| match value {
+            ValueOf::Occupancy(of) => Some(of(report)),
+            ValueOf::Class(of) => class.map(of),
             _ => None,
         });
     }

@@ -318,6 +318,7 @@ fn sensors_of_motion_become_series() {
             car_half_extents_m: nalgebra::Vector3::zeros(),
             cars: 1,
             radar,
+            occupancy: false,
             protection: false,
         };
         let opening = Opening {

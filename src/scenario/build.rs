@@ -7,6 +7,7 @@ use super::{Override, ScenarioError, check};
 use crate::bus::{TrainEnd, TrainId, WaysideCalibration};
 use crate::settings::{Checker, FileError, Problem, Settings, read_settings};
 use crate::track::network::{Itinerary, Network};
+use crate::track::plan::PlanNetwork;
 use crate::track::{Direction, Place, Track, Tunnel};
 use crate::twin::physics::{HISTORY_S, PhysicsSettings, TrainSettings};
 use crate::twin::sensors::{CameraSettings, LidarSettings, RigSettings};
@@ -47,6 +48,11 @@ impl OnboardSettings {
         self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
     }
 
+    /// It says on which track it is.
+    pub fn tells_its_track(&self) -> bool {
+        self.gnss.is_some() && self.equipment.contains(&OnboardEquipment::Occupancy)
+    }
+
     /// Its speed is supervised.
     pub fn protects(&self) -> bool {
         self.equipment.contains(&OnboardEquipment::Protection)
@@ -60,7 +66,9 @@ impl OnboardSettings {
             imu: file.imu,
             odometer: file.odometer,
             doppler: file.doppler,
+            gnss: file.gnss,
             led: file.stack.led.clone(),
+            occupancy: file.stack.occupancy,
             protection: file.stack.protection.clone(),
             equipment: match file.bench {
                 Some(_) => vec![OnboardEquipment::Led],
@@ -191,6 +199,11 @@ impl Scenario {
                 .retain(|site| in_use(&site.name));
         }
         Arc::new(map)
+    }
+
+    /// The tracks in plan that the stack is given.
+    pub fn plan(&self) -> PlanNetwork {
+        self.file.survey.plan(&self.tunnel, self.file.seed)
     }
 
     /// In its tunnel, unless there are problems already, or are then.

@@ -4,6 +4,7 @@ use super::RecordSettings;
 use super::sampling::StudySettings;
 use crate::settings::settings;
 use crate::stack::led::LedSettings;
+use crate::stack::occupancy::OccupancySettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::stack::wayside::WaysideSettings;
 use crate::twin::air::AirSettings;
@@ -14,7 +15,8 @@ use crate::twin::physics::{
     TrackSettings, TrainSettings, WorkerSettings, train_key,
 };
 use crate::twin::sensors::{
-    CameraSettings, DopplerSettings, ImuSettings, LidarSettings, OdometerSettings, RigSettings,
+    CameraSettings, DopplerSettings, GnssSettings, ImuSettings, LidarSettings, OdometerSettings,
+    RigSettings,
 };
 use crate::twin::survey::SurveySettings;
 use schemars::JsonSchema;
@@ -79,6 +81,8 @@ settings! {
         odometer: OdometerSettings, nested;
         /// A Doppler radar on the train. Default: none.
         doppler: Option<DopplerSettings>, nested;
+        /// A satellite receiver on the train. Default: none, so no track occupancy.
+        gnss: Option<GnssSettings>, nested;
         /// Sensors and equipment of other trains. Default: none.
         #[serde(default)]
         onboard: Vec<OnboardSettings>, nested;
@@ -135,9 +139,14 @@ settings! {
         odometer: OdometerSettings, nested;
         /// Its Doppler radar. Default: none.
         doppler: Option<DopplerSettings>, nested;
+        /// Its satellite receiver. Default: none.
+        gnss: Option<GnssSettings>, nested;
         /// Its positioning by lamps.
         #[serde(default)]
         led: LedSettings, nested;
+        /// Its track occupancy.
+        #[serde(default)]
+        occupancy: OccupancySettings, nested;
         /// Its warning and control.
         #[serde(default)]
         protection: ProtectionSettings, nested;
@@ -153,6 +162,8 @@ settings! {
 pub enum OnboardEquipment {
     /// Positioning by lamps; needs a rig.
     Led,
+    /// On which track it is; needs a satellite receiver.
+    Occupancy,
     /// Warning and control.
     Protection,
 }
@@ -160,7 +171,7 @@ pub enum OnboardEquipment {
 impl OnboardEquipment {
     /// In the order in which they work.
     pub fn all() -> Vec<Self> {
-        vec![Self::Led, Self::Protection]
+        vec![Self::Led, Self::Occupancy, Self::Protection]
     }
 }
 
@@ -183,6 +194,8 @@ settings! {
     pub struct StackSettings {
         /// Positioning by lamps, on the train.
         led: LedSettings = LedSettings::default(), nested;
+        /// Track occupancy, on the train.
+        occupancy: OccupancySettings = OccupancySettings::default(), nested;
         /// Obstacle detection, in every wayside device.
         wayside: WaysideSettings = WaysideSettings::default(), nested;
         /// Onboard warning and control.

@@ -1,8 +1,9 @@
 //! What passes in a session, as observers (recordings, tables, scores) see it.
 
+use super::OccupancyClass;
 use crate::bus::{
-    CameraFault, Frame, LedReport, Message, Node, RigCalibration, SimTime, StereoPair, TrainId,
-    WaysideCalibration, WaysideReport,
+    CameraFault, Frame, LedReport, Message, Node, OccupancyReport, RigCalibration, SimTime,
+    StereoPair, TrainId, WaysideCalibration, WaysideReport,
 };
 use crate::track::{TrackId, Tunnel};
 use crate::twin::geometry::Body;
@@ -38,6 +39,8 @@ pub struct TrainOpening {
     pub cars: usize,
     /// It has a Doppler radar.
     pub radar: bool,
+    /// Track occupancy runs: its reports will come.
+    pub occupancy: bool,
     /// A protection runs: its reports and the driver's display will come.
     pub protection: bool,
 }
@@ -100,6 +103,15 @@ pub enum Event<'a> {
         truth: &'a TrainState,
         /// Pose `world_from_camera` of its left camera, where it has a rig.
         left_eye: Option<&'a Isometry3<f64>>,
+    },
+    /// A train's track occupancy reported.
+    Occupancy {
+        /// Which train.
+        train: TrainId,
+        /// What it says.
+        report: &'a OccupancyReport,
+        /// Its class, if it comes of a fix.
+        class: Option<OccupancyClass>,
     },
     /// A message arrived at a node, or was sent there; those with images come as [`Event::Pair`] and
     /// [`Event::Wayside`].

@@ -7,16 +7,18 @@
 use crate::bus::{Content, DopplerSample, ImuSample, Node, OdometerSample, TrainEnd, TrainId};
 use crate::scenario::{OnboardEquipment, OnboardSettings, Scenario, WaysidePost};
 use crate::stack::Equipment;
+use crate::stack::occupancy::TrackOccupancy;
 use crate::stack::positioning::{CabMount, LampPositioning};
 use crate::stack::protection::TrainProtection;
 use crate::stack::wayside::WaysideDetection;
 use crate::track::Tunnel;
 use crate::track::network::Route;
+use crate::track::plan::PlanNetwork;
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
-    BaliseAntenna, Doppler, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera, WaysideCamera,
-    WaysideLidar,
+    BaliseAntenna, Doppler, Gnss, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
+    WaysideCamera, WaysideLidar,
 };
 use std::sync::Arc;
 
@@ -97,6 +99,10 @@ impl Fitting {
             self.add_motion_sensors(onboard, &node, seed);
             let antenna = BaliseAntenna::new(train, world);
             self.add_sensor(node.clone(), antenna);
+            if let Some((settings, datum)) = onboard.gnss.as_ref().zip(scenario.tunnel.datum) {
+                let tracks = (scenario.tunnel.network.tracks.as_slice(), &datum);
+                self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seed));
+            }
         }
         if let Some(rig) = &onboard.rig {
             let camera = StereoCamera::new(train, rig, &scenario.file.faults.cameras, seed);
@@ -184,6 +190,12 @@ fn one_of_onboard(
             let led = &onboard.led;
             Box::new(LampPositioning::new(node, mount, led, sheet, network))
         }
+        OnboardEquipment::Occupancy => {
+            let plan = maps.plan.clone().filter(|_| onboard.gnss.is_some())?;
+            let (plan, node) = ((plan, maps.map.datum?), node.clone());
+            let (network, settings) = (&maps.map.network, &onboard.occupancy);
+            Box::new(TrackOccupancy::new(node, plan, network, settings))
+        }
         OnboardEquipment::Protection => {
             let (node, settings) = (node.clone(), &onboard.protection);
             let (route, network) = (maps.route(onboard.id()), &maps.map.network);
@@ -200,6 +212,8 @@ fn one_of_onboard(
 /// The surveyed map, and the routes that trains are told to run.
 pub struct Maps {
     map: Arc<Tunnel>,
+    /// The tracks in plan, if a train's equipment needs them.
+    plan: Option<Arc<PlanNetwork>>,
     routes: Vec<Route>,
 }
 
@@ -208,6 +222,11 @@ impl Maps {
     pub fn new(scenario: &Scenario) -> Self {
         Self {
             map: scenario.map(),
+            plan: (scenario
+                .onboard
+                .iter()
+                .any(OnboardSettings::tells_its_track))
+            .then(|| Arc::new(scenario.plan())),
             routes: scenario
                 .itineraries
                 .iter()

@@ -25,6 +25,7 @@ mod fitting;
 mod health;
 mod image_box;
 mod imaging;
+mod occupancy_score;
 mod outcome;
 mod positioning_score;
 mod posts;
@@ -47,8 +48,9 @@ pub use profile::{DrawingProfile, PassCost, profile};
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{
-    CameraFigures, Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, Physics, Positioning,
-    ProtectionFigures, Summary, TrainFigures, TrainSummary, WallShares, Wayside,
+    CameraFigures, Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, OccupancyClass,
+    OccupancyFigures, Physics, Positioning, ProtectionFigures, Summary, SwitchDistances,
+    TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

@@ -7,7 +7,8 @@ use super::{
     End, Event, Opening, Physics, SessionError, Summary, TrainOpening, TrainSummary, WallShares,
 };
 use crate::bus::{
-    CameraHealth, Content, EYES, LedReport, Message, Node, SimTime, TrainId, WaysideReport,
+    CameraHealth, Content, EYES, LedReport, Message, Node, OccupancyReport, SimTime, TrainId,
+    WaysideReport,
 };
 use crate::scenario::OnboardSettings;
 
@@ -21,6 +22,7 @@ impl Session<'_, '_> {
             car_half_extents_m: (self.world.car_half_extents_m(onboard.id())).unwrap_or_default(),
             cars: (self.world.train(onboard.id())).map_or(0, |t| t.world_from_cars.len()),
             radar: onboard.doppler.is_some(),
+            occupancy: onboard.tells_its_track(),
             protection: onboard.protects(),
         };
         let trains: Vec<_> = self.scenario.onboard.iter().map(opening).collect();
@@ -49,6 +51,7 @@ impl Session<'_, '_> {
         }
         match (&message.content, sender) {
             (Content::Led(report), Node::Train(id)) => self.score_led(*id, report),
+            (Content::Occupancy(report), Node::Train(id)) => self.score_occupancy(*id, report),
             (Content::Wayside(report), Node::Post(_)) => self.score_wayside(now, sender, report),
             (Content::Camera(status), _) => {
                 self.note_camera(sender, &status.camera, now, status.health)
@@ -83,6 +86,21 @@ impl Session<'_, '_> {
                 true_chainages_m: &truths_m,
             })?;
         }
+        Ok(())
+    }
+
+    fn score_occupancy(
+        &mut self,
+        train: TrainId,
+        report: &OccupancyReport,
+    ) -> Result<(), SessionError> {
+        let score = self.trains.get_mut(&train);
+        let class = score.and_then(|score| score.on_occupancy(report, &self.world));
+        self.observers.show(&Event::Occupancy {
+            train,
+            report,
+            class,
+        })?;
         Ok(())
     }
 
@@ -224,6 +242,7 @@ impl Session<'_, '_> {
             wayside: self.posts.finish(),
             cameras,
             dark_lamps: first.dark_lamps,
+            occupancy: first.occupancy,
             protection: first.protection,
             train: first.train,
             incidents: world.incidents().to_vec(),

@@ -40,6 +40,8 @@ pub struct Summary {
     pub cameras: BTreeMap<String, CameraFigures>,
     /// Lamps that the stack says do not shine, by their UIDs, in the order passed.
     pub dark_lamps: Vec<String>,
+    /// Track occupancy.
+    pub occupancy: Option<OccupancyFigures>,
     /// Train protection.
     pub protection: Option<ProtectionFigures>,
     /// How the train ran.
@@ -65,6 +67,8 @@ pub struct TrainSummary {
     pub cameras: BTreeMap<String, CameraFigures>,
     /// Lamps that the equipment says do not shine, by their UIDs, in the order passed.
     pub dark_lamps: Vec<String>,
+    /// Track occupancy.
+    pub occupancy: Option<OccupancyFigures>,
     /// Train protection.
     pub protection: Option<ProtectionFigures>,
     /// How it ran.
@@ -264,6 +268,79 @@ pub struct TrainFigures {
     pub energy: EnergyBook,
     /// Energy that the book cannot place, over what was turned over.
     pub energy_gap_share: f64,
+}
+
+/// Track occupancy: what was said after each fix, and how soon legs of switches were known.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct OccupancyFigures {
+    /// Fixes after which something was said.
+    pub fixes: u32,
+    /// Legs of switches that the antenna came to over the toe.
+    pub switches: u32,
+    /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
+    pub never_identified: u32,
+    /// From the toe to where the antenna was when the leg was identified for good.
+    pub identified_after_m: Option<SwitchDistances>,
+    /// The same of each leg in order; `null` where it was never identified.
+    pub legs_identified_after_m: Vec<Option<f64>>,
+    /// How many fixes are of which class.
+    pub classes: BTreeMap<OccupancyClass, u32>,
+    /// Error of the antenna's place along the track, of fixes whose track is right.
+    pub error_m: Option<ErrorStatistics>,
+    /// Mean of (error/sigma)^2 of the same: 1 for an honest sigma.
+    pub nees_mean: Option<f64>,
+}
+
+impl OccupancyFigures {
+    /// Share of fixes of some classes; none of no fixes.
+    pub fn share(&self, counts: impl Fn(OccupancyClass) -> bool) -> Option<f64> {
+        let of = self.classes.iter().filter(|(class, _)| counts(**class));
+        let sum: u32 = of.map(|(_, count)| count).sum();
+        (self.fixes > 0).then(|| f64::from(sum) / f64::from(self.fixes))
+    }
+}
+
+impl OccupancyClass {
+    /// The most probable track is another than the true one.
+    pub fn is_wrong(self) -> bool {
+        matches!(
+            self,
+            Self::WrongConfident | Self::WrongFairlyConfident | Self::WrongUndecided
+        )
+    }
+}
+
+/// Distances from toes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[allow(missing_docs, reason = "the names say it")]
+pub struct SwitchDistances {
+    pub mean: f64,
+    pub p95: f64,
+    pub max: f64,
+}
+
+/// What the most probable track after a fix is worth (Guo et al. 2020). Confident: no other track is left. Fairly
+/// confident: its probability is over 0.9.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
+pub enum OccupancyClass {
+    /// Another track than the true one, and no other left.
+    #[serde(rename = "wc")]
+    WrongConfident,
+    /// Another one, over 0.9.
+    #[serde(rename = "wf")]
+    WrongFairlyConfident,
+    /// Another one.
+    #[serde(rename = "wu")]
+    WrongUndecided,
+    /// The true one.
+    #[serde(rename = "cu")]
+    CorrectUndecided,
+    /// The true one, over 0.9.
+    #[serde(rename = "cf")]
+    CorrectFairlyConfident,
+    /// The true one, and no other left.
+    #[serde(rename = "cc")]
+    CorrectConfident,
 }
 
 /// Train protection.

@@ -2,13 +2,14 @@
 
 use super::SessionError;
 use super::health::Health;
+use super::occupancy_score::OccupancyScore;
 use super::outcome::Outcome;
 use super::positioning_score::PositioningScore;
 use super::ride::Ride;
-use super::summary::TrainSummary;
+use super::summary::{OccupancyClass, TrainSummary};
 use crate::bus::{
-    EYES, LedReport, Method, PositionFix, ProtectionReport, RigCalibration, SimTime, TrainEnd,
-    TrainId,
+    EYES, LedReport, Method, OccupancyReport, PositionFix, ProtectionReport, RigCalibration,
+    SimTime, TrainEnd, TrainId,
 };
 use crate::scenario::{OnboardSettings, Scenario};
 use crate::track::uid::Uid;
@@ -26,6 +27,7 @@ pub struct TrainScore {
     /// Its rig as it really is, and the end of the train that it is at.
     rig: Option<(RigCalibration, TrainEnd)>,
     positioning: Option<PositioningScore>,
+    occupancy: Option<OccupancyScore>,
     outcome: Outcome,
     ride: Ride,
     dark_lamps: Vec<String>,
@@ -54,6 +56,10 @@ impl TrainScore {
             rig: rig.map(|rig| (rig.actual(), rig.end)),
             health: Health::of(eyes),
             positioning,
+            occupancy: onboard
+                .filter(|onboard| onboard.tells_its_track())
+                .and_then(|onboard| onboard.gnss)
+                .map(|gnss| OccupancyScore::new(-gnss.antenna_m[0])),
             outcome: Outcome::default(),
             ride: Ride::default(),
             dark_lamps: Vec::new(),
@@ -99,6 +105,15 @@ impl TrainScore {
         Ok(truths_m)
     }
 
+    /// Takes down what track occupancy says; gives the class of it, if a fix is its ground.
+    pub fn on_occupancy(
+        &mut self,
+        report: &OccupancyReport,
+        world: &World,
+    ) -> Option<OccupancyClass> {
+        self.occupancy.as_mut()?.report(report, world, self.id)
+    }
+
     /// Takes down a cycle of the protection.
     pub fn on_protection(&mut self, now: SimTime, report: &ProtectionReport) {
         self.outcome.on_cycle(now, report, self.aim_mps);
@@ -135,6 +150,7 @@ impl TrainScore {
             positioning: positioning.unwrap_or_default(),
             cameras: self.health.cameras,
             dark_lamps: self.dark_lamps,
+            occupancy: self.occupancy.map(OccupancyScore::finish),
             protection: self.outcome.protection(self.id, world),
             train: self.ride.finish(self.id, world, derailed),
         }

@@ -3,7 +3,8 @@
 use crate::bus::{Method, TrainId};
 use crate::record::parquet::Kind;
 use crate::session::{
-    ErrorStatistics, Event, Observer, ObserverError, ObstacleScore, Summary, Wayside,
+    ErrorStatistics, Event, Observer, ObserverError, ObstacleScore, OccupancyClass, Summary,
+    Wayside,
 };
 use Kind::{Flag, Int, Real, Reals};
 use Method::{Mono, Stereo};
@@ -174,6 +175,28 @@ pub const MEASURES: &[Measure] = positioning![
     measure_of("detection_distance_error_m", Real, "m",
         "mean size of the error of its reported distance, of the obstacle with the largest",
         |s, _| of(s.wayside.as_ref(), |w| worst(w, |o| o.distance_error_m))),
+    measure_of("occupancy_fixes", Int, "1", "fixes after which track occupancy said something",
+        |s, _| of(s.occupancy.as_ref(), |o| Some(o.fixes))),
+    measure_of("occupancy_wrong_confident", Int, "1", "of these, wrong with no other track left",
+        |s, _| of(s.occupancy.as_ref(), |o| o.classes.get(&OccupancyClass::WrongConfident).copied())),
+    measure_of("occupancy_wrong_share", Real, "1", "share of these whose most probable track is wrong",
+        |s, _| of(s.occupancy.as_ref(), |o| o.share(OccupancyClass::is_wrong))),
+    measure_of("occupancy_confident_share", Real, "1", "share of these that are right with no other track left",
+        |s, _| of(s.occupancy.as_ref(), |o| o.share(|class| class == OccupancyClass::CorrectConfident))),
+    measure_of("occupancy_switches", Int, "1", "legs of switches run over from the toe",
+        |s, _| of(s.occupancy.as_ref(), |o| Some(o.switches))),
+    measure_of("occupancy_never_identified", Int, "1", "of these, not identified for good before they were left",
+        |s, _| of(s.occupancy.as_ref(), |o| Some(o.never_identified))),
+    measure_of("occupancy_identified_mean_m", Real, "m", "from the toe to where the leg was identified for good, mean of the run",
+        |s, _| of(s.occupancy.as_ref(), |o| o.identified_after_m.map(|d| d.mean))),
+    measure_of("occupancy_identified_max_m", Real, "m", "the longest of these",
+        |s, _| of(s.occupancy.as_ref(), |o| o.identified_after_m.map(|d| d.max))),
+    measure_of("occupancy_leg_m", Reals, "m", "of every leg that was identified: distance from the toe",
+        |s, _| s.occupancy.as_ref().map_or(Value::Null, |o| list(o.legs_identified_after_m.iter().copied().flatten()))),
+    measure_of("occupancy_error_max_m", Real, "m", "largest error along the track, of fixes whose track is right",
+        |s, _| of(s.occupancy.as_ref(), |o| o.error_m.map(|e| e.max))),
+    measure_of("occupancy_nees_mean", Real, "1", "mean of (error / sigma)^2: 1 for an honest sigma",
+        |s, _| of(s.occupancy.as_ref(), |o| o.nees_mean)),
     measure_of("brake_commanded_s", Real, "s", "when the train first braked for an obstacle",
         |s, _| of(s.protection.as_ref(), |p| p.brake_commanded_s)),
     measure_of("stopped_s", Real, "s", "when it first stood after that",

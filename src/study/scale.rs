@@ -8,9 +8,10 @@ use serde::Serialize;
 /// Figures that have a sign: positions, and differences of them.
 const SIGNED: [&str; 3] = ["stop_margin_m", "stop_error_m", "run_m"];
 /// Ends of names of shares.
-const SHARES: [&str; 2] = ["_availability", "_uid_decode_rate"];
+const SHARES: [&str; 3] = ["_availability", "_uid_decode_rate", "_share"];
 /// Ends of names of figures of which less is worse.
-const LESS_IS_WORSE: [&str; 5] = [
+const LESS_IS_WORSE: [&str; 6] = [
+    "_confident_share",
     "_availability",
     "_uid_decode_rate",
     "_fixes",
@@ -18,7 +19,8 @@ const LESS_IS_WORSE: [&str; 5] = [
     "least_wheel_load",
 ];
 /// Ends of names of figures of which neither less nor more is worse: they say what a run was like.
-const NEUTRAL: [&str; 7] = [
+const NEUTRAL: [&str; 8] = [
+    "occupancy_switches",
     "obstacles",
     "dark_lamps",
     "brake_commanded_s",

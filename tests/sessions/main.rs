@@ -16,5 +16,6 @@ mod fault_matrix;
 mod faults;
 mod messages;
 mod occupancy;
+mod receivers;
 mod trains;
 mod validation;

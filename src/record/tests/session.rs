@@ -126,6 +126,7 @@ pub(crate) fn play(observer: &mut dyn Observer, extent: Extent) {
         car_half_extents_m: Vector3::new(9.5, 1.4, 1.7),
         cars: extent.cars,
         radar: false,
+        occupancy: false,
         protection: extent.cars > 0,
     };
     let opening = Opening {

@@ -4,10 +4,11 @@ use super::line::LineCheck;
 use crate::bus::TrainEnd;
 use crate::scenario::ScenarioFile;
 use crate::settings::Checker;
+use crate::stack::occupancy::OccupancySettings;
 use crate::stack::protection::ProtectionSettings;
 use crate::track::Direction;
 use crate::twin::physics::TrainSettings;
-use crate::twin::sensors::{MountSide, RigSettings, ever_sees};
+use crate::twin::sensors::{GnssSettings, MountSide, RigSettings, ever_sees};
 use std::collections::BTreeSet;
 
 /// Of so many lamps, evenly along the line, it is found whether a rig sees them.
@@ -21,6 +22,8 @@ const REAR_LENGTH_ERROR_M: f64 = 0.1;
 /// Elsewhere it says which gradients are under the train: a quarter of a car is not a coupler more or
 /// less, but a car forgotten.
 const LENGTH_ERROR_M: f64 = 5.0;
+/// By how much its equipment may take the place of the satellite receiver's antenna wrong.
+const ANTENNA_ERROR_M: f64 = 1.0;
 
 /// Sensors and equipment of other trains, each of a train that there is, and named once.
 pub(super) fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
@@ -56,12 +59,13 @@ pub(super) fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
 /// The sensors of motion need the part of the train that they sit on.
 pub(super) fn check_motion(file: &ScenarioFile, check: &mut Checker<'_>) {
     let Some(train) = &file.train else {
-        if file.doppler.is_some() {
-            check.problem(
-                "doppler",
-                "there is no train that carries it",
-                "add [train], or take this out",
-            );
+        let carried = [
+            ("doppler", file.doppler.is_some()),
+            ("gnss", file.gnss.is_some()),
+        ];
+        for (key, _) in carried.into_iter().filter(|(_, given)| *given) {
+            let what = "there is no train that carries it";
+            check.problem(key, what, "add [train], or take this out");
         }
         return;
     };
@@ -91,10 +95,42 @@ impl LineCheck<'_, '_> {
         let file = self.file;
         let first = file.rig.as_ref();
         self.equipped("stack", &file.stack.protection, "rig", first, 0);
+        let settings = &file.stack.occupancy;
+        self.receiver("gnss", file.gnss.as_ref(), "stack.occupancy", settings);
         for (k, onboard) in file.onboard.iter().enumerate() {
             let (at, rig) = (format!("onboard[{k}]"), onboard.rig.as_ref());
             let (protection, train) = (&onboard.protection, onboard.train.into());
             self.equipped(&at, protection, &format!("{at}.rig"), rig, train);
+            let (gnss, own) = (format!("{at}.gnss"), format!("{at}.occupancy"));
+            self.receiver(&gnss, onboard.gnss.as_ref(), &own, &onboard.occupancy);
+        }
+    }
+
+    /// Satellites are over a place on the earth, and the equipment is told where the antenna is.
+    fn receiver(
+        &mut self,
+        at: &str,
+        gnss: Option<&GnssSettings>,
+        stack_at: &str,
+        stack: &OccupancySettings,
+    ) {
+        let Some(gnss) = gnss else {
+            return;
+        };
+        let (behind_m, told_m) = (-gnss.antenna_m[0], stack.antenna_behind_head_m);
+        if (behind_m - told_m).abs() > ANTENNA_ERROR_M {
+            let what = format!("is {told_m} m, but the antenna is {behind_m} m behind the head");
+            let remedy = format!("give a measured distance within {ANTENNA_ERROR_M} m of it");
+            let key = format!("{stack_at}.antenna_behind_head_m");
+            self.check.problem(&key, what, remedy);
+        }
+        if self.tunnel.datum.is_none() {
+            let what = format!(
+                "tunnel `{}` does not say where on the earth it is",
+                self.tunnel.name
+            );
+            let remedy = "add [datum] with latitude_deg and longitude_deg to the tunnel file, or take this out";
+            self.check.problem(at, what, remedy);
         }
     }
 

@@ -17,10 +17,33 @@ fn keys(rest: &str) -> Vec<String> {
 /// be silent all the run.
 #[test]
 fn sensors_of_motion_need_their_place() {
-    assert_eq!(keys("[bench]\n[rig]\n[doppler]\n"), ["doppler"]);
+    assert_eq!(
+        keys("[bench]\n[rig]\n[doppler]\n[gnss]\n"),
+        ["doppler", "gnss"]
+    );
     assert_eq!(keys("[train]\n[doppler]\n[odometer]\naxle = 24\n"), [""; 0]);
     let short = "[train]\ncars = 2\n[odometer]\naxle = 9\n[doppler]\nrate_hz = 0.0\n";
     assert_eq!(keys(short), ["doppler.rate_hz", "odometer.axle"]);
+}
+
+/// Satellites are over a place on the earth, which only a datum says.
+#[test]
+fn a_satellite_receiver_needs_a_datum() {
+    let text = "name = \"test\"\ntunnel = \"given\"\n[train]\ncars = 1\nstart_chainage_m = 100.0\nstop_at_m = 150.0\n[gnss]\n\
+                [[other_trains]]\ncars = 1\nstart_chainage_m = 200.0\nstop_at_m = 300.0\n[[onboard]]\ntrain = 1\n[onboard.gnss]\n";
+    let file = read_toml::<ScenarioFile>(text).unwrap();
+    let line = "name = 'line'\nplan = [{ kind = 'straight', length_m = 400.0 }]\n";
+    let keys = |datum: &str| {
+        let tunnel = Tunnel::from_toml(&format!("{datum}{line}")).unwrap();
+        let mut problems = Vec::new();
+        in_tunnel(&file, &tunnel, &mut Checker::new("", &mut problems));
+        problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+    };
+    assert_eq!(keys(""), ["gnss", "onboard[0].gnss"]);
+    assert_eq!(
+        keys("datum = { latitude_deg = 1.0, longitude_deg = 2.0 }\n"),
+        [""; 0]
+    );
 }
 
 /// Every fault that could not act as written is refused, with its key.

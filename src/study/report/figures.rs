@@ -115,7 +115,7 @@ pub fn all(template: &Template, digest: &Digest, rows: &[Row]) -> Vec<Plot> {
 
 /// Figures that users ask for; the rest stand in the tables.
 fn is_worth_plotting(measure: &Measure) -> bool {
-    const ASKED: [&str; 8] = [
+    const ASKED: [&str; 11] = [
         "paper_error_mean_m",
         "paper_error_max_m",
         "paper_availability",
@@ -124,6 +124,9 @@ fn is_worth_plotting(measure: &Measure) -> bool {
         "detection_distance_error_m",
         "stop_margin_m",
         "stop_error_m",
+        "occupancy_identified_mean_m",
+        "occupancy_identified_max_m",
+        "occupancy_confident_share",
     ];
     measure.kind == Kind::Real && ASKED.contains(&measure.name)
 }

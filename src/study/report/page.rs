@@ -79,12 +79,13 @@ pub fn page(study: &Study, digest: &Digest, plots: &[Plot], rows: &[Row]) -> Res
 
 /// By the first figure that is an error, a latency or a margin.
 fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
-    const JUDGED: [&str; 7] = [
+    const JUDGED: [&str; 8] = [
         "impact_speed_mps",
         "stop_margin_m",
         "paper_error_max_m",
         "missed",
         "detection_latency_s",
+        "occupancy_identified_max_m",
         "stop_error_m",
         "most_slip_mps",
     ];

@@ -1,0 +1,179 @@
+//! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
+
+use super::summary::{ErrorStatistics, OccupancyClass, OccupancyFigures, SwitchDistances};
+use crate::bus::{OccupancyReport, SimTime, TrainId};
+use crate::track::network::Route;
+use crate::track::{Place, TrackId};
+use crate::twin::physics::World;
+
+/// A decision that is more probable is fairly confident.
+const FAIRLY: f64 = 0.9;
+/// So near before the end of a leg the next track may be probable too.
+const BEFORE_END_M: f64 = 10.0;
+
+/// Scores track occupancy of one train.
+#[derive(Debug)]
+pub struct OccupancyScore {
+    /// The antenna behind the head.
+    antenna_behind_m: f64,
+    classes: [u32; 6],
+    errors_m: Vec<f64>,
+    nees_sum: f64,
+    /// Legs that were left.
+    switches: Vec<Option<f64>>,
+    /// The leg that the antenna is on, if it came there over a toe.
+    leg: Option<Leg>,
+    /// The track that the antenna was on last, and its distance along the route.
+    last: Option<(TrackId, f64)>,
+}
+
+/// A leg of a switch that was run facing.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    toe_m: f64,
+    end_m: f64,
+    /// Beyond the toe, from where on it has been identified.
+    identified_m: Option<f64>,
+}
+
+impl OccupancyScore {
+    /// Of an antenna so far behind the head.
+    pub fn new(antenna_behind_m: f64) -> Self {
+        Self {
+            antenna_behind_m,
+            classes: [0; 6],
+            errors_m: Vec::new(),
+            nees_sum: 0.0,
+            switches: Vec::new(),
+            leg: None,
+            last: None,
+        }
+    }
+
+    /// Where the antenna was at a time.
+    pub fn true_place(&self, world: &World, id: TrainId, time: SimTime) -> Option<Place> {
+        let run_m = world.run_at(id, time)? - self.antenna_behind_m;
+        Some(world.route(id)?.place(run_m).0)
+    }
+
+    /// Takes a report in that was sent now; gives the class of it, if a fix is its ground.
+    pub fn report(
+        &mut self,
+        report: &OccupancyReport,
+        world: &World,
+        id: TrainId,
+    ) -> Option<OccupancyClass> {
+        let truth = self.true_place(world, id, report.time)?;
+        let class = class_of(report, truth.track);
+        self.follow(world, id, class);
+        let class = class.filter(|_| report.of_fix)?;
+        self.classes[class as usize] += 1;
+        let best = report
+            .tracks
+            .first()
+            .filter(|best| best.track == truth.track);
+        if let Some(best) = best {
+            let error_m = best.s_m - truth.s_m;
+            self.errors_m.push(error_m.abs());
+            self.nees_sum += (error_m / best.sigma_m).powi(2);
+        }
+        Some(class)
+    }
+
+    /// Follows the antenna over the toes of switches.
+    fn follow(&mut self, world: &World, id: TrainId, class: Option<OccupancyClass>) {
+        let (Some(route), Some(head_m)) = (world.route(id), world.run_m(id)) else {
+            return;
+        };
+        let run_m = head_m - self.antenna_behind_m;
+        let (place, _) = route.place(run_m);
+        if let Some((_, before_m)) = self.last.filter(|(track, _)| *track != place.track) {
+            self.switches
+                .extend(self.leg.take().map(|leg| leg.identified_m));
+            self.leg = leg_entered(world, route, (before_m, run_m), place.track);
+        }
+        self.last = Some((place.track, run_m));
+        let Some(leg) = &mut self.leg else {
+            return;
+        };
+        let near_end = run_m > leg.end_m - BEFORE_END_M;
+        let is_told = class == Some(OccupancyClass::CorrectConfident);
+        leg.identified_m = match leg.identified_m {
+            Some(m) if is_told || near_end => Some(m),
+            _ => is_told.then_some(run_m - leg.toe_m),
+        };
+    }
+
+    /// The figures.
+    pub fn finish(mut self) -> OccupancyFigures {
+        // The run ended on a leg: that it was not identified by then counts, too.
+        self.switches
+            .extend(self.leg.take().map(|leg| leg.identified_m));
+        let fixes = self.errors_m.len();
+        let mut distances_m: Vec<f64> = self.switches.iter().copied().flatten().collect();
+        let [wc, wf, wu, cu, cf, cc] = self.classes;
+        OccupancyFigures {
+            fixes: self.classes.iter().sum(),
+            switches: self.switches.len() as u32,
+            never_identified: self.switches.iter().filter(|m| m.is_none()).count() as u32,
+            identified_after_m: ErrorStatistics::of(&mut distances_m).map(|s| SwitchDistances {
+                mean: s.mean,
+                p95: s.p95,
+                max: s.max,
+            }),
+            legs_identified_after_m: self.switches,
+            classes: [
+                (OccupancyClass::WrongConfident, wc),
+                (OccupancyClass::WrongFairlyConfident, wf),
+                (OccupancyClass::WrongUndecided, wu),
+                (OccupancyClass::CorrectUndecided, cu),
+                (OccupancyClass::CorrectFairlyConfident, cf),
+                (OccupancyClass::CorrectConfident, cc),
+            ]
+            .into(),
+            nees_mean: (fixes > 0).then(|| self.nees_sum / fixes as f64),
+            error_m: ErrorStatistics::of(&mut self.errors_m),
+        }
+    }
+}
+
+/// None while nothing is said.
+fn class_of(report: &OccupancyReport, truth: TrackId) -> Option<OccupancyClass> {
+    use OccupancyClass::{
+        CorrectConfident, CorrectFairlyConfident, CorrectUndecided, WrongConfident,
+        WrongFairlyConfident, WrongUndecided,
+    };
+    let best = report.tracks.first()?;
+    let fairly = best.probability > FAIRLY;
+    Some(match (best.track == truth, report.identified, fairly) {
+        (false, true, _) => WrongConfident,
+        (false, _, true) => WrongFairlyConfident,
+        (false, _, false) => WrongUndecided,
+        (true, true, _) => CorrectConfident,
+        (true, _, true) => CorrectFairlyConfident,
+        (true, _, false) => CorrectUndecided,
+    })
+}
+
+/// The leg onto which the antenna came over a toe between two places of the route; none where it came over a joint, or
+/// over a switch run trailing.
+fn leg_entered(
+    world: &World,
+    route: &Route,
+    (from_m, to_m): (f64, f64),
+    track: TrackId,
+) -> Option<Leg> {
+    let passings = world.network().passings(route);
+    let between = from_m.min(to_m)..=from_m.max(to_m);
+    let passing = passings
+        .iter()
+        .find(|passing| passing.facing && between.contains(&passing.toe_m))?;
+    let legs = route.legs().iter().enumerate();
+    let mut begins = legs.map(|(k, leg)| (route.begin_m(k), leg));
+    let (begin_m, leg) = begins.find(|(begin_m, _)| (begin_m - passing.toe_m).abs() < 1e-6)?;
+    (leg.track == track).then(|| Leg {
+        toe_m: passing.toe_m,
+        end_m: begin_m + leg.length_m(),
+        identified_m: None,
+    })
+}

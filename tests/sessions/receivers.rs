@@ -1,0 +1,110 @@
+//! Satellite receivers and track occupancy on trains: whole sessions.
+
+use metrotwin::bus::{Content, GnssFix, OccupancyReport, TrainId};
+use metrotwin::scenario::{Override, Scenario};
+use metrotwin::session::{
+    Event, Observer, ObserverError, OccupancyClass, RendererChoice, RunOptions, Summary, run,
+};
+use std::path::Path;
+
+/// What a train's receiver and equipment said, with the true distance of its head.
+#[derive(Default)]
+struct Heard {
+    run_m: f64,
+    fixes: Vec<(f64, GnssFix)>,
+    reports: Vec<(f64, OccupancyReport)>,
+}
+
+impl Observer for Heard {
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        match event {
+            Event::Train {
+                train: TrainId(0),
+                truth,
+                ..
+            } => self.run_m = truth.run_m,
+            Event::Message { message, .. } => {
+                if let Content::Gnss(fix) = &message.content {
+                    self.fixes.push((self.run_m, fix.clone()));
+                }
+            }
+            Event::Occupancy {
+                train: TrainId(0),
+                report,
+                ..
+            } => self.reports.push((self.run_m, (*report).clone())),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+fn play(scenario: &str, overrides: &[&str]) -> (Heard, Summary) {
+    let overrides: Vec<Override> = overrides.iter().map(|o| o.parse().unwrap()).collect();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{scenario}.toml"));
+    let scenario = Scenario::load(&path, &overrides).unwrap();
+    let options = RunOptions {
+        renderer: RendererChoice::Cpu,
+        ..RunOptions::default()
+    };
+    let mut heard = Heard::default();
+    let summary = run(&scenario, &options, &mut [&mut heard]).unwrap();
+    (heard, summary)
+}
+
+/// Out of the tunnel at 445 m, over a ladder into the third of five tracks 5 m apart: no fix comes underground, the
+/// balise before the portal says where the train is, and every leg is known.
+#[test]
+fn a_train_finds_its_track_in_a_depot() {
+    let (heard, summary) = play("depot_fan", &[]);
+    // The antenna is 10 m behind the head, and a fix takes 80 ms.
+    let (first_m, _) = heard.fixes[0];
+    assert!(first_m > 445.0 + 10.0 - 4.0, "{first_m}");
+    let known = heard.reports.iter().find(|(_, r)| !r.tracks.is_empty());
+    let (known_m, report) = known.unwrap();
+    assert!(
+        !report.of_fix && (440.0..460.0).contains(known_m),
+        "{known_m}"
+    );
+    let occupancy = summary.occupancy.unwrap();
+    eprintln!("{occupancy:?}");
+    assert_eq!(occupancy.classes[&OccupancyClass::WrongConfident], 0);
+    assert_eq!(occupancy.never_identified, 0);
+    // A leg with a radius of 200 m is 4 m aside after 40 m.
+    assert!(occupancy.identified_after_m.unwrap().max < 40.0);
+    let (_, last) = heard.reports.last().unwrap();
+    assert!(last.identified);
+    let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("tunnels/terminus.toml");
+    let tunnel = std::fs::read_to_string(scenario).unwrap();
+    let tunnel = metrotwin::track::Tunnel::from_toml(&tunnel).unwrap();
+    assert_eq!(tunnel.network.named("depot 3"), Some(last.tracks[0].track));
+    // The train stands with its head at 200 m.
+    assert!((last.tracks[0].s_m - 190.0).abs() < 4.0 * last.tracks[0].sigma_m.max(0.5));
+}
+
+/// The published method and its baseline run as equipment too, and are slower to tell.
+#[test]
+fn the_published_method_takes_longer() {
+    let mean_m = |method: &str| {
+        let method = format!("stack.occupancy.method=\"{method}\"");
+        let (_, summary) = play("parallel_tracks", &[&method, "duration_s=90"]);
+        let occupancy = summary.occupancy.unwrap();
+        // The curves of the other train do not count here; fixes that were not said anything about would.
+        assert!(
+            occupancy.fixes > 400 && occupancy.switches >= 2,
+            "{occupancy:?}"
+        );
+        let distances = occupancy.identified_after_m.map(|d| d.mean);
+        (
+            distances.unwrap_or(f64::INFINITY),
+            occupancy.classes[&OccupancyClass::WrongConfident],
+        )
+    };
+    let (fused_m, wrong) = mean_m("fused");
+    assert_eq!(wrong, 0);
+    for method in ["pedal", "perpendicular"] {
+        let (m, _) = mean_m(method);
+        eprintln!("{method}: {m:.1} m, fused: {fused_m:.1} m");
+        assert!(m > fused_m, "{method}: {m} {fused_m}");
+    }
+}
