@@ -157,7 +157,7 @@ fn two_balises_refute_a_certainty() {
         .map(|(id, y)| TrackElement::new(id, vec![Point2::new(0.0, y), Point2::new(3000.0, y)]));
     let network = PlanNetwork::new(None, lines.into_iter().flatten().collect(), &[]);
     let mut occupancy = Occupancy::new(network.into(), OccupancySettings::default());
-    run_along_stem(&mut occupancy, 0..200, 6.0);
+    run_along_stem(&mut occupancy, 0..200, 4.2);
     let wrong = occupancy.decision();
     assert!(
         wrong.is_identified() && wrong.tracks[0].element == 1,
