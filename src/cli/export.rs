@@ -28,11 +28,11 @@ Examples:
 #[command(after_help = AFTER)]
 pub(super) struct ExportArgs {
     #[command(subcommand)]
-    format: Format,
+    format: ExportFormat,
 }
 
 #[derive(clap::Subcommand)]
-enum Format {
+enum ExportFormat {
     /// GeoJSON (RFC 7946): tracks, switches, crossings, lamps, devices, balises, base stations and stations, for maps
     Geojson {
         /// Tunnel file with a [datum]
@@ -45,7 +45,7 @@ enum Format {
 }
 
 pub(super) fn export(args: &ExportArgs) -> Result<(), Failure> {
-    let Format::Geojson { tunnel: path, out } = &args.format;
+    let ExportFormat::Geojson { tunnel: path, out } = &args.format;
     let text = read(path)?;
     FileKind::refuse_other_than_tunnel(path, &text)?;
     let tunnel = Tunnel::from_toml(&text).map_err(|e| Failure::file(path, &text, e))?;

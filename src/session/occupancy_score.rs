@@ -22,14 +22,14 @@ pub struct OccupancyScore {
     /// Legs that were left.
     switches: Vec<Option<f64>>,
     /// The leg that the antenna is on, if it came there over a toe.
-    leg: Option<Leg>,
+    leg: Option<EnteredLeg>,
     /// The track that the antenna was on last, and its distance along the route.
     last: Option<(TrackId, f64)>,
 }
 
 /// A leg of a switch that was run facing.
 #[derive(Clone, Copy, Debug)]
-struct Leg {
+struct EnteredLeg {
     toe_m: f64,
     end_m: f64,
     /// Beyond the toe, from where on it has been identified.
@@ -162,7 +162,7 @@ fn leg_entered(
     route: &Route,
     (from_m, to_m): (f64, f64),
     track: TrackId,
-) -> Option<Leg> {
+) -> Option<EnteredLeg> {
     let passings = world.network().passings(route);
     let between = from_m.min(to_m)..=from_m.max(to_m);
     let passing = passings
@@ -171,7 +171,7 @@ fn leg_entered(
     let legs = route.legs().iter().enumerate();
     let mut begins = legs.map(|(k, leg)| (route.begin_m(k), leg));
     let (begin_m, leg) = begins.find(|(begin_m, _)| (begin_m - passing.toe_m).abs() < 1e-6)?;
-    (leg.track == track).then(|| Leg {
+    (leg.track == track).then(|| EnteredLeg {
         toe_m: passing.toe_m,
         end_m: begin_m + leg.length_m(),
         identified_m: None,

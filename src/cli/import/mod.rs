@@ -77,11 +77,11 @@ Examples:
 #[derive(clap::Args)]
 pub(super) struct ImportArgs {
     #[command(subcommand)]
-    format: Format,
+    format: ImportFormat,
 }
 
 #[derive(clap::Subcommand)]
-enum Format {
+enum ImportFormat {
     /// OpenStreetMap: raw JSON or XML
     #[command(after_help = AFTER_OSM)]
     Osm(OsmArgs),
@@ -221,9 +221,9 @@ fn railml(args: &RailmlArgs) -> Result<(), Failure> {
 
 pub(super) fn import(args: &ImportArgs) -> Result<(), Failure> {
     match &args.format {
-        Format::Csv(args) => csv(args),
-        Format::Osm(args) => osm(args),
-        Format::Railml(args) => railml(args),
+        ImportFormat::Csv(args) => csv(args),
+        ImportFormat::Osm(args) => osm(args),
+        ImportFormat::Railml(args) => railml(args),
     }
 }
 

@@ -36,7 +36,7 @@ pub const SIGMA_MPS: f64 = 1.0;
 /// A speed at each fix, forwards positive: the way that the train first moves. It turns its sign where the train
 /// goes back. Distances are those between fixes of one kind; where there are none, the last speed holds.
 pub fn speeds(fixes: &[RecordedFix]) -> Vec<(SimTime, f64)> {
-    let mut way = Way::default();
+    let mut way = TravelDirection::default();
     let mut taken: Option<(SimTime, f64)> = None;
     let mut speeds: Vec<(SimTime, f64)> = Vec::with_capacity(fixes.len());
     for (k, fix) in fixes.iter().enumerate() {
@@ -102,7 +102,7 @@ fn median(mut of: Vec<f64>) -> Option<f64> {
 
 /// Which way the train goes.
 #[derive(Default)]
-struct Way {
+struct TravelDirection {
     /// Unit vector.
     before: Option<Vector2<f64>>,
     /// Since when it has been another one.
@@ -111,7 +111,7 @@ struct Way {
     stood: Option<SimTime>,
 }
 
-impl Way {
+impl TravelDirection {
     /// 1 forwards, -1 back, at a velocity.
     fn sign(&mut self, now: SimTime, velocity: Vector2<f64>, stands: bool) -> f64 {
         let speed_mps = velocity.norm();

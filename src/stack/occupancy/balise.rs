@@ -1,7 +1,7 @@
 //! What a balise says of the hypotheses: the train is on its track, and where on it.
 
 use super::Occupancy;
-use super::hypothesis::{Hypothesis, PLACE, State, StateCovariance};
+use super::hypothesis::{Hypothesis, PLACE};
 use super::matching::{Match, by_perpendicular};
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
@@ -18,7 +18,6 @@ const SIGMA_M: f64 = 0.3;
 const FOREIGN: f64 = 1e-6;
 /// Within so many metres before and behind the place of a hypothesis a foreign balise is as probable anywhere.
 const FOREIGN_SPAN_M: f64 = 200.0;
-
 /// Within so many metres of a balise a track may be the train's that is read by cross-talk.
 const FOREIGN_REACH_M: f64 = 20.0;
 
@@ -46,7 +45,6 @@ impl Occupancy {
                 hypothesis.update_balise(place, &self.settings);
             }
         }
-        self.grow();
         self.tidy();
     }
 
@@ -82,8 +80,13 @@ impl Occupancy {
 }
 
 impl Hypothesis {
-    /// How far the antenna is before where it is when the head is at a place; none where the course does not go there.
-    fn off_m(&self, (element, along_m): (usize, f64), settings: &OccupancySettings) -> Option<f64> {
+    /// How far the train has to run until its head is at a place, below 0 if it is beyond; none where its course does
+    /// not lead there.
+    fn left_m(
+        &self,
+        (element, along_m): (usize, f64),
+        settings: &OccupancySettings,
+    ) -> Option<f64> {
         let legs = self.course.legs().iter();
         legs.filter(|leg| leg.towards.element == element)
             .map(|leg| leg.course_m(along_m) - settings.antenna_behind_head_m - self.place_m())
@@ -92,13 +95,13 @@ impl Hypothesis {
 
     /// Whether the head may be at a place.
     fn runs_over(&self, place: (usize, f64), settings: &OccupancySettings) -> bool {
-        self.off_m(place, settings)
-            .is_some_and(|off_m| off_m.abs() < FOREIGN_SPAN_M)
+        self.left_m(place, settings)
+            .is_some_and(|left_m| left_m.abs() < FOREIGN_SPAN_M)
     }
 
     fn update_balise(&mut self, place: (usize, f64), settings: &OccupancySettings) {
         let foreign_log = (FOREIGN / FOREIGN_SPAN_M).ln();
-        let off_m = self.off_m(place, settings);
+        let off_m = self.left_m(place, settings);
         let variance_m2 = self.covariance[(PLACE, PLACE)] + SIGMA_M.powi(2);
         let fits_log = off_m.map_or(f64::NEG_INFINITY, |off_m| {
             -0.5 * (off_m.powi(2) / variance_m2 + (TAU * variance_m2).ln())
@@ -107,9 +110,7 @@ impl Hypothesis {
         let Some(off_m) = off_m.filter(|_| fits_log > foreign_log) else {
             return;
         };
-        let across: State = self.covariance.column(PLACE).into_owned();
-        self.mean += across * (off_m / variance_m2);
-        let left: StateCovariance = self.covariance - across * across.transpose() / variance_m2;
-        self.covariance = 0.5 * (left + left.transpose());
+        let across = self.covariance.column(PLACE).into_owned();
+        self.correct_by(&across, off_m, variance_m2);
     }
 }

@@ -9,7 +9,7 @@ const SAME_M: f64 = 1e-6;
 
 /// A run over one element.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Leg {
+pub struct CourseLeg {
     /// The element, and the end towards which a train runs that runs forwards.
     pub towards: ElementEnd,
     /// Where it begins along the course, metres.
@@ -20,9 +20,9 @@ pub struct Leg {
 
 /// Elements in the order in which a train that runs forwards has them. Distances along it grow forwards.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Course(Vec<Leg>);
+pub struct Course(Vec<CourseLeg>);
 
-impl Leg {
+impl CourseLeg {
     fn end_m(&self) -> f64 {
         self.begin_m + self.length_m
     }
@@ -52,7 +52,7 @@ impl Course {
             Direction::Up => along_m,
             Direction::Down => length_m - along_m,
         };
-        Self(vec![Leg {
+        Self(vec![CourseLeg {
             towards,
             begin_m: -run_m,
             length_m,
@@ -60,7 +60,7 @@ impl Course {
     }
 
     /// Its legs.
-    pub fn legs(&self) -> &[Leg] {
+    pub fn legs(&self) -> &[CourseLeg] {
         &self.0
     }
 
@@ -71,7 +71,7 @@ impl Course {
     }
 
     /// The leg at a place, or the nearest.
-    pub fn leg_at(&self, course_m: f64) -> &Leg {
+    pub fn leg_at(&self, course_m: f64) -> &CourseLeg {
         let after = self.0.partition_point(|leg| leg.begin_m <= course_m);
         &self.0[after.saturating_sub(1)]
     }
@@ -95,7 +95,7 @@ impl Course {
         let next = network.onward(last.towards).iter();
         next.map(|towards| {
             let mut longer = self.clone();
-            longer.0.push(Leg {
+            longer.0.push(CourseLeg {
                 towards: *towards,
                 begin_m: last.end_m(),
                 length_m: network.elements[towards.element].length_m(),
@@ -115,7 +115,7 @@ impl Course {
                 let mut longer = self.clone();
                 longer.0.insert(
                     0,
-                    Leg {
+                    CourseLeg {
                         towards: away.opposite(),
                         begin_m: first.begin_m - length_m,
                         length_m,
@@ -129,7 +129,7 @@ impl Course {
     /// Whether another one has the same legs, each so much farther along.
     pub fn is_shifted(&self, other: &Self, by_m: f64) -> bool {
         let pairs = || self.0.iter().zip(&other.0);
-        let same = |(a, b): (&Leg, &Leg)| {
+        let same = |(a, b): (&CourseLeg, &CourseLeg)| {
             a.towards == b.towards && (b.begin_m - a.begin_m - by_m).abs() < SAME_M
         };
         self.0.len() == other.0.len() && pairs().all(same)
@@ -144,7 +144,7 @@ impl Course {
     /// Without the elements that do not touch a stretch: what a train has left behind, or not reached yet, may be
     /// set another way when it comes there again.
     pub fn trim(&mut self, [from_m, to_m]: [f64; 2]) {
-        let touches = |leg: &Leg| leg.end_m() >= from_m && leg.begin_m <= to_m;
+        let touches = |leg: &CourseLeg| leg.end_m() >= from_m && leg.begin_m <= to_m;
         if self.0.iter().any(touches) {
             self.0.retain(touches);
         }

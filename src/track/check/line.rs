@@ -9,13 +9,13 @@ use nalgebra::Point3;
 
 /// Where a track runs, but for its place in the world.
 #[derive(Clone, Debug)]
-pub(super) struct Course {
+pub(super) struct UnplacedLine {
     pub elements: Vec<PlanElement>,
     /// None: on as what it is joined to.
     pub grades: Vec<Grade>,
 }
 
-impl Course {
+impl UnplacedLine {
     /// Of a track as written, level so far.
     pub(super) fn of(entry: &TrackEntry, check: &mut Checker<'_>) -> Self {
         Self {

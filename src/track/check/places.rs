@@ -2,7 +2,7 @@
 
 use super::joints::Joints;
 use super::key_of;
-use super::line::{self, Course};
+use super::line::{self, UnplacedLine};
 use super::placing::{self, Order};
 use crate::settings::{Checker, Problem};
 use crate::track::Alignment;
@@ -16,8 +16,9 @@ pub(super) fn lines(
     check: &mut Checker<'_>,
 ) -> Option<Vec<Alignment>> {
     let courses = tracks.iter().enumerate();
-    let courses = courses.map(|(k, track)| Course::of(track, &mut check.below(&key_of(file, k))));
-    let courses: Vec<Course> = courses.collect();
+    let courses =
+        courses.map(|(k, track)| UnplacedLine::of(track, &mut check.below(&key_of(file, k))));
+    let courses: Vec<UnplacedLine> = courses.collect();
     let (lines, found) = placed(file, tracks, joints, courses.clone());
     let found = match found.is_empty() {
         true => found,
@@ -36,7 +37,7 @@ fn without_start(
     file: &TunnelFile,
     tracks: &[TrackEntry],
     joints: &Joints,
-    courses: &[Course],
+    courses: &[UnplacedLine],
     found: Vec<Problem>,
 ) -> Vec<Problem> {
     let twice = placing::placed_twice(tracks, joints);
@@ -63,7 +64,7 @@ fn placed(
     file: &TunnelFile,
     tracks: &[TrackEntry],
     joints: &Joints,
-    mut courses: Vec<Course>,
+    mut courses: Vec<UnplacedLine>,
 ) -> (Option<Vec<Alignment>>, Vec<Problem>) {
     let mut found = Vec::new();
     let check = &mut Checker::new("", &mut found);

@@ -2,7 +2,7 @@
 //! to ends.
 
 use super::joints::{Joints, key_of, word_of};
-use super::line::Course;
+use super::line::UnplacedLine;
 use crate::settings::Checker;
 use crate::track::file::TrackEntry;
 use crate::track::network::{
@@ -92,8 +92,8 @@ impl Order {
     }
 
     /// The tracks at their places; those that have none lie at the world's origin.
-    pub(super) fn place(&self, tracks: &[TrackEntry], courses: &[Course]) -> Vec<Alignment> {
-        let nowhere = |course: &Course| course.from(Point3::origin(), 0.0, 0.0);
+    pub(super) fn place(&self, tracks: &[TrackEntry], courses: &[UnplacedLine]) -> Vec<Alignment> {
+        let nowhere = |course: &UnplacedLine| course.from(Point3::origin(), 0.0, 0.0);
         let mut lines: Vec<Alignment> = courses.iter().map(nowhere).collect();
         for (track, anchor) in &self.0 {
             let k = usize::from(track.0);
@@ -123,7 +123,7 @@ impl Order {
 }
 
 /// The line that ends at a pose.
-fn ending_at(course: &Course, pose: &TrackFrame) -> Alignment {
+fn ending_at(course: &UnplacedLine, pose: &TrackFrame) -> Alignment {
     let trial = course.from(Point3::origin(), 0.0, pose.slope);
     let end = trial.at(trial.length_m());
     let heading_rad = pose.heading_rad - end.heading_rad;
@@ -198,7 +198,7 @@ pub(super) fn close(
     tracks: &[TrackEntry],
     joints: &Joints,
     order: &Order,
-    courses: &mut [Course],
+    courses: &mut [UnplacedLine],
     check: &mut Checker<'_>,
 ) {
     let closing: Vec<(usize, usize)> = (tracks.iter().enumerate())
@@ -211,7 +211,7 @@ pub(super) fn close(
     if closing.is_empty() {
         return;
     }
-    let gaps = |courses: &[Course]| {
+    let gaps = |courses: &[UnplacedLine]| {
         let lines = order.place(tracks, courses);
         let at = |end: TrackEnd| {
             leaving(&lines[usize::from(end.track.0)], end.way)

@@ -146,7 +146,7 @@ impl FitTask<'_> {
 
     /// A curve to begin with: its curvatures are those of the points, over the stretch of each arc.
     fn first(&self, stretches: usize) -> ArcChain {
-        let course = Course::of(self.points);
+        let course = HeadingProfile::of(self.points);
         let count = stretches as f64;
         let middles: Vec<f64> = (0..=stretches).map(|k| k as f64 / count).collect();
         let half_m = 0.5 * course.length_m / count;
@@ -328,13 +328,13 @@ fn rms(feet: &[Foot], of: impl Fn(&Foot) -> f64) -> f64 {
 }
 
 /// Headings of straights between points, linear from middle to middle.
-pub(super) struct Course {
+pub(super) struct HeadingProfile {
     pub length_m: f64,
     /// Middles of the straights and their headings, which do not jump by a whole turn.
     middles: Vec<(f64, f64)>,
 }
 
-impl Course {
+impl HeadingProfile {
     pub fn of(points: &[Point2<f64>]) -> Self {
         let mut along_m = 0.0;
         let mut middles: Vec<(f64, f64)> = Vec::new();

@@ -6,7 +6,7 @@
 
 use super::joining::{Joined, Meeting};
 use crate::track::Direction;
-use crate::track::import::fit::{ArcChain, Course, EndPose, EndRule, FitTask};
+use crate::track::import::fit::{ArcChain, EndPose, EndRule, FitTask, HeadingProfile};
 use crate::track::import::plane::{along_m, length_m, turn_rad};
 use crate::track::network::TrackEnd;
 use nalgebra::Point2;
@@ -69,14 +69,14 @@ pub(super) type FoundWays = BTreeMap<Vec<[u64; 2]>, Option<(ArcChain, Vec<f64>)>
 
 /// Points of a way straight on, and which of them are where tracks meet.
 #[derive(Default)]
-struct Way {
+struct StraightWay {
     points: Vec<Point2<f64>>,
     /// Number of a point, and the ends by which a train leaves one track there and enters the next.
     meetings: Vec<(usize, TrackEnd, TrackEnd)>,
 }
 
 /// All ways straight on, each once, cut within long tracks.
-fn ways(joined: &Joined, onward: &BTreeMap<TrackEnd, TrackEnd>) -> Vec<Way> {
+fn ways(joined: &Joined, onward: &BTreeMap<TrackEnd, TrackEnd>) -> Vec<StraightWay> {
     let mut ways = Vec::new();
     let mut seen: BTreeSet<TrackEnd> = BTreeSet::new();
     let leaving = |end: &TrackEnd| !onward.contains_key(&end.opposite());
@@ -89,7 +89,7 @@ fn ways(joined: &Joined, onward: &BTreeMap<TrackEnd, TrackEnd>) -> Vec<Way> {
         if seen.contains(start) {
             continue;
         }
-        let mut way = Way::default();
+        let mut way = StraightWay::default();
         let mut leaves = Some(*start);
         way.points = last_of(&running(joined, *start));
         while let Some(end) = leaves {
@@ -152,7 +152,7 @@ fn last_of(points: &[Point2<f64>]) -> Vec<Point2<f64>> {
     last
 }
 
-impl Way {
+impl StraightWay {
     fn add_poses(
         &self,
         sigma_m: f64,
@@ -172,7 +172,7 @@ impl Way {
         let is_long = length_m(&self.points) > LEAST_M;
         let smooth = || is_long.then(|| task.smooth(APART_M).ok()).flatten();
         let curve = found.entry(key).or_insert_with(smooth);
-        let course = Course::of(&self.points);
+        let course = HeadingProfile::of(&self.points);
         let along_m = along_m(&self.points);
         for (point, end, entered) in &self.meetings {
             let near = curve
@@ -212,7 +212,7 @@ pub(super) fn rules(
     begin: Option<(BentPose, bool)>,
     end: Option<(BentPose, bool)>,
 ) -> [EndRule; 2] {
-    let course = Course::of(points);
+    let course = HeadingProfile::of(points);
     let near = |drawn_rad: f64, pose: EndPose| EndPose {
         heading_rad: drawn_rad + turn_rad(drawn_rad, pose.heading_rad),
         ..pose

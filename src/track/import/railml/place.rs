@@ -28,7 +28,25 @@ pub(super) struct Coordinates<'a> {
     pub(super) crs: Option<&'a str>,
 }
 
-impl Coordinates<'_> {
+impl<'a> Coordinates<'a> {
+    /// The place along a track of what they belong to.
+    pub(super) fn known_at(
+        self,
+        (of, at_m): (Item<'a>, f64),
+        weight: u32,
+        options: &RailMlOptions,
+    ) -> Result<KnownPlace<'a>, RailMlError> {
+        let (place, swapped) = self.resolve(options)?;
+        Ok(KnownPlace {
+            at_m,
+            place,
+            swapped,
+            weight,
+            item: self.item,
+            what: of.title(),
+        })
+    }
+
     /// On earth, as written and the other way round.
     pub(super) fn resolve(
         &self,

@@ -219,15 +219,9 @@ impl<'a> FileDefaults<'a> {
             return Ok(None);
         };
         let crs = item.attribute("epsgCode").or(self.crs);
-        let (place, swapped) = Coordinates { item, values, crs }.resolve(&self.options)?;
-        Ok(Some(KnownPlace {
-            at_m,
-            place,
-            swapped,
-            weight,
-            item,
-            what: of.title(),
-        }))
+        let coordinates = Coordinates { item, values, crs };
+        let known = coordinates.known_at((of, at_m), weight, &self.options)?;
+        Ok(Some(known))
     }
 }
 

@@ -51,15 +51,9 @@ impl<'a> NetReading<'a> {
             Ok(Some(Crs::Wgs84)) => [y, x],
             _ => [x, y],
         };
-        let (place, swapped) = Coordinates { item, values, crs }.resolve(&self.options)?;
-        Ok(Some(KnownPlace {
-            at_m,
-            place,
-            swapped,
-            weight,
-            item,
-            what: of.title(),
-        }))
+        let coordinates = Coordinates { item, values, crs };
+        let known = coordinates.known_at((of, at_m), weight, &self.options)?;
+        Ok(Some(known))
     }
 
     /// The element that something lies on; none where it is a collection.

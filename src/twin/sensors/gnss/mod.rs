@@ -25,7 +25,7 @@ use crate::twin::geometry::{RayStart, Sight, TunnelCaster};
 use crate::twin::physics::World;
 use crate::twin::random::Stream;
 use nalgebra::{Point3, Rotation2, Rotation3, Unit, Vector3};
-use range_errors::{RangeErrors, Way};
+use range_errors::{RangeErrors, SignalWay};
 use satellites::{SATELLITES, Sky};
 use solution::{MeasuredRange, Solution, solve};
 use std::sync::Arc;
@@ -168,7 +168,7 @@ impl Gnss {
         for (number, direction) in directions.into_iter().enumerate() {
             let way = match direction.z > lowest {
                 true => self.way(near, antenna, &direction),
-                false => Way::Blocked,
+                false => SignalWay::Blocked,
             };
             let error_m = match direction.z > lowest {
                 true => self.errors.of(number, direction.z, way, step_s),
@@ -184,7 +184,7 @@ impl Gnss {
             if seconds - since_s < self.settings.acquisition_s {
                 continue;
             }
-            free += usize::from(way == Way::Free);
+            free += usize::from(way == SignalWay::Free);
             let sigma_m = self.settings.range_sigma_m(direction.z);
             ranges.push(MeasuredRange {
                 direction,
@@ -197,13 +197,18 @@ impl Gnss {
     }
 
     /// Whether something is between the antenna and a satellite (east, north, up).
-    fn way(&self, near: RayStart, antenna: &Point3<f64>, direction: &Unit<Vector3<f64>>) -> Way {
+    fn way(
+        &self,
+        near: RayStart,
+        antenna: &Point3<f64>,
+        direction: &Unit<Vector3<f64>>,
+    ) -> SignalWay {
         let world_from_earth =
             Rotation3::from_axis_angle(&Vector3::z_axis(), -self.datum.heading_deg.to_radians());
         let ray = world_from_earth * direction.into_inner();
         match self.tunnel.look(near, antenna, &ray, SIGHT_M) {
-            Sight::Open => Way::Free,
-            Sight::Surface(_) | Sight::Dark => Way::Blocked,
+            Sight::Open => SignalWay::Free,
+            Sight::Surface(_) | Sight::Dark => SignalWay::Blocked,
         }
     }
 }

@@ -37,7 +37,7 @@ struct Range {
 
 /// How a satellite's signal may reach the antenna.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Way {
+pub enum SignalWay {
     /// Nothing is between them.
     Free,
     /// Something is.
@@ -97,11 +97,11 @@ impl RangeErrors {
     }
 
     /// The error of a satellite's range, metres; none where its signal is not received.
-    pub fn of(&mut self, satellite: usize, sine: f64, way: Way, step_s: f64) -> Option<f64> {
+    pub fn of(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64) -> Option<f64> {
         let first = (self.drawn * (SATELLITES as u64 + 1) + satellite as u64 + 1) * NUMBERS;
         self.reflect(satellite, sine, way, step_s, first + 2);
         let range = &self.ranges[satellite];
-        if way == Way::Blocked && range.excess_m.is_none() {
+        if way == SignalWay::Blocked && range.excess_m.is_none() {
             return None;
         }
         let noise_m = self.settings.noise_m * self.settings.error_scale;
@@ -112,11 +112,11 @@ impl RangeErrors {
     }
 
     /// A two-state chain: reflections come and go with their mean duration, so that over time their share is as set.
-    fn reflect(&mut self, satellite: usize, sine: f64, way: Way, step_s: f64, first: u64) {
+    fn reflect(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64, first: u64) {
         let settings = &self.settings;
         let share = match way {
-            Way::Free => settings.reflected_share * (1.0 - sine * sine).sqrt(),
-            Way::Blocked => settings.reflected_if_blocked,
+            SignalWay::Free => settings.reflected_share * (1.0 - sine * sine).sqrt(),
+            SignalWay::Blocked => settings.reflected_if_blocked,
         };
         let stay = (-step_s / (settings.reflected_s * (1.0 - share)).max(1e-9)).exp();
         let keeps = self.stream.uniform(first) < stay;

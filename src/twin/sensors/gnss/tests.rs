@@ -111,7 +111,7 @@ fn reflections_have_their_share_excess_and_duration() {
     let mut was_on = false;
     for k in 1..=count {
         errors.advance(step_s * f64::from(k));
-        let error_m = errors.of(7, sine, Way::Free, step_s).unwrap();
+        let error_m = errors.of(7, sine, SignalWay::Free, step_s).unwrap();
         let is_on = error_m > 0.0;
         on += u32::from(is_on);
         begun += u32::from(is_on && !was_on);

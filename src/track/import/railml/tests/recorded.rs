@@ -33,7 +33,8 @@ fn spread(values: impl Iterator<Item = f64>) -> (f64, f64) {
 /// Coordinates in UTM of zone 32, of which the file does not say so; radii without transitions; ends of tracks whose
 /// coordinates lie off by hundreds of metres, detectors with those of another track.
 #[test]
-#[ignore = "needs METROTWIN_RECORDED, a folder with maps/arna.railml that may not be distributed"]
+#[ignore = "needs METROTWIN_RECORDED, a folder with maps/arna.railml that may not be distributed; \
+    super::v2 and super::v2_wrong test the same on drawn files"]
 fn arna() {
     let text = text("arna.railml");
     let error = read(&text, None).unwrap_err().to_string();
@@ -79,7 +80,8 @@ fn arna() {
 /// with the coordinates of another track, and of one in the middle of a curve of 700 m radius in which nothing else is
 /// known over 1160 m.
 #[test]
-#[ignore = "needs METROTWIN_RECORDED, a folder with maps/arna.railml that may not be distributed"]
+#[ignore = "needs METROTWIN_RECORDED, a folder with maps/arna.railml that may not be distributed; \
+    super::v2 and super::v2_wrong test the same on drawn files"]
 #[allow(clippy::print_stdout, reason = "figures for people")]
 fn arna_without_every_second_detector() {
     let text = text("arna.railml");
@@ -120,7 +122,8 @@ fn arna_without_every_second_detector() {
 
 /// Lengths alone: the plan is laid out, every joint is at one place, and elements are as long as stated.
 #[test]
-#[ignore = "needs METROTWIN_RECORDED, a folder with maps/gen_15x15.railml that may not be distributed"]
+#[ignore = "needs METROTWIN_RECORDED, a folder with maps/gen_15x15.railml that may not be distributed; \
+    super::layout tests the same on drawn files"]
 fn gen_15x15() {
     let map = read(&text("gen_15x15.railml"), None).unwrap();
     // A switch has one connection, and so has its leg's end: 840; the other 32 join 16 pairs of ends.
@@ -148,7 +151,8 @@ fn gen_15x15() {
 
 /// railML.org's own example: 51 single elements and 10 collections, 85 relations between the former.
 #[test]
-#[ignore = "needs METROTWIN_RECORDED, a folder with maps/advanced_example_railml32.xml that may not be distributed"]
+#[ignore = "needs METROTWIN_RECORDED, a folder with maps/advanced_example_railml32.xml that may not be distributed; \
+    super::v3 and super::layout test the same on drawn files"]
 #[allow(clippy::print_stdout, reason = "figures for people")]
 fn advanced_example() {
     let map = read(&text("advanced_example_railml32.xml"), None).unwrap();
