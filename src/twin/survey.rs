@@ -15,24 +15,21 @@
 //! the map is that of the last track measurement, some millimetres off; balises are placed to
 //! some decimetres.
 //!
-//! Track occupancy is given the tracks in plan, and these are off too: maps that are made from the air or from old
-//! drawings lie some decimetres beside the earth's coordinates. Half of the variance is common to all tracks, the other
-//! half is each track's own and fades out towards its ends, where tracks meet.
+//! Track occupancy is given the tracks in plan, and these are off too (`plan`).
 //!
 //! **What it does not do.** Plan and profile of the map's track are right for positioning along it: what a survey
 //! leaves of them is millimetres over the length of a train.
+
+mod plan;
 
 use super::random::Stream;
 use crate::settings::settings;
 use crate::track::plan::PlanNetwork;
 use crate::track::{Track, TrackPoint, Tunnel};
-use nalgebra::Vector2;
 use std::sync::Arc;
 
 /// Distance of the control points.
 const CONTROL_M: f64 = 120.0;
-/// From its ends on, a track's own error in plan grows over this.
-const JOINED_M: f64 = 60.0;
 
 settings! {
     /// How well the map was surveyed: one sigma of normal errors.
@@ -72,24 +69,12 @@ impl SurveySettings {
     /// The tracks of a tunnel in plan as they were surveyed.
     pub fn plan(&self, tunnel: &Tunnel, seed: u64) -> PlanNetwork {
         let plan = PlanNetwork::of_network(&tunnel.network, tunnel.datum);
-        if self.track_sigma_m == 0.0 {
-            return plan;
-        }
-        let sigma_m = self.track_sigma_m * std::f64::consts::FRAC_1_SQRT_2;
-        let common = Stream::new(seed, 0, "survey/plan");
-        let common_m = Vector2::new(common.normal(0), common.normal(1)) * sigma_m;
-        let own = |axis: &str| -> Vec<Stream> {
-            let tracks = tunnel.network.tracks.iter();
-            let name = |track: &Arc<Track>| format!("survey/plan {axis} {}", track.name);
-            tracks.map(|t| Stream::new(seed, 0, &name(t))).collect()
-        };
-        let (east, north) = (own("east"), own("north"));
-        plan.displaced(|element, along_m, _| {
-            let left_m = plan.elements[element].length_m() - along_m;
-            let share = (along_m.min(left_m) / JOINED_M).clamp(0.0, 1.0);
-            let own = [&east, &north].map(|of| between_controls(&of[element], along_m));
-            common_m + Vector2::from(own) * (share * sigma_m)
-        })
+        self.surveyed(&plan, seed)
+    }
+
+    /// A plan as it was surveyed.
+    pub fn surveyed(&self, plan: &PlanNetwork, seed: u64) -> PlanNetwork {
+        plan::surveyed(plan, self.track_sigma_m, seed)
     }
 
     fn track(&self, track: &Track, seed: u64) -> Track {
@@ -238,47 +223,6 @@ mod tests {
         assert_eq!(
             SurveySettings::default().track(&track, 1).lamps,
             track.lamps
-        );
-    }
-
-    /// Tracks in plan are off by what is set, in the middle of long ones; where two meet, both by the same.
-    #[test]
-    fn tracks_in_plan_are_off_and_still_meet() {
-        let text = include_str!("../../tunnels/terminus.toml");
-        let tunnel = Tunnel::from_toml(text).unwrap();
-        let settings = SurveySettings {
-            track_sigma_m: 0.5,
-            ..SurveySettings::default()
-        };
-        let right = SurveySettings::default().plan(&tunnel, 1);
-        let (mut sum_m2, mut count) = (0.0, 0.0);
-        for seed in 0..200 {
-            let plan = settings.plan(&tunnel, seed);
-            let off = |element: usize, m: f64| {
-                plan.elements[element].at(m).0 - right.elements[element].at(m).0
-            };
-            let ends = tunnel.network.ends().flat_map(|end| {
-                let next = tunnel.network.next(end);
-                next.map(move |next| (end, next))
-            });
-            let at = |end: crate::track::network::TrackEnd| {
-                let element = usize::from(end.track.0);
-                match end.way {
-                    crate::track::Direction::Down => off(element, 0.0),
-                    crate::track::Direction::Up => off(element, plan.elements[element].length_m()),
-                }
-            };
-            for (a, b) in ends {
-                assert!((at(a) - at(b)).norm() < 1e-9);
-            }
-            // A control point in the middle of a track of 460 m.
-            sum_m2 += off(0, 240.0).norm_squared();
-            count += 2.0;
-        }
-        let sigma_m = f64::sqrt(sum_m2 / count);
-        assert!(
-            (sigma_m - 0.5).abs() < 4.0 * 0.5 / f64::sqrt(2.0 * count),
-            "{sigma_m}"
         );
     }
 }

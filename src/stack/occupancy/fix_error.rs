@@ -1,7 +1,7 @@
 //! How the error of fixes goes on from one to the next.
 //!
 //! Of the variance P of a fix a share c changes slowly: that error b is a Gauss-Markov process with variance c P and
-//! the map's, the rest is white. So a hundred fixes in a minute count for little more than one, as they have to: a
+//! the map's along the track, the rest is white. So a hundred fixes in a minute count for little more than one, as they have to: a
 //! filter that takes them for white grows sure of a wrong track.
 //!
 //! Receivers have several solutions. One that is carried on without reception has the error of the last fix and
@@ -27,10 +27,14 @@ pub struct ErrorWay {
     pub more_m2: Matrix2<f64>,
 }
 
-/// Part of a fix's error that changes slowly.
-pub fn slow_m2(covariance: &Matrix2<f64>, settings: &OccupancySettings) -> Matrix2<f64> {
+/// Part of a fix's error that changes slowly, with what the map has wrong along the track.
+pub fn slow_m2(
+    covariance: &Matrix2<f64>,
+    forward: &Vector2<f64>,
+    settings: &OccupancySettings,
+) -> Matrix2<f64> {
     let map_m2 = settings.map_sigma_m.powi(2);
-    covariance * settings.correlated_share + Matrix2::identity() * map_m2
+    covariance * settings.correlated_share + forward * forward.transpose() * map_m2
 }
 
 impl Hypothesis {

@@ -10,13 +10,14 @@ use super::TrainRun;
 use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
-    EAST, HEADING, Hypothesis, NORTH, PLACE, SCALE, STATES, State, StateCovariance, YAW_OFFSET,
-    log_sum,
+    ASIDE, EAST, HEADING, Hypothesis, NORTH, PLACE, SCALE, STATES, State, StateCovariance, TURNED,
+    YAW_OFFSET, log_sum,
 };
+use super::map_error;
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
-use std::f64::consts::{PI, SQRT_2, TAU};
+use std::f64::consts::{PI, TAU};
 
 /// Of the place of a new hypothesis, before its first fix is taken in.
 const NEW_PLACE_SIGMA_M: f64 = 100.0;
@@ -26,13 +27,6 @@ const LEAST_FIX_SIGMA_M: f64 = 0.05;
 const SPEED_CORRELATION_S: f64 = 1.0;
 /// Slower is standing, metres a second.
 const STANDING_MPS: f64 = 0.05;
-/// Places on the map that are so far apart, metres, are wrong by themselves, and between them it has one wrong heading.
-/// Comparisons that are nearer to each other are no news of it; counted as such, they make a wrong track sure.
-const MAP_HEADING_M: f64 = 100.0;
-/// Margin for maps that are worse than believed and change their heading at once where pieces meet. Chosen by
-/// measurement: on maps that are one and a half times as far off as believed, with 1 some of the fixes beside a parallel
-/// track were wrong with certainty, with 2 none (`tests/sessions/occupancy.rs`).
-const MAP_MARGIN: f64 = 2.0;
 /// Share of headings on which the map or the gyro is altogether wrong.
 const WRONG_HEADING: f64 = 1e-3;
 /// Drift of the yaw rate's offset, rad/s in the root of a second.
@@ -41,11 +35,20 @@ const YAW_OFFSET_DRIFT: f64 = 1e-5;
 impl Hypothesis {
     /// Variances of a hypothesis about whose place nothing is known but the course.
     pub fn start_fused(&mut self, settings: &OccupancySettings, heading_offset_rad: f64) {
+        let map = map_error::unknown(settings);
         self.covariance = StateCovariance::zeros();
         self.covariance[(PLACE, PLACE)] = NEW_PLACE_SIGMA_M.powi(2);
         self.covariance[(SCALE, SCALE)] = settings.speed_scale_sigma.powi(2);
-        self.covariance[(HEADING, HEADING)] = (2.0 * settings.heading_sigma_rad).powi(2);
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] = settings.yaw_offset_sigma_radps.powi(2);
+        self.covariance
+            .fixed_view_mut::<2, 2>(ASIDE, ASIDE)
+            .copy_from(&map);
+        // The offset was taken from the map's heading.
+        let turned_rad2 = map[(1, 1)];
+        self.covariance[(HEADING, HEADING)] =
+            (2.0 * settings.heading_sigma_rad).powi(2) + turned_rad2;
+        self.covariance[(HEADING, TURNED)] = -turned_rad2;
+        self.covariance[(TURNED, HEADING)] = -turned_rad2;
         self.mean[HEADING] = heading_offset_rad;
     }
 
@@ -53,39 +56,28 @@ impl Hypothesis {
     pub(super) fn advance_fused(&mut self, run: &TrainRun, settings: &OccupancySettings) {
         let (seconds, run_m) = (run.seconds, run.length_m);
         let keep = (-seconds / settings.correlation_s).exp();
-        // The transition is the unit matrix but for these; the covariance takes it from both sides.
-        for (to, from, factor) in [(PLACE, SCALE, run_m), (HEADING, YAW_OFFSET, seconds)] {
-            self.mean[to] += factor * self.mean[from];
-            for k in 0..STATES {
-                self.covariance[(to, k)] += factor * self.covariance[(from, k)];
-            }
-            for k in 0..STATES {
-                self.covariance[(k, to)] += factor * self.covariance[(k, from)];
-            }
-        }
-        for error in [EAST, NORTH] {
-            self.mean[error] *= keep;
-            for k in 0..STATES {
-                self.covariance[(error, k)] *= keep;
-            }
-            for k in 0..STATES {
-                self.covariance[(k, error)] *= keep;
-            }
-        }
+        let (map, new_of_map) = map_error::over_run(run_m, settings);
+        let mut transition = StateCovariance::identity();
+        transition[(PLACE, SCALE)] = run_m;
+        transition[(HEADING, YAW_OFFSET)] = seconds;
+        transition[(EAST, EAST)] = keep;
+        transition[(NORTH, NORTH)] = keep;
+        transition
+            .fixed_view_mut::<2, 2>(ASIDE, ASIDE)
+            .copy_from(&map);
+        self.mean = transition * self.mean;
         self.mean[PLACE] += run_m;
+        self.covariance = transition * self.covariance * transition.transpose();
         let moves = run_m.abs() > STANDING_MPS * seconds;
         let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
-        self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 };
-        self.covariance[(PLACE, PLACE)] += run.unknown_m2;
-        // What the map has wrong of headings changes with the way run, as a process with this correlation does.
-        let map_rad = MAP_MARGIN * SQRT_2 * settings.map_sigma_m / MAP_HEADING_M;
-        let map_rad2 = 2.0 * map_rad.powi(2) * run_m.abs() / MAP_HEADING_M;
-        self.covariance[(HEADING, HEADING)] +=
-            settings.yaw_rate_sigma_radps.powi(2) * seconds + map_rad2;
+        self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 } + run.unknown_m2;
+        self.covariance[(HEADING, HEADING)] += settings.yaw_rate_sigma_radps.powi(2) * seconds;
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * seconds;
         for k in [EAST, NORTH] {
             self.covariance[(k, k)] += (1.0 - keep * keep) * self.fix_variance_m2;
         }
+        let mut of_map = self.covariance.fixed_view_mut::<2, 2>(ASIDE, ASIDE);
+        of_map += new_of_map;
     }
 
     /// Takes a fix in.
@@ -96,16 +88,17 @@ impl Hypothesis {
         settings: &OccupancySettings,
     ) {
         let (fix, covariance) = (&judged.fix.place, &judged.fix.covariance_m2);
-        let slow_m2 = slow_m2(covariance, settings);
+        let (mapped, forward) = self.course.at(network, self.place_m());
+        let slow_m2 = slow_m2(covariance, &forward, settings);
         let ways = self.error_ways(judged, &slow_m2, settings);
         self.fix_variance_m2 = 0.5 * slow_m2.trace();
         self.fix_time = judged.fix.time;
         self.kind = Some(judged.kind);
-        let (place, forward) = self.course.at(network, self.place_m());
+        let place = mapped + left_of(&forward) * self.mean[ASIDE];
         let white = covariance * (1.0 - settings.correlated_share)
             + Matrix2::identity() * LEAST_FIX_SIGMA_M.powi(2);
         let of_state = spread(&self.covariance, &forward);
-        let place_m2 = forward * forward.transpose() * self.covariance[(PLACE, PLACE)];
+        let place_m2 = spread_of_place(&self.covariance, &forward);
         let found = ways.map(|way| {
             let spread = white + way.more_m2 + if way.is_own { place_m2 } else { of_state };
             let log = way.probability.ln() + log_density(&(fix - place - way.error_m), &spread);
@@ -151,10 +144,11 @@ impl Hypothesis {
         let half_m = 0.5 * settings.bogie_distance_m;
         let chord = |m: f64| self.course.heading_rad(network, [m - half_m, m + half_m]);
         let place_m = self.place_m();
-        let off = wrapped(turned_rad - self.mean[HEADING] - chord(place_m));
+        let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - chord(place_m));
         let mut measured = RowSVector::<f64, STATES>::zeros();
         measured[PLACE] = wrapped(chord(place_m + 1.0) - chord(place_m - 1.0)) / 2.0;
         measured[HEADING] = 1.0;
+        measured[TURNED] = 1.0;
         let across = self.covariance * measured.transpose();
         let variance = (measured * across)[0] + settings.heading_sigma_rad.powi(2);
         let fits_log =
@@ -178,17 +172,35 @@ impl Hypothesis {
     }
 }
 
-/// Covariance of the state with a fix: that of the place, forwards, and of the error.
+/// Covariance of the state with a fix: that of the place, forwards and aside, and of the error.
 fn across(covariance: &StateCovariance, forward: &Vector2<f64>) -> SMatrix<f64, STATES, 2> {
+    let left = left_of(forward);
     SMatrix::from_fn(|k, axis| {
-        forward[axis] * covariance[(k, PLACE)] + covariance[(k, EAST + axis)]
+        forward[axis] * covariance[(k, PLACE)]
+            + left[axis] * covariance[(k, ASIDE)]
+            + covariance[(k, EAST + axis)]
     })
 }
 
 /// Covariance of a fix, but for its white part.
 fn spread(covariance: &StateCovariance, forward: &Vector2<f64>) -> Matrix2<f64> {
-    let across = across(covariance, forward);
-    Matrix2::from_fn(|i, j| forward[i] * across[(PLACE, j)] + across[(EAST + i, j)])
+    let (across, left) = (across(covariance, forward), left_of(forward));
+    Matrix2::from_fn(|i, j| {
+        forward[i] * across[(PLACE, j)] + left[i] * across[(ASIDE, j)] + across[(EAST + i, j)]
+    })
+}
+
+/// Covariance of the place in the plane.
+fn spread_of_place(covariance: &StateCovariance, forward: &Vector2<f64>) -> Matrix2<f64> {
+    let axes = [(PLACE, *forward), (ASIDE, left_of(forward))];
+    let pairs = axes.iter().flat_map(|a| axes.iter().map(move |b| (a, b)));
+    pairs
+        .map(|((i, a), (j, b))| a * b.transpose() * covariance[(*i, *j)])
+        .sum()
+}
+
+fn left_of(forward: &Vector2<f64>) -> Vector2<f64> {
+    Vector2::new(-forward.y, forward.x)
 }
 
 fn log_density(off: &Vector2<f64>, spread: &Matrix2<f64>) -> f64 {

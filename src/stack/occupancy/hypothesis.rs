@@ -7,14 +7,17 @@ use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
 /// What is estimated: place along the course, error of the speed's scale, heading that the yaw rates' sum lacks,
-/// offset of the yaw rate, error of fixes to the east and to the north.
-pub const STATES: usize = 6;
+/// offset of the yaw rate, error of fixes to the east and to the north, and by how much the track lies to the left of
+/// where it is mapped and is turned to the left.
+pub const STATES: usize = 8;
 pub const PLACE: usize = 0;
 pub const SCALE: usize = 1;
 pub const HEADING: usize = 2;
 pub const YAW_OFFSET: usize = 3;
 pub const EAST: usize = 4;
 pub const NORTH: usize = 5;
+pub const ASIDE: usize = 6;
+pub const TURNED: usize = 7;
 
 pub type State = SVector<f64, STATES>;
 pub type StateCovariance = SMatrix<f64, STATES, STATES>;

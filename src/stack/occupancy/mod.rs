@@ -42,6 +42,7 @@ mod fix_error;
 mod fix_trust;
 mod fused;
 mod hypothesis;
+mod map_error;
 mod matching;
 mod pedal;
 mod settings;

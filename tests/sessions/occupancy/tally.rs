@@ -1,0 +1,195 @@
+//! Counts over many runs.
+
+use metrotwin::stack::occupancy::Decision;
+
+/// So near to a joint a certain decision for the element beyond it is wrong about the place, not about the track.
+const AT_JOINT_M: f64 = 15.0;
+/// Upper ends of classes of 1 - p, the probability that a decision is said to be wrong with.
+const SAID_WRONG: [f64; 6] = [1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
+
+/// What became of one switch.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct AtSwitch {
+    /// Beyond the toe, where only one leg was left and it stayed so to the leg's end; none where that was not
+    /// before the next switch.
+    pub identified_m: Option<f64>,
+    /// Whether the most probable element was the right one to the leg's end.
+    pub right: bool,
+}
+
+/// Decisions that were said to be wrong with about the same probability.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Said {
+    pub decisions: usize,
+    /// Sum of the probabilities: so many of them should be wrong.
+    pub expected_wrong: f64,
+    pub wrong: usize,
+}
+
+#[derive(Default)]
+pub struct Tally {
+    pub switches: Vec<AtSwitch>,
+    /// Of fixes: wrong confident, wrong fairly confident, wrong undecided, right undecided, fairly, confident.
+    pub classes: [usize; 6],
+    /// Of the wrong confident ones, those near a joint.
+    pub at_joint: usize,
+    /// First decisions of each element that say a probability of a class: fixes of one element are no
+    /// independent trials, but at whichever time one stops, as many are wrong as said.
+    pub said: [Said; SAID_WRONG.len()],
+    told: Option<(usize, [bool; SAID_WRONG.len()])>,
+    sigmas_m: [usize; 3],
+    /// Squared errors of the place over their variance: sum and number, of fixes on the right element.
+    squares: (f64, usize),
+    /// Fixes where the tracks lie side by side, and how many were right.
+    pub parallel: [usize; 2],
+    /// From so far behind a leg's begin to so far before its end the tracks lie side by side.
+    pub parallel_from_m: f64,
+}
+
+impl Tally {
+    /// A run begins: what was said on another one is no decision of it.
+    pub fn begin_run(&mut self) {
+        self.told = None;
+    }
+
+    pub fn add(&mut self, decision: &Decision, (truth, along_m): (usize, f64), length_m: f64) {
+        let Some(best) = decision.tracks.first() else {
+            self.classes[2] += 1;
+            return;
+        };
+        let right = best.element == truth;
+        let sure = match (decision.is_identified(), best.probability > 0.9) {
+            (true, _) => 2,
+            (false, true) => 1,
+            (false, false) => 0,
+        };
+        self.classes[if right { 3 + sure } else { 2 - sure }] += 1;
+        let from_end_m = along_m.min(length_m - along_m);
+        self.at_joint += usize::from(!right && sure == 2 && from_end_m < AT_JOINT_M);
+        if from_end_m > AT_JOINT_M {
+            self.add_said(truth, 1.0 - best.probability, right);
+        }
+        for (count, most_m) in self.sigmas_m.iter_mut().zip([1.0, 2.0, 3.0]) {
+            *count += usize::from(best.sigma_m < most_m);
+        }
+        if right {
+            self.squares.0 += ((best.along_m - along_m) / best.sigma_m).powi(2);
+            self.squares.1 += 1;
+        }
+        let is_leg = !truth.is_multiple_of(3);
+        if is_leg && self.parallel_from_m > 0.0 && from_end_m > self.parallel_from_m {
+            self.parallel[0] += 1;
+            self.parallel[1] += usize::from(right);
+        }
+    }
+
+    fn add_said(&mut self, truth: usize, said_wrong: f64, right: bool) {
+        let told = self.told.get_or_insert_default();
+        if told.0 != truth {
+            *told = (truth, Default::default());
+        }
+        let class = SAID_WRONG.partition_point(|most| *most < said_wrong);
+        if !std::mem::replace(&mut told.1[class], true) {
+            let said = &mut self.said[class];
+            said.decisions += 1;
+            said.expected_wrong += said_wrong;
+            said.wrong += usize::from(!right);
+        }
+    }
+
+    pub fn extend(&mut self, other: Self) {
+        self.switches.extend(other.switches);
+        let sums = self.classes.iter_mut().zip(other.classes);
+        let sums = sums.chain(self.sigmas_m.iter_mut().zip(other.sigmas_m));
+        for (sum, count) in sums.chain(self.parallel.iter_mut().zip(other.parallel)) {
+            *sum += count;
+        }
+        for (sum, said) in self.said.iter_mut().zip(other.said) {
+            sum.decisions += said.decisions;
+            sum.expected_wrong += said.expected_wrong;
+            sum.wrong += said.wrong;
+        }
+        self.at_joint += other.at_joint;
+        self.squares.0 += other.squares.0;
+        self.squares.1 += other.squares.1;
+    }
+
+    pub fn fixes(&self) -> usize {
+        self.classes.iter().sum()
+    }
+
+    /// Shares of fixes whose place has a standard deviation under 1, 2 and 3 m.
+    pub fn sigmas(&self) -> String {
+        let shares = self
+            .sigmas_m
+            .map(|count| 100.0 * count as f64 / self.fixes() as f64);
+        shares.map(|share| format!("{share:.0} %")).join(", ")
+    }
+
+    /// Mean squared error of the place over its variance.
+    pub fn nees(&self) -> f64 {
+        self.squares.0 / self.squares.1 as f64
+    }
+
+    /// Mean, 95 % and most of the distances, of switches that were identified, and the share that were not.
+    pub fn distances(&self) -> ([f64; 3], f64) {
+        let mut all: Vec<f64> = self
+            .switches
+            .iter()
+            .filter_map(|s| s.identified_m)
+            .collect();
+        all.sort_by(f64::total_cmp);
+        let undecided = 1.0 - all.len() as f64 / self.switches.len() as f64;
+        if all.is_empty() {
+            return ([f64::NAN; 3], undecided);
+        }
+        let mean = all.iter().sum::<f64>() / all.len() as f64;
+        let p95 = all[(0.95 * (all.len() - 1) as f64) as usize];
+        ([mean, p95, all[all.len() - 1]], undecided)
+    }
+
+    /// Share of switches where the leg was right.
+    pub fn right(&self) -> f64 {
+        let right = self.switches.iter().filter(|s| s.right).count();
+        right as f64 / self.switches.len() as f64
+    }
+
+    /// Prints how often decisions were wrong that said so.
+    pub fn print_said(&self, title: &str) {
+        println!("\n{title}\nsaid wrong up to   decisions   expected wrong   wrong");
+        for (most, said) in SAID_WRONG.iter().zip(&self.said) {
+            let Said {
+                decisions,
+                expected_wrong,
+                wrong,
+            } = said;
+            println!("{most:16.0e} {decisions:11} {expected_wrong:16.3} {wrong:7}");
+        }
+    }
+}
+
+pub fn table(title: &str, rows: &[(String, Tally)]) {
+    println!("\n{title}");
+    println!(
+        "                           switches  mean m   95 %   most  undecided  right %   wc (at joints)  wf    wu    cu    cf     cc (% of fixes)  nees"
+    );
+    for (name, tally) in rows {
+        let ([mean, p95, most], undecided) = tally.distances();
+        let fixes = tally.fixes() as f64;
+        let [wc, wf, wu, cu, cf, cc] = tally.classes;
+        let share = |count: usize| 100.0 * count as f64 / fixes;
+        println!(
+            "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
+            tally.switches.len(),
+            100.0 * undecided,
+            100.0 * tally.right(),
+            tally.at_joint,
+            share(wf),
+            share(wu),
+            share(cu),
+            share(cf),
+            share(cc),
+            tally.nees(),
+        );
+    }
+}
