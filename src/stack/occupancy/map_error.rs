@@ -12,15 +12,13 @@
 use super::settings::OccupancySettings;
 use nalgebra::Matrix2;
 
-/// Correlation length, metres: places of a map that are 100 m apart are wrong by themselves. The error of a straight
-/// between two such places turns it by 1.4 standard deviations over 100 m.
-const LENGTH_M: f64 = 70.0;
-/// Maps are worse than they are said to be: a standard deviation is taken times this.
-const MARGIN: f64 = 1.5;
+/// Correlation length, metres: places of a map that are 67 m apart have half of their error in common, as between points
+/// surveyed every 120 m.
+const LENGTH_M: f64 = 40.0;
 
 /// Covariance of both where nothing is known of them.
 pub fn unknown(settings: &OccupancySettings) -> Matrix2<f64> {
-    let aside_m2 = (MARGIN * settings.map_sigma_m).powi(2);
+    let aside_m2 = settings.map_sigma_m.powi(2);
     Matrix2::new(aside_m2, 0.0, 0.0, aside_m2 / LENGTH_M.powi(2))
 }
 

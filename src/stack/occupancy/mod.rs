@@ -123,6 +123,8 @@ pub struct Occupancy {
     speed_filter: pedal::SpeedFilter,
     /// Since the hypotheses were carried on.
     since: TrainRun,
+    /// Since the last fix, seconds.
+    since_fix_s: f64,
     /// Run since the start.
     run_m: f64,
     /// Run since headings were compared.
@@ -147,6 +149,7 @@ impl Occupancy {
             yaw_rate: None,
             speed_filter: pedal::SpeedFilter::default(),
             since: TrainRun::default(),
+            since_fix_s: 0.0,
             run_m: 0.0,
             since_heading_m: 0.0,
             turned_rad: 0.0,
@@ -207,6 +210,7 @@ impl Occupancy {
                 Method::Perpendicular => hypothesis.update_matched(network, fix, by_perpendicular),
             }
         }
+        self.since_fix_s = 0.0;
         self.tidy();
     }
 
@@ -276,11 +280,14 @@ impl Occupancy {
 
     fn advance(&mut self) {
         let run = std::mem::take(&mut self.since);
-        let speed_sigma_mps = self.speed_filter.sigma_mps();
+        // From fix to fix the error of the speed is one.
+        let [before_s, now_s] = [self.since_fix_s, self.since_fix_s + run.seconds];
+        self.since_fix_s = now_s;
+        let speed_m2 = self.speed_filter.sigma_mps().powi(2) * (now_s.powi(2) - before_s.powi(2));
         for hypothesis in &mut self.hypotheses {
             match self.settings.method {
                 Method::Fused => hypothesis.advance_fused(&run, &self.settings),
-                _ => hypothesis.advance_by_speed(run.length_m, speed_sigma_mps * run.seconds),
+                _ => hypothesis.advance_by_speed(run.length_m, speed_m2),
             }
         }
     }

@@ -46,10 +46,10 @@ impl Hypothesis {
         self.covariance[(PLACE, PLACE)] = found.sigma_m.powi(2);
     }
 
-    /// Carries it on by what was run.
-    pub fn advance_by_speed(&mut self, run_m: f64, sigma_m: f64) {
+    /// Carries it on by what was run, and its variance.
+    pub fn advance_by_speed(&mut self, run_m: f64, variance_m2: f64) {
         self.mean[PLACE] += run_m;
-        self.covariance[(PLACE, PLACE)] += sigma_m.powi(2);
+        self.covariance[(PLACE, PLACE)] += variance_m2;
     }
 
     /// Takes a fix in by its match.

@@ -251,34 +251,3 @@ impl Progress {
         left
     }
 }
-
-pub fn dbg(world: &PlanNetwork, map: Arc<PlanNetwork>, settings: &OccupancySettings, run: &Run) {
-    let way = Way::new(world, [0].into_iter());
-    let mut occupancy = Occupancy::new(Arc::clone(&map), *settings);
-    let mut k = 0;
-    let mut receiver = Receiver::new(
-        run.errors,
-        Stream::new(run.seed, (run.speed_mps * 100.0) as u64, "fixes"),
-    );
-    drive(run, &way, &mut occupancy, |d, _e, along| {
-        k += 1;
-        let e = receiver.error(k);
-        if k % 20 == 0 {
-            let p = |n: usize| {
-                d.tracks
-                    .iter()
-                    .find(|t| t.element == n)
-                    .map_or(1e-11, |t| t.probability)
-            };
-            let off = |n: usize| map.elements[n].at(along).0 - world.elements[n].at(along).0;
-            println!(
-                "{:5.0} llr {:6.1} fix {:5.2} map {:5.2} {:5.2}",
-                along,
-                (p(0) / p(1)).ln(),
-                e.y,
-                off(0).y,
-                off(1).y
-            );
-        }
-    });
-}

@@ -26,6 +26,19 @@ pub struct Said {
     pub wrong: usize,
 }
 
+impl Said {
+    /// Probability that of as many as this are said to be wrong at least so many are (Poisson's, which is wider than
+    /// that of independent decisions).
+    fn at_least(&self) -> f64 {
+        let terms = (0..self.wrong).scan((-self.expected_wrong).exp(), |term, k| {
+            let now = *term;
+            *term *= self.expected_wrong / (k + 1) as f64;
+            Some(now)
+        });
+        1.0 - terms.sum::<f64>()
+    }
+}
+
 #[derive(Default)]
 pub struct Tally {
     pub switches: Vec<AtSwitch>,
@@ -152,6 +165,12 @@ impl Tally {
     pub fn right(&self) -> f64 {
         let right = self.switches.iter().filter(|s| s.right).count();
         right as f64 / self.switches.len() as f64
+    }
+
+    /// The least probability of a class that so many or more of its decisions are wrong.
+    pub fn least_calibrated(&self) -> f64 {
+        let classes = self.said.iter().map(Said::at_least);
+        classes.fold(1.0, f64::min)
     }
 
     /// Prints how often decisions were wrong that said so.
