@@ -11,6 +11,7 @@
 #[path = "../common/mod.rs"]
 mod common;
 
+mod calibration;
 mod determinism;
 mod fault_matrix;
 mod faults;

@@ -1,10 +1,12 @@
 //! Satellite receivers and track occupancy on trains: whole sessions.
 
+use crate::calibration::Calibration;
 use metrotwin::bus::{Content, GnssFix, OccupancyReport, TrainId};
 use metrotwin::scenario::{Override, Scenario};
 use metrotwin::session::{
     Event, Observer, ObserverError, OccupancyClass, RendererChoice, RunOptions, Summary, run,
 };
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What a train's receiver and equipment said, with the true distance of its head.
@@ -40,6 +42,12 @@ impl Observer for Heard {
 }
 
 fn play(scenario: &str, overrides: &[&str]) -> (Heard, Summary) {
+    let mut heard = Heard::default();
+    let summary = watch(scenario, overrides, &mut heard);
+    (heard, summary)
+}
+
+fn watch(scenario: &str, overrides: &[&str], observer: &mut dyn Observer) -> Summary {
     let overrides: Vec<Override> = overrides.iter().map(|o| o.parse().unwrap()).collect();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenarios/{scenario}.toml"));
     let scenario = Scenario::load(&path, &overrides).unwrap();
@@ -47,9 +55,7 @@ fn play(scenario: &str, overrides: &[&str]) -> (Heard, Summary) {
         renderer: RendererChoice::Cpu,
         ..RunOptions::default()
     };
-    let mut heard = Heard::default();
-    let summary = run(&scenario, &options, &mut [&mut heard]).unwrap();
-    (heard, summary)
+    run(&scenario, &options, &mut [observer]).unwrap()
 }
 
 /// Out of the tunnel at 445 m, over a ladder into the third of five tracks 5 m apart: no fix comes underground, the
@@ -80,6 +86,68 @@ fn a_train_finds_its_track_in_a_depot() {
     assert_eq!(tunnel.network.named("depot 3"), Some(last.tracks[0].track));
     // The train stands with its head at 200 m.
     assert!((last.tracks[0].s_m - 190.0).abs() < 4.0 * last.tracks[0].sigma_m.max(0.5));
+}
+
+/// Of all trains of many runs: classes of fixes, and whether decisions are wrong as often as they say. The map is as far
+/// off as the stack believes; each receiver's errors are a quarter larger than it states.
+#[derive(Default)]
+struct Scores {
+    /// The track that each train is on is not told; a decision counts once a stay of the named track.
+    calibrations: BTreeMap<TrainId, Calibration>,
+    classes: BTreeMap<OccupancyClass, usize>,
+}
+
+impl Observer for Scores {
+    fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
+        if let Event::Occupancy {
+            train,
+            report,
+            class: Some(class),
+        } = event
+        {
+            let best = &report.tracks[0];
+            *self.classes.entry(*class).or_default() += 1;
+            let right = *class >= OccupancyClass::CorrectUndecided;
+            let calibration = self.calibrations.entry(*train).or_default();
+            calibration.add(usize::from(best.track.0), 1.0 - best.probability, right);
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn val_no_train_is_wrong_with_certainty() {
+    let mut all = Calibration::default();
+    let mut classes: BTreeMap<OccupancyClass, usize> = BTreeMap::new();
+    for seed in 1..=20 {
+        let mut scores = Scores::default();
+        let overrides = [
+            &format!("seed={seed}") as &str,
+            "duration_s=60",
+            "survey.track_sigma_m=0.3",
+        ];
+        watch("parallel_tracks", &overrides, &mut scores);
+        assert_eq!(
+            scores.calibrations.len(),
+            2,
+            "both trains say where they are"
+        );
+        for calibration in scores.calibrations.values() {
+            all.extend(calibration);
+        }
+        for (class, count) in scores.classes {
+            *classes.entry(class).or_default() += count;
+        }
+    }
+    println!("\n{classes:?}");
+    all.print("trains with simulated receivers");
+    assert!(classes.values().sum::<usize>() > 10_000);
+    assert_eq!(classes.get(&OccupancyClass::WrongConfident), None);
+    assert!(
+        all.least_probability() > 1e-3,
+        "{}",
+        all.least_probability()
+    );
 }
 
 /// The published method and its baseline run as equipment too, and are slower to tell.

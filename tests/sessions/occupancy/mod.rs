@@ -286,8 +286,8 @@ fn val_probabilities_are_calibrated() {
             beside_a_parallel_track(MAP_SIGMA_M, 1000),
         ),
     ] {
-        of.print_said(title);
-        let probability = of.least_calibrated();
+        of.calibration.print(title);
+        let probability = of.calibration.least_probability();
         assert!(probability > 1e-3, "{title}: {probability}");
     }
 }
@@ -324,7 +324,8 @@ fn val_beside_a_parallel_track_nothing_wrong_grows_certain() {
     println!(
         "\nfrom nothing beside a parallel track: wc {wc}, wf {wf}, wu {wu}, cu {cu}, cf {cf}, cc {cc}"
     );
-    tally.print_said("from nothing beside a parallel track");
+    (tally.calibration)
+        .print("from nothing beside a parallel track, map half as far off again as believed");
     assert!(tally.fixes() > 250_000);
     assert_eq!(wc, 0, "wrong with certainty");
 }

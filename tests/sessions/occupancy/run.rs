@@ -182,7 +182,7 @@ pub fn over_line(
     });
     let way = Way::new(world, elements.flatten());
     let mut occupancy = Occupancy::new(map, *settings);
-    tally.begin_run();
+    tally.calibration.begin_run();
     let mut at = Progress::default();
     drive(run, &way, &mut occupancy, |decision, element, along_m| {
         let length_m = world.elements[element].length_m();
@@ -207,7 +207,7 @@ pub fn along_first(
 ) {
     let way = Way::new(world, [0].into_iter());
     let mut occupancy = Occupancy::new(map, *settings);
-    tally.begin_run();
+    tally.calibration.begin_run();
     drive(run, &way, &mut occupancy, |decision, element, along_m| {
         tally.add(decision, (element, along_m), way.length_m);
     });

@@ -1,12 +1,10 @@
 //! Counts over many runs.
 
+use crate::calibration::Calibration;
 use metrotwin::stack::occupancy::Decision;
 
 /// So near to a joint a certain decision for the element beyond it is wrong about the place, not about the track.
 const AT_JOINT_M: f64 = 15.0;
-/// Upper ends of classes of 1 - p, the probability that a decision is said to be wrong with.
-const SAID_WRONG: [f64; 6] = [1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
-
 /// What became of one switch.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AtSwitch {
@@ -17,28 +15,6 @@ pub struct AtSwitch {
     pub right: bool,
 }
 
-/// Decisions that were said to be wrong with about the same probability.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Said {
-    pub decisions: usize,
-    /// Sum of the probabilities: so many of them should be wrong.
-    pub expected_wrong: f64,
-    pub wrong: usize,
-}
-
-impl Said {
-    /// Probability that of as many as this are said to be wrong at least so many are (Poisson's, which is wider than
-    /// that of independent decisions).
-    fn at_least(&self) -> f64 {
-        let terms = (0..self.wrong).scan((-self.expected_wrong).exp(), |term, k| {
-            let now = *term;
-            *term *= self.expected_wrong / (k + 1) as f64;
-            Some(now)
-        });
-        1.0 - terms.sum::<f64>()
-    }
-}
-
 #[derive(Default)]
 pub struct Tally {
     pub switches: Vec<AtSwitch>,
@@ -46,10 +22,8 @@ pub struct Tally {
     pub classes: [usize; 6],
     /// Of the wrong confident ones, those near a joint.
     pub at_joint: usize,
-    /// First decisions of each element that say a probability of a class: fixes of one element are no
-    /// independent trials, but at whichever time one stops, as many are wrong as said.
-    pub said: [Said; SAID_WRONG.len()],
-    told: Option<(usize, [bool; SAID_WRONG.len()])>,
+    /// But near joints.
+    pub calibration: Calibration,
     sigmas_m: [usize; 3],
     /// Squared errors of the place over their variance: sum and number, of fixes on the right element.
     squares: (f64, usize),
@@ -60,11 +34,6 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// A run begins: what was said on another one is no decision of it.
-    pub fn begin_run(&mut self) {
-        self.told = None;
-    }
-
     pub fn add(&mut self, decision: &Decision, (truth, along_m): (usize, f64), length_m: f64) {
         let Some(best) = decision.tracks.first() else {
             self.classes[2] += 1;
@@ -80,7 +49,7 @@ impl Tally {
         let from_end_m = along_m.min(length_m - along_m);
         self.at_joint += usize::from(!right && sure == 2 && from_end_m < AT_JOINT_M);
         if from_end_m > AT_JOINT_M {
-            self.add_said(truth, 1.0 - best.probability, right);
+            self.calibration.add(truth, 1.0 - best.probability, right);
         }
         for (count, most_m) in self.sigmas_m.iter_mut().zip([1.0, 2.0, 3.0]) {
             *count += usize::from(best.sigma_m < most_m);
@@ -96,20 +65,6 @@ impl Tally {
         }
     }
 
-    fn add_said(&mut self, truth: usize, said_wrong: f64, right: bool) {
-        let told = self.told.get_or_insert_default();
-        if told.0 != truth {
-            *told = (truth, Default::default());
-        }
-        let class = SAID_WRONG.partition_point(|most| *most < said_wrong);
-        if !std::mem::replace(&mut told.1[class], true) {
-            let said = &mut self.said[class];
-            said.decisions += 1;
-            said.expected_wrong += said_wrong;
-            said.wrong += usize::from(!right);
-        }
-    }
-
     pub fn extend(&mut self, other: Self) {
         self.switches.extend(other.switches);
         let sums = self.classes.iter_mut().zip(other.classes);
@@ -117,11 +72,7 @@ impl Tally {
         for (sum, count) in sums.chain(self.parallel.iter_mut().zip(other.parallel)) {
             *sum += count;
         }
-        for (sum, said) in self.said.iter_mut().zip(other.said) {
-            sum.decisions += said.decisions;
-            sum.expected_wrong += said.expected_wrong;
-            sum.wrong += said.wrong;
-        }
+        self.calibration.extend(&other.calibration);
         self.at_joint += other.at_joint;
         self.squares.0 += other.squares.0;
         self.squares.1 += other.squares.1;
@@ -165,25 +116,6 @@ impl Tally {
     pub fn right(&self) -> f64 {
         let right = self.switches.iter().filter(|s| s.right).count();
         right as f64 / self.switches.len() as f64
-    }
-
-    /// The least probability of a class that so many or more of its decisions are wrong.
-    pub fn least_calibrated(&self) -> f64 {
-        let classes = self.said.iter().map(Said::at_least);
-        classes.fold(1.0, f64::min)
-    }
-
-    /// Prints how often decisions were wrong that said so.
-    pub fn print_said(&self, title: &str) {
-        println!("\n{title}\nsaid wrong up to   decisions   expected wrong   wrong");
-        for (most, said) in SAID_WRONG.iter().zip(&self.said) {
-            let Said {
-                decisions,
-                expected_wrong,
-                wrong,
-            } = said;
-            println!("{most:16.0e} {decisions:11} {expected_wrong:16.3} {wrong:7}");
-        }
     }
 }
 
