@@ -122,9 +122,9 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
     for (_, of) in by_speed {
         all.extend(of);
     }
-    let ([mean_m, _, most_m], undecided) = all.distances();
+    let ([mean_m, p95_m, most_m], undecided) = all.distances();
     println!(
-        "fused: {} switches, {} fixes, mean {mean_m:.1} m, {:.3} % right",
+        "fused: {} switches, {} fixes; identified after {mean_m:.1} m (95 %: {p95_m:.1}, most {most_m:.1}); {:.3} % right",
         all.switches.len(),
         all.fixes(),
         100.0 * all.right()
