@@ -17,7 +17,7 @@ use crate::track::plan::PlanNetwork;
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
-    BaliseAntenna, Doppler, Gnss, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
+    BaliseAntenna, Doppler, Gnss, GnssSeeds, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
     WaysideCamera, WaysideLidar,
 };
 use std::sync::Arc;
@@ -101,7 +101,11 @@ impl Fitting {
             self.add_sensor(node.clone(), antenna);
             if let Some((settings, datum)) = onboard.gnss.as_ref().zip(scenario.tunnel.datum) {
                 let tracks = (scenario.tunnel.network.tracks.as_slice(), &datum);
-                self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seed));
+                let seeds = GnssSeeds {
+                    common: scenario.file.seed,
+                    own: seed,
+                };
+                self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seeds));
             }
         }
         if let Some(rig) = &onboard.rig {
