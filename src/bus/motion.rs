@@ -1,14 +1,16 @@
 //! Samples of the sensors of motion.
 
-use super::SimTime;
+use super::{SimTime, TrainEnd};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-/// One inertial sample, in the vehicle frame.
+/// One inertial sample, in the vehicle frame of its end of the train.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImuSample {
     /// When it was taken.
     pub time: SimTime,
+    /// Where the unit is: in a curve the first and the last car turn at different rates.
+    pub end: TrainEnd,
     /// Turn rates.
     pub gyro_rad_s: Vector3<f64>,
     /// Specific force (at rest on level track: +g along z).

@@ -13,6 +13,7 @@ pub(super) fn of(scenario: &Scenario) -> Vec<String> {
     let of_each = scenario.onboard.iter().map(|onboard| {
         [
             without_position(onboard, scenario),
+            without_receiver(onboard, scenario),
             told_wrong_position(onboard, scenario),
             without_lamps(onboard, scenario),
         ]
@@ -208,9 +209,7 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
     if !onboard.protects() || protection.initial_chainage_m.is_some() {
         return None;
     }
-    let [from_m, to_m] = way_m(onboard, scenario)?;
-    let balises = &scenario.along(onboard.id())?.balises;
-    let meets_balise = (balises.iter()).any(|b| (from_m..=to_m).contains(&b.chainage_m));
+    let meets_balise = meets_balise(onboard, scenario)?;
     let key = match onboard.train {
         0 => "stack.protection",
         _ => "the protection of its [[onboard]]",
@@ -233,6 +232,33 @@ fn without_position(onboard: &OnboardSettings, scenario: &Scenario) -> Option<St
             (true, true) => "until it has read a balise or found itself by lamps",
         }
     ))
+}
+
+/// A train that is to tell its track without a satellite receiver.
+fn without_receiver(onboard: &OnboardSettings, scenario: &Scenario) -> Option<String> {
+    if onboard.gnss.is_some() || !onboard.tells_its_track() {
+        return None;
+    }
+    Some(format!(
+        "{} has the equipment \"occupancy\" and no satellite receiver: {}; {} gives it one",
+        train_name(scenario, onboard.id()),
+        match meets_balise(onboard, scenario)? {
+            true => "it knows its track from the first balise on that it runs over",
+            false => "it never knows its track, as it meets no balise",
+        },
+        match onboard.train {
+            0 => "[gnss]",
+            _ => "gnss = {} in its [[onboard]]",
+        }
+    ))
+}
+
+/// Whether a train runs over a balise on its way.
+fn meets_balise(onboard: &OnboardSettings, scenario: &Scenario) -> Option<bool> {
+    let [from_m, to_m] = way_m(onboard, scenario)?;
+    let track = scenario.along(onboard.id())?;
+    let mut balises = track.balises.iter();
+    Some(balises.any(|b| (from_m..=to_m).contains(&b.chainage_m)))
 }
 
 /// A rig on a train that has all lamps behind it.

@@ -38,24 +38,47 @@ impl OnboardSettings {
         TrainId(self.train)
     }
 
-    /// It finds its position by lamps.
-    pub fn positions(&self) -> bool {
-        self.rig.is_some() && self.equipment.contains(&OnboardEquipment::Led)
+    /// Its equipment in the order in which it works: as named, or all that it has the sensors for.
+    pub fn equipment_kinds(&self) -> Vec<OnboardEquipment> {
+        let has_sensors = |kind: &OnboardEquipment| match kind {
+            OnboardEquipment::Led => self.rig.is_some(),
+            OnboardEquipment::Occupancy => self.gnss.is_some(),
+            OnboardEquipment::Protection => true,
+        };
+        match &self.equipment {
+            Some(named) => named.clone(),
+            None => (OnboardEquipment::ALL.into_iter().filter(has_sensors)).collect(),
+        }
     }
 
-    /// The end at which its rig and its inertial unit are.
+    /// It finds its position by lamps.
+    pub fn positions(&self) -> bool {
+        self.rig.is_some() && self.equipment_kinds().contains(&OnboardEquipment::Led)
+    }
+
+    /// The end at which its rig is.
     pub fn rig_end(&self) -> TrainEnd {
         self.rig.as_ref().map_or(TrainEnd::Front, |rig| rig.end)
     }
 
+    /// The ends at which it has inertial units: that of its rig, and the front, whose turn track occupancy goes by.
+    pub fn imu_ends(&self) -> Vec<TrainEnd> {
+        match self.rig_end() {
+            TrainEnd::Rear if self.tells_its_track() => vec![TrainEnd::Rear, TrainEnd::Front],
+            end => vec![end],
+        }
+    }
+
     /// It says on which track it is.
     pub fn tells_its_track(&self) -> bool {
-        self.gnss.is_some() && self.equipment.contains(&OnboardEquipment::Occupancy)
+        self.equipment_kinds()
+            .contains(&OnboardEquipment::Occupancy)
     }
 
     /// Its speed is supervised.
     pub fn protects(&self) -> bool {
-        self.equipment.contains(&OnboardEquipment::Protection)
+        self.equipment_kinds()
+            .contains(&OnboardEquipment::Protection)
     }
 
     /// Of the first train, or of a bench.
@@ -71,7 +94,7 @@ impl OnboardSettings {
             occupancy: file.stack.occupancy,
             protection: file.stack.protection.clone(),
             equipment: match file.bench {
-                Some(_) => vec![OnboardEquipment::Led],
+                Some(_) => Some(vec![OnboardEquipment::Led]),
                 None => file.stack.onboard.clone(),
             },
         }

@@ -73,7 +73,8 @@ settings! {
         workers: Vec<WorkerSettings>, nested;
         /// The stereo rig on the train head. Default: no rig, so no positioning by lamps.
         rig: Option<RigSettings>, nested;
-        /// The inertial unit on the train. Default: ADIS16488 class.
+        /// The inertial unit on the train, at the end where its rig is, or at the front; where track occupancy needs
+        /// another one at the front, that is of the same kind. Default: ADIS16488 class.
         #[serde(default)]
         imu: ImuSettings, nested;
         /// The odometer on the train.
@@ -150,9 +151,8 @@ settings! {
         /// Its warning and control.
         #[serde(default)]
         protection: ProtectionSettings, nested;
-        /// Its equipment. Default: all.
-        #[serde(default = "OnboardEquipment::all")]
-        equipment: Vec<OnboardEquipment>;
+        /// Its equipment. Default: all that it has the sensors for.
+        equipment: Option<Vec<OnboardEquipment>>;
     }
 }
 
@@ -162,7 +162,7 @@ settings! {
 pub enum OnboardEquipment {
     /// Positioning by lamps; needs a rig.
     Led,
-    /// On which track it is; needs a satellite receiver.
+    /// On which track it is, by a satellite receiver; if named, by balises alone where there is none.
     Occupancy,
     /// Warning and control.
     Protection,
@@ -170,9 +170,7 @@ pub enum OnboardEquipment {
 
 impl OnboardEquipment {
     /// In the order in which they work.
-    pub fn all() -> Vec<Self> {
-        vec![Self::Led, Self::Occupancy, Self::Protection]
-    }
+    pub const ALL: [Self; 3] = [Self::Led, Self::Occupancy, Self::Protection];
 }
 
 settings! {
@@ -202,8 +200,8 @@ settings! {
         protection: ProtectionSettings = ProtectionSettings::default(), nested;
         /// From the last row of a frame to the result, ms.
         latency_ms: f64 = 50.0, in 0.0..=5000.0;
-        /// Equipment of the first train. Default: all.
-        onboard: Vec<OnboardEquipment> = OnboardEquipment::all();
+        /// Equipment of the first train. Default: all that it has the sensors for.
+        onboard: Option<Vec<OnboardEquipment>> = None;
     }
 }
 

@@ -17,7 +17,7 @@ use crate::track::plan::PlanNetwork;
 use crate::twin::physics::World;
 use crate::twin::random::{Stream, branch};
 use crate::twin::sensors::{
-    BaliseAntenna, Doppler, Gnss, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
+    BaliseAntenna, Doppler, Gnss, GnssSeeds, Imu, Lidar, Odometer, Periodic, Sensor, StereoCamera,
     WaysideCamera, WaysideLidar,
 };
 use std::sync::Arc;
@@ -101,7 +101,11 @@ impl Fitting {
             self.add_sensor(node.clone(), antenna);
             if let Some((settings, datum)) = onboard.gnss.as_ref().zip(scenario.tunnel.datum) {
                 let tracks = (scenario.tunnel.network.tracks.as_slice(), &datum);
-                self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seed));
+                let seeds = GnssSeeds {
+                    common: scenario.file.seed,
+                    own: seed,
+                };
+                self.add_sensor(node.clone(), Gnss::new(settings, train, tracks, seeds));
             }
         }
         if let Some(rig) = &onboard.rig {
@@ -113,14 +117,15 @@ impl Fitting {
 
     fn add_motion_sensors(&mut self, onboard: &OnboardSettings, node: &Node, seed: u64) {
         let train = onboard.id();
-        let end = onboard.rig_end();
-        let mut imu = Imu::new(&onboard.imu, seed, 0);
-        let read = move |world: &World, time| {
-            let sample = imu.sample(world, train, end)?;
-            Some(Content::Imu(ImuSample { time, ..sample }))
-        };
-        let (rate_hz, clock) = (onboard.imu.rate_hz, onboard.imu.clock);
-        self.add_sensor(node.clone(), Periodic::new(rate_hz, clock, read));
+        for (index, end) in (0..).zip(onboard.imu_ends()) {
+            let mut imu = Imu::new(&onboard.imu, seed, index);
+            let read = move |world: &World, time| {
+                let sample = imu.sample(world, train, end)?;
+                Some(Content::Imu(ImuSample { time, ..sample }))
+            };
+            let (rate_hz, clock) = (onboard.imu.rate_hz, onboard.imu.clock);
+            self.add_sensor(node.clone(), Periodic::new(rate_hz, clock, read));
+        }
 
         let mut odometer = Odometer::new(&onboard.odometer, seed, 0);
         let read = move |world: &World, time| {
@@ -167,8 +172,8 @@ impl Fitting {
 
 /// The equipment of a train.
 pub fn onboard_equipment(onboard: &OnboardSettings, maps: &Maps) -> impl Iterator<Item = Fitted> {
-    let kinds = onboard.equipment.iter();
-    kinds.filter_map(|kind| one_of_onboard(*kind, onboard, maps))
+    let kinds = onboard.equipment_kinds().into_iter();
+    kinds.filter_map(|kind| one_of_onboard(kind, onboard, maps))
 }
 
 /// A piece of equipment of a train; `None` where the train lacks what it needs.
@@ -191,8 +196,7 @@ fn one_of_onboard(
             Box::new(LampPositioning::new(node, mount, led, sheet, network))
         }
         OnboardEquipment::Occupancy => {
-            let plan = maps.plan.clone().filter(|_| onboard.gnss.is_some())?;
-            let (plan, node) = ((plan, maps.map.datum?), node.clone());
+            let (plan, node) = (maps.plan.clone()?, node.clone());
             let (network, settings) = (&maps.map.network, &onboard.occupancy);
             Box::new(TrackOccupancy::new(node, plan, network, settings))
         }

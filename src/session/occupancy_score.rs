@@ -1,13 +1,18 @@
 //! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
 
-use super::summary::{ErrorStatistics, OccupancyClass, OccupancyFigures, SwitchDistances};
+use super::summary::{
+    ErrorStatistics, FacingFigures, OccupancyClass, OccupancyFigures, SwitchDistances,
+};
 use crate::bus::{OccupancyReport, SimTime, TrainId};
+use crate::scenario::OnboardSettings;
 use crate::track::network::Route;
-use crate::track::{Place, TrackId};
+use crate::track::{Direction, Place, TrackId};
 use crate::twin::physics::World;
 
 /// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
+/// The other way is at most so probable where one is certain.
+const DOUBT: f64 = 1e-9;
 /// So near before the end of a leg the next track may be probable too.
 const BEFORE_END_M: f64 = 10.0;
 
@@ -16,9 +21,11 @@ const BEFORE_END_M: f64 = 10.0;
 pub struct OccupancyScore {
     /// The antenna behind the head.
     antenna_behind_m: f64,
+    has_receiver: bool,
     classes: [u32; 6],
     errors_m: Vec<f64>,
     nees_sum: f64,
+    facing: FacingFigures,
     /// Legs that were left.
     switches: Vec<Option<f64>>,
     /// The leg that the antenna is on, if it came there over a toe.
@@ -37,36 +44,40 @@ struct EnteredLeg {
 }
 
 impl OccupancyScore {
-    /// Of an antenna so far behind the head.
-    pub fn new(antenna_behind_m: f64) -> Self {
+    /// Of a train; without a receiver the place is that where its antenna would be.
+    pub fn new(onboard: &OnboardSettings) -> Self {
+        let told_m = onboard.occupancy.antenna_behind_head_m;
         Self {
-            antenna_behind_m,
+            antenna_behind_m: onboard.gnss.map_or(told_m, |gnss| -gnss.antenna_m[0]),
+            has_receiver: onboard.gnss.is_some(),
             classes: [0; 6],
             errors_m: Vec::new(),
             nees_sum: 0.0,
+            facing: FacingFigures::default(),
             switches: Vec::new(),
             leg: None,
             last: None,
         }
     }
 
-    /// Where the antenna was at a time.
-    pub fn true_place(&self, world: &World, id: TrainId, time: SimTime) -> Option<Place> {
+    /// Where the antenna was at a time, and which way along the track the front looked.
+    fn true_place(&self, world: &World, id: TrainId, time: SimTime) -> Option<(Place, Direction)> {
         let run_m = world.run_at(id, time)? - self.antenna_behind_m;
-        Some(world.route(id)?.place(run_m).0)
+        Some(world.route(id)?.place(run_m))
     }
 
-    /// Takes a report in that was sent now; gives the class of it, if a fix is its ground.
+    /// Takes a report in that was sent now; gives the class of it, if a fix is its ground or there are none.
     pub fn report(
         &mut self,
         report: &OccupancyReport,
         world: &World,
         id: TrainId,
     ) -> Option<OccupancyClass> {
-        let truth = self.true_place(world, id, report.time)?;
+        let (truth, facing) = self.true_place(world, id, report.time)?;
         let class = class_of(report, truth.track);
         self.follow(world, id, class);
-        let class = class.filter(|_| report.of_fix)?;
+        self.facing.add(report, (truth.track, facing));
+        let class = class.filter(|_| report.of_fix || !self.has_receiver)?;
         self.classes[class as usize] += 1;
         let best = report
             .tracks
@@ -131,9 +142,24 @@ impl OccupancyScore {
                 (OccupancyClass::CorrectConfident, cc),
             ]
             .into(),
+            facing: self.facing,
             nees_mean: (fixes > 0).then(|| self.nees_sum / fixes as f64),
             error_m: ErrorStatistics::of(&mut self.errors_m),
         }
+    }
+}
+
+impl FacingFigures {
+    /// Takes a report in, with the track that the train is on and the way that it faces there.
+    fn add(&mut self, report: &OccupancyReport, (track, facing): (TrackId, Direction)) {
+        let Some(best) = report.tracks.first().filter(|best| best.track == track) else {
+            return;
+        };
+        let is_wrong = best.facing != facing;
+        let doubt = 1.0 - best.facing_probability;
+        self.reports += 1;
+        self.wrong_over_0_9 += u32::from(is_wrong && best.facing_probability > FAIRLY);
+        self.wrong_certain += u32::from(is_wrong && doubt < DOUBT);
     }
 }
 
@@ -176,4 +202,47 @@ fn leg_entered(
         end_m: begin_m + leg.length_m(),
         identified_m: None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bus::OccupiedTrack;
+
+    /// Only the way that is said of the true track counts, and what is certain is over 0.9 too.
+    #[test]
+    fn wrong_facings_are_counted() {
+        let report = |track: u16, facing: Direction, facing_probability: f64| OccupancyReport {
+            time: SimTime::ZERO,
+            tracks: vec![OccupiedTrack {
+                track: TrackId(track),
+                probability: 1.0,
+                facing,
+                facing_probability,
+                s_m: 0.0,
+                sigma_m: 1.0,
+            }],
+            identified: true,
+            hypotheses: 1,
+            of_fix: false,
+        };
+        let mut figures = FacingFigures::default();
+        let truth = (TrackId(3), Direction::Up);
+        for (track, facing, probability, expected) in [
+            (3, Direction::Up, 1.0, [1, 0, 0]),
+            (3, Direction::Down, 0.9, [2, 0, 0]),
+            (3, Direction::Down, 0.95, [3, 1, 0]),
+            (3, Direction::Down, 1.0 - 1e-8, [4, 2, 0]),
+            (3, Direction::Down, 1.0 - 1e-10, [5, 3, 1]),
+            (2, Direction::Down, 1.0, [5, 3, 1]),
+        ] {
+            figures.add(&report(track, facing, probability), truth);
+            let found = [
+                figures.reports,
+                figures.wrong_over_0_9,
+                figures.wrong_certain,
+            ];
+            assert_eq!(found, expected, "{track} {facing} {probability}");
+        }
+    }
 }

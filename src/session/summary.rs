@@ -273,7 +273,7 @@ pub struct TrainFigures {
 /// Track occupancy: what was said after each fix, and how soon legs of switches were known.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OccupancyFigures {
-    /// Fixes after which something was said.
+    /// Fixes after which something was said; without a receiver, all reports.
     pub fixes: u32,
     /// Legs of switches that the antenna came to over the toe.
     pub switches: u32,
@@ -285,6 +285,8 @@ pub struct OccupancyFigures {
     pub legs_identified_after_m: Vec<Option<f64>>,
     /// How many fixes are of which class.
     pub classes: BTreeMap<OccupancyClass, u32>,
+    /// Which way the train was said to face.
+    pub facing: FacingFigures,
     /// Error of the antenna's place along the track, of fixes whose track is right.
     pub error_m: Option<ErrorStatistics>,
     /// Mean of (error/sigma)^2 of the same: 1 for an honest sigma.
@@ -308,6 +310,17 @@ impl OccupancyClass {
             Self::WrongConfident | Self::WrongFairlyConfident | Self::WrongUndecided
         )
     }
+}
+
+/// Which way along its track a train was said to face, after fixes and without.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+pub struct FacingFigures {
+    /// Reports whose most probable track is the true one.
+    pub reports: u32,
+    /// Of these, the wrong way with a probability over 0.9.
+    pub wrong_over_0_9: u32,
+    /// Of these, the wrong way with a probability over 1 - 1e-9.
+    pub wrong_certain: u32,
 }
 
 /// Distances from toes.

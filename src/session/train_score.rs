@@ -58,8 +58,7 @@ impl TrainScore {
             positioning,
             occupancy: onboard
                 .filter(|onboard| onboard.tells_its_track())
-                .and_then(|onboard| onboard.gnss)
-                .map(|gnss| OccupancyScore::new(-gnss.antenna_m[0])),
+                .map(OccupancyScore::new),
             outcome: Outcome::default(),
             ride: Ride::default(),
             dark_lamps: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::line::LineCheck;
 use crate::bus::TrainEnd;
-use crate::scenario::ScenarioFile;
+use crate::scenario::{OnboardEquipment, ScenarioFile};
 use crate::settings::Checker;
 use crate::stack::occupancy::OccupancySettings;
 use crate::stack::protection::ProtectionSettings;
@@ -27,10 +27,11 @@ const ANTENNA_ERROR_M: f64 = 1.0;
 
 /// Sensors and equipment of other trains, each of a train that there is, and named once.
 pub(super) fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
-    let kinds = file.onboard.iter().enumerate();
-    let kinds = kinds.map(|(k, o)| (format!("onboard[{k}].equipment"), &o.equipment));
-    for (key, kinds) in kinds.chain([("stack.onboard".to_owned(), &file.stack.onboard)]) {
-        if (1..kinds.len()).any(|k| kinds[..k].contains(&kinds[k])) {
+    let others = file.onboard.iter().enumerate();
+    let others = others.map(|(k, o)| (format!("onboard[{k}].equipment"), &o.equipment));
+    for (key, named) in others.chain([("stack.onboard".to_owned(), &file.stack.onboard)]) {
+        let named = named.as_deref().unwrap_or_default();
+        if (1..named.len()).any(|k| named[..k].contains(&named[k])) {
             check.problem(&key, "names an equipment twice", "name each once");
         }
     }
@@ -97,12 +98,40 @@ impl LineCheck<'_, '_> {
         self.equipped("stack", &file.stack.protection, "rig", first, 0);
         let settings = &file.stack.occupancy;
         self.receiver("gnss", file.gnss.as_ref(), "stack.occupancy", settings);
+        if file.train.is_some() && file.gnss.is_none() {
+            self.without_receiver("stack.onboard", &file.stack.onboard, "[gnss]");
+        }
         for (k, onboard) in file.onboard.iter().enumerate() {
             let (at, rig) = (format!("onboard[{k}]"), onboard.rig.as_ref());
             let (protection, train) = (&onboard.protection, onboard.train.into());
             self.equipped(&at, protection, &format!("{at}.rig"), rig, train);
             let (gnss, own) = (format!("{at}.gnss"), format!("{at}.occupancy"));
             self.receiver(&gnss, onboard.gnss.as_ref(), &own, &onboard.occupancy);
+            if onboard.gnss.is_none() {
+                let (key, receiver) = (format!("{at}.equipment"), format!("gnss = {{}} to {at}"));
+                self.without_receiver(&key, &onboard.equipment, &receiver);
+            }
+        }
+    }
+
+    /// Track occupancy that is named goes by balises, where there is no satellite receiver.
+    fn without_receiver(
+        &mut self,
+        key: &str,
+        named: &Option<Vec<OnboardEquipment>>,
+        receiver: &str,
+    ) {
+        let is_named = (named.iter().flatten()).any(|kind| *kind == OnboardEquipment::Occupancy);
+        let has_balises = (self.tunnel.network.tracks.iter()).any(|t| !t.balises.is_empty());
+        if is_named && !has_balises {
+            let what = format!(
+                "names \"occupancy\", but the train has no satellite receiver and tunnel `{}` has no balises: \
+                 it would never know its track",
+                self.tunnel.name
+            );
+            let remedy =
+                format!("add {receiver}, or balises to the tunnel file, or take \"occupancy\" out");
+            self.check.problem(key, what, remedy);
         }
     }
 

@@ -46,6 +46,56 @@ fn a_satellite_receiver_needs_a_datum() {
     );
 }
 
+/// Without receiver and balises nothing would ever be said; what is not named is not asked for.
+#[test]
+fn track_occupancy_needs_a_receiver_or_balises() {
+    let line = |balises: &str| {
+        let line = format!(
+            "name = 'line'\ndatum = {{ latitude_deg = 1.0, longitude_deg = 2.0 }}\n\
+             plan = [{{ kind = 'straight', length_m = 400.0 }}]\n{balises}"
+        );
+        Tunnel::from_toml(&line).unwrap()
+    };
+    let keys = |more: &str, balises: &str| {
+        let text = format!(
+            "name = \"test\"\ntunnel = \"given\"\n{more}\
+             [train]\ncars = 1\nstart_chainage_m = 100.0\nstop_at_m = 150.0\n\
+             [[other_trains]]\ncars = 1\nstart_chainage_m = 200.0\nstop_at_m = 300.0\n"
+        );
+        let mut problems = Vec::new();
+        let file = read_toml::<ScenarioFile>(&text).unwrap();
+        in_tunnel(&file, &line(balises), &mut Checker::new("", &mut problems));
+        problems.into_iter().map(|p| p.key).collect::<Vec<_>>()
+    };
+    let balises = "balises = [{ name = 'B1', chainage_m = 130.0 }]\n";
+    let (first, other) = ("stack.onboard", "onboard[0].equipment");
+    for (more, balises, expected) in [
+        ("", "", vec![]),
+        ("stack.onboard = ['occupancy']\n", "", vec![first]),
+        ("stack.onboard = ['occupancy']\n", balises, vec![]),
+        ("stack.onboard = ['occupancy']\ngnss = {}\n", "", vec![]),
+        ("stack.onboard = ['protection']\n", "", vec![]),
+        ("onboard = [{ train = 1 }]\n", "", vec![]),
+        (
+            "onboard = [{ train = 1, equipment = ['led', 'occupancy', 'protection'] }]\n",
+            "",
+            vec![other],
+        ),
+        (
+            "onboard = [{ train = 1, equipment = ['occupancy'] }]\n",
+            balises,
+            vec![],
+        ),
+        (
+            "onboard = [{ train = 1, equipment = ['occupancy'], gnss = {} }]\n",
+            "",
+            vec![],
+        ),
+    ] {
+        assert_eq!(keys(more, balises), expected, "{more}{balises}");
+    }
+}
+
 /// Every fault that could not act as written is refused, with its key.
 #[test]
 fn faults_must_be_able_to_strike() {

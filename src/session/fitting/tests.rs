@@ -83,6 +83,39 @@ fn rates_and_speeds() {
     assert!((radar / truth - 1.0).abs() < 0.005, "{radar} of {truth}");
 }
 
+/// A train whose rig looks back has a unit in its last car, and one in its first if track occupancy goes by that: at
+/// 15 m/s into a curve of 500 m the first car turns at 30 mrad/s while the last one is on the straight before.
+#[test]
+fn each_end_that_needs_one_has_an_inertial_unit() {
+    let rear = "[rig]\nend = 'rear'\nside = 'right'\nyaw_deg = 141.0\n";
+    for (more, ends) in [
+        ("", vec![TrainEnd::Rear]),
+        ("[gnss]\n", vec![TrainEnd::Rear, TrainEnd::Front]),
+    ] {
+        let train = TRAIN.replace("400.0", "465.0");
+        let scenario = scenario(&format!("{train}stop_at_m = 900.0\n{rear}{more}"));
+        let mut turned = [(TrainEnd::Front, 0.0, 0), (TrainEnd::Rear, 0.0, 0)];
+        run(&scenario, &mut world(&scenario), 1.0, |_, _, output| {
+            if let Output::Sample(sample) = output
+                && let Content::Imu(imu) = sample.content
+            {
+                let of_end = turned.iter_mut().find(|(end, ..)| *end == imu.end).unwrap();
+                of_end.1 += imu.gyro_rad_s.z;
+                of_end.2 += 1;
+            }
+        });
+        for (end, sum, count) in turned {
+            assert_eq!(count > 0, ends.contains(&end), "{end:?}: {count}");
+            let expected = if end == TrainEnd::Front { 0.03 } else { 0.0 };
+            let mean = sum / f64::from(count.max(1));
+            assert!(
+                count == 0 || (mean - expected).abs() < 0.005,
+                "{end:?}: {mean}"
+            );
+        }
+    }
+}
+
 /// A clock that is fast and drifts stamps samples ahead of the time, and samples as much sooner.
 #[test]
 fn each_sensor_has_its_own_clock() {

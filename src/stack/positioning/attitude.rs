@@ -106,6 +106,7 @@ impl CarAttitude {
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
+    use crate::bus::TrainEnd;
     use crate::track::PlanElement;
     use nalgebra::Point3;
 
@@ -123,6 +124,7 @@ mod tests {
     fn turning(rate: f64, k: i64) -> ImuSample {
         ImuSample {
             time: SimTime::from_nanos(k * 1_000_000),
+            end: TrainEnd::Front,
             gyro_rad_s: Vector3::new(0.0, 0.0, rate),
             accel_m_s2: Vector3::new(0.0, 0.0, 9.81),
         }

@@ -132,7 +132,10 @@ impl LampPositioning {
 impl Equipment for LampPositioning {
     fn on(&mut self, message: &Message) {
         match &message.content {
-            Content::Imu(sample) => self.positioner.on_imu(sample),
+            // What turns the rig's images is its own car.
+            Content::Imu(sample) if sample.end == self.mount.end => {
+                self.positioner.on_imu(sample);
+            }
             Content::Odometer(sample) => {
                 self.positioner.on_odometer(&self.mount.of_cab(sample));
             }

@@ -3,7 +3,7 @@
 use super::LedPositioner;
 use crate::bus::{
     CameraFault, CameraModel, Distortion, Identity, ImuSample, Intrinsics, LedReport, Method,
-    OdometerSample, RigCalibration, SimTime, StereoPair,
+    OdometerSample, RigCalibration, SimTime, StereoPair, TrainEnd,
 };
 use crate::stack::led::LedSettings;
 use crate::stack::led::testing::{SplitMix64, TestWorld, rig, track, wide_rig};
@@ -419,6 +419,7 @@ fn the_gyro_holds_the_position_of_a_swinging_car() {
             without.on_odometer(&odometer);
             with_gyro.on_imu(&ImuSample {
                 time: odometer.time,
+                end: TrainEnd::Front,
                 gyro_rad_s: Vector3::new(0.0, 0.0, TAU * SWING * (TAU * time_s).cos()),
                 accel_m_s2: Vector3::new(0.0, 0.0, 9.81),
             });

@@ -37,7 +37,7 @@ pub use auto_exposure::{AutoExposure, Exposed, ExposureMode, ExposureSettings};
 pub use balise_antenna::BaliseAntenna;
 pub use camera::{CameraSettings, ReadOut, WaysideError};
 pub use doppler::{Doppler, DopplerSettings};
-pub use gnss::{Gnss, GnssSettings};
+pub use gnss::{Gnss, GnssSeeds, GnssSettings};
 pub use imu::{Imu, ImuSettings};
 pub use lamp_view::{ever_sees, visible_interval};
 pub use lidar::{Lidar, LidarSettings};

@@ -4,11 +4,13 @@
 //! vaults or bridges are in between, so fixes get worse before a portal, are gone underground and come back after it.
 //! Ranges have slow and fast errors and reflections (`range_errors`); the receiver solves for its place by weighted least
 //! squares, leaves out ranges that do not fit, and states the covariance of what it takes its ranges for (`solution`).
-//! So an error ellipse is long towards what hides the sky, and errors of one fix are those of the next.
+//! So an error ellipse is long towards what hides the sky, and errors of one fix are those of the next. All receivers of
+//! a world have one sky over them, and the errors that come from there.
 //!
 //! What it does not do: buildings, trees and other trains beside the track (a share of reflections stands for them),
 //! carrier phase, jamming, systems with clocks apart.
 
+mod common_errors;
 mod range_errors;
 mod satellites;
 mod solution;
@@ -98,6 +100,15 @@ impl GnssSettings {
     }
 }
 
+/// From which seeds a receiver's numbers are drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct GnssSeeds {
+    /// What all receivers of a world have in common: the time of day, and errors of satellites' signals and of the air.
+    pub common: u64,
+    /// What is its own: multipath, noise and reflections.
+    pub own: u64,
+}
+
 /// A receiver at work.
 pub struct Gnss {
     settings: GnssSettings,
@@ -114,14 +125,14 @@ pub struct Gnss {
 }
 
 impl Gnss {
-    /// On a train; the time of day and all errors follow from the seed.
+    /// On a train, over the tracks of a place on the earth.
     pub fn new(
         settings: &GnssSettings,
         train: TrainId,
         (tracks, datum): (&[Arc<Track>], &Datum),
-        seed: u64,
+        seeds: GnssSeeds,
     ) -> Self {
-        let day = Stream::new(seed, 0, "gnss time of day");
+        let day = Stream::new(seeds.common, 0, "gnss time of day");
         let phases = [0, 1, 2].map(|k| day.uniform(k));
         Self {
             settings: *settings,
@@ -131,7 +142,7 @@ impl Gnss {
             near: None,
             ticker: Ticker::new(settings.rate_hz),
             sky: Sky::new(&datum.place, phases),
-            errors: RangeErrors::new(settings, Stream::new(seed, 0, "gnss ranges")),
+            errors: RangeErrors::new(settings, seeds),
             since_s: [None; SATELLITES],
             last_s: None,
         }

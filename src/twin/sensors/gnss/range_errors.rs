@@ -4,31 +4,38 @@
 //! what is left of the troposphere over the receiver. The slow ones are first-order Gauss-Markov processes. All but the
 //! first grow as 1/sin(elevation), the way through the air or near the ground. Now and then a satellite comes by a
 //! reflection alone: its range is then too long by an excess with exponential distribution.
+//!
+//! Orbits, clocks, ionosphere and troposphere are the same for all receivers of a world (`common_errors`): over the
+//! length of a line they hardly change. The rest is each receiver's own.
 
-use super::GnssSettings;
+use super::common_errors::CommonErrors;
 use super::satellites::SATELLITES;
+use super::{GnssSeeds, GnssSettings};
 use crate::twin::random::Stream;
 
 /// No satellite is taken for lower than this: 1/sin is bounded.
 const LOWEST_SINE: f64 = 0.05;
-/// Numbers of the stream that are kept for one satellite at one time.
+/// Numbers of the receiver's stream that are kept for one satellite at one time.
 const NUMBERS: u64 = 8;
 
 /// The errors of all ranges at one time after another.
 #[derive(Clone, Debug)]
 pub struct RangeErrors {
     settings: GnssSettings,
-    stream: Stream,
-    /// Of all satellites, towards the zenith.
-    troposphere_m: f64,
+    /// Of each satellite's orbit, clock and ionosphere.
+    signal_in_space: CommonErrors,
+    /// Towards the zenith.
+    troposphere: CommonErrors,
+    /// What is the receiver's own.
+    own: Stream,
     ranges: [Range; SATELLITES],
     seconds: f64,
     drawn: u64,
 }
 
+/// The receiver's own errors of a range.
 #[derive(Clone, Copy, Debug, Default)]
 struct Range {
-    signal_in_space_m: f64,
     /// Towards the zenith.
     multipath_m: f64,
     /// Of the reflection, while only that is received.
@@ -46,16 +53,21 @@ pub enum SignalWay {
 
 impl RangeErrors {
     /// As they are at time 0.
-    pub fn new(settings: &GnssSettings, stream: Stream) -> Self {
+    pub fn new(settings: &GnssSettings, seeds: GnssSeeds) -> Self {
+        let common = |name: &str, count: usize, correlation_s: f64| {
+            CommonErrors::new(Stream::new(seeds.common, 0, name), count, correlation_s)
+        };
+        let (space_s, air_s) = (settings.signal_in_space_s, settings.troposphere_s);
         let mut errors = Self {
             settings: *settings,
-            stream,
-            troposphere_m: 0.0,
+            signal_in_space: common("gnss signal in space", SATELLITES, space_s),
+            troposphere: common("gnss troposphere", 1, air_s),
+            own: Stream::new(seeds.own, 0, "gnss ranges"),
             ranges: [Range::default(); SATELLITES],
             seconds: 0.0,
             drawn: 0,
         };
-        errors.change(None);
+        errors.change_multipath(0.0);
         errors
     }
 
@@ -63,52 +75,42 @@ impl RangeErrors {
     pub fn advance(&mut self, seconds: f64) {
         let step_s = seconds - self.seconds;
         self.seconds = seconds;
-        self.change(Some(step_s));
+        self.signal_in_space.advance(seconds);
+        self.troposphere.advance(seconds);
+        self.change_multipath((-step_s / self.settings.multipath_s).exp());
     }
 
-    /// The errors change over a time; over none they are drawn anew.
-    fn change(&mut self, step_s: Option<f64>) {
+    /// So much of each is kept, the rest is drawn.
+    fn change_multipath(&mut self, keep: f64) {
         self.drawn += 1;
-        let (settings, stream) = (self.settings, self.stream);
-        let first = self.drawn * NUMBERS * (SATELLITES as u64 + 1);
-        let scale = settings.error_scale;
-        let markov = |old: f64, sigma_m: f64, time_s: f64, number: u64| {
-            let keep = step_s.map_or(0.0, |step_s| (-step_s / time_s).exp());
-            keep * old + (1.0 - keep * keep).sqrt() * sigma_m * scale * stream.normal(number)
-        };
-        let air_m = settings.troposphere_m * settings.left_by_corrections();
-        self.troposphere_m = markov(self.troposphere_m, air_m, settings.troposphere_s, first);
-        let space_m = settings.signal_in_space_m * settings.left_by_corrections();
-        for (range, number) in self.ranges.iter_mut().zip(1..) {
-            let first = first + NUMBERS * number;
-            range.signal_in_space_m = markov(
-                range.signal_in_space_m,
-                space_m,
-                settings.signal_in_space_s,
-                first,
-            );
-            range.multipath_m = markov(
-                range.multipath_m,
-                settings.multipath_m,
-                settings.multipath_s,
-                first + 1,
-            );
+        let more_m = (1.0 - keep * keep).sqrt() * self.settings.multipath_m;
+        for satellite in 0..SATELLITES {
+            let drawn_m = more_m * self.own.normal(self.first_number(satellite));
+            let multipath_m = &mut self.ranges[satellite].multipath_m;
+            *multipath_m = keep * *multipath_m + drawn_m;
         }
+    }
+
+    /// Of those that the receiver's stream has for a satellite now.
+    fn first_number(&self, satellite: usize) -> u64 {
+        (self.drawn * SATELLITES as u64 + satellite as u64) * NUMBERS
     }
 
     /// The error of a satellite's range, metres; none where its signal is not received.
     pub fn of(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64) -> Option<f64> {
-        let first = (self.drawn * (SATELLITES as u64 + 1) + satellite as u64 + 1) * NUMBERS;
-        self.reflect(satellite, sine, way, step_s, first + 2);
-        let range = &self.ranges[satellite];
+        let first = self.first_number(satellite);
+        self.reflect(satellite, sine, way, step_s, first + 1);
+        let (settings, range) = (&self.settings, &self.ranges[satellite]);
         if way == SignalWay::Blocked && range.excess_m.is_none() {
             return None;
         }
-        let noise_m = self.settings.noise_m * self.settings.error_scale;
-        let noise_m = noise_m * self.stream.normal(first + 6);
-        let near_m = self.troposphere_m + range.multipath_m + noise_m;
-        let sine = sine.max(LOWEST_SINE);
-        Some(range.signal_in_space_m + near_m / sine + range.excess_m.unwrap_or(0.0))
+        let left = settings.left_by_corrections();
+        let space_m = left * settings.signal_in_space_m * self.signal_in_space.of(satellite);
+        let air_m = left * settings.troposphere_m * self.troposphere.of(0);
+        let noise_m = settings.noise_m * self.own.normal(first + 4);
+        let near_m = air_m + range.multipath_m + noise_m;
+        let all_m = space_m + near_m / sine.max(LOWEST_SINE);
+        Some(settings.error_scale * all_m + range.excess_m.unwrap_or(0.0))
     }
 
     /// A two-state chain: reflections come and go with their mean duration, so that over time their share is as set.
@@ -119,13 +121,13 @@ impl RangeErrors {
             SignalWay::Blocked => settings.reflected_if_blocked,
         };
         let stay = (-step_s / (settings.reflected_s * (1.0 - share)).max(1e-9)).exp();
-        let keeps = self.stream.uniform(first) < stay;
+        let keeps = self.own.uniform(first) < stay;
         let excess_m = &mut self.ranges[satellite].excess_m;
         if keeps {
             return;
         }
         // What has changed is anew in one of both states.
-        *excess_m = (self.stream.uniform(first + 1) < share)
-            .then(|| -settings.reflected_excess_m * self.stream.uniform(first + 2).ln());
+        *excess_m = (self.own.uniform(first + 1) < share)
+            .then(|| -settings.reflected_excess_m * self.own.uniform(first + 2).ln());
     }
 }

@@ -17,8 +17,13 @@ fn line() -> Tunnel {
 }
 
 fn receiver(settings: &GnssSettings, line: &Tunnel, seed: u64) -> Gnss {
+    one_of_several(settings, line, [seed, seed])
+}
+
+/// Of a scenario's seed and its own.
+fn one_of_several(settings: &GnssSettings, line: &Tunnel, [common, own]: [u64; 2]) -> Gnss {
     let tracks = (line.network.tracks.as_slice(), &line.datum.unwrap());
-    Gnss::new(settings, TrainId(0), tracks, seed)
+    Gnss::new(settings, TrainId(0), tracks, GnssSeeds { common, own })
 }
 
 fn antenna(line: &Tunnel, s_m: f64) -> Point3<f64> {
@@ -95,6 +100,72 @@ fn multipath_is_gauss_markov() {
     }
 }
 
+/// What comes from the sky is wrong by one number for all receivers of a scenario: of two trains 10 m apart the fixes are
+/// 10 m apart, also where the one has begun later and has another rate.
+#[test]
+fn two_receivers_have_one_sky() {
+    let line = line();
+    let settings = GnssSettings {
+        multipath_m: 0.0,
+        noise_m: 0.0,
+        reflected_share: 0.0,
+        acquisition_s: 0.0,
+        signal_in_space_s: 20.0,
+        troposphere_s: 50.0,
+        ..GnssSettings::default()
+    };
+    let antennas = [50.0, 60.0].map(|s_m| antenna(&line, s_m));
+    let mut one = one_of_several(&settings, &line, [1, 2]);
+    let mut other = one_of_several(&settings, &line, [1, 3]);
+    let mut errors_m = Vec::new();
+    for k in 0..400 {
+        let time = SimTime::from_secs(0.2 * f64::from(k));
+        let a = one.fix(time, &antennas[0]).unwrap();
+        if k >= 7 && k % 3 == 0 {
+            let b = other.fix(time, &antennas[1]).unwrap();
+            let [a_m, b_m] = [
+                error_m(&line, &a, &antennas[0]),
+                error_m(&line, &b, &antennas[1]),
+            ];
+            assert!((a_m - b_m).norm() < 1e-6, "{a_m} {b_m}");
+            assert_eq!(a.satellites, b.satellites);
+            errors_m.push(a_m);
+        }
+    }
+    let most_m = errors_m.iter().map(|m| m.norm()).fold(0.0, f64::max);
+    let changed_m = (errors_m[0] - errors_m[errors_m.len() - 1]).norm();
+    assert!(most_m > 0.3 && changed_m > 0.1, "{most_m} {changed_m}");
+    let mut another = one_of_several(&settings, &line, [4, 2]);
+    let fix = another.fix(SimTime::default(), &antennas[0]).unwrap();
+    assert!((error_m(&line, &fix, &antennas[0]) - errors_m[0]).norm() > 1e-3);
+}
+
+/// Multipath and noise of one train's receiver say nothing of those of another one.
+#[test]
+fn own_errors_are_independent() {
+    let line = line();
+    let settings = GnssSettings {
+        reflected_share: 0.0,
+        troposphere_m: 0.0,
+        signal_in_space_m: 0.0,
+        ..GnssSettings::default()
+    };
+    let antenna = antenna(&line, 50.0);
+    let (mut product, mut squares) = (0.0, 0.0);
+    for seed in 0..1500 {
+        let [a, b] = [1, 2].map(|train| {
+            let mut receiver = one_of_several(&settings, &line, [seed, 10 * seed + train]);
+            let fix = receiver.fix(SimTime::default(), &antenna).unwrap();
+            error_m(&line, &fix, &antenna)
+        });
+        product += a.dot(&b);
+        squares += 0.5 * (a.norm_squared() + b.norm_squared());
+    }
+    // 3000 pairs of components.
+    let found = product / squares;
+    assert!(found.abs() < 4.0 / 3000f64.sqrt(), "{found}");
+}
+
 /// A mixture: its share of time, mean excess and mean duration are those of the settings.
 #[test]
 fn reflections_have_their_share_excess_and_duration() {
@@ -105,7 +176,7 @@ fn reflections_have_their_share_excess_and_duration() {
         reflected_excess_m: 12.0,
         ..GnssSettings::default()
     };
-    let mut errors = RangeErrors::new(&settings, Stream::new(3, 0, "ranges"));
+    let mut errors = RangeErrors::new(&settings, GnssSeeds { common: 3, own: 3 });
     let (sine, step_s, count) = (0.6, 0.5, 400_000u32);
     let (mut on, mut begun, mut excess_m) = (0u32, 0u32, 0.0);
     let mut was_on = false;

@@ -174,16 +174,20 @@ impl Imu {
     }
 
     /// A sample at one end of a train, of the time since the last one; `None` without its train, and on
-    /// the first call,
-    /// which starts the unit.
+    /// the first call, which starts the unit.
     pub fn sample(&mut self, world: &World, train: TrainId, end: TrainEnd) -> Option<ImuSample> {
         let now = *world.vehicle_motion(train, end)?;
         let before = self.last.replace(now)?;
-        self.between(&before, &now)
+        self.between(end, &before, &now)
     }
 
     /// A sample of the time between two motions; `None` if there is none.
-    fn between(&mut self, before: &VehicleMotion, now: &VehicleMotion) -> Option<ImuSample> {
+    fn between(
+        &mut self,
+        end: TrainEnd,
+        before: &VehicleMotion,
+        now: &VehicleMotion,
+    ) -> Option<ImuSample> {
         let span_s = now.time.since(before.time);
         if span_s <= 0.0 {
             return None;
@@ -199,6 +203,7 @@ impl Imu {
         let (gyro_rad_s, accel_m_s2) = self.measure(&turn, &force, span_s);
         Some(ImuSample {
             time: now.time,
+            end,
             gyro_rad_s,
             accel_m_s2,
         })

@@ -49,7 +49,11 @@ fn the_lever_arm_is_felt() {
         };
         let mut imu = Imu::new(&settings, 1, 0);
         let sample = imu
-            .between(&spinning(-0.0005, w, a), &spinning(0.0005, w, a))
+            .between(
+                TrainEnd::Front,
+                &spinning(-0.0005, w, a),
+                &spinning(0.0005, w, a),
+            )
             .unwrap();
         let wanted = Vector3::new(wanted[0], wanted[1], G_MPS2);
         assert!((sample.accel_m_s2 - wanted).norm() < 1e-5, "{wanted}");
