@@ -103,7 +103,7 @@ struct MergeArgs {
     folder: PathBuf,
 }
 
-/// Write a study's figures and plots as one page
+/// Write a study's figures and plots as one page, and print the figures, those of each swept value too
 #[derive(clap::Args)]
 struct ReportArgs {
     /// Folder of the study
@@ -182,6 +182,9 @@ pub(super) fn study(args: &StudyArgs) -> Result<(), Failure> {
             let digest = Digest::of(&study.template, &rows);
             let page = study::report(&study, &digest, &rows)?;
             print(&digest_text(&digest)?)?;
+            if !digest.swept.is_empty() {
+                print(&swept_text(&digest)?)?;
+            }
             print(&format!("report  {}", page.display()))
         }
         StudyCommand::Compare(args) => compare(args),
@@ -341,9 +344,19 @@ fn reasons(rows: &[Row]) -> Vec<(&str, usize)> {
     counts
 }
 
+/// What all runs come to.
 fn digest_text(digest: &Digest) -> Result<String, Failure> {
-    let template = include_str!("texts/digest.txt");
-    render("digest.txt", template, digest).map_err(Failure::run)
+    let lines = include_str!("texts/digest_lines.txt");
+    let template = lines.to_owned() + include_str!("texts/digest.txt");
+    render("digest.txt", &template, digest).map_err(Failure::run)
+}
+
+/// What those of each swept value come to.
+fn swept_text(digest: &Digest) -> Result<String, Failure> {
+    let lines = include_str!("texts/digest_lines.txt");
+    let template = lines.to_owned() + include_str!("texts/swept.txt");
+    let text = render("swept.txt", &template, digest).map_err(Failure::run)?;
+    Ok(text.trim().to_owned())
 }
 
 fn show(bar: &ProgressBar, progress: &Progress) {

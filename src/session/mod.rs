@@ -48,9 +48,9 @@ pub use profile::{DrawingProfile, PassCost, profile};
 pub use speed::{Speeds, measure};
 pub(crate) use summary::quantile;
 pub use summary::{
-    CameraFigures, Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, OccupancyClass,
-    OccupancyFigures, Physics, Positioning, ProtectionFigures, Summary, SwitchDistances,
-    TrainFigures, TrainSummary, WallShares, Wayside,
+    CameraFigures, Cost, End, ErrorStatistics, FacingFigures, FaultSpan, ObstacleScore,
+    OccupancyClass, OccupancyFigures, Physics, Positioning, ProtectionFigures, Summary,
+    SwitchDistances, TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

@@ -5,7 +5,7 @@ use super::stats::{
     first_order, first_order_of_groups, rank_correlation, weighted_mean, weighted_rate,
 };
 use super::stop::{Precision, PrecisionCheck};
-use super::{MEASURES, Measure, Row, WorseSide};
+use super::{MEASURES, Measure, Row, SweptDigest, WorseSide};
 use crate::record::parquet::Kind;
 use crate::scenario::sampling::{Condition, Distribution, Template};
 use serde::Serialize;
@@ -32,6 +32,8 @@ pub struct Digest {
     pub events: Vec<EventDigest>,
     /// Figures that vary, in the order of columns.
     pub figures: Vec<FigureDigest>,
+    /// Both again for each value of what is swept.
+    pub swept: Vec<SweptDigest>,
 }
 
 /// The figure that a study stopped by.
@@ -68,6 +70,10 @@ pub struct FigureDigest {
     pub measure: &'static Measure,
     /// How many complete runs have it: its mean and quantiles are over these.
     pub runs: usize,
+    /// How many numbers these have: one each, but of a list all, each of which counts for one.
+    pub numbers: usize,
+    /// Of a count, all of these together.
+    pub sum: Option<f64>,
     /// How many runs have it not, or only of a part of the run.
     pub lacking: usize,
     /// Which of its values are worse.
@@ -110,19 +116,23 @@ impl Digest {
         let weighted = template.is_weighted();
         let ln_weights: Vec<f64> = rows.iter().map(|r| r.ln_weight).collect();
         let events = template.events.iter();
+        let early = EarlyStop::of(template, rows);
+        let rows: &[&Row] = &rows.iter().collect::<Vec<_>>();
         let shown = MEASURES.iter().filter(|m| is_shown(m));
         Self {
             runs: rows.len(),
             complete: rows.iter().filter(|r| r.is_complete()).count(),
-            early: EarlyStop::of(template, rows),
+            early,
             rejected: rows.iter().map(|r| u64::from(r.rejected)).sum(),
             effective_runs: weighted.then(|| effective_runs(&ln_weights)),
             events: events
                 .map(|(name, condition)| EventDigest::of(template, name, condition, rows))
                 .collect(),
             figures: shown
-                .filter_map(|m| FigureDigest::of(template, m, rows))
+                .filter(|m| varies(m, rows))
+                .map(|m| FigureDigest::of(template, m, rows))
                 .collect(),
+            swept: SweptDigest::all(template, rows),
         }
     }
 }
@@ -140,7 +150,12 @@ impl EarlyStop {
 }
 
 impl EventDigest {
-    fn of(template: &Template, name: &str, condition: &Condition, rows: &[Row]) -> Self {
+    pub(super) fn of(
+        template: &Template,
+        name: &str,
+        condition: &Condition,
+        rows: &[&Row],
+    ) -> Self {
         let outcomes = || rows.iter().map(|r| (r.ln_weight, r.outcome(condition)));
         // Weights have mean 1 by themselves only if no condition cut draws off.
         let cut_off = !template.settings.require.is_empty();
@@ -168,28 +183,69 @@ fn shares_a_table(template: &Template) -> bool {
     })
 }
 
-fn is_shown(measure: &Measure) -> bool {
+/// Whether it is a single figure of a run, and none of the machine's.
+pub(super) fn is_shown(measure: &Measure) -> bool {
     matches!(measure.kind, Kind::Real | Kind::Int | Kind::Flag) && !measure.is_wall_time()
 }
 
-impl FigureDigest {
-    /// `None` of a figure that no run has, or that is the same in all.
-    fn of(template: &Template, measure: &'static Measure, rows: &[Row]) -> Option<Self> {
-        let complete: Vec<&Row> = rows.iter().filter(|r| r.is_complete()).collect();
-        let known = complete
-            .iter()
-            .filter_map(|r| Some((r.ln_weight, r.number(measure.name)?)));
-        let known: Vec<(f64, f64)> = known.collect();
-        let first = rows.iter().find_map(|r| r.number(measure.name))?;
-        let is_same = |x: f64| x.to_bits() == first.to_bits();
-        let lacking = rows.len() - known.len();
-        if lacking == 0 && known.iter().all(|(_, x)| is_same(*x)) {
-            return None;
+/// Whether runs have it, and it is not the same in all of them.
+pub(super) fn varies(measure: &Measure, rows: &[&Row]) -> bool {
+    let first = rows
+        .iter()
+        .find_map(|row| row.values_of(measure).first().copied());
+    let Some(first) = first else {
+        return false;
+    };
+    let is_same = |x: f64| x.to_bits() == first.to_bits();
+    rows.iter().any(|row| {
+        let values = row.values_of(measure);
+        !row.is_complete() || values.is_empty() || !values.into_iter().all(is_same)
+    })
+}
+
+impl Row {
+    /// All numbers of a figure: one, those of a list, or none.
+    fn values_of(&self, measure: &Measure) -> Vec<f64> {
+        match measure.kind {
+            Kind::Reals => self.numbers(measure.name),
+            _ => self.number(measure.name).into_iter().collect(),
         }
+    }
+}
+
+impl FigureDigest {
+    /// With what drives it.
+    fn of(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Self {
+        let figure = Self::over(template, measure, rows);
+        if template.is_weighted() {
+            return figure;
+        }
+        let complete: Vec<&Row> = rows.iter().copied().filter(|r| r.is_complete()).collect();
+        let variables = template.settings.variables.keys();
+        let drivers = variables.map(|name| Sensitivity::of(template, name, measure, &complete));
+        Self {
+            drivers: drivers.collect(),
+            ..figure
+        }
+    }
+
+    /// Without what drives it.
+    pub(super) fn over(template: &Template, measure: &'static Measure, rows: &[&Row]) -> Self {
+        let complete = rows.iter().filter(|r| r.is_complete());
+        let known = complete.map(|row| (row.ln_weight, row.values_of(measure)));
+        let known: Vec<_> = known.filter(|(_, values)| !values.is_empty()).collect();
+        let runs = known.len();
+        let pairs = |(ln_weight, values): (f64, Vec<f64>)| {
+            values.into_iter().map(move |value| (ln_weight, value))
+        };
+        let pairs: Vec<(f64, f64)> = known.into_iter().flat_map(pairs).collect();
+        let sample: Vec<f64> = pairs.iter().map(|(_, x)| *x).collect();
         let bare = Self {
             measure,
-            runs: known.len(),
-            lacking,
+            runs,
+            numbers: sample.len(),
+            sum: (measure.kind == Kind::Int).then(|| sample.iter().sum()),
+            lacking: rows.len() - runs,
             worse_side: measure.worse_side(),
             worst: WorstCase::of(measure, rows),
             mean: None,
@@ -197,30 +253,29 @@ impl FigureDigest {
             drivers: Vec::new(),
         };
         if template.is_weighted() {
-            let mean = weighted_mean(&known, measure.range());
-            return Some(Self { mean, ..bare });
+            // The numbers of a list share their run's weight: they are worth fewer than they are.
+            let is_list = measure.kind == Kind::Reals;
+            let mean = weighted_mean(&pairs, measure.range()).filter(|_| !is_list);
+            return Self { mean, ..bare };
         }
-        let sample: Vec<f64> = known.into_iter().map(|(_, x)| x).collect();
-        let mean = measure.mean(&sample);
-        let variables = template.settings.variables.keys();
-        let drivers = variables.map(|name| Sensitivity::of(template, name, measure, &complete));
         let is_flag = measure.kind == Kind::Flag;
-        Some(Self {
-            mean,
+        Self {
+            mean: measure.mean(&sample),
             quantiles: QUANTILES.map(|p| measure.quantile(&sample, p).filter(|_| !is_flag)),
-            drivers: drivers.collect(),
             ..bare
-        })
+        }
     }
 }
 
 impl WorstCase {
-    fn of(measure: &Measure, rows: &[Row]) -> Option<Self> {
-        let known = rows.iter().filter_map(|row| {
-            let value = row.number(measure.name)?;
+    fn of(measure: &Measure, rows: &[&Row]) -> Option<Self> {
+        let values = |row: &&Row| {
             let index = row.index;
-            Some((measure.badness(value)?, Self { value, index }))
-        });
+            let values = row.values_of(measure).into_iter();
+            values.map(move |value| Self { value, index })
+        };
+        let cases = rows.iter().flat_map(values);
+        let known = cases.filter_map(|case| Some((measure.badness(case.value)?, case)));
         // The first of several that are equal.
         let worst = known.reduce(|worst, case| if case.0 > worst.0 { case } else { worst });
         worst.map(|(_, case)| case)

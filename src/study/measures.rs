@@ -1,5 +1,6 @@
 //! The figures of a run that a study keeps, each with its unit and meaning.
 
+use super::all_trains::OccupancyOfTrains;
 use crate::bus::{Method, TrainId};
 use crate::record::parquet::Kind;
 use crate::session::{
@@ -109,6 +110,12 @@ fn error(s: &Summary, method: Method, get: fn(&ErrorStatistics) -> f64) -> Value
     of(s.positioning.get(&method), |p| p.error_m.as_ref().map(get))
 }
 
+/// A figure of track occupancy, where a train has it.
+fn occupancy<T: Into<Value>>(s: &Summary, get: fn(&OccupancyOfTrains<'_>) -> Option<T>) -> Value {
+    let trains = OccupancyOfTrains::of(s.occupancy.as_ref(), &s.trains);
+    of(trains.as_ref(), get)
+}
+
 fn worst(w: &Wayside, get: fn(&ObstacleScore) -> Option<f64>) -> Option<f64> {
     let all = w.obstacles.iter().filter_map(get);
     all.max_by(|a, b| f64::total_cmp(&a.abs(), &b.abs()))
@@ -175,34 +182,34 @@ pub const MEASURES: &[Measure] = positioning![
     measure_of("detection_distance_error_m", Real, "m",
         "mean size of the error of its reported distance, of the obstacle with the largest",
         |s, _| of(s.wayside.as_ref(), |w| worst(w, |o| o.distance_error_m))),
-    measure_of("occupancy_fixes", Int, "1", "fixes after which track occupancy said something",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.fixes))),
+    measure_of("occupancy_fixes", Int, "1", "fixes after which track occupancy said something, of all trains that have it, as below",
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.fixes)))),
     measure_of("occupancy_wrong_confident", Int, "1", "of these, wrong with no other track left",
-        |s, _| of(s.occupancy.as_ref(), |o| o.classes.get(&OccupancyClass::WrongConfident).copied())),
+        |s, _| occupancy(s, |o| Some(o.fixes_of(|class| class == OccupancyClass::WrongConfident)))),
     measure_of("occupancy_wrong_share", Real, "1", "share of these whose most probable track is wrong",
-        |s, _| of(s.occupancy.as_ref(), |o| o.share(OccupancyClass::is_wrong))),
+        |s, _| occupancy(s, |o| o.share(OccupancyClass::is_wrong))),
     measure_of("occupancy_confident_share", Real, "1", "share of these that are right with no other track left",
-        |s, _| of(s.occupancy.as_ref(), |o| o.share(|class| class == OccupancyClass::CorrectConfident))),
+        |s, _| occupancy(s, |o| o.share(|class| class == OccupancyClass::CorrectConfident))),
     measure_of("occupancy_facing_reports", Int, "1", "reports of track occupancy whose most probable track is right",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.facing.reports))),
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.facing.reports)))),
     measure_of("occupancy_facing_wrong_over_0_9", Int, "1", "of these, facing the wrong way with a probability over 0.9",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.facing.wrong_over_0_9))),
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.facing.wrong_over_0_9)))),
     measure_of("occupancy_facing_wrong_certain", Int, "1", "of these, facing the wrong way with a probability over 1 - 1e-9",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.facing.wrong_certain))),
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.facing.wrong_certain)))),
     measure_of("occupancy_switches", Int, "1", "legs of switches run over from the toe",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.switches))),
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.switches)))),
     measure_of("occupancy_never_identified", Int, "1", "of these, not identified for good before they were left",
-        |s, _| of(s.occupancy.as_ref(), |o| Some(o.never_identified))),
+        |s, _| occupancy(s, |o| Some(o.sum(|figures| figures.never_identified)))),
     measure_of("occupancy_identified_mean_m", Real, "m", "from the toe to where the leg was identified for good, mean of the run",
-        |s, _| of(s.occupancy.as_ref(), |o| o.identified_after_m.map(|d| d.mean))),
+        |s, _| occupancy(s, |o| Some(o.identified_after_m()?.mean))),
     measure_of("occupancy_identified_max_m", Real, "m", "the longest of these",
-        |s, _| of(s.occupancy.as_ref(), |o| o.identified_after_m.map(|d| d.max))),
+        |s, _| occupancy(s, |o| Some(o.identified_after_m()?.max))),
     measure_of("occupancy_leg_m", Reals, "m", "of every leg that was identified: distance from the toe",
-        |s, _| s.occupancy.as_ref().map_or(Value::Null, |o| list(o.legs_identified_after_m.iter().copied().flatten()))),
+        |s, _| occupancy(s, |o| Some(list(o.legs_m().into_iter())))),
     measure_of("occupancy_error_max_m", Real, "m", "largest error along the track, of fixes whose track is right",
-        |s, _| of(s.occupancy.as_ref(), |o| o.error_m.map(|e| e.max))),
+        |s, _| occupancy(s, |o| o.error_max_m())),
     measure_of("occupancy_nees_mean", Real, "1", "mean of (error / sigma)^2: 1 for an honest sigma",
-        |s, _| of(s.occupancy.as_ref(), |o| o.nees_mean)),
+        |s, _| occupancy(s, |o| o.nees_mean())),
     measure_of("brake_commanded_s", Real, "s", "when the train first braked for an obstacle",
         |s, _| of(s.protection.as_ref(), |p| p.brake_commanded_s)),
     measure_of("stopped_s", Real, "s", "when it first stood after that",

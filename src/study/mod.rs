@@ -24,6 +24,7 @@
 //!
 //! Schedule over machines: `submit` hands the shards to Slurm as a job array.
 
+mod all_trains;
 mod collected;
 mod compare;
 mod digest;
@@ -41,6 +42,7 @@ mod shard;
 mod slurm;
 pub mod stats;
 mod stop;
+mod swept;
 mod table;
 mod worker;
 
@@ -57,6 +59,7 @@ pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
 pub use scale::WorseSide;
 pub use shard::{MOST_SHARDS, Shard};
 pub use slurm::{Submission, Submitted};
+pub use swept::{ByValue, OfValue, SweptDigest};
 pub use worker::{ScenarioRunner, serve};
 
 use crate::record::{self, LIST, Listing};

@@ -5,8 +5,8 @@ use super::stats::{Bounds, IntervalEstimate, quantile};
 use crate::record::parquet::Kind;
 use serde::Serialize;
 
-/// Figures that have a sign: positions, and differences of them.
-const SIGNED: [&str; 3] = ["stop_margin_m", "stop_error_m", "run_m"];
+/// Ends of names of figures that have a sign: positions, and differences of them.
+const SIGNED: [&str; 4] = ["stop_margin_m", "stop_error_m", "run_m", "_fix_error_m"];
 /// Ends of names of shares.
 const SHARES: [&str; 3] = ["_availability", "_uid_decode_rate", "_share"];
 /// Ends of names of figures of which less is worse.
@@ -19,13 +19,14 @@ const LESS_IS_WORSE: [&str; 6] = [
     "least_wheel_load",
 ];
 /// Ends of names of figures of which neither less nor more is worse: they say what a run was like.
-const NEUTRAL: [&str; 8] = [
+const NEUTRAL: [&str; 9] = [
     "occupancy_switches",
     "obstacles",
     "dark_lamps",
     "brake_commanded_s",
     "stopped_s",
     "run_m",
+    "_fix_range_m",
     "simulated_s",
     "_frames",
 ];
@@ -45,12 +46,15 @@ pub enum WorseSide {
 }
 
 impl Measure {
+    fn is_one_of(&self, ends: &[&str]) -> bool {
+        ends.iter().any(|end| self.name.ends_with(end))
+    }
+
     /// What its values lie between.
     pub fn range(&self) -> Bounds {
-        let is_share = SHARES.iter().any(|end| self.name.ends_with(end));
-        if self.kind == Kind::Flag || is_share {
+        if self.kind == Kind::Flag || self.is_one_of(&SHARES) {
             Bounds::SHARE
-        } else if SIGNED.contains(&self.name) {
+        } else if self.is_one_of(&SIGNED) {
             Bounds::NONE
         } else {
             Bounds::NOT_NEGATIVE
@@ -59,12 +63,11 @@ impl Measure {
 
     /// Which of its values are worse.
     pub fn worse_side(&self) -> WorseSide {
-        let is_of = |ends: &[&str]| ends.iter().any(|end| self.name.ends_with(end));
-        if is_of(&LESS_IS_WORSE) {
+        if self.is_one_of(&LESS_IS_WORSE) {
             WorseSide::Less
-        } else if is_of(&NEUTRAL) {
+        } else if self.is_one_of(&NEUTRAL) {
             WorseSide::Neither
-        } else if SIGNED.contains(&self.name) {
+        } else if self.is_one_of(&SIGNED) {
             WorseSide::Farther
         } else {
             WorseSide::More

@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 const SMALL: &str = "tests/studies/small.toml";
 
 /// A folder of a test with the inputs of the small study.
-fn folder(name: &str) -> PathBuf {
+pub fn folder(name: &str) -> PathBuf {
     let folder = crate::program::folder(name);
     for file in [
         SMALL,
@@ -30,7 +30,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 /// The small study, with events about how it ends.
-fn template(folder: &Path) -> Template {
+pub fn template(folder: &Path) -> Template {
     let path = folder.join(INPUTS).join(SMALL);
     let text = fs::read_to_string(&path).unwrap();
     let (head, _) = text.split_once("[study.events]").unwrap();
@@ -39,7 +39,7 @@ fn template(folder: &Path) -> Template {
     Template::load(&path).unwrap()
 }
 
-fn row(index: u64, status: Status, figures: Value) -> Row {
+pub fn row(index: u64, status: Status, figures: Value) -> Row {
     let sample = ScenarioSample {
         index,
         ..ScenarioSample::default()
@@ -311,7 +311,7 @@ fn an_early_stop_is_marked() {
 }
 
 /// Makes a folder one that a study has left.
-fn leave(folder: &Path, rows: &[Row]) {
+pub fn leave(folder: &Path, rows: &[Row]) {
     let lines = rows
         .iter()
         .map(|row| serde_json::to_string(row).unwrap() + "\n");

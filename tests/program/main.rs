@@ -31,3 +31,4 @@ mod schema;
 #[cfg(target_os = "linux")]
 mod signals;
 mod studies;
+mod swept;

@@ -140,6 +140,8 @@ mod tests {
         let figure = FigureDigest {
             measure: measure("stop_error_m").unwrap(),
             runs: 3,
+            numbers: 3,
+            sum: None,
             lacking: 0,
             worse_side: WorseSide::Farther,
             worst: None,
@@ -155,6 +157,7 @@ mod tests {
             effective_runs: None,
             events: Vec::new(),
             figures: vec![figure],
+            swept: Vec::new(),
         };
         let worst = worst(&digest, &rows).unwrap();
         let order: Vec<u64> = worst.runs.iter().map(|run| run.index).collect();

@@ -80,14 +80,27 @@ pub fn quantile(sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
     }
     let below = Binomial::new(p, n as u64).ok()?;
     // X_(i) <= q in all but P(fewer than i lie below q) = F(i - 1) of all samples (i from 1).
-    let i = (1..=n)
-        .take_while(|i| below.cdf(*i as u64 - 1) <= TAIL)
-        .last();
-    let j = (1..=n).find(|j| below.cdf(*j as u64 - 1) >= 1.0 - TAIL);
+    let share_below = |i: usize| below.cdf(i as u64 - 1);
+    let i = least_where(n, |i| share_below(i) > TAIL).map_or(n, |above| above - 1);
+    let j = least_where(n, |i| share_below(i) >= 1.0 - TAIL);
     Some(IntervalEstimate {
         value: interpolated(sorted, p),
-        low: i.map_or(f64::NEG_INFINITY, |i| sorted[i - 1]),
+        low: i.checked_sub(1).map_or(f64::NEG_INFINITY, |k| sorted[k]),
         high: j.map_or(f64::INFINITY, |j| sorted[j - 1]),
         n,
     })
+}
+
+/// The least of 1 to `n` for which something holds that holds from some number on.
+fn least_where(n: usize, holds: impl Fn(usize) -> bool) -> Option<usize> {
+    let (mut low, mut high) = (1, n + 1);
+    while low < high {
+        let middle = low.midpoint(high);
+        if holds(middle) {
+            high = middle;
+        } else {
+            low = middle + 1;
+        }
+    }
+    (low <= n).then_some(low)
 }

@@ -102,6 +102,7 @@ with_track! {
 
 with_track! {
     /// One of several tracks.
+    #[derive(Default)]
     pub struct TrackEntry {
         /// Its name. Its ends are `name.begin` and `name.end`.
         name: String;
@@ -267,21 +268,7 @@ impl TrackEntry {
     pub(super) fn empty(name: &str) -> Self {
         Self {
             name: name.to_owned(),
-            ambient_lx: None,
-            from: None,
-            to: None,
-            start: None,
-            stated_chainage: None,
-            plan: Vec::new(),
-            grades: Vec::new(),
-            sections: Vec::new(),
-            lamps: None,
-            lamp_rows: Vec::new(),
-            lamp: Vec::new(),
-            wayside: Vec::new(),
-            balises: Vec::new(),
-            base_stations: Vec::new(),
-            stations: Vec::new(),
+            ..Self::default()
         }
     }
 

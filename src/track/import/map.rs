@@ -27,16 +27,16 @@ pub struct ImportedMap {
 pub struct AlongElement {
     /// Name for people, if it has one.
     pub name: Option<String>,
-    /// From where on which curvature holds, to the left positive, 1/m; empty where the map says nothing.
-    pub curvatures: Vec<(f64, f64)>,
-    /// From where on which cant holds, millimetres.
-    pub cants_mm: Vec<(f64, f64)>,
-    /// From where on which grade holds, rising towards the last point positive, permille.
-    pub grades_permille: Vec<(f64, f64)>,
+    /// Curvature, to the left positive; empty where the map says nothing.
+    pub curvatures_per_m: Vec<MapStep>,
+    /// Cant.
+    pub cants_mm: Vec<MapStep>,
+    /// Grade, rising towards the last point positive.
+    pub grades_permille: Vec<MapStep>,
     /// Permitted speeds.
     pub speeds: Vec<MapSpeed>,
-    /// Balises: name and place.
-    pub balises: Vec<(String, f64)>,
+    /// Balises.
+    pub balises: Vec<MapBalise>,
     /// Signals.
     pub signals: Vec<MapSignal>,
     /// Stretches in a tunnel.
@@ -49,6 +49,24 @@ pub struct AlongElement {
     pub buffers: [bool; 2],
     /// Line of the file that it stands on, from 1; 0 where lines mean nothing.
     pub line: usize,
+}
+
+/// A value that holds from a place on, up to the next one of its list, whose name has the unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MapStep {
+    /// Where it begins.
+    pub from_m: f64,
+    /// What it is from there on.
+    pub value: f64,
+}
+
+/// A balise.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MapBalise {
+    /// Its name.
+    pub name: String,
+    /// Where it lies.
+    pub along_m: f64,
 }
 
 /// A permitted speed, from a place on.

@@ -38,8 +38,8 @@ pub use crs::{Crs, UnknownCrs};
 pub use junction::JunctionKind;
 pub use laying::{LaidMap, LaidTrack, LayingError, LayingOptions};
 pub use map::{
-    AlongElement, ImportCount, ImportReport, ImportedMap, LeftOut, MapSignal, MapSpeed, MapSwitch,
-    PlanCheck,
+    AlongElement, ImportCount, ImportReport, ImportedMap, LeftOut, MapBalise, MapSignal, MapSpeed,
+    MapStep, MapSwitch, PlanCheck,
 };
 pub use osm::{AroundPlace, OsmError, OsmImport};
 pub use table::{SheetError, TableFault, TableImport, TableOptions};

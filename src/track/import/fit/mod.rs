@@ -1,13 +1,13 @@
 //! From points along a track to its plan: straights and arcs with clothoids between, as railways are set out.
 //!
 //! Points of a map lie beside the track by some decimetres, and joining them by straights gives kinks that no train
-//! can run. The curve is an [`ArcChain`](chain::ArcChain): as many arcs as it takes to come as near to the points as
+//! can run. The curve is an [`ArcChain`](arc_chain::ArcChain): as many arcs as it takes to come as near to the points as
 //! they are accurate. It begins with few; stretches whose points are too far away are halved. Then arcs that need not
 //! turn become straights. Where a curve must begin and end in given poses it does so exactly.
 //!
 //! Not here: cant, and curves by design speed.
 
-mod chain;
+mod arc_chain;
 mod solve;
 #[cfg(test)]
 #[allow(
@@ -17,7 +17,7 @@ mod solve;
 )]
 mod tests;
 
-pub(super) use chain::ArcChain;
+pub(super) use arc_chain::ArcChain;
 pub(super) use solve::{EndPose, EndRule, FitTask};
 
 use super::plane::{length_m, turn_rad};

@@ -5,7 +5,7 @@
 //! Sequin 1992) that the points allow. Poses and curvatures that an end must have are constraints, by Lagrange's
 //! multipliers.
 
-use super::chain::{ArcChain, BEGIN, ChainPlace, Effects};
+use super::arc_chain::{ArcChain, BEGIN, ChainPlace, Effects};
 use crate::track::import::plane::along_m;
 use nalgebra::{DMatrix, DVector, Point2, Vector2};
 

@@ -273,7 +273,7 @@ impl Laying<'_> {
             along
                 .balises
                 .iter()
-                .map(|(name, m)| (*m, name.clone()))
+                .map(|balise| (balise.along_m, balise.name.clone()))
                 .collect()
         };
         let balises = self.along(k, length_m, of).into_iter();

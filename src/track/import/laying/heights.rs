@@ -281,22 +281,22 @@ impl Laying<'_> {
             let known = &self.map.along[*element].grades_permille;
             profile.is_known |= !known.is_empty();
             // The first one holds from the begin on.
-            let froms = known
-                .iter()
-                .enumerate()
-                .map(|(k, (m, _))| if k == 0 { 0.0 } else { m.clamp(0.0, own_m) });
+            let froms = known.iter().enumerate().map(|(k, grade)| match k {
+                0 => 0.0,
+                _ => grade.from_m.clamp(0.0, own_m),
+            });
             let tos = known
                 .iter()
                 .skip(1)
-                .map(|(m, _)| m.clamp(0.0, own_m))
+                .map(|grade| grade.from_m.clamp(0.0, own_m))
                 .chain([own_m]);
             let mut rises: Vec<Rise> = froms
                 .zip(tos)
                 .zip(known)
-                .map(|((from_m, to_m), (_, permille))| Rise {
+                .map(|((from_m, to_m), grade)| Rise {
                     from_m,
                     to_m,
-                    slope: permille / 1e3,
+                    slope: grade.value / 1e3,
                 })
                 .collect();
             if rises.is_empty() {

@@ -142,7 +142,10 @@ fn unwritten(map: &ImportedMap) -> Option<LeftOut> {
     let count = |of: fn(&AlongElement) -> usize| map.along.iter().map(of).sum::<usize>();
     let counts = [
         (count(|along| along.cants_mm.len()), "cants"),
-        (count(|along| along.curvatures.len()), "stated curvatures"),
+        (
+            count(|along| along.curvatures_per_m.len()),
+            "stated curvatures",
+        ),
         (count(|along| along.speeds.len()), "speeds"),
         (count(|along| along.signals.len()), "signals"),
     ];

@@ -1,6 +1,6 @@
 use super::*;
 use crate::track::file::SectionShape;
-use crate::track::import::map::{ImportReport, MapSwitch};
+use crate::track::import::map::{ImportReport, MapBalise, MapStep, MapSwitch};
 use crate::track::plan::{ElementEnd, PlanNetwork, TrackElement};
 use crate::track::{Alignment, Tunnel};
 use nalgebra::Point2;
@@ -211,7 +211,10 @@ fn a_triangle_closes() {
 fn grades_that_do_not_close_are_evened_out() {
     let mut map = triangle(false);
     for (along, permille) in map.along.iter_mut().zip([0.0, 0.0, 0.0, 5.0, -3.0, 1.0]) {
-        along.grades_permille = vec![(0.0, permille)];
+        along.grades_permille = vec![MapStep {
+            from_m: 0.0,
+            value: permille,
+        }];
     }
     let laid = map.lay(&options(0.1)).unwrap();
     assert!(laid.left_out.is_empty(), "{:?}", laid.left_out);
@@ -271,8 +274,12 @@ fn tunnels_and_balises_lie_where_the_map_has_them() {
     let mut map = map(elements, Vec::new(), &joints);
     map.along[1].tunnels_m = vec![[0.0, 150.0]];
     map.along[2].tunnels_m = vec![[0.0, 20.0]];
-    map.along[1].balises = vec![("B".to_owned(), 30.0)];
-    map.along[2].balises = vec![("B".to_owned(), 30.0)];
+    for along in &mut map.along[1..=2] {
+        along.balises = vec![MapBalise {
+            name: "B".to_owned(),
+            along_m: 30.0,
+        }];
+    }
     let options = LayingOptions {
         join: true,
         ..options(0.1)

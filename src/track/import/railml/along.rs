@@ -1,7 +1,7 @@
 //! What lies along a track, cut where the track is.
 
 use crate::track::Direction;
-use crate::track::import::{AlongElement, MapSpeed};
+use crate::track::import::{AlongElement, MapBalise, MapSpeed, MapStep};
 
 /// Values at a cut to within this are at it, metres.
 const SAME_M: f64 = 1e-6;
@@ -10,14 +10,14 @@ impl AlongElement {
     /// In the order along the track, with tunnels that touch made one.
     pub(super) fn sort(&mut self) {
         for steps in [
-            &mut self.curvatures,
+            &mut self.curvatures_per_m,
             &mut self.cants_mm,
             &mut self.grades_permille,
         ] {
-            steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+            steps.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
         }
         self.speeds.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
-        self.balises.sort_by(|a, b| a.1.total_cmp(&b.1));
+        self.balises.sort_by(|a, b| a.along_m.total_cmp(&b.along_m));
         self.signals.sort_by(|a, b| a.along_m.total_cmp(&b.along_m));
         self.tunnels_m.sort_by(|a, b| a[0].total_cmp(&b[0]));
         let mut tunnels: Vec<[f64; 2]> = Vec::new();
@@ -39,14 +39,15 @@ impl AlongElement {
         along: &impl Fn(f64) -> f64,
     ) -> Self {
         let inside = |at_m: f64| from_m <= at_m && (at_m < to_m || is_last && at_m <= to_m);
-        let steps = |steps: &[(f64, f64)]| -> Vec<(f64, f64)> {
-            let after = steps.partition_point(|step| step.0 <= from_m + SAME_M);
+        let steps = |steps: &[MapStep]| -> Vec<MapStep> {
+            let after = steps.partition_point(|step| step.from_m <= from_m + SAME_M);
             let held = after.checked_sub(1).and_then(|k| steps.get(k));
             let ahead = steps.get(after..).unwrap_or_default().iter();
-            let ahead = ahead.take_while(|step| step.0 < to_m - SAME_M);
-            let held = held.map(|(_, value)| (0.0, *value));
+            let ahead = ahead.take_while(|step| step.from_m < to_m - SAME_M);
+            let moved = |from_m: f64, step: &MapStep| MapStep { from_m, ..*step };
+            let held = held.map(|step| moved(0.0, step));
             held.into_iter()
-                .chain(ahead.map(|(at_m, value)| (along(*at_m), *value)))
+                .chain(ahead.map(|step| moved(along(step.from_m), step)))
                 .collect()
         };
         let of = |from: usize, place: &dyn Fn(usize) -> Option<f64>| {
@@ -54,8 +55,8 @@ impl AlongElement {
                 .take_while(move |k| place(*k).is_some_and(inside))
                 .collect::<Vec<_>>()
         };
-        let balises = of(self.balises.partition_point(|b| b.1 < from_m), &|k| {
-            self.balises.get(k).map(|b| b.1)
+        let balises = of(self.balises.partition_point(|b| b.along_m < from_m), &|k| {
+            self.balises.get(k).map(|b| b.along_m)
         });
         let signals = of(self.signals.partition_point(|s| s.along_m < from_m), &|k| {
             self.signals.get(k).map(|s| s.along_m)
@@ -65,14 +66,17 @@ impl AlongElement {
         let tunnels = tunnels.take_while(|t| t[0] < to_m);
         Self {
             buffers: [self.buffers[0] && from_m <= 0.0, self.buffers[1] && is_last],
-            curvatures: steps(&self.curvatures),
+            curvatures_per_m: steps(&self.curvatures_per_m),
             cants_mm: steps(&self.cants_mm),
             grades_permille: steps(&self.grades_permille),
             speeds: self.speeds_in([from_m, to_m], along),
             balises: balises
                 .into_iter()
                 .filter_map(|k| self.balises.get(k))
-                .map(|(name, at_m)| (name.clone(), along(*at_m)))
+                .map(|balise| MapBalise {
+                    name: balise.name.clone(),
+                    along_m: along(balise.along_m),
+                })
                 .collect(),
             signals: signals
                 .into_iter()
@@ -134,13 +138,22 @@ mod tests {
         MapSpeed { from_m, kmh, way }
     }
 
+    fn step(from_m: f64, value: f64) -> MapStep {
+        MapStep { from_m, value }
+    }
+
+    fn balise(name: &str, along_m: f64) -> MapBalise {
+        let name = name.to_owned();
+        MapBalise { name, along_m }
+    }
+
     /// Cut at 100 m: every step is held over the cut in its direction, every thing is on one side of it.
     #[test]
     fn pieces_have_what_holds_where_they_begin() {
         let (up, down) = (Some(Direction::Up), Some(Direction::Down));
         let mut all = AlongElement {
-            grades_permille: vec![(120.0, 7.0), (0.0, 5.0)],
-            curvatures: vec![(100.0, 1e-3)],
+            grades_permille: vec![step(120.0, 7.0), step(0.0, 5.0)],
+            curvatures_per_m: vec![step(100.0, 1e-3)],
             speeds: vec![
                 speed(150.0, 60.0, down),
                 speed(120.0, 70.0, up),
@@ -148,7 +161,7 @@ mod tests {
                 speed(50.0, 80.0, up),
                 speed(90.0, 30.0, down),
             ],
-            balises: vec![("b".to_owned(), 100.0), ("a".to_owned(), 20.0)],
+            balises: vec![balise("b", 100.0), balise("a", 20.0)],
             signals: vec![MapSignal {
                 name: "s".to_owned(),
                 along_m: 200.0,
@@ -160,10 +173,10 @@ mod tests {
         all.sort();
         let first = all.piece([0.0, 100.0], false, &|at_m| at_m);
         let second = all.piece([100.0, 200.0], true, &|at_m| (at_m - 100.0) * 2.0);
-        assert_eq!(first.grades_permille, [(0.0, 5.0)]);
-        assert_eq!(second.grades_permille, [(0.0, 5.0), (40.0, 7.0)]);
-        assert!(first.curvatures.is_empty());
-        assert_eq!(second.curvatures, [(0.0, 1e-3)]);
+        assert_eq!(first.grades_permille, [step(0.0, 5.0)]);
+        assert_eq!(second.grades_permille, [step(0.0, 5.0), step(40.0, 7.0)]);
+        assert!(first.curvatures_per_m.is_empty());
+        assert_eq!(second.curvatures_per_m, [step(0.0, 1e-3)]);
         assert_eq!(
             first.speeds,
             [
@@ -181,8 +194,8 @@ mod tests {
                 speed(100.0, 60.0, down)
             ]
         );
-        assert_eq!(first.balises, [("a".to_owned(), 20.0)]);
-        assert_eq!(second.balises, [("b".to_owned(), 0.0)]);
+        assert_eq!(first.balises, [balise("a", 20.0)]);
+        assert_eq!(second.balises, [balise("b", 0.0)]);
         assert_eq!((first.signals.len(), second.signals.len()), (0, 1));
         assert_eq!(first.tunnels_m, [[60.0, 100.0]]);
         assert_eq!(second.tunnels_m, [[0.0, 60.0]]);

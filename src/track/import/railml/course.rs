@@ -1,6 +1,7 @@
 //! Arcs and straights by stated curvature, and how chords between known places turn them.
 
-use super::chain::TrackSpot;
+use super::agreement::TrackSpot;
+use crate::track::import::MapStep;
 use crate::track::import::plane::turn_rad;
 use nalgebra::{Point2, Vector2};
 
@@ -41,6 +42,13 @@ impl ArcBegin {
     }
 }
 
+/// An angle at a place along a track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct AngleAt {
+    pub(super) at_m: f64,
+    pub(super) rad: f64,
+}
+
 /// How much of a turn a track has made, whichever way, up to a place along it.
 pub(super) struct StatedTurn {
     /// Place, turn up to it, and turn a metre from there on.
@@ -48,12 +56,12 @@ pub(super) struct StatedTurn {
 }
 
 impl StatedTurn {
-    pub(super) fn new(steps: &[(f64, f64)]) -> Self {
+    pub(super) fn new(steps: &[MapStep]) -> Self {
         let mut knots = vec![(0.0, 0.0, LEAST_BEND_PER_M)];
         let mut last = (0.0, 0.0, LEAST_BEND_PER_M);
-        for (at_m, curvature) in steps {
-            let turn = last.1 + (at_m - last.0) * last.2;
-            last = (*at_m, turn, curvature.abs() + LEAST_BEND_PER_M);
+        for step in steps {
+            let turn = last.1 + (step.from_m - last.0) * last.2;
+            last = (step.from_m, turn, step.value.abs() + LEAST_BEND_PER_M);
             knots.push(last);
         }
         Self { knots }
@@ -79,7 +87,7 @@ impl StatedTurn {
 
 impl TrackCourse {
     /// From the origin in a direction, straight where no curvature is stated; steps are in their order along it.
-    pub(super) fn new(heading: f64, steps: &[(f64, f64)]) -> Self {
+    pub(super) fn new(heading: f64, steps: &[MapStep]) -> Self {
         let mut last = ArcBegin {
             at_m: 0.0,
             place: Point2::origin(),
@@ -87,13 +95,13 @@ impl TrackCourse {
             curvature: 0.0,
         };
         let mut knots = vec![last];
-        for (at_m, curvature) in steps {
-            let (place, heading) = last.run(*at_m);
+        for step in steps {
+            let (place, heading) = last.run(step.from_m);
             last = ArcBegin {
-                at_m: *at_m,
+                at_m: step.from_m,
                 place,
                 heading,
-                curvature: *curvature,
+                curvature: step.value,
             };
             knots.push(last);
         }
@@ -144,33 +152,33 @@ impl TrackCourse {
 }
 
 /// Steps of curvature, with the heading turned by angles at places, and between these in proportion to the bend.
-pub(super) fn turned(
-    steps: &[(f64, f64)],
-    turns: &[(f64, f64)],
-    bend: &StatedTurn,
-) -> Vec<(f64, f64)> {
+pub(super) fn turned(steps: &[MapStep], turns: &[AngleAt], bend: &StatedTurn) -> Vec<MapStep> {
     let parts = turns.windows(2).filter_map(|pair| match pair {
-        [(a_m, a), (b_m, b)] if b_m > a_m => {
-            Some((*a_m, (b - a) / (bend.up_to(*b_m) - bend.up_to(*a_m))))
-        }
+        [a, b] if b.at_m > a.at_m => Some(MapStep {
+            from_m: a.at_m,
+            value: (b.rad - a.rad) / (bend.up_to(b.at_m) - bend.up_to(a.at_m)),
+        }),
         _ => None,
     });
-    let end = turns.last().map(|(at_m, _)| (*at_m, 0.0));
-    let parts: Vec<(f64, f64)> = parts.chain(end).collect();
-    let value = |steps: &[(f64, f64)], at_m: f64| {
-        let after = steps.partition_point(|step| step.0 <= at_m);
+    let end = turns.last().map(|turn| MapStep {
+        from_m: turn.at_m,
+        value: 0.0,
+    });
+    let parts: Vec<MapStep> = parts.chain(end).collect();
+    let value = |steps: &[MapStep], at_m: f64| {
+        let after = steps.partition_point(|step| step.from_m <= at_m);
         let held = after.checked_sub(1).and_then(|k| steps.get(k));
-        held.map_or(0.0, |(_, value)| *value)
+        held.map_or(0.0, |step| step.value)
     };
-    let mut places: Vec<f64> = steps.iter().chain(&parts).map(|step| step.0).collect();
+    let mut places: Vec<f64> = steps.iter().chain(&parts).map(|step| step.from_m).collect();
     places.sort_by(f64::total_cmp);
     places.dedup();
-    let sum = |at_m: f64| {
-        let own = value(steps, at_m);
-        (
-            at_m,
-            own + value(&parts, at_m) * (own.abs() + LEAST_BEND_PER_M),
-        )
+    let sum = |from_m: f64| {
+        let own = value(steps, from_m);
+        MapStep {
+            from_m,
+            value: own + value(&parts, from_m) * (own.abs() + LEAST_BEND_PER_M),
+        }
     };
     places.into_iter().map(sum).collect()
 }
@@ -183,7 +191,8 @@ mod tests {
     #[test]
     fn an_arc_is_exact() {
         // A quarter of a circle to the left, then straight on to the north.
-        let course = TrackCourse::new(0.0, &[(0.0, 1.0 / 200.0), (100.0 * PI, 0.0)]);
+        let steps = [(0.0, 1.0 / 200.0), (100.0 * PI, 0.0)];
+        let course = TrackCourse::new(0.0, &steps.map(|(from_m, value)| MapStep { from_m, value }));
         let (end, heading) = course.at(100.0 * PI + 50.0);
         assert!((end - Point2::new(200.0, 250.0)).norm() < 1e-9, "{end}");
         assert!((heading - PI / 2.0).abs() < 1e-12);

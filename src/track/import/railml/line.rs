@@ -1,6 +1,7 @@
 //! A track in plan, and the points of its elements.
 
-use super::chain::TrackSpot;
+use super::agreement::TrackSpot;
+use super::course::AngleAt;
 use super::draft::ElementShape;
 use super::through::ThroughPlaces;
 use crate::track::import::plane::along_m;
@@ -97,7 +98,7 @@ impl Line {
 }
 
 /// Straight from place to place; through one place alone, in a direction.
-pub(super) fn straight(spots: &[TrackSpot], heading: Option<(f64, f64)>) -> Option<Line> {
+pub(super) fn straight(spots: &[TrackSpot], heading: Option<AngleAt>) -> Option<Line> {
     let mut places: Vec<(f64, Point2<f64>)> = Vec::new();
     for spot in spots {
         if places
@@ -107,10 +108,10 @@ pub(super) fn straight(spots: &[TrackSpot], heading: Option<(f64, f64)>) -> Opti
             places.push((spot.at_m, spot.place));
         }
     }
-    if let ([(at_m, place)], Some((_, heading))) = (places.as_slice(), heading) {
+    if let ([(at_m, place)], Some(heading)) = (places.as_slice(), heading) {
         places.push((
             at_m + 1.0,
-            place + Vector2::new(heading.cos(), heading.sin()),
+            place + Vector2::new(heading.rad.cos(), heading.rad.sin()),
         ));
     }
     (places.len() > 1).then_some(Line::Straight(places))

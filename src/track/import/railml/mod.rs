@@ -65,8 +65,8 @@
 //! Not here: rolling stock, timetable, interlocking; heights (gradients are read); transitions of railML 2, which
 //! states radii in steps; cant of railML 3; electrification, platforms, train detection; speeds of single trains.
 
+mod agreement;
 mod along;
-mod chain;
 mod course;
 mod draft;
 mod layout;

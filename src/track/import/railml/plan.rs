@@ -1,8 +1,8 @@
 //! Tracks in plan, through the coordinates that a file states.
 
 use super::RailMlError;
-use super::chain::{TrackSpot, agree, chain};
-use super::course::TrackCourse;
+use super::agreement::{TrackSpot, agree, agreeing};
+use super::course::{AngleAt, TrackCourse};
 use super::draft::{CutEnd, Draft, DraftPlan, DraftTrack, ElementShape};
 use super::line::{Line, straight};
 use super::place::KnownPlace;
@@ -10,7 +10,7 @@ use super::report::Fates;
 use super::stated::SAME_M;
 use super::through::ThroughPlaces;
 use crate::track::geodesy::{Datum, Geodetic};
-use crate::track::import::PlanCheck;
+use crate::track::import::{MapStep, PlanCheck};
 use nalgebra::{Point2, Vector2};
 use std::f64::consts::PI;
 
@@ -52,9 +52,18 @@ fn world(datum: &Datum, place: &Geodetic) -> Point2<f64> {
 }
 
 /// Steps of curvature, none where none are stated.
-fn stated<'t>(track: &'t DraftTrack<'_>) -> Option<&'t [(f64, f64)]> {
-    let steps = track.along.curvatures.as_slice();
+fn stated<'t>(track: &'t DraftTrack<'_>) -> Option<&'t [MapStep]> {
+    let steps = track.along.curvatures_per_m.as_slice();
     (!steps.is_empty()).then_some(steps)
+}
+
+/// Multiplied by 1 or -1, as positive curvature turns to the left or to the right.
+fn turned_by(turn: f64, steps: &[MapStep]) -> Vec<MapStep> {
+    let turned = steps.iter().map(|step| MapStep {
+        value: turn * step.value,
+        ..*step
+    });
+    turned.collect()
 }
 
 /// Fails where distances are as stated only with the coordinates the other way round.
@@ -135,7 +144,7 @@ fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSp
         let course = stated(track).map(|steps| TrackCourse::new(0.0, steps));
         let chord_m =
             |[a, b]: [&TrackSpot; 2]| course.as_ref().map(|c| c.chord([a.at_m, b.at_m]).norm());
-        let chosen = chain(spots, |pair| agree(pair, chord_m(pair)));
+        let chosen = agreeing(spots, |pair| agree(pair, chord_m(pair)));
         let kept: Vec<TrackSpot> = chosen
             .iter()
             .filter_map(|k| spots.get(*k).cloned())
@@ -165,8 +174,7 @@ fn turn(draft: &Draft<'_>, spots: &[Vec<TrackSpot>]) -> Option<f64> {
     let uneven = |turn: f64| -> f64 {
         let of_tracks = draft.tracks.iter().zip(spots).map(|(track, spots)| {
             let steps = stated(track).unwrap_or_default();
-            let steps: Vec<_> = steps.iter().map(|(at_m, k)| (*at_m, turn * k)).collect();
-            let turns = TrackCourse::new(0.0, &steps).turns(spots);
+            let turns = TrackCourse::new(0.0, &turned_by(turn, steps)).turns(spots);
             turns
                 .windows(2)
                 .map(|pair| (pair[1].1 - pair[0].1).abs())
@@ -240,7 +248,7 @@ impl DrawnTracks<'_, '_> {
             return false;
         };
         let mut spots = spots.clone();
-        let mut headings: Vec<(f64, f64)> = Vec::new();
+        let mut headings: Vec<AngleAt> = Vec::new();
         for (from, onto) in joints {
             let Some(Some(line)) = self.lines.get(from.track) else {
                 continue;
@@ -250,11 +258,14 @@ impl DrawnTracks<'_, '_> {
             if is_end
                 && headings
                     .iter()
-                    .all(|heading| (heading.0 - onto_m).abs() > 0.0)
+                    .all(|heading| (heading.at_m - onto_m).abs() > 0.0)
             {
                 // A train that leaves by one end enters by the other.
                 let turned = if from.way == onto.way { PI } else { 0.0 };
-                headings.push((onto_m, line.heading(from_m) + turned));
+                headings.push(AngleAt {
+                    at_m: onto_m,
+                    rad: line.heading(from_m) + turned,
+                });
             }
             if spots.is_empty() {
                 let (weight, source) = (1, from.track);
@@ -268,7 +279,7 @@ impl DrawnTracks<'_, '_> {
         }
         let line = match (self.turn, stated(track)) {
             (Some(turn), Some(steps)) => {
-                let steps: Vec<_> = steps.iter().map(|(at_m, k)| (*at_m, turn * k)).collect();
+                let steps = turned_by(turn, steps);
                 ThroughPlaces::new(&steps, &spots, &headings).map(Line::Curved)
             }
             _ => straight(&spots, headings.first().copied()),

@@ -8,8 +8,9 @@
 //! interpolants", SIAM J. Sci. Stat. Comput. 5, 1984), which does not swing where known places are near each other. So
 //! the track runs through them without a bend.
 
-use super::chain::TrackSpot;
-use super::course::{StatedTurn, TrackCourse, turned};
+use super::agreement::TrackSpot;
+use super::course::{AngleAt, StatedTurn, TrackCourse, turned};
+use crate::track::import::MapStep;
 use crate::track::import::plane::turn_rad;
 use nalgebra::{Point2, Vector2};
 
@@ -30,30 +31,33 @@ pub(super) struct ThroughPlaces {
 impl ThroughPlaces {
     /// Through at least one place, in their order along the track, with headings at places at its ends.
     pub(super) fn new(
-        steps: &[(f64, f64)],
+        steps: &[MapStep],
         known: &[TrackSpot],
-        headings: &[(f64, f64)],
+        headings: &[AngleAt],
     ) -> Option<Self> {
         let first = known.first()?;
         let bend = StatedTurn::new(steps);
         let mut course = TrackCourse::new(0.0, steps);
         let chords = course.turns(known);
-        let middle = |turn: &([f64; 2], f64)| (bend.middle(turn.0), turn.1);
-        let mut turns: Vec<(f64, f64)> = chords.iter().map(middle).collect();
+        let middle = |(chord_m, rad): &([f64; 2], f64)| AngleAt {
+            at_m: bend.middle(*chord_m),
+            rad: *rad,
+        };
+        let mut turns: Vec<AngleAt> = chords.iter().map(middle).collect();
         let held = held(&course, &turns, headings);
         if turns.is_empty() && held.is_empty() {
             course = TrackCourse::new(by_chord(&course, known)?, steps);
         }
         for _ in 0..TURNS {
-            let mut all: Vec<(f64, f64)> = turns.iter().chain(&held).copied().collect();
-            all.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let Some((_, start)) = all.first() else {
+            let mut all: Vec<AngleAt> = turns.iter().chain(&held).copied().collect();
+            all.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
+            let Some(start) = all.first() else {
                 break;
             };
-            course = TrackCourse::new(*start, &turned(steps, &all, &bend));
+            course = TrackCourse::new(start.rad, &turned(steps, &all, &bend));
             let more = course.turns(known);
             for (turn, (_, more)) in turns.iter_mut().zip(more) {
-                turn.1 += more;
+                turn.rad += more;
             }
         }
         let origin = first.place - course.at(first.at_m).0;
@@ -99,20 +103,22 @@ impl ThroughPlaces {
 }
 
 /// By how much headings at ends of a track turn its course, near to what the chords beside them ask for.
-fn held(course: &TrackCourse, turns: &[(f64, f64)], headings: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let held = headings.iter().filter_map(|(at_m, heading)| {
-        let is_before = turns.first().is_none_or(|turn| turn.0 > *at_m);
-        let is_after = turns.last().is_none_or(|turn| turn.0 < *at_m);
+fn held(course: &TrackCourse, turns: &[AngleAt], headings: &[AngleAt]) -> Vec<AngleAt> {
+    let held = headings.iter().filter_map(|heading| {
+        let at_m = heading.at_m;
+        let is_before = turns.first().is_none_or(|turn| turn.at_m > at_m);
+        let is_after = turns.last().is_none_or(|turn| turn.at_m < at_m);
         let beside = if is_before {
             turns.first()
         } else {
             turns.last()
         };
-        let near = beside.map_or(0.0, |turn| turn.1);
-        let more = turn_rad(near, heading - course.at(*at_m).1);
+        let near = beside.map_or(0.0, |turn| turn.rad);
+        let more = turn_rad(near, heading.rad - course.at(at_m).1);
         // A neighbour that lies quite otherwise is no neighbour that a train runs to.
         let fits = beside.is_none() || more.abs() < MOST_HELD;
-        ((is_before || is_after) && fits).then_some((*at_m, near + more))
+        let rad = near + more;
+        ((is_before || is_after) && fits).then_some(AngleAt { at_m, rad })
     });
     let count = if turns.is_empty() { 1 } else { 2 };
     held.take(count).collect()
@@ -166,11 +172,19 @@ mod tests {
         }
     }
 
+    fn step(from_m: f64, value: f64) -> MapStep {
+        MapStep { from_m, value }
+    }
+
+    fn heading(at_m: f64, rad: f64) -> AngleAt {
+        AngleAt { at_m, rad }
+    }
+
     /// A curve of stated radius between known places 250 m apart is that curve: within millimetres of the truth, where
     /// chords are 23 m off.
     #[test]
     fn a_stated_curve_is_a_curve() {
-        let steps = [(100.0, -1.0 / 350.0), (500.0, 0.0)];
+        let steps = [step(100.0, -1.0 / 350.0), step(500.0, 0.0)];
         let truth = TrackCourse::new(2.0, &steps);
         let moved = Vector2::new(1234.0, -77.0);
         let known: Vec<TrackSpot> = [0.0, 250.0, 500.0, 600.0]
@@ -185,7 +199,7 @@ mod tests {
     /// Round and round: angles of chords are not told from those of a turn more.
     #[test]
     fn a_track_may_turn_all_the_way_round() {
-        let steps = [(0.0, 1.0 / 200.0)];
+        let steps = [step(0.0, 1.0 / 200.0)];
         let truth = TrackCourse::new(3.0, &steps);
         let known: Vec<TrackSpot> = (0..20)
             .map(|k| spot(150.0 * f64::from(k), truth.at(150.0 * f64::from(k)).0))
@@ -200,15 +214,15 @@ mod tests {
     /// to a centimetre, near to and far from each other, the track is nowhere farther off than a metre, and has no bend.
     #[test]
     fn what_radii_leave_out_is_taken_from_known_places() {
-        let mut true_steps: Vec<(f64, f64)> = (0..40)
-            .map(|k| (300.0 + 2.0 * f64::from(k), f64::from(k) / 40.0 / 600.0))
+        let mut true_steps: Vec<MapStep> = (0..40)
+            .map(|k| step(300.0 + 2.0 * f64::from(k), f64::from(k) / 40.0 / 600.0))
             .collect();
-        true_steps.push((380.0, 1.0 / 600.0));
+        true_steps.push(step(380.0, 1.0 / 600.0));
         true_steps.extend(
-            (0..40).map(|k| (700.0 + 2.0 * f64::from(k), f64::from(39 - k) / 40.0 / 600.0)),
+            (0..40).map(|k| step(700.0 + 2.0 * f64::from(k), f64::from(39 - k) / 40.0 / 600.0)),
         );
         let truth = TrackCourse::new(-1.0, &true_steps);
-        let steps = [(340.0, 1.0 / 612.0), (740.0, 0.0)];
+        let steps = [step(340.0, 1.0 / 612.0), step(740.0, 0.0)];
         let places = [0.0, 200.0, 201.5, 420.0, 640.0, 650.0, 900.0, 1400.0];
         let noise = |s: f64| Vector2::new((s * 1.7).sin(), (s * 2.3).cos()) * 0.01;
         let known: Vec<TrackSpot> = places.map(|s| spot(s, truth.at(s).0 + noise(s))).into();
@@ -233,37 +247,37 @@ mod tests {
         let truth = TrackCourse::new(
             0.5,
             &[
-                (300.0, 1.0 / 500.0),
-                (600.0, 0.0),
-                (1200.0, -1.0 / 400.0),
-                (1400.0, 0.0),
+                step(300.0, 1.0 / 500.0),
+                step(600.0, 0.0),
+                step(1200.0, -1.0 / 400.0),
+                step(1400.0, 0.0),
             ],
         );
         let steps = [
-            (300.0, 1.0 / 510.0),
-            (600.0, 0.0),
-            (1200.0, -1.0 / 400.0),
-            (1400.0, 0.0),
+            step(300.0, 1.0 / 510.0),
+            step(600.0, 0.0),
+            step(1200.0, -1.0 / 400.0),
+            step(1400.0, 0.0),
         ];
         let known = [0.0, 2000.0].map(|s| spot(s, truth.at(s).0));
-        let worst = |headings: &[(f64, f64)]| {
+        let worst = |headings: &[AngleAt]| {
             let fit = ThroughPlaces::new(&steps, &known, headings).unwrap();
             let off = (0..=2000)
                 .map(f64::from)
                 .map(|s| (fit.at(s) - truth.at(s).0).norm());
             off.fold(0.0, f64::max)
         };
-        let (alone, held) = (worst(&[]), worst(&[(0.0, 0.5)]));
+        let (alone, held) = (worst(&[]), worst(&[heading(0.0, 0.5)]));
         assert!(held < 0.5 * alone, "{held} {alone}");
         // The other way round it is no heading of this track.
-        assert!((worst(&[(0.0, 0.5 + PI)]) - alone).abs() < 1e-9);
+        assert!((worst(&[heading(0.0, 0.5 + PI)]) - alone).abs() < 1e-9);
     }
 
     #[test]
     fn one_place_needs_a_heading() {
         let known = [spot(10.0, Point2::new(5.0, 5.0))];
         assert!(ThroughPlaces::new(&[], &known, &[]).is_none());
-        let fit = ThroughPlaces::new(&[], &known, &[(10.0, PI / 2.0)]).unwrap();
+        let fit = ThroughPlaces::new(&[], &known, &[heading(10.0, PI / 2.0)]).unwrap();
         assert!((fit.at(30.0) - Point2::new(5.0, 25.0)).norm() < 1e-9);
     }
 }

@@ -144,12 +144,12 @@ impl<'a> Draft<'a> {
         for track in &mut self.tracks {
             match turn {
                 Some(turn) => {
-                    for (_, curvature) in &mut track.along.curvatures {
-                        *curvature *= turn;
+                    for step in &mut track.along.curvatures_per_m {
+                        step.value *= turn;
                     }
                 }
                 None => {
-                    track.along.curvatures.clear();
+                    track.along.curvatures_per_m.clear();
                     for curve in &track.curves {
                         fates.leave(*curve, "neither the file nor its coordinates say which way a positive radius turns");
                     }

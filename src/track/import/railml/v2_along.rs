@@ -7,7 +7,7 @@ use super::stated::{LEAST_RADIUS_M, MOST_GRADE_PERMILLE, place_m, switch_m};
 use super::xml::Item;
 use super::{RailMlError, RailMlOptions};
 use crate::track::Direction;
-use crate::track::import::{MapSignal, MapSpeed};
+use crate::track::import::{MapBalise, MapSignal, MapSpeed, MapStep};
 use std::collections::BTreeMap;
 
 /// More cant is none.
@@ -96,29 +96,31 @@ impl<'a> FileDefaults<'a> {
                 self.add_place(track, item, at_m, 2)?;
             }
             "gradientChange" => {
-                let slope = bounded(item, "slope", MOST_GRADE_PERMILLE)?;
-                track.along.grades_permille.push((at(track)?, slope));
+                let value = bounded(item, "slope", MOST_GRADE_PERMILLE)?;
+                let from_m = at(track)?;
+                (track.along.grades_permille).push(MapStep { from_m, value });
                 fates.take(item);
-                self.add_place(track, item, at(track)?, 1)?;
+                self.add_place(track, item, from_m, 1)?;
             }
             "radiusChange" => {
                 let radius_m = item.needed_value("radius")?;
-                let curvature = if radius_m.abs() > 0.0 {
+                let value = if radius_m.abs() > 0.0 {
                     1.0 / radius_m
                 } else {
                     0.0
                 };
-                if curvature.abs() > 1.0 / LEAST_RADIUS_M {
+                if value.abs() > 1.0 / LEAST_RADIUS_M {
                     return Err(item.fault(format!("`radius` is {radius_m} m: 0 (straight) or at least {LEAST_RADIUS_M} m is needed")));
                 }
-                track.along.curvatures.push((at(track)?, curvature));
+                let from_m = at(track)?;
+                (track.along.curvatures_per_m).push(MapStep { from_m, value });
                 if item.attribute("superelevation").is_some() {
-                    let cant_mm = bounded(item, "superelevation", MOST_CANT_MM)?;
-                    track.along.cants_mm.push((at(track)?, cant_mm));
+                    let value = bounded(item, "superelevation", MOST_CANT_MM)?;
+                    track.along.cants_mm.push(MapStep { from_m, value });
                 }
                 track.curves.push(item);
                 fates.take(item);
-                self.add_place(track, item, at(track)?, 1)?;
+                self.add_place(track, item, from_m, 1)?;
             }
             "speedChange" => self.read_speed(track, item, at(track)?, fates)?,
             "tunnel" => {
@@ -132,9 +134,10 @@ impl<'a> FileDefaults<'a> {
                 fates.take(item);
             }
             "balise" => {
-                track.along.balises.push((item.label(), at(track)?));
+                let (name, along_m) = (item.label(), at(track)?);
+                track.along.balises.push(MapBalise { name, along_m });
                 fates.take(item);
-                self.add_place(track, item, at(track)?, 1)?;
+                self.add_place(track, item, along_m, 1)?;
             }
             "signal" => {
                 let along_m = at(track)?;

@@ -6,7 +6,7 @@ use super::stated::{LEAST_RADIUS_M, MOST_GRADE_PERMILLE, place_m};
 use super::v3_reading::NetReading;
 use super::xml::Item;
 use crate::track::Direction;
-use crate::track::import::{MapSignal, MapSpeed};
+use crate::track::import::{MapBalise, MapSignal, MapSpeed, MapStep};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Steps in which a transition's curvature changes.
@@ -25,8 +25,13 @@ struct Reach {
     is_back: bool,
 }
 
-/// A curve: from, to, and curvature; none on a transition.
-type CurveReach = (f64, f64, Option<f64>);
+/// A curve along a track.
+struct CurveReach {
+    from_m: f64,
+    to_m: f64,
+    /// None on a transition.
+    per_m: Option<f64>,
+}
 
 /// Reads everything that is taken over into the tracks.
 pub(super) fn read<'a>(
@@ -76,7 +81,10 @@ pub(super) fn read<'a>(
                 is_taken
             })?,
             "baliseGroup" | "balise" => spot(item, draft, reading, |track, at_m, _| {
-                track.along.balises.push((item.label(), at_m));
+                track.along.balises.push(MapBalise {
+                    name: item.label(),
+                    along_m: at_m,
+                });
                 true
             })?,
             "bufferStop" | "border" => spot(item, draft, reading, |track, at_m, _| {
@@ -96,7 +104,7 @@ pub(super) fn read<'a>(
     }
     for (number, curves) in curves {
         if let Some(track) = draft.tracks.get_mut(number) {
-            track.along.curvatures = steps(curves, track.length_m);
+            track.along.curvatures_per_m = steps(curves, track.length_m);
         }
     }
     Ok(())
@@ -268,8 +276,10 @@ fn grade<'a>(
         let Some(track) = draft.tracks.get_mut(reach.track) else {
             continue;
         };
-        let rise = if reach.is_back { -permille } else { permille };
-        track.along.grades_permille.push((reach.from_m, rise));
+        track.along.grades_permille.push(MapStep {
+            from_m: reach.from_m,
+            value: if reach.is_back { -permille } else { permille },
+        });
     }
     took(item, reaches.is_empty(), reading);
     Ok(())
@@ -304,11 +314,12 @@ fn curve<'a>(
     };
     let reaches = reaches(item, draft, reading)?;
     for reach in &reaches {
-        let own = curvature.map(|curvature| if reach.is_back { -curvature } else { curvature });
-        curves
-            .entry(reach.track)
-            .or_default()
-            .push((reach.from_m, reach.to_m, own));
+        let along = |per_m: f64| if reach.is_back { -per_m } else { per_m };
+        curves.entry(reach.track).or_default().push(CurveReach {
+            from_m: reach.from_m,
+            to_m: reach.to_m,
+            per_m: curvature.map(along),
+        });
         if let Some(track) = draft.tracks.get_mut(reach.track) {
             track.curves.push(item);
         }
@@ -319,39 +330,42 @@ fn curve<'a>(
 
 /// Steps of curvature: transitions lead from the curve before them to the one after, and where no curve is stated the
 /// track is straight.
-fn steps(mut curves: Vec<CurveReach>, length_m: f64) -> Vec<(f64, f64)> {
-    curves.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut steps: Vec<(f64, f64)> = Vec::new();
-    let mut reached: (f64, f64) = (0.0, 0.0);
-    for (k, (from_m, to_m, curvature)) in curves.iter().enumerate() {
-        if from_m - reached.0 > FOLLOWS_M {
-            steps.push((reached.0, 0.0));
-            reached.1 = 0.0;
+fn steps(mut curves: Vec<CurveReach>, length_m: f64) -> Vec<MapStep> {
+    curves.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
+    let mut steps: Vec<MapStep> = Vec::new();
+    let mut add = |from_m, value| steps.push(MapStep { from_m, value });
+    let (mut reached_m, mut reached) = (0.0, 0.0);
+    for (k, curve) in curves.iter().enumerate() {
+        let CurveReach { from_m, to_m, .. } = *curve;
+        if from_m - reached_m > FOLLOWS_M {
+            add(reached_m, 0.0);
+            reached = 0.0;
         }
         let next = curves
             .get(k + 1)
-            .filter(|next| (next.0 - to_m).abs() <= FOLLOWS_M);
-        match curvature {
-            Some(curvature) => {
-                steps.push((*from_m, *curvature));
-                reached = (*to_m, *curvature);
+            .filter(|next| (next.from_m - to_m).abs() <= FOLLOWS_M);
+        match curve.per_m {
+            Some(per_m) => {
+                add(from_m, per_m);
+                reached = per_m;
             }
             None => {
-                let end = next.and_then(|next| next.2).unwrap_or(0.0);
+                let end = next.and_then(|next| next.per_m).unwrap_or(0.0);
                 for step in 0..TRANSITION_STEPS {
                     let part = f64::from(step) / f64::from(TRANSITION_STEPS);
                     let middle = part + 0.5 / f64::from(TRANSITION_STEPS);
-                    steps.push((
+                    add(
                         from_m + part * (to_m - from_m),
-                        reached.1 + middle * (end - reached.1),
-                    ));
+                        reached + middle * (end - reached),
+                    );
                 }
-                reached = (*to_m, end);
+                reached = end;
             }
         }
+        reached_m = to_m;
     }
-    if length_m - reached.0 > FOLLOWS_M {
-        steps.push((reached.0, 0.0));
+    if length_m - reached_m > FOLLOWS_M {
+        add(reached_m, 0.0);
     }
     steps
 }

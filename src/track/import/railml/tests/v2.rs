@@ -2,7 +2,7 @@
 
 use crate::track::Direction;
 use crate::track::import::railml::{RailMlError, RailMlOptions, read_railml};
-use crate::track::import::{Crs, ImportedMap, MapSignal, MapSpeed};
+use crate::track::import::{Crs, ImportedMap, MapBalise, MapSignal, MapSpeed, MapStep};
 use crate::track::plan::ElementEnd;
 
 const UP: Direction = Direction::Up;
@@ -187,12 +187,16 @@ fn what_lies_along_tracks_is_taken_over() {
     assert_eq!(first.speeds.first(), Some(&speed(0.0, 60.0, UP)));
     assert!((map.along[2].speeds[1].from_m - 100.0).abs() < 1.0);
     assert_eq!(map.along[2].speeds[1].way, Some(DOWN));
-    assert_eq!(first.grades_permille, [(0.0, 5.0)]);
-    assert!((second.grades_permille[1].1 + 2.5).abs() < 1e-12);
-    assert!((second.grades_permille[1].0 - 100.0).abs() < 0.5);
+    let grade = MapStep {
+        from_m: 0.0,
+        value: 5.0,
+    };
+    assert_eq!(first.grades_permille, [grade]);
+    assert!((second.grades_permille[1].value + 2.5).abs() < 1e-12);
+    assert!((second.grades_permille[1].from_m - 100.0).abs() < 0.5);
     // Without coordinates nothing says which way the radius turns; cant has no side.
-    assert!(first.curvatures.is_empty() && second.curvatures.is_empty());
-    assert!((second.cants_mm[0].1 - 60.0).abs() < 1e-12);
+    assert!(first.curvatures_per_m.is_empty() && second.curvatures_per_m.is_empty());
+    assert!((second.cants_mm[0].value - 60.0).abs() < 1e-12);
     assert_eq!(
         first.signals,
         [MapSignal {
@@ -201,7 +205,11 @@ fn what_lies_along_tracks_is_taken_over() {
             way: UP
         }]
     );
-    assert_eq!(first.balises, [("b1".to_owned(), 120.0)]);
+    let balise = MapBalise {
+        name: "b1".to_owned(),
+        along_m: 120.0,
+    };
+    assert_eq!(first.balises, [balise]);
     assert_eq!(first.tunnels_m, [[250.0, 300.0]]);
     let buffers = [0, 1, 3].map(|element: usize| map.along[element].buffers);
     assert_eq!(buffers, [[false, false], [false, false], [false, true]]);
@@ -397,9 +405,9 @@ fn coordinates_tell_which_way_radii_turn() {
             sign * radius_m
         );
         let map = read(&text).unwrap();
-        let curvatures = &map.along[0].curvatures;
+        let curvatures = &map.along[0].curvatures_per_m;
         assert!(
-            (curvatures[1].1 - 1.0 / radius_m).abs() < 1e-12,
+            (curvatures[1].value - 1.0 / radius_m).abs() < 1e-12,
             "{curvatures:?}"
         );
         let (middle, _) = map.network.elements[0].at(100.0 + radius_m / 2.0);

@@ -2,7 +2,7 @@
 
 use crate::track::Direction;
 use crate::track::import::railml::{RailMlError, RailMlOptions, read_railml};
-use crate::track::import::{ImportedMap, MapSignal, MapSpeed};
+use crate::track::import::{ImportedMap, MapBalise, MapSignal, MapSpeed, MapStep};
 use crate::track::plan::ElementEnd;
 
 const UP: Direction = Direction::Up;
@@ -145,7 +145,11 @@ fn what_lies_along_elements_is_taken_over() {
         (stem.one_way, left.one_way, right.one_way),
         (Some(UP), None, Some(DOWN))
     );
-    assert_eq!(stem.balises, [("ba".to_owned(), 100.0)]);
+    let balise = MapBalise {
+        name: "ba".to_owned(),
+        along_m: 100.0,
+    };
+    assert_eq!(stem.balises, [balise]);
     assert_eq!(
         stem.signals,
         [MapSignal {
@@ -167,16 +171,18 @@ fn what_lies_along_elements_is_taken_over() {
         [stem.buffers, left.buffers],
         [[false, false], [false, true]]
     );
-    assert_eq!(right.grades_permille, [(0.0, -4.0)]);
+    let step = |from_m, value| MapStep { from_m, value };
+    assert_eq!(right.grades_permille, [step(0.0, -4.0)]);
     // Positive radii turn to the right; the transition leads to the straight after it, in steps.
-    let curvatures = &stem.curvatures;
-    assert_eq!(curvatures[..2], [(0.0, 0.0), (100.0, -1.0 / 500.0)]);
+    let curvatures = &stem.curvatures_per_m;
+    assert_eq!(curvatures[..2], [step(0.0, 0.0), step(100.0, -1.0 / 500.0)]);
     assert_eq!(curvatures.len(), 11);
     assert!(
-        (curvatures[2].1 + 0.9375 / 500.0).abs() < 1e-12 && (curvatures[2].0 - 200.0).abs() < 1e-9
+        (curvatures[2].value + 0.9375 / 500.0).abs() < 1e-12
+            && (curvatures[2].from_m - 200.0).abs() < 1e-9
     );
-    assert!((curvatures[9].1 + 0.0625 / 500.0).abs() < 1e-12);
-    assert_eq!(curvatures[10], (280.0, 0.0));
+    assert!((curvatures[9].value + 0.0625 / 500.0).abs() < 1e-12);
+    assert_eq!(curvatures[10], step(280.0, 0.0));
 }
 
 #[test]

@@ -39,7 +39,7 @@ pub(super) fn agree([a, b]: [&TrackSpot; 2], chord_m: Option<f64>) -> Option<f64
 }
 
 /// Numbers of the places that agree, of places in their order along the track.
-pub(super) fn chain(
+pub(super) fn agreeing(
     spots: &[TrackSpot],
     agree: impl Fn([&TrackSpot; 2]) -> Option<f64>,
 ) -> Vec<usize> {
@@ -101,14 +101,14 @@ mod tests {
             spot(150.0, 130.0, 1),
             spot(300.0, 299.5, 2),
         ];
-        assert_eq!(chain(&spots, straight), [0, 1, 3]);
+        assert_eq!(agreeing(&spots, straight), [0, 1, 3]);
         // One that all others contradict loses, however much it weighs alone.
         let spots = [
             spot(0.0, 500.0, 3),
             spot(100.0, 100.0, 2),
             spot(200.0, 200.0, 2),
         ];
-        assert_eq!(chain(&spots, straight), [1, 2]);
+        assert_eq!(agreeing(&spots, straight), [1, 2]);
         // Two that agree with each other, and just so with those far from them, weigh less than one that is exact.
         let spots = [
             spot(0.0, 0.0, 1),
@@ -117,13 +117,13 @@ mod tests {
             spot(400.0, 398.0, 1),
             spot(800.0, 800.0, 1),
         ];
-        assert_eq!(chain(&spots, straight), [0, 1, 4]);
+        assert_eq!(agreeing(&spots, straight), [0, 1, 4]);
         // Of two that contradict each other, the first.
         assert_eq!(
-            chain(&[spot(0.0, 0.0, 1), spot(100.0, 50.0, 1)], straight),
+            agreeing(&[spot(0.0, 0.0, 1), spot(100.0, 50.0, 1)], straight),
             [0]
         );
-        assert!(chain(&[], straight).is_empty());
+        assert!(agreeing(&[], straight).is_empty());
     }
 
     #[test]

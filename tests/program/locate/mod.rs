@@ -1,0 +1,131 @@
+//! `metrotwin locate` on fixes of made and of recorded runs.
+
+mod recorded;
+mod recorded_maps;
+mod variants;
+
+use crate::program::{folder, printed, program, succeeds};
+use metrotwin::track::{TrackPoint, Tunnel};
+use std::fmt::Write as _;
+use std::fs;
+
+/// Fixes of a train that runs 7 m/s along tracks of the terminus, each from a chainage to another, to the decimetre.
+fn fixes(runs: &[(&str, f64, f64)]) -> String {
+    let text = include_str!("../../../tunnels/terminus.toml");
+    let tunnel = Tunnel::from_toml(text).unwrap();
+    let datum = tunnel.datum.unwrap();
+    let mut table = String::from("timestamp,latitude,longitude,sigma_north_m,sigma_east_m\n");
+    let mut second = 0.0;
+    for (name, from_m, to_m) in runs {
+        let line = tunnel
+            .network
+            .alignment(tunnel.network.named(name).unwrap())
+            .unwrap();
+        for k in 0..((to_m - from_m).abs() / 3.5) as u32 {
+            let s_m = from_m + 3.5 * f64::from(k) * (to_m - from_m).signum();
+            let at = line.world_from_track(TrackPoint {
+                s_m,
+                l_m: 0.0,
+                h_m: 0.0,
+            });
+            let place = datum.geodetic(&at);
+            let (latitude, longitude) = (place.latitude_deg, place.longitude_deg);
+            writeln!(table, "{second:.1},{latitude:.8},{longitude:.8},0.1,0.1").unwrap();
+            second += 0.5;
+        }
+    }
+    table
+}
+
+/// Provokes: a train that is put onto the wrong track of a depot's fan, and files that are not there.
+#[test]
+fn a_train_is_located_in_the_depot() {
+    let out = folder("located");
+    fs::create_dir_all(&out).unwrap();
+    let gnss = out.join("fixes.csv");
+    fs::write(
+        &gnss,
+        fixes(&[("lead", 500.0, 700.0), ("depot 1", 0.0, 60.0)]),
+    )
+    .unwrap();
+    let [gnss, results] = [gnss, out.join("results")].map(|path| path.display().to_string());
+    let run = program([
+        "locate",
+        "--network",
+        "tunnels/terminus.toml",
+        "--gnss",
+        &gnss,
+        "--out",
+        &results,
+    ])
+    .output()
+    .unwrap();
+    succeeds(&run);
+    let table = fs::read_to_string(format!("{results}/tracks.csv")).unwrap();
+    let last: Vec<&str> = table.lines().last().unwrap().split(',').collect();
+    assert_eq!(
+        (last[3], last[5], last[6]),
+        ("depot 1", "true", "up"),
+        "{table}"
+    );
+    let summary = fs::read_to_string(format!("{results}/summary.json")).unwrap();
+    let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+    assert_eq!(summary["visits"][0]["element"], "lead");
+    let map = fs::read_to_string(format!("{results}/tracks.geojson")).unwrap();
+    let map: serde_json::Value = serde_json::from_str(&map).unwrap();
+    assert_eq!(
+        map["features"].as_array().unwrap().len(),
+        table.lines().count() - 1
+    );
+}
+
+/// Provokes: wrong input that is taken, or refused without its line and a remedy.
+#[test]
+fn wrong_recordings_are_refused() {
+    let out = folder("not_located");
+    fs::create_dir_all(&out).unwrap();
+    let [gnss, network] = ["fixes.csv", "network.geojson"].map(|name| out.join(name));
+    let said = |network: &str, table: &str| {
+        fs::write(&gnss, table).unwrap();
+        let gnss = gnss.display().to_string();
+        let results = out.join("results").display().to_string();
+        let run = program([
+            "locate",
+            "--network",
+            network,
+            "--gnss",
+            &gnss,
+            "--out",
+            &results,
+        ])
+        .output()
+        .unwrap();
+        assert_eq!(run.status.code(), Some(2), "{run:?}");
+        assert!(!out.join("results").exists());
+        printed(&run)
+    };
+    let right = fixes(&[("u1", 0.0, 50.0)]);
+    let terminus = "tunnels/terminus.toml";
+    let swapped = right.replacen("latitude,longitude", "longitude,latitude", 1);
+    assert!(
+        said(terminus, &swapped).contains("not on any railway"),
+        "{}",
+        said(terminus, &swapped)
+    );
+    let far = "time,latitude,longitude\n0,50.9,4.5\n";
+    assert!(
+        said(terminus, far).contains("swapped"),
+        "{}",
+        said(terminus, far)
+    );
+    let cut = "time,latitude,longitude\n0,30.55\n";
+    assert!(
+        said(terminus, cut).contains("line 2"),
+        "{}",
+        said(terminus, cut)
+    );
+    assert!(said("tunnels/test_bench.toml", &right).contains("[datum]"));
+    fs::write(&network, "{ \"features\": [").unwrap();
+    let broken = said(&network.display().to_string(), &right);
+    assert!(broken.contains("line 1"), "{broken}");
+}

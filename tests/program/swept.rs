@@ -1,0 +1,99 @@
+//! What a study that sweeps a variable comes to for each of its values.
+
+use crate::digest::{folder, leave, row, template};
+use crate::program::{run, says, succeeds};
+use metrotwin::study::{ByValue, Digest, FigureDigest, Row, Status};
+use serde_json::{Value, json};
+use std::fs;
+
+/// Of each kind of rail three complete runs and one that failed; on dry rails a train hits once in three runs.
+fn rows() -> Vec<Row> {
+    let dry = [
+        json!([10.0, 20.0]),
+        json!([60.0]),
+        json!([]),
+        json!([900.0]),
+    ];
+    let leaves = [json!([5.0]), json!([5.0]), json!([5.0, 5.0]), json!([])];
+    let run = |rail: &str, k: u64, legs_m: &Value| {
+        let figures = json!({"occupancy_leg_m": legs_m, "occupancy_switches": k + 1,
+            "occupancy_wrong_confident": if rail == "dry" { 2 * k } else { 0 },
+            "collision": rail == "dry" && k == 0});
+        let status = if k < 3 {
+            Status::Complete
+        } else {
+            Status::Failed
+        };
+        let mut row = row(2 * k + u64::from(rail != "dry"), status, figures);
+        row.values.insert("rail".to_owned(), json!(rail));
+        row
+    };
+    let pairs = (0..4).zip(dry.iter().zip(&leaves));
+    pairs
+        .flat_map(|(k, (dry, leaves))| [run("dry", k, dry), run("leaf_film", k, leaves)])
+        .collect()
+}
+
+fn figure<'a>(figures: &'a [ByValue<FigureDigest>], name: &str) -> Option<[&'a FigureDigest; 2]> {
+    let figure = figures.iter().find(|figure| figure.name == name)?;
+    let [dry, leaves] = &figure.values[..] else {
+        panic!("{name}: {} values", figure.values.len());
+    };
+    assert_eq!((&*dry.value, &*leaves.value), ("dry", "leaf_film"));
+    Some([&dry.digest, &leaves.digest])
+}
+
+/// Fails where runs of two values are mixed, lists are means of means, counts of failed runs are summed up, or a value
+/// is left out because its runs are all alike.
+#[test]
+fn figures_stand_by_swept_value() {
+    let base = folder("swept");
+    let rows = rows();
+    let digest = Digest::of(&template(&base), &rows);
+    assert!(
+        digest
+            .figures
+            .iter()
+            .all(|f| f.measure.name != "occupancy_leg_m")
+    );
+    let [by_rail] = &digest.swept[..] else {
+        panic!("{} variables", digest.swept.len());
+    };
+    assert_eq!(by_rail.variable, "rail");
+    let of = |name| figure(&by_rail.figures, name);
+
+    let [dry, leaves] = of("occupancy_leg_m").unwrap();
+    assert_eq!((dry.numbers, dry.runs, dry.lacking), (3, 2, 2));
+    assert_eq!((leaves.numbers, leaves.runs, leaves.lacking), (4, 3, 1));
+    for (figure, mean_m) in [(dry, 30.0), (leaves, 5.0)] {
+        assert!((figure.mean.unwrap().value - mean_m).abs() < 1e-12);
+    }
+    assert_eq!(dry.worst.unwrap().index, 6, "that of the failed run");
+    let [dry, leaves] = of("occupancy_wrong_confident").unwrap();
+    assert_eq!([dry.sum, leaves.sum], [Some(6.0), Some(0.0)]);
+    let [hit, _] = &by_rail.events[..] else {
+        panic!("{} events", by_rail.events.len());
+    };
+    let rates = hit.values.iter().map(|v| v.digest.rate.unwrap());
+    let rates: Vec<_> = rates.map(|rate| (rate.events, rate.unknown)).collect();
+    assert_eq!(rates, [(1, 1), (0, 1)]);
+    fs::remove_dir_all(base).ok();
+}
+
+/// The same is printed, and stands on the page.
+#[test]
+fn a_report_says_it_by_swept_value() {
+    let base = folder("swept_report");
+    template(&base);
+    leave(&base, &rows());
+    let report = run(&format!("study report {}", base.display()));
+    succeeds(&report);
+    says(&report, "by rail");
+    says(&report, "; 3 numbers");
+    says(&report, "; 6 in all");
+    let page = fs::read_to_string(base.join("report.html")).unwrap();
+    for said in ["<h2>By rail</h2>", "<td>leaf_film</td>", "30.0"] {
+        assert!(page.contains(said), "no `{said}` in the page");
+    }
+    fs::remove_dir_all(base).ok();
+}
