@@ -28,6 +28,7 @@ impl Occupancy {
             return;
         }
         self.advance();
+        self.unknown_m = 0.0;
         let place = (element, along_m);
         if self.hypotheses.is_empty() {
             self.start_at_balise(time, place);

@@ -18,8 +18,8 @@ const WITHOUT_FIX_S: f64 = 1.0;
 
 /// Takes fixes, speed, yaw rate and balises in the order of their times, and says on which track the train is.
 ///
-/// Samples of a wheel that slides or slips are left out: the speed before is held until one that rolls. The yaw rate is
-/// that of the leading car, where the antenna is; in a curve the last car has another.
+/// While a wheel slides or slips its speed is doubtful. The yaw rate is that of the leading car, where the antenna is; in
+/// a curve the last car has another.
 pub struct TrackOccupancy {
     node: Node,
     occupancy: Occupancy,
@@ -37,8 +37,8 @@ pub struct TrackOccupancy {
 /// Of one time, they are taken in in this order.
 enum Input {
     Speed(f64),
-    /// Of a wheel that slides: no more than that the time has come.
-    NoSpeed,
+    /// Of a wheel that slides or slips.
+    Slide(f64),
     YawRate(f64),
     Balise(usize, f64),
     Fix(Fix),
@@ -47,7 +47,7 @@ enum Input {
 impl Input {
     fn rank(&self) -> u8 {
         match self {
-            Self::Speed(_) | Self::NoSpeed => 0,
+            Self::Speed(_) | Self::Slide(_) => 0,
             Self::YawRate(_) => 1,
             Self::Balise(..) => 2,
             Self::Fix(_) => 3,
@@ -90,7 +90,7 @@ impl TrackOccupancy {
     fn take(&mut self, time: SimTime, input: Input) -> bool {
         match input {
             Input::Speed(speed_mps) => self.occupancy.on_speed(time, speed_mps),
-            Input::NoSpeed => {}
+            Input::Slide(speed_mps) => self.occupancy.on_slide(time, speed_mps),
             Input::YawRate(radps) => self.occupancy.on_yaw_rate(time, radps),
             Input::Balise(element, along_m) => self.occupancy.on_balise(time, (element, along_m)),
             Input::Fix(fix) => {
@@ -148,7 +148,7 @@ impl Equipment for TrackOccupancy {
             Content::Odometer(sample) => self.wait(
                 sample.time,
                 match sample.slides {
-                    true => Input::NoSpeed,
+                    true => Input::Slide(sample.speed_mps),
                     false => Input::Speed(sample.speed_mps),
                 },
             ),

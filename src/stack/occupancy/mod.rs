@@ -75,6 +75,12 @@ const OFF_TRACK_M: f64 = 2000.0;
 const HEADING_EVERY_M: f64 = 2.0;
 /// A speed or a yaw rate is not known any more after a longer silence, seconds.
 const SILENCE_S: f64 = 2.0;
+/// So far a wheel may be off the train's speed before it is said to slide or slip: a share of that, and no less than
+/// this. Each maker of slide protection has its own rule.
+const SLIDE_SHARE: f64 = 0.1;
+const SLIDE_MPS: f64 = 0.3;
+/// And so fast a train's speed changes meanwhile.
+const SLIDE_MPS2: f64 = 1.0;
 
 /// A fix in the plane of the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +123,10 @@ pub struct Occupancy {
     hypotheses: Vec<Hypothesis>,
     time: Option<SimTime>,
     speed: Option<(SimTime, f64)>,
-    /// Standard deviation of what was run since the last speed, beyond [`SILENCE_S`].
+    /// Since when the wheel slides or slips.
+    slides: Option<SimTime>,
+    /// Standard deviation of what was run since the last fix or balise, for want of a speed: a train that brakes slides
+    /// the same way again and again, so that errors add up.
     unknown_m: f64,
     yaw_rate: Option<(SimTime, f64)>,
     speed_filter: pedal::SpeedFilter,
@@ -145,6 +154,7 @@ impl Occupancy {
             hypotheses: Vec::new(),
             time: None,
             speed: None,
+            slides: None,
             unknown_m: 0.0,
             yaw_rate: None,
             speed_filter: pedal::SpeedFilter::default(),
@@ -171,9 +181,26 @@ impl Occupancy {
             self.since.length_m += more_m;
             self.run_m += more_m;
             self.speed = Some((time, speed_mps));
-            self.unknown_m = 0.0;
+            self.slides = None;
             self.speed_filter
                 .update(time, speed_mps, self.settings.speed_sigma_mps);
+        }
+    }
+
+    /// Takes the speed of a wheel that slides or slips. The train's goes after it no faster than adhesion allows, and is
+    /// more and more doubtful.
+    pub fn on_slide(&mut self, time: SimTime, speed_mps: f64) {
+        if !(speed_mps.abs() <= MOST_MPS && self.run_to(time)) {
+            return;
+        }
+        if let Some((before, held_mps)) = self.speed {
+            let most_mps = SLIDE_MPS2 * time.since(before);
+            let now_mps = held_mps + (speed_mps - held_mps).clamp(-most_mps, most_mps);
+            let more_m = change_since(self.speed, (time, now_mps));
+            self.since.length_m += more_m;
+            self.run_m += more_m;
+            self.speed = Some((time, now_mps));
+            self.slides.get_or_insert(before);
         }
     }
 
@@ -198,6 +225,7 @@ impl Occupancy {
         let Some(judged) = self.trust.judge(fix, at, &self.settings) else {
             return;
         };
+        self.unknown_m = 0.0;
         let fix = &judged.fix;
         self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);
@@ -239,16 +267,21 @@ impl Occupancy {
                 .filter(|(at, _)| time.since(*at) <= SILENCE_S)
                 .map_or(0.0, |(_, value)| value)
         };
-        let run_m = match self.speed {
-            Some((at, speed_mps)) if time.since(at) > SILENCE_S => {
-                // It may have stopped at once, or gone on.
-                let before_m2 = self.unknown_m.powi(2);
-                self.unknown_m += 0.5 * speed_mps.abs() * seconds;
-                self.since.unknown_m2 += self.unknown_m.powi(2) - before_m2;
-                0.5 * speed_mps * seconds
+        let (speed_mps, doubt_mps) = match (self.speed, self.slides) {
+            (Some((_, speed_mps)), Some(since)) => {
+                let off_mps = SLIDE_MPS.max(SLIDE_SHARE * speed_mps.abs());
+                (speed_mps, off_mps + SLIDE_MPS2 * time.since(since))
             }
-            speed => held(speed) * seconds,
+            // It may have stopped at once, or gone on.
+            (Some((at, speed_mps)), None) if time.since(at) > SILENCE_S => {
+                (0.5 * speed_mps, 0.5 * speed_mps.abs())
+            }
+            (speed, _) => (held(speed), 0.0),
         };
+        let run_m = speed_mps * seconds;
+        let before_m2 = self.unknown_m.powi(2);
+        self.unknown_m += doubt_mps * seconds;
+        self.since.unknown_m2 += self.unknown_m.powi(2) - before_m2;
         self.turned_rad += held(self.yaw_rate) * seconds;
         self.since.length_m += run_m;
         self.since.seconds += seconds;
