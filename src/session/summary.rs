@@ -293,15 +293,6 @@ pub struct OccupancyFigures {
     pub nees_mean: Option<f64>,
 }
 
-impl OccupancyFigures {
-    /// Share of fixes of some classes; none of no fixes.
-    pub fn share(&self, counts: impl Fn(OccupancyClass) -> bool) -> Option<f64> {
-        let of = self.classes.iter().filter(|(class, _)| counts(**class));
-        let sum: u32 = of.map(|(_, count)| count).sum();
-        (self.fixes > 0).then(|| f64::from(sum) / f64::from(self.fixes))
-    }
-}
-
 impl OccupancyClass {
     /// The most probable track is another than the true one.
     pub fn is_wrong(self) -> bool {

@@ -6,8 +6,8 @@ use metrotwin::scenario::{Override, Scenario};
 use metrotwin::session::{
     Event, Observer, ObserverError, OccupancyClass, RendererChoice, RunOptions, Summary, run,
 };
-use std::collections::BTreeMap;
 use metrotwin::twin::physics::TrainState;
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What a train's receiver and equipment said, with the true distance of its head.

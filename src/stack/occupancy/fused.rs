@@ -10,8 +10,8 @@ use super::TrainRun;
 use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
-    ASIDE, EAST, HEADING, Hypothesis, NORTH, PLACE, SCALE, STATES, State, StateCovariance, TURNED,
-    YAW_OFFSET, log_sum,
+    ASIDE, EAST, HEADING, Hypothesis, NEAR_M, NORTH, PLACE, SCALE, STATES, State, StateCovariance,
+    TURNED, YAW_OFFSET, log_sum,
 };
 use super::map_error;
 use super::settings::OccupancySettings;
@@ -141,16 +141,20 @@ impl Hypothesis {
         turned_rad: f64,
         settings: &OccupancySettings,
     ) {
-        let half_m = 0.5 * settings.bogie_distance_m;
-        let chord = |m: f64| self.course.heading_rad(network, [m - half_m, m + half_m]);
-        let place_m = self.place_m();
-        let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - chord(place_m));
+        // Over a standard deviation to both sides: a kink of the map is no curve, and in a curve that begins the place is
+        // told no better than the heading changes over where it may be.
+        let (place_m, spread_m) = (self.place_m(), self.sigma_m().max(NEAR_M));
+        let [behind, here, ahead] = [-spread_m, 0.0, spread_m]
+            .map(|m| self.car_heading_rad(network, place_m + m, settings));
+        let [to_here, to_ahead] = [here - behind, ahead - here].map(wrapped);
+        let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - here);
+        let bend_rad2 = (0.5 * (to_ahead - to_here)).powi(2);
         let mut measured = RowSVector::<f64, STATES>::zeros();
-        measured[PLACE] = wrapped(chord(place_m + 1.0) - chord(place_m - 1.0)) / 2.0;
+        measured[PLACE] = (to_here + to_ahead) / (2.0 * spread_m);
         measured[HEADING] = 1.0;
         measured[TURNED] = 1.0;
         let across = self.covariance * measured.transpose();
-        let variance = (measured * across)[0] + settings.heading_sigma_rad.powi(2);
+        let variance = (measured * across)[0] + settings.heading_sigma_rad.powi(2) + bend_rad2;
         let fits_log =
             (1.0 - WRONG_HEADING).ln() - 0.5 * (off * off / variance + (TAU * variance).ln());
         let wrong_log = (WRONG_HEADING / TAU).ln();

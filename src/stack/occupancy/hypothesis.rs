@@ -25,7 +25,7 @@ pub type StateCovariance = SMatrix<f64, STATES, STATES>;
 /// Beyond so many standard deviations of the place nothing is looked for.
 const FAR_SIGMAS: f64 = 4.0;
 /// And not within this, metres.
-const NEAR_M: f64 = 1.0;
+pub const NEAR_M: f64 = 1.0;
 /// Hypotheses whose places are farther apart stay two.
 const MERGED_SIGMAS: f64 = 3.0;
 
@@ -90,9 +90,23 @@ impl Hypothesis {
         self.covariance[(PLACE, PLACE)] >= 0.0 && all.copied().all(f64::is_finite)
     }
 
+    /// Heading of the leading car on the map, if the antenna is at a place.
+    pub fn car_heading_rad(
+        &self,
+        network: &PlanNetwork,
+        antenna_m: f64,
+        settings: &OccupancySettings,
+    ) -> f64 {
+        let middle_m = antenna_m + settings.middle_before_antenna_m();
+        let half_m = 0.5 * settings.bogie_distance_m;
+        self.course
+            .heading_rad(network, [middle_m - half_m, middle_m + half_m])
+    }
+
     /// What may be needed of the course: chords between bogies, where the train may be, and it itself.
     fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
-        let reach_m = 0.5 * settings.bogie_distance_m + NEAR_M + FAR_SIGMAS * self.sigma_m();
+        let bogies_m = settings.middle_before_antenna_m().abs() + 0.5 * settings.bogie_distance_m;
+        let reach_m = bogies_m + NEAR_M + FAR_SIGMAS * self.sigma_m();
         let place_m = self.place_m();
         [place_m - reach_m, place_m + reach_m]
     }

@@ -6,8 +6,8 @@
 //! [`OccupancySettings::least_probability`] is dropped. When all that are left are on one track, that is identified.
 //! Nothing is decided before a fix lies on the map.
 //!
-//! What it cannot do: a receiver that calls a drift of more than about a metre a second a good fix, where tracks lie
-//! side by side, makes it certain of a wrong one, until the receiver has found itself again.
+//! What it cannot do: a receiver that calls a drift of about half a metre a second for half a minute a good fix, where
+//! tracks lie side by side, makes it certain of a wrong one, until the receiver has found itself again.
 //!
 //! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
 //! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with

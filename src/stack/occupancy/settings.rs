@@ -60,15 +60,25 @@ settings! {
         yaw_rate_sigma_radps: f64 = 1e-3, in 1e-9..=1.0;
         /// Of its offset, radians a second.
         yaw_offset_sigma_radps: f64 = 1e-3, in 0.0..=1.0;
-        /// Of the map's headings, and of the car's against the track, radians.
+        /// Of the car's heading against the track's as mapped, but for what the map has wrong over a length: play, and kinks
+        /// between mapped points, radians.
         heading_sigma_rad: f64 = 8e-3, in 1e-6..=3.0;
         /// Between the bogies: a car has the heading of a chord of this length, metres.
         bogie_distance_m: f64 = 15.0, in 0.1..=50.0;
         /// Under a train of this length no switch moves, metres.
         train_length_m: f64 = 20.0, in 1.0..=1000.0;
-        /// The antenna of the receiver behind the head, over the middle of the leading car, metres.
+        /// The antenna of the receiver behind the head, metres.
         antenna_behind_head_m: f64 = 10.0, in -10.0..=200.0;
+        /// The middle of the leading car behind the head, metres.
+        car_middle_behind_head_m: f64 = 10.0, in 0.0..=50.0;
         /// Inputs wait for this long for such as are older and come later, ms.
         hold_ms: f64 = 200.0, in 0.0..=10_000.0;
+    }
+}
+
+impl OccupancySettings {
+    /// The middle of the leading car before the antenna.
+    pub(super) fn middle_before_antenna_m(&self) -> f64 {
+        self.antenna_behind_head_m - self.car_middle_behind_head_m
     }
 }

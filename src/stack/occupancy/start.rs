@@ -132,8 +132,8 @@ impl Occupancy {
         };
         match self.settings.method {
             Method::Fused => {
-                let (_, forward) = hypothesis.course.at(&self.network, 0.0);
-                let offset_rad = self.turned_rad - forward.y.atan2(forward.x);
+                let mapped_rad = hypothesis.car_heading_rad(&self.network, 0.0, &self.settings);
+                let offset_rad = self.turned_rad - mapped_rad;
                 hypothesis.start_fused(&self.settings, offset_rad);
             }
             _ => hypothesis.start_matched(found),

@@ -178,3 +178,57 @@ fn two_balises_refute_a_certainty() {
         "{two:?}"
     );
 }
+
+/// A straight of 300 m, a curve with a radius of 200 m, and a straight.
+fn curved() -> Arc<PlanNetwork> {
+    let turned = |m: f64| (m - 300.0).clamp(0.0, 100.0) / 200.0;
+    let mut points = vec![Point2::new(0.0, 0.0)];
+    for k in 0..700 {
+        let (sin, cos) = turned(f64::from(k) + 0.5).sin_cos();
+        points.push(points[points.len() - 1] + Vector2::new(cos, sin));
+    }
+    let elements = TrackElement::new("line", points).into_iter().collect();
+    PlanNetwork::new(None, elements, &[]).into()
+}
+
+/// Fails where a car's heading is compared at the antenna instead of the car's middle, which turns sooner or later:
+/// a curve then says that the train is elsewhere.
+#[test]
+fn a_curve_tells_the_place_wherever_the_antenna_is() {
+    let network = curved();
+    for antenna_behind_head_m in [1.0, 10.0, 18.0] {
+        let settings = OccupancySettings {
+            antenna_behind_head_m,
+            ..OccupancySettings::default()
+        };
+        let mut occupancy = Occupancy::new(Arc::clone(&network), settings);
+        let place = |head_m: f64| network.elements[0].at(head_m - antenna_behind_head_m).0;
+        let heading = |head_m: f64| {
+            let bogie = |m: f64| network.elements[0].at(head_m - 10.0 + m).0;
+            let chord = bogie(7.5) - bogie(-7.5);
+            chord.y.atan2(chord.x)
+        };
+        for k in 0..450u32 {
+            let time = SimTime::from_secs(0.1 * f64::from(k));
+            let head_m = 100.0 + f64::from(k);
+            occupancy.on_speed(time, 10.0);
+            occupancy.on_yaw_rate(time, (heading(head_m + 0.1) - heading(head_m - 0.1)) * 50.0);
+            // Into a tunnel before the curve.
+            if head_m < 250.0 && k % 10 == 0 {
+                occupancy.on_fix(&Fix {
+                    time,
+                    place: place(head_m),
+                    covariance_m2: Matrix2::identity(),
+                });
+            }
+        }
+        occupancy.carry_on(SimTime::from_secs(44.9));
+        let told = occupancy.decision().tracks[0];
+        let error_m = told.along_m - (549.0 - antenna_behind_head_m);
+        assert!(
+            error_m.abs() < 1.0 && told.sigma_m < 3.0,
+            "{antenna_behind_head_m}: {error_m} {}",
+            told.sigma_m
+        );
+    }
+}
