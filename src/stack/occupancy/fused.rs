@@ -57,17 +57,18 @@ impl Hypothesis {
         let (seconds, run_m) = (run.seconds, run.length_m);
         let keep = (-seconds / settings.correlation_s).exp();
         let (map, new_of_map) = map_error::over_run(run_m, settings);
-        let mut transition = StateCovariance::identity();
-        transition[(PLACE, SCALE)] = run_m;
-        transition[(HEADING, YAW_OFFSET)] = seconds;
-        transition[(EAST, EAST)] = keep;
-        transition[(NORTH, NORTH)] = keep;
-        transition
-            .fixed_view_mut::<2, 2>(ASIDE, ASIDE)
-            .copy_from(&map);
-        self.mean = transition * self.mean;
+        let transition = Transition {
+            run_m,
+            seconds,
+            keep,
+            map,
+        };
+        transition.apply(&mut self.mean);
         self.mean[PLACE] += run_m;
-        self.covariance = transition * self.covariance * transition.transpose();
+        // The covariance is symmetric: F P F' = F (F P)'.
+        transition.apply(&mut self.covariance);
+        self.covariance.transpose_mut();
+        transition.apply(&mut self.covariance);
         let moves = run_m.abs() > STANDING_MPS * seconds;
         let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
         self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 } + run.unknown_m2;
@@ -173,6 +174,30 @@ impl Hypothesis {
         self.mean += across * (off / variance);
         let left = self.covariance - across * across.transpose() / variance;
         self.covariance = 0.5 * (left + left.transpose());
+    }
+}
+
+/// How the state goes on; a unit matrix but for a few elements.
+struct Transition {
+    run_m: f64,
+    seconds: f64,
+    /// Of the error of fixes.
+    keep: f64,
+    map: Matrix2<f64>,
+}
+
+impl Transition {
+    /// Multiplies columns by it, from the left.
+    fn apply<const N: usize>(&self, columns: &mut SMatrix<f64, STATES, N>) {
+        for mut state in columns.column_iter_mut() {
+            state[PLACE] += self.run_m * state[SCALE];
+            state[HEADING] += self.seconds * state[YAW_OFFSET];
+            state[EAST] *= self.keep;
+            state[NORTH] *= self.keep;
+            let (aside, turned) = (state[ASIDE], state[TURNED]);
+            state[ASIDE] = self.map[(0, 0)] * aside + self.map[(0, 1)] * turned;
+            state[TURNED] = self.map[(1, 0)] * aside + self.map[(1, 1)] * turned;
+        }
     }
 }
 
