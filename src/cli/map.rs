@@ -7,7 +7,7 @@ use crate::settings::ReadLimit;
 use crate::track::Tunnel;
 use crate::track::geodesy::Datum;
 use crate::track::import::railml::{RailMlOptions, read_railml};
-use crate::track::import::{AroundPlace, ImportedMap, OsmImport};
+use crate::track::import::{AroundPlace, Crs, ImportedMap, OsmImport};
 use crate::track::plan::PlanNetwork;
 use std::fmt::Display;
 use std::path::Path;
@@ -33,7 +33,8 @@ impl MapFormat {
         let text = text.trim_start_matches('\u{feff}').trim_start();
         let at = |key: &str| text.find(key).unwrap_or(usize::MAX);
         if text.starts_with('<') {
-            match (at("<osm"), at("<railml").min(at("<railML"))) {
+            let railml = ["<railml", "<railML", "<infrastructure"].map(at);
+            match (at("<osm"), railml[0].min(railml[1]).min(railml[2])) {
                 (usize::MAX, usize::MAX) => Self::Other,
                 (osm, railml) if osm < railml => Self::OsmXml,
                 _ => Self::RailMl,
@@ -102,12 +103,12 @@ pub(super) fn read_railml_map(
 }
 
 /// The network of a file of any kind, with where it is on the earth.
-pub(super) fn read_network(path: &Path) -> Result<(PlanNetwork, Datum), Failure> {
+pub(super) fn read_network(path: &Path, crs: Option<Crs>) -> Result<(PlanNetwork, Datum), Failure> {
     let is_map = path
         .extension()
         .is_none_or(|ending| !ending.eq_ignore_ascii_case("toml"));
     let network = match is_map {
-        true => of_map(path, &read_map(path)?)?,
+        true => of_map(path, &read_map(path)?, crs)?,
         false => {
             let text = read(path)?;
             if !matches!(FileKind::of(&text), FileKind::Tunnel) {
@@ -129,10 +130,10 @@ pub(super) fn read_network(path: &Path) -> Result<(PlanNetwork, Datum), Failure>
     Ok((network, datum))
 }
 
-fn of_map(path: &Path, text: &str) -> Result<PlanNetwork, Failure> {
+fn of_map(path: &Path, text: &str, crs: Option<Crs>) -> Result<PlanNetwork, Failure> {
     match MapFormat::of(text) {
         MapFormat::OsmJson | MapFormat::OsmXml => Ok(read_osm(path, text, None)?.map.network),
-        MapFormat::RailMl => Ok(read_railml_map(path, text, &RailMlOptions::default())?.network),
+        MapFormat::RailMl => Ok(read_railml_map(path, text, &RailMlOptions { crs })?.network),
         MapFormat::GeoJson => PlanNetwork::from_geojson(text).map_err(|e| {
             refused(
                 path,
@@ -176,6 +177,7 @@ mod tests {
                 "<?xml version='1.0'?><railML version='3.2'>",
                 MapFormat::RailMl,
             ),
+            ("<infrastructure version='2.3'>", MapFormat::RailMl),
             (
                 "<railml version='2.2'><!-- from <osm> -->",
                 MapFormat::RailMl,

@@ -32,8 +32,19 @@ pub struct Digest {
     pub events: Vec<EventDigest>,
     /// Figures that vary, in the order of columns.
     pub figures: Vec<FigureDigest>,
+    /// The others.
+    pub unvarying: Vec<Unvarying>,
     /// Both again for each value of what is swept.
     pub swept: Vec<SweptDigest>,
+}
+
+/// A figure that is the same in all runs.
+#[derive(Clone, Debug, Serialize)]
+pub struct Unvarying {
+    /// Which.
+    pub measure: &'static Measure,
+    /// In its unit; a flag is 0 or 1.
+    pub value: f64,
 }
 
 /// The figure that a study stopped by.
@@ -119,6 +130,11 @@ impl Digest {
         let early = EarlyStop::of(template, rows);
         let rows: &[&Row] = &rows.iter().collect::<Vec<_>>();
         let shown = MEASURES.iter().filter(|m| is_shown(m));
+        let unvarying = shown.clone().filter(|m| !varies(m, rows));
+        let unvarying = unvarying.filter_map(|measure| {
+            let value = rows.iter().find_map(|row| row.number(measure.name))?;
+            Some(Unvarying { measure, value })
+        });
         Self {
             runs: rows.len(),
             complete: rows.iter().filter(|r| r.is_complete()).count(),
@@ -132,6 +148,7 @@ impl Digest {
                 .filter(|m| varies(m, rows))
                 .map(|m| FigureDigest::of(template, m, rows))
                 .collect(),
+            unvarying: unvarying.collect(),
             swept: SweptDigest::all(template, rows),
         }
     }

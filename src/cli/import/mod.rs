@@ -65,9 +65,12 @@ Examples:
 
 const AFTER_RAILML: &str = "\
 Read are infrastructure and topology of railML 2.x and 3.x. Taken over: tracks, as curves near their coordinates;
-switches with their names, crossings at one level, balises, tunnels, permitted speeds on diverging legs. Without
-coordinates the graph and the lengths of its elements are the file's, and where tracks lie is made up. Not taken over,
-for tunnel files do not have it: slips, signals, speeds elsewhere.
+gradients; switches with their names, crossings at one level, balises, tunnels, permitted speeds on diverging legs. Radii
+are followed where a track has no points that say otherwise. Not taken over, for tunnel files do not have it: slips,
+signals, speeds elsewhere.
+
+Without coordinates where tracks lie is made up, from the graph and the lengths of its elements; where tracks would then
+touch, switches and joints are left out. The last lines and --report say how many.
 
 Examples:
   metrotwin import railml station.railml --out out/station.toml

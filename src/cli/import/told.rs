@@ -22,8 +22,9 @@ pub(super) struct Told<'a> {
 }
 
 impl Told<'_> {
+    /// What could not be laid first: that are tracks and switches.
     fn all_left_out(&self) -> impl Iterator<Item = &LeftOut> {
-        self.map.report.left_out.iter().chain(&self.laid.left_out)
+        self.laid.left_out.iter().chain(&self.map.report.left_out)
     }
 
     fn length_m(&self) -> f64 {

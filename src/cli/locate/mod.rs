@@ -11,6 +11,7 @@ use super::print;
 use crate::bus::SimTime;
 use crate::settings::ReadLimit;
 use crate::stack::occupancy::{Occupancy, OccupancySettings};
+use crate::track::import::Crs;
 use crate::track::plan::PlanNetwork;
 use output::{Located, Report};
 use recorded::{RecordedFix, RecordedFixes};
@@ -43,6 +44,9 @@ pub(super) struct LocateArgs {
     /// Map: a tunnel file, GeoJSON, OpenStreetMap or railML
     #[arg(long, value_name = "NETWORK")]
     network: PathBuf,
+    /// System of a railML file's coordinates, if the file names none: EPSG:4326, EPSG:25832 (UTM zone 32) and so on
+    #[arg(long, value_name = "EPSG:N")]
+    crs: Option<Crs>,
     /// Recorded fixes
     #[arg(long, value_name = "FIXES")]
     gnss: PathBuf,
@@ -55,7 +59,7 @@ pub(super) struct LocateArgs {
 }
 
 pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
-    let (network, datum) = read_network(&args.network)?;
+    let (network, datum) = read_network(&args.network, args.crs)?;
     let network = Arc::new(network);
     let text = read_as(&args.gnss, ReadLimit::RECORDED)?;
     let recorded = RecordedFixes::read(&text, &datum).map_err(|e| table(&args.gnss, &e))?;
@@ -75,7 +79,7 @@ pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
         datum: &datum,
         recorded: &recorded,
         located: &located,
-        measured_speed: args.speed.is_some(),
+        speeds_in_time: args.speed.as_ref().map(|_| in_time(&speeds, &recorded)),
     };
     report.write(&args.out).map_err(Failure::run)?;
     print(&report.text(&args.out))
@@ -105,6 +109,15 @@ fn run(
         });
     }
     located
+}
+
+/// Speeds between the first fix and the last.
+fn in_time(speeds: &[(SimTime, f64)], recorded: &RecordedFixes) -> usize {
+    let last = recorded.fixes.last().map_or(SimTime::ZERO, |r| r.fix.time);
+    let times = speeds.iter().map(|(time, _)| *time);
+    times
+        .filter(|time| (SimTime::ZERO..=last).contains(time))
+        .count()
 }
 
 /// Fixes that are nowhere near the network: most often latitude and longitude are swapped.

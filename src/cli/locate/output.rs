@@ -27,7 +27,8 @@ pub struct Report<'a> {
     pub datum: &'a Datum,
     pub recorded: &'a RecordedFixes,
     pub located: &'a [Located],
-    pub measured_speed: bool,
+    /// Of the measured speeds those of the time of the fixes; none where none were measured.
+    pub speeds_in_time: Option<usize>,
 }
 
 /// A stretch of time over which one element is the most probable.
@@ -142,7 +143,7 @@ impl Report<'_> {
             "fixes": self.located.len(),
             "refused_fixes": self.recorded.refused,
             "out_of_order": self.recorded.out_of_order,
-            "speed": if self.measured_speed { "measured" } else { "from the fixes" },
+            "speed": if self.speeds_in_time.is_some() { "measured" } else { "from the fixes" },
             "identified": identified,
             "fairly_confident": fairly,
             "undecided": undecided,
@@ -176,8 +177,43 @@ impl Report<'_> {
                 visit.from_s, visit.to_s, visit.fixes, visit.least_probability, visit.element
             );
         }
+        for note in self.notes() {
+            let _ = write!(text, "\nnote: {note}");
+        }
         let _ = write!(text, "\nresults in {}", folder.display());
         text
+    }
+
+    /// What hints at tables or a map that are not as they should be.
+    fn notes(&self) -> Vec<String> {
+        let recorded = self.recorded;
+        let [_, _, _, nowhere] = self.counts();
+        let mut notes = Vec::new();
+        if recorded.out_of_order > 0 {
+            notes.push(format!(
+                "{} rows of the fixes are not newer than the row before, and were left out: sort the table by time, and \
+                 give times with their fractions of seconds",
+                recorded.out_of_order
+            ));
+        }
+        if recorded.refused > 0 {
+            notes.push(format!(
+                "{} rows are no fixes by their solution_status, and were left out",
+                recorded.refused
+            ));
+        }
+        if nowhere == self.located.len() {
+            notes.push("no fix came near enough to a track: is the map of that place, and the covariance as large as \
+                        the errors?".to_owned());
+        }
+        if self.network.is_without_joints() {
+            notes.push("the map says of no two elements that a train runs from one to the other: each stands for itself"
+                .to_owned());
+        }
+        if self.speeds_in_time == Some(0) {
+            notes.push("no speed is of the time of the fixes: do both tables count time from the same moment?".to_owned());
+        }
+        notes
     }
 
     /// Fixes with one track left, with one over 0.9, with none so probable, and on no track.

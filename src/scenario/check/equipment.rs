@@ -24,6 +24,9 @@ const REAR_LENGTH_ERROR_M: f64 = 0.1;
 const LENGTH_ERROR_M: f64 = 5.0;
 /// By how much its equipment may take the place of the satellite receiver's antenna wrong.
 const ANTENNA_ERROR_M: f64 = 1.0;
+/// An antenna stands on the roof: so far from the middle at most, and between these heights over the rails.
+const ANTENNA_ASIDE_M: f64 = 1.6;
+const ANTENNA_UP_M: std::ops::RangeInclusive<f64> = 2.0..=6.0;
 
 /// Sensors and equipment of other trains, each of a train that there is, and named once.
 pub(super) fn check_onboard(file: &ScenarioFile, check: &mut Checker<'_>) {
@@ -152,6 +155,18 @@ impl LineCheck<'_, '_> {
             let remedy = format!("give a measured distance within {ANTENNA_ERROR_M} m of it");
             let key = format!("{stack_at}.antenna_behind_head_m");
             self.check.problem(&key, what, remedy);
+        }
+        let [_, left_m, up_m] = gnss.antenna_m;
+        if left_m.abs() > ANTENNA_ASIDE_M || !ANTENNA_UP_M.contains(&up_m) {
+            let what = format!(
+                "the antenna is {left_m} m to the left of the middle and {up_m} m above the rails"
+            );
+            let remedy = format!(
+                "[forward, left, up] from the head at top of rail: within {ANTENNA_ASIDE_M} m of the middle, {} to {} m up",
+                ANTENNA_UP_M.start(),
+                ANTENNA_UP_M.end()
+            );
+            self.check.problem(&format!("{at}.antenna_m"), what, remedy);
         }
         if self.tunnel.datum.is_none() {
             let what = format!(

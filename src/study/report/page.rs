@@ -157,6 +157,7 @@ mod tests {
             effective_runs: None,
             events: Vec::new(),
             figures: vec![figure],
+            unvarying: Vec::new(),
             swept: Vec::new(),
         };
         let worst = worst(&digest, &rows).unwrap();

@@ -192,6 +192,11 @@ impl PlanNetwork {
         &self.onward[end.element][side(end.way)]
     }
 
+    /// Whether no train runs on from any element, although there are several.
+    pub fn is_without_joints(&self) -> bool {
+        self.elements.len() > 1 && self.onward.iter().flatten().all(Vec::is_empty)
+    }
+
     /// Elements that come so near to a place, in the order of their numbers.
     pub fn near(&self, place: &Point2<f64>, within_m: f64) -> Vec<usize> {
         let mut near = self.grid.near(place, within_m);
