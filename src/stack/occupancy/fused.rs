@@ -6,7 +6,7 @@
 //!
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
-use super::TrainRun;
+use super::dead_reckoning::TrainRun;
 use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
