@@ -44,7 +44,7 @@ impl Occupancy {
             self.set_speed(time, speed_mps);
             self.sliding_since = None;
             self.speed_filter
-                .update(time, speed_mps, self.settings.speed_sigma_mps);
+                .update(time, self.settings.speed_sigma_mps);
         }
     }
 
