@@ -4,9 +4,10 @@
 //! cargo bench --bench occupancy
 //! ```
 //!
-//! A stem parts at a switch into two tracks, these into four, and so on, into a fan of parallel tracks 4.5 m apart. Fixes
-//! state 500 m, so that nearly all tracks stay possible. The train runs onto the middle of them, and where all lie side
-//! by side each fix is measured, with its speed and the decision after it: one thread, 10 fixes a second, 1 km at 10 m/s.
+//! A stem parts at a switch into two tracks, these into four, and so on, into a fan of parallel tracks 4.5 m apart.
+//! Fixes state a standard deviation of 500 m, so that nearly all tracks stay possible. The train runs onto the track in
+//! the middle. Where all tracks lie side by side each fix is measured, with its speed and the decision after it: one
+//! thread, 10 fixes a second, 1 km at 10 m/s.
 
 #![allow(
     clippy::unwrap_used,
@@ -26,13 +27,13 @@ use std::time::Instant;
 
 const STEM_M: f64 = 200.0;
 const APART_M: f64 = 4.5;
-/// Along by across, between a switch and the next.
+/// So much farther along than across the line a track leads, between a switch and the next.
 const SLOPE: f64 = 9.0;
 const MEASURED_M: f64 = 1000.0;
 const SIGMA_M: f64 = 500.0;
 const SPEED_MPS: f64 = 10.0;
 const STEP_S: f64 = 0.1;
-/// Of so many runs alike, the least cost of each fix counts: the machine does other things, too.
+/// Of so many equal runs the least cost of each fix counts, because the machine does other things too.
 const RUNS: u32 = 5;
 
 /// Tracks after so many switches, one after the other. Element 0 is the stem; behind element k come 2 k + 1 and
@@ -125,7 +126,7 @@ fn measure(fan: &Fan) -> Vec<MeasuredFix> {
     measured
 }
 
-/// Prints a line.
+/// Prints the line of a fan with so many switches in a row.
 fn report(switches: u32) {
     let fan = Fan { switches };
     let mut fixes = measure(&fan);

@@ -11,7 +11,7 @@ use crate::twin::physics::World;
 
 /// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
-/// The other way is at most so probable where one is certain.
+/// One way is certain where the other one is less probable than this.
 const DOUBT: f64 = 1e-9;
 /// So near before the end of a leg the next track may be probable too.
 const BEFORE_END_M: f64 = 10.0;
@@ -44,7 +44,7 @@ struct EnteredLeg {
 }
 
 impl OccupancyScore {
-    /// Of a train; without a receiver the place is that where its antenna would be.
+    /// Of a train. Without a receiver the place is scored where the stack takes the antenna to be.
     pub fn new(onboard: &OnboardSettings) -> Self {
         let told_m = onboard.occupancy.antenna_behind_head_m;
         Self {
@@ -66,7 +66,7 @@ impl OccupancyScore {
         Some(world.route(id)?.place(run_m))
     }
 
-    /// Takes a report in that was sent now; gives the class of it, if a fix is its ground or there are none.
+    /// Takes a report in that was sent now; gives its class, if it follows a fix or the train has no receiver.
     pub fn report(
         &mut self,
         report: &OccupancyReport,

@@ -25,13 +25,13 @@ impl<'a> OccupancyOfTrains<'a> {
         self.sum(|figures| fixes_of(figures, &counts))
     }
 
-    /// Their share of all fixes; `None` of no fixes.
+    /// Share of fixes of some classes; `None` of no fixes.
     pub fn share(&self, counts: impl Fn(OccupancyClass) -> bool) -> Option<f64> {
         let fixes = self.sum(|figures| figures.fixes);
         (fixes > 0).then(|| f64::from(self.fixes_of(counts)) / f64::from(fixes))
     }
 
-    /// From the toe to where the leg was identified for good, of every leg that was.
+    /// Distance from the toe to where the leg was identified for good, of every leg that was, metres.
     pub fn legs_m(&self) -> Vec<f64> {
         let legs = self
             .0
@@ -45,7 +45,7 @@ impl<'a> OccupancyOfTrains<'a> {
         ErrorStatistics::of(&mut self.legs_m())
     }
 
-    /// Largest error along the track, of fixes whose track is right.
+    /// Largest error along the track, of fixes whose track is right, metres.
     pub fn error_max_m(&self) -> Option<f64> {
         let most = self
             .0
@@ -54,7 +54,7 @@ impl<'a> OccupancyOfTrains<'a> {
         most.reduce(f64::max)
     }
 
-    /// Mean of (error / sigma)^2 of the same fixes.
+    /// Mean of (error / sigma)^2 of fixes whose track is right.
     pub fn nees_mean(&self) -> Option<f64> {
         let right = |figures: &OccupancyFigures| fixes_of(figures, |class| !class.is_wrong());
         let sums = self

@@ -34,7 +34,7 @@ pub struct Digest {
     pub figures: Vec<FigureDigest>,
     /// The others.
     pub unvarying: Vec<Unvarying>,
-    /// Both again for each value of what is swept.
+    /// Events and figures again, by the values of each variable that is swept.
     pub swept: Vec<SweptDigest>,
 }
 
@@ -81,9 +81,9 @@ pub struct FigureDigest {
     pub measure: &'static Measure,
     /// How many complete runs have it: its mean and quantiles are over these.
     pub runs: usize,
-    /// How many numbers these have: one each, but of a list all, each of which counts for one.
+    /// How many numbers these runs have together: one of each, or all of each one's list.
     pub numbers: usize,
-    /// Of a count, all of these together.
+    /// Their sum, of a figure that is a count.
     pub sum: Option<f64>,
     /// How many runs have it not, or only of a part of the run.
     pub lacking: usize,
@@ -200,12 +200,12 @@ fn shares_a_table(template: &Template) -> bool {
     })
 }
 
-/// Whether it is a single figure of a run, and none of the machine's.
+/// Whether a figure has one number a run, and says nothing of the machine.
 pub(super) fn is_shown(measure: &Measure) -> bool {
     matches!(measure.kind, Kind::Real | Kind::Int | Kind::Flag) && !measure.is_wall_time()
 }
 
-/// Whether runs have it, and it is not the same in all of them.
+/// Whether runs have a figure, and it is not the same in all of them.
 pub(super) fn varies(measure: &Measure, rows: &[&Row]) -> bool {
     let first = rows
         .iter()

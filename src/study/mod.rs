@@ -59,7 +59,7 @@ pub use runner::{Options, Progress, RUN_LIMIT_S, check, run};
 pub use scale::WorseSide;
 pub use shard::{MOST_SHARDS, Shard};
 pub use slurm::{Submission, Submitted};
-pub use swept::{ByValue, OfValue, SweptDigest};
+pub use swept::{ByValue, SweptDigest, ValueDigest};
 pub use worker::{ScenarioRunner, serve};
 
 use crate::record::{self, LIST, Listing};

@@ -1,5 +1,7 @@
-//! What the rows of a study come to for each value of a variable that it sweeps: all runs with that value together,
-//! whatever the other variables are. Figures that are lists stand here too: all numbers of all these runs, each for one.
+//! What the rows of a study come to for each value of a variable that it sweeps.
+//!
+//! All runs with a value count together, whatever the other variables are. Figures that are lists stand here too: the
+//! numbers of all these runs, each of which counts for one.
 
 use super::digest::{is_shown, varies};
 use super::{EventDigest, FigureDigest, MEASURES, Measure, Row};
@@ -24,15 +26,15 @@ pub struct ByValue<T> {
     /// Its name.
     pub name: String,
     /// For each value that there are runs of, in the order of the sweep.
-    pub values: Vec<OfValue<T>>,
+    pub values: Vec<ValueDigest<T>>,
 }
 
-/// Of the runs with one value.
+/// A value of the variable, and what its runs come to.
 #[derive(Clone, Debug, Serialize)]
-pub struct OfValue<T> {
+pub struct ValueDigest<T> {
     /// The value.
     pub value: String,
-    /// What they come to.
+    /// The event or figure in the runs that have it.
     pub digest: T,
 }
 
@@ -93,9 +95,9 @@ impl<'a> Group<'a> {
     }
 }
 
-fn of_values<T>(groups: &[Group<'_>], of: impl Fn(&[&Row]) -> T) -> Vec<OfValue<T>> {
+fn of_values<T>(groups: &[Group<'_>], of: impl Fn(&[&Row]) -> T) -> Vec<ValueDigest<T>> {
     let seen = groups.iter().filter(|group| !group.rows.is_empty());
-    let values = seen.map(|group| OfValue {
+    let values = seen.map(|group| ValueDigest {
         value: group.value.clone(),
         digest: of(&group.rows),
     });

@@ -97,7 +97,7 @@ fn a_train_finds_its_track_in_a_depot() {
 /// off as the stack believes; each receiver's errors are a quarter larger than it states.
 #[derive(Default)]
 struct Scores {
-    /// The track that each train is on is not told; a decision counts once a stay of the named track.
+    /// By train. The event does not say on which track the train is, so decisions are counted by the track that they name.
     calibrations: BTreeMap<TrainId, Calibration>,
     classes: BTreeMap<OccupancyClass, usize>,
 }

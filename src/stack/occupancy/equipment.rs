@@ -18,12 +18,12 @@ const WITHOUT_FIX_S: f64 = 1.0;
 
 /// Takes fixes, speed, yaw rate and balises in the order of their times, and says on which track the train is.
 ///
-/// While a wheel slides or slips its speed is doubtful. The yaw rate is that of the leading car, where the antenna is; in
-/// a curve the last car has another.
+/// The speed of a wheel that slides or slips is not taken for the train's. The yaw rate is that of the leading car: in a
+/// curve the last car has another.
 pub struct TrackOccupancy {
     node: Node,
     occupancy: Occupancy,
-    /// Without it fixes cannot be put on the plan.
+    /// None of a map that is nowhere on the earth: fixes are then left out.
     datum: Option<Datum>,
     hold_s: f64,
     /// By element and place along it.

@@ -1,8 +1,8 @@
 //! How the error of fixes goes on from one to the next.
 //!
-//! Of the variance P of a fix a share c changes slowly: that error b is a Gauss-Markov process with variance c P and
-//! the map's along the track, the rest is white. So a hundred fixes in a minute count for little more than one, as they have to: a
-//! filter that takes them for white grows sure of a wrong track.
+//! Of the variance P of a fix a share c changes slowly, the rest is white. The slow error b is a Gauss-Markov process
+//! with variance c P and, along the track, that of the map. So a hundred fixes in a minute count for little more than
+//! one, as they have to: a filter that takes them for white grows sure of a wrong track.
 //!
 //! Receivers have several solutions. One that is carried on without reception has the error of the last fix and
 //! more; one that is found again by itself has that of its own last fix. Which of both it is, the fixes show. With a
@@ -27,7 +27,7 @@ pub struct ErrorWay {
     pub more_m2: Matrix2<f64>,
 }
 
-/// Part of a fix's error that changes slowly, with what the map has wrong along the track.
+/// Covariance of the part of a fix's error that changes slowly, with what the map has wrong along the track.
 pub fn slow_m2(
     covariance: &Matrix2<f64>,
     forward: &Vector2<f64>,

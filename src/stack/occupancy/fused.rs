@@ -6,14 +6,14 @@
 //!
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
-use super::TrainRun;
+use super::dead_reckoning::TrainRun;
 use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
     ASIDE, EAST, HEADING, Hypothesis, NEAR_M, NORTH, PLACE, SCALE, STATES, State, StateCovariance,
     TURNED, YAW_OFFSET, log_sum,
 };
-use super::map_error;
+use super::map_error::{self, MapErrorChange};
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
@@ -32,10 +32,19 @@ const WRONG_HEADING: f64 = 1e-3;
 /// Drift of the yaw rate's offset, rad/s in the root of a second.
 const YAW_OFFSET_DRIFT: f64 = 1e-5;
 
+/// Heading of the car on the map, around the place of a hypothesis.
+struct MappedHeading {
+    here_rad: f64,
+    /// By how much it turns to the left for each metre farther on.
+    slope_radpm: f64,
+    /// Variance, because it does not turn evenly.
+    bend_rad2: f64,
+}
+
 impl Hypothesis {
     /// Variances of a hypothesis about whose place nothing is known but the course.
     pub fn start_fused(&mut self, settings: &OccupancySettings, heading_offset_rad: f64) {
-        let map = map_error::unknown(settings);
+        let map = map_error::stationary(settings);
         self.covariance = StateCovariance::zeros();
         self.covariance[(PLACE, PLACE)] = NEW_PLACE_SIGMA_M.powi(2);
         self.covariance[(SCALE, SCALE)] = settings.speed_scale_sigma.powi(2);
@@ -56,12 +65,12 @@ impl Hypothesis {
     pub(super) fn advance_fused(&mut self, run: &TrainRun, settings: &OccupancySettings) {
         let (seconds, run_m) = (run.seconds, run.length_m);
         let keep = (-seconds / settings.correlation_s).exp();
-        let (map, new_of_map) = map_error::over_run(run_m, settings);
+        let map = MapErrorChange::over_run(run_m, settings);
         let transition = Transition {
             run_m,
             seconds,
             keep,
-            map,
+            map: map.transition,
         };
         transition.apply(&mut self.mean);
         self.mean[PLACE] += run_m;
@@ -78,7 +87,7 @@ impl Hypothesis {
             self.covariance[(k, k)] += (1.0 - keep * keep) * self.fix_variance_m2;
         }
         let mut of_map = self.covariance.fixed_view_mut::<2, 2>(ASIDE, ASIDE);
-        of_map += new_of_map;
+        of_map += map.new;
     }
 
     /// Takes a fix in.
@@ -142,20 +151,15 @@ impl Hypothesis {
         turned_rad: f64,
         settings: &OccupancySettings,
     ) {
-        // Over a standard deviation to both sides: a kink of the map is no curve, and in a curve that begins the place is
-        // told no better than the heading changes over where it may be.
-        let (place_m, spread_m) = (self.place_m(), self.sigma_m().max(NEAR_M));
-        let [behind, here, ahead] = [-spread_m, 0.0, spread_m]
-            .map(|m| self.car_heading_rad(network, place_m + m, settings));
-        let [to_here, to_ahead] = [here - behind, ahead - here].map(wrapped);
-        let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - here);
-        let bend_rad2 = (0.5 * (to_ahead - to_here)).powi(2);
+        let mapped = self.mapped_heading(network, settings);
+        let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - mapped.here_rad);
         let mut measured = RowSVector::<f64, STATES>::zeros();
-        measured[PLACE] = (to_here + to_ahead) / (2.0 * spread_m);
+        measured[PLACE] = mapped.slope_radpm;
         measured[HEADING] = 1.0;
         measured[TURNED] = 1.0;
         let across = self.covariance * measured.transpose();
-        let variance = (measured * across)[0] + settings.heading_sigma_rad.powi(2) + bend_rad2;
+        let variance =
+            (measured * across)[0] + settings.heading_sigma_rad.powi(2) + mapped.bend_rad2;
         let fits_log =
             (1.0 - WRONG_HEADING).ln() - 0.5 * (off * off / variance + (TAU * variance).ln());
         let wrong_log = (WRONG_HEADING / TAU).ln();
@@ -166,6 +170,20 @@ impl Hypothesis {
         self.log_probability += both;
         if fits_log > wrong_log {
             self.correct_by(&across, off, variance);
+        }
+    }
+
+    /// Its slope is taken over one standard deviation of the place to both sides. So a kink at a mapped point hardly
+    /// counts as a curve, and where the heading does not turn evenly over that stretch, the difference counts as variance.
+    fn mapped_heading(&self, network: &PlanNetwork, settings: &OccupancySettings) -> MappedHeading {
+        let (place_m, spread_m) = (self.place_m(), self.sigma_m().max(NEAR_M));
+        let [behind, here, ahead] = [-spread_m, 0.0, spread_m]
+            .map(|m| self.car_heading_rad(network, place_m + m, settings));
+        let [to_here, to_ahead] = [here - behind, ahead - here].map(wrapped);
+        MappedHeading {
+            here_rad: here,
+            slope_radpm: (to_here + to_ahead) / (2.0 * spread_m),
+            bend_rad2: (0.5 * (to_ahead - to_here)).powi(2),
         }
     }
 

@@ -6,17 +6,23 @@ use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 
-/// What is estimated: place along the course, error of the speed's scale, heading that the yaw rates' sum lacks,
-/// offset of the yaw rate, error of fixes to the east and to the north, and by how much the track lies to the left of
-/// where it is mapped and is turned to the left.
+/// How many numbers are estimated.
 pub const STATES: usize = 8;
+/// Place of the antenna along the course, metres.
 pub const PLACE: usize = 0;
+/// Error of the speed's scale.
 pub const SCALE: usize = 1;
+/// Heading that the sum of the yaw rates lacks, radians.
 pub const HEADING: usize = 2;
+/// Offset of the yaw rate, radians a second.
 pub const YAW_OFFSET: usize = 3;
+/// Error of fixes along the world's x, metres.
 pub const EAST: usize = 4;
+/// And along its y.
 pub const NORTH: usize = 5;
+/// By how much the track lies to the left of where it is mapped, metres.
 pub const ASIDE: usize = 6;
+/// By how much it is turned to the left there, radians.
 pub const TURNED: usize = 7;
 
 pub type State = SVector<f64, STATES>;
@@ -24,7 +30,7 @@ pub type StateCovariance = SMatrix<f64, STATES, STATES>;
 
 /// Beyond so many standard deviations of the place nothing is looked for.
 const FAR_SIGMAS: f64 = 4.0;
-/// And not within this, metres.
+/// Places that are nearer to each other are not told apart, metres.
 pub const NEAR_M: f64 = 1.0;
 /// Hypotheses whose places are farther apart stay two.
 const MERGED_SIGMAS: f64 = 3.0;
@@ -43,10 +49,11 @@ pub struct Hypothesis {
     pub log_probability: f64,
     pub mean: State,
     pub covariance: StateCovariance,
-    /// Of the last fix, that part which changes slowly.
+    /// Of the last fix, the part of the variance that changes slowly.
     pub fix_variance_m2: f64,
-    /// When that was, and of which kind.
+    /// When the last fix was.
     pub fix_time: SimTime,
+    /// Its kind.
     pub kind: Option<i32>,
     /// Whether its error had jumped.
     pub has_jumped: bool,
@@ -69,14 +76,14 @@ impl Hypothesis {
         self.mean[PLACE]
     }
 
+    /// Standard deviation of the place, metres.
+    pub fn sigma_m(&self) -> f64 {
+        self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
+    }
+
     /// The element there, and the end towards which the train looks.
     pub fn towards(&self) -> ElementEnd {
         self.course.leg_at(self.place_m()).towards
-    }
-
-    /// Standard deviation of that, metres.
-    pub fn sigma_m(&self) -> f64 {
-        self.covariance[(PLACE, PLACE)].max(0.0).sqrt()
     }
 
     /// Error of the fixes, if it is right.
@@ -97,15 +104,15 @@ impl Hypothesis {
         antenna_m: f64,
         settings: &OccupancySettings,
     ) -> f64 {
-        let middle_m = antenna_m + settings.middle_before_antenna_m();
+        let middle_m = antenna_m + settings.middle_ahead_of_antenna_m();
         let half_m = 0.5 * settings.bogie_distance_m;
         self.course
             .heading_rad(network, [middle_m - half_m, middle_m + half_m])
     }
 
-    /// What may be needed of the course: chords between bogies, where the train may be, and it itself.
+    /// From where to where the course is needed: the chord between the bogies, wherever the train may be.
     fn needed_m(&self, settings: &OccupancySettings) -> [f64; 2] {
-        let bogies_m = settings.middle_before_antenna_m().abs() + 0.5 * settings.bogie_distance_m;
+        let bogies_m = settings.middle_ahead_of_antenna_m().abs() + 0.5 * settings.bogie_distance_m;
         let reach_m = bogies_m + NEAR_M + FAR_SIGMAS * self.sigma_m();
         let place_m = self.place_m();
         [place_m - reach_m, place_m + reach_m]

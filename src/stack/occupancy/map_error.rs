@@ -2,7 +2,7 @@
 //!
 //! The track lies so far to the left of where it is mapped, and is turned by so much: m and h = dm/ds along the run s.
 //! Both are a Gauss-Markov process of second order (Matern's covariance with smoothness 3/2), m with the standard
-//! deviation of the map and correlated over a length, h with that over the length. So what a map has wrong of a heading
+//! deviation of the map and correlated over a length, h with that deviation divided by the length. So what a map has wrong of a heading
 //! is bounded, however far a train runs, and two tracks side by side, each with an error of its own, cannot be told
 //! apart by it; and where a leg turns by more than a map can be wrong, it is told by that at once.
 //!
@@ -12,25 +12,34 @@
 use super::settings::OccupancySettings;
 use nalgebra::Matrix2;
 
-/// Correlation length, metres: places of a map that are 67 m apart have half of their error in common, as between points
-/// surveyed every 120 m.
+/// Metres: errors of places 67 m apart have a correlation of one half, as between points surveyed every 120 m.
 const LENGTH_M: f64 = 40.0;
 
-/// Covariance of both where nothing is known of them.
-pub fn unknown(settings: &OccupancySettings) -> Matrix2<f64> {
+/// Covariance of m, in metres, and h, in radians, where no fix or heading has said anything of them.
+pub fn stationary(settings: &OccupancySettings) -> Matrix2<f64> {
     let aside_m2 = settings.map_sigma_m.powi(2);
     Matrix2::new(aside_m2, 0.0, 0.0, aside_m2 / LENGTH_M.powi(2))
 }
 
-/// Transition over a run, backwards below 0, and the covariance of what is new.
-pub fn over_run(run_m: f64, settings: &OccupancySettings) -> (Matrix2<f64>, Matrix2<f64>) {
-    let x = run_m.abs() / LENGTH_M;
-    let transition = Matrix2::new(1.0 + x, run_m, -run_m / LENGTH_M.powi(2), 1.0 - x) * (-x).exp();
-    let unknown = unknown(settings);
-    (
-        transition,
-        unknown - transition * unknown * transition.transpose(),
-    )
+/// What becomes of m and h over a run.
+pub struct MapErrorChange {
+    pub transition: Matrix2<f64>,
+    /// Covariance of what is new.
+    pub new: Matrix2<f64>,
+}
+
+impl MapErrorChange {
+    /// Over a run, backwards below 0.
+    pub fn over_run(run_m: f64, settings: &OccupancySettings) -> Self {
+        let x = run_m.abs() / LENGTH_M;
+        let transition =
+            Matrix2::new(1.0 + x, run_m, -run_m / LENGTH_M.powi(2), 1.0 - x) * (-x).exp();
+        let stationary = stationary(settings);
+        Self {
+            transition,
+            new: stationary - transition * stationary * transition.transpose(),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -42,14 +51,15 @@ mod tests {
     fn runs_add_up() {
         let settings = OccupancySettings::default();
         for (first_m, second_m) in [(3.0, 4.0), (0.02, 150.0), (-7.0, -30.0), (0.0, 5.0)] {
-            let [first, second, both] =
-                [first_m, second_m, first_m + second_m].map(|run_m| over_run(run_m, &settings));
-            assert!((second.0 * first.0 - both.0).norm() < 1e-12 * both.0.norm().max(1.0));
-            let new = second.0 * first.1 * second.0.transpose() + second.1;
-            assert!((new - both.1).norm() < 1e-12);
+            let over_run = |run_m| MapErrorChange::over_run(run_m, &settings);
+            let [first, second, both] = [first_m, second_m, first_m + second_m].map(over_run);
+            let kept = second.transition * first.transition;
+            assert!((kept - both.transition).norm() < 1e-12 * both.transition.norm().max(1.0));
+            let new = second.transition * first.new * second.transition.transpose() + second.new;
+            assert!((new - both.new).norm() < 1e-12);
             let mirror = Matrix2::new(1.0, 0.0, 0.0, -1.0);
-            let back = over_run(-first_m, &settings);
-            assert_eq!(mirror * back.0 * mirror, first.0);
+            let back = over_run(-first_m);
+            assert_eq!(mirror * back.transition * mirror, first.transition);
         }
     }
 
@@ -58,10 +68,11 @@ mod tests {
     fn what_is_new_is_bounded() {
         let settings = OccupancySettings::default();
         for run_m in [1e-6, 1e-3, 0.1, 1.0, 10.0, 1e3, 1e6] {
-            let (_, new) = over_run(run_m, &settings);
+            let new = MapErrorChange::over_run(run_m, &settings).new;
             let least = new.symmetric_eigenvalues().min();
             assert!(least > -1e-15, "{run_m}: {least}");
         }
-        assert!((over_run(1e4, &settings).1 - unknown(&settings)).norm() < 1e-9);
+        let long = MapErrorChange::over_run(1e4, &settings);
+        assert!((long.new - stationary(&settings)).norm() < 1e-9);
     }
 }

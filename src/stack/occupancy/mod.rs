@@ -1,13 +1,13 @@
 //! Which track the train is on, where on it, and how probable that is.
 //!
-//! Fixes of a satellite receiver, speed and, if there is one, a yaw rate are held against a network in plan. What is
-//! believed is a set of hypotheses: a course over the network, the place on it, a probability. Where a course comes
-//! to a switch it becomes two; where two courses meet for good they become one; a hypothesis under
+//! Fixes of a satellite receiver, balises, speed and, if there is one, a yaw rate are held against a network in plan.
+//! What is believed is a set of hypotheses: a course over the network, the place on it, a probability. Where a course
+//! comes to a switch it becomes two; where two courses meet for good they become one; a hypothesis under
 //! [`OccupancySettings::least_probability`] is dropped. When all that are left are on one track, that is identified.
-//! Nothing is decided before a fix lies on the map.
+//! Nothing is decided before a fix lies on the map or a balise of the map is read.
 //!
-//! What it cannot do: a receiver that calls a drift of about half a metre a second for half a minute a good fix, where
-//! tracks lie side by side, makes it certain of a wrong one, until the receiver has found itself again.
+//! What it cannot do: where tracks lie side by side, a receiver whose fixes drift by about half a metre a second for
+//! half a minute, while it states that they are good, makes it certain of a wrong track until the drift has ended.
 //!
 //! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
 //! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with
@@ -36,6 +36,7 @@
 
 mod balise;
 mod course;
+mod dead_reckoning;
 mod decision;
 mod equipment;
 mod fix_error;
@@ -58,29 +59,17 @@ pub use settings::{Method, OccupancySettings};
 
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
+use dead_reckoning::TrainRun;
 use fix_trust::{Circumstances, FixTrust};
 use hypothesis::Hypothesis;
 use nalgebra::{Matrix2, Point2};
 use std::sync::Arc;
 
-/// Inputs beyond these are no measurements of a train: speed, yaw rate, distance from the world's origin, and the
-/// standard deviation of a fix.
-const MOST_MPS: f64 = 200.0;
-const MOST_RADPS: f64 = 10.0;
+/// Fixes beyond these are no measurements of a train: distance from the world's origin, and standard deviation.
 const FARTHEST_M: f64 = 1e7;
 const LEAST_SIGMA_M: f64 = 1e-3;
 /// No track is looked for farther away, metres.
 const OFF_TRACK_M: f64 = 2000.0;
-/// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
-const HEADING_EVERY_M: f64 = 2.0;
-/// A speed or a yaw rate is not known any more after a longer silence, seconds.
-const SILENCE_S: f64 = 2.0;
-/// So far a wheel may be off the train's speed before it is said to slide or slip: a share of that, and no less than
-/// this. Each maker of slide protection has its own rule.
-const SLIDE_SHARE: f64 = 0.1;
-const SLIDE_MPS: f64 = 0.3;
-/// And so fast a train's speed changes meanwhile.
-const SLIDE_MPS2: f64 = 1.0;
 
 /// A fix in the plane of the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,15 +95,6 @@ impl Fix {
     }
 }
 
-/// What the train has run in a time, by the measured speed.
-#[derive(Clone, Copy, Debug, Default)]
-struct TrainRun {
-    length_m: f64,
-    seconds: f64,
-    /// Variance of the length for want of a speed.
-    unknown_m2: f64,
-}
-
 /// The filter.
 #[derive(Clone, Debug)]
 pub struct Occupancy {
@@ -124,24 +104,26 @@ pub struct Occupancy {
     time: Option<SimTime>,
     speed: Option<(SimTime, f64)>,
     /// Since when the wheel slides or slips.
-    slides: Option<SimTime>,
-    /// Standard deviation of what was run since the last fix or balise, for want of a speed: a train that brakes slides
+    sliding_since: Option<SimTime>,
+    /// Standard deviation, for want of a speed, of what was run since the last fix or balise: a train that brakes slides
     /// the same way again and again, so that errors add up.
     unknown_m: f64,
     yaw_rate: Option<(SimTime, f64)>,
     speed_filter: pedal::SpeedFilter,
-    /// Since the hypotheses were carried on.
-    since: TrainRun,
+    /// What the hypotheses have not been carried on by yet.
+    pending: TrainRun,
     /// Since the last fix, seconds.
     since_fix_s: f64,
     /// Run since the start.
     run_m: f64,
     /// Run since headings were compared.
     since_heading_m: f64,
+    /// Sum of the yaw rates since the start.
     turned_rad: f64,
-    lost: u32,
+    /// Fixes in a row that were far from all hypotheses.
+    lost_fixes: u32,
     /// Since when fixes lie on a track that no hypothesis is on.
-    doubted: Option<SimTime>,
+    doubted_since: Option<SimTime>,
     trust: FixTrust,
 }
 
@@ -154,17 +136,17 @@ impl Occupancy {
             hypotheses: Vec::new(),
             time: None,
             speed: None,
-            slides: None,
+            sliding_since: None,
             unknown_m: 0.0,
             yaw_rate: None,
             speed_filter: pedal::SpeedFilter::default(),
-            since: TrainRun::default(),
+            pending: TrainRun::default(),
             since_fix_s: 0.0,
             run_m: 0.0,
             since_heading_m: 0.0,
             turned_rad: 0.0,
-            lost: 0,
-            doubted: None,
+            lost_fixes: 0,
+            doubted_since: None,
             trust: FixTrust::default(),
         }
     }
@@ -172,44 +154,6 @@ impl Occupancy {
     /// How many hypotheses are alive.
     pub fn alive(&self) -> usize {
         self.hypotheses.len()
-    }
-
-    /// Takes the speed, forwards positive. What no train can have, or is older than the last input, is dropped.
-    pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
-        if speed_mps.abs() <= MOST_MPS && self.run_to(time) {
-            let more_m = change_since(self.speed, (time, speed_mps));
-            self.since.length_m += more_m;
-            self.run_m += more_m;
-            self.speed = Some((time, speed_mps));
-            self.slides = None;
-            self.speed_filter
-                .update(time, speed_mps, self.settings.speed_sigma_mps);
-        }
-    }
-
-    /// Takes the speed of a wheel that slides or slips. The train's goes after it no faster than adhesion allows, and is
-    /// more and more doubtful.
-    pub fn on_slide(&mut self, time: SimTime, speed_mps: f64) {
-        if !(speed_mps.abs() <= MOST_MPS && self.run_to(time)) {
-            return;
-        }
-        if let Some((before, held_mps)) = self.speed {
-            let most_mps = SLIDE_MPS2 * time.since(before);
-            let now_mps = held_mps + (speed_mps - held_mps).clamp(-most_mps, most_mps);
-            let more_m = change_since(self.speed, (time, now_mps));
-            self.since.length_m += more_m;
-            self.run_m += more_m;
-            self.speed = Some((time, now_mps));
-            self.slides.get_or_insert(before);
-        }
-    }
-
-    /// Takes the yaw rate, to the left positive.
-    pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
-        if yaw_rate_radps.abs() <= MOST_RADPS && self.run_to(time) {
-            self.turned_rad += change_since(self.yaw_rate, (time, yaw_rate_radps));
-            self.yaw_rate = Some((time, yaw_rate_radps));
-        }
     }
 
     /// Takes a fix.
@@ -255,76 +199,6 @@ impl Occupancy {
         Decision::of(&self.hypotheses, self.settings.least_probability)
     }
 
-    /// Sums speed and yaw rate up to a time; whether it is no older than the last input.
-    fn run_to(&mut self, time: SimTime) -> bool {
-        let seconds = self.time.map_or(0.0, |last| time.since(last));
-        if seconds < 0.0 {
-            return false;
-        }
-        self.time = Some(time);
-        let held = |reading: Option<(SimTime, f64)>| {
-            reading
-                .filter(|(at, _)| time.since(*at) <= SILENCE_S)
-                .map_or(0.0, |(_, value)| value)
-        };
-        let (speed_mps, doubt_mps) = match (self.speed, self.slides) {
-            (Some((_, speed_mps)), Some(since)) => {
-                let off_mps = SLIDE_MPS.max(SLIDE_SHARE * speed_mps.abs());
-                (speed_mps, off_mps + SLIDE_MPS2 * time.since(since))
-            }
-            // It may have stopped at once, or gone on.
-            (Some((at, speed_mps)), None) if time.since(at) > SILENCE_S => {
-                (0.5 * speed_mps, 0.5 * speed_mps.abs())
-            }
-            (speed, _) => (held(speed), 0.0),
-        };
-        let run_m = speed_mps * seconds;
-        let before_m2 = self.unknown_m.powi(2);
-        self.unknown_m += doubt_mps * seconds;
-        self.since.unknown_m2 += self.unknown_m.powi(2) - before_m2;
-        self.turned_rad += held(self.yaw_rate) * seconds;
-        self.since.length_m += run_m;
-        self.since.seconds += seconds;
-        self.run_m += run_m;
-        self.since_heading_m += run_m.abs();
-        if self.since_heading_m >= HEADING_EVERY_M {
-            self.compare_headings();
-        }
-        true
-    }
-
-    fn compare_headings(&mut self) {
-        self.since_heading_m = 0.0;
-        self.advance();
-        if self.yaw_rate.is_some() && self.settings.method == Method::Fused {
-            let (network, settings) = (&self.network, &self.settings);
-            for hypothesis in &mut self.hypotheses {
-                hypothesis.update_heading(network, self.turned_rad, settings);
-            }
-            self.tidy();
-            return;
-        }
-        let before = self.hypotheses.len();
-        self.grow();
-        if self.hypotheses.len() != before {
-            self.tidy();
-        }
-    }
-
-    fn advance(&mut self) {
-        let run = std::mem::take(&mut self.since);
-        // From fix to fix the error of the speed is one.
-        let [before_s, now_s] = [self.since_fix_s, self.since_fix_s + run.seconds];
-        self.since_fix_s = now_s;
-        let speed_m2 = self.speed_filter.sigma_mps().powi(2) * (now_s.powi(2) - before_s.powi(2));
-        for hypothesis in &mut self.hypotheses {
-            match self.settings.method {
-                Method::Fused => hypothesis.advance_fused(&run, &self.settings),
-                _ => hypothesis.advance_by_speed(run.length_m, speed_m2),
-            }
-        }
-    }
-
     fn grow(&mut self) {
         let (network, settings) = (&self.network, &self.settings);
         let grown = self
@@ -334,22 +208,13 @@ impl Occupancy {
         self.hypotheses = grown.collect();
     }
 
-    /// Normalises, drops, merges and branches.
+    /// Normalises, drops, branches and merges.
     fn tidy(&mut self) {
-        let Some(most) = self
-            .hypotheses
-            .iter()
-            .map(|h| h.log_probability)
-            .reduce(f64::max)
-        else {
+        let logs = || self.hypotheses.iter().map(|h| h.log_probability);
+        let Some(most) = logs().reduce(f64::max) else {
             return;
         };
-        let sum: f64 = self
-            .hypotheses
-            .iter()
-            .map(|h| (h.log_probability - most).exp())
-            .sum();
-        let log_sum = most + sum.ln();
+        let log_sum = most + logs().map(|log| (log - most).exp()).sum::<f64>().ln();
         let least = self.settings.least_probability.ln();
         for hypothesis in &mut self.hypotheses {
             hypothesis.log_probability -= log_sum;
@@ -360,6 +225,11 @@ impl Occupancy {
         self.hypotheses
             .truncate(self.settings.most_hypotheses as usize);
         self.grow();
+        self.merge();
+    }
+
+    /// Makes one of those that say the same of all that is to come.
+    fn merge(&mut self) {
         let mut kept: Vec<Hypothesis> = Vec::with_capacity(self.hypotheses.len());
         // Only what is on the same element, the same way, can be one.
         let mut on: Vec<ElementEnd> = Vec::with_capacity(self.hypotheses.len());
@@ -385,17 +255,4 @@ impl Occupancy {
 /// But for rounding, as of a covariance that was turned.
 fn is_symmetric(covariance: &Matrix2<f64>) -> bool {
     (covariance[(0, 1)] - covariance[(1, 0)]).abs() <= 1e-9 * covariance.trace()
-}
-
-/// By how much more a quantity has summed up since its last reading than if it had stayed as it was then: it changes
-/// evenly from one reading to the next.
-fn change_since(last: Option<(SimTime, f64)>, (time, value): (SimTime, f64)) -> f64 {
-    last.map_or(0.0, |(before, old)| {
-        let seconds = time.since(before);
-        if seconds <= SILENCE_S {
-            0.5 * (value - old) * seconds
-        } else {
-            0.0
-        }
-    })
 }

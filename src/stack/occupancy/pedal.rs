@@ -16,26 +16,33 @@ const AROUND_M: f64 = 30.0;
 /// By how much a train's speed changes in a second, m/s: the acceleration of metros.
 const SPEED_CHANGE_MPS2: f64 = 1.0;
 
-/// A Kalman filter of the speed.
+/// Variance of a Kalman filter of the speed; its mean is not needed, as the place is carried on by the measured speed.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct SpeedFilter(Option<(SimTime, f64, f64)>);
+pub struct SpeedFilter(Option<SpeedVariance>);
+
+/// As it was at the last speed.
+#[derive(Clone, Copy, Debug)]
+struct SpeedVariance {
+    time: SimTime,
+    m2ps2: f64,
+}
 
 impl SpeedFilter {
-    /// Takes a measured speed.
-    pub fn update(&mut self, time: SimTime, speed_mps: f64, sigma_mps: f64) {
-        let measured_m2 = sigma_mps.powi(2);
-        let Some((last, mean, variance)) = self.0 else {
-            self.0 = Some((time, speed_mps, measured_m2));
-            return;
-        };
-        let prior = variance + (SPEED_CHANGE_MPS2 * time.since(last)).powi(2);
-        let gain = prior / (prior + measured_m2);
-        self.0 = Some((time, mean + gain * (speed_mps - mean), (1.0 - gain) * prior));
+    /// Takes in that the speed was measured.
+    pub fn update(&mut self, time: SimTime, sigma_mps: f64) {
+        let measured_m2ps2 = sigma_mps.powi(2);
+        let m2ps2 = self.0.map_or(measured_m2ps2, |last| {
+            let change_mps = SPEED_CHANGE_MPS2 * time.since(last.time);
+            let prior_m2ps2 = last.m2ps2 + change_mps.powi(2);
+            let gain = prior_m2ps2 / (prior_m2ps2 + measured_m2ps2);
+            (1.0 - gain) * prior_m2ps2
+        });
+        self.0 = Some(SpeedVariance { time, m2ps2 });
     }
 
     /// Standard deviation of the speed.
     pub fn sigma_mps(&self) -> f64 {
-        self.0.map_or(0.0, |(_, _, variance)| variance.sqrt())
+        self.0.map_or(0.0, |last| last.m2ps2.sqrt())
     }
 }
 
@@ -46,7 +53,7 @@ impl Hypothesis {
         self.covariance[(PLACE, PLACE)] = found.sigma_m.powi(2);
     }
 
-    /// Carries it on by what was run, and its variance.
+    /// Carries it on by what was run; the variance is that of the run.
     pub fn advance_by_speed(&mut self, run_m: f64, variance_m2: f64) {
         self.mean[PLACE] += run_m;
         self.covariance[(PLACE, PLACE)] += variance_m2;

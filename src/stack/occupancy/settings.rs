@@ -60,8 +60,8 @@ settings! {
         yaw_rate_sigma_radps: f64 = 1e-3, in 1e-9..=1.0;
         /// Of its offset, radians a second.
         yaw_offset_sigma_radps: f64 = 1e-3, in 0.0..=1.0;
-        /// Of the car's heading against the track's as mapped, but for what the map has wrong over a length: play, and kinks
-        /// between mapped points, radians.
+        /// Of the car's heading against that of the mapped track, beside what `map_sigma_m` makes of that: by play, and by
+        /// kinks at mapped points, radians.
         heading_sigma_rad: f64 = 8e-3, in 1e-6..=3.0;
         /// Between the bogies: a car has the heading of a chord of this length, metres.
         bogie_distance_m: f64 = 15.0, in 0.1..=50.0;
@@ -77,8 +77,8 @@ settings! {
 }
 
 impl OccupancySettings {
-    /// The middle of the leading car before the antenna.
-    pub(super) fn middle_before_antenna_m(&self) -> f64 {
+    /// The middle of the leading car ahead of the antenna, below 0 behind it.
+    pub(super) fn middle_ahead_of_antenna_m(&self) -> f64 {
         self.antenna_behind_head_m - self.car_middle_behind_head_m
     }
 }

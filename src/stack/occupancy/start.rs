@@ -27,15 +27,19 @@ impl Occupancy {
     /// New hypotheses where there are none, where they are lost or in doubt.
     pub(super) fn start(&mut self, judged: &Judged) {
         let fix = &judged.fix;
-        self.lost = if self.is_lost(fix) { self.lost + 1 } else { 0 };
+        self.lost_fixes = if self.is_lost(fix) {
+            self.lost_fixes + 1
+        } else {
+            0
+        };
         let is_doubted = self.is_doubted(judged);
         // Where map and fixes do not agree there is nothing to begin with.
         if !judged.is_near {
             return;
         }
-        if self.hypotheses.is_empty() || self.lost >= LOST_FIXES {
+        if self.hypotheses.is_empty() || self.lost_fixes >= LOST_FIXES {
             self.hypotheses = self.all_near(fix);
-            self.lost = 0;
+            self.lost_fixes = 0;
         } else if is_doubted {
             self.doubt(fix);
         } else {
@@ -64,14 +68,14 @@ impl Occupancy {
         let needed_m = self.hypotheses.iter().map(|h| h.error_m().norm());
         let least_m = needed_m.fold(f64::INFINITY, f64::min);
         if !judged.is_near || least_m < DOUBTED_SIGMAS * sigma_m {
-            self.doubted = None;
+            self.doubted_since = None;
         } else if self.hypotheses.first().is_some_and(|most| most.has_jumped) {
-            self.doubted.get_or_insert(judged.fix.time);
+            self.doubted_since.get_or_insert(judged.fix.time);
         }
-        let since = self.doubted;
+        let since = self.doubted_since;
         let is_doubted = since.is_some_and(|since| judged.fix.time.since(since) > DOUBTED_S);
         if is_doubted {
-            self.doubted = None;
+            self.doubted_since = None;
         }
         is_doubted
     }

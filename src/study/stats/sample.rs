@@ -80,9 +80,9 @@ pub fn quantile(sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
     }
     let below = Binomial::new(p, n as u64).ok()?;
     // X_(i) <= q in all but P(fewer than i lie below q) = F(i - 1) of all samples (i from 1).
-    let share_below = |i: usize| below.cdf(i as u64 - 1);
-    let i = least_where(n, |i| share_below(i) > TAIL).map_or(n, |above| above - 1);
-    let j = least_where(n, |i| share_below(i) >= 1.0 - TAIL);
+    let probability_of_fewer = |i: usize| below.cdf(i as u64 - 1);
+    let i = least_where(n, |i| probability_of_fewer(i) > TAIL).map_or(n, |above| above - 1);
+    let j = least_where(n, |i| probability_of_fewer(i) >= 1.0 - TAIL);
     Some(IntervalEstimate {
         value: interpolated(sorted, p),
         low: i.checked_sub(1).map_or(f64::NEG_INFINITY, |k| sorted[k]),

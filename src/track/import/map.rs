@@ -51,7 +51,7 @@ pub struct AlongElement {
     pub line: usize,
 }
 
-/// A value that holds from a place on, up to the next one of its list, whose name has the unit.
+/// A value that holds from a place on, up to the next one of its list. The unit is in the name of the list.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapStep {
     /// Where it begins.

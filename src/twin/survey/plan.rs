@@ -1,11 +1,12 @@
 //! Errors of the tracks in plan.
 //!
 //! Maps that are made from the air or from old drawings lie some decimetres beside the earth's coordinates. Half of the
-//! variance is common to all tracks: that of the map's control points, so that it turns and stretches from one to the
-//! next. The other half is each track's own. At joints, where tracks meet, that is the joint's, so that toes of
-//! switches are off by themselves; within a track it goes over into errors of points on that track alone.
+//! variance is common to all tracks, that of the map's control points: the map turns and stretches from one to the next.
+//! The other half is the joint's where tracks meet, so that each toe of a switch is off by itself, and the track's own
+//! away from joints; towards its ends it goes over from the one into the other.
 //!
-//! Every error is interpolated between normal ones so that its standard deviation is the same everywhere.
+//! Every error is interpolated between independent normal ones, and scaled so that its standard deviation is the same
+//! everywhere.
 
 use super::CONTROL_M;
 use crate::track::plan::PlanNetwork;
@@ -13,10 +14,8 @@ use crate::twin::random::Stream;
 use nalgebra::{Point2, Vector2};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-/// From its ends on, a track has more and more of its own error over this.
+/// Over this distance from an end of a track the joint's error goes over into the track's own.
 const JOINED_M: f64 = CONTROL_M;
-/// Joints that are so near to each other have errors that are alike.
-const JOINTS_M: f64 = CONTROL_M;
 
 /// A plan with the errors of a seed, of a standard deviation on each axis.
 pub fn surveyed(plan: &PlanNetwork, sigma_m: f64, seed: u64) -> PlanNetwork {
@@ -50,38 +49,38 @@ struct AxisErrors {
 }
 
 impl AxisErrors {
-    /// Of both halves together, at a place of a track, which is from 0 at its ends to 1 in its middle.
+    /// Of both halves together, at a place of a track; `inward` is 0 at its ends and 1 where joints count no more.
     fn at(&self, (track, along_m): (usize, f64), place: &Point2<f64>, inward: f64) -> f64 {
         let (of_track, of_joint) = (FRAC_PI_2 * inward).sin_cos();
-        in_plane(&self.common, place, CONTROL_M)
-            + of_joint * in_plane(&self.joints, place, JOINTS_M)
+        in_plane(&self.common, place)
+            + of_joint * in_plane(&self.joints, place)
             + of_track * along(&self.tracks[track], along_m)
     }
 }
 
 /// Between points every [`CONTROL_M`] of a line.
 fn along(stream: &Stream, along_m: f64) -> f64 {
-    let (before, share) = split(along_m, CONTROL_M);
+    let (before, share) = split(along_m);
     let weights = [1.0 - share, share];
     let values = [0, 1].map(|k| stream.normal((before + k) as u64));
     interpolated(weights.into_iter().zip(values))
 }
 
-/// Between the points of a square grid.
-fn in_plane(stream: &Stream, place: &Point2<f64>, apart_m: f64) -> f64 {
-    let ((east, x), (north, y)) = (split(place.x, apart_m), split(place.y, apart_m));
+/// Between points every [`CONTROL_M`] of a square grid.
+fn in_plane(stream: &Stream, place: &Point2<f64>) -> f64 {
+    let ((east, x), (north, y)) = (split(place.x), split(place.y));
     let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| {
         let weight = [1.0 - x, x][i] * [1.0 - y, y][j];
-        let number = ((east + i as i64) as u32, (north + j as i64) as u32);
-        let value = stream.normal(u64::from(number.0) << 32 | u64::from(number.1));
+        let [column, row] = [east + i as i64, north + j as i64].map(|n| n as u32);
+        let value = stream.normal(u64::from(column) << 32 | u64::from(row));
         (weight, value)
     });
     interpolated(corners.into_iter())
 }
 
-/// The number of the last point before a place, and how far behind it that is, in distances of points.
-fn split(m: f64, apart_m: f64) -> (i64, f64) {
-    let x = m / apart_m;
+/// The number of the last point before a place, and which share of the way to the next one lies between.
+fn split(m: f64) -> (i64, f64) {
+    let x = m / CONTROL_M;
     (x.floor() as i64, x - x.floor())
 }
 

@@ -31,7 +31,7 @@ struct StatedRun {
 struct Variant {
     name: &'static str,
     change: fn(&mut StatedRun),
-    /// The method is known not to take it.
+    /// It is known to make the method certain of a wrong track: it is printed and not asserted.
     is_beyond: bool,
 }
 

@@ -92,8 +92,8 @@ impl Runs<'_> {
     }
 }
 
-/// The seed's table (Guo et al. 2020: 40 switches, mean 37.6 m at best, most 53 m; perpendicular match 39.6 and 55 m)
-/// beside ours, on errors that change slowly.
+/// Beside the published table (Guo et al. 2020: 40 switches, mean 37.6 m at best, most 53 m; perpendicular match 39.6
+/// and 55 m), on errors that change slowly.
 #[test]
 fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
     let by_speed = SPEEDS_KMH.map(|speed_kmh| {
@@ -122,24 +122,9 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
     for (_, of) in by_speed {
         all.extend(of);
     }
-    let ([mean_m, p95_m, most_m], undecided) = all.distances();
-    println!(
-        "fused: {} switches, {} fixes; identified after {mean_m:.1} m (95 %: {p95_m:.1}, most {most_m:.1}); {:.3} % right",
-        all.switches.len(),
-        all.fixes(),
-        100.0 * all.right()
-    );
-    println!("sigma of the place under 1, 2, 3 m: {}", all.sigmas());
-    println!(
-        "squared error of the place over its variance: {:.2}",
-        all.nees()
-    );
-    let parallel = all.parallel[1] as f64 / all.parallel[0] as f64;
-    println!(
-        "{:.4} % of {} fixes beside the other track right",
-        100.0 * parallel,
-        all.parallel[0]
-    );
+    let ([mean_m, _, most_m], undecided) = all.distances();
+    all.print("fused");
+    let parallel = all.parallel_right();
     assert!(all.switches.len() >= 4000 && all.fixes() >= 100_000);
     assert!(mean_m < 30.0 && most_m < 60.0, "{mean_m} {most_m}");
     assert!(parallel > 0.999, "{parallel}");

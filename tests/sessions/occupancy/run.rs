@@ -8,7 +8,7 @@ use metrotwin::twin::random::Stream;
 use nalgebra::{Matrix2, Point2, Vector2};
 use std::sync::Arc;
 
-pub const RATE_HZ: f64 = 5.0;
+const RATE_HZ: f64 = 5.0;
 /// Speeds and yaw rates for each fix.
 const PARTS: u64 = 10;
 /// Half of the distance of the bogies, which is not what the filter takes it for.
@@ -120,7 +120,8 @@ impl Receiver {
     }
 }
 
-/// Drives a train over its way, and says after each fix what the filter decided, where it was and when.
+/// Drives a train over its way, and says after each fix what the filter decided, on which element the train was and
+/// how far along it, metres.
 fn drive(
     run: &Run,
     way: &Way<'_>,

@@ -5,6 +5,7 @@ use metrotwin::stack::occupancy::Decision;
 
 /// So near to a joint a certain decision for the element beyond it is wrong about the place, not about the track.
 const AT_JOINT_M: f64 = 15.0;
+
 /// What became of one switch.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AtSwitch {
@@ -22,13 +23,13 @@ pub struct Tally {
     pub classes: [usize; 6],
     /// Of the wrong confident ones, those near a joint.
     pub at_joint: usize,
-    /// But near joints.
+    /// Of fixes that are not near joints.
     pub calibration: Calibration,
     sigmas_m: [usize; 3],
     /// Squared errors of the place over their variance: sum and number, of fixes on the right element.
     squares: (f64, usize),
     /// Fixes where the tracks lie side by side, and how many were right.
-    pub parallel: [usize; 2],
+    parallel: [usize; 2],
     /// From so far behind a leg's begin to so far before its end the tracks lie side by side.
     pub parallel_from_m: f64,
 }
@@ -82,8 +83,34 @@ impl Tally {
         self.classes.iter().sum()
     }
 
+    /// Share of fixes beside the other track that are right.
+    pub fn parallel_right(&self) -> f64 {
+        self.parallel[1] as f64 / self.parallel[0] as f64
+    }
+
+    /// Prints what no column of [`table`] has.
+    pub fn print(&self, name: &str) {
+        let ([mean_m, p95_m, most_m], _) = self.distances();
+        println!(
+            "{name}: {} switches, {} fixes; identified after {mean_m:.1} m (95 %: {p95_m:.1}, most {most_m:.1}); {:.3} % right",
+            self.switches.len(),
+            self.fixes(),
+            100.0 * self.right()
+        );
+        println!("sigma of the place under 1, 2, 3 m: {}", self.sigmas());
+        println!(
+            "squared error of the place over its variance: {:.2}",
+            self.nees()
+        );
+        println!(
+            "{:.4} % of {} fixes beside the other track right",
+            100.0 * self.parallel_right(),
+            self.parallel[0]
+        );
+    }
+
     /// Shares of fixes whose place has a standard deviation under 1, 2 and 3 m.
-    pub fn sigmas(&self) -> String {
+    fn sigmas(&self) -> String {
         let shares = self
             .sigmas_m
             .map(|count| 100.0 * count as f64 / self.fixes() as f64);

@@ -96,27 +96,36 @@ impl<'a> FileDefaults<'a> {
                 self.add_place(track, item, at_m, 2)?;
             }
             "gradientChange" => {
-                let value = bounded(item, "slope", MOST_GRADE_PERMILLE)?;
+                let permille = bounded(item, "slope", MOST_GRADE_PERMILLE)?;
                 let from_m = at(track)?;
-                (track.along.grades_permille).push(MapStep { from_m, value });
+                track.along.grades_permille.push(MapStep {
+                    from_m,
+                    value: permille,
+                });
                 fates.take(item);
                 self.add_place(track, item, from_m, 1)?;
             }
             "radiusChange" => {
                 let radius_m = item.needed_value("radius")?;
-                let value = if radius_m.abs() > 0.0 {
+                let per_m = if radius_m.abs() > 0.0 {
                     1.0 / radius_m
                 } else {
                     0.0
                 };
-                if value.abs() > 1.0 / LEAST_RADIUS_M {
+                if per_m.abs() > 1.0 / LEAST_RADIUS_M {
                     return Err(item.fault(format!("`radius` is {radius_m} m: 0 (straight) or at least {LEAST_RADIUS_M} m is needed")));
                 }
                 let from_m = at(track)?;
-                (track.along.curvatures_per_m).push(MapStep { from_m, value });
+                track.along.curvatures_per_m.push(MapStep {
+                    from_m,
+                    value: per_m,
+                });
                 if item.attribute("superelevation").is_some() {
-                    let value = bounded(item, "superelevation", MOST_CANT_MM)?;
-                    track.along.cants_mm.push(MapStep { from_m, value });
+                    let cant_mm = bounded(item, "superelevation", MOST_CANT_MM)?;
+                    track.along.cants_mm.push(MapStep {
+                        from_m,
+                        value: cant_mm,
+                    });
                 }
                 track.curves.push(item);
                 fates.take(item);

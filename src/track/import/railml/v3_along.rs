@@ -30,7 +30,7 @@ struct CurveReach {
     from_m: f64,
     to_m: f64,
     /// None on a transition.
-    per_m: Option<f64>,
+    curvature_per_m: Option<f64>,
 }
 
 /// Reads everything that is taken over into the tracks.
@@ -318,7 +318,7 @@ fn curve<'a>(
         curves.entry(reach.track).or_default().push(CurveReach {
             from_m: reach.from_m,
             to_m: reach.to_m,
-            per_m: curvature.map(along),
+            curvature_per_m: curvature.map(along),
         });
         if let Some(track) = draft.tracks.get_mut(reach.track) {
             track.curves.push(item);
@@ -334,32 +334,32 @@ fn steps(mut curves: Vec<CurveReach>, length_m: f64) -> Vec<MapStep> {
     curves.sort_by(|a, b| a.from_m.total_cmp(&b.from_m));
     let mut steps: Vec<MapStep> = Vec::new();
     let mut add = |from_m, value| steps.push(MapStep { from_m, value });
-    let (mut reached_m, mut reached) = (0.0, 0.0);
+    let (mut reached_m, mut reached_per_m) = (0.0, 0.0);
     for (k, curve) in curves.iter().enumerate() {
         let CurveReach { from_m, to_m, .. } = *curve;
         if from_m - reached_m > FOLLOWS_M {
             add(reached_m, 0.0);
-            reached = 0.0;
+            reached_per_m = 0.0;
         }
         let next = curves
             .get(k + 1)
             .filter(|next| (next.from_m - to_m).abs() <= FOLLOWS_M);
-        match curve.per_m {
+        match curve.curvature_per_m {
             Some(per_m) => {
                 add(from_m, per_m);
-                reached = per_m;
+                reached_per_m = per_m;
             }
             None => {
-                let end = next.and_then(|next| next.per_m).unwrap_or(0.0);
+                let end_per_m = next.and_then(|next| next.curvature_per_m).unwrap_or(0.0);
                 for step in 0..TRANSITION_STEPS {
                     let part = f64::from(step) / f64::from(TRANSITION_STEPS);
                     let middle = part + 0.5 / f64::from(TRANSITION_STEPS);
                     add(
                         from_m + part * (to_m - from_m),
-                        reached + middle * (end - reached),
+                        reached_per_m + middle * (end_per_m - reached_per_m),
                     );
                 }
-                reached = end;
+                reached_per_m = end_per_m;
             }
         }
         reached_m = to_m;

@@ -148,7 +148,7 @@ impl Gnss {
         }
     }
 
-    /// A fix of an antenna that is here in the world; none where too few satellites are received.
+    /// A fix of an antenna at a place in the world; none where too few satellites are received.
     fn fix(&mut self, time: SimTime, antenna: &Point3<f64>) -> Option<GnssFix> {
         let Solution {
             error_m,
@@ -166,6 +166,7 @@ impl Gnss {
         })
     }
 
+    /// The error of the place at a time, and its covariance.
     fn solution(&mut self, seconds: f64, antenna: &Point3<f64>) -> Option<Solution> {
         let step_s = seconds - self.last_s.unwrap_or(seconds);
         let is_first = self.last_s.replace(seconds).is_none();
@@ -177,14 +178,8 @@ impl Gnss {
         let mut ranges = Vec::with_capacity(SATELLITES);
         let mut free = 0;
         for (number, direction) in directions.into_iter().enumerate() {
-            let way = match direction.z > lowest {
-                true => self.way(near, antenna, &direction),
-                false => SignalWay::Blocked,
-            };
-            let error_m = match direction.z > lowest {
-                true => self.errors.of(number, direction.z, way, step_s),
-                false => None,
-            };
+            let way = (direction.z > lowest).then(|| self.way(near, antenna, &direction));
+            let error_m = way.and_then(|way| self.errors.of(number, direction.z, way, step_s));
             let Some(error_m) = error_m else {
                 self.since_s[number] = None;
                 continue;
@@ -195,7 +190,7 @@ impl Gnss {
             if seconds - since_s < self.settings.acquisition_s {
                 continue;
             }
-            free += usize::from(way == SignalWay::Free);
+            free += usize::from(way == Some(SignalWay::Free));
             let sigma_m = self.settings.range_sigma_m(direction.z);
             ranges.push(MeasuredRange {
                 direction,

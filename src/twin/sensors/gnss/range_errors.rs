@@ -1,7 +1,7 @@
 //! By how much ranges to satellites are wrong.
 //!
 //! Each satellite's range has an error of its orbit, clock and ionosphere, one of multipath and white noise; all have
-//! what is left of the troposphere over the receiver. The slow ones are first-order Gauss-Markov processes. All but the
+//! what models leave of the troposphere over the receiver. The slow ones are first-order Gauss-Markov processes. All but the
 //! first grow as 1/sin(elevation), the way through the air or near the ground. Now and then a satellite comes by a
 //! reflection alone: its range is then too long by an excess with exponential distribution.
 //!
@@ -17,6 +17,10 @@ use crate::twin::random::Stream;
 const LOWEST_SINE: f64 = 0.05;
 /// Numbers of the receiver's stream that are kept for one satellite at one time.
 const NUMBERS: u64 = 8;
+/// Which of them are for what.
+const MULTIPATH: u64 = 0;
+const REFLECTION: [u64; 3] = [1, 2, 3];
+const NOISE: u64 = 4;
 
 /// The errors of all ranges at one time after another.
 #[derive(Clone, Debug)]
@@ -85,7 +89,7 @@ impl RangeErrors {
         self.drawn += 1;
         let more_m = (1.0 - keep * keep).sqrt() * self.settings.multipath_m;
         for satellite in 0..SATELLITES {
-            let drawn_m = more_m * self.own.normal(self.first_number(satellite));
+            let drawn_m = more_m * self.own.normal(self.first_number(satellite) + MULTIPATH);
             let multipath_m = &mut self.ranges[satellite].multipath_m;
             *multipath_m = keep * *multipath_m + drawn_m;
         }
@@ -98,8 +102,7 @@ impl RangeErrors {
 
     /// The error of a satellite's range, metres; none where its signal is not received.
     pub fn of(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64) -> Option<f64> {
-        let first = self.first_number(satellite);
-        self.reflect(satellite, sine, way, step_s, first + 1);
+        self.reflect(satellite, sine, way, step_s);
         let (settings, range) = (&self.settings, &self.ranges[satellite]);
         if way == SignalWay::Blocked && range.excess_m.is_none() {
             return None;
@@ -107,27 +110,27 @@ impl RangeErrors {
         let left = settings.left_by_corrections();
         let space_m = left * settings.signal_in_space_m * self.signal_in_space.of(satellite);
         let air_m = left * settings.troposphere_m * self.troposphere.of(0);
-        let noise_m = settings.noise_m * self.own.normal(first + 4);
+        let noise_m = settings.noise_m * self.own.normal(self.first_number(satellite) + NOISE);
         let near_m = air_m + range.multipath_m + noise_m;
         let all_m = space_m + near_m / sine.max(LOWEST_SINE);
         Some(settings.error_scale * all_m + range.excess_m.unwrap_or(0.0))
     }
 
     /// A two-state chain: reflections come and go with their mean duration, so that over time their share is as set.
-    fn reflect(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64, first: u64) {
+    fn reflect(&mut self, satellite: usize, sine: f64, way: SignalWay, step_s: f64) {
         let settings = &self.settings;
         let share = match way {
             SignalWay::Free => settings.reflected_share * (1.0 - sine * sine).sqrt(),
             SignalWay::Blocked => settings.reflected_if_blocked,
         };
         let stay = (-step_s / (settings.reflected_s * (1.0 - share)).max(1e-9)).exp();
-        let keeps = self.own.uniform(first) < stay;
-        let excess_m = &mut self.ranges[satellite].excess_m;
-        if keeps {
+        let first = self.first_number(satellite);
+        let drawn = |number: usize| self.own.uniform(first + REFLECTION[number]);
+        if drawn(0) < stay {
             return;
         }
         // What has changed is anew in one of both states.
-        *excess_m = (self.own.uniform(first + 1) < share)
-            .then(|| -settings.reflected_excess_m * self.own.uniform(first + 2).ln());
+        self.ranges[satellite].excess_m =
+            (drawn(1) < share).then(|| -settings.reflected_excess_m * drawn(2).ln());
     }
 }
