@@ -53,6 +53,9 @@ settings! {
         /// Of the tracks' places in plan, each way, m. What the stack takes it to be is
         /// `stack.occupancy.map_sigma_m`.
         track_sigma_m: f64 = 0.0, in 0.0..=100.0;
+        /// Distance of the points that these were measured or drawn by, m: errors of places farther apart are independent.
+        /// What the stack takes a third of it to be is `stack.occupancy.map_correlation_m`.
+        track_points_m: f64 = 120.0, in 1.0..=1e4;
     }
 }
 
@@ -74,7 +77,7 @@ impl SurveySettings {
 
     /// A plan as it was surveyed.
     pub fn surveyed(&self, plan: &PlanNetwork, seed: u64) -> PlanNetwork {
-        plan::surveyed(plan, self.track_sigma_m, seed)
+        plan::surveyed(plan, self, seed)
     }
 
     fn track(&self, track: &Track, seed: u64) -> Track {
@@ -125,6 +128,7 @@ mod tests {
         cant_sigma_mm: 0.0,
         balise_sigma_m: 0.0,
         track_sigma_m: 0.0,
+        track_points_m: 120.0,
     };
 
     fn line() -> Track {

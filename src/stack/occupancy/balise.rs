@@ -28,17 +28,15 @@ impl Occupancy {
             return;
         }
         self.advance();
-        self.unknown_m = 0.0;
         let place = (element, along_m);
         if self.hypotheses.is_empty() {
             self.start_at_balise(time, place);
         } else {
-            // The right one may have been dropped, with no more than that probability.
-            if !self
-                .hypotheses
-                .iter()
-                .any(|h| h.runs_over(place, &self.settings))
-            {
+            let is_expected = (self.hypotheses.iter()).any(|h| h.runs_over(place, &self.settings));
+            if is_expected {
+                self.unknown_m = self.unknown_m.min(SIGMA_M);
+            } else {
+                // The right one may have been dropped, with no more than that probability.
                 let least_log = self.settings.least_probability.ln();
                 self.add_at(time, place, least_log);
             }

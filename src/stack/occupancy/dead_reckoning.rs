@@ -1,16 +1,22 @@
 //! What the train has run and turned by its own speed and yaw rate, and hypotheses carried on by that.
 //!
 //! From one reading to the next both change evenly. A speed that is missing, or of a wheel that slides or slips, makes
-//! what was run less known: the standard deviation of that adds up until a fix or a balise.
+//! what was run less known: the standard deviation of that adds up until a fix or a balise. A yaw rate that is missing
+//! makes what was turned less known.
 
 use super::{Method, Occupancy};
 use crate::bus::SimTime;
+use std::f64::consts::PI;
 
 /// Inputs beyond these are no measurements of a train.
 const MOST_MPS: f64 = 200.0;
 const MOST_RADPS: f64 = 10.0;
-/// A speed or a yaw rate is not known any more after a longer silence, seconds.
+/// A speed is not known any more after a longer silence, seconds.
 const SILENCE_S: f64 = 2.0;
+/// Nor is a yaw rate: within half a second no train begins to turn by more than a map's headings are off.
+const YAW_SILENCE_S: f64 = 0.5;
+/// A train turns no faster, radians a second (20 m/s on a radius of 200 m).
+const TURN_RADPS: f64 = 0.1;
 /// A wheel that is off the train's speed by less than this share of it is not yet said to slide or slip. Each maker of
 /// slide protection has its own rule.
 const UNSEEN_SLIDE_SHARE: f64 = 0.1;
@@ -28,6 +34,8 @@ pub struct TrainRun {
     pub seconds: f64,
     /// Variance of the length for want of a speed.
     pub unknown_m2: f64,
+    /// Variance of what was turned for want of a yaw rate.
+    pub unknown_rad2: f64,
 }
 
 /// The speed since the last input.
@@ -54,18 +62,23 @@ impl Occupancy {
         if !(speed_mps.abs() <= MOST_MPS && self.run_to(time)) {
             return;
         }
-        if let Some((before, held_mps)) = self.speed {
-            let most_mps = SLIDE_MPS2 * time.since(before);
-            let change_mps = (speed_mps - held_mps).clamp(-most_mps, most_mps);
-            self.set_speed(time, held_mps + change_mps);
-            self.sliding_since.get_or_insert(before);
-        }
+        let Some((before, held_mps)) = self.speed else {
+            // It may as well stand: the doubt is as large as the speed.
+            self.speed = Some((time, speed_mps));
+            self.sliding_since = Some(time.plus(-speed_mps.abs() / SLIDE_MPS2));
+            return;
+        };
+        let most_mps = SLIDE_MPS2 * time.since(before);
+        let change_mps = (speed_mps - held_mps).clamp(-most_mps, most_mps);
+        self.set_speed(time, held_mps + change_mps);
+        self.sliding_since.get_or_insert(before);
     }
 
     /// Takes the yaw rate, to the left positive.
     pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
         if yaw_rate_radps.abs() <= MOST_RADPS && self.run_to(time) {
             self.turned_rad += change_since(self.yaw_rate, (time, yaw_rate_radps));
+            self.unknown_rad = 0.0;
             self.yaw_rate = Some((time, yaw_rate_radps));
         }
     }
@@ -91,12 +104,17 @@ impl Occupancy {
         self.unknown_m += speed.unknown_mps * seconds;
         self.pending.unknown_m2 += self.unknown_m.powi(2) - before_m2;
         self.turned_rad += held(self.yaw_rate, time) * seconds;
+        if !self.has_yaw_rate(time) {
+            let before_rad2 = self.unknown_rad.powi(2);
+            self.unknown_rad = (self.unknown_rad + TURN_RADPS * seconds).min(PI);
+            self.pending.unknown_rad2 += self.unknown_rad.powi(2) - before_rad2;
+        }
         self.pending.length_m += run_m;
         self.pending.seconds += seconds;
         self.run_m += run_m;
         self.since_heading_m += run_m.abs();
         if self.since_heading_m >= HEADING_EVERY_M {
-            self.compare_headings();
+            self.compare_headings(time);
         }
         true
     }
@@ -119,10 +137,15 @@ impl Occupancy {
         }
     }
 
-    fn compare_headings(&mut self) {
+    /// Whether the yaw rate is known.
+    fn has_yaw_rate(&self, time: SimTime) -> bool {
+        (self.yaw_rate).is_some_and(|(at, _)| time.since(at) <= YAW_SILENCE_S)
+    }
+
+    fn compare_headings(&mut self, time: SimTime) {
         self.since_heading_m = 0.0;
         self.advance();
-        if self.yaw_rate.is_some() && self.settings.method == Method::Fused {
+        if self.has_yaw_rate(time) && self.settings.method == Method::Fused {
             let (network, settings) = (&self.network, &self.settings);
             for hypothesis in &mut self.hypotheses {
                 hypothesis.update_heading(network, self.turned_rad, settings);

@@ -81,7 +81,8 @@ impl Hypothesis {
         let moves = run_m.abs() > STANDING_MPS * seconds;
         let speed_m2 = settings.speed_sigma_mps.powi(2) * seconds * SPEED_CORRELATION_S;
         self.covariance[(PLACE, PLACE)] += if moves { speed_m2 } else { 0.0 } + run.unknown_m2;
-        self.covariance[(HEADING, HEADING)] += settings.yaw_rate_sigma_radps.powi(2) * seconds;
+        self.covariance[(HEADING, HEADING)] +=
+            settings.yaw_rate_sigma_radps.powi(2) * seconds + run.unknown_rad2;
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * seconds;
         for k in [EAST, NORTH] {
             self.covariance[(k, k)] += (1.0 - keep * keep) * self.fix_variance_m2;

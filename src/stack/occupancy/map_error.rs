@@ -2,9 +2,10 @@
 //!
 //! The track lies so far to the left of where it is mapped, and is turned by so much: m and h = dm/ds along the run s.
 //! Both are a Gauss-Markov process of second order (Matern's covariance with smoothness 3/2), m with the standard
-//! deviation of the map and correlated over a length, h with that deviation divided by the length. So what a map has wrong of a heading
-//! is bounded, however far a train runs, and two tracks side by side, each with an error of its own, cannot be told
-//! apart by it; and where a leg turns by more than a map can be wrong, it is told by that at once.
+//! deviation of the map and correlated over a length, h with that deviation divided by the length. So what a map has wrong
+//! of a heading is bounded, however far a train runs, and two tracks side by side, each with an error of its own, cannot
+//! be told apart by it; and where a leg turns by more than a map can be wrong, it is told by that at once. A map whose
+//! errors change over a shorter length than this has headings that are worse than believed.
 //!
 //! For a run of s, with a = 1 / length, the transition is exp(-a s) (1 + a s, s; -a^2 s, 1 - a s); what is new has the
 //! covariance that keeps the process as it is.
@@ -12,13 +13,15 @@
 use super::settings::OccupancySettings;
 use nalgebra::Matrix2;
 
-/// Metres: errors of places 67 m apart have a correlation of one half, as between points surveyed every 120 m.
-const LENGTH_M: f64 = 40.0;
-
 /// Covariance of m, in metres, and h, in radians, where no fix or heading has said anything of them.
 pub fn stationary(settings: &OccupancySettings) -> Matrix2<f64> {
     let aside_m2 = settings.map_sigma_m.powi(2);
-    Matrix2::new(aside_m2, 0.0, 0.0, aside_m2 / LENGTH_M.powi(2))
+    Matrix2::new(
+        aside_m2,
+        0.0,
+        0.0,
+        aside_m2 / settings.map_correlation_m.powi(2),
+    )
 }
 
 /// What becomes of m and h over a run.
@@ -31,9 +34,10 @@ pub struct MapErrorChange {
 impl MapErrorChange {
     /// Over a run, backwards below 0.
     pub fn over_run(run_m: f64, settings: &OccupancySettings) -> Self {
-        let x = run_m.abs() / LENGTH_M;
+        let length_m = settings.map_correlation_m;
+        let x = run_m.abs() / length_m;
         let transition =
-            Matrix2::new(1.0 + x, run_m, -run_m / LENGTH_M.powi(2), 1.0 - x) * (-x).exp();
+            Matrix2::new(1.0 + x, run_m, -run_m / length_m.powi(2), 1.0 - x) * (-x).exp();
         let stationary = stationary(settings);
         Self {
             transition,

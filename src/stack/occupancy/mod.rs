@@ -7,7 +7,10 @@
 //! Nothing is decided before a fix lies on the map or a balise of the map is read.
 //!
 //! What it cannot do: where tracks lie side by side, a receiver whose fixes drift by about half a metre a second for
-//! half a minute, while it states that they are good, makes it certain of a wrong track until the drift has ended.
+//! half a minute, while it states that they are good, makes it certain of a wrong track until the drift has ended. The
+//! same do errors of fixes that last for much longer than [`OccupancySettings::correlation_s`] while a train stands or
+//! creeps, and a map whose errors change over less than [`OccupancySettings::map_correlation_m`], where a yaw rate is
+//! held against it.
 //!
 //! Theory: Guo et al. 2020 (see [`Method::Pedal`]) for hypotheses, pedal curve, pruning and the six classes of a
 //! decision; Gerlach and Hoppe 2009 for the baseline; [`Method::Fused`] is a bank of extended Kalman filters with
@@ -108,6 +111,8 @@ pub struct Occupancy {
     /// Standard deviation, for want of a speed, of what was run since the last fix or balise: a train that brakes slides
     /// the same way again and again, so that errors add up.
     unknown_m: f64,
+    /// Standard deviation of what was turned since the last yaw rate.
+    unknown_rad: f64,
     yaw_rate: Option<(SimTime, f64)>,
     speed_filter: pedal::SpeedFilter,
     /// What the hypotheses have not been carried on by yet.
@@ -138,6 +143,7 @@ impl Occupancy {
             speed: None,
             sliding_since: None,
             unknown_m: 0.0,
+            unknown_rad: 0.0,
             yaw_rate: None,
             speed_filter: pedal::SpeedFilter::default(),
             pending: TrainRun::default(),
@@ -169,7 +175,8 @@ impl Occupancy {
         let Some(judged) = self.trust.judge(fix, at, &self.settings) else {
             return;
         };
-        self.unknown_m = 0.0;
+        // After a fix the run is known no better than by it.
+        self.unknown_m = self.unknown_m.min(judged.fix.covariance_m2.trace().sqrt());
         let fix = &judged.fix;
         self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);

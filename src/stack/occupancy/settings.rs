@@ -44,6 +44,9 @@ settings! {
         most_hypotheses: u32 = 400, in 2.0..=1e5;
         /// Of the surveyed map across the track, metres.
         map_sigma_m: f64 = 0.3, in 1e-3..=100.0;
+        /// Along the track, correlation length of that, metres: errors of places 1.7 times as far apart have a correlation
+        /// of one half. A third of the distance between the map's surveyed or drawn points.
+        map_correlation_m: f64 = 40.0, in 1.0..=1e4;
         /// Share of a fix's variance that changes slowly.
         correlated_share: f64 = 0.8, in 0.0..=1.0;
         /// Time constant of that, seconds.

@@ -8,17 +8,15 @@
 //! Every error is interpolated between independent normal ones, and scaled so that its standard deviation is the same
 //! everywhere.
 
-use super::CONTROL_M;
+use super::SurveySettings;
 use crate::track::plan::PlanNetwork;
 use crate::twin::random::Stream;
 use nalgebra::{Point2, Vector2};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
 
-/// Over this distance from an end of a track the joint's error goes over into the track's own.
-const JOINED_M: f64 = CONTROL_M;
-
-/// A plan with the errors of a seed, of a standard deviation on each axis.
-pub fn surveyed(plan: &PlanNetwork, sigma_m: f64, seed: u64) -> PlanNetwork {
+/// A plan with the errors of a seed.
+pub fn surveyed(plan: &PlanNetwork, settings: &SurveySettings, seed: u64) -> PlanNetwork {
+    let (sigma_m, apart_m) = (settings.track_sigma_m, settings.track_points_m);
     if sigma_m == 0.0 {
         return plan.clone();
     }
@@ -26,16 +24,18 @@ pub fn surveyed(plan: &PlanNetwork, sigma_m: f64, seed: u64) -> PlanNetwork {
     let axes = ["east", "north"].map(|axis| {
         let tracks = plan.elements.iter();
         AxisErrors {
+            apart_m,
             common: stream(&format!("{axis} control")),
             joints: stream(&format!("{axis} joints")),
             tracks: tracks
-                .map(|e| stream(&format!("{axis} {}", e.id)))
+                .map(|e| stream(&format!("{axis} track {}", e.id)))
                 .collect(),
         }
     });
     plan.displaced(|element, along_m, place| {
         let left_m = plan.elements[element].length_m() - along_m;
-        let inward = (along_m.min(left_m) / JOINED_M).clamp(0.0, 1.0);
+        // Over the distance of two points the joint's error goes over into the track's own.
+        let inward = (along_m.min(left_m) / apart_m).clamp(0.0, 1.0);
         let error = |axis: &AxisErrors| axis.at((element, along_m), place, inward);
         Vector2::new(error(&axes[0]), error(&axes[1])) * (sigma_m * FRAC_1_SQRT_2)
     })
@@ -43,6 +43,8 @@ pub fn surveyed(plan: &PlanNetwork, sigma_m: f64, seed: u64) -> PlanNetwork {
 
 /// Of one axis; all of standard deviation 1.
 struct AxisErrors {
+    /// Distance of the points between which they are interpolated.
+    apart_m: f64,
     common: Stream,
     joints: Stream,
     tracks: Vec<Stream>,
@@ -52,36 +54,36 @@ impl AxisErrors {
     /// Of both halves together, at a place of a track; `inward` is 0 at its ends and 1 where joints count no more.
     fn at(&self, (track, along_m): (usize, f64), place: &Point2<f64>, inward: f64) -> f64 {
         let (of_track, of_joint) = (FRAC_PI_2 * inward).sin_cos();
-        in_plane(&self.common, place)
-            + of_joint * in_plane(&self.joints, place)
-            + of_track * along(&self.tracks[track], along_m)
+        self.in_plane(&self.common, place)
+            + of_joint * self.in_plane(&self.joints, place)
+            + of_track * self.along(&self.tracks[track], along_m)
     }
-}
 
-/// Between points every [`CONTROL_M`] of a line.
-fn along(stream: &Stream, along_m: f64) -> f64 {
-    let (before, share) = split(along_m);
-    let weights = [1.0 - share, share];
-    let values = [0, 1].map(|k| stream.normal((before + k) as u64));
-    interpolated(weights.into_iter().zip(values))
-}
+    /// Between points of a line.
+    fn along(&self, stream: &Stream, along_m: f64) -> f64 {
+        let (before, share) = self.split(along_m);
+        let weights = [1.0 - share, share];
+        let values = [0, 1].map(|k| stream.normal((before + k) as u64));
+        interpolated(weights.into_iter().zip(values))
+    }
 
-/// Between points every [`CONTROL_M`] of a square grid.
-fn in_plane(stream: &Stream, place: &Point2<f64>) -> f64 {
-    let ((east, x), (north, y)) = (split(place.x), split(place.y));
-    let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| {
-        let weight = [1.0 - x, x][i] * [1.0 - y, y][j];
-        let [column, row] = [east + i as i64, north + j as i64].map(|n| n as u32);
-        let value = stream.normal(u64::from(column) << 32 | u64::from(row));
-        (weight, value)
-    });
-    interpolated(corners.into_iter())
-}
+    /// Between points of a square grid.
+    fn in_plane(&self, stream: &Stream, place: &Point2<f64>) -> f64 {
+        let ((east, x), (north, y)) = (self.split(place.x), self.split(place.y));
+        let corners = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(i, j)| {
+            let weight = [1.0 - x, x][i] * [1.0 - y, y][j];
+            let [column, row] = [east + i as i64, north + j as i64].map(|n| n as u32);
+            let value = stream.normal(u64::from(column) << 32 | u64::from(row));
+            (weight, value)
+        });
+        interpolated(corners.into_iter())
+    }
 
-/// The number of the last point before a place, and which share of the way to the next one lies between.
-fn split(m: f64) -> (i64, f64) {
-    let x = m / CONTROL_M;
-    (x.floor() as i64, x - x.floor())
+    /// The number of the last point before a place, and which share of the way to the next one lies between.
+    fn split(&self, m: f64) -> (i64, f64) {
+        let x = m / self.apart_m;
+        (x.floor() as i64, x - x.floor())
+    }
 }
 
 /// A mean of independent numbers, by weights, with the standard deviation of each of them.
@@ -98,6 +100,16 @@ mod tests {
     use crate::track::{Direction, Tunnel};
 
     const SIGMA_M: f64 = 0.5;
+    const SETTINGS: SurveySettings = SurveySettings {
+        along_sigma_m: 0.0,
+        across_sigma_m: 0.0,
+        height_sigma_m: 0.0,
+        control_sigma_m: 0.0,
+        cant_sigma_mm: 0.0,
+        balise_sigma_m: 0.0,
+        track_sigma_m: SIGMA_M,
+        track_points_m: 120.0,
+    };
     const SEEDS: u64 = 400;
 
     fn terminus() -> PlanNetwork {
@@ -124,7 +136,7 @@ mod tests {
         let length_m = plan.elements[0].length_m();
         for m in [0.0, 20.0, 60.0, 150.0, 180.0, 240.0, length_m] {
             let rms = rms_m(|seed| {
-                let map = surveyed(&plan, SIGMA_M, seed);
+                let map = surveyed(&plan, &SETTINGS, seed);
                 map.elements[0].at(m).0 - plan.elements[0].at(m).0
             });
             // The points of the plan are some metres apart: between them errors are interpolated.
@@ -136,7 +148,7 @@ mod tests {
     #[test]
     fn tracks_meet_and_toes_are_off_by_themselves() {
         let plan = terminus();
-        let map = surveyed(&plan, SIGMA_M, 1);
+        let map = surveyed(&plan, &SETTINGS, 1);
         let ends = (0..plan.elements.len()).flat_map(|element| {
             [Direction::Down, Direction::Up].map(|way| ElementEnd { element, way })
         });
@@ -156,7 +168,7 @@ mod tests {
         }
         assert!(joints > 10);
         let apart = rms_m(|seed| {
-            let map = surveyed(&plan, SIGMA_M, seed);
+            let map = surveyed(&plan, &SETTINGS, seed);
             let off = |m: f64| map.elements[0].at(m).0 - plan.elements[0].at(m).0;
             off(plan.elements[0].length_m()) - off(0.0)
         });
@@ -172,13 +184,13 @@ mod tests {
         };
         let plan = PlanNetwork::new(None, vec![track("one", 0.0), track("other", 4.0)], &[]);
         let between = rms_m(|seed| {
-            let map = surveyed(&plan, SIGMA_M, seed);
+            let map = surveyed(&plan, &SETTINGS, seed);
             let off = |k: usize| map.elements[k].at(240.0).0 - plan.elements[k].at(240.0).0;
             off(1) - off(0)
         });
         assert!((0.9..1.1).contains(&(between / SIGMA_M)), "{between}");
         let turned_rad = rms_m(|seed| {
-            let map = surveyed(&plan, SIGMA_M, seed);
+            let map = surveyed(&plan, &SETTINGS, seed);
             let heading =
                 |k: usize| (map.elements[k].at(330.0).0 - map.elements[k].at(270.0).0) / 60.0;
             heading(1) - heading(0)

@@ -182,4 +182,9 @@ fn recorded_runs_are_never_wrong_with_certainty() {
         println!("{name:6} {} {p50_us:.0} {p99_us:.0}", counts.text());
         assert_eq!(counts.wrong_confident(), 0, "{name}: wrong with certainty");
     }
+    let known = recorded.runs.iter().filter(|run| run.known.is_some());
+    assert!(
+        known.count() > 0,
+        "occupancy/truth.csv holds none of the runs"
+    );
 }

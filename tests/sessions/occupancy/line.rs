@@ -129,9 +129,14 @@ pub fn two_tracks(length_m: f64) -> PlanNetwork {
 }
 
 /// As surveyed with an error on each axis.
-pub fn map_of(world: &PlanNetwork, track_sigma_m: f64, seed: u64) -> PlanNetwork {
+pub fn map_of(
+    world: &PlanNetwork,
+    (track_sigma_m, track_points_m): (f64, f64),
+    seed: u64,
+) -> PlanNetwork {
     let survey = SurveySettings {
         track_sigma_m,
+        track_points_m,
         ..SurveySettings::default()
     };
     survey.surveyed(world, seed)

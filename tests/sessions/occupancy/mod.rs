@@ -12,14 +12,35 @@ mod tally;
 
 use line::{ONE_IN_9, ONE_IN_12, ONE_IN_18_5, Turnout, line, map_of, two_tracks};
 use metrotwin::stack::occupancy::{Method, OccupancySettings};
+use metrotwin::track::plan::PlanNetwork;
 use nalgebra::Matrix2;
 use run::{AS_BELIEVED, FixErrors, Run, along_first, over_line};
 use std::f64::consts::FRAC_1_SQRT_2;
 use std::sync::Arc;
 use tally::{Tally, table};
 
-/// That the filter takes for the map's standard deviation.
-const MAP_SIGMA_M: f64 = 0.3;
+/// What is wrong with a map, and what the filter takes it for.
+#[derive(Clone, Copy)]
+struct MapErrors {
+    sigma_m: f64,
+    /// Distance of surveyed points.
+    points_m: f64,
+    believed_sigma_m: f64,
+    believed_correlation_m: f64,
+}
+
+/// As the filter's defaults have it.
+const MAP_AS_BELIEVED: MapErrors = MapErrors {
+    sigma_m: 0.3,
+    points_m: 120.0,
+    believed_sigma_m: 0.3,
+    believed_correlation_m: 40.0,
+};
+/// Half as far off again.
+const MAP_WORSE: MapErrors = MapErrors {
+    sigma_m: 0.45,
+    ..MAP_AS_BELIEVED
+};
 const STAGES: usize = 42;
 const SPEEDS_KMH: [f64; 5] = [20.0, 40.0, 60.0, 80.0, 100.0];
 const WHITE: FixErrors = FixErrors {
@@ -33,8 +54,7 @@ struct Runs<'a> {
     method: Method,
     errors: FixErrors,
     turnout: Turnout,
-    map_sigma_m: f64,
-    believed_map_m: f64,
+    map: MapErrors,
     speeds_kmh: &'a [f64],
     seeds: u64,
     with_gyro: bool,
@@ -45,26 +65,38 @@ const FUSED: Runs<'_> = Runs {
     method: Method::Fused,
     errors: AS_BELIEVED,
     turnout: ONE_IN_9,
-    map_sigma_m: 1.5 * MAP_SIGMA_M,
-    believed_map_m: MAP_SIGMA_M,
+    map: MAP_WORSE,
     speeds_kmh: &SPEEDS_KMH,
     seeds: 4,
     with_gyro: true,
     reversed: false,
 };
 
+impl MapErrors {
+    fn believed(&self) -> OccupancySettings {
+        OccupancySettings {
+            map_sigma_m: self.believed_sigma_m,
+            map_correlation_m: self.believed_correlation_m,
+            ..OccupancySettings::default()
+        }
+    }
+
+    fn map_of(&self, world: &PlanNetwork, seed: u64) -> PlanNetwork {
+        map_of(world, (self.sigma_m, self.points_m), seed)
+    }
+}
+
 impl Runs<'_> {
     fn tally(&self) -> Tally {
         let world = line(&self.turnout, STAGES);
         let settings = OccupancySettings {
             method: self.method,
-            map_sigma_m: self.believed_map_m,
-            ..OccupancySettings::default()
+            ..self.map.believed()
         };
         let mut tally = Tally::default();
         tally.parallel_from_m = self.turnout.change_m() + 5.0;
         for seed in 0..self.seeds {
-            let map = Arc::new(map_of(&world, self.map_sigma_m, seed));
+            let map = Arc::new(self.map.map_of(&world, seed));
             for speed_kmh in self.speeds_kmh {
                 let run = Run {
                     errors: self.errors,
@@ -183,8 +215,11 @@ fn val_turnouts_that_fit_the_speed() {
             ..FUSED
         };
         let good_map = Runs {
-            map_sigma_m: 0.15,
-            believed_map_m: 0.1,
+            map: MapErrors {
+                sigma_m: 0.15,
+                believed_sigma_m: 0.1,
+                ..MAP_AS_BELIEVED
+            },
             ..runs
         };
         rows.push((format!("fused, {}", turnout.name), runs.tally()));
@@ -255,7 +290,7 @@ fn val_other_errors_make_no_false_certainty() {
 #[test]
 fn val_probabilities_are_calibrated() {
     let as_believed = Runs {
-        map_sigma_m: MAP_SIGMA_M,
+        map: MAP_AS_BELIEVED,
         seeds: 10,
         ..FUSED
     };
@@ -268,7 +303,7 @@ fn val_probabilities_are_calibrated() {
         ("switches, no yaw rate", no_yaw_rate.tally()),
         (
             "beside a parallel track",
-            beside_a_parallel_track(MAP_SIGMA_M, 1000),
+            beside_a_parallel_track(MAP_AS_BELIEVED, 1000),
         ),
     ] {
         of.calibration.print(title);
@@ -278,7 +313,7 @@ fn val_probabilities_are_calibrated() {
 }
 
 /// Starts from nothing on one of two tracks that never meet.
-fn beside_a_parallel_track(map_sigma_m: f64, seeds: u64) -> Tally {
+fn beside_a_parallel_track(errors: MapErrors, seeds: u64) -> Tally {
     let world = two_tracks(3000.0);
     let mut tally = Tally::default();
     for seed in 0..seeds {
@@ -289,22 +324,49 @@ fn beside_a_parallel_track(map_sigma_m: f64, seeds: u64) -> Tally {
             with_gyro: true,
             reversed: false,
         };
-        let map = Arc::new(map_of(&world, map_sigma_m, seed));
-        along_first(
-            (&world, map),
-            &OccupancySettings::default(),
-            &run,
-            &mut tally,
-        );
+        let map = Arc::new(errors.map_of(&world, seed));
+        along_first((&world, map), &errors.believed(), &run, &mut tally);
     }
     tally
 }
 
+/// Maps whose points are nearer to each other than the filter believes turn more than it believes; where it is told, and
+/// where they are only half as far apart, nothing wrong grows certain.
+#[test]
+fn val_maps_of_nearer_points() {
+    let half_as_far = MapErrors {
+        points_m: 60.0,
+        ..MAP_WORSE
+    };
+    let near = MapErrors {
+        points_m: 25.0,
+        ..MAP_WORSE
+    };
+    let told = MapErrors {
+        believed_correlation_m: 8.0,
+        ..near
+    };
+    let mut rows = Vec::new();
+    for (name, map) in [
+        ("60 m, 120 m believed", half_as_far),
+        ("25 m, told", told),
+        ("25 m, 120 m believed", near),
+    ] {
+        rows.push((name.to_owned(), Runs { map, ..FUSED }.tally()));
+        let parallel = beside_a_parallel_track(map, 100);
+        rows.push((format!("parallel, {name}"), parallel));
+    }
+    table("1 in 9, distances of a map's points", &rows);
+    for (name, of) in &rows[..4] {
+        assert_eq!(of.classes[0], 0, "{name}: wrong with certainty");
+    }
+}
+
 /// A start from nothing beside a parallel track, without a switch: fixes alone hardly tell the tracks, and nothing else
-/// does; so nothing may grow certain that is wrong, however long it takes.
+/// does; so nothing may grow certain that is wrong over 3 km.
 #[test]
 fn val_beside_a_parallel_track_nothing_wrong_grows_certain() {
-    let tally = beside_a_parallel_track(1.5 * MAP_SIGMA_M, 300);
+    let tally = beside_a_parallel_track(MAP_WORSE, 300);
     let [wc, wf, wu, cu, cf, cc] = tally.classes;
     println!(
         "\nfrom nothing beside a parallel track: wc {wc}, wf {wf}, wu {wu}, cu {cu}, cf {cf}, cc {cc}"

@@ -12,7 +12,7 @@ pub struct AtSwitch {
     /// Beyond the toe, where only one leg was left and it stayed so to the leg's end; none where that was not
     /// before the next switch.
     pub identified_m: Option<f64>,
-    /// Whether the most probable element was the right one to the leg's end.
+    /// Whether the most probable element was the right one at the last fix before the leg's end.
     pub right: bool,
 }
 
