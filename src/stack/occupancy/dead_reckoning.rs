@@ -4,7 +4,7 @@
 //! what was run less known: the standard deviation of that adds up until a fix or a balise. A yaw rate that is missing
 //! makes what was turned less known.
 
-use super::{Method, Occupancy};
+use super::{Method, Occupancy, headings};
 use crate::bus::SimTime;
 use std::f64::consts::PI;
 
@@ -143,13 +143,12 @@ impl Occupancy {
     }
 
     fn compare_headings(&mut self, time: SimTime) {
-        self.since_heading_m = 0.0;
+        let run_m = std::mem::take(&mut self.since_heading_m);
         self.advance();
         if self.has_yaw_rate(time) && self.settings.method == Method::Fused {
             let (network, settings) = (&self.network, &self.settings);
-            for hypothesis in &mut self.hypotheses {
-                hypothesis.update_heading(network, self.turned_rad, settings);
-            }
+            let turned = (self.turned_rad, run_m);
+            headings::compare_headings(&mut self.hypotheses, network, turned, settings);
             self.tidy();
             return;
         }

@@ -11,13 +11,13 @@ use super::fix_error::{JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
     ASIDE, EAST, HEADING, Hypothesis, NEAR_M, NORTH, PLACE, SCALE, STATES, State, StateCovariance,
-    TURNED, YAW_OFFSET, log_sum,
+    TURNED, YAW_OFFSET, log_sum, wrapped,
 };
 use super::map_error::{self, MapErrorChange};
 use super::settings::OccupancySettings;
 use crate::track::plan::PlanNetwork;
 use nalgebra::{Matrix2, RowSVector, SMatrix, Vector2};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::TAU;
 
 /// Of the place of a new hypothesis, before its first fix is taken in.
 const NEW_PLACE_SIGMA_M: f64 = 100.0;
@@ -145,13 +145,14 @@ impl Hypothesis {
         }
     }
 
-    /// Takes in the sum of yaw rates since the start.
+    /// Takes in the sum of yaw rates since the start. Gives the heading of the car on the map, and the logarithm of the
+    /// likelihood of what was found.
     pub fn update_heading(
         &mut self,
         network: &PlanNetwork,
         turned_rad: f64,
         settings: &OccupancySettings,
-    ) {
+    ) -> (f64, f64) {
         let mapped = self.mapped_heading(network, settings);
         let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - mapped.here_rad);
         let mut measured = RowSVector::<f64, STATES>::zeros();
@@ -165,13 +166,11 @@ impl Hypothesis {
             (1.0 - WRONG_HEADING).ln() - 0.5 * (off * off / variance + (TAU * variance).ln());
         let wrong_log = (WRONG_HEADING / TAU).ln();
         let both = log_sum(fits_log, wrong_log);
-        if !both.is_finite() {
-            return;
-        }
-        self.log_probability += both;
         if fits_log > wrong_log {
             self.correct_by(&across, off, variance);
         }
+        // What is no number is dropped with the state that it comes from.
+        (mapped.here_rad, both.max(wrong_log))
     }
 
     /// Its slope is taken over one standard deviation of the place to both sides. So a kink at a mapped point hardly
@@ -259,9 +258,4 @@ fn log_density(off: &Vector2<f64>, spread: &Matrix2<f64>) -> f64 {
         }
         _ => f64::NEG_INFINITY,
     }
-}
-
-/// Between -pi and pi.
-fn wrapped(angle_rad: f64) -> f64 {
-    (angle_rad + PI).rem_euclid(TAU) - PI
 }

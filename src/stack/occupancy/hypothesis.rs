@@ -5,6 +5,7 @@ use super::settings::OccupancySettings;
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use std::f64::consts::{PI, TAU};
 
 /// How many numbers are estimated.
 pub const STATES: usize = 8;
@@ -41,12 +42,19 @@ pub fn log_sum(a: f64, b: f64) -> f64 {
     most + ((a - most).exp() + (b - most).exp()).ln()
 }
 
+/// Between -pi and pi.
+pub fn wrapped(angle_rad: f64) -> f64 {
+    (angle_rad + PI).rem_euclid(TAU) - PI
+}
+
 /// A course, its probability and the place along it.
 #[derive(Clone, Debug)]
 pub struct Hypothesis {
     pub course: Course,
     /// Natural logarithm.
     pub log_probability: f64,
+    /// What headings say of it, against the most probable one, and is not counted yet (see `headings`).
+    pub heading_log: f64,
     pub mean: State,
     pub covariance: StateCovariance,
     /// Of the last fix, the part of the variance that changes slowly.

@@ -45,6 +45,7 @@ mod equipment;
 mod fix_error;
 mod fix_trust;
 mod fused;
+mod headings;
 mod hypothesis;
 mod map_error;
 mod matching;

@@ -126,6 +126,7 @@ impl Occupancy {
         let mut hypothesis = Hypothesis {
             course: Course::at_place(&self.network, towards, found.along_m),
             log_probability: 0.0,
+            heading_log: 0.0,
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
             fix_variance_m2: 0.0,

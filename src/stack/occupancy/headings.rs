@@ -1,0 +1,50 @@
+//! Which hypotheses the headings tell apart.
+//!
+//! A map is wrong about the headings of two tracks by an error of each. Where it has both parallel, to within what these
+//! errors may be, the tracks may well be parallel, and which of them has the better heading says nothing; counted for
+//! kilometres it makes a wrong track certain, the sooner the worse the map is. So what headings say is kept aside, and
+//! fades over some lengths of the map's errors, until the map has the tracks part by more than it can be wrong.
+
+use super::hypothesis::{Hypothesis, wrapped};
+use super::map_error;
+use super::settings::OccupancySettings;
+use crate::track::plan::PlanNetwork;
+use std::f64::consts::SQRT_2;
+
+/// Two mapped headings that differ by so many standard deviations of the difference are two headings.
+const PARTED_SIGMAS: f64 = 3.0;
+/// What was kept aside fades by e over so many correlation lengths of the map's errors.
+const KEPT_LENGTHS: f64 = 3.0;
+
+/// Takes the sum of yaw rates into all hypotheses, after a run since the last time.
+pub fn compare_headings(
+    hypotheses: &mut [Hypothesis],
+    network: &PlanNetwork,
+    (turned_rad, run_m): (f64, f64),
+    settings: &OccupancySettings,
+) {
+    let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
+    let mut mapped_rad = Vec::with_capacity(hypotheses.len());
+    for hypothesis in hypotheses.iter_mut() {
+        let (mapped, log) = hypothesis.update_heading(network, turned_rad, settings);
+        hypothesis.heading_log = keep * hypothesis.heading_log + log;
+        mapped_rad.push(mapped);
+    }
+    let numbers = 0..hypotheses.len();
+    let by_probability = |a: &usize, b: &usize| {
+        let [a, b] = [*a, *b].map(|k| hypotheses[k].log_probability);
+        a.total_cmp(&b)
+    };
+    let Some(most) = numbers.max_by(by_probability) else {
+        return;
+    };
+    let (most_rad, most_log) = (mapped_rad[most], hypotheses[most].heading_log);
+    let turned_m2 = map_error::stationary(settings)[(1, 1)];
+    let parted_rad = PARTED_SIGMAS * SQRT_2 * turned_m2.sqrt();
+    for (hypothesis, mapped_rad) in hypotheses.iter_mut().zip(mapped_rad) {
+        hypothesis.heading_log -= most_log;
+        if wrapped(mapped_rad - most_rad).abs() > parted_rad {
+            hypothesis.log_probability += std::mem::take(&mut hypothesis.heading_log);
+        }
+    }
+}
