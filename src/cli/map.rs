@@ -33,8 +33,10 @@ impl MapFormat {
         let text = text.trim_start_matches('\u{feff}').trim_start();
         let at = |key: &str| text.find(key).unwrap_or(usize::MAX);
         if text.starts_with('<') {
-            let railml = ["<railml", "<railML", "<infrastructure"].map(at);
-            match (at("<osm"), railml[0].min(railml[1]).min(railml[2])) {
+            let roots = ["<railml", "<railML", "<infrastructure"]
+                .into_iter()
+                .map(at);
+            match (at("<osm"), roots.min().unwrap_or(usize::MAX)) {
                 (usize::MAX, usize::MAX) => Self::Other,
                 (osm, railml) if osm < railml => Self::OsmXml,
                 _ => Self::RailMl,

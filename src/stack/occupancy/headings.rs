@@ -23,25 +23,22 @@ pub fn compare_headings(
     (turned_rad, run_m): (f64, f64),
     settings: &OccupancySettings,
 ) {
-    let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
-    let mut mapped_rad = Vec::with_capacity(hypotheses.len());
-    for hypothesis in hypotheses.iter_mut() {
-        let (mapped, log) = hypothesis.update_heading(network, turned_rad, settings);
-        hypothesis.heading_log = keep * hypothesis.heading_log + log;
-        mapped_rad.push(mapped);
-    }
-    let numbers = 0..hypotheses.len();
-    let by_probability = |a: &usize, b: &usize| {
-        let [a, b] = [*a, *b].map(|k| hypotheses[k].log_probability);
-        a.total_cmp(&b)
-    };
-    let Some(most) = numbers.max_by(by_probability) else {
+    let numbered = hypotheses.iter().map(|h| h.log_probability).enumerate();
+    let Some((most, _)) = numbered.max_by(|(_, a), (_, b)| a.total_cmp(b)) else {
         return;
     };
-    let (most_rad, most_log) = (mapped_rad[most], hypotheses[most].heading_log);
-    let turned_m2 = map_error::stationary(settings)[(1, 1)];
-    let parted_rad = PARTED_SIGMAS * SQRT_2 * turned_m2.sqrt();
-    for (hypothesis, mapped_rad) in hypotheses.iter_mut().zip(mapped_rad) {
+    let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
+    let update = |hypothesis: &mut Hypothesis| {
+        let (mapped_rad, log) = hypothesis.update_heading(network, turned_rad, settings);
+        hypothesis.heading_log = keep * hypothesis.heading_log + log;
+        mapped_rad
+    };
+    let most_rad = update(&mut hypotheses[most]);
+    let most_log = std::mem::take(&mut hypotheses[most].heading_log);
+    let turned_rad2 = map_error::stationary(settings)[(1, 1)];
+    let parted_rad = PARTED_SIGMAS * SQRT_2 * turned_rad2.sqrt();
+    for (_, hypothesis) in (hypotheses.iter_mut().enumerate()).filter(|(k, _)| *k != most) {
+        let mapped_rad = update(hypothesis);
         hypothesis.heading_log -= most_log;
         if wrapped(mapped_rad - most_rad).abs() > parted_rad {
             hypothesis.log_probability += std::mem::take(&mut hypothesis.heading_log);
