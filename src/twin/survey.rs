@@ -48,7 +48,7 @@ settings! {
         /// Of the cant, mm.
         cant_sigma_mm: f64 = 0.0, in 0.0..=20.0;
         /// Of the balises' places along the track, m. What the stack takes it to be is
-        /// `stack.protection.balise_sigma_m`.
+        /// `balise_sigma_m` of `stack.protection` and of `stack.occupancy`.
         balise_sigma_m: f64 = 0.0, in 0.0..=5.0;
         /// Of the tracks' places in plan, each way, m. What the stack takes it to be is
         /// `stack.occupancy.map_sigma_m`.

@@ -1,10 +1,9 @@
-//! What the train has run and turned by its own speed and yaw rate, and hypotheses carried on by that.
+//! What the train has run and turned by its own speed and yaw rate.
 //!
 //! From one reading to the next both change evenly. A speed that is missing, or of a wheel that slides or slips, makes
 //! what was run less known: the standard deviation of that adds up until a fix or a balise. A yaw rate that is missing
 //! makes what was turned less known.
 
-use super::{Method, Occupancy, headings};
 use crate::bus::SimTime;
 use std::f64::consts::PI;
 
@@ -12,7 +11,7 @@ use std::f64::consts::PI;
 const MOST_MPS: f64 = 200.0;
 const MOST_RADPS: f64 = 10.0;
 /// A speed is not known any more after a longer silence, seconds.
-const SILENCE_S: f64 = 2.0;
+const SPEED_SILENCE_S: f64 = 2.0;
 /// Nor is a yaw rate: within half a second no train begins to turn by more than a map's headings are off.
 const YAW_SILENCE_S: f64 = 0.5;
 /// A train turns no faster, radians a second (20 m/s on a radius of 200 m).
@@ -22,10 +21,9 @@ const TURN_RADPS: f64 = 0.1;
 const UNSEEN_SLIDE_SHARE: f64 = 0.1;
 /// Nor is one that is off by less than this.
 const UNSEEN_SLIDE_MPS: f64 = 0.3;
-/// While a wheel slides or slips the train's speed changes no faster: more, adhesion does not allow.
+/// While a wheel slides or slips the train's speed changes no faster: more, reduced adhesion does not allow (SUBSET-026-3,
+/// A.3.2, the greatest default of A_NVMAXREDADH).
 const SLIDE_MPS2: f64 = 1.0;
-/// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
-const HEADING_EVERY_M: f64 = 2.0;
 
 /// What the train has run in a time, by the measured speed.
 #[derive(Clone, Copy, Debug, Default)]
@@ -45,15 +43,64 @@ struct HeldSpeed {
     unknown_mps: f64,
 }
 
-impl Occupancy {
-    /// Takes the speed, forwards positive. What no train can have, or is older than the last input, is dropped.
-    pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
-        if speed_mps.abs() <= MOST_MPS && self.run_to(time) {
+/// Sums of speed and yaw rate.
+#[derive(Clone, Debug, Default)]
+pub struct DeadReckoning {
+    /// Of the last input.
+    time: Option<SimTime>,
+    speed: Option<(SimTime, f64)>,
+    yaw_rate: Option<(SimTime, f64)>,
+    /// Since when the wheel slides or slips.
+    sliding_since: Option<SimTime>,
+    /// Standard deviation, for want of a speed, of what was run since the last fix or balise: a train that brakes slides
+    /// the same way again and again, so that errors add up.
+    unknown_m: f64,
+    /// Standard deviation of what was turned since the last yaw rate.
+    unknown_rad: f64,
+    /// Since it was last taken.
+    pending: TrainRun,
+    /// Run since the start, less what was run backwards.
+    pub run_m: f64,
+    /// Sum of the yaw rates since the start.
+    pub turned_rad: f64,
+    /// Run since headings were compared, either way.
+    pub since_heading_m: f64,
+}
+
+impl DeadReckoning {
+    /// Sums up to a time; whether it is no older than the last input.
+    pub fn run_to(&mut self, time: SimTime) -> bool {
+        let seconds = self.time.map_or(0.0, |last| time.since(last));
+        if seconds < 0.0 {
+            return false;
+        }
+        self.time = Some(time);
+        let speed = self.held_speed(time);
+        let run_m = speed.speed_mps * seconds;
+        let before_m2 = self.unknown_m.powi(2);
+        self.unknown_m += speed.unknown_mps * seconds;
+        self.pending.unknown_m2 += self.unknown_m.powi(2) - before_m2;
+        self.turned_rad += held(self.yaw_rate, time, YAW_SILENCE_S) * seconds;
+        if !self.has_yaw_rate() {
+            let before_rad2 = self.unknown_rad.powi(2);
+            self.unknown_rad = (self.unknown_rad + TURN_RADPS * seconds).min(PI);
+            self.pending.unknown_rad2 += self.unknown_rad.powi(2) - before_rad2;
+        }
+        self.pending.length_m += run_m;
+        self.pending.seconds += seconds;
+        self.run_m += run_m;
+        self.since_heading_m += run_m.abs();
+        true
+    }
+
+    /// Takes the speed, forwards positive; whether it is one that a train can have, and no older than the last input.
+    pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) -> bool {
+        let is_taken = speed_mps.abs() <= MOST_MPS && self.run_to(time);
+        if is_taken {
             self.set_speed(time, speed_mps);
             self.sliding_since = None;
-            self.speed_filter
-                .update(time, self.settings.speed_sigma_mps);
         }
+        is_taken
     }
 
     /// Takes the speed of a wheel that slides or slips. The train's speed is taken to follow it no faster than adhesion
@@ -77,46 +124,34 @@ impl Occupancy {
     /// Takes the yaw rate, to the left positive.
     pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
         if yaw_rate_radps.abs() <= MOST_RADPS && self.run_to(time) {
-            self.turned_rad += change_since(self.yaw_rate, (time, yaw_rate_radps));
+            let reading = (time, yaw_rate_radps);
+            self.turned_rad += change_since(self.yaw_rate, reading, YAW_SILENCE_S);
             self.unknown_rad = 0.0;
-            self.yaw_rate = Some((time, yaw_rate_radps));
+            self.yaw_rate = Some(reading);
         }
     }
 
-    /// The train's speed now.
+    /// A fix or balise says where the train is, with this standard deviation: after it the run is known no worse.
+    pub fn known_to(&mut self, sigma_m: f64) {
+        self.unknown_m = self.unknown_m.min(sigma_m);
+    }
+
+    /// What was run since this was last called.
+    pub fn take_run(&mut self) -> TrainRun {
+        std::mem::take(&mut self.pending)
+    }
+
+    /// Whether the yaw rate is known now.
+    pub fn has_yaw_rate(&self) -> bool {
+        let last = self.yaw_rate.zip(self.time);
+        last.is_some_and(|((at, _), now)| now.since(at) <= YAW_SILENCE_S)
+    }
+
     fn set_speed(&mut self, time: SimTime, speed_mps: f64) {
-        let more_m = change_since(self.speed, (time, speed_mps));
+        let more_m = change_since(self.speed, (time, speed_mps), SPEED_SILENCE_S);
         self.pending.length_m += more_m;
         self.run_m += more_m;
         self.speed = Some((time, speed_mps));
-    }
-
-    /// Sums speed and yaw rate up to a time; whether it is no older than the last input.
-    pub(super) fn run_to(&mut self, time: SimTime) -> bool {
-        let seconds = self.time.map_or(0.0, |last| time.since(last));
-        if seconds < 0.0 {
-            return false;
-        }
-        self.time = Some(time);
-        let speed = self.held_speed(time);
-        let run_m = speed.speed_mps * seconds;
-        let before_m2 = self.unknown_m.powi(2);
-        self.unknown_m += speed.unknown_mps * seconds;
-        self.pending.unknown_m2 += self.unknown_m.powi(2) - before_m2;
-        self.turned_rad += held(self.yaw_rate, time) * seconds;
-        if !self.has_yaw_rate(time) {
-            let before_rad2 = self.unknown_rad.powi(2);
-            self.unknown_rad = (self.unknown_rad + TURN_RADPS * seconds).min(PI);
-            self.pending.unknown_rad2 += self.unknown_rad.powi(2) - before_rad2;
-        }
-        self.pending.length_m += run_m;
-        self.pending.seconds += seconds;
-        self.run_m += run_m;
-        self.since_heading_m += run_m.abs();
-        if self.since_heading_m >= HEADING_EVERY_M {
-            self.compare_headings(time);
-        }
-        true
     }
 
     fn held_speed(&self, time: SimTime) -> HeldSpeed {
@@ -126,73 +161,35 @@ impl Occupancy {
                 (speed_mps, unseen_mps + SLIDE_MPS2 * time.since(since))
             }
             // It may have stopped at once, or gone on.
-            (Some((at, speed_mps)), None) if time.since(at) > SILENCE_S => {
+            (Some((at, speed_mps)), None) if time.since(at) > SPEED_SILENCE_S => {
                 (0.5 * speed_mps, 0.5 * speed_mps.abs())
             }
-            (speed, _) => (held(speed, time), 0.0),
+            (speed, _) => (held(speed, time, SPEED_SILENCE_S), 0.0),
         };
         HeldSpeed {
             speed_mps,
             unknown_mps,
         }
     }
-
-    /// Whether the yaw rate is known.
-    fn has_yaw_rate(&self, time: SimTime) -> bool {
-        (self.yaw_rate).is_some_and(|(at, _)| time.since(at) <= YAW_SILENCE_S)
-    }
-
-    fn compare_headings(&mut self, time: SimTime) {
-        let run_m = std::mem::take(&mut self.since_heading_m);
-        self.advance();
-        if self.has_yaw_rate(time) && self.settings.method == Method::Fused {
-            let (network, settings) = (&self.network, &self.settings);
-            let turned = (self.turned_rad, run_m);
-            headings::compare_headings(&mut self.hypotheses, network, turned, settings);
-            self.tidy();
-            return;
-        }
-        let before = self.hypotheses.len();
-        self.grow();
-        if self.hypotheses.len() != before {
-            self.tidy();
-        }
-    }
-
-    /// Carries the hypotheses on by what was run since this was last done.
-    pub(super) fn advance(&mut self) {
-        let run = std::mem::take(&mut self.pending);
-        let speed_m2 = self.speed_variance_m2(run.seconds);
-        for hypothesis in &mut self.hypotheses {
-            match self.settings.method {
-                Method::Fused => hypothesis.advance_fused(&run, &self.settings),
-                _ => hypothesis.advance_by_speed(run.length_m, speed_m2),
-            }
-        }
-    }
-
-    /// What so many seconds more add to the variance of what was run since the last fix. From fix to fix the speed is
-    /// wrong by the same, so that the variance grows with the square of the time.
-    fn speed_variance_m2(&mut self, seconds: f64) -> f64 {
-        let [before_s, now_s] = [self.since_fix_s, self.since_fix_s + seconds];
-        self.since_fix_s = now_s;
-        self.speed_filter.sigma_mps().powi(2) * (now_s.powi(2) - before_s.powi(2))
-    }
 }
 
 /// The last reading of a quantity, as long as it is one of now; else 0.
-fn held(reading: Option<(SimTime, f64)>, time: SimTime) -> f64 {
+fn held(reading: Option<(SimTime, f64)>, time: SimTime, silence_s: f64) -> f64 {
     reading
-        .filter(|(at, _)| time.since(*at) <= SILENCE_S)
+        .filter(|(at, _)| time.since(*at) <= silence_s)
         .map_or(0.0, |(_, value)| value)
 }
 
 /// By how much more a quantity has summed up since its last reading than if it had stayed as it was then: it changes
 /// evenly from one reading to the next.
-fn change_since(last: Option<(SimTime, f64)>, (time, value): (SimTime, f64)) -> f64 {
+fn change_since(
+    last: Option<(SimTime, f64)>,
+    (time, value): (SimTime, f64),
+    silence_s: f64,
+) -> f64 {
     last.map_or(0.0, |(before, old)| {
         let seconds = time.since(before);
-        if seconds <= SILENCE_S {
+        if seconds <= silence_s {
             0.5 * (value - old) * seconds
         } else {
             0.0

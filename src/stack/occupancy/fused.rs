@@ -7,10 +7,10 @@
 //! The sum of yaw rates is the heading of the chord between the bogies, less an offset that drifts.
 
 use super::dead_reckoning::TrainRun;
-use super::fix_error::{JUMPS, slow_m2};
+use super::fix_error::{self, JUMPS, slow_m2};
 use super::fix_trust::Judged;
 use super::hypothesis::{
-    ASIDE, EAST, HEADING, Hypothesis, NEAR_M, NORTH, PLACE, SCALE, STATES, State, StateCovariance,
+    ASIDE, FIX_ERROR, HEADING, Hypothesis, NEAR_M, PLACE, SCALE, STATES, State, StateCovariance,
     TURNED, YAW_OFFSET, log_sum, wrapped,
 };
 use super::map_error::{self, MapErrorChange};
@@ -64,7 +64,7 @@ impl Hypothesis {
     /// Carries it on over a time in which so much was run, by the measured speed.
     pub(super) fn advance_fused(&mut self, run: &TrainRun, settings: &OccupancySettings) {
         let (seconds, run_m) = (run.seconds, run.length_m);
-        let keep = (-seconds / settings.correlation_s).exp();
+        let keep = fix_error::kept(seconds, settings);
         let map = MapErrorChange::over_run(run_m, settings);
         let transition = Transition {
             run_m,
@@ -84,8 +84,11 @@ impl Hypothesis {
         self.covariance[(HEADING, HEADING)] +=
             settings.yaw_rate_sigma_radps.powi(2) * seconds + run.unknown_rad2;
         self.covariance[(YAW_OFFSET, YAW_OFFSET)] += YAW_OFFSET_DRIFT.powi(2) * seconds;
-        for k in [EAST, NORTH] {
-            self.covariance[(k, k)] += (1.0 - keep * keep) * self.fix_variance_m2;
+        for (k, (keep, variance_m2)) in keep.iter().zip(self.fix_variances_m2).enumerate() {
+            let new_m2 = (1.0 - keep * keep) * variance_m2;
+            for axis in [FIX_ERROR + 2 * k, FIX_ERROR + 2 * k + 1] {
+                self.covariance[(axis, axis)] += new_m2;
+            }
         }
         let mut of_map = self.covariance.fixed_view_mut::<2, 2>(ASIDE, ASIDE);
         of_map += map.new;
@@ -102,7 +105,6 @@ impl Hypothesis {
         let (mapped, forward) = self.course.at(network, self.place_m());
         let slow_m2 = slow_m2(covariance, &forward, settings);
         let ways = self.error_ways(judged, &slow_m2, settings);
-        self.fix_variance_m2 = 0.5 * slow_m2.trace();
         self.fix_time = judged.fix.time;
         self.kind = Some(judged.kind);
         let place = mapped + left_of(&forward) * self.mean[ASIDE];
@@ -111,9 +113,10 @@ impl Hypothesis {
         let of_state = spread(&self.covariance, &forward);
         let place_m2 = spread_of_place(&self.covariance, &forward);
         let found = ways.map(|way| {
-            let spread = white + way.more_m2 + if way.is_own { place_m2 } else { of_state };
-            let log = way.probability.ln() + log_density(&(fix - place - way.error_m), &spread);
-            (log, spread)
+            let of_error = if way.is_own { place_m2 } else { of_state };
+            let spread = white + fix_error::sum_m2(&way.more_m2) + of_error;
+            let off = fix - place - fix_error::sum(&way.error_m);
+            (way.probability.ln() + log_density(&off, &spread), spread)
         });
         let all = found.iter().map(|(log, _)| *log).reduce(log_sum);
         let most = (0..found.len()).max_by(|a, b| found[*a].0.total_cmp(&found[*b].0));
@@ -124,7 +127,8 @@ impl Hypothesis {
         let (way, (_, spread)) = (&ways[most], &found[most]);
         self.has_jumped = most >= JUMPS;
         self.set_error(way);
-        self.correct(&forward, &(fix - place - way.error_m), spread);
+        let off = fix - place - self.error_m();
+        self.correct(&forward, &off, spread);
     }
 
     /// Kalman's update with what was found of place and error together.
@@ -199,8 +203,8 @@ impl Hypothesis {
 struct Transition {
     run_m: f64,
     seconds: f64,
-    /// Of the error of fixes.
-    keep: f64,
+    /// Of the two parts of the error of fixes.
+    keep: [f64; 2],
     map: Matrix2<f64>,
 }
 
@@ -210,8 +214,9 @@ impl Transition {
         for mut state in columns.column_iter_mut() {
             state[PLACE] += self.run_m * state[SCALE];
             state[HEADING] += self.seconds * state[YAW_OFFSET];
-            state[EAST] *= self.keep;
-            state[NORTH] *= self.keep;
+            for axis in 0..4 {
+                state[FIX_ERROR + axis] *= self.keep[axis / 2];
+            }
             let (aside, turned) = (state[ASIDE], state[TURNED]);
             state[ASIDE] = self.map[(0, 0)] * aside + self.map[(0, 1)] * turned;
             state[TURNED] = self.map[(1, 0)] * aside + self.map[(1, 1)] * turned;
@@ -225,7 +230,8 @@ fn across(covariance: &StateCovariance, forward: &Vector2<f64>) -> SMatrix<f64, 
     SMatrix::from_fn(|k, axis| {
         forward[axis] * covariance[(k, PLACE)]
             + left[axis] * covariance[(k, ASIDE)]
-            + covariance[(k, EAST + axis)]
+            + covariance[(k, FIX_ERROR + axis)]
+            + covariance[(k, FIX_ERROR + 2 + axis)]
     })
 }
 
@@ -233,7 +239,10 @@ fn across(covariance: &StateCovariance, forward: &Vector2<f64>) -> SMatrix<f64, 
 fn spread(covariance: &StateCovariance, forward: &Vector2<f64>) -> Matrix2<f64> {
     let (across, left) = (across(covariance, forward), left_of(forward));
     Matrix2::from_fn(|i, j| {
-        forward[i] * across[(PLACE, j)] + left[i] * across[(ASIDE, j)] + across[(EAST + i, j)]
+        forward[i] * across[(PLACE, j)]
+            + left[i] * across[(ASIDE, j)]
+            + across[(FIX_ERROR + i, j)]
+            + across[(FIX_ERROR + 2 + i, j)]
     })
 }
 

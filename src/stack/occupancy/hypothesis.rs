@@ -1,14 +1,16 @@
 //! One way that the train may have come and go, and where it then is.
 
+use super::balise::DoubtedGroup;
 use super::course::Course;
+use super::fix_error;
 use super::settings::OccupancySettings;
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
-use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
+use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
 use std::f64::consts::{PI, TAU};
 
 /// How many numbers are estimated.
-pub const STATES: usize = 8;
+pub const STATES: usize = 10;
 /// Place of the antenna along the course, metres.
 pub const PLACE: usize = 0;
 /// Error of the speed's scale.
@@ -17,14 +19,13 @@ pub const SCALE: usize = 1;
 pub const HEADING: usize = 2;
 /// Offset of the yaw rate, radians a second.
 pub const YAW_OFFSET: usize = 3;
-/// Error of fixes along the world's x, metres.
-pub const EAST: usize = 4;
-/// And along its y.
-pub const NORTH: usize = 5;
+/// Error of fixes that changes slowly, metres: the part that changes with what is around the antenna, along the world's
+/// x and y, then the part that lasts, along x and y.
+pub const FIX_ERROR: usize = 4;
 /// By how much the track lies to the left of where it is mapped, metres.
-pub const ASIDE: usize = 6;
+pub const ASIDE: usize = 8;
 /// By how much it is turned to the left there, radians.
-pub const TURNED: usize = 7;
+pub const TURNED: usize = 9;
 
 pub type State = SVector<f64, STATES>;
 pub type StateCovariance = SMatrix<f64, STATES, STATES>;
@@ -57,8 +58,8 @@ pub struct Hypothesis {
     pub heading_log: f64,
     pub mean: State,
     pub covariance: StateCovariance,
-    /// Of the last fix, the part of the variance that changes slowly.
-    pub fix_variance_m2: f64,
+    /// Of the last fix, what its error had of variance that changes with the surroundings, and that lasts.
+    pub fix_variances_m2: [f64; 2],
     /// When the last fix was.
     pub fix_time: SimTime,
     /// Its kind.
@@ -67,6 +68,8 @@ pub struct Hypothesis {
     pub has_jumped: bool,
     /// Of the other kinds of fixes, as it was at the last one of each.
     pub kinds: Vec<KindError>,
+    /// Groups of balises that are foreign, if it is right.
+    pub doubted_groups: Vec<DoubtedGroup>,
 }
 
 /// Error of fixes of a kind.
@@ -74,8 +77,8 @@ pub struct Hypothesis {
 pub struct KindError {
     pub kind: i32,
     pub time: SimTime,
-    pub error_m: Vector2<f64>,
-    pub covariance_m2: Matrix2<f64>,
+    pub error_m: Vector4<f64>,
+    pub covariance_m2: Matrix4<f64>,
 }
 
 impl Hypothesis {
@@ -96,7 +99,12 @@ impl Hypothesis {
 
     /// Error of the fixes, if it is right.
     pub fn error_m(&self) -> Vector2<f64> {
-        Vector2::new(self.mean[EAST], self.mean[NORTH])
+        fix_error::sum(&self.slow_error_m())
+    }
+
+    /// Its two parts.
+    pub fn slow_error_m(&self) -> Vector4<f64> {
+        self.mean.fixed_rows::<4>(FIX_ERROR).into_owned()
     }
 
     /// Whether all of it is numbers: what rounding has made of it otherwise is worth nothing.

@@ -63,7 +63,7 @@ pub use settings::{Method, OccupancySettings};
 
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
-use dead_reckoning::TrainRun;
+use dead_reckoning::DeadReckoning;
 use fix_trust::{Circumstances, FixTrust};
 use hypothesis::Hypothesis;
 use nalgebra::{Matrix2, Point2};
@@ -74,6 +74,9 @@ const FARTHEST_M: f64 = 1e7;
 const LEAST_SIGMA_M: f64 = 1e-3;
 /// No track is looked for farther away, metres.
 const OFF_TRACK_M: f64 = 2000.0;
+
+/// Headings are compared each time that so much was run: what the map has wrong is wrong over a stretch.
+const HEADING_EVERY_M: f64 = 2.0;
 
 /// A fix in the plane of the network.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -105,27 +108,8 @@ pub struct Occupancy {
     network: Arc<PlanNetwork>,
     settings: OccupancySettings,
     hypotheses: Vec<Hypothesis>,
-    time: Option<SimTime>,
-    speed: Option<(SimTime, f64)>,
-    /// Since when the wheel slides or slips.
-    sliding_since: Option<SimTime>,
-    /// Standard deviation, for want of a speed, of what was run since the last fix or balise: a train that brakes slides
-    /// the same way again and again, so that errors add up.
-    unknown_m: f64,
-    /// Standard deviation of what was turned since the last yaw rate.
-    unknown_rad: f64,
-    yaw_rate: Option<(SimTime, f64)>,
+    reckoning: DeadReckoning,
     speed_filter: pedal::SpeedFilter,
-    /// What the hypotheses have not been carried on by yet.
-    pending: TrainRun,
-    /// Since the last fix, seconds.
-    since_fix_s: f64,
-    /// Run since the start.
-    run_m: f64,
-    /// Run since headings were compared.
-    since_heading_m: f64,
-    /// Sum of the yaw rates since the start.
-    turned_rad: f64,
     /// Fixes in a row that were far from all hypotheses.
     lost_fixes: u32,
     /// Since when fixes lie on a track that no hypothesis is on.
@@ -140,18 +124,8 @@ impl Occupancy {
             network,
             settings,
             hypotheses: Vec::new(),
-            time: None,
-            speed: None,
-            sliding_since: None,
-            unknown_m: 0.0,
-            unknown_rad: 0.0,
-            yaw_rate: None,
+            reckoning: DeadReckoning::default(),
             speed_filter: pedal::SpeedFilter::default(),
-            pending: TrainRun::default(),
-            since_fix_s: 0.0,
-            run_m: 0.0,
-            since_heading_m: 0.0,
-            turned_rad: 0.0,
             lost_fixes: 0,
             doubted_since: None,
             trust: FixTrust::default(),
@@ -163,6 +137,27 @@ impl Occupancy {
         self.hypotheses.len()
     }
 
+    /// Takes the speed, forwards positive. What no train can have, or is older than the last input, is dropped.
+    pub fn on_speed(&mut self, time: SimTime, speed_mps: f64) {
+        if self.reckoning.on_speed(time, speed_mps) {
+            self.speed_filter
+                .update(time, self.settings.speed_sigma_mps);
+            self.after_run();
+        }
+    }
+
+    /// Takes the speed of a wheel that slides or slips.
+    pub fn on_slide(&mut self, time: SimTime, speed_mps: f64) {
+        self.reckoning.on_slide(time, speed_mps);
+        self.after_run();
+    }
+
+    /// Takes the yaw rate, to the left positive.
+    pub fn on_yaw_rate(&mut self, time: SimTime, yaw_rate_radps: f64) {
+        self.reckoning.on_yaw_rate(time, yaw_rate_radps);
+        self.after_run();
+    }
+
     /// Takes a fix.
     pub fn on_fix(&mut self, fix: &Fix) {
         if !fix.is_possible() || !self.run_to(fix.time) {
@@ -171,13 +166,13 @@ impl Occupancy {
         self.advance();
         let at = Circumstances {
             away_m: self.network.distance_m(&fix.place, OFF_TRACK_M),
-            run_m: self.run_m,
+            run_m: self.reckoning.run_m,
         };
         let Some(judged) = self.trust.judge(fix, at, &self.settings) else {
             return;
         };
-        // After a fix the run is known no better than by it.
-        self.unknown_m = self.unknown_m.min(judged.fix.covariance_m2.trace().sqrt());
+        let fix_sigma_m = judged.fix.covariance_m2.trace().sqrt();
+        self.reckoning.known_to(fix_sigma_m);
         let fix = &judged.fix;
         self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);
@@ -190,7 +185,7 @@ impl Occupancy {
                 Method::Perpendicular => hypothesis.update_matched(network, fix, by_perpendicular),
             }
         }
-        self.since_fix_s = 0.0;
+        self.speed_filter.on_fix();
         self.tidy();
     }
 
@@ -205,6 +200,48 @@ impl Occupancy {
     /// What is believed at the last fix, or since then at the time that it was carried on to.
     pub fn decision(&self) -> Decision {
         Decision::of(&self.hypotheses, self.settings.least_probability)
+    }
+
+    /// Sums speed and yaw rate up to a time; whether it is no older than the last input.
+    fn run_to(&mut self, time: SimTime) -> bool {
+        let is_later = self.reckoning.run_to(time);
+        if is_later {
+            self.after_run();
+        }
+        is_later
+    }
+
+    /// Compares headings where enough was run since this was last done.
+    fn after_run(&mut self) {
+        if self.reckoning.since_heading_m < HEADING_EVERY_M {
+            return;
+        }
+        let run_m = std::mem::take(&mut self.reckoning.since_heading_m);
+        self.advance();
+        if self.reckoning.has_yaw_rate() && self.settings.method == Method::Fused {
+            let (network, settings) = (&self.network, &self.settings);
+            let turned = (self.reckoning.turned_rad, run_m);
+            headings::compare_headings(&mut self.hypotheses, network, turned, settings);
+            self.tidy();
+            return;
+        }
+        let before = self.hypotheses.len();
+        self.grow();
+        if self.hypotheses.len() != before {
+            self.tidy();
+        }
+    }
+
+    /// Carries the hypotheses on by what was run since this was last done.
+    fn advance(&mut self) {
+        let run = self.reckoning.take_run();
+        let speed_m2 = self.speed_filter.variance_m2(&run);
+        for hypothesis in &mut self.hypotheses {
+            match self.settings.method {
+                Method::Fused => hypothesis.advance_fused(&run, &self.settings),
+                _ => hypothesis.advance_by_speed(run.length_m, speed_m2),
+            }
+        }
     }
 
     fn grow(&mut self) {

@@ -5,6 +5,7 @@
 //! deviation of the fix in that direction. The variance of a match along the track is that of the pedal curve there.
 
 use super::Fix;
+use super::dead_reckoning::TrainRun;
 use super::hypothesis::{Hypothesis, PLACE, StateCovariance};
 use super::matching::{Match, Matching};
 use crate::bus::SimTime;
@@ -16,9 +17,13 @@ const AROUND_M: f64 = 30.0;
 /// By how much a train's speed changes in a second, m/s: the acceleration of metros.
 const SPEED_CHANGE_MPS2: f64 = 1.0;
 
-/// Variance of a Kalman filter of the speed; its mean is not needed, as the place is carried on by the measured speed.
+/// Variance of a Kalman filter of the speed, and of what was run by it since the last fix. Its mean is not needed, as the
+/// place is carried on by the measured speed.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct SpeedFilter(Option<SpeedVariance>);
+pub struct SpeedFilter {
+    last: Option<SpeedVariance>,
+    since_fix_s: f64,
+}
 
 /// As it was at the last speed.
 #[derive(Clone, Copy, Debug)]
@@ -31,18 +36,27 @@ impl SpeedFilter {
     /// Takes in that the speed was measured.
     pub fn update(&mut self, time: SimTime, sigma_mps: f64) {
         let measured_m2ps2 = sigma_mps.powi(2);
-        let m2ps2 = self.0.map_or(measured_m2ps2, |last| {
+        let m2ps2 = self.last.map_or(measured_m2ps2, |last| {
             let change_mps = SPEED_CHANGE_MPS2 * time.since(last.time);
             let prior_m2ps2 = last.m2ps2 + change_mps.powi(2);
             let gain = prior_m2ps2 / (prior_m2ps2 + measured_m2ps2);
             (1.0 - gain) * prior_m2ps2
         });
-        self.0 = Some(SpeedVariance { time, m2ps2 });
+        self.last = Some(SpeedVariance { time, m2ps2 });
     }
 
-    /// Standard deviation of the speed.
-    pub fn sigma_mps(&self) -> f64 {
-        self.0.map_or(0.0, |last| last.m2ps2.sqrt())
+    /// A fix was taken in.
+    pub fn on_fix(&mut self) {
+        self.since_fix_s = 0.0;
+    }
+
+    /// What a run adds to the variance of what was run since the last fix. From fix to fix the speed is wrong by the same,
+    /// so that the variance grows with the square of the time.
+    pub fn variance_m2(&mut self, run: &TrainRun) -> f64 {
+        let [before_s, now_s] = [self.since_fix_s, self.since_fix_s + run.seconds];
+        self.since_fix_s = now_s;
+        let speed_m2ps2 = self.last.map_or(0.0, |last| last.m2ps2);
+        speed_m2ps2 * (now_s.powi(2) - before_s.powi(2)) + run.unknown_m2
     }
 }
 

@@ -49,8 +49,12 @@ settings! {
         map_correlation_m: f64 = 40.0, in 1.0..=1e4;
         /// Share of a fix's variance that changes slowly.
         correlated_share: f64 = 0.8, in 0.0..=1.0;
-        /// Time constant of that, seconds.
+        /// Time constant of what of that changes with the surroundings of the antenna (multipath), seconds.
         correlation_s: f64 = 60.0, in 1e-3..=1e6;
+        /// Share of the slow variance that lasts (orbits, clocks, the air).
+        lasting_share: f64 = 0.5, in 0.0..=1.0;
+        /// Time constant of that, seconds.
+        lasting_s: f64 = 1800.0, in 1e-3..=1e6;
         /// Probability that the error of a fix jumps from the last one (reflections, a wrong integer).
         jump_probability: f64 = 1e-3, in 1e-12..=0.5;
         /// By how much, metres.
@@ -74,6 +78,8 @@ settings! {
         antenna_behind_head_m: f64 = 10.0, in -10.0..=200.0;
         /// The middle of the leading car behind the head, metres.
         car_middle_behind_head_m: f64 = 10.0, in 0.0..=50.0;
+        /// One sigma of the position given by a balise, metres.
+        balise_sigma_m: f64 = 0.5, in 1e-3..=50.0;
         /// Inputs wait for this long for such as are older and come later, ms.
         hold_ms: f64 = 200.0, in 0.0..=10_000.0;
     }

@@ -129,16 +129,17 @@ impl Occupancy {
             heading_log: 0.0,
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
-            fix_variance_m2: 0.0,
+            fix_variances_m2: [0.0; 2],
             fix_time: time,
             kind: None,
             has_jumped: false,
             kinds: Vec::new(),
+            doubted_groups: Vec::new(),
         };
         match self.settings.method {
             Method::Fused => {
                 let mapped_rad = hypothesis.car_heading_rad(&self.network, 0.0, &self.settings);
-                let offset_rad = self.turned_rad - mapped_rad;
+                let offset_rad = self.reckoning.turned_rad - mapped_rad;
                 hypothesis.start_fused(&self.settings, offset_rad);
             }
             _ => hypothesis.start_matched(found),

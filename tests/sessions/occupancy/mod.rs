@@ -253,6 +253,20 @@ fn val_other_errors_make_no_false_certainty() {
             },
         ),
         (
+            "nothing lasts",
+            FixErrors {
+                lasting_share: 0.0,
+                ..AS_BELIEVED
+            },
+        ),
+        (
+            "all of it lasts",
+            FixErrors {
+                lasting_share: 1.0,
+                ..AS_BELIEVED
+            },
+        ),
+        (
             "all of it slow",
             FixErrors {
                 slow_share: 0.99,
@@ -305,6 +319,11 @@ fn val_probabilities_are_calibrated() {
             "beside a parallel track",
             beside_a_parallel_track(MAP_AS_BELIEVED, 1000),
         ),
+        // For ten minutes over 300 m: what lasts of a fix's error is as good as constant.
+        (
+            "creeping beside a parallel track",
+            beside_at_speed(0.5, 340.0, MAP_AS_BELIEVED, 300),
+        ),
     ] {
         of.calibration.print(title);
         let probability = of.calibration.least_probability();
@@ -314,12 +333,16 @@ fn val_probabilities_are_calibrated() {
 
 /// Starts from nothing on one of two tracks that never meet.
 fn beside_a_parallel_track(errors: MapErrors, seeds: u64) -> Tally {
-    let world = two_tracks(3000.0);
+    beside_at_speed(60.0 / 3.6, 3000.0, errors, seeds)
+}
+
+fn beside_at_speed(speed_mps: f64, length_m: f64, errors: MapErrors, seeds: u64) -> Tally {
+    let world = two_tracks(length_m);
     let mut tally = Tally::default();
     for seed in 0..seeds {
         let run = Run {
             errors: AS_BELIEVED,
-            speed_mps: 60.0 / 3.6,
+            speed_mps,
             seed,
             with_gyro: true,
             reversed: false,

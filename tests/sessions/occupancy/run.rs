@@ -21,8 +21,12 @@ const BEFORE_END_M: f64 = 15.0;
 /// How a receiver errs.
 #[derive(Clone, Copy)]
 pub struct FixErrors {
+    /// Share of the variance that changes slowly, and of that the share that lasts.
     pub slow_share: f64,
+    pub lasting_share: f64,
+    /// Time constants of the rest of it, and of that share.
     pub correlation_s: f64,
+    pub lasting_s: f64,
     /// Jumps an hour, by 10 m.
     pub jumps_per_h: f64,
     /// Of a fix.
@@ -31,7 +35,9 @@ pub struct FixErrors {
 
 pub const AS_BELIEVED: FixErrors = FixErrors {
     slow_share: 0.8,
+    lasting_share: 0.5,
     correlation_s: 60.0,
+    lasting_s: 1800.0,
     jumps_per_h: 0.0,
     // 1 m on each axis, more along one diagonal than along the other.
     covariance_m2: Matrix2::new(1.0, 0.5, 0.5, 1.0),
@@ -91,12 +97,14 @@ impl<'a> Way<'a> {
 struct Receiver {
     errors: FixErrors,
     stream: Stream,
-    slow: Vector2<f64>,
+    /// What changes with the surroundings, and what lasts, each of variance 1.
+    slow: [Vector2<f64>; 2],
 }
 
 impl Receiver {
     fn new(errors: FixErrors, stream: Stream) -> Self {
-        let slow = Vector2::new(stream.normal(0), stream.normal(1)) * errors.slow_share.sqrt();
+        let normal = |k| Vector2::new(stream.normal(k), stream.normal(k + 1));
+        let slow = [normal(0), normal(2)];
         Self {
             errors,
             stream,
@@ -106,17 +114,33 @@ impl Receiver {
 
     /// Of fix number k, from 1 on.
     fn error(&mut self, k: u64) -> Vector2<f64> {
-        let normal = |what: u64| self.stream.normal(8 * k + what);
-        let keep = (-1.0 / (RATE_HZ * self.errors.correlation_s)).exp();
-        let step_sigma = (self.errors.slow_share * (1.0 - keep * keep)).sqrt();
-        self.slow = self.slow * keep + Vector2::new(normal(0), normal(1)) * step_sigma;
-        let jumps = self.errors.jumps_per_h / 3600.0 / RATE_HZ;
-        if self.stream.uniform(8 * k + 2) < jumps {
-            self.slow += Vector2::new(normal(3), normal(4)) * 10.0;
+        let FixErrors {
+            slow_share,
+            lasting_share,
+            ..
+        } = self.errors;
+        let stream = &self.stream;
+        let normal = |what| {
+            Vector2::new(
+                stream.normal(16 * k + what),
+                stream.normal(16 * k + what + 1),
+            )
+        };
+        let times_s = [self.errors.correlation_s, self.errors.lasting_s];
+        for (part, (slow, time_s)) in self.slow.iter_mut().zip(times_s).enumerate() {
+            let keep = (-1.0 / (RATE_HZ * time_s)).exp();
+            *slow = *slow * keep + normal(2 * part as u64) * (1.0 - keep * keep).sqrt();
         }
-        let white = Vector2::new(normal(5), normal(6)) * (1.0 - self.errors.slow_share).sqrt();
+        let jumps = self.errors.jumps_per_h / 3600.0 / RATE_HZ;
+        if stream.uniform(16 * k + 4) < jumps {
+            let around_sigma = (slow_share * (1.0 - lasting_share)).sqrt();
+            self.slow[0] += normal(5) * (10.0 / around_sigma);
+        }
+        let [around, lasting] = self.slow;
+        let slow = around * (1.0 - lasting_share).sqrt() + lasting * lasting_share.sqrt();
+        let error = slow * slow_share.sqrt() + normal(7) * (1.0 - slow_share).sqrt();
         let root = self.errors.covariance_m2.cholesky().unwrap();
-        root.l() * (self.slow + white)
+        root.l() * error
     }
 }
 
