@@ -33,8 +33,9 @@ const WRONG_HEADING: f64 = 1e-3;
 const YAW_OFFSET_DRIFT: f64 = 1e-5;
 
 /// Heading of the car on the map, around the place of a hypothesis.
-struct MappedHeading {
-    here_rad: f64,
+#[derive(Clone, Copy)]
+pub struct MappedHeading {
+    pub here_rad: f64,
     /// By how much it turns to the left for each metre farther on.
     slope_radpm: f64,
     /// Variance, because it does not turn evenly.
@@ -107,7 +108,7 @@ impl Hypothesis {
         let ways = self.error_ways(judged, &slow_m2, settings);
         self.fix_time = judged.fix.time;
         self.kind = Some(judged.kind);
-        let place = mapped + left_of(&forward) * self.mean[ASIDE];
+        let place = mapped + self.shift_m() + left_of(&forward) * self.mean[ASIDE];
         let white = covariance * (1.0 - settings.correlated_share)
             + Matrix2::identity() * LEAST_FIX_SIGMA_M.powi(2);
         let of_state = spread(&self.covariance, &forward);
@@ -149,15 +150,13 @@ impl Hypothesis {
         }
     }
 
-    /// Takes in the sum of yaw rates since the start. Gives the heading of the car on the map, and the logarithm of the
-    /// likelihood of what was found.
+    /// Takes in the sum of yaw rates since the start. Gives the logarithm of the likelihood of what was found.
     pub fn update_heading(
         &mut self,
-        network: &PlanNetwork,
+        mapped: &MappedHeading,
         turned_rad: f64,
         settings: &OccupancySettings,
-    ) -> (f64, f64) {
-        let mapped = self.mapped_heading(network, settings);
+    ) -> f64 {
         let off = wrapped(turned_rad - self.mean[HEADING] - self.mean[TURNED] - mapped.here_rad);
         let mut measured = RowSVector::<f64, STATES>::zeros();
         measured[PLACE] = mapped.slope_radpm;
@@ -174,12 +173,16 @@ impl Hypothesis {
             self.correct_by(&across, off, variance);
         }
         // What is no number is dropped with the state that it comes from.
-        (mapped.here_rad, both.max(wrong_log))
+        both.max(wrong_log)
     }
 
     /// Its slope is taken over one standard deviation of the place to both sides. So a kink at a mapped point hardly
     /// counts as a curve, and where the heading does not turn evenly over that stretch, the difference counts as variance.
-    fn mapped_heading(&self, network: &PlanNetwork, settings: &OccupancySettings) -> MappedHeading {
+    pub fn mapped_heading(
+        &self,
+        network: &PlanNetwork,
+        settings: &OccupancySettings,
+    ) -> MappedHeading {
         let (place_m, spread_m) = (self.place_m(), self.sigma_m().max(NEAR_M));
         let [behind, here, ahead] = [-spread_m, 0.0, spread_m]
             .map(|m| self.car_heading_rad(network, place_m + m, settings));

@@ -16,6 +16,12 @@ const PARTED_SIGMAS: f64 = 3.0;
 /// What was kept aside fades by e over so many correlation lengths of the map's errors.
 const KEPT_LENGTHS: f64 = 3.0;
 
+/// Mapped headings that differ by more are two headings.
+pub fn parted_rad(settings: &OccupancySettings) -> f64 {
+    let turned_rad2 = map_error::stationary(settings)[(1, 1)];
+    PARTED_SIGMAS * SQRT_2 * turned_rad2.sqrt()
+}
+
 /// Takes the sum of yaw rates into all hypotheses, after a run since the last time.
 pub fn compare_headings(
     hypotheses: &mut [Hypothesis],
@@ -28,19 +34,24 @@ pub fn compare_headings(
         return;
     };
     let keep = (-run_m / (KEPT_LENGTHS * settings.map_correlation_m)).exp();
+    let of_most = hypotheses[most].mapped_heading(network, settings);
     let update = |hypothesis: &mut Hypothesis| {
-        let (mapped_rad, log) = hypothesis.update_heading(network, turned_rad, settings);
+        let mapped = if hypothesis.is_beside_most() {
+            of_most
+        } else {
+            hypothesis.mapped_heading(network, settings)
+        };
+        let log = hypothesis.update_heading(&mapped, turned_rad, settings);
         hypothesis.heading_log = keep * hypothesis.heading_log + log;
-        mapped_rad
+        mapped.here_rad
     };
-    let most_rad = update(&mut hypotheses[most]);
+    update(&mut hypotheses[most]);
     let most_log = std::mem::take(&mut hypotheses[most].heading_log);
-    let turned_rad2 = map_error::stationary(settings)[(1, 1)];
-    let parted_rad = PARTED_SIGMAS * SQRT_2 * turned_rad2.sqrt();
+    let parted_rad = parted_rad(settings);
     for (_, hypothesis) in (hypotheses.iter_mut().enumerate()).filter(|(k, _)| *k != most) {
         let mapped_rad = update(hypothesis);
         hypothesis.heading_log -= most_log;
-        if wrapped(mapped_rad - most_rad).abs() > parted_rad {
+        if wrapped(mapped_rad - of_most.here_rad).abs() > parted_rad {
             hypothesis.log_probability += std::mem::take(&mut hypothesis.heading_log);
         }
     }

@@ -4,6 +4,7 @@ use super::balise::DoubtedGroup;
 use super::course::Course;
 use super::fix_error;
 use super::settings::OccupancySettings;
+use super::side_by_side::BesideMost;
 use crate::bus::SimTime;
 use crate::track::plan::{ElementEnd, PlanNetwork};
 use nalgebra::{Matrix4, SMatrix, SVector, Vector2, Vector4};
@@ -56,6 +57,8 @@ pub struct Hypothesis {
     pub log_probability: f64,
     /// What headings say of it, against the most probable one, and is not counted yet (see `headings`).
     pub heading_log: f64,
+    /// Beside the most probable one; none where the map has them part.
+    pub beside_most: Option<BesideMost>,
     pub mean: State,
     pub covariance: StateCovariance,
     /// Of the last fix, what its error had of variance that changes with the surroundings, and that lasts.

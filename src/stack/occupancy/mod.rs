@@ -51,6 +51,7 @@ mod map_error;
 mod matching;
 mod pedal;
 mod settings;
+mod side_by_side;
 mod start;
 #[cfg(test)]
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
@@ -176,6 +177,10 @@ impl Occupancy {
         let fix = &judged.fix;
         self.start(&judged);
         let (network, settings) = (&self.network, &self.settings);
+        if settings.method == Method::Fused {
+            let run_m = std::mem::take(&mut self.reckoning.since_fix_m);
+            side_by_side::compare_distances(&mut self.hypotheses, network, run_m, settings);
+        }
         for hypothesis in &mut self.hypotheses {
             match settings.method {
                 Method::Fused => {

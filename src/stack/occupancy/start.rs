@@ -127,6 +127,7 @@ impl Occupancy {
             course: Course::at_place(&self.network, towards, found.along_m),
             log_probability: 0.0,
             heading_log: 0.0,
+            beside_most: None,
             mean: State::zeros(),
             covariance: StateCovariance::zeros(),
             fix_variances_m2: [0.0; 2],
