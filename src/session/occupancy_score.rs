@@ -1,8 +1,9 @@
 //! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
 
-use super::summary::{
-    ErrorStatistics, FacingFigures, OccupancyClass, OccupancyFigures, SwitchDistances,
+use super::occupancy_figures::{
+    FacingFigures, LegDistances, OccupancyClass, OccupancyFigures, mean_of_identified_m,
 };
+use super::summary::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
 use crate::track::network::Route;
@@ -121,18 +122,14 @@ impl OccupancyScore {
         self.switches
             .extend(self.leg.take().map(|leg| leg.identified_m));
         let fixes = self.errors_m.len();
-        let mut distances_m: Vec<f64> = self.switches.iter().copied().flatten().collect();
         let [wc, wf, wu, cu, cf, cc] = self.classes;
         OccupancyFigures {
             fixes: self.classes.iter().sum(),
             switches: self.switches.len() as u32,
             never_identified: self.switches.iter().filter(|m| m.is_none()).count() as u32,
-            identified_after_m: ErrorStatistics::of(&mut distances_m).map(|s| SwitchDistances {
-                mean: s.mean,
-                p95: s.p95,
-                max: s.max,
-            }),
-            legs_identified_after_m: self.switches,
+            identified_mean_m: mean_of_identified_m(&self.switches),
+            known_after_m: LegDistances::of(&self.switches),
+            legs_known_after_m: self.switches,
             classes: [
                 (OccupancyClass::WrongConfident, wc),
                 (OccupancyClass::WrongFairlyConfident, wf),

@@ -1,5 +1,6 @@
 //! What a session comes to, as `summary.json` has it.
 
+use super::occupancy_figures::OccupancyFigures;
 use crate::bus::{CameraFault, Method, TrainId};
 use crate::twin::physics::{EnergyBook, Impact, Incident};
 use crate::twin::render::Backend;
@@ -175,12 +176,17 @@ impl Cost {
     }
 }
 
-/// Linear interpolation between order statistics (numpy's default) of sorted values.
+/// Linear interpolation between order statistics (numpy's default) of sorted values. Between a number and infinity lies
+/// infinity.
 pub(crate) fn quantile(sorted: &[f64], p: f64) -> f64 {
     let x = p * (sorted.len() - 1) as f64;
     let k = x.floor() as usize;
-    let next = sorted[(k + 1).min(sorted.len() - 1)];
-    sorted[k] + (next - sorted[k]) * (x - k as f64)
+    let share = x - k as f64;
+    let (low, high) = (sorted[k], sorted[(k + 1).min(sorted.len() - 1)]);
+    if high.is_infinite() {
+        return if share > 0.0 { high } else { low };
+    }
+    low + (high - low) * share
 }
 
 /// What the stack says of one camera.
@@ -268,83 +274,6 @@ pub struct TrainFigures {
     pub energy: EnergyBook,
     /// Energy that the book cannot place, over what was turned over.
     pub energy_gap_share: f64,
-}
-
-/// Track occupancy: what was said after each fix, and how soon legs of switches were known.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct OccupancyFigures {
-    /// Fixes after which something was said; without a receiver, all reports.
-    pub fixes: u32,
-    /// Legs of switches that the antenna came to over the toe.
-    pub switches: u32,
-    /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
-    pub never_identified: u32,
-    /// From the toe to where the antenna was when the leg was identified for good.
-    pub identified_after_m: Option<SwitchDistances>,
-    /// The same of each leg in order; `null` where it was never identified.
-    pub legs_identified_after_m: Vec<Option<f64>>,
-    /// How many fixes are of which class.
-    pub classes: BTreeMap<OccupancyClass, u32>,
-    /// Which way the train was said to face.
-    pub facing: FacingFigures,
-    /// Error of the antenna's place along the track, of fixes whose track is right.
-    pub error_m: Option<ErrorStatistics>,
-    /// Mean of (error/sigma)^2 of the same: 1 for an honest sigma.
-    pub nees_mean: Option<f64>,
-}
-
-impl OccupancyClass {
-    /// The most probable track is another than the true one.
-    pub fn is_wrong(self) -> bool {
-        matches!(
-            self,
-            Self::WrongConfident | Self::WrongFairlyConfident | Self::WrongUndecided
-        )
-    }
-}
-
-/// Which way along its track a train was said to face, after fixes and without.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct FacingFigures {
-    /// Reports whose most probable track is the true one.
-    pub reports: u32,
-    /// Of these, the wrong way with a probability over 0.9.
-    pub wrong_over_0_9: u32,
-    /// Of these, the wrong way with a probability over 1 - 1e-9.
-    pub wrong_certain: u32,
-}
-
-/// Distances from toes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[allow(missing_docs, reason = "the names say it")]
-pub struct SwitchDistances {
-    pub mean: f64,
-    pub p95: f64,
-    pub max: f64,
-}
-
-/// What the most probable track after a fix is worth (Guo et al. 2020). Confident: no other track is left. Fairly
-/// confident: its probability is over 0.9.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-pub enum OccupancyClass {
-    /// Another track than the true one, and no other left.
-    #[serde(rename = "wc")]
-    WrongConfident,
-    /// Another one, over 0.9.
-    #[serde(rename = "wf")]
-    WrongFairlyConfident,
-    /// Another one.
-    #[serde(rename = "wu")]
-    WrongUndecided,
-    /// The true one.
-    #[serde(rename = "cu")]
-    CorrectUndecided,
-    /// The true one, over 0.9.
-    #[serde(rename = "cf")]
-    CorrectFairlyConfident,
-    /// The true one, and no other left.
-    #[serde(rename = "cc")]
-    CorrectConfident,
 }
 
 /// Train protection.

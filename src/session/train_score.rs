@@ -2,11 +2,12 @@
 
 use super::SessionError;
 use super::health::Health;
+use super::occupancy_figures::OccupancyClass;
 use super::occupancy_score::OccupancyScore;
 use super::outcome::Outcome;
 use super::positioning_score::PositioningScore;
 use super::ride::Ride;
-use super::summary::{OccupancyClass, TrainSummary};
+use super::summary::TrainSummary;
 use crate::bus::{
     EYES, LedReport, Method, OccupancyReport, PositionFix, ProtectionReport, RigCalibration,
     SimTime, TrainEnd, TrainId,

@@ -1,6 +1,8 @@
 //! Track occupancy of a run: of all its trains that report it, from their counts together.
 
-use crate::session::{ErrorStatistics, OccupancyClass, OccupancyFigures, TrainSummary};
+use crate::session::{
+    LegDistances, OccupancyClass, OccupancyFigures, TrainSummary, mean_of_identified_m,
+};
 
 /// The figures of those trains, at least one.
 pub struct OccupancyOfTrains<'a>(Vec<&'a OccupancyFigures>);
@@ -31,18 +33,24 @@ impl<'a> OccupancyOfTrains<'a> {
         (fixes > 0).then(|| f64::from(self.fixes_of(counts)) / f64::from(fixes))
     }
 
-    /// Distance from the toe to where the leg was identified for good, of every leg that was, metres.
-    pub fn legs_m(&self) -> Vec<f64> {
+    /// Distance from the toe to where the leg was identified for good, metres, of every leg; `None` of one that never
+    /// was.
+    pub fn legs_m(&self) -> Vec<Option<f64>> {
         let legs = self
             .0
             .iter()
-            .flat_map(|figures| &figures.legs_identified_after_m);
-        legs.copied().flatten().collect()
+            .flat_map(|figures| &figures.legs_known_after_m);
+        legs.copied().collect()
     }
 
-    /// What these distances come to.
-    pub fn identified_after_m(&self) -> Option<ErrorStatistics> {
-        ErrorStatistics::of(&mut self.legs_m())
+    /// Mean of the legs that were identified.
+    pub fn identified_mean_m(&self) -> Option<f64> {
+        mean_of_identified_m(&self.legs_m())
+    }
+
+    /// The longest of all legs; `None` where one was never identified, or there is none.
+    pub fn known_max_m(&self) -> Option<f64> {
+        LegDistances::of(&self.legs_m())?.max
     }
 
     /// Largest error along the track, of fixes whose track is right, metres.
@@ -75,7 +83,7 @@ fn fixes_of(figures: &OccupancyFigures, counts: impl Fn(OccupancyClass) -> bool)
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::session::FacingFigures;
+    use crate::session::{ErrorStatistics, FacingFigures};
     use OccupancyClass::{CorrectConfident, WrongConfident};
 
     fn figures(wrong: u32, right: u32, legs: &[Option<f64>], nees: f64) -> OccupancyFigures {
@@ -83,8 +91,9 @@ mod tests {
             fixes: wrong + right,
             switches: legs.len() as u32,
             never_identified: legs.iter().filter(|leg| leg.is_none()).count() as u32,
-            identified_after_m: None,
-            legs_identified_after_m: legs.to_vec(),
+            identified_mean_m: None,
+            known_after_m: None,
+            legs_known_after_m: legs.to_vec(),
             classes: [(WrongConfident, wrong), (CorrectConfident, right)].into(),
             error_m: ErrorStatistics::of(&mut [0.1 * nees]),
             nees_mean: Some(nees),
@@ -108,12 +117,16 @@ mod tests {
             (10, Some(0.025))
         );
         let undecided = all.sum(|figures| figures.never_identified);
-        assert_eq!((undecided, all.legs_m()), (1, vec![40.0, 20.0]));
-        let identified = all.identified_after_m().unwrap();
         assert_eq!(
-            (Some(identified.mean), Some(identified.max)),
-            (Some(30.0), Some(40.0))
+            (undecided, all.legs_m()),
+            (1, vec![Some(40.0), None, Some(20.0)])
         );
+        assert_eq!(
+            (all.identified_mean_m(), all.known_max_m()),
+            (Some(30.0), None)
+        );
+        let others = OccupancyOfTrains::of(None, &trains[2..]).unwrap();
+        assert_eq!(others.known_max_m(), Some(20.0));
         let nees = (90.0 * 4.0 + 300.0) / 390.0;
         assert!((all.nees_mean().unwrap() - nees).abs() < 1e-12);
         assert_eq!(all.error_max_m(), Some(0.4));

@@ -83,6 +83,9 @@ pub struct FigureDigest {
     pub runs: usize,
     /// How many numbers these runs have together: one of each, or all of each one's list.
     pub numbers: usize,
+    /// Of these, how many are infinite, because what they tell of never came about: they count in quantiles and for the
+    /// worst, and are not in the mean.
+    pub beyond: usize,
     /// Their sum, of a figure that is a count.
     pub sum: Option<f64>,
     /// How many runs have it not, or only of a part of the run.
@@ -257,10 +260,12 @@ impl FigureDigest {
         };
         let pairs: Vec<(f64, f64)> = known.into_iter().flat_map(pairs).collect();
         let sample: Vec<f64> = pairs.iter().map(|(_, x)| *x).collect();
+        let finite: Vec<(f64, f64)> = pairs.into_iter().filter(|(_, x)| x.is_finite()).collect();
         let bare = Self {
             measure,
             runs,
             numbers: sample.len(),
+            beyond: sample.len() - finite.len(),
             sum: (measure.kind == Kind::Int).then(|| sample.iter().sum()),
             lacking: rows.len() - runs,
             worse_side: measure.worse_side(),
@@ -272,12 +277,12 @@ impl FigureDigest {
         if template.is_weighted() {
             // The numbers of a list share their run's weight: they are worth fewer than they are.
             let is_list = measure.kind == Kind::Reals;
-            let mean = weighted_mean(&pairs, measure.range()).filter(|_| !is_list);
+            let mean = weighted_mean(&finite, measure.range()).filter(|_| !is_list);
             return Self { mean, ..bare };
         }
         let is_flag = measure.kind == Kind::Flag;
         Self {
-            mean: measure.mean(&sample),
+            mean: measure.mean(&finite.iter().map(|(_, x)| *x).collect::<Vec<_>>()),
             quantiles: QUANTILES.map(|p| measure.quantile(&sample, p).filter(|_| !is_flag)),
             ..bare
         }
@@ -323,7 +328,9 @@ impl Sensitivity {
         let independent = settings.correlated.is_empty()
             && settings.require.is_empty()
             && !shares_a_table(template)
-            && rows.iter().all(|r| r.number(measure.name).is_some());
+            && rows
+                .iter()
+                .all(|r| r.number(measure.name).is_some_and(f64::is_finite));
         let share = || {
             if pairs.is_empty() {
                 let named = rows.iter().filter_map(|r| {

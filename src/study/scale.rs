@@ -31,6 +31,19 @@ const NEUTRAL: [&str; 9] = [
     "_frames",
 ];
 
+/// Figures of something that may never come about, and the count of how often it did not: so many of their values are
+/// beyond every number.
+const BEYOND: [(&str, &str); 2] = [
+    ("occupancy_known_max_m", "occupancy_never_identified"),
+    ("occupancy_known_leg_m", "occupancy_never_identified"),
+];
+
+/// The name of the count of values of a figure that are beyond every number.
+pub(super) fn count_beyond(name: &str) -> Option<&'static str> {
+    let of = BEYOND.iter().find(|(figure, _)| *figure == name);
+    of.map(|(_, count)| *count)
+}
+
 /// Which values of a figure are worse than others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -120,6 +133,9 @@ mod tests {
         let ends = SHARES.iter().chain(&LESS_IS_WORSE).chain(&NEUTRAL);
         for end in ends.chain(&SIGNED) {
             assert!(MEASURES.iter().any(|m| m.name.ends_with(end)), "{end}");
+        }
+        for name in BEYOND.iter().flat_map(|(figure, count)| [figure, count]) {
+            assert!(MEASURES.iter().any(|m| m.name == *name), "{name}");
         }
     }
 }

@@ -16,6 +16,16 @@ pub struct AtSwitch {
     pub right: bool,
 }
 
+/// Distances of all switches, metres: one whose leg was never identified counts as infinite.
+pub struct Distances {
+    /// Of those that were identified; not a number where none was.
+    pub mean_of_identified: f64,
+    pub p95: f64,
+    pub most: f64,
+    /// How many never were.
+    pub never: usize,
+}
+
 #[derive(Default)]
 pub struct Tally {
     pub switches: Vec<AtSwitch>,
@@ -90,11 +100,13 @@ impl Tally {
 
     /// Prints what no column of [`table`] has.
     pub fn print(&self, name: &str) {
-        let ([mean_m, p95_m, most_m], _) = self.distances();
+        let of = self.distances();
+        let (mean_m, p95_m, most_m) = (of.mean_of_identified, of.p95, of.most);
         println!(
-            "{name}: {} switches, {} fixes; identified after {mean_m:.1} m (95 %: {p95_m:.1}, most {most_m:.1}); {:.3} % right",
+            "{name}: {} switches, {} fixes; {} never identified, the others after {mean_m:.1} m in the mean; of all 95 %: {p95_m:.1} m, most {most_m:.1} m; {:.3} % right",
             self.switches.len(),
             self.fixes(),
+            of.never,
             100.0 * self.right()
         );
         println!("sigma of the place under 1, 2, 3 m: {}", self.sigmas());
@@ -122,21 +134,25 @@ impl Tally {
         self.squares.0 / self.squares.1 as f64
     }
 
-    /// Mean, 95 % and most of the distances, of switches that were identified, and the share that were not.
-    pub fn distances(&self) -> ([f64; 3], f64) {
-        let mut all: Vec<f64> = self
-            .switches
-            .iter()
-            .filter_map(|s| s.identified_m)
-            .collect();
+    /// Distances behind the toe at which legs were known.
+    pub fn distances(&self) -> Distances {
+        let legs = || self.switches.iter().map(|s| s.identified_m);
+        let identified: Vec<f64> = legs().flatten().collect();
+        let mut all: Vec<f64> = legs().map(|m| m.unwrap_or(f64::INFINITY)).collect();
         all.sort_by(f64::total_cmp);
-        let undecided = 1.0 - all.len() as f64 / self.switches.len() as f64;
-        if all.is_empty() {
-            return ([f64::NAN; 3], undecided);
+        // The least that so many are not above.
+        let quantile = |p: f64| all[((p * all.len() as f64).ceil() as usize).max(1) - 1];
+        Distances {
+            mean_of_identified: identified.iter().sum::<f64>() / identified.len() as f64,
+            p95: quantile(0.95),
+            most: quantile(1.0),
+            never: all.len() - identified.len(),
         }
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        let p95 = all[(0.95 * (all.len() - 1) as f64) as usize];
-        ([mean, p95, all[all.len() - 1]], undecided)
+    }
+
+    /// Share of switches whose leg was never identified.
+    pub fn never(&self) -> f64 {
+        self.distances().never as f64 / self.switches.len() as f64
     }
 
     /// Share of switches where the leg was right.
@@ -148,18 +164,20 @@ impl Tally {
 
 pub fn table(title: &str, rows: &[(String, Tally)]) {
     println!("\n{title}");
+    println!("inf: more than the leg; the mean is of the legs that were identified");
     println!(
-        "                           switches  mean m   95 %   most  undecided  right %   wc (at joints)  wf    wu    cu    cf     cc (% of fixes)  nees"
+        "                           switches  mean m   95 %   most      never  right %   wc (at joints)  wf    wu    cu    cf     cc (% of fixes)  nees"
     );
     for (name, tally) in rows {
-        let ([mean, p95, most], undecided) = tally.distances();
+        let of = tally.distances();
+        let (mean, p95, most) = (of.mean_of_identified, of.p95, of.most);
         let fixes = tally.fixes() as f64;
         let [wc, wf, wu, cu, cf, cc] = tally.classes;
         let share = |count: usize| 100.0 * count as f64 / fixes;
         println!(
             "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
             tally.switches.len(),
-            100.0 * undecided,
+            100.0 * tally.never(),
             100.0 * tally.right(),
             tally.at_joint,
             share(wf),
