@@ -25,6 +25,7 @@ mod fitting;
 mod health;
 mod image_box;
 mod imaging;
+mod leg_score;
 mod occupancy_figures;
 mod occupancy_score;
 mod outcome;

@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 pub struct OccupancyFigures {
     /// Fixes after which something was said; without a receiver, all reports.
     pub fixes: u32,
-    /// Legs of switches that the antenna came to over the toe.
+    /// Legs of switches that the train's head came to over the toe.
     pub switches: u32,
     /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
     pub never_identified: u32,
-    /// From the toe to where the antenna was when the leg was identified for good: mean of the legs that were, `null`
-    /// where none was. Those of `never_identified` have no distance and are not in it.
+    /// From the toe to where the train's head was when the leg was identified for good, which needs a report of the
+    /// antenna's place on the leg: mean of the legs that were, `null` where none was. Those of `never_identified` have no distance and are not in it.
     pub identified_mean_m: Option<f64>,
     /// The same distance over all legs; `null` without legs.
     pub known_after_m: Option<LegDistances>,
@@ -52,7 +52,7 @@ pub struct FacingFigures {
     pub wrong_certain: u32,
 }
 
-/// Order statistics of the distance from the toe to where a leg was known, over all legs: one that was never identified
+/// Order statistics of the distance from the toe to the head when a leg was known, over all legs: one that was never identified
 /// counts as farther than any other. `null`: more than the leg, because the statistic falls among these.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
 #[allow(missing_docs, reason = "the names say it")]

@@ -1,21 +1,19 @@
 //! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
 
+use super::leg_score::{FacingLeg, LegScore, ReportedAt};
 use super::occupancy_figures::{
     FacingFigures, LegDistances, OccupancyClass, OccupancyFigures, mean_of_identified_m,
 };
 use super::summary::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
-use crate::track::network::Route;
-use crate::track::{Direction, Place, TrackId};
+use crate::track::{Direction, TrackId};
 use crate::twin::physics::World;
 
 /// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
 /// One way is certain where the other one is less probable than this.
 const DOUBT: f64 = 1e-9;
-/// So near before the end of a leg the next track may be probable too.
-const BEFORE_END_M: f64 = 10.0;
 
 /// Scores track occupancy of one train.
 #[derive(Debug)]
@@ -27,21 +25,7 @@ pub struct OccupancyScore {
     errors_m: Vec<f64>,
     nees_sum: f64,
     facing: FacingFigures,
-    /// Legs that were left.
-    switches: Vec<Option<f64>>,
-    /// The leg that the antenna is on, if it came there over a toe.
-    leg: Option<EnteredLeg>,
-    /// The track that the antenna was on last, and its distance along the route.
-    last: Option<(TrackId, f64)>,
-}
-
-/// A leg of a switch that was run facing.
-#[derive(Clone, Copy, Debug)]
-struct EnteredLeg {
-    toe_m: f64,
-    end_m: f64,
-    /// Beyond the toe, from where on it has been identified.
-    identified_m: Option<f64>,
+    legs: LegScore,
 }
 
 impl OccupancyScore {
@@ -55,16 +39,13 @@ impl OccupancyScore {
             errors_m: Vec::new(),
             nees_sum: 0.0,
             facing: FacingFigures::default(),
-            switches: Vec::new(),
-            leg: None,
-            last: None,
+            legs: LegScore::default(),
         }
     }
 
-    /// Where the antenna was at a time, and which way along the track the front looked.
-    fn true_place(&self, world: &World, id: TrainId, time: SimTime) -> Option<(Place, Direction)> {
-        let run_m = world.run_at(id, time)? - self.antenna_behind_m;
-        Some(world.route(id)?.place(run_m))
+    /// Where the antenna was at a time, along the route, metres.
+    fn antenna_m(&self, world: &World, id: TrainId, time: SimTime) -> Option<f64> {
+        Some(world.run_at(id, time)? - self.antenna_behind_m)
     }
 
     /// Takes a report in that was sent now; gives its class, if it follows a fix or the train has no receiver.
@@ -74,9 +55,11 @@ impl OccupancyScore {
         world: &World,
         id: TrainId,
     ) -> Option<OccupancyClass> {
-        let (truth, facing) = self.true_place(world, id, report.time)?;
+        let antenna_m = self.antenna_m(world, id, report.time)?;
+        let (truth, facing) = world.route(id)?.place(antenna_m);
         let class = class_of(report, truth.track);
-        self.follow(world, id, class);
+        let is_told = class == Some(OccupancyClass::CorrectConfident);
+        self.follow(world, id, antenna_m, is_told);
         self.facing.add(report, (truth.track, facing));
         let class = class.filter(|_| report.of_fix || !self.has_receiver)?;
         self.classes[class as usize] += 1;
@@ -92,44 +75,29 @@ impl OccupancyScore {
         Some(class)
     }
 
-    /// Follows the antenna over the toes of switches.
-    fn follow(&mut self, world: &World, id: TrainId, class: Option<OccupancyClass>) {
+    /// Follows the train over the toes of switches. What counts for a leg is said of the place of the antenna, and the
+    /// distance is that of the head, which is the first to be in another train's way, when the report is sent.
+    fn follow(&mut self, world: &World, id: TrainId, antenna_m: f64, is_told: bool) {
         let (Some(route), Some(head_m)) = (world.route(id), world.run_m(id)) else {
             return;
         };
-        let run_m = head_m - self.antenna_behind_m;
-        let (place, _) = route.place(run_m);
-        if let Some((_, before_m)) = self.last.filter(|(track, _)| *track != place.track) {
-            self.switches
-                .extend(self.leg.take().map(|leg| leg.identified_m));
-            self.leg = leg_entered(world, route, (before_m, run_m), place.track);
-        }
-        self.last = Some((place.track, run_m));
-        let Some(leg) = &mut self.leg else {
-            return;
-        };
-        let near_end = run_m > leg.end_m - BEFORE_END_M;
-        let is_told = class == Some(OccupancyClass::CorrectConfident);
-        leg.identified_m = match leg.identified_m {
-            Some(m) if is_told || near_end => Some(m),
-            _ => is_told.then_some(run_m - leg.toe_m),
-        };
+        let legs = FacingLeg::all(world.network(), route);
+        let at = ReportedAt { head_m, antenna_m };
+        self.legs.report(&legs, at, is_told);
     }
 
     /// The figures.
     pub fn finish(mut self) -> OccupancyFigures {
-        // The run ended on a leg: that it was not identified by then counts, too.
-        self.switches
-            .extend(self.leg.take().map(|leg| leg.identified_m));
         let fixes = self.errors_m.len();
+        let legs_m = self.legs.finish();
         let [wc, wf, wu, cu, cf, cc] = self.classes;
         OccupancyFigures {
             fixes: self.classes.iter().sum(),
-            switches: self.switches.len() as u32,
-            never_identified: self.switches.iter().filter(|m| m.is_none()).count() as u32,
-            identified_mean_m: mean_of_identified_m(&self.switches),
-            known_after_m: LegDistances::of(&self.switches),
-            legs_known_after_m: self.switches,
+            switches: legs_m.len() as u32,
+            never_identified: legs_m.iter().filter(|m| m.is_none()).count() as u32,
+            identified_mean_m: mean_of_identified_m(&legs_m),
+            known_after_m: LegDistances::of(&legs_m),
+            legs_known_after_m: legs_m,
             classes: [
                 (OccupancyClass::WrongConfident, wc),
                 (OccupancyClass::WrongFairlyConfident, wf),
@@ -175,29 +143,6 @@ fn class_of(report: &OccupancyReport, truth: TrackId) -> Option<OccupancyClass> 
         (true, true, _) => CorrectConfident,
         (true, _, true) => CorrectFairlyConfident,
         (true, _, false) => CorrectUndecided,
-    })
-}
-
-/// The leg onto which the antenna came over a toe between two places of the route; none where it came over a joint, or
-/// over a switch run trailing.
-fn leg_entered(
-    world: &World,
-    route: &Route,
-    (from_m, to_m): (f64, f64),
-    track: TrackId,
-) -> Option<EnteredLeg> {
-    let passings = world.network().passings(route);
-    let between = from_m.min(to_m)..=from_m.max(to_m);
-    let passing = passings
-        .iter()
-        .find(|passing| passing.facing && between.contains(&passing.toe_m))?;
-    let legs = route.legs().iter().enumerate();
-    let mut begins = legs.map(|(k, leg)| (route.begin_m(k), leg));
-    let (begin_m, leg) = begins.find(|(begin_m, _)| (begin_m - passing.toe_m).abs() < 1e-6)?;
-    (leg.track == track).then(|| EnteredLeg {
-        toe_m: passing.toe_m,
-        end_m: begin_m + leg.length_m(),
-        identified_m: None,
     })
 }
 

@@ -33,7 +33,7 @@ impl<'a> OccupancyOfTrains<'a> {
         (fixes > 0).then(|| f64::from(self.fixes_of(counts)) / f64::from(fixes))
     }
 
-    /// Distance from the toe to where the leg was identified for good, metres, of every leg; `None` of one that never
+    /// From the toe to the head when the leg was identified for good, metres, of every leg; `None` of one that never
     /// was.
     pub fn legs_m(&self) -> Vec<Option<f64>> {
         let legs = self

@@ -81,9 +81,9 @@ fn a_train_finds_its_track_in_a_depot() {
     eprintln!("{occupancy:?}");
     assert_eq!(occupancy.classes[&OccupancyClass::WrongConfident], 0);
     assert_eq!(occupancy.never_identified, 0);
-    // A leg with a radius of 200 m is 4 m aside after 40 m.
+    // A leg with a radius of 200 m is 4 m aside after 40 m; the antenna is 10 m behind the head.
     let most_m = occupancy.known_after_m.unwrap().max;
-    assert!(most_m.is_some_and(|m| m < 40.0), "{most_m:?}");
+    assert!(most_m.is_some_and(|m| m < 50.0), "{most_m:?}");
     let (_, last) = heard.reports.last().unwrap();
     assert!(last.identified);
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("tunnels/terminus.toml");
