@@ -169,4 +169,17 @@ mod tests {
             "it began there"
         );
     }
+
+    /// Fails where only one of the toes between two reports counts, or a leg that was run over wholly does not.
+    #[test]
+    fn every_toe_between_two_reports_counts() {
+        for (then_m, expected) in [
+            (205.0, [Some(105.0), None]),
+            (215.0, [None, Some(15.0)]),
+            (315.0, [None, None]),
+        ] {
+            let found = distances(&[(90.0, true), (then_m, true)]);
+            assert_eq!(found, expected, "{then_m}");
+        }
+    }
 }
