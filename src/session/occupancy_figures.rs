@@ -8,14 +8,17 @@ use std::collections::BTreeMap;
 /// Track occupancy: what was said after each fix, and how soon legs of switches were known.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
 pub struct OccupancyFigures {
-    /// Fixes after which something was said; without a receiver, all reports.
+    /// Fixes after which something was said; without a receiver, such reports.
     pub fixes: u32,
+    /// These, and the fixes after which nothing was said: all of `classes`, which shares of fixes are of.
+    pub fixes_in_all: u32,
     /// Legs of switches that the train's head came to over the toe.
     pub switches: u32,
     /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
     pub never_identified: u32,
     /// From the toe to where the train's head was when the leg was identified for good, which needs a report of the
-    /// antenna's place on the leg: mean of the legs that were, `null` where none was. Those of `never_identified` have no distance and are not in it.
+    /// antenna's place on the leg: mean of the legs that were, `null` where none was. Those of `never_identified` have no
+    /// distance and are not in it.
     pub identified_mean_m: Option<f64>,
     /// The same distance over all legs; `null` without legs.
     pub known_after_m: Option<LegDistances>,
@@ -32,12 +35,25 @@ pub struct OccupancyFigures {
 }
 
 impl OccupancyClass {
+    /// All of them, from the worst on.
+    pub const ALL: [Self; 7] = [
+        Self::WrongConfident,
+        Self::WrongFairlyConfident,
+        Self::WrongUndecided,
+        Self::NothingSaid,
+        Self::CorrectUndecided,
+        Self::CorrectFairlyConfident,
+        Self::CorrectConfident,
+    ];
+
+    /// The most probable track is the true one.
+    pub fn is_right(self) -> bool {
+        self > Self::NothingSaid
+    }
+
     /// The most probable track is another than the true one.
     pub fn is_wrong(self) -> bool {
-        matches!(
-            self,
-            Self::WrongConfident | Self::WrongFairlyConfident | Self::WrongUndecided
-        )
+        self < Self::NothingSaid
     }
 }
 
@@ -85,7 +101,7 @@ pub(crate) fn mean_of_identified_m(legs_m: &[Option<f64>]) -> Option<f64> {
 }
 
 /// What the most probable track after a fix is worth (Guo et al. 2020). Confident: no other track is left. Fairly
-/// confident: its probability is over 0.9.
+/// confident: its probability is over 0.9. Where nothing is said there is no such track: neither wrong nor right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
 pub enum OccupancyClass {
     /// Another track than the true one, and no other left.
@@ -97,6 +113,9 @@ pub enum OccupancyClass {
     /// Another one.
     #[serde(rename = "wu")]
     WrongUndecided,
+    /// None: no track is named.
+    #[serde(rename = "ns")]
+    NothingSaid,
     /// The true one.
     #[serde(rename = "cu")]
     CorrectUndecided,
@@ -111,6 +130,16 @@ pub enum OccupancyClass {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Fails where a class is missing, or counts as wrong and right, or as neither though a track is named.
+    #[test]
+    fn all_classes_but_one_are_wrong_or_right() {
+        assert!(OccupancyClass::ALL.is_sorted());
+        let sides = OccupancyClass::ALL.map(|class| (class.is_wrong(), class.is_right()));
+        let (wrong, right) = ((true, false), (false, true));
+        let neither = (false, false);
+        assert_eq!(sides, [wrong, wrong, wrong, neither, right, right, right]);
+    }
 
     /// Fails where the quantiles leave out legs that were never identified, or the mean takes them in.
     #[test]

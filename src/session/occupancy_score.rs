@@ -9,6 +9,7 @@ use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
 use crate::track::{Direction, TrackId};
 use crate::twin::physics::World;
+use std::collections::BTreeMap;
 
 /// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
@@ -21,7 +22,7 @@ pub struct OccupancyScore {
     /// The antenna behind the head.
     antenna_behind_m: f64,
     has_receiver: bool,
-    classes: [u32; 6],
+    classes: BTreeMap<OccupancyClass, u32>,
     errors_m: Vec<f64>,
     nees_sum: f64,
     facing: FacingFigures,
@@ -35,7 +36,7 @@ impl OccupancyScore {
         Self {
             antenna_behind_m: onboard.gnss.map_or(told_m, |gnss| -gnss.antenna_m[0]),
             has_receiver: onboard.gnss.is_some(),
-            classes: [0; 6],
+            classes: OccupancyClass::ALL.map(|class| (class, 0)).into(),
             errors_m: Vec::new(),
             nees_sum: 0.0,
             facing: FacingFigures::default(),
@@ -58,11 +59,13 @@ impl OccupancyScore {
         let antenna_m = self.antenna_m(world, id, report.time)?;
         let (truth, facing) = world.route(id)?.place(antenna_m);
         let class = class_of(report, truth.track);
-        let is_told = class == Some(OccupancyClass::CorrectConfident);
+        let is_told = class == OccupancyClass::CorrectConfident;
         self.follow(world, id, antenna_m, is_told);
         self.facing.add(report, (truth.track, facing));
-        let class = class.filter(|_| report.of_fix || !self.has_receiver)?;
-        self.classes[class as usize] += 1;
+        if self.has_receiver && !report.of_fix {
+            return None;
+        }
+        *self.classes.entry(class).or_default() += 1;
         let best = report
             .tracks
             .first()
@@ -88,27 +91,21 @@ impl OccupancyScore {
 
     /// The figures.
     pub fn finish(mut self) -> OccupancyFigures {
-        let fixes = self.errors_m.len();
+        let right = self.errors_m.len();
         let legs_m = self.legs.finish();
-        let [wc, wf, wu, cu, cf, cc] = self.classes;
+        let fixes_in_all = self.classes.values().sum();
+        let unsaid = self.classes.get(&OccupancyClass::NothingSaid);
         OccupancyFigures {
-            fixes: self.classes.iter().sum(),
+            fixes: fixes_in_all - unsaid.unwrap_or(&0),
+            fixes_in_all,
             switches: legs_m.len() as u32,
             never_identified: legs_m.iter().filter(|m| m.is_none()).count() as u32,
             identified_mean_m: mean_of_identified_m(&legs_m),
             known_after_m: LegDistances::of(&legs_m),
             legs_known_after_m: legs_m,
-            classes: [
-                (OccupancyClass::WrongConfident, wc),
-                (OccupancyClass::WrongFairlyConfident, wf),
-                (OccupancyClass::WrongUndecided, wu),
-                (OccupancyClass::CorrectUndecided, cu),
-                (OccupancyClass::CorrectFairlyConfident, cf),
-                (OccupancyClass::CorrectConfident, cc),
-            ]
-            .into(),
+            classes: self.classes,
             facing: self.facing,
-            nees_mean: (fixes > 0).then(|| self.nees_sum / fixes as f64),
+            nees_mean: (right > 0).then(|| self.nees_sum / right as f64),
             error_m: ErrorStatistics::of(&mut self.errors_m),
         }
     }
@@ -128,22 +125,24 @@ impl FacingFigures {
     }
 }
 
-/// None while nothing is said.
-fn class_of(report: &OccupancyReport, truth: TrackId) -> Option<OccupancyClass> {
+/// What a report is worth of a train whose antenna is on a track.
+fn class_of(report: &OccupancyReport, truth: TrackId) -> OccupancyClass {
     use OccupancyClass::{
-        CorrectConfident, CorrectFairlyConfident, CorrectUndecided, WrongConfident,
+        CorrectConfident, CorrectFairlyConfident, CorrectUndecided, NothingSaid, WrongConfident,
         WrongFairlyConfident, WrongUndecided,
     };
-    let best = report.tracks.first()?;
+    let Some(best) = report.tracks.first() else {
+        return NothingSaid;
+    };
     let fairly = best.probability > FAIRLY;
-    Some(match (best.track == truth, report.identified, fairly) {
+    match (best.track == truth, report.identified, fairly) {
         (false, true, _) => WrongConfident,
         (false, _, true) => WrongFairlyConfident,
         (false, _, false) => WrongUndecided,
         (true, true, _) => CorrectConfident,
         (true, _, true) => CorrectFairlyConfident,
         (true, _, false) => CorrectUndecided,
-    })
+    }
 }
 
 #[cfg(test)]
@@ -151,22 +150,50 @@ mod tests {
     use super::*;
     use crate::bus::OccupiedTrack;
 
+    fn report(tracks: &[(u16, f64)], identified: bool) -> OccupancyReport {
+        let tracks = tracks.iter().map(|(track, probability)| OccupiedTrack {
+            track: TrackId(*track),
+            probability: *probability,
+            facing: Direction::Up,
+            facing_probability: 1.0,
+            s_m: 0.0,
+            sigma_m: 1.0,
+        });
+        OccupancyReport {
+            time: SimTime::ZERO,
+            tracks: tracks.collect(),
+            identified,
+            hypotheses: 1,
+            of_fix: true,
+        }
+    }
+
+    /// Fails where a report without a track is no class, or one of those with a track.
+    #[test]
+    fn a_report_without_a_track_is_a_class_of_its_own() {
+        let class =
+            |tracks: &[(u16, f64)], identified| class_of(&report(tracks, identified), TrackId(3));
+        assert_eq!(class(&[], false), OccupancyClass::NothingSaid);
+        let classes = [
+            class(&[(2, 1.0)], true),
+            class(&[(2, 0.95), (3, 0.05)], false),
+            class(&[(2, 0.6), (3, 0.4)], false),
+            class(&[], true),
+            class(&[(3, 0.6), (2, 0.4)], false),
+            class(&[(3, 0.95), (2, 0.05)], false),
+            class(&[(3, 1.0)], true),
+        ];
+        assert_eq!(classes, OccupancyClass::ALL);
+    }
+
     /// Only the way that is said of the true track counts, and what is certain is over 0.9 too.
     #[test]
     fn wrong_facings_are_counted() {
-        let report = |track: u16, facing: Direction, facing_probability: f64| OccupancyReport {
-            time: SimTime::ZERO,
-            tracks: vec![OccupiedTrack {
-                track: TrackId(track),
-                probability: 1.0,
-                facing,
-                facing_probability,
-                s_m: 0.0,
-                sigma_m: 1.0,
-            }],
-            identified: true,
-            hypotheses: 1,
-            of_fix: false,
+        let report = |track: u16, facing: Direction, facing_probability: f64| {
+            let mut report = report(&[(track, 1.0)], true);
+            report.tracks[0].facing = facing;
+            report.tracks[0].facing_probability = facing_probability;
+            report
         };
         let mut figures = FacingFigures::default();
         let truth = (TrackId(3), Direction::Up);

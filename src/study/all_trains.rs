@@ -27,9 +27,9 @@ impl<'a> OccupancyOfTrains<'a> {
         self.sum(|figures| fixes_of(figures, &counts))
     }
 
-    /// Share of fixes of some classes; `None` of no fixes.
+    /// Share of fixes of some classes, of all fixes, those included after which nothing was said; `None` of no fixes.
     pub fn share(&self, counts: impl Fn(OccupancyClass) -> bool) -> Option<f64> {
-        let fixes = self.sum(|figures| figures.fixes);
+        let fixes = self.sum(|figures| figures.fixes_in_all);
         (fixes > 0).then(|| f64::from(self.fixes_of(counts)) / f64::from(fixes))
     }
 
@@ -64,7 +64,7 @@ impl<'a> OccupancyOfTrains<'a> {
 
     /// Mean of (error / sigma)^2 of fixes whose track is right.
     pub fn nees_mean(&self) -> Option<f64> {
-        let right = |figures: &OccupancyFigures| fixes_of(figures, |class| !class.is_wrong());
+        let right = |figures: &OccupancyFigures| fixes_of(figures, OccupancyClass::is_right);
         let sums = self
             .0
             .iter()
@@ -84,24 +84,32 @@ fn fixes_of(figures: &OccupancyFigures, counts: impl Fn(OccupancyClass) -> bool)
 mod tests {
     use super::*;
     use crate::session::{ErrorStatistics, FacingFigures};
-    use OccupancyClass::{CorrectConfident, WrongConfident};
+    use OccupancyClass::{CorrectConfident, NothingSaid, WrongConfident};
 
+    /// Of two wrong fixes there is one after which nothing is said.
     fn figures(wrong: u32, right: u32, legs: &[Option<f64>], nees: f64) -> OccupancyFigures {
         OccupancyFigures {
             fixes: wrong + right,
+            fixes_in_all: wrong + right + wrong / 2,
             switches: legs.len() as u32,
             never_identified: legs.iter().filter(|leg| leg.is_none()).count() as u32,
             identified_mean_m: None,
             known_after_m: None,
             legs_known_after_m: legs.to_vec(),
-            classes: [(WrongConfident, wrong), (CorrectConfident, right)].into(),
+            classes: [
+                (WrongConfident, wrong),
+                (NothingSaid, wrong / 2),
+                (CorrectConfident, right),
+            ]
+            .into(),
             error_m: ErrorStatistics::of(&mut [0.1 * nees]),
             nees_mean: Some(nees),
             facing: FacingFigures::default(),
         }
     }
 
-    /// Fails where only the first train counts, or a short run as much as a long one.
+    /// Fails where only the first train counts, or a short run as much as a long one, or fixes after which nothing is said
+    /// are in no denominator.
     #[test]
     fn trains_count_by_their_fixes() {
         let first = figures(10, 90, &[Some(40.0), None], 4.0);
@@ -114,7 +122,7 @@ mod tests {
         let is_wrong = |class| class == WrongConfident;
         assert_eq!(
             (all.fixes_of(is_wrong), all.share(is_wrong)),
-            (10, Some(0.025))
+            (10, Some(10.0 / 405.0))
         );
         let undecided = all.sum(|figures| figures.never_identified);
         assert_eq!(
@@ -131,7 +139,7 @@ mod tests {
         assert!((all.nees_mean().unwrap() - nees).abs() < 1e-12);
         assert_eq!(all.error_max_m(), Some(0.4));
         let alone = OccupancyOfTrains::of(Some(&first), &[]).unwrap();
-        assert_eq!(alone.share(is_wrong), Some(0.1));
+        assert_eq!(alone.share(is_wrong), Some(10.0 / 105.0));
         assert!(OccupancyOfTrains::of(None, &trains[1..2]).is_none());
     }
 }

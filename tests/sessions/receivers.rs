@@ -111,9 +111,11 @@ impl Observer for Scores {
             class: Some(class),
         } = event
         {
-            let best = &report.tracks[0];
             *self.classes.entry(*class).or_default() += 1;
-            let right = *class >= OccupancyClass::CorrectUndecided;
+            let Some(best) = report.tracks.first() else {
+                return Ok(());
+            };
+            let right = class.is_right();
             let calibration = self.calibrations.entry(*train).or_default();
             calibration.add(usize::from(best.track.0), 1.0 - best.probability, right);
         }

@@ -371,9 +371,9 @@ fn val_maps_of_nearer_points() {
 #[test]
 fn val_beside_a_parallel_track_nothing_wrong_grows_certain() {
     let tally = beside_a_parallel_track(MAP_WORSE, 300);
-    let [wc, wf, wu, cu, cf, cc] = tally.classes;
+    let [wc, wf, wu, ns, cu, cf, cc] = tally.classes;
     println!(
-        "\nfrom nothing beside a parallel track: wc {wc}, wf {wf}, wu {wu}, cu {cu}, cf {cf}, cc {cc}"
+        "\nfrom nothing beside a parallel track: wc {wc}, wf {wf}, wu {wu}, ns {ns}, cu {cu}, cf {cf}, cc {cc}"
     );
     (tally.calibration)
         .print("from nothing beside a parallel track, map half as far off again as believed");

@@ -29,8 +29,9 @@ pub struct Distances {
 #[derive(Default)]
 pub struct Tally {
     pub switches: Vec<AtSwitch>,
-    /// Of fixes: wrong confident, wrong fairly confident, wrong undecided, right undecided, fairly, confident.
-    pub classes: [usize; 6],
+    /// Of fixes: wrong confident, wrong fairly confident, wrong undecided, nothing said, right undecided, fairly,
+    /// confident.
+    pub classes: [usize; 7],
     /// Of the wrong confident ones, those near a joint.
     pub at_joint: usize,
     /// Of fixes that are not near joints.
@@ -46,18 +47,22 @@ pub struct Tally {
 
 impl Tally {
     pub fn add(&mut self, decision: &Decision, (truth, along_m): (usize, f64), length_m: f64) {
+        let from_end_m = along_m.min(length_m - along_m);
+        let is_leg = !truth.is_multiple_of(3);
+        let is_parallel = is_leg && self.parallel_from_m > 0.0 && from_end_m > self.parallel_from_m;
+        self.parallel[0] += usize::from(is_parallel);
         let Some(best) = decision.tracks.first() else {
-            self.classes[2] += 1;
+            self.classes[3] += 1;
             return;
         };
         let right = best.element == truth;
+        self.parallel[1] += usize::from(is_parallel && right);
         let sure = match (decision.is_identified(), best.probability > 0.9) {
             (true, _) => 2,
             (false, true) => 1,
             (false, false) => 0,
         };
-        self.classes[if right { 3 + sure } else { 2 - sure }] += 1;
-        let from_end_m = along_m.min(length_m - along_m);
+        self.classes[if right { 4 + sure } else { 2 - sure }] += 1;
         self.at_joint += usize::from(!right && sure == 2 && from_end_m < AT_JOINT_M);
         if from_end_m > AT_JOINT_M {
             self.calibration.add(truth, 1.0 - best.probability, right);
@@ -68,11 +73,6 @@ impl Tally {
         if right {
             self.squares.0 += ((best.along_m - along_m) / best.sigma_m).powi(2);
             self.squares.1 += 1;
-        }
-        let is_leg = !truth.is_multiple_of(3);
-        if is_leg && self.parallel_from_m > 0.0 && from_end_m > self.parallel_from_m {
-            self.parallel[0] += 1;
-            self.parallel[1] += usize::from(right);
         }
     }
 
@@ -166,22 +166,23 @@ pub fn table(title: &str, rows: &[(String, Tally)]) {
     println!("\n{title}");
     println!("inf: more than the leg; the mean is of the legs that were identified");
     println!(
-        "                           switches  mean m   95 %   most      never  right %   wc (at joints)  wf    wu    cu    cf     cc (% of fixes)  nees"
+        "                           switches  mean m   95 %   most      never  right %   wc (at joints)  wf    wu    ns    cu    cf     cc (% of fixes)  nees"
     );
     for (name, tally) in rows {
         let of = tally.distances();
         let (mean, p95, most) = (of.mean_of_identified, of.p95, of.most);
         let fixes = tally.fixes() as f64;
-        let [wc, wf, wu, cu, cf, cc] = tally.classes;
+        let [wc, wf, wu, ns, cu, cf, cc] = tally.classes;
         let share = |count: usize| 100.0 * count as f64 / fixes;
         println!(
-            "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
+            "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
             tally.switches.len(),
             100.0 * tally.never(),
             100.0 * tally.right(),
             tally.at_joint,
             share(wf),
             share(wu),
+            share(ns),
             share(cu),
             share(cf),
             share(cc),
