@@ -7,7 +7,7 @@ use super::occupancy_figures::{
 use super::summary::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
-use crate::track::{Direction, TrackId};
+use crate::track::{Direction, Place, TrackId};
 use crate::twin::physics::World;
 use std::collections::BTreeMap;
 
@@ -15,6 +15,15 @@ use std::collections::BTreeMap;
 const FAIRLY: f64 = 0.9;
 /// One way is certain where the other one is less probable than this.
 const DOUBT: f64 = 1e-9;
+
+/// A report held against the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// Where the antenna was at the time of the report.
+    pub truth: Place,
+    /// What the report is worth, if it follows a fix or the train has no receiver.
+    pub class: Option<OccupancyClass>,
+}
 
 /// Scores track occupancy of one train.
 #[derive(Debug)]
@@ -49,13 +58,13 @@ impl OccupancyScore {
         Some(world.run_at(id, time)? - self.antenna_behind_m)
     }
 
-    /// Takes a report in that was sent now; gives its class, if it follows a fix or the train has no receiver.
+    /// Takes a report in that was sent now; none where the world does not go back to its time.
     pub fn report(
         &mut self,
         report: &OccupancyReport,
         world: &World,
         id: TrainId,
-    ) -> Option<OccupancyClass> {
+    ) -> Option<Judged> {
         let antenna_m = self.antenna_m(world, id, report.time)?;
         let (truth, facing) = world.route(id)?.place(antenna_m);
         let class = class_of(report, truth.track);
@@ -63,7 +72,7 @@ impl OccupancyScore {
         self.follow(world, id, antenna_m, is_told);
         self.facing.add(report, (truth.track, facing));
         if self.has_receiver && !report.of_fix {
-            return None;
+            return Some(Judged { truth, class: None });
         }
         *self.classes.entry(class).or_default() += 1;
         let best = report
@@ -75,7 +84,8 @@ impl OccupancyScore {
             self.errors_m.push(error_m.abs());
             self.nees_sum += (error_m / best.sigma_m).powi(2);
         }
-        Some(class)
+        let class = Some(class);
+        Some(Judged { truth, class })
     }
 
     /// Follows the train over the toes of switches. What counts for a leg is said of the place of the antenna, and the

@@ -1,10 +1,11 @@
 //! Satellite receivers and track occupancy on trains: whole sessions.
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, TruePlace};
 use metrotwin::bus::{Content, GnssFix, OccupancyReport, TrainId};
 use metrotwin::scenario::{Override, Scenario};
 use metrotwin::session::{
-    Event, Observer, ObserverError, OccupancyClass, RendererChoice, RunOptions, Summary, run,
+    Event, Observer, ObserverError, OccupancyClass, Opening, RendererChoice, RunOptions, Summary,
+    run,
 };
 use metrotwin::twin::physics::TrainState;
 use std::collections::BTreeMap;
@@ -98,26 +99,36 @@ fn a_train_finds_its_track_in_a_depot() {
 /// off as the stack believes; each receiver's errors are a quarter larger than it states.
 #[derive(Default)]
 struct Scores {
-    /// By train. The event does not say on which track the train is, so decisions are counted by the track that they name.
+    /// Of the tracks.
+    lengths_m: Vec<f64>,
+    /// By train.
     calibrations: BTreeMap<TrainId, Calibration>,
     classes: BTreeMap<OccupancyClass, usize>,
 }
 
 impl Observer for Scores {
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+        let tracks = opening.tunnel.network.tracks.iter();
+        self.lengths_m = tracks.map(|track| track.alignment.length_m()).collect();
+        Ok(())
+    }
+
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         if let Event::Occupancy {
             train,
             report,
             class: Some(class),
+            truth: Some(truth),
         } = event
         {
             *self.classes.entry(*class).or_default() += 1;
             let Some(best) = report.tracks.first() else {
                 return Ok(());
             };
-            let right = class.is_right();
+            let element = usize::from(truth.track.0);
+            let place = TruePlace::new(element, truth.s_m, self.lengths_m[element]);
             let calibration = self.calibrations.entry(*train).or_default();
-            calibration.add(usize::from(best.track.0), 1.0 - best.probability, right);
+            calibration.add(place, 1.0 - best.probability, class.is_right());
         }
         Ok(())
     }

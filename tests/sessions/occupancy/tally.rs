@@ -1,10 +1,7 @@
 //! Counts over many runs.
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, TruePlace};
 use metrotwin::stack::occupancy::Decision;
-
-/// So near to a joint a certain decision for the element beyond it is wrong about the place, not about the track.
-const AT_JOINT_M: f64 = 15.0;
 
 /// What became of one switch.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,7 +31,6 @@ pub struct Tally {
     pub classes: [usize; 7],
     /// Of the wrong confident ones, those near a joint.
     pub at_joint: usize,
-    /// Of fixes that are not near joints.
     pub calibration: Calibration,
     sigmas_m: [usize; 3],
     /// Squared errors of the place over their variance: sum and number, of fixes on the right element.
@@ -47,9 +43,10 @@ pub struct Tally {
 
 impl Tally {
     pub fn add(&mut self, decision: &Decision, (truth, along_m): (usize, f64), length_m: f64) {
-        let from_end_m = along_m.min(length_m - along_m);
+        let place = TruePlace::new(truth, along_m, length_m);
         let is_leg = !truth.is_multiple_of(3);
-        let is_parallel = is_leg && self.parallel_from_m > 0.0 && from_end_m > self.parallel_from_m;
+        let is_parallel =
+            is_leg && self.parallel_from_m > 0.0 && place.from_end_m > self.parallel_from_m;
         self.parallel[0] += usize::from(is_parallel);
         let Some(best) = decision.tracks.first() else {
             self.classes[3] += 1;
@@ -63,10 +60,8 @@ impl Tally {
             (false, false) => 0,
         };
         self.classes[if right { 4 + sure } else { 2 - sure }] += 1;
-        self.at_joint += usize::from(!right && sure == 2 && from_end_m < AT_JOINT_M);
-        if from_end_m > AT_JOINT_M {
-            self.calibration.add(truth, 1.0 - best.probability, right);
-        }
+        self.at_joint += usize::from(!right && sure == 2 && place.is_at_joint());
+        self.calibration.add(place, 1.0 - best.probability, right);
         for (count, most_m) in self.sigmas_m.iter_mut().zip([1.0, 2.0, 3.0]) {
             *count += usize::from(best.sigma_m < most_m);
         }
