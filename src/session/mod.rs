@@ -37,6 +37,7 @@ mod ride;
 mod scheduler;
 mod scoring;
 mod speed;
+mod statistics;
 mod summary;
 mod train_score;
 mod wayside_score;
@@ -50,10 +51,11 @@ pub use occupancy_figures::{FacingFigures, LegDistances, OccupancyClass, Occupan
 pub(crate) use presence::FieldOfView;
 pub use profile::{DrawingProfile, PassCost, profile};
 pub use speed::{Speeds, measure};
-pub(crate) use summary::quantile;
+pub(crate) use statistics::quantile;
+pub use statistics::{Cost, ErrorStatistics};
 pub use summary::{
-    CameraFigures, Cost, End, ErrorStatistics, FaultSpan, ObstacleScore, Physics, Positioning,
-    ProtectionFigures, Summary, TrainFigures, TrainSummary, WallShares, Wayside,
+    CameraFigures, End, FaultSpan, ObstacleScore, Physics, Positioning, ProtectionFigures, Summary,
+    TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

@@ -1,6 +1,6 @@
 //! What track occupancy comes to, as `summary.json` has it.
 
-use super::summary::ErrorStatistics;
+use super::statistics::ErrorStatistics;
 use schemars::JsonSchema;
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -4,7 +4,7 @@ use super::leg_score::{FacingLeg, LegScore, ReportedAt};
 use super::occupancy_figures::{
     FacingFigures, LegDistances, OccupancyClass, OccupancyFigures, mean_of_identified_m,
 };
-use super::summary::ErrorStatistics;
+use super::statistics::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
 use crate::track::{Direction, Place, TrackId};
