@@ -104,7 +104,7 @@ fn a_report_says_it_by_swept_value() {
 #[test]
 fn what_never_came_about_is_farther_than_any_number() {
     let known_m = |k: u64| 10.0 + k as f64;
-    let run = |k: u64| {
+    let run_of = |k: u64| {
         let (legs_m, never) = match k {
             18 => (vec![known_m(k)], 1),
             19 => (Vec::new(), 2),
@@ -119,9 +119,16 @@ fn what_never_came_about_is_farther_than_any_number() {
         row.values.insert("rail".to_owned(), json!("dry"));
         row
     };
-    let rows: Vec<Row> = (0..20).map(run).collect();
+    let rows: Vec<Row> = (0..20).map(run_of).collect();
     let base = folder("never");
     let digest = Digest::of(&template(&base), &rows);
+    leave(&base, &rows);
+    let report = run(&format!("study report {}", base.display()));
+    succeeds(&report);
+    says(&report, "2 of 20 never, counted as inf and not in the mean");
+    says(&report, "3 of 40 never");
+    let page = fs::read_to_string(base.join("report.html")).unwrap();
+    assert!(page.contains("40, 3 never"), "{page}");
     fs::remove_dir_all(base).ok();
     let of_name = |f: &&FigureDigest| f.measure.name == "occupancy_known_max_m";
     let most = digest.figures.iter().find(of_name).unwrap();
