@@ -24,7 +24,8 @@ pub struct OccupancyFigures {
     pub known_after_m: Option<LegDistances>,
     /// The same of each leg in order; `null` where it was never identified.
     pub legs_known_after_m: Vec<Option<f64>>,
-    /// How many fixes are of which class.
+    /// How many fixes are of which class: `wc`, `wf`, `wu` wrong, `cu`, `cf`, `cc` correct, each confident, fairly
+    /// confident or undecided; `ns` nothing said.
     pub classes: BTreeMap<OccupancyClass, u32>,
     /// Which way the train was said to face.
     pub facing: FacingFigures,

@@ -135,8 +135,11 @@ impl Tally {
         let identified: Vec<f64> = legs().flatten().collect();
         let mut all: Vec<f64> = legs().map(|m| m.unwrap_or(f64::INFINITY)).collect();
         all.sort_by(f64::total_cmp);
-        // The least that so many are not above.
-        let quantile = |p: f64| all[((p * all.len() as f64).ceil() as usize).max(1) - 1];
+        // The least that so many are not above; not a number without switches.
+        let quantile = |p: f64| {
+            let rank = (p * all.len() as f64).ceil() as usize;
+            all.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+        };
         Distances {
             mean_of_identified: identified.iter().sum::<f64>() / identified.len() as f64,
             p95: quantile(0.95),
