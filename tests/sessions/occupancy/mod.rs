@@ -159,10 +159,10 @@ fn val_legs_are_told_soon_and_never_wrong_with_certainty() {
     let parallel = all.parallel_right();
     assert!(all.switches.len() >= 4000 && all.fixes() >= 100_000);
     assert!(
-        of.mean_of_identified < 30.0 && of.p95 < 60.0,
+        of.mean_of_identified < 30.0 && of.most < 60.0,
         "{} {}",
         of.mean_of_identified,
-        of.p95
+        of.most
     );
     assert!(parallel > 0.999, "{parallel}");
     assert!(
