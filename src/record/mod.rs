@@ -298,6 +298,7 @@ impl Open {
                 train,
                 report,
                 class,
+                ..
             } => {
                 if let Some(view) = self.view(train) {
                     view.plots.occupancy(report, class);

@@ -149,12 +149,13 @@ const DEVICE_COLOURS: [Color; 4] = [CYAN, ORANGE, OLIVE, VIOLET];
 /// What the rig is called among cameras; both eyes are exposed alike.
 pub(super) const RIG_CAMERA: &str = "rig";
 
-/// Wrong below zero, right over it, the surer the farther.
+/// Wrong below zero, right over it, the surer the farther; nothing said is zero.
 fn class_value(class: OccupancyClass) -> f64 {
     match class {
         OccupancyClass::WrongConfident => -3.0,
         OccupancyClass::WrongFairlyConfident => -2.0,
         OccupancyClass::WrongUndecided => -1.0,
+        OccupancyClass::NothingSaid => 0.0,
         OccupancyClass::CorrectUndecided => 1.0,
         OccupancyClass::CorrectFairlyConfident => 2.0,
         OccupancyClass::CorrectConfident => 3.0,

@@ -1,7 +1,7 @@
 //! Median and 99th percentile of many costs, in memory that does not grow with their number: they are
 //! counted in bins, each 1 % wider than the one before.
 
-use super::summary::Cost;
+use super::statistics::Cost;
 
 const BINS_A_DECADE: f64 = 230.0;
 const LEAST_MS: f64 = 1e-4;

@@ -5,7 +5,7 @@ use crate::bus::{
     CameraFault, Frame, LedReport, Message, Node, OccupancyReport, RigCalibration, SimTime,
     StereoPair, TrainId, WaysideCalibration, WaysideReport,
 };
-use crate::track::{TrackId, Tunnel};
+use crate::track::{Place, TrackId, Tunnel};
 use crate::twin::geometry::Body;
 use crate::twin::physics::{BodyLabel, TrainState};
 use crate::twin::render::Job;
@@ -110,8 +110,10 @@ pub enum Event<'a> {
         train: TrainId,
         /// What it says.
         report: &'a OccupancyReport,
-        /// Its class, if it comes of a fix.
+        /// Its class, if it comes of a fix or the train has no receiver.
         class: Option<OccupancyClass>,
+        /// Where the antenna really was at the time of the report; none where the world does not go so far back.
+        truth: Option<Place>,
     },
     /// A message arrived at a node, or was sent there; those with images come as [`Event::Pair`] and
     /// [`Event::Wayside`].

@@ -25,6 +25,8 @@ mod fitting;
 mod health;
 mod image_box;
 mod imaging;
+mod leg_score;
+mod occupancy_figures;
 mod occupancy_score;
 mod outcome;
 mod positioning_score;
@@ -35,6 +37,7 @@ mod ride;
 mod scheduler;
 mod scoring;
 mod speed;
+mod statistics;
 mod summary;
 mod train_score;
 mod wayside_score;
@@ -43,14 +46,16 @@ pub use event::{
     Event, Exposure, Observer, ObserverError, Opening, Source, TrainOpening, TrainPoint,
 };
 pub use fitting::{Fitted, Fitting, Mounted};
+pub(crate) use occupancy_figures::mean_of_identified_m;
+pub use occupancy_figures::{FacingFigures, LegDistances, OccupancyClass, OccupancyFigures};
 pub(crate) use presence::FieldOfView;
 pub use profile::{DrawingProfile, PassCost, profile};
 pub use speed::{Speeds, measure};
-pub(crate) use summary::quantile;
+pub(crate) use statistics::quantile;
+pub use statistics::{Cost, ErrorStatistics};
 pub use summary::{
-    CameraFigures, Cost, End, ErrorStatistics, FacingFigures, FaultSpan, ObstacleScore,
-    OccupancyClass, OccupancyFigures, Physics, Positioning, ProtectionFigures, Summary,
-    SwitchDistances, TrainFigures, TrainSummary, WallShares, Wayside,
+    CameraFigures, End, FaultSpan, ObstacleScore, Physics, Positioning, ProtectionFigures, Summary,
+    TrainFigures, TrainSummary, WallShares, Wayside,
 };
 
 use crate::scenario::Scenario;

@@ -1,20 +1,29 @@
 //! Scores of track occupancy: what is said after each fix, and how soon after a switch its leg is known.
 
-use super::summary::{
-    ErrorStatistics, FacingFigures, OccupancyClass, OccupancyFigures, SwitchDistances,
+use super::leg_score::{FacingLeg, LegScore, ReportedAt};
+use super::occupancy_figures::{
+    FacingFigures, LegDistances, OccupancyClass, OccupancyFigures, mean_of_identified_m,
 };
+use super::statistics::ErrorStatistics;
 use crate::bus::{OccupancyReport, SimTime, TrainId};
 use crate::scenario::OnboardSettings;
-use crate::track::network::Route;
 use crate::track::{Direction, Place, TrackId};
 use crate::twin::physics::World;
+use std::collections::BTreeMap;
 
 /// A decision that is more probable is fairly confident.
 const FAIRLY: f64 = 0.9;
 /// One way is certain where the other one is less probable than this.
 const DOUBT: f64 = 1e-9;
-/// So near before the end of a leg the next track may be probable too.
-const BEFORE_END_M: f64 = 10.0;
+
+/// A report held against the truth.
+#[derive(Clone, Copy, Debug)]
+pub struct Judged {
+    /// Where the antenna was at the time of the report.
+    pub truth: Place,
+    /// What the report is worth, if it follows a fix or the train has no receiver.
+    pub class: Option<OccupancyClass>,
+}
 
 /// Scores track occupancy of one train.
 #[derive(Debug)]
@@ -22,25 +31,11 @@ pub struct OccupancyScore {
     /// The antenna behind the head.
     antenna_behind_m: f64,
     has_receiver: bool,
-    classes: [u32; 6],
+    classes: BTreeMap<OccupancyClass, u32>,
     errors_m: Vec<f64>,
     nees_sum: f64,
     facing: FacingFigures,
-    /// Legs that were left.
-    switches: Vec<Option<f64>>,
-    /// The leg that the antenna is on, if it came there over a toe.
-    leg: Option<EnteredLeg>,
-    /// The track that the antenna was on last, and its distance along the route.
-    last: Option<(TrackId, f64)>,
-}
-
-/// A leg of a switch that was run facing.
-#[derive(Clone, Copy, Debug)]
-struct EnteredLeg {
-    toe_m: f64,
-    end_m: f64,
-    /// Beyond the toe, from where on it has been identified.
-    identified_m: Option<f64>,
+    legs: LegScore,
 }
 
 impl OccupancyScore {
@@ -50,35 +45,36 @@ impl OccupancyScore {
         Self {
             antenna_behind_m: onboard.gnss.map_or(told_m, |gnss| -gnss.antenna_m[0]),
             has_receiver: onboard.gnss.is_some(),
-            classes: [0; 6],
+            classes: OccupancyClass::ALL.map(|class| (class, 0)).into(),
             errors_m: Vec::new(),
             nees_sum: 0.0,
             facing: FacingFigures::default(),
-            switches: Vec::new(),
-            leg: None,
-            last: None,
+            legs: LegScore::default(),
         }
     }
 
-    /// Where the antenna was at a time, and which way along the track the front looked.
-    fn true_place(&self, world: &World, id: TrainId, time: SimTime) -> Option<(Place, Direction)> {
-        let run_m = world.run_at(id, time)? - self.antenna_behind_m;
-        Some(world.route(id)?.place(run_m))
+    /// Where the antenna was at a time, along the route, metres.
+    fn antenna_m(&self, world: &World, id: TrainId, time: SimTime) -> Option<f64> {
+        Some(world.run_at(id, time)? - self.antenna_behind_m)
     }
 
-    /// Takes a report in that was sent now; gives its class, if it follows a fix or the train has no receiver.
+    /// Takes a report in that was sent now; none where the world does not go back to its time.
     pub fn report(
         &mut self,
         report: &OccupancyReport,
         world: &World,
         id: TrainId,
-    ) -> Option<OccupancyClass> {
-        let (truth, facing) = self.true_place(world, id, report.time)?;
+    ) -> Option<Judged> {
+        let antenna_m = self.antenna_m(world, id, report.time)?;
+        let (truth, facing) = world.route(id)?.place(antenna_m);
         let class = class_of(report, truth.track);
-        self.follow(world, id, class);
+        let is_told = class == OccupancyClass::CorrectConfident;
+        self.follow(world, id, antenna_m, is_told);
         self.facing.add(report, (truth.track, facing));
-        let class = class.filter(|_| report.of_fix || !self.has_receiver)?;
-        self.classes[class as usize] += 1;
+        if self.has_receiver && !report.of_fix {
+            return Some(Judged { truth, class: None });
+        }
+        *self.classes.entry(class).or_default() += 1;
         let best = report
             .tracks
             .first()
@@ -88,62 +84,38 @@ impl OccupancyScore {
             self.errors_m.push(error_m.abs());
             self.nees_sum += (error_m / best.sigma_m).powi(2);
         }
-        Some(class)
+        let class = Some(class);
+        Some(Judged { truth, class })
     }
 
-    /// Follows the antenna over the toes of switches.
-    fn follow(&mut self, world: &World, id: TrainId, class: Option<OccupancyClass>) {
+    /// Follows the train over the toes of switches. What counts for a leg is said of the place of the antenna, and the
+    /// distance is that of the head, which is the first to be in another train's way, when the report is sent.
+    fn follow(&mut self, world: &World, id: TrainId, antenna_m: f64, is_told: bool) {
         let (Some(route), Some(head_m)) = (world.route(id), world.run_m(id)) else {
             return;
         };
-        let run_m = head_m - self.antenna_behind_m;
-        let (place, _) = route.place(run_m);
-        if let Some((_, before_m)) = self.last.filter(|(track, _)| *track != place.track) {
-            self.switches
-                .extend(self.leg.take().map(|leg| leg.identified_m));
-            self.leg = leg_entered(world, route, (before_m, run_m), place.track);
-        }
-        self.last = Some((place.track, run_m));
-        let Some(leg) = &mut self.leg else {
-            return;
-        };
-        let near_end = run_m > leg.end_m - BEFORE_END_M;
-        let is_told = class == Some(OccupancyClass::CorrectConfident);
-        leg.identified_m = match leg.identified_m {
-            Some(m) if is_told || near_end => Some(m),
-            _ => is_told.then_some(run_m - leg.toe_m),
-        };
+        let legs = FacingLeg::all(world.network(), route);
+        let at = ReportedAt { head_m, antenna_m };
+        self.legs.report(&legs, at, is_told);
     }
 
     /// The figures.
     pub fn finish(mut self) -> OccupancyFigures {
-        // The run ended on a leg: that it was not identified by then counts, too.
-        self.switches
-            .extend(self.leg.take().map(|leg| leg.identified_m));
-        let fixes = self.errors_m.len();
-        let mut distances_m: Vec<f64> = self.switches.iter().copied().flatten().collect();
-        let [wc, wf, wu, cu, cf, cc] = self.classes;
+        let right = self.errors_m.len();
+        let legs_m = self.legs.finish();
+        let fixes_in_all = self.classes.values().sum();
+        let unsaid = self.classes.get(&OccupancyClass::NothingSaid);
         OccupancyFigures {
-            fixes: self.classes.iter().sum(),
-            switches: self.switches.len() as u32,
-            never_identified: self.switches.iter().filter(|m| m.is_none()).count() as u32,
-            identified_after_m: ErrorStatistics::of(&mut distances_m).map(|s| SwitchDistances {
-                mean: s.mean,
-                p95: s.p95,
-                max: s.max,
-            }),
-            legs_identified_after_m: self.switches,
-            classes: [
-                (OccupancyClass::WrongConfident, wc),
-                (OccupancyClass::WrongFairlyConfident, wf),
-                (OccupancyClass::WrongUndecided, wu),
-                (OccupancyClass::CorrectUndecided, cu),
-                (OccupancyClass::CorrectFairlyConfident, cf),
-                (OccupancyClass::CorrectConfident, cc),
-            ]
-            .into(),
+            fixes: fixes_in_all - unsaid.unwrap_or(&0),
+            fixes_in_all,
+            switches: legs_m.len() as u32,
+            never_identified: legs_m.iter().filter(|m| m.is_none()).count() as u32,
+            identified_mean_m: mean_of_identified_m(&legs_m),
+            known_after_m: LegDistances::of(&legs_m),
+            legs_known_after_m: legs_m,
+            classes: self.classes,
             facing: self.facing,
-            nees_mean: (fixes > 0).then(|| self.nees_sum / fixes as f64),
+            nees_mean: (right > 0).then(|| self.nees_sum / right as f64),
             error_m: ErrorStatistics::of(&mut self.errors_m),
         }
     }
@@ -163,45 +135,24 @@ impl FacingFigures {
     }
 }
 
-/// None while nothing is said.
-fn class_of(report: &OccupancyReport, truth: TrackId) -> Option<OccupancyClass> {
+/// What a report is worth of a train whose antenna is on a track.
+fn class_of(report: &OccupancyReport, truth: TrackId) -> OccupancyClass {
     use OccupancyClass::{
-        CorrectConfident, CorrectFairlyConfident, CorrectUndecided, WrongConfident,
+        CorrectConfident, CorrectFairlyConfident, CorrectUndecided, NothingSaid, WrongConfident,
         WrongFairlyConfident, WrongUndecided,
     };
-    let best = report.tracks.first()?;
+    let Some(best) = report.tracks.first() else {
+        return NothingSaid;
+    };
     let fairly = best.probability > FAIRLY;
-    Some(match (best.track == truth, report.identified, fairly) {
+    match (best.track == truth, report.identified, fairly) {
         (false, true, _) => WrongConfident,
         (false, _, true) => WrongFairlyConfident,
         (false, _, false) => WrongUndecided,
         (true, true, _) => CorrectConfident,
         (true, _, true) => CorrectFairlyConfident,
         (true, _, false) => CorrectUndecided,
-    })
-}
-
-/// The leg onto which the antenna came over a toe between two places of the route; none where it came over a joint, or
-/// over a switch run trailing.
-fn leg_entered(
-    world: &World,
-    route: &Route,
-    (from_m, to_m): (f64, f64),
-    track: TrackId,
-) -> Option<EnteredLeg> {
-    let passings = world.network().passings(route);
-    let between = from_m.min(to_m)..=from_m.max(to_m);
-    let passing = passings
-        .iter()
-        .find(|passing| passing.facing && between.contains(&passing.toe_m))?;
-    let legs = route.legs().iter().enumerate();
-    let mut begins = legs.map(|(k, leg)| (route.begin_m(k), leg));
-    let (begin_m, leg) = begins.find(|(begin_m, _)| (begin_m - passing.toe_m).abs() < 1e-6)?;
-    (leg.track == track).then(|| EnteredLeg {
-        toe_m: passing.toe_m,
-        end_m: begin_m + leg.length_m(),
-        identified_m: None,
-    })
+    }
 }
 
 #[cfg(test)]
@@ -209,22 +160,50 @@ mod tests {
     use super::*;
     use crate::bus::OccupiedTrack;
 
+    fn report(tracks: &[(u16, f64)], identified: bool) -> OccupancyReport {
+        let tracks = tracks.iter().map(|(track, probability)| OccupiedTrack {
+            track: TrackId(*track),
+            probability: *probability,
+            facing: Direction::Up,
+            facing_probability: 1.0,
+            s_m: 0.0,
+            sigma_m: 1.0,
+        });
+        OccupancyReport {
+            time: SimTime::ZERO,
+            tracks: tracks.collect(),
+            identified,
+            hypotheses: 1,
+            of_fix: true,
+        }
+    }
+
+    /// Fails where a report without a track is no class, or one of those with a track.
+    #[test]
+    fn a_report_without_a_track_is_a_class_of_its_own() {
+        let class =
+            |tracks: &[(u16, f64)], identified| class_of(&report(tracks, identified), TrackId(3));
+        assert_eq!(class(&[], false), OccupancyClass::NothingSaid);
+        let classes = [
+            class(&[(2, 1.0)], true),
+            class(&[(2, 0.95), (3, 0.05)], false),
+            class(&[(2, 0.6), (3, 0.4)], false),
+            class(&[], true),
+            class(&[(3, 0.6), (2, 0.4)], false),
+            class(&[(3, 0.95), (2, 0.05)], false),
+            class(&[(3, 1.0)], true),
+        ];
+        assert_eq!(classes, OccupancyClass::ALL);
+    }
+
     /// Only the way that is said of the true track counts, and what is certain is over 0.9 too.
     #[test]
     fn wrong_facings_are_counted() {
-        let report = |track: u16, facing: Direction, facing_probability: f64| OccupancyReport {
-            time: SimTime::ZERO,
-            tracks: vec![OccupiedTrack {
-                track: TrackId(track),
-                probability: 1.0,
-                facing,
-                facing_probability,
-                s_m: 0.0,
-                sigma_m: 1.0,
-            }],
-            identified: true,
-            hypotheses: 1,
-            of_fix: false,
+        let report = |track: u16, facing: Direction, facing_probability: f64| {
+            let mut report = report(&[(track, 1.0)], true);
+            report.tracks[0].facing = facing;
+            report.tracks[0].facing_probability = facing_probability;
+            report
         };
         let mut figures = FacingFigures::default();
         let truth = (TrackId(3), Direction::Up);

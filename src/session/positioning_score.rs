@@ -1,7 +1,8 @@
 //! Scores of lamp positioning: fixes and names held against the truth.
 
 use super::cost_tally::CostTally;
-use super::summary::{ErrorStatistics, Positioning};
+use super::statistics::ErrorStatistics;
+use super::summary::Positioning;
 use crate::bus::{Identity, Intrinsics, LedReport, Method, PositionFix, SimTime};
 use crate::track::Tunnel;
 use crate::track::uid::Uid;

@@ -10,7 +10,7 @@
 
 use super::costs::Stopwatch;
 use super::speed::{Error, POST, TRAIN, Watched, scenario};
-use super::summary::Cost;
+use super::statistics::Cost;
 use super::{RunOptions, run_on};
 use crate::scenario::Scenario;
 use crate::twin::render::cpu::CpuRenderer;

@@ -95,11 +95,12 @@ impl Session<'_, '_> {
         report: &OccupancyReport,
     ) -> Result<(), SessionError> {
         let score = self.trains.get_mut(&train);
-        let class = score.and_then(|score| score.on_occupancy(report, &self.world));
+        let judged = score.and_then(|score| score.on_occupancy(report, &self.world));
         self.observers.show(&Event::Occupancy {
             train,
             report,
-            class,
+            class: judged.and_then(|judged| judged.class),
+            truth: judged.map(|judged| judged.truth),
         })?;
         Ok(())
     }

@@ -5,7 +5,7 @@
 //! frames of wayside device W1530 (1920 x 1080). The tunnel is part of the program, so it works anywhere.
 
 use super::costs::Stopwatch;
-use super::summary::Cost;
+use super::statistics::Cost;
 use super::{Event, Observer, ObserverError, RendererChoice, RunOptions, Source, renderer, run_on};
 use crate::bus::{Node, TrainCommand};
 use crate::scenario::{Override, Scenario, ScenarioFile};

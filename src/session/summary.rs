@@ -1,5 +1,7 @@
 //! What a session comes to, as `summary.json` has it.
 
+use super::occupancy_figures::OccupancyFigures;
+use super::statistics::{Cost, ErrorStatistics};
 use crate::bus::{CameraFault, Method, TrainId};
 use crate::twin::physics::{EnergyBook, Impact, Incident};
 use crate::twin::render::Backend;
@@ -128,61 +130,6 @@ pub struct Positioning {
     pub nees_mean: Option<f64>,
 }
 
-/// Order statistics.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[allow(missing_docs, reason = "the names say it")]
-pub struct ErrorStatistics {
-    pub mean: f64,
-    pub p50: f64,
-    pub p75: f64,
-    pub p95: f64,
-    pub p99: f64,
-    pub max: f64,
-}
-
-impl ErrorStatistics {
-    /// Of the values given (sorted in passing); `None` of none.
-    pub fn of(values: &mut [f64]) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        let max = *values.last()?;
-        Some(Self {
-            mean: values.iter().sum::<f64>() / values.len() as f64,
-            p50: quantile(values, 0.50),
-            p75: quantile(values, 0.75),
-            p95: quantile(values, 0.95),
-            p99: quantile(values, 0.99),
-            max,
-        })
-    }
-}
-
-/// Median and 99th percentile of a cost.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[allow(missing_docs, reason = "the names say it")]
-pub struct Cost {
-    pub p50: f64,
-    pub p99: f64,
-}
-
-impl Cost {
-    /// Of the values given (sorted in passing); `None` of none.
-    pub fn of(values: &mut [f64]) -> Option<Self> {
-        values.sort_by(f64::total_cmp);
-        (!values.is_empty()).then(|| Self {
-            p50: quantile(values, 0.50),
-            p99: quantile(values, 0.99),
-        })
-    }
-}
-
-/// Linear interpolation between order statistics (numpy's default) of sorted values.
-pub(crate) fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let x = p * (sorted.len() - 1) as f64;
-    let k = x.floor() as usize;
-    let next = sorted[(k + 1).min(sorted.len() - 1)];
-    sorted[k] + (next - sorted[k]) * (x - k as f64)
-}
-
 /// What the stack says of one camera.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub struct CameraFigures {
@@ -270,83 +217,6 @@ pub struct TrainFigures {
     pub energy_gap_share: f64,
 }
 
-/// Track occupancy: what was said after each fix, and how soon legs of switches were known.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct OccupancyFigures {
-    /// Fixes after which something was said; without a receiver, all reports.
-    pub fixes: u32,
-    /// Legs of switches that the antenna came to over the toe.
-    pub switches: u32,
-    /// Of these, legs that were not identified before they were left, or not to their end, or to that of the run.
-    pub never_identified: u32,
-    /// From the toe to where the antenna was when the leg was identified for good.
-    pub identified_after_m: Option<SwitchDistances>,
-    /// The same of each leg in order; `null` where it was never identified.
-    pub legs_identified_after_m: Vec<Option<f64>>,
-    /// How many fixes are of which class.
-    pub classes: BTreeMap<OccupancyClass, u32>,
-    /// Which way the train was said to face.
-    pub facing: FacingFigures,
-    /// Error of the antenna's place along the track, of fixes whose track is right.
-    pub error_m: Option<ErrorStatistics>,
-    /// Mean of (error/sigma)^2 of the same: 1 for an honest sigma.
-    pub nees_mean: Option<f64>,
-}
-
-impl OccupancyClass {
-    /// The most probable track is another than the true one.
-    pub fn is_wrong(self) -> bool {
-        matches!(
-            self,
-            Self::WrongConfident | Self::WrongFairlyConfident | Self::WrongUndecided
-        )
-    }
-}
-
-/// Which way along its track a train was said to face, after fixes and without.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
-pub struct FacingFigures {
-    /// Reports whose most probable track is the true one.
-    pub reports: u32,
-    /// Of these, the wrong way with a probability over 0.9.
-    pub wrong_over_0_9: u32,
-    /// Of these, the wrong way with a probability over 1 - 1e-9.
-    pub wrong_certain: u32,
-}
-
-/// Distances from toes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-#[allow(missing_docs, reason = "the names say it")]
-pub struct SwitchDistances {
-    pub mean: f64,
-    pub p95: f64,
-    pub max: f64,
-}
-
-/// What the most probable track after a fix is worth (Guo et al. 2020). Confident: no other track is left. Fairly
-/// confident: its probability is over 0.9.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, JsonSchema)]
-pub enum OccupancyClass {
-    /// Another track than the true one, and no other left.
-    #[serde(rename = "wc")]
-    WrongConfident,
-    /// Another one, over 0.9.
-    #[serde(rename = "wf")]
-    WrongFairlyConfident,
-    /// Another one.
-    #[serde(rename = "wu")]
-    WrongUndecided,
-    /// The true one.
-    #[serde(rename = "cu")]
-    CorrectUndecided,
-    /// The true one, over 0.9.
-    #[serde(rename = "cf")]
-    CorrectFairlyConfident,
-    /// The true one, and no other left.
-    #[serde(rename = "cc")]
-    CorrectConfident,
-}
-
 /// Train protection.
 #[derive(Clone, Debug, Default, Serialize, JsonSchema)]
 pub struct ProtectionFigures {
@@ -368,24 +238,4 @@ pub struct ProtectionFigures {
     pub collision: bool,
     /// What it hit, in order of time.
     pub impacts: Vec<Impact>,
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Off-by-one in the quantiles, mean over the wrong count. Figures from numpy.percentile
-    /// (tests/studies/figures.py).
-    #[test]
-    fn distribution_matches_numpy() {
-        let mut v = vec![5.0, 1.0, 4.0, 2.0];
-        let d = ErrorStatistics::of(&mut v).unwrap_or_else(|| unreachable!());
-        assert!((d.mean - 3.0).abs() < 1e-15);
-        assert!((d.p50 - 3.0).abs() < 1e-15);
-        assert!((d.p75 - 4.25).abs() < 1e-15);
-        assert!((d.p95 - 4.85).abs() < 1e-12);
-        assert!((d.max - 5.0).abs() < 1e-15);
-        assert_eq!(ErrorStatistics::of(&mut []), None);
-        assert_eq!(Cost::of(&mut []), None);
-    }
 }

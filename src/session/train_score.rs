@@ -2,11 +2,11 @@
 
 use super::SessionError;
 use super::health::Health;
-use super::occupancy_score::OccupancyScore;
+use super::occupancy_score::{Judged, OccupancyScore};
 use super::outcome::Outcome;
 use super::positioning_score::PositioningScore;
 use super::ride::Ride;
-use super::summary::{OccupancyClass, TrainSummary};
+use super::summary::TrainSummary;
 use crate::bus::{
     EYES, LedReport, Method, OccupancyReport, PositionFix, ProtectionReport, RigCalibration,
     SimTime, TrainEnd, TrainId,
@@ -104,12 +104,8 @@ impl TrainScore {
         Ok(truths_m)
     }
 
-    /// Takes down what track occupancy says; gives the class of it, if a fix is its ground.
-    pub fn on_occupancy(
-        &mut self,
-        report: &OccupancyReport,
-        world: &World,
-    ) -> Option<OccupancyClass> {
+    /// Takes down what track occupancy says, and gives what it is worth.
+    pub fn on_occupancy(&mut self, report: &OccupancyReport, world: &World) -> Option<Judged> {
         self.occupancy.as_mut()?.report(report, world, self.id)
     }
 

@@ -1,6 +1,8 @@
 //! Track occupancy of a run: of all its trains that report it, from their counts together.
 
-use crate::session::{ErrorStatistics, OccupancyClass, OccupancyFigures, TrainSummary};
+use crate::session::{
+    LegDistances, OccupancyClass, OccupancyFigures, TrainSummary, mean_of_identified_m,
+};
 
 /// The figures of those trains, at least one.
 pub struct OccupancyOfTrains<'a>(Vec<&'a OccupancyFigures>);
@@ -25,24 +27,30 @@ impl<'a> OccupancyOfTrains<'a> {
         self.sum(|figures| fixes_of(figures, &counts))
     }
 
-    /// Share of fixes of some classes; `None` of no fixes.
+    /// Share of fixes of some classes, of all fixes, those included after which nothing was said; `None` of no fixes.
     pub fn share(&self, counts: impl Fn(OccupancyClass) -> bool) -> Option<f64> {
-        let fixes = self.sum(|figures| figures.fixes);
+        let fixes = self.sum(|figures| figures.fixes_in_all);
         (fixes > 0).then(|| f64::from(self.fixes_of(counts)) / f64::from(fixes))
     }
 
-    /// Distance from the toe to where the leg was identified for good, of every leg that was, metres.
-    pub fn legs_m(&self) -> Vec<f64> {
+    /// From the toe to the head when the leg was identified for good, metres, of every leg; `None` of one that never
+    /// was.
+    pub fn legs_m(&self) -> Vec<Option<f64>> {
         let legs = self
             .0
             .iter()
-            .flat_map(|figures| &figures.legs_identified_after_m);
-        legs.copied().flatten().collect()
+            .flat_map(|figures| &figures.legs_known_after_m);
+        legs.copied().collect()
     }
 
-    /// What these distances come to.
-    pub fn identified_after_m(&self) -> Option<ErrorStatistics> {
-        ErrorStatistics::of(&mut self.legs_m())
+    /// Mean of the legs that were identified.
+    pub fn identified_mean_m(&self) -> Option<f64> {
+        mean_of_identified_m(&self.legs_m())
+    }
+
+    /// The longest of all legs; `None` where one was never identified, or there is none.
+    pub fn known_max_m(&self) -> Option<f64> {
+        LegDistances::of(&self.legs_m())?.max
     }
 
     /// Largest error along the track, of fixes whose track is right, metres.
@@ -56,7 +64,7 @@ impl<'a> OccupancyOfTrains<'a> {
 
     /// Mean of (error / sigma)^2 of fixes whose track is right.
     pub fn nees_mean(&self) -> Option<f64> {
-        let right = |figures: &OccupancyFigures| fixes_of(figures, |class| !class.is_wrong());
+        let right = |figures: &OccupancyFigures| fixes_of(figures, OccupancyClass::is_right);
         let sums = self
             .0
             .iter()
@@ -75,24 +83,33 @@ fn fixes_of(figures: &OccupancyFigures, counts: impl Fn(OccupancyClass) -> bool)
 #[allow(clippy::unwrap_used, reason = "a test may panic")]
 mod tests {
     use super::*;
-    use crate::session::FacingFigures;
-    use OccupancyClass::{CorrectConfident, WrongConfident};
+    use crate::session::{ErrorStatistics, FacingFigures};
+    use OccupancyClass::{CorrectConfident, NothingSaid, WrongConfident};
 
+    /// Of two wrong fixes there is one after which nothing is said.
     fn figures(wrong: u32, right: u32, legs: &[Option<f64>], nees: f64) -> OccupancyFigures {
         OccupancyFigures {
             fixes: wrong + right,
+            fixes_in_all: wrong + right + wrong / 2,
             switches: legs.len() as u32,
             never_identified: legs.iter().filter(|leg| leg.is_none()).count() as u32,
-            identified_after_m: None,
-            legs_identified_after_m: legs.to_vec(),
-            classes: [(WrongConfident, wrong), (CorrectConfident, right)].into(),
+            identified_mean_m: None,
+            known_after_m: None,
+            legs_known_after_m: legs.to_vec(),
+            classes: [
+                (WrongConfident, wrong),
+                (NothingSaid, wrong / 2),
+                (CorrectConfident, right),
+            ]
+            .into(),
             error_m: ErrorStatistics::of(&mut [0.1 * nees]),
             nees_mean: Some(nees),
             facing: FacingFigures::default(),
         }
     }
 
-    /// Fails where only the first train counts, or a short run as much as a long one.
+    /// Fails where only the first train counts, or a short run as much as a long one, or fixes after which nothing is said
+    /// are in no denominator.
     #[test]
     fn trains_count_by_their_fixes() {
         let first = figures(10, 90, &[Some(40.0), None], 4.0);
@@ -105,20 +122,24 @@ mod tests {
         let is_wrong = |class| class == WrongConfident;
         assert_eq!(
             (all.fixes_of(is_wrong), all.share(is_wrong)),
-            (10, Some(0.025))
+            (10, Some(10.0 / 405.0))
         );
         let undecided = all.sum(|figures| figures.never_identified);
-        assert_eq!((undecided, all.legs_m()), (1, vec![40.0, 20.0]));
-        let identified = all.identified_after_m().unwrap();
         assert_eq!(
-            (Some(identified.mean), Some(identified.max)),
-            (Some(30.0), Some(40.0))
+            (undecided, all.legs_m()),
+            (1, vec![Some(40.0), None, Some(20.0)])
         );
+        assert_eq!(
+            (all.identified_mean_m(), all.known_max_m()),
+            (Some(30.0), None)
+        );
+        let others = OccupancyOfTrains::of(None, &trains[2..]).unwrap();
+        assert_eq!(others.known_max_m(), Some(20.0));
         let nees = (90.0 * 4.0 + 300.0) / 390.0;
         assert!((all.nees_mean().unwrap() - nees).abs() < 1e-12);
         assert_eq!(all.error_max_m(), Some(0.4));
         let alone = OccupancyOfTrains::of(Some(&first), &[]).unwrap();
-        assert_eq!(alone.share(is_wrong), Some(0.1));
+        assert_eq!(alone.share(is_wrong), Some(10.0 / 105.0));
         assert!(OccupancyOfTrains::of(None, &trains[1..2]).is_none());
     }
 }

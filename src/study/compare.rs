@@ -60,7 +60,7 @@ pub fn compare(a: &Path, b: &Path) -> Result<Comparison> {
         let both = pairs
             .iter()
             .filter_map(|(a, b)| Some((a.ln_weight, of(b)? - of(a)?)));
-        let both: Vec<(f64, f64)> = both.collect();
+        let both: Vec<(f64, f64)> = both.filter(|(_, d)| d.is_finite()).collect();
         let estimate = if weighted {
             weighted_mean(&both, bounds).filter(|_| sampled_otherwise == 0)
         } else {

@@ -2,7 +2,8 @@
 
 use super::stats::{
     IntervalEstimate, LEAST_WORTH, Rate, Tally, Weighted, bounded_mean, effective_runs,
-    first_order, first_order_of_groups, rank_correlation, weighted_mean, weighted_rate,
+    first_order, first_order_of_groups, mean_of_lists, rank_correlation, weighted_mean,
+    weighted_rate,
 };
 use super::stop::{Precision, PrecisionCheck};
 use super::{MEASURES, Measure, Row, SweptDigest, WorseSide};
@@ -83,6 +84,9 @@ pub struct FigureDigest {
     pub runs: usize,
     /// How many numbers these runs have together: one of each, or all of each one's list.
     pub numbers: usize,
+    /// Of these, how many are infinite, because what they tell of never came about: they count in quantiles and for the
+    /// worst, and are not in the mean.
+    pub beyond: usize,
     /// Their sum, of a figure that is a count.
     pub sum: Option<f64>,
     /// How many runs have it not, or only of a part of the run.
@@ -251,18 +255,17 @@ impl FigureDigest {
         let complete = rows.iter().filter(|r| r.is_complete());
         let known = complete.map(|row| (row.ln_weight, row.values_of(measure)));
         let known: Vec<_> = known.filter(|(_, values)| !values.is_empty()).collect();
-        let runs = known.len();
-        let pairs = |(ln_weight, values): (f64, Vec<f64>)| {
-            values.into_iter().map(move |value| (ln_weight, value))
-        };
-        let pairs: Vec<(f64, f64)> = known.into_iter().flat_map(pairs).collect();
-        let sample: Vec<f64> = pairs.iter().map(|(_, x)| *x).collect();
+        let (ln_weights, lists): (Vec<f64>, Vec<Vec<f64>>) = known.into_iter().unzip();
+        let finite: Vec<Vec<f64>> = lists.iter().map(|list| finite_of(list)).collect();
+        let numbers = || lists.iter().flatten().copied();
+        let count = numbers().count();
         let bare = Self {
             measure,
-            runs,
-            numbers: sample.len(),
-            sum: (measure.kind == Kind::Int).then(|| sample.iter().sum()),
-            lacking: rows.len() - runs,
+            runs: lists.len(),
+            numbers: count,
+            beyond: count - finite.iter().flatten().count(),
+            sum: (measure.kind == Kind::Int).then(|| numbers().sum()),
+            lacking: rows.len() - lists.len(),
             worse_side: measure.worse_side(),
             worst: WorstCase::of(measure, rows),
             mean: None,
@@ -272,16 +275,25 @@ impl FigureDigest {
         if template.is_weighted() {
             // The numbers of a list share their run's weight: they are worth fewer than they are.
             let is_list = measure.kind == Kind::Reals;
-            let mean = weighted_mean(&pairs, measure.range()).filter(|_| !is_list);
+            let weighted = ln_weights.iter().zip(&finite);
+            let weighted = weighted.filter_map(|(ln, values)| Some((*ln, *values.first()?)));
+            let weighted: Vec<(f64, f64)> = weighted.collect();
+            let mean = weighted_mean(&weighted, measure.range()).filter(|_| !is_list);
             return Self { mean, ..bare };
         }
         let is_flag = measure.kind == Kind::Flag;
         Self {
-            mean: measure.mean(&sample),
-            quantiles: QUANTILES.map(|p| measure.quantile(&sample, p).filter(|_| !is_flag)),
+            mean: measure.mean_of_runs(&finite),
+            quantiles: QUANTILES.map(|p| measure.quantile(&lists, p).filter(|_| !is_flag)),
             ..bare
         }
     }
+}
+
+/// Those numbers that are not beyond every number.
+fn finite_of(numbers: &[f64]) -> Vec<f64> {
+    let finite = numbers.iter().copied().filter(|x| x.is_finite());
+    finite.collect()
 }
 
 impl WorstCase {
@@ -309,6 +321,14 @@ impl Measure {
         }
         bounded_mean(values, self.range())
     }
+
+    /// The mean of all numbers that runs have; the interval is by runs.
+    fn mean_of_runs(&self, runs: &[Vec<f64>]) -> Option<IntervalEstimate> {
+        match self.kind {
+            Kind::Reals => mean_of_lists(runs, self.range()),
+            _ => self.mean(&runs.concat()),
+        }
+    }
 }
 
 impl Sensitivity {
@@ -323,7 +343,9 @@ impl Sensitivity {
         let independent = settings.correlated.is_empty()
             && settings.require.is_empty()
             && !shares_a_table(template)
-            && rows.iter().all(|r| r.number(measure.name).is_some());
+            && rows
+                .iter()
+                .all(|r| r.number(measure.name).is_some_and(f64::is_finite));
         let share = || {
             if pairs.is_empty() {
                 let named = rows.iter().filter_map(|r| {

@@ -1,6 +1,7 @@
 //! One run of a study, as a row of its results.
 
 use super::measures::{Fixes, MEASURES};
+use super::scale::count_beyond;
 use crate::scenario::sampling::{SampleError, ScenarioSample};
 use crate::session::{End, Summary};
 use serde::{Deserialize, Serialize};
@@ -99,19 +100,26 @@ impl Row {
         }
     }
 
-    /// A variable or a figure as a number: flags are 0 and 1.
+    /// A variable or a figure as a number: flags are 0 and 1, and what never came about infinite.
     pub fn number(&self, name: &str) -> Option<f64> {
-        let value = self.values.get(name).or_else(|| self.figures.get(name))?;
-        value.as_f64().or_else(|| value.as_bool().map(f64::from))
+        match self.values.get(name).or_else(|| self.figures.get(name)) {
+            Some(value) => value.as_f64().or_else(|| value.as_bool().map(f64::from)),
+            None => (self.beyond(name) > 0).then_some(f64::INFINITY),
+        }
     }
 
-    /// A list of numbers.
+    /// A list of numbers, infinite those of what never came about.
     pub fn numbers(&self, name: &str) -> Vec<f64> {
         let list = self.figures.get(name).and_then(Value::as_array);
-        list.into_iter()
-            .flatten()
-            .filter_map(Value::as_f64)
-            .collect()
+        let finite = list.into_iter().flatten().filter_map(Value::as_f64);
+        let beyond = std::iter::repeat_n(f64::INFINITY, self.beyond(name));
+        finite.chain(beyond).collect()
+    }
+
+    /// How many values of a figure are beyond every number.
+    fn beyond(&self, name: &str) -> usize {
+        let count = count_beyond(name).and_then(|count| self.figures.get(count)?.as_u64());
+        count.unwrap_or(0) as usize
     }
 
     /// The first thing in which two rows of one run differ; wall times may.

@@ -1,7 +1,7 @@
 //! Where the values of a figure can lie, and which of them are worse.
 
 use super::Measure;
-use super::stats::{Bounds, IntervalEstimate, quantile};
+use super::stats::{Bounds, IntervalEstimate, quantile, quantile_of_lists};
 use crate::record::parquet::Kind;
 use serde::Serialize;
 
@@ -30,6 +30,19 @@ const NEUTRAL: [&str; 9] = [
     "simulated_s",
     "_frames",
 ];
+
+/// Figures of something that may never come about, and the count of how often it did not: so many of their values are
+/// beyond every number.
+const BEYOND: [(&str, &str); 2] = [
+    ("occupancy_known_max_m", "occupancy_never_identified"),
+    ("occupancy_known_leg_m", "occupancy_never_identified"),
+];
+
+/// The name of the count of values of a figure that are beyond every number.
+pub(super) fn count_beyond(name: &str) -> Option<&'static str> {
+    let of = BEYOND.iter().find(|(figure, _)| *figure == name);
+    of.map(|(_, count)| *count)
+}
 
 /// Which values of a figure are worse than others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -85,17 +98,22 @@ impl Measure {
         }
     }
 
-    /// The value that a share `p` of the runs is no worse than; of a figure with a sign its size. Where no
-    /// side is worse, the value that this share is not above. An end that the sample is too small for is that
-    /// of the range, where the values keep it.
-    pub fn quantile(&self, values: &[f64], p: f64) -> Option<IntervalEstimate> {
+    /// The value that a share `p` of the values is no worse than, from those of each run; of a figure with a sign its
+    /// size. Where no side is worse, the value that this share is not above. An end that there are too few runs for is
+    /// that of the range, where the values keep it.
+    pub fn quantile(&self, runs: &[Vec<f64>], p: f64) -> Option<IntervalEstimate> {
         let side = self.worse_side();
         let share = if side == WorseSide::Less { 1.0 - p } else { p };
         let is_size = side == WorseSide::Farther;
         let number = |x: &f64| if is_size { x.abs() } else { *x };
-        let mut sorted: Vec<f64> = values.iter().map(number).collect();
+        let lists = runs.iter().map(|run| run.iter().map(number).collect());
+        let lists: Vec<Vec<f64>> = lists.collect();
+        let mut sorted: Vec<f64> = lists.iter().flatten().copied().collect();
         sorted.sort_by(f64::total_cmp);
-        let e = quantile(&sorted, share)?;
+        let e = match self.kind {
+            Kind::Reals => quantile_of_lists(&lists, share)?,
+            _ => quantile(&sorted, share)?,
+        };
         let bounds = if is_size {
             Bounds::NOT_NEGATIVE
         } else {
@@ -120,6 +138,9 @@ mod tests {
         let ends = SHARES.iter().chain(&LESS_IS_WORSE).chain(&NEUTRAL);
         for end in ends.chain(&SIGNED) {
             assert!(MEASURES.iter().any(|m| m.name.ends_with(end)), "{end}");
+        }
+        for name in BEYOND.iter().flat_map(|(figure, count)| [figure, count]) {
+            assert!(MEASURES.iter().any(|m| m.name == *name), "{name}");
         }
     }
 }

@@ -104,7 +104,8 @@ impl PrecisionCheck {
         self.rows += 1;
         match &self.precision.figure {
             Figure::Mean(measure) => {
-                if let Some(x) = row.number(measure.name).filter(|_| row.is_complete()) {
+                let x = row.number(measure.name).filter(|x| x.is_finite());
+                if let Some(x) = x.filter(|_| row.is_complete()) {
                     self.moments.add(x);
                 }
             }

@@ -1,7 +1,7 @@
 //! What the rows of a study come to for each value of a variable that it sweeps.
 //!
 //! All runs with a value count together, whatever the other variables are. Figures that are lists stand here too: the
-//! numbers of all these runs, each of which counts for one.
+//! numbers of all these runs, each of which counts for one; their intervals are by runs.
 
 use super::digest::{is_shown, varies};
 use super::{EventDigest, FigureDigest, MEASURES, Measure, Row};

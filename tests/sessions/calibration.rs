@@ -3,6 +3,30 @@
 /// Upper ends of classes of the probability that a decision is said to be wrong with.
 const SAID_WRONG: [f64; 6] = [1e-6, 1e-4, 1e-3, 1e-2, 0.1, 1.0];
 
+/// So near to a joint a decision for the element beyond it is wrong about the place, not about the track.
+pub const AT_JOINT_M: f64 = 15.0;
+
+/// Where a train really is.
+#[derive(Clone, Copy)]
+pub struct TruePlace {
+    pub element: usize,
+    /// To the nearer end of the element.
+    pub from_end_m: f64,
+}
+
+impl TruePlace {
+    pub fn new(element: usize, along_m: f64, length_m: f64) -> Self {
+        Self {
+            element,
+            from_end_m: along_m.min(length_m - along_m),
+        }
+    }
+
+    pub fn is_at_joint(&self) -> bool {
+        self.from_end_m < AT_JOINT_M
+    }
+}
+
 /// Decisions that were said to be wrong with about the same probability.
 #[derive(Clone, Copy, Debug, Default)]
 struct Said {
@@ -25,28 +49,34 @@ impl Said {
     }
 }
 
-/// Counts of the first decisions of each class on each track: decisions on one track are no independent trials, but at
-/// whichever time one stops, as many are wrong as are said to be.
+/// Counts of the first decisions of each class of each stay on an element, but near joints: decisions of one stay are no
+/// independent trials, but at whichever time one stops, as many are wrong as are said to be. A stay is by where the
+/// train really is: whatever is named meanwhile, and however often that changes, counts once a class. A stay by what is
+/// named would begin anew with each change of mind, and count one error of a map or a receiver again and again.
 #[derive(Debug, Default)]
 pub struct Calibration {
     classes: [Said; SAID_WRONG.len()],
-    /// The track that the train is on, and the classes counted there.
-    track: Option<(usize, [bool; SAID_WRONG.len()])>,
+    /// The element that the train is on, and the classes counted there.
+    stay: Option<(usize, [bool; SAID_WRONG.len()])>,
 }
 
 impl Calibration {
     /// A run begins: what was said on another one is no decision of it.
     pub fn begin_run(&mut self) {
-        self.track = None;
+        self.stay = None;
     }
 
-    /// Takes a decision that was made on a track.
-    pub fn add(&mut self, track: usize, said_wrong: f64, right: bool) {
-        if self.track.is_none_or(|(last, _)| last != track) {
-            self.track = Some((track, Default::default()));
+    /// Takes a decision that was made at a place, said to be wrong with a probability.
+    pub fn add(&mut self, truth: TruePlace, said_wrong: f64, right: bool) {
+        let element = truth.element;
+        if self.stay.is_none_or(|(last, _)| last != element) {
+            self.stay = Some((element, Default::default()));
+        }
+        if truth.is_at_joint() {
+            return;
         }
         let class = SAID_WRONG.partition_point(|most| *most < said_wrong);
-        let Some((_, counted)) = &mut self.track else {
+        let Some((_, counted)) = &mut self.stay else {
             return;
         };
         if !std::mem::replace(&mut counted[class], true) {
@@ -88,11 +118,33 @@ impl Calibration {
 fn too_many_wrong_ones_are_seen() {
     for (wrong, passes) in [(0, true), (1, true), (6, false)] {
         let mut of = Calibration::default();
-        for track in 0..100 {
-            of.add(track, 5e-3, track >= wrong);
-            of.add(track, 5e-3, false);
+        for element in 0..100 {
+            let truth = TruePlace::new(element, 50.0, 100.0);
+            of.add(truth, 5e-3, element >= wrong);
+            of.add(truth, 5e-3, false);
         }
         let probability = of.least_probability();
         assert_eq!(probability > 1e-3, passes, "{wrong}: {probability}");
+    }
+}
+
+/// Fails where decisions near a joint count, or a second one of a class in a stay, or none of the next stay.
+#[test]
+fn a_stay_counts_once_a_class() {
+    let mut of = Calibration::default();
+    let at = |element, along_m| TruePlace::new(element, along_m, 100.0);
+    for (truth, said_wrong, decisions) in [
+        (at(1, 14.0), 5e-3, 0),
+        (at(1, 16.0), 5e-3, 1),
+        (at(1, 50.0), 6e-3, 1),
+        (at(1, 60.0), 0.05, 2),
+        (at(1, 90.0), 0.5, 2),
+        (at(2, 5.0), 5e-3, 2),
+        (at(2, 50.0), 5e-3, 3),
+        (at(1, 50.0), 5e-3, 4),
+    ] {
+        of.add(truth, said_wrong, false);
+        let sum: usize = of.classes.iter().map(|said| said.decisions).sum();
+        assert_eq!(sum, decisions, "{} {said_wrong}", truth.element);
     }
 }

@@ -1,10 +1,11 @@
 //! Satellite receivers and track occupancy on trains: whole sessions.
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, TruePlace};
 use metrotwin::bus::{Content, GnssFix, OccupancyReport, TrainId};
 use metrotwin::scenario::{Override, Scenario};
 use metrotwin::session::{
-    Event, Observer, ObserverError, OccupancyClass, RendererChoice, RunOptions, Summary, run,
+    Event, Observer, ObserverError, OccupancyClass, Opening, RendererChoice, RunOptions, Summary,
+    run,
 };
 use metrotwin::twin::physics::TrainState;
 use std::collections::BTreeMap;
@@ -81,8 +82,9 @@ fn a_train_finds_its_track_in_a_depot() {
     eprintln!("{occupancy:?}");
     assert_eq!(occupancy.classes[&OccupancyClass::WrongConfident], 0);
     assert_eq!(occupancy.never_identified, 0);
-    // A leg with a radius of 200 m is 4 m aside after 40 m.
-    assert!(occupancy.identified_after_m.unwrap().max < 40.0);
+    // A leg with a radius of 200 m is 4 m aside after 40 m; the antenna is 10 m behind the head.
+    let most_m = occupancy.known_after_m.unwrap().max;
+    assert!(most_m.is_some_and(|m| m < 50.0), "{most_m:?}");
     let (_, last) = heard.reports.last().unwrap();
     assert!(last.identified);
     let scenario = Path::new(env!("CARGO_MANIFEST_DIR")).join("tunnels/terminus.toml");
@@ -97,24 +99,36 @@ fn a_train_finds_its_track_in_a_depot() {
 /// off as the stack believes; each receiver's errors are a quarter larger than it states.
 #[derive(Default)]
 struct Scores {
-    /// By train. The event does not say on which track the train is, so decisions are counted by the track that they name.
+    /// Of the tracks.
+    lengths_m: Vec<f64>,
+    /// By train.
     calibrations: BTreeMap<TrainId, Calibration>,
     classes: BTreeMap<OccupancyClass, usize>,
 }
 
 impl Observer for Scores {
+    fn open(&mut self, opening: &Opening<'_>) -> Result<(), ObserverError> {
+        let tracks = opening.tunnel.network.tracks.iter();
+        self.lengths_m = tracks.map(|track| track.alignment.length_m()).collect();
+        Ok(())
+    }
+
     fn observe(&mut self, event: &Event<'_>) -> Result<(), ObserverError> {
         if let Event::Occupancy {
             train,
             report,
             class: Some(class),
+            truth: Some(truth),
         } = event
         {
-            let best = &report.tracks[0];
             *self.classes.entry(*class).or_default() += 1;
-            let right = *class >= OccupancyClass::CorrectUndecided;
+            let Some(best) = report.tracks.first() else {
+                return Ok(());
+            };
+            let element = usize::from(truth.track.0);
+            let place = TruePlace::new(element, truth.s_m, self.lengths_m[element]);
             let calibration = self.calibrations.entry(*train).or_default();
-            calibration.add(usize::from(best.track.0), 1.0 - best.probability, right);
+            calibration.add(place, 1.0 - best.probability, class.is_right());
         }
         Ok(())
     }
@@ -167,9 +181,9 @@ fn the_published_method_takes_longer() {
             occupancy.fixes > 400 && occupancy.switches >= 2,
             "{occupancy:?}"
         );
-        let distances = occupancy.identified_after_m.map(|d| d.mean);
+        let median_m = occupancy.known_after_m.unwrap().p50;
         (
-            distances.unwrap_or(f64::INFINITY),
+            median_m.unwrap_or(f64::INFINITY),
             occupancy.classes[&OccupancyClass::WrongConfident],
         )
     };

@@ -124,8 +124,8 @@ fn is_worth_plotting(measure: &Measure) -> bool {
         "detection_distance_error_m",
         "stop_margin_m",
         "stop_error_m",
-        "occupancy_identified_mean_m",
-        "occupancy_identified_max_m",
+        "occupancy_known_mean_m",
+        "occupancy_known_max_m",
         "occupancy_confident_share",
     ];
     measure.kind == Kind::Real && ASKED.contains(&measure.name)
@@ -153,13 +153,22 @@ fn label(measure: &Measure) -> String {
     }
 }
 
-/// How many runs a plot of a figure lacks.
+/// How many runs a plot of a figure lacks, and in how many it is beyond every number.
 fn without(figure: &FigureDigest) -> String {
     let (lacking, runs) = (figure.lacking, figure.runs + figure.lacking);
-    match lacking {
+    let lacking = match lacking {
         0 => String::new(),
         _ => format!(", without {lacking} of {runs} runs that lack it"),
+    };
+    match figure.beyond {
+        0 => lacking,
+        never => format!("{lacking}, in {never} never"),
     }
+}
+
+/// A figure of a run as a point of a plot.
+fn point(row: &Row, measure: &Measure) -> Option<f64> {
+    row.number(measure.name).filter(|x| x.is_finite())
 }
 
 /// How often an event happens at each value of a variable.
@@ -217,7 +226,7 @@ fn event_map(inputs: &[Input<'_>], name: &str, event: &Condition, rows: &[&Row])
 /// A figure of every run against a variable, with the mean of each group.
 fn figure_plot(input: &Input<'_>, figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
     let measure = figure.measure;
-    let pairs = input.pairs(rows, |r| r.number(measure.name));
+    let pairs = input.pairs(rows, |r| point(r, measure));
     let bars = groups(&pairs).into_iter().filter_map(|group| {
         let e = measure.mean(&group.iter().map(|p| p.1).collect::<Vec<_>>())?;
         Some((middle(group), e))
@@ -238,7 +247,9 @@ fn distribution(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
     let measure = figure.measure;
     let mut sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
     sample.sort_by(f64::total_cmp);
+    // Those beyond every number are not below any.
     let n = sample.len() as f64;
+    sample.retain(|x| x.is_finite());
     let share = |k: usize| k as f64 / n;
     let steps = sample
         .iter()
@@ -265,7 +276,7 @@ fn distribution(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
 /// The mean after each run, with its interval.
 fn convergence(figure: &FigureDigest, rows: &[&Row]) -> Option<Plot> {
     let measure = figure.measure;
-    let sample: Vec<f64> = rows.iter().filter_map(|r| r.number(measure.name)).collect();
+    let sample: Vec<f64> = rows.iter().filter_map(|r| point(r, measure)).collect();
     let looks = (4..=sample.len()).step_by((sample.len() / 200).max(1));
     let after = looks.filter_map(|n| Some((n as f64, measure.mean(&sample[..n])?)));
     let after: Vec<_> = after.collect();

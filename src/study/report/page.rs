@@ -85,7 +85,7 @@ fn worst(digest: &Digest, rows: &[Row]) -> Option<Worst> {
         "paper_error_max_m",
         "missed",
         "detection_latency_s",
-        "occupancy_identified_max_m",
+        "occupancy_known_max_m",
         "stop_error_m",
         "most_slip_mps",
     ];
@@ -141,6 +141,7 @@ mod tests {
             measure: measure("stop_error_m").unwrap(),
             runs: 3,
             numbers: 3,
+            beyond: 0,
             sum: None,
             lacking: 0,
             worse_side: WorseSide::Farther,

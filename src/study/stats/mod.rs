@@ -5,6 +5,8 @@
 //! | [`mean`] | Student's t | needs some 30 runs where errors are skew; two studies are held against each other by the mean of the differences between runs of the same index, which met the same chances |
 //! | [`bounded_mean`] | the same in a scale that has no end at the bounds (logarithm, logit) | delta method: it never leaves the bounds; of two to four numbers that differ much it has no upper end |
 //! | [`quantile`] | two order statistics, by the binomial distribution | exact for any distribution: David and Nagaraja, Order Statistics, 7.1 |
+//! | [`mean_of_lists`] | Student's t of as many runs, of a ratio of sums over runs | Cochran, Sampling Techniques: the numbers of one run are not independent |
+//! | [`quantile_of_lists`] | order statistics, as of so many independent numbers as know the share below as well | Woodruff, J. Am. Stat. Assoc. 47 (1952); Korn and Graubard 1998 |
 //! | [`rate`] | Wilson's score, and Clopper and Pearson's exact one | Brown, Cai, DasGupta, Stat. Sci. 16 (2001) |
 //! | [`weighted_mean`] | normal, within the bounds of the figure | importance sampling; none of runs worth fewer than 100 (Kish) |
 //! | [`weighted_rate`] | Wilson's, of as many runs as would know it as well | the same; Korn and Graubard, Survey Methodology 24 (1998) |
@@ -20,12 +22,14 @@
 //! intervals are wider than they need be, and Sobol's too wherever few variables act at a time.
 
 mod bounds;
+mod lists;
 mod rate;
 mod sample;
 mod sensitivity;
 mod weight;
 
 pub use bounds::Bounds;
+pub use lists::{mean_of_lists, quantile_of_lists};
 pub use rate::{Rate, Tally, rate};
 pub use sample::{Moments, bounded_mean, mean, quantile};
 pub use sensitivity::{first_order, first_order_of_groups, rank_correlation};

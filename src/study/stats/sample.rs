@@ -56,9 +56,7 @@ impl Moments {
             return None;
         }
         let sigma = (self.squares / (n - 1) as f64 / n as f64).sqrt();
-        let t = StudentsT::new(0.0, 1.0, (n - 1) as f64)
-            .ok()?
-            .inverse_cdf(1.0 - TAIL);
+        let t = student_t(n)?;
         let bounds = bounds.kept_by([self.least, self.most]);
         let (low, high) = bounds.interval(self.mean, t * sigma);
         Some(IntervalEstimate {
@@ -78,17 +76,33 @@ pub fn quantile(sorted: &[f64], p: f64) -> Option<IntervalEstimate> {
     if n == 0 {
         return None;
     }
-    let below = Binomial::new(p, n as u64).ok()?;
+    let (i, j) = order_statistics(n, p);
+    Some(IntervalEstimate {
+        value: interpolated(sorted, p),
+        low: i.map_or(f64::NEG_INFINITY, |i| sorted[i - 1]),
+        high: j.map_or(f64::INFINITY, |j| sorted[j - 1]),
+        n,
+    })
+}
+
+/// Of `n` independent numbers in order, from 1 on, those between which the quantile p of all that there could be lies
+/// with 95 % at least; `None` where there are too few for an end.
+pub(super) fn order_statistics(n: usize, p: f64) -> (Option<usize>, Option<usize>) {
+    let Ok(below) = Binomial::new(p, n as u64) else {
+        return (None, None);
+    };
     // X_(i) <= q in all but P(fewer than i lie below q) = F(i - 1) of all samples (i from 1).
     let probability_of_fewer = |i: usize| below.cdf(i as u64 - 1);
     let i = least_where(n, |i| probability_of_fewer(i) > TAIL).map_or(n, |above| above - 1);
     let j = least_where(n, |i| probability_of_fewer(i) >= 1.0 - TAIL);
-    Some(IntervalEstimate {
-        value: interpolated(sorted, p),
-        low: i.checked_sub(1).map_or(f64::NEG_INFINITY, |k| sorted[k]),
-        high: j.map_or(f64::INFINITY, |j| sorted[j - 1]),
-        n,
-    })
+    ((i > 0).then_some(i), j)
+}
+
+/// Half the width of an interval of a mean of `n` numbers, in standard deviations of the mean; `None` of fewer than two.
+pub(super) fn student_t(n: usize) -> Option<f64> {
+    let freedom = n.checked_sub(1)? as f64;
+    let t = StudentsT::new(0.0, 1.0, freedom).ok()?;
+    Some(t.inverse_cdf(1.0 - TAIL))
 }
 
 /// The least of 1 to `n` for which something holds that holds from some number on.

@@ -95,8 +95,75 @@ fn known_runs(path: &Path) -> BTreeMap<String, KnownRun> {
     known
 }
 
+/// Fixes of a run by what is known of them: where a stay names several elements the truth is not unique, and being right
+/// is easier.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct JudgedFixes {
+    /// Where one element is known.
+    pub unique: ClassCounts,
+    /// Where one of several is.
+    pub several: ClassCounts,
+}
+
+impl JudgedFixes {
+    /// Of a table of tracks.
+    pub fn of(tracks: &str, known: &[KnownStay]) -> Self {
+        let mut judged = Self::default();
+        for row in tracks.lines().skip(1) {
+            let columns: Vec<&str> = row.split(',').collect();
+            let second: f64 = columns[0].parse().unwrap();
+            // Between two stays, either.
+            let stays = known
+                .iter()
+                .filter(|stay| (stay.from_s - 0.45..stay.to_s + 0.45).contains(&second));
+            let mut elements: Vec<&String> = stays.flat_map(|stay| &stay.elements).collect();
+            elements.sort();
+            elements.dedup();
+            let right = elements.iter().any(|element| *element == columns[3]);
+            let counts = match elements.len() {
+                0 | 1 => &mut judged.unique,
+                _ => &mut judged.several,
+            };
+            counts.add_fix(columns[4].parse().ok(), columns[5] == "true", right);
+        }
+        judged
+    }
+
+    pub fn add(&mut self, other: &Self) {
+        self.unique.add(&other.unique);
+        self.several.add(&other.several);
+    }
+
+    pub fn fixes(&self) -> usize {
+        self.unique.fixes() + self.several.fixes()
+    }
+
+    pub fn wrong_confident(&self) -> usize {
+        self.unique.of_class[0] + self.several.of_class[0]
+    }
+
+    /// Both under [`ClassCounts::HEADER`].
+    pub fn text(&self) -> String {
+        format!("{} | {}", self.unique.text(), self.several.text())
+    }
+
+    /// Over the columns of [`Self::text`].
+    pub fn header() -> String {
+        format!("{} | {}", ClassCounts::HEADER, ClassCounts::HEADER)
+    }
+}
+
+/// Of known stays, how many name one element, and several.
+pub fn stays_of_one_and_several<'a>(runs: impl IntoIterator<Item = &'a KnownRun>) -> [usize; 2] {
+    let mut stays = [0; 2];
+    for stay in runs.into_iter().flatten() {
+        stays[usize::from(stay.elements.len() > 1)] += 1;
+    }
+    stays
+}
+
 /// How many fixes are of which class.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Default, PartialEq, Debug)]
 pub struct ClassCounts {
     /// Wrong confident, wrong fairly confident, wrong undecided, right undecided, fairly confident, confident.
     pub of_class: [usize; 6],
@@ -107,36 +174,21 @@ pub struct ClassCounts {
 impl ClassCounts {
     pub const HEADER: &str = "   wc    wf    wu    cu    cf    cc  none";
 
-    /// Of a table of tracks.
-    pub fn of(tracks: &str, known: &[KnownStay]) -> Self {
-        let mut counts = Self::default();
-        for row in tracks.lines().skip(1) {
-            let columns: Vec<&str> = row.split(',').collect();
-            let second: f64 = columns[0].parse().unwrap();
-            // Between two stays, either.
-            let mut stays = known
-                .iter()
-                .filter(|stay| (stay.from_s - 0.45..stay.to_s + 0.45).contains(&second));
-            let right = stays.any(|stay| stay.elements.iter().any(|e| e == columns[3]));
-            let sure = match (columns[5], columns[4].parse::<f64>()) {
-                (_, Err(_)) => {
-                    counts.none += 1;
-                    continue;
-                }
-                ("true", _) => 2,
-                (_, Ok(probability)) => usize::from(probability > 0.9),
-            };
-            counts.of_class[if right { 3 + sure } else { 2 - sure }] += 1;
-        }
-        counts
+    /// One more fix, after which the most probable track has a probability, none where nothing is said.
+    fn add_fix(&mut self, probability: Option<f64>, identified: bool, right: bool) {
+        let Some(probability) = probability else {
+            self.none += 1;
+            return;
+        };
+        let sure = match identified {
+            true => 2,
+            false => usize::from(probability > 0.9),
+        };
+        self.of_class[if right { 3 + sure } else { 2 - sure }] += 1;
     }
 
     pub fn fixes(&self) -> usize {
         self.of_class.iter().sum::<usize>() + self.none
-    }
-
-    pub fn wrong_confident(&self) -> usize {
-        self.of_class[0]
     }
 
     /// Share of the fixes after which one track was left, percent.
@@ -160,6 +212,31 @@ impl ClassCounts {
     }
 }
 
+/// Fails where fixes of a stay that names several elements count among those whose truth is unique.
+#[test]
+fn fixes_of_several_elements_are_counted_apart() {
+    let stay = |from_s, to_s, elements: &[&str]| KnownStay {
+        from_s,
+        to_s,
+        elements: elements.iter().map(|name| (*name).to_owned()).collect(),
+    };
+    let known = vec![stay(0.0, 9.0, &["a"]), stay(10.0, 20.0, &["b", "c"])];
+    assert_eq!(stays_of_one_and_several([&known]), [1, 1]);
+    let tracks = "header\n\
+        1,,,a,1.0,true\n\
+        2,,,b,0.95,false\n\
+        3,,,,,false\n\
+        11,,,b,1.0,true\n\
+        12,,,c,0.6,false\n\
+        13,,,a,0.6,false\n\
+        30,,,a,0.6,false\n";
+    let judged = JudgedFixes::of(tracks, &known);
+    assert_eq!(judged.unique.of_class, [0, 1, 1, 0, 0, 1]);
+    assert_eq!(judged.several.of_class, [0, 0, 1, 1, 0, 1]);
+    assert_eq!((judged.unique.none, judged.several.none), (1, 0));
+    assert_eq!((judged.fixes(), judged.wrong_confident()), (7, 0));
+}
+
 /// No decision on a recorded run is both certain and wrong. What was really run comes from `occupancy/truth.csv`;
 /// runs that it does not hold are only located.
 #[test]
@@ -168,7 +245,10 @@ impl ClassCounts {
 fn recorded_runs_are_never_wrong_with_certainty() {
     let recorded = RecordedRuns::read();
     let out = folder("recorded_runs");
-    println!("run    {}  us a fix: p50, p99", ClassCounts::HEADER);
+    let known = recorded.runs.iter().filter_map(|run| run.known.as_ref());
+    let [one, several] = stays_of_one_and_several(known);
+    println!("{one} stays are known to one element (left), {several} to one of several (right)");
+    println!("run    {}  us a fix: p50, p99", JudgedFixes::header());
     for run in &recorded.runs {
         let name = &run.name;
         let (tracks, summary) = recorded.locate(&run.gnss, &out.join(name));
@@ -176,7 +256,7 @@ fn recorded_runs_are_never_wrong_with_certainty() {
             println!("{name}: nothing known, {}", summary["identified"]);
             continue;
         };
-        let counts = ClassCounts::of(&tracks, known);
+        let counts = JudgedFixes::of(&tracks, known);
         let cost_us = |share: &str| summary["us_per_fix"][share].as_f64().unwrap();
         let (p50_us, p99_us) = (cost_us("p50"), cost_us("p99"));
         println!("{name:6} {} {p50_us:.0} {p99_us:.0}", counts.text());

@@ -1,6 +1,6 @@
 //! Recorded runs with something changed: time, fixes left out, sigmas, errors of more kinds.
 
-use super::recorded::{ClassCounts, KnownRun, KnownStay, RecordedRun, RecordedRuns};
+use super::recorded::{JudgedFixes, KnownRun, KnownStay, RecordedRun, RecordedRuns};
 use crate::program::folder;
 use metrotwin::track::geodesy::{Datum, Geodetic};
 use metrotwin::twin::random::Stream;
@@ -201,27 +201,27 @@ fn changed_recorded_runs_are_never_wrong_with_certainty() {
     let runs = recorded.runs.iter().filter_map(|run| {
         let (tracks, _) = recorded.locate(&run.gnss, &out.join(&run.name));
         let known = run.known.as_ref()?;
-        let before = ClassCounts::of(&tracks, known).of_class;
+        let before = JudgedFixes::of(&tracks, known);
         Some((&run.name, StatedRun::of(run, known, &tracks), before))
     });
     let runs: Vec<_> = runs.collect();
     assert!(!runs.is_empty(), "truth.csv holds none of the runs");
     println!(
-        "variant            fixes {}  identified",
-        ClassCounts::HEADER
+        "variant            fixes {}  identified: of known to one element, of known to several",
+        JudgedFixes::header()
     );
     let mut wrong = Vec::new();
     for variant in &VARIANTS {
-        let mut all = ClassCounts::default();
+        let mut all = JudgedFixes::default();
         for (name, run, before) in &runs {
             let mut run = run.clone();
             (variant.change)(&mut run);
             let gnss = out.join("fixes.csv");
             fs::write(&gnss, run.table()).unwrap();
             let (tracks, _) = recorded.locate(&gnss, &out.join("changed"));
-            let counts = ClassCounts::of(&tracks, &run.known);
+            let counts = JudgedFixes::of(&tracks, &run.known);
             if variant.name == "as recorded" {
-                assert_eq!(counts.of_class, *before, "{name}: other sigmas");
+                assert_eq!(counts, *before, "{name}: other sigmas");
             }
             if counts.wrong_confident() > 0 && !variant.is_beyond {
                 wrong.push(format!("{name}, {}", variant.name));
@@ -229,8 +229,9 @@ fn changed_recorded_runs_are_never_wrong_with_certainty() {
             all.add(&counts);
         }
         let (name, fixes) = (variant.name, all.fixes());
-        let (counts, identified) = (all.text(), all.identified_percent());
-        println!("{name:17} {fixes:6} {counts}  {identified:6.1} %");
+        let (counts, one) = (all.text(), all.unique.identified_percent());
+        let several = all.several.identified_percent();
+        println!("{name:17} {fixes:6} {counts}  {one:6.1} % {several:6.1} %");
     }
     assert!(wrong.is_empty(), "wrong with certainty: {wrong:?}");
 }

@@ -1,10 +1,7 @@
 //! Counts over many runs.
 
-use crate::calibration::Calibration;
+use crate::calibration::{Calibration, TruePlace};
 use metrotwin::stack::occupancy::Decision;
-
-/// So near to a joint a certain decision for the element beyond it is wrong about the place, not about the track.
-const AT_JOINT_M: f64 = 15.0;
 
 /// What became of one switch.
 #[derive(Clone, Copy, Debug, Default)]
@@ -16,14 +13,24 @@ pub struct AtSwitch {
     pub right: bool,
 }
 
+/// Distances of all switches, metres: one whose leg was never identified counts as infinite.
+pub struct Distances {
+    /// Of those that were identified; not a number where none was.
+    pub mean_of_identified: f64,
+    pub p95: f64,
+    pub most: f64,
+    /// How many never were.
+    pub never: usize,
+}
+
 #[derive(Default)]
 pub struct Tally {
     pub switches: Vec<AtSwitch>,
-    /// Of fixes: wrong confident, wrong fairly confident, wrong undecided, right undecided, fairly, confident.
-    pub classes: [usize; 6],
+    /// Of fixes: wrong confident, wrong fairly confident, wrong undecided, nothing said, right undecided, fairly,
+    /// confident.
+    pub classes: [usize; 7],
     /// Of the wrong confident ones, those near a joint.
     pub at_joint: usize,
-    /// Of fixes that are not near joints.
     pub calibration: Calibration,
     sigmas_m: [usize; 3],
     /// Squared errors of the place over their variance: sum and number, of fixes on the right element.
@@ -36,33 +43,31 @@ pub struct Tally {
 
 impl Tally {
     pub fn add(&mut self, decision: &Decision, (truth, along_m): (usize, f64), length_m: f64) {
+        let place = TruePlace::new(truth, along_m, length_m);
+        let is_leg = !truth.is_multiple_of(3);
+        let is_parallel =
+            is_leg && self.parallel_from_m > 0.0 && place.from_end_m > self.parallel_from_m;
+        self.parallel[0] += usize::from(is_parallel);
         let Some(best) = decision.tracks.first() else {
-            self.classes[2] += 1;
+            self.classes[3] += 1;
             return;
         };
         let right = best.element == truth;
+        self.parallel[1] += usize::from(is_parallel && right);
         let sure = match (decision.is_identified(), best.probability > 0.9) {
             (true, _) => 2,
             (false, true) => 1,
             (false, false) => 0,
         };
-        self.classes[if right { 3 + sure } else { 2 - sure }] += 1;
-        let from_end_m = along_m.min(length_m - along_m);
-        self.at_joint += usize::from(!right && sure == 2 && from_end_m < AT_JOINT_M);
-        if from_end_m > AT_JOINT_M {
-            self.calibration.add(truth, 1.0 - best.probability, right);
-        }
+        self.classes[if right { 4 + sure } else { 2 - sure }] += 1;
+        self.at_joint += usize::from(!right && sure == 2 && place.is_at_joint());
+        self.calibration.add(place, 1.0 - best.probability, right);
         for (count, most_m) in self.sigmas_m.iter_mut().zip([1.0, 2.0, 3.0]) {
             *count += usize::from(best.sigma_m < most_m);
         }
         if right {
             self.squares.0 += ((best.along_m - along_m) / best.sigma_m).powi(2);
             self.squares.1 += 1;
-        }
-        let is_leg = !truth.is_multiple_of(3);
-        if is_leg && self.parallel_from_m > 0.0 && from_end_m > self.parallel_from_m {
-            self.parallel[0] += 1;
-            self.parallel[1] += usize::from(right);
         }
     }
 
@@ -90,11 +95,13 @@ impl Tally {
 
     /// Prints what no column of [`table`] has.
     pub fn print(&self, name: &str) {
-        let ([mean_m, p95_m, most_m], _) = self.distances();
+        let of = self.distances();
+        let (mean_m, p95_m, most_m) = (of.mean_of_identified, of.p95, of.most);
         println!(
-            "{name}: {} switches, {} fixes; identified after {mean_m:.1} m (95 %: {p95_m:.1}, most {most_m:.1}); {:.3} % right",
+            "{name}: {} switches, {} fixes; {} never identified, the others after {mean_m:.1} m in the mean; of all 95 %: {p95_m:.1} m, most {most_m:.1} m; {:.3} % right",
             self.switches.len(),
             self.fixes(),
+            of.never,
             100.0 * self.right()
         );
         println!("sigma of the place under 1, 2, 3 m: {}", self.sigmas());
@@ -122,21 +129,28 @@ impl Tally {
         self.squares.0 / self.squares.1 as f64
     }
 
-    /// Mean, 95 % and most of the distances, of switches that were identified, and the share that were not.
-    pub fn distances(&self) -> ([f64; 3], f64) {
-        let mut all: Vec<f64> = self
-            .switches
-            .iter()
-            .filter_map(|s| s.identified_m)
-            .collect();
+    /// Distances behind the toe at which legs were known.
+    pub fn distances(&self) -> Distances {
+        let legs = || self.switches.iter().map(|s| s.identified_m);
+        let identified: Vec<f64> = legs().flatten().collect();
+        let mut all: Vec<f64> = legs().map(|m| m.unwrap_or(f64::INFINITY)).collect();
         all.sort_by(f64::total_cmp);
-        let undecided = 1.0 - all.len() as f64 / self.switches.len() as f64;
-        if all.is_empty() {
-            return ([f64::NAN; 3], undecided);
+        // The least that so many are not above; not a number without switches.
+        let quantile = |p: f64| {
+            let rank = (p * all.len() as f64).ceil() as usize;
+            all.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+        };
+        Distances {
+            mean_of_identified: identified.iter().sum::<f64>() / identified.len() as f64,
+            p95: quantile(0.95),
+            most: quantile(1.0),
+            never: all.len() - identified.len(),
         }
-        let mean = all.iter().sum::<f64>() / all.len() as f64;
-        let p95 = all[(0.95 * (all.len() - 1) as f64) as usize];
-        ([mean, p95, all[all.len() - 1]], undecided)
+    }
+
+    /// Share of switches whose leg was never identified.
+    pub fn never(&self) -> f64 {
+        self.distances().never as f64 / self.switches.len() as f64
     }
 
     /// Share of switches where the leg was right.
@@ -148,22 +162,25 @@ impl Tally {
 
 pub fn table(title: &str, rows: &[(String, Tally)]) {
     println!("\n{title}");
+    println!("inf: more than the leg; the mean is of the legs that were identified");
     println!(
-        "                           switches  mean m   95 %   most  undecided  right %   wc (at joints)  wf    wu    cu    cf     cc (% of fixes)  nees"
+        "                           switches  mean m   95 %   most      never  right %   wc (at joints)  wf    wu    ns    cu    cf     cc (% of fixes)  nees"
     );
     for (name, tally) in rows {
-        let ([mean, p95, most], undecided) = tally.distances();
+        let of = tally.distances();
+        let (mean, p95, most) = (of.mean_of_identified, of.p95, of.most);
         let fixes = tally.fixes() as f64;
-        let [wc, wf, wu, cu, cf, cc] = tally.classes;
+        let [wc, wf, wu, ns, cu, cf, cc] = tally.classes;
         let share = |count: usize| 100.0 * count as f64 / fixes;
         println!(
-            "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
+            "{name:26} {:8} {mean:7.1} {p95:6.1} {most:6.1} {:9.2} % {:7.2} {wc:5} ({:5}) {:5.2} {:5.2} {:5.2} {:5.2} {:5.2} {:6.2} {:5.2}",
             tally.switches.len(),
-            100.0 * undecided,
+            100.0 * tally.never(),
             100.0 * tally.right(),
             tally.at_joint,
             share(wf),
             share(wu),
+            share(ns),
             share(cu),
             share(cf),
             share(cc),
