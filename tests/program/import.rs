@@ -151,7 +151,7 @@ fn a_map_of_openstreetmap_is_a_tunnel() {
         "osm",
         "map.json",
         &siding(),
-        &["--around", "48.2,15.6", "--radius-m", "150"],
+        &["--around", "48.2,15.6", "--radius-m", "150", "--force"],
     );
     succeeds(&run);
     says(&run, "1 tracks, 0.140 km, 0 switches");
@@ -265,8 +265,75 @@ fn wrong_maps_are_refused() {
         &["--datum", "104.066,30.657"],
         "latitude and longitude",
     );
-    let run = program(["import", "osm", "none.json", "--out", "out/none.txt"])
-        .output()
-        .unwrap();
-    refuses(&run, "none.json");
+    for (out, told) in [
+        ("out/none.txt", "none.txt is no name of a tunnel file"),
+        ("out/none.toml", "none.json"),
+    ] {
+        let run = program(["import", "osm", "none.json", "--out", out])
+            .output()
+            .unwrap();
+        refuses(&run, told);
+    }
+}
+
+/// Fails where a file that was there is lost without `--force`, is not replaced with it, or one of two files is written
+/// though the other cannot be.
+#[test]
+fn files_that_are_there_are_kept() {
+    let folder = folder("kept");
+    let [out, report, map] =
+        ["out.toml", "report.json", "out.geojson"].map(|name| folder.join(name));
+    let [csv, railml] = [
+        ("csv", "line.csv", ALIGNMENT),
+        ("railml", "line.railml", RAILML),
+    ];
+    let text = |path: &Path| fs::read_to_string(path).unwrap();
+    let refused = |run: &Output, path: &Path| {
+        refuses(run, &format!("{} is there already", path.display()));
+        says(run, "--force");
+        assert_eq!(text(path), "mine");
+    };
+
+    fs::write(&out, "mine").unwrap();
+    for (format, file, content) in [csv, railml] {
+        refused(&import(&folder, format, file, content, &[]), &out);
+    }
+    fs::write(&report, "mine").unwrap();
+    fs::remove_file(&out).unwrap();
+    let option = ["--report", &report.display().to_string()].map(str::to_owned);
+    let import_both = |more: &[&str]| {
+        let more: Vec<&str> = option
+            .iter()
+            .map(String::as_str)
+            .chain(more.iter().copied())
+            .collect();
+        import(&folder, railml.0, railml.1, railml.2, &more)
+    };
+    refused(&import_both(&[]), &report);
+    assert!(!out.exists());
+    succeeds(&import_both(&["--force"]));
+    assert!(text(&report).contains("counts") && text(&out).contains("datum"));
+
+    let export = |more: &[&str]| {
+        let [tunnel, map] = [&out, &map].map(|path| path.display().to_string());
+        let args = ["export", "geojson", &tunnel, "--out", &map];
+        program(args.iter().chain(more)).output().unwrap()
+    };
+    fs::write(&map, "mine").unwrap();
+    refused(&export(&[]), &map);
+    succeeds(&export(&["--force"]));
+    assert!(text(&map).contains("FeatureCollection"));
+    // One name for two files, and a folder.
+    let same = ["--report", &out.display().to_string(), "--force"].map(str::to_owned);
+    let same: Vec<&str> = same.iter().map(String::as_str).collect();
+    refuses(
+        &import(&folder, railml.0, railml.1, railml.2, &same),
+        "give them two names",
+    );
+    fs::remove_file(&out).unwrap();
+    fs::create_dir(&out).unwrap();
+    refuses(
+        &import(&folder, csv.0, csv.1, csv.2, &["--force"]),
+        "is a folder",
+    );
 }

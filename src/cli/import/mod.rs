@@ -5,7 +5,8 @@ mod told;
 use super::check::read_as;
 use super::fault::Failure;
 use super::map::{read_map, read_osm, read_railml_map, refused};
-use super::{print, write_whole};
+use super::print;
+use super::result_file::{refuse_taken, write_whole};
 use crate::settings::ReadLimit;
 use crate::track::geodesy::Geodetic;
 use crate::track::import::railml::RailMlOptions;
@@ -105,6 +106,25 @@ struct Written {
     /// Write all that was left out, and how near each track is to the map, as JSON
     #[arg(long, value_name = "FILE")]
     report: Option<PathBuf>,
+    /// Write over files that are there
+    #[arg(long)]
+    force: bool,
+}
+
+impl Written {
+    /// Refuses names that cannot be written to, before anything is read.
+    fn refuse_unusable(&self) -> Result<(), Failure> {
+        refuse_ending(&self.out)?;
+        refuse_taken(&self.out, "--out", self.force)?;
+        match &self.report {
+            Some(report) if *report == self.out => Err(Failure::input(
+                format!("{} is named by --out and by --report", self.out.display()),
+                "give them two names",
+            )),
+            Some(report) => refuse_taken(report, "--report", self.force),
+            None => Ok(()),
+        }
+    }
 }
 
 #[derive(clap::Args)]
@@ -115,6 +135,9 @@ struct CsvArgs {
     /// Tunnel file to be written
     #[arg(long, value_name = "TUNNEL")]
     out: PathBuf,
+    /// Write over a file that is there
+    #[arg(long)]
+    force: bool,
     /// Table of lamps
     #[arg(long, value_name = "LAMPS")]
     lamps: Option<PathBuf>,
@@ -131,6 +154,7 @@ struct CsvArgs {
 
 fn csv(args: &CsvArgs) -> Result<(), Failure> {
     refuse_ending(&args.out)?;
+    refuse_taken(&args.out, "--out", args.force)?;
     let alignment = read_as(&args.file, ReadLimit::CSV)?;
     let lamps = args
         .lamps
@@ -212,6 +236,7 @@ struct RailmlArgs {
 }
 
 fn railml(args: &RailmlArgs) -> Result<(), Failure> {
+    args.written.refuse_unusable()?;
     let text = read_map(&args.file)?;
     let map = read_railml_map(&args.file, &text, &RailMlOptions { crs: args.crs })?;
     let options = LayingOptions {
@@ -231,6 +256,7 @@ pub(super) fn import(args: &ImportArgs) -> Result<(), Failure> {
 }
 
 fn osm(args: &OsmArgs) -> Result<(), Failure> {
+    args.written.refuse_unusable()?;
     let text = read_map(&args.file)?;
     let around = args.around.zip(args.radius_m);
     let around = around.map(|(place, radius_m)| AroundPlace { place, radius_m });
@@ -252,7 +278,6 @@ fn lay(
     to: &Written,
     source: &[&str],
 ) -> Result<(), Failure> {
-    refuse_ending(&to.out)?;
     let laid = map.lay(options).map_err(|error| {
         Failure::input(
             format!("{} cannot be laid: {error}", path.display()),
