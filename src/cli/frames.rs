@@ -1,9 +1,10 @@
 //! `metrotwin frames`: images with labels, as a data set, from any scenario.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, RUN_BAR, STOP, prepare, seed, stop_on_signals};
+use super::folder::{self, prepare};
+use super::print;
+use super::running::{ProgressBar, RUN_BAR, STOP, seed, stop_on_signals};
 use super::scenario_fault::load_scenario;
-use super::{print, running};
 use crate::record::dataset::{DataSet, FolderError, FramePlan, LabelKinds, Provenance};
 use crate::scenario::sampling::Inputs;
 use crate::scenario::{Override, Scenario};
@@ -168,7 +169,7 @@ fn unusable(out: &Path, error: &FolderError) -> Failure {
              that it lists are then removed, and nothing else"
         }
         FolderError::Taken(_) => "choose another folder with --out, or move that file away",
-        FolderError::Io(error) => return running::unusable(out, error),
+        FolderError::Io(error) => return folder::unusable(out, error),
     };
     Failure::input(format!("cannot use {}: {error}", out.display()), remedy)
 }

@@ -21,6 +21,7 @@ mod excerpt;
 mod export;
 mod fault;
 mod file_kind;
+mod folder;
 mod import;
 mod locate;
 mod map;

@@ -1,6 +1,7 @@
 //! Files that a command writes under the name that its user gives.
 
 use super::fault::Failure;
+use crate::files;
 use std::fs;
 use std::path::Path;
 
@@ -22,19 +23,9 @@ pub(super) fn refuse_taken(path: &Path, option: &str, force: bool) -> Result<(),
 
 /// Writes a file: whole or not at all.
 pub(super) fn write_whole(path: &Path, text: &str) -> Result<(), Failure> {
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
-    let write = || {
-        if let Some(folder) = folder {
-            fs::create_dir_all(folder)?;
-        }
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let part = path.with_file_name(format!(".{name}.part"));
-        fs::write(&part, text)?;
-        fs::rename(part, path)
-    };
-    write().map_err(|error: std::io::Error| {
+    let folder = path.parent().map_or(Ok(()), fs::create_dir_all);
+    let written = folder.and_then(|()| files::write_whole(path, text.as_bytes()));
+    written.map_err(|error| {
         let what = format!("cannot write {}", path.display());
         Failure::run(anyhow::Error::new(error).context(what))
     })

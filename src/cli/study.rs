@@ -1,7 +1,8 @@
 //! `metrotwin study`: many runs, and what they come to.
 
 use super::fault::Failure;
-use super::running::{ProgressBar, STOP, prepare, stop_on_signals};
+use super::folder::prepare;
+use super::running::{ProgressBar, STOP, stop_on_signals};
 use super::scenario_fault::load_template;
 use super::{print, signals};
 use crate::record::parquet::Kind;

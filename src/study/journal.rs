@@ -5,7 +5,7 @@ use super::{
     MANIFEST, Manifest, REPORT, Result, Row, Status, StudyError, announce, not_read, not_written,
     table::TABLE,
 };
-use crate::record::open_in_place;
+use crate::files::open_in_place;
 use crate::settings::open_regular;
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};

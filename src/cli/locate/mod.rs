@@ -6,9 +6,11 @@ mod speed_of_fixes;
 
 use super::check::read_as;
 use super::fault::Failure;
+use super::folder::{prepare, unusable};
 use super::map::read_network;
 use super::print;
 use crate::bus::SimTime;
+use crate::files::Listing;
 use crate::settings::ReadLimit;
 use crate::stack::occupancy::{Occupancy, OccupancySettings};
 use crate::track::import::Crs;
@@ -22,6 +24,9 @@ use std::time::Instant;
 /// Fixes that are all farther from the network are of somewhere else.
 const FAR_M: f64 = 5000.0;
 
+/// Whose files are listed.
+const COMMAND: &str = "metrotwin locate";
+
 const AFTER: &str = "\
 NETWORK is a tunnel file with a [datum], GeoJSON of track elements (LineString with `id`) and relations
 (netelementA, netelementB, positionOnA, positionOnB, navigability), OpenStreetMap (raw JSON with its nodes, or XML), or
@@ -31,7 +36,8 @@ sigma_north_m, sigma_east_m, covariance_m2, position_type, solution_status. With
 of solution. SPEEDS has timestamp and speed_mps, forwards positive. Without it, speed comes from the fixes.
 
 Written to DIR: tracks.csv (a row a fix: most probable element, its probability, place, way), tracks.geojson (the
-same for a map), summary.json.
+same for a map), summary.json, and files.txt, the list of these files. The next run into the folder replaces them; files
+that the list does not name are never removed or written over.
 
 Examples:
   metrotwin locate --network network.geojson --gnss run.csv --out out/run
@@ -73,6 +79,10 @@ pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
             speed_of_fixes::speeds(&recorded.fixes)
         }
     };
+    prepare(&args.out)?;
+    // Open until the end: no other command writes into the folder meanwhile.
+    let names = output::FILES.map(str::to_owned).to_vec();
+    let listing = Listing::claim(&args.out, COMMAND, names).map_err(|e| unusable(&args.out, &e))?;
     let located = run(&network, settings, &recorded, &speeds);
     let report = Report {
         network: &network,
@@ -81,7 +91,8 @@ pub(super) fn locate(args: &LocateArgs) -> Result<(), Failure> {
         located: &located,
         speeds_in_time: args.speed.as_ref().map(|_| in_time(&speeds, &recorded)),
     };
-    report.write(&args.out).map_err(Failure::run)?;
+    let written = report.write(&args.out).and_then(|()| listing.close());
+    written.map_err(|e| Failure::run(anyhow::Error::new(e).context("cannot write the results")))?;
     print(&report.text(&args.out))
 }
 

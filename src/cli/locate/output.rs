@@ -1,6 +1,7 @@
 //! What `metrotwin locate` writes.
 
 use super::recorded::{RecordedFix, RecordedFixes};
+use crate::files::write_whole;
 use crate::stack::occupancy::Decision;
 use crate::track::Direction;
 use crate::track::geodesy::Datum;
@@ -8,6 +9,9 @@ use crate::track::plan::PlanNetwork;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
+
+/// Names of the files.
+pub const FILES: [&str; 3] = ["tracks.csv", "tracks.geojson", "summary.json"];
 
 /// A decision with this probability or more is fairly confident.
 const FAIRLY: f64 = 0.9;
@@ -43,17 +47,10 @@ struct Visit<'a> {
 impl Report<'_> {
     /// Writes all files; each is whole or not there.
     pub fn write(&self, folder: &Path) -> std::io::Result<()> {
-        std::fs::create_dir_all(folder)?;
         let summary = serde_json::to_string_pretty(&self.summary())?;
         let map = serde_json::to_string(&self.geojson())?;
-        for (name, text) in [
-            ("tracks.csv", self.table()),
-            ("tracks.geojson", map),
-            ("summary.json", summary),
-        ] {
-            let part = folder.join(format!(".{name}.part"));
-            std::fs::write(&part, text)?;
-            std::fs::rename(part, folder.join(name))?;
+        for (name, text) in FILES.into_iter().zip([self.table(), map, summary]) {
+            write_whole(&folder.join(name), text.as_bytes())?;
         }
         Ok(())
     }
