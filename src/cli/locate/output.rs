@@ -33,6 +33,8 @@ pub struct Report<'a> {
     pub located: &'a [Located],
     /// Of the measured speeds those of the time of the fixes; none where none were measured.
     pub speeds_in_time: Option<usize>,
+    /// Tables in which numbers have a decimal comma.
+    pub decimal_commas: Vec<&'a Path>,
 }
 
 /// A stretch of time over which one element is the most probable.
@@ -186,6 +188,12 @@ impl Report<'_> {
         let recorded = self.recorded;
         let [_, _, _, nowhere] = self.counts();
         let mut notes = Vec::new();
+        for path in &self.decimal_commas {
+            notes.push(format!(
+                "commas in the numbers of {} were taken for decimal commas, as other signs stand between its headers",
+                path.display()
+            ));
+        }
         if recorded.out_of_order > 0 {
             notes.push(format!(
                 "{} rows of the fixes are not newer than the row before, and were left out: sort the table by time, and \

@@ -42,6 +42,8 @@ pub use map::{
     MapStep, MapSwitch, PlanCheck,
 };
 pub use osm::{AroundPlace, OsmError, OsmImport};
+#[cfg(feature = "cli")]
+pub(crate) use table::{Sheet, SheetColumn, SheetRow};
 pub use table::{SheetError, TableFault, TableImport, TableOptions};
 
 /// The number in a key of a file such as `switches[3].name`, if it is one of that table.

@@ -80,6 +80,34 @@ fn a_train_is_located_in_the_depot() {
     );
 }
 
+/// Fails where a table with decimal commas is located otherwise than the same with points, or it is not said.
+#[test]
+fn a_table_with_decimal_commas_is_taken() {
+    let out = folder("decimal_commas");
+    let points = fixes(&[("lead", 500.0, 600.0)]);
+    let commas = points.replace(',', ";").replace('.', ",");
+    let located = [("points", points), ("commas", commas)].map(|(name, table)| {
+        let gnss = out.join(name).with_extension("csv");
+        fs::write(&gnss, table).unwrap();
+        let [gnss, results] = [gnss, out.join(name)].map(|path| path.display().to_string());
+        let args = [
+            "locate",
+            "--network",
+            "tunnels/terminus.toml",
+            "--gnss",
+            &gnss,
+            "--out",
+            &results,
+        ];
+        let run = program(args).output().unwrap();
+        succeeds(&run);
+        let is_said = printed(&run).contains("commas.csv were taken for decimal commas");
+        assert_eq!(is_said, name == "commas", "{}", printed(&run));
+        fs::read_to_string(format!("{results}/tracks.csv")).unwrap()
+    });
+    assert_eq!(located[0], located[1]);
+}
+
 /// Fails where a file of the results is not listed, a file of others is written over, or results cannot be written
 /// again.
 #[test]

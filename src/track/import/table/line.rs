@@ -22,8 +22,8 @@ pub(super) struct TableLine {
 }
 
 impl TableLine {
-    pub fn of(sheet: &Sheet) -> Result<Self, SheetError> {
-        let rows: Vec<SheetRow<'_>> = sheet.rows().collect();
+    pub fn of(sheet: &Sheet<'_>) -> Result<Self, SheetError> {
+        let rows: Vec<SheetRow<'_>> = sheet.rows().collect::<Result<_, _>>()?;
         let Some((first, last)) = rows.first().zip(rows.last()) else {
             let what = "there is no row under the headers".to_owned();
             return Err(SheetError::NotATable { line: 1, what });
@@ -107,10 +107,11 @@ impl TableLine {
 
     pub fn lamps(
         &self,
-        sheet: &Sheet,
+        sheet: &Sheet<'_>,
         line_number: u8,
     ) -> Result<Vec<(usize, LampEntry)>, SheetError> {
         let lamps = sheet.rows().map(|row| {
+            let row = row?;
             let stated_m = row.needed("chainage_m")?;
             let chainage_m = rounded(stated_m - self.begin_m, 6);
             if !(0.0..=self.length_m).contains(&chainage_m) {
@@ -177,7 +178,7 @@ fn grade(row: &SheetRow<'_>, from_m: f64) -> Result<Option<GradeEntry>, SheetErr
     }))
 }
 
-fn shape(row: &SheetRow<'_>, sheet: &Sheet) -> Result<PlanShape, SheetError> {
+fn shape(row: &SheetRow<'_>, sheet: &Sheet<'_>) -> Result<PlanShape, SheetError> {
     let radius_m = row.number("radius_m")?.unwrap_or(0.0);
     let is_straight = radius_m.abs() < f64::MIN_POSITIVE || radius_m.is_infinite();
     let word = row.text("element").map(str::to_lowercase);
