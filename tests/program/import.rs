@@ -173,12 +173,27 @@ fn tables_are_a_tunnel() {
     ];
     let run = import(&folder, "csv", "line.csv", ALIGNMENT, &more);
     succeeds(&run);
-    says(&run, "700.000 m, 5 elements, 2 grades, 2 lamps");
+    says(
+        &run,
+        "700.000 m, 5 elements, 2 grades, 2 lamps; in a tunnel",
+    );
     let said = checked(&folder);
     assert!(
         said.contains("km 12.000") && said.contains("tightest radius 500 m"),
         "{said}"
     );
+    let run = import(
+        &folder,
+        "csv",
+        "line.csv",
+        ALIGNMENT,
+        &["--open", "--force"],
+    );
+    succeeds(&run);
+    says(&run, "0 lamps; in the open");
+    let written = fs::read_to_string(folder.join("out.toml")).unwrap();
+    assert!(written.contains("\"open\""), "{written}");
+    checked(&folder);
 }
 
 #[test]

@@ -50,14 +50,15 @@ turn               left or right, looking up the line; without this column a neg
 element            straight, arc or clothoid; without this column what has a radius is an arc. A clothoid runs from the
                    curvature before to that after it
 length_m           of the element; needed in the last row, if that is not the end of the line
-cant_mm            of an arc
-grade_permille     from here on, rising positive; empty: as before
+cant_mm            of an arc; or cant_m, in metres
+grade_permille     from here on, rising positive; empty: as before; or grade_percent, or grade_ratio (1:40, or -1:40 where
+                   the line falls)
 vertical_radius_m  of the curve that leads into the grade; default 3000
 
 Columns may stand in any order, with `,`, `;` or tabs between them; with `;` or tabs numbers may have a decimal comma.
 A table of lamps has the columns chainage_m, number (or uid, as 1-023), and, if there are any, lateral_m (left of the
-track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel; sections, balises, stations and so
-on are added to the written file by hand.
+track positive), height_m, aim_yaw_deg, power_w. The line lies in a circular tunnel, or with --open all of it in the open;
+other sections, balises, stations and so on are added to the written file by hand.
 
 Examples:
   metrotwin import csv alignment.csv --out out/line.toml
@@ -150,6 +151,9 @@ struct CsvArgs {
     /// Its direction there, degrees from east towards north
     #[arg(long, value_name = "H", default_value_t = 0.0, value_parser = heading, allow_hyphen_values = true)]
     heading_deg: f64,
+    /// The line lies in the open, not in a tunnel
+    #[arg(long)]
+    open: bool,
 }
 
 fn csv(args: &CsvArgs) -> Result<(), Failure> {
@@ -166,6 +170,7 @@ fn csv(args: &CsvArgs) -> Result<(), Failure> {
         line_number: args.line_number,
         datum: args.datum,
         heading_deg: args.heading_deg,
+        is_open: args.open,
     };
     let import = TableImport::read(&alignment, lamps.as_deref(), &options).map_err(|fault| {
         let path = match &args.lamps {
@@ -189,12 +194,16 @@ fn csv(args: &CsvArgs) -> Result<(), Failure> {
         eprintln!("left out: column `{header}`: it means nothing here");
     }
     print(&format!(
-        "{}: {:.3} m, {} elements, {} grades, {} lamps",
+        "{}: {:.3} m, {} elements, {} grades, {} lamps; {}",
         args.out.display(),
         import.length_m,
         import.file.plan.len(),
         import.file.grades.len(),
-        import.file.lamp.len()
+        import.file.lamp.len(),
+        match args.open {
+            true => "in the open",
+            false => "in a tunnel (--open: in the open)",
+        }
     ))
 }
 

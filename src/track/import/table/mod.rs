@@ -13,19 +13,24 @@ pub use sheet::SheetError;
 pub(crate) use sheet::{Sheet, SheetColumn, SheetRow};
 
 use crate::track::check::check;
-use crate::track::file::{DatumEntry, Increment, StartEntry, StatedChainageEntry, TunnelFile};
+use crate::track::file::{
+    DatumEntry, Increment, SectionEntry, SectionShape, StartEntry, StatedChainageEntry, TunnelFile,
+};
 use crate::track::geodesy::Geodetic;
 use line::{SAME_M, TableLine};
 
 /// Columns of the table of the alignment.
-const ALIGNMENT: [SheetColumn; 8] = [
+const ALIGNMENT: [SheetColumn; 11] = [
     SheetColumn::needed("chainage_m", &["chainage", "station", "station_m"]),
     SheetColumn::needed("radius_m", &["radius", "r"]),
     SheetColumn::optional("turn", &["hand", "direction"]),
     SheetColumn::optional("element", &["type", "kind"]),
     SheetColumn::optional("length_m", &["length", "l"]),
     SheetColumn::optional("cant_mm", &["cant"]),
+    SheetColumn::optional("cant_m", &[]),
     SheetColumn::optional("grade_permille", &["grade", "gradient_permille"]),
+    SheetColumn::optional("grade_percent", &["gradient_percent"]),
+    SheetColumn::optional("grade_ratio", &["gradient_ratio"]),
     SheetColumn::optional("vertical_radius_m", &["vertical_radius"]),
 ];
 
@@ -50,6 +55,8 @@ pub struct TableOptions {
     pub datum: Option<Geodetic>,
     /// Its direction there, degrees from east towards north.
     pub heading_deg: f64,
+    /// It lies in the open, not in a circular tunnel.
+    pub is_open: bool,
 }
 
 /// A line of tables.
@@ -99,6 +106,13 @@ impl TableImport {
                 increment: Increment::Increasing,
                 equations: Vec::new(),
             });
+        }
+        if options.is_open {
+            file.sections = vec![SectionEntry {
+                from_m: 0.0,
+                to_m: None,
+                shape: SectionShape::Open { width_m: None },
+            }];
         }
         file.plan = line.plan.iter().map(|(_, entry)| entry.clone()).collect();
         file.grades = line.grades.iter().map(|(_, entry)| entry.clone()).collect();
