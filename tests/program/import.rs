@@ -92,6 +92,11 @@ fn a_map_of_openstreetmap_is_a_tunnel() {
     );
     succeeds(&run);
     says(&run, "4 tracks, 1.200 km, 2 switches, 0 crossings");
+    says(&run, "in tunnel: 0.000 km of the tracks, 0 of the switches");
+    says(
+        &run,
+        "latitude 48.20000 to 48.20004, longitude 15.60000 to 15.61076 degrees",
+    );
     let said = checked(&folder);
     assert!(said.contains("to the left, 40 km/h"), "{said}");
     let text = fs::read_to_string(folder.join("out.toml")).unwrap();
@@ -155,6 +160,37 @@ fn a_map_of_openstreetmap_is_a_tunnel() {
     );
     succeeds(&run);
     says(&run, "1 tracks, 0.140 km, 0 switches");
+}
+
+/// Fails where what the map has in tunnels is counted as in the open, or the other way round.
+#[test]
+fn what_lies_in_tunnels_is_counted() {
+    let folder = folder("imported_tunnels");
+    let report = folder.join("report.json").display().to_string();
+    // Both legs at the first switch begin in the open; the line before it is cut off and in a tunnel.
+    let first: Vec<String> = (0..=10).map(|k| k.to_string()).collect();
+    let nodes = format!("\"nodes\":[{},", first.join(","));
+    let cut = format!(
+        "\"nodes\":[{}],\"tags\":{{\"railway\":\"rail\",\"tunnel\":\"yes\"}}}},\
+         {{\"type\":\"way\",\"id\":3,\"nodes\":[10,",
+        first.join(",")
+    );
+    let map = siding();
+    assert!(map.contains(&nodes));
+    let run = import(
+        &folder,
+        "osm",
+        "map.json",
+        &map.replacen(&nodes, &cut, 1),
+        &["--report", &report],
+    );
+    succeeds(&run);
+    says(&run, "1.200 km, 2 switches");
+    says(&run, "in tunnel: 0.200 km of the tracks, 1 of the switches");
+    let report: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(report).unwrap()).unwrap();
+    assert_eq!(report["in_tunnel"]["switches"], 1);
+    checked(&folder);
 }
 
 #[test]

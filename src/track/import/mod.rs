@@ -36,7 +36,7 @@ mod table;
 
 pub use crs::{Crs, UnknownCrs};
 pub use junction::JunctionKind;
-pub use laying::{LaidMap, LaidTrack, LayingError, LayingOptions};
+pub use laying::{InTunnel, LaidMap, LaidTrack, LayingError, LayingOptions};
 pub use map::{
     AlongElement, ImportCount, ImportReport, ImportedMap, LeftOut, MapBalise, MapSignal, MapSpeed,
     MapStep, MapSwitch, PlanCheck,
