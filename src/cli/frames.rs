@@ -91,9 +91,7 @@ pub(super) fn frames(args: &FramesArgs) -> Result<(), Failure> {
     let overrides = args.overrides.iter();
     let provenance = Provenance {
         inputs: Some(Inputs::of_scenario(&args.scenario, &scenario.file).map_err(Failure::run)?),
-        overrides: overrides
-            .map(|o| format!("{}={}", o.key, o.value))
-            .collect(),
+        overrides: overrides.map(Override::assignment).collect(),
     };
     let progress = ProgressBar::new(RUN_BAR);
     let to_s = plan.to_s.min(scenario.file.duration_s);

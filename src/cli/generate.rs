@@ -55,7 +55,7 @@ const INPUTS: &str = "inputs";
 const INDEX: &str = "index.csv";
 
 pub(super) fn generate(args: &GenerateArgs) -> Result<(), Failure> {
-    let template = load_template(&args.scenario)?.with(args.seed, Some(args.number));
+    let template = load_template(&args.scenario, &[])?.with(args.seed, Some(args.number));
     let samples = (0..u64::from(args.number)).map(|k| template.sample(k));
     let samples = samples.collect::<Result<Vec<_>, _>>();
     let samples =

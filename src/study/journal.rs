@@ -189,6 +189,7 @@ mod tests {
             program: String::new(),
             study: "study.toml".into(),
             inputs: BTreeMap::new(),
+            set: Vec::new(),
             runs: 4,
             renderer: Backend {
                 backend: String::new(),
