@@ -7,16 +7,14 @@ use super::draft::{CutEnd, Draft, DraftPlan, DraftTrack, ElementShape};
 use super::line::{Line, straight};
 use super::place::KnownPlace;
 use super::report::Fates;
-use super::stated::SAME_M;
+use super::stated::{SAME_M, SAME_POINT_M};
 use super::swapped::refuse_swapped;
 use super::through::ThroughPlaces;
-use crate::track::geodesy::{Datum, Geodetic};
+use crate::track::geodesy::Datum;
 use crate::track::import::{MapStep, PlanCheck};
-use nalgebra::{Point2, Vector2};
+use nalgebra::Vector2;
 use std::f64::consts::PI;
 
-/// Coordinates of one place may be so far apart, metres.
-pub(super) const SAME_POINT_M: f64 = 0.5;
 /// Turns of headings that are no reading error, radians, all together.
 const LEAST_TURN: f64 = 0.02;
 
@@ -48,16 +46,6 @@ pub(super) fn draw(draft: &Draft<'_>, fates: &mut Fates) -> Result<DraftPlan, Ra
     })
 }
 
-pub(super) fn world(datum: &Datum, place: &Geodetic) -> Point2<f64> {
-    datum.world(place).xy()
-}
-
-/// Steps of curvature, none where none are stated.
-pub(super) fn stated<'t>(track: &'t DraftTrack<'_>) -> Option<&'t [MapStep]> {
-    let steps = track.along.curvatures_per_m.as_slice();
-    (!steps.is_empty()).then_some(steps)
-}
-
 /// Multiplied by 1 or -1, as positive curvature turns to the left or to the right.
 fn turned_by(turn: f64, steps: &[MapStep]) -> Vec<MapStep> {
     let turned = steps.iter().map(|step| MapStep {
@@ -73,7 +61,7 @@ fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSp
     let own = |(source, track): (usize, &DraftTrack<'_>)| -> Vec<TrackSpot> {
         let spot = |known: &KnownPlace<'_>| TrackSpot {
             at_m: known.at_m,
-            place: world(datum, &known.place),
+            place: known.in_plane(datum),
             weight: known.weight,
             source,
         };
@@ -99,7 +87,7 @@ fn spots(draft: &Draft<'_>, datum: &Datum, fates: &mut Fates) -> Vec<Vec<TrackSp
     }
     for ((spots, track), own) in all.iter_mut().zip(&draft.tracks).zip(&own) {
         spots.sort_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.source.cmp(&b.source)));
-        let course = stated(track).map(|steps| TrackCourse::new(0.0, steps));
+        let course = track.curvatures().map(|steps| TrackCourse::new(0.0, steps));
         let chord_m =
             |[a, b]: [&TrackSpot; 2]| course.as_ref().map(|c| c.chord([a.at_m, b.at_m]).norm());
         let chosen = agreeing(spots, |pair| agree(pair, chord_m(pair)));
@@ -135,7 +123,7 @@ fn not_drawn(track: &DraftTrack<'_>, datum: &Datum) -> RailMlError {
         (Some(a), Some(b)) if b.at_m - a.at_m > SAME_M => b.item.fault(format!(
             "its coordinates are {:.1} m from those of {} (line {}), and the track between them is stated to be {:.1} m long: \
              correct the coordinates, or the stated length (`pos` in railML 2, `length` in railML 3)",
-            (world(datum, &b.place) - world(datum, &a.place)).norm(),
+            (b.in_plane(datum) - a.in_plane(datum)).norm(),
             a.what,
             a.item.line(),
             b.at_m - a.at_m
@@ -150,7 +138,7 @@ fn not_drawn(track: &DraftTrack<'_>, datum: &Datum) -> RailMlError {
 fn turn(draft: &Draft<'_>, spots: &[Vec<TrackSpot>]) -> Option<f64> {
     let uneven = |turn: f64| -> f64 {
         let of_tracks = draft.tracks.iter().zip(spots).map(|(track, spots)| {
-            let steps = stated(track).unwrap_or_default();
+            let steps = track.curvatures().unwrap_or_default();
             let turns = TrackCourse::new(0.0, &turned_by(turn, steps)).turns(spots);
             turns
                 .windows(2)
@@ -252,7 +240,7 @@ impl DrawnTracks<'_, '_> {
                 });
             }
         }
-        let line = match (self.turn, stated(track)) {
+        let line = match (self.turn, track.curvatures()) {
             (Some(turn), Some(steps)) => {
                 let steps = turned_by(turn, steps);
                 ThroughPlaces::new(&steps, &spots, &headings).map(Line::Curved)
@@ -289,7 +277,7 @@ impl DrawnTracks<'_, '_> {
             for (known, line) in track.beside.iter().zip(line.iter().cycle()) {
                 let heading = line.heading(known.at_m);
                 let forward = Vector2::new(heading.cos(), heading.sin());
-                let to = world(datum, &known.place) - line.at(known.at_m);
+                let to = known.in_plane(datum) - line.at(known.at_m);
                 fates.take(known.item);
                 let check = PlanCheck {
                     line: known.item.line(),

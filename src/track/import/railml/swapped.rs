@@ -10,7 +10,7 @@ use super::agreement::{TrackSpot, agree};
 use super::course::TrackCourse;
 use super::draft::DraftTrack;
 use super::place::KnownPlace;
-use super::plan::{SAME_POINT_M, stated, world};
+use super::stated::SAME_POINT_M;
 use crate::track::geodesy::{Datum, Geodetic};
 
 /// Distances the two ways are told apart by more than this, metres,
@@ -85,7 +85,7 @@ impl BothWays {
     fn pairs<'p, 'a>(&self, track: &'p DraftTrack<'a>) -> Vec<PairLengths<'p, 'a>> {
         let mut places: Vec<&KnownPlace<'a>> = track.places.iter().collect();
         places.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
-        let course = stated(track).map(|steps| TrackCourse::new(0.0, steps));
+        let course = track.curvatures().map(|steps| TrackCourse::new(0.0, steps));
         let of_pair = |pair: &[&'p KnownPlace<'a>]| {
             let [from, to] = *pair else { return None };
             let (swapped_from, swapped_to) = (from.swapped?, to.swapped?);
@@ -94,7 +94,7 @@ impl BothWays {
                 .as_ref()
                 .map(|c| c.chord([from.at_m, to.at_m]).norm());
             let spots = |datum: &Datum, places: [&Geodetic; 2]| {
-                let [a, b] = places.map(|place| world(datum, place));
+                let [a, b] = places.map(|place| datum.world(place).xy());
                 [(from.at_m, a), (to.at_m, b)].map(|(at_m, place)| TrackSpot {
                     at_m,
                     place,
