@@ -545,10 +545,10 @@ fn a_study_may_set_values_for_all_runs() {
     for (more, told) in [
         (
             "--set train.cars=3",
-            "`train.cars` is drawn by the study's variable `cars`",
+            "train.cars: is drawn by the study's variable `cars`",
         ),
         ("--set train={cars=3}", "is drawn by the study's variable"),
-        ("--set seed=3", "`seed` is drawn for each run"),
+        ("--set seed=3", "seed: is drawn for each run"),
         ("--set duration=3", "duration"),
         ("--set duration_s=-3", "duration_s"),
     ] {
